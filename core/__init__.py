@@ -1,0 +1,1 @@
+"""The science: data, replay, effects, diagnosis. Knows nothing of the web."""

@@ -1,0 +1,156 @@
+"""What the experimenter believes, as one frozen description. An effect replaces a part of it; the solver reads nothing else."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from core.errors import SetupError
+from core.frames import Transform
+
+__all__ = ["Box", "Detachment", "Edge", "Inclusion", "Load", "Material", "MaterialLaw", "Sensor", "Setup", "Support", "Tool"]
+
+MaterialLaw = Literal["neo_hooke", "corotational"]
+Edge = Literal["-x", "+x", "-y", "+y"]
+
+
+def _within(key: str, value: float, low: float, high: float, unit: str) -> None:
+    if not (math.isfinite(value) and low <= value <= high):
+        raise SetupError(f"{key} = {value:g} {unit} is outside {low:g} to {high:g} {unit}", key=key, value=value, low=low, high=high)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box:
+    """A block on its base, edge lengths (x, y, z) [m]."""
+
+    size: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        for axis, length in zip("xyz", self.size, strict=True):
+            _within(f"size {axis}", length, 1e-3, 2.0, "m")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inclusion:
+    """A ball of other stiffness: centre in the phantom frame [m], radius [m], stiffness of lump over rest [1]."""
+
+    x: float
+    y: float
+    z: float
+    radius: float
+    stiffness_ratio: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Material:
+    """Young's modulus [Pa], Poisson's ratio [1], the law, and lumps inside."""
+
+    young_modulus: float = 5.0e3
+    poisson_ratio: float = 0.45
+    law: MaterialLaw = "neo_hooke"
+    inclusions: tuple[Inclusion, ...] = ()
+
+    def __post_init__(self) -> None:
+        _within("young_modulus", self.young_modulus, 1.0, 1e9, "Pa")
+        _within("poisson_ratio", self.poisson_ratio, -0.5, 0.4999, "")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Load:
+    """Own weight per volume over Young's modulus, rho g / E [1/m]; zero leaves gravity out."""
+
+    specific_weight_over_stiffness: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Detachment:
+    """A strip of the base along one edge that is not held, `extent` inwards from it [m]."""
+
+    edge: Edge
+    extent: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Support:
+    """How the base is held: fixed (friction None) or sliding as a whole with Coulomb friction; strips may be detached."""
+
+    friction_coefficient: float | None = None
+    detached: tuple[Detachment, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tool:
+    """A rigid sphere: radius [m]; its true centre is the stated one plus `offset` (phantom frame) [m]."""
+
+    radius: float
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _within("tool radius", self.radius, 1e-4, 0.2, "m")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensor:
+    """The depth camera.
+
+    Attributes:
+        depth_sigma: the maker's stated accuracy [m].
+        time_offset: cloud stamp minus robot stamp of the same instant [s].
+        camera_shift: where the camera registration is off: true phantom_from_camera = camera_shift @ stated one.
+    """
+
+    depth_sigma: float = 0.002
+    time_offset: float = 0.0
+    camera_shift: Transform = field(default_factory=Transform)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """One experiment as believed: geometry, material, load, support, tool, sensor and registrations.
+
+    Attributes:
+        mass: of the phantom [kg].
+        phantom_from_robot, phantom_from_camera: the stated registrations.
+    """
+
+    geometry: Box
+    tool: Tool
+    material: Material = field(default_factory=Material)
+    load: Load = field(default_factory=Load)
+    support: Support = field(default_factory=Support)
+    sensor: Sensor = field(default_factory=Sensor)
+    mass: float = 0.1
+    phantom_from_robot: Transform = field(default_factory=Transform)
+    phantom_from_camera: Transform = field(default_factory=Transform)
+
+    @property
+    def phantom_from_camera_true(self) -> Transform:
+        """The camera registration including the sensor's believed shift."""
+        return self.sensor.camera_shift @ self.phantom_from_camera
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON, SI units."""
+        return {
+            "geometry": {"size": list(self.geometry.size)},
+            "material": {
+                "law": self.material.law,
+                "young_modulus": self.material.young_modulus,
+                "poisson_ratio": self.material.poisson_ratio,
+                "inclusions": [vars(lump) for lump in self.material.inclusions],
+            },
+            "load": {"specific_weight_over_stiffness": self.load.specific_weight_over_stiffness},
+            "support": {
+                "friction_coefficient": self.support.friction_coefficient,
+                "detached": [vars(strip) for strip in self.support.detached],
+            },
+            "tool": {"radius": self.tool.radius, "offset": list(self.tool.offset)},
+            "sensor": {
+                "depth_sigma": self.sensor.depth_sigma,
+                "time_offset": self.sensor.time_offset,
+                "camera_shift": self.sensor.camera_shift.matrix.tolist(),
+            },
+            "mass": self.mass,
+            "phantom_from_robot": self.phantom_from_robot.matrix.tolist(),
+            "phantom_from_camera": self.phantom_from_camera.matrix.tolist(),
+        }
