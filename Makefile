@@ -1,0 +1,64 @@
+# make demo    set everything up, make a phantom with a hidden fault, find it, open the page   (ARGS="--no-serve" ends after the table)
+# make test    set everything up, run the tests (fast ones and the browser's; the slow ones: make test ARGS="-m slow")
+# make bench   speed and accuracy of the engine                    make check   lint, format, types
+# make clean   remove .venv and all caches                         PYTHON=...   another Python 3.11
+
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV := .venv
+PIP := $(VENV)/bin/python -m pip
+ARGS ?=
+
+# Palpate spreads work over processes; threads inside them would fight for the same cores.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+export MKL_NUM_THREADS ?= 1
+export NUMBA_NUM_THREADS ?= 1
+
+.PHONY: demo test bench check clean install develop
+.DELETE_ON_ERROR:
+
+demo: install
+	$(VENV)/bin/palpate demo $(ARGS)
+
+test: develop
+	$(VENV)/bin/python -m pytest -m "not slow" -n 2 --dist loadfile $(ARGS)
+
+bench: install
+	$(VENV)/bin/python -m benchmarks $(ARGS)
+
+check: develop
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/mypy
+
+clean:
+	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find app core tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+
+install: $(VENV)/.system-demo $(VENV)/.installed
+develop: $(VENV)/.system-test $(VENV)/.developed
+
+# Each step leaves its stamp only when it succeeded, so that a second call is instant and a failed one is repeated.
+$(VENV)/.created:
+	@test -n "$(PYTHON)" || { echo "Python 3.11 was not found: install it, or say where it is with make PYTHON=/path/to/python3.11"; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+		|| { echo "$(PYTHON) is older than Python 3.11: say where 3.11 is with make PYTHON=/path/to/python3.11"; exit 1; }
+	@$(PYTHON) -m venv $(VENV) || { echo "No virtual environment could be made: on Debian and Ubuntu, apt-get install python3.11-venv"; exit 1; }
+	@touch $@
+
+$(VENV)/.system-%: .ci/system | $(VENV)/.created
+	@.ci/system $*
+	@touch $@
+
+# torch first and alone: the exact pin lets pip take a CPU build where there is one; a looser one fetches gigabytes of CUDA.
+$(VENV)/.torch: constraints.txt | $(VENV)/.created
+	$(PIP) install --quiet "$$(grep '^torch==' constraints.txt)" -c constraints.txt
+	@touch $@
+
+$(VENV)/.installed: pyproject.toml constraints.txt $(VENV)/.torch
+	$(PIP) install --quiet -e . -c constraints.txt
+	@touch $@
+
+$(VENV)/.developed: pyproject.toml constraints.txt $(VENV)/.installed
+	$(PIP) install --quiet -e ".[test,check]" -c constraints.txt
+	@touch $@
