@@ -1,0 +1,217 @@
+"""Point clouds as PLY: a strict reader, because the usual ones return an empty or shortened cloud where a file is broken.
+
+Binary in either byte order and ascii; x, y, z are float or double among any other vertex properties.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from core.dataset.files import open_inside, problem
+from core.dataset.table import check_coordinates
+from core.errors import DatasetError
+from core.frames import FloatArray
+
+__all__ = ["PlyHeader", "read_cloud", "read_header"]
+
+_LARGEST_HEADER = 2**14
+_TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
+    "short": "i2", "int16": "i2", "ushort": "u2", "uint16": "u2",
+    "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
+    "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
+}  # fmt: skip
+_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": "="}
+_Order = Literal["<", ">", "="]
+
+
+@dataclass(frozen=True)
+class PlyHeader:
+    """Where the points of a PLY file are.
+
+    Attributes:
+        count: number of points.
+        order: byte order of numpy, "=" stands for ascii.
+        fields: (name, type) of each vertex property.
+        start: first byte of the first point.
+    """
+
+    count: int
+    order: _Order
+    fields: tuple[tuple[str, str], ...]
+    start: int
+
+    @property
+    def layout(self) -> np.dtype[Any]:
+        """The packed record of one point."""
+        return np.dtype([(name, self.order + kind) for name, kind in self.fields])
+
+
+@dataclass
+class _Element:
+    name: str
+    count: int
+    fields: list[tuple[str, str]]
+    has_list: bool = False
+
+    @property
+    def record(self) -> int:
+        return sum(int(kind[1]) for _, kind in self.fields)
+
+
+def read_header(root: Path, file: str, within: str = "") -> PlyHeader:
+    """The header of a cloud, checked against the size of the file without reading its points."""
+    with open_inside(root, file, within) as stream:
+        return _header(file, _read(file, stream, _LARGEST_HEADER), os.fstat(stream.fileno()).st_size)
+
+
+def read_cloud(root: Path, file: str, within: str = "") -> FloatArray:
+    """The points (n, 3) [m], n >= 1, camera frame, all finite and within the reach of a bench."""
+    with open_inside(root, file, within) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        header = _header(file, _read(file, stream, _LARGEST_HEADER), size)
+        stream.seek(header.start)
+        length = size - header.start if header.order == "=" else header.count * header.layout.itemsize
+        data = _read(file, stream, length)
+    points = _ascii_points(file, header, data) if header.order == "=" else _binary_points(file, header, data)
+    check_coordinates(file, points, first_row=1)
+    return points
+
+
+def _read(file: str, stream: Any, length: int) -> bytes:
+    try:
+        return bytes(stream.read(length))
+    except OSError as error:
+        raise problem(file, f"cannot be read ({error.strerror}); check the disk and copy the file again") from error
+
+
+def _header(file: str, data: bytes, size: int) -> PlyHeader:
+    text, start = _header_text(file, data)
+    order, elements = _elements(file, text)
+    skipped = 0
+    for index, element in enumerate(elements):
+        if element.name == "vertex":
+            _check_vertex(file, element)
+            header = PlyHeader(element.count, order, tuple(element.fields), start + skipped)
+            _check_size(file, header, size, elements[index + 1 :])
+            return header
+        if element.has_list or (order == "=" and element.count):
+            raise problem(file, f"element {element.name} comes before the points; expected vertex first: write it first")
+        skipped += element.count * element.record
+    raise problem(file, "has no element vertex; expected the points there: export the cloud as a PLY of vertices", key="vertex")
+
+
+def _header_text(file: str, data: bytes) -> tuple[list[str], int]:
+    if not data.startswith((b"ply\n", b"ply\r\n")):
+        found = "is empty" if not data else f"starts with {data[:8]!r}"
+        raise problem(file, f"{found}; expected a PLY file ('ply' in its first line): export the cloud again as PLY", row=1)
+    newline = b"\r\n" if data.startswith(b"ply\r\n") else b"\n"
+    end = data.find(newline + b"end_header" + newline)
+    if end < 0:
+        raise problem(file, "has no end_header line; expected a whole PLY header: the file is cut off or damaged, export it again")
+    try:
+        text = data[:end].decode("ascii")
+    except UnicodeDecodeError:
+        raise problem(file, "has more than plain characters in its header; expected ASCII there: export it again") from None
+    return text.split("\r\n" if newline == b"\r\n" else "\n"), end + len(newline) * 2 + len(b"end_header")
+
+
+def _elements(file: str, lines: list[str]) -> tuple[_Order, list[_Element]]:
+    order: _Order | None = None
+    elements: list[_Element] = []
+    for row, line in enumerate(lines[1:], 2):
+        try:
+            match line.split():
+                case [] | ["comment" | "obj_info", *_]:
+                    pass
+                case ["format", name, "1.0"] if name in _ORDERS and order is None:
+                    order = _ORDERS[name]  # type: ignore[assignment]
+                case ["element", name, count] if re.fullmatch(r"\d{1,18}", count, re.ASCII):
+                    elements.append(_Element(name, int(count), []))
+                case ["property", "list", _, _, _] if elements:
+                    elements[-1].has_list = True
+                case ["property", kind, name] if elements and name not in dict(elements[-1].fields):
+                    elements[-1].fields.append((name, _TYPES[kind]))
+                case _:
+                    raise KeyError(line)
+        except KeyError:
+            text = f"'{line[:60]}' is no line of a PLY 1.0 header, or comes twice; export the cloud again"
+            raise problem(file, text, row=row, value=line[:60]) from None
+    if order is None:
+        raise problem(
+            file, f"has no format line; expected one of {', '.join(_ORDERS)}: export the cloud again", row=2, key="format"
+        )
+    return order, elements
+
+
+def _check_vertex(file: str, element: _Element) -> None:
+    kinds = dict(element.fields)
+    for axis in "xyz":
+        if kinds.get(axis) not in ("f4", "f8"):
+            found = f"has no vertex property {axis}" if axis not in kinds else f"{axis} is an integer"
+            raise problem(file, f"{found}; expected float or double x, y, z in metres: export the cloud again", key=axis)
+    if element.has_list:
+        raise problem(file, "a point has a list property; expected numbers only: export the cloud without it", key="vertex")
+    if element.count == 0:
+        raise problem(file, "is an empty cloud (element vertex 0); expected points: leave this frame out", key="vertex", value=0)
+
+
+def _check_size(file: str, header: PlyHeader, size: int, rest: list[_Element]) -> None:
+    # Two characters are the least that one number and its separator take in ascii.
+    record = 2 * len(header.fields) if header.order == "=" else header.layout.itemsize
+    present = size - header.start + (1 if header.order == "=" else 0)
+    if present < header.count * record:
+        text = (
+            f"the header announces {header.count} points ({header.count * record} bytes) but {max(present, 0)} bytes follow; "
+            "expected all of them: the file is cut off, export or copy it again"
+        )
+        raise problem(file, text, key="vertex", value=header.count)
+    if header.order == "=" or any(element.has_list for element in rest):
+        return
+    expected = header.count * record + sum(element.count * element.record for element in rest)
+    if present != expected:
+        text = f"{expected} bytes announced in the header, {present} found after it; expected the same: export or copy it again"
+        raise problem(file, text, key="vertex", value=header.count)
+
+
+def _binary_points(file: str, header: PlyHeader, data: bytes) -> FloatArray:
+    records = np.frombuffer(data, dtype=header.layout, count=header.count)
+    if [name for name, _ in header.fields] == ["x", "y", "z"] and len({kind for _, kind in header.fields}) == 1:
+        return records.view(header.layout["x"]).reshape(-1, 3).astype(np.float64)
+    points = np.empty((header.count, 3))
+    for axis, name in enumerate("xyz"):
+        points[:, axis] = records[name]
+    return points
+
+
+def _ascii_points(file: str, header: PlyHeader, data: bytes) -> FloatArray:
+    lines = data.split(b"\n", header.count)[: header.count]
+    names = [name for name, _ in header.fields]
+    columns = [names.index(axis) for axis in "xyz"]
+    points = np.empty((header.count, 3))
+    if len(lines) < header.count:
+        raise _short(file, header, len(lines))
+    for row, line in enumerate(lines):
+        cells = line.split()
+        if not cells and row == len(lines) - 1:
+            raise _short(file, header, row)
+        if len(cells) != len(names):
+            text = f"{len(cells)} numbers; expected {len(names)} ({' '.join(names)}): export the cloud again"
+            raise problem(file, text, row=row + 1)
+        try:
+            points[row] = [float(cells[column]) for column in columns]
+        except ValueError:
+            found = line[:40].decode("ascii", "replace")
+            raise problem(file, f"'{found}' are not numbers; export the cloud again", row=row + 1, value=found) from None
+    return points
+
+
+def _short(file: str, header: PlyHeader, found: int) -> DatasetError:
+    text = f"the header announces {header.count} points, {found} follow; the file is cut off, export or copy it again"
+    return problem(file, text, row=found + 1, key="vertex", value=header.count)

@@ -1,0 +1,62 @@
+"""Safe reading inside a dataset folder: regular files only, never outside of it, never larger than a file of its kind can be."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+from core.errors import DatasetError
+
+__all__ = ["open_inside", "problem", "read_text"]
+
+
+def problem(file: str, text: str, *, row: int | None = None, key: str | None = None, value: object = None) -> DatasetError:
+    """The error for a place in a dataset; `file` is relative to the dataset, `row` is the line in it (the header is row 1)."""
+    shown = value if value is None or isinstance(value, int | str) else str(value)
+    place = file + (f", row {row}" if row is not None else "") + (f", {key}" if key is not None else "")
+    return DatasetError(f"{place}: {text}", file=file, row=row, key=key, value=shown)
+
+
+def open_inside(root: Path, file: str, within: str = "") -> BinaryIO:
+    """Open `file` (relative to `root`) for reading; links may not lead out of `root/within`."""
+    path = root / file
+    try:
+        kind = path.stat().st_mode
+    except FileNotFoundError:
+        raise problem(file, "not found; expected this file: add it, or correct the name that refers to it") from None
+    except (OSError, ValueError) as error:
+        raise problem(file, f"cannot be looked at ({_reason(error)}); check the name and the rights of this file") from error
+    if not stat.S_ISREG(kind):
+        found = "a folder" if stat.S_ISDIR(kind) else "not a regular file"
+        raise problem(file, f"is {found}; expected a plain file: put the file itself here")
+    home = os.path.realpath(root / within)
+    if os.path.commonpath([home, os.path.realpath(path)]) != home:
+        raise problem(file, "leads out of its folder through a link; expected a file inside: copy the file itself here")
+    try:
+        return path.open("rb")
+    except OSError as error:
+        raise problem(file, f"cannot be opened ({_reason(error)}); check the rights of this file") from error
+
+
+def read_text(root: Path, file: str, limit: int) -> str:
+    """The text of a UTF-8 file of at most `limit` bytes, with plain line ends and without a byte order mark."""
+    with open_inside(root, file) as stream:
+        try:
+            data = stream.read(limit + 1)
+        except OSError as error:
+            raise problem(file, f"cannot be read ({_reason(error)}); check the disk and copy the file again") from error
+    if len(data) > limit:
+        raise problem(file, f"is larger than {limit // 2**20} MiB; expected far less of such a file: check what was exported")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        row = data.count(b"\n", 0, error.start) + 1
+        found = f"byte 0x{data[error.start]:02x} is not UTF-8 text; save the file as UTF-8"
+        raise problem(file, found, row=row) from None
+    return text.replace("\r\n", "\n")
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)

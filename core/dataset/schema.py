@@ -1,0 +1,244 @@
+"""The keys of dataset.toml, format 1: what the experimenter states about phantom, tool, landmarks, camera and splits."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+from core.dataset.files import problem, read_text
+from core.errors import DatasetError, SetupError
+from core.frames import Transform
+
+__all__ = ["FILE", "DatasetConfig", "nearest", "read_config"]
+
+FILE = "dataset.toml"
+_LIMIT = 2**20
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DatasetConfig:
+    """What dataset.toml states, SI units.
+
+    Attributes:
+        size: edge lengths of the box (x, y, z) [m].
+        mass: of the phantom [kg].
+        fixed: what is believed to be held, always "base".
+        young_modulus, poisson_ratio: beliefs about the material [Pa], [1].
+        tool_radius: believed radius of the spherical tip [m].
+        landmarks: name to position, phantom frame [m].
+        touch_offset: tool centre above the landmark at touch, along phantom z [m].
+        has_camera: whether there is a [camera] table; without one the next three are defaults.
+        depth_sigma: the maker's stated accuracy [m].
+        to_phantom: first guess of phantom_from_camera.
+        train, validation, test: names of sequences.
+    """
+
+    name: str
+    size: Vector
+    mass: float
+    fixed: str
+    young_modulus: float
+    poisson_ratio: float
+    tool_radius: float
+    landmarks: dict[str, Vector]
+    touch_offset: float
+    has_camera: bool
+    camera_name: str
+    depth_sigma: float
+    to_phantom: Transform | None
+    train: tuple[str, ...]
+    validation: tuple[str, ...]
+    test: tuple[str, ...]
+
+
+def read_config(root: Path) -> DatasetConfig:
+    """Read and check dataset.toml; every mistake names its key, its value and what was expected."""
+    top = _Keys("", _toml(root))
+    top.only(("format", "name", "phantom", "tool", "landmarks", "camera", "splits", "topics"))
+    if (version := top.take("format")) != 1 or isinstance(version, bool):
+        raise top.wrong("format", version, "1, the only version there is: convert the dataset")
+    if "topics" in top.values:
+        raise top.wrong("topics", None, "a dataset without it: bags are not read yet, export them to csv and ply")
+    return DatasetConfig(
+        name=top.name("name"),
+        **_phantom(top.table("phantom")),
+        tool_radius=_tool(top.table("tool")),
+        **_landmarks(top.table("landmarks")),
+        **_camera(top.table("camera") if "camera" in top.values else None),
+        **_splits(top.table("splits")),
+    )
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A sentence naming what may have been meant, and all that is known."""
+    known = sorted(known)
+    close = difflib.get_close_matches(name, known, n=1)
+    return (f"did you mean '{close[0]}'? " if close else "") + "Known: " + (", ".join(known) or "none")
+
+
+def _toml(root: Path) -> dict[str, Any]:
+    text = read_text(root, FILE, _LIMIT)
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        # tomllib ends its sentence with "(at line 3, column 8)"
+        tail = str(error).rpartition("at line ")[2].partition(",")[0]
+        row = int(tail) if tail.isdecimal() else None
+        raise problem(FILE, f"is not valid TOML: {error}; correct the syntax there", row=row) from None
+
+
+class _Keys:
+    """One table of the file; hands out checked values and knows its place for messages."""
+
+    def __init__(self, prefix: str, values: dict[str, Any]) -> None:
+        self.prefix = prefix
+        self.values = values
+
+    def wrong(self, key: str, value: object, expected: str) -> DatasetError:
+        shown = None if value is None else f"{value!r:.80}"
+        found = "found" if shown is None else f"= {shown}"
+        return problem(FILE, f"{found}; expected {expected}", key=self.prefix + key, value=shown)
+
+    def only(self, known: tuple[str, ...]) -> None:
+        for key in self.values:
+            if key not in known:
+                raise problem(FILE, f"is an unknown key; {nearest(key, known)}", key=self.prefix + key)
+
+    def take(self, key: str) -> Any:
+        if key not in self.values:
+            raise problem(FILE, "is missing; expected this key: add it", key=self.prefix + key)
+        return self.values[key]
+
+    def table(self, key: str) -> _Keys:
+        value = self.take(key)
+        if not isinstance(value, dict):
+            raise self.wrong(key, value, f"a table: write [{key}] and its keys below it")
+        return _Keys(f"{self.prefix}{key}.", value)
+
+    def text(self, key: str) -> str:
+        value = self.take(key)
+        if not isinstance(value, str) or not value.strip() or not value.isprintable() or len(value) > 200:
+            raise self.wrong(key, value, "a name in quotes: write one")
+        return value
+
+    def name(self, key: str) -> str:
+        value = self.text(key)
+        if "/" in value or "\\" in value or value.startswith("."):
+            raise self.wrong(key, value, "a plain name without slashes or a leading dot: rename it")
+        return value
+
+    def choice(self, key: str, only: str, why: str) -> str:
+        value = self.take(key)
+        if value != only:
+            raise self.wrong(key, value, f"'{only}': {why}")
+        return only
+
+    def number(self, key: str, low: float, high: float, unit: str, default: float | None = None) -> float:
+        if default is not None and key not in self.values:
+            return default
+        return self.finite(key, self.take(key), low, high, unit)
+
+    def vector(self, key: str, low: float, high: float) -> Vector:
+        value = self.take(key)
+        if not isinstance(value, list) or len(value) != 3:
+            raise self.wrong(key, value, "three numbers [x, y, z] in metres: write all three")
+        return cast(Vector, tuple(self.finite(f"{key}[{i}]", one, low, high, "m") for i, one in enumerate(value)))
+
+    def names(self, key: str) -> tuple[str, ...]:
+        value = self.values.get(key, [])
+        if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
+            raise self.wrong(key, value, "a list of names of sequences in quotes")
+        return tuple(value)
+
+    def finite(self, key: str, value: object, low: float, high: float, unit: str) -> float:
+        span = f"a number from {low:g} to {high:g} {unit}".rstrip()
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.wrong(key, value, f"{span}: write it without quotes")
+        number = float(value) if abs(value) < 1e300 else math.inf
+        if not math.isfinite(number) or not low <= number <= high:
+            raise self.wrong(key, value, span + _unit_hint(value, low, high, unit))
+        return number
+
+
+def _unit_hint(value: float, low: float, high: float, unit: str) -> str:
+    """Ask about the unit where a factor of 1000 would bring the value into its bounds."""
+    down, up = {"m": ("millimetres", ""), "kg": ("grams", ""), "Pa": ("", "kilopascals")}.get(unit, ("", ""))
+    for name, factor in ((down, 1e-3), (up, 1e3)):
+        if name and math.isfinite(value) and low <= value * factor <= high:
+            return f": did you write {name}? That would be {value * factor:g} {unit}"
+    return ": correct it"
+
+
+def _phantom(keys: _Keys) -> dict[str, Any]:
+    keys.only(("geometry", "surface", "size", "mass", "fixed", "young_modulus", "poisson_ratio"))
+    keys.choice("geometry", "box", "other shapes than a box cannot be replayed yet")
+    if "surface" in keys.values:
+        raise keys.wrong("surface", keys.values["surface"], "no surface for a box: remove this key")
+    return {
+        "size": keys.vector("size", 1e-3, 2.0),
+        "mass": keys.number("mass", 1e-5, 50.0, "kg"),
+        "fixed": keys.choice("fixed", "base", "only a held base is supported"),
+        "young_modulus": keys.number("young_modulus", 50.0, 1e9, "Pa", default=5.0e3),
+        "poisson_ratio": keys.number("poisson_ratio", -0.5, 0.4999, "", default=0.45),
+    }
+
+
+def _tool(keys: _Keys) -> float:
+    keys.only(("shape", "radius"))
+    keys.choice("shape", "sphere", "only a sphere is supported")
+    return keys.number("radius", 1e-4, 0.2, "m")
+
+
+def _landmarks(keys: _Keys) -> dict[str, Any]:
+    offset = keys.number("touch_offset", -0.2, 0.2, "m", default=0.0)
+    names = [name for name in keys.values if name != "touch_offset"]
+    return {"landmarks": {name: keys.vector(name, -2.0, 2.0) for name in names}, "touch_offset": offset}
+
+
+def _camera(keys: _Keys | None) -> dict[str, Any]:
+    if keys is None:
+        return {"has_camera": False, "camera_name": "", "depth_sigma": 0.002, "to_phantom": None}
+    keys.only(("name", "depth_sigma", "to_phantom"))
+    return {
+        "has_camera": True,
+        "camera_name": keys.text("name"),
+        "depth_sigma": keys.number("depth_sigma", 1e-6, 0.1, "m"),
+        "to_phantom": _pose(keys, "to_phantom") if "to_phantom" in keys.values else None,
+    }
+
+
+def _pose(keys: _Keys, key: str) -> Transform:
+    rows = keys.take(key)
+    if not isinstance(rows, list) or len(rows) != 4 or any(not isinstance(row, list) or len(row) != 4 for row in rows):
+        raise keys.wrong(key, rows, "a 4x4 matrix, row major: four rows of four numbers")
+    units = ("", "", "", "m")
+    matrix = [[keys.finite(f"{key}[{i}][{j}]", row[j], -10.0, 10.0, units[j]) for j in range(4)] for i, row in enumerate(rows)]
+    if matrix[3] != [0.0, 0.0, 0.0, 1.0]:
+        raise keys.wrong(key, matrix[3], "0, 0, 0, 1 in the last row: write the matrix row by row")
+    try:
+        return Transform.from_matrix(matrix)
+    except SetupError as error:
+        raise keys.wrong(key, None, f"a pose: {error.message}; write a right-handed rotation with a translation") from None
+
+
+def _splits(keys: _Keys) -> dict[str, Any]:
+    keys.only(("train", "validation", "test"))
+    keys.take("train")
+    splits = {key: keys.names(key) for key in ("train", "validation", "test")}
+    if not splits["train"]:
+        raise keys.wrong("train", [], "at least one sequence to fit on: name one")
+    home: dict[str, str] = {}
+    for split, names in splits.items():
+        for name in names:
+            if name in home:
+                where = "twice" if home[name] == split else f"in {home[name]} too"
+                raise keys.wrong(split, name, f"each sequence in one split, it is {where}: remove one")
+            home[name] = split
+    return dict(splits)
