@@ -132,7 +132,7 @@ def _elements(file: str, lines: list[str]) -> tuple[_Order, list[_Element]]:
                     pass
                 case ["format", name, "1.0"] if name in _ORDERS and order is None:
                     order = _ORDERS[name]  # type: ignore[assignment]
-                case ["element", name, count] if re.fullmatch(r"\d{1,18}", count, re.ASCII):
+                case ["element", name, count] if _is_count(count) and name not in (element.name for element in elements):
                     elements.append(_Element(name, int(count), []))
                 case ["property", "list", _, _, _] if elements:
                     elements[-1].has_list = True
@@ -148,6 +148,10 @@ def _elements(file: str, lines: list[str]) -> tuple[_Order, list[_Element]]:
             file, f"has no format line; expected one of {', '.join(_ORDERS)}: export the cloud again", row=2, key="format"
         )
     return order, elements
+
+
+def _is_count(text: str) -> bool:
+    return re.fullmatch(r"\d{1,18}", text, re.ASCII) is not None
 
 
 def _check_vertex(file: str, element: _Element) -> None:

@@ -189,17 +189,17 @@ def _check_touch_scale(file: str, positions: FloatArray, landmarks: FloatArray) 
 
 
 def _sequence_names(root: Path) -> list[str]:
-    folder = root / "sequences"
-    if not folder.is_dir():
-        raise problem("sequences", "is not a folder here; expected one folder per sequence in it: add it")
-    names = []
-    for path in sorted(folder.iterdir()):
-        if path.name.startswith("."):
-            continue
-        if path.suffix in _BAGS:
-            raise problem(f"sequences/{path.name}", "bags are not read yet; expected a folder: export it to csv and ply")
-        if path.is_dir():
-            names.append(path.name)
+    try:
+        entries = sorted((entry.name, entry.is_dir()) for entry in (root / "sequences").iterdir() if not entry.name.startswith("."))
+    except OSError as error:
+        text = f"is no folder that can be read ({error.strerror}); expected one folder per sequence in it: add it"
+        raise problem("sequences", text) from None
+    for name, _ in entries:
+        if name.endswith(_BAGS):
+            raise problem(f"sequences/{name}", "bags are not read yet; expected a folder: export it to csv and ply")
+        if not name.isprintable():
+            raise problem("sequences", f"the name {name!a} cannot be printed; expected letters and digits: rename it")
+    names = [name for name, is_folder in entries if is_folder]
     if not names:
         raise problem("sequences", "holds no sequence; expected at least one folder with kinematics.csv: add one")
     return names
@@ -229,7 +229,7 @@ def _read_kinematics(root: Path, file: str) -> Kinematics:
     table = read_numbers(root, file, "t,x,y,z,qx,qy,qz,qw")
     if len(table) < 2:
         raise problem(file, "has one row; expected a motion of at least two: export this sequence again", row=FIRST_ROW + 1)
-    time, position, quaternion = table[:, 0], table[:, 1:4], table[:, 4:]
+    time, position, quaternion = table[:, 0].copy(), table[:, 1:4], table[:, 4:]
     check_increasing(file, time)
     check_coordinates(file, position)
     norms = np.linalg.norm(quaternion, axis=1)

@@ -102,7 +102,7 @@ class _Keys:
         self.values = values
 
     def wrong(self, key: str, value: object, expected: str) -> DatasetError:
-        shown = None if value is None else f"{value!r:.80}"
+        shown = None if value is None else _shown(value)
         found = "found" if shown is None else f"= {shown}"
         return problem(FILE, f"{found}; expected {expected}", key=self.prefix + key, value=shown)
 
@@ -163,15 +163,22 @@ class _Keys:
             raise self.wrong(key, value, f"{span}: write it without quotes")
         number = float(value) if abs(value) < 1e300 else math.inf
         if not math.isfinite(number) or not low <= number <= high:
-            raise self.wrong(key, value, span + _unit_hint(value, low, high, unit))
+            raise self.wrong(key, value, span + _unit_hint(number, low, high, unit))
         return number
+
+
+def _shown(value: object) -> str:
+    try:
+        return f"{value!r:.80}"
+    except ValueError:  # Python refuses to print integers of thousands of digits
+        return "a number of thousands of digits"
 
 
 def _unit_hint(value: float, low: float, high: float, unit: str) -> str:
     """Ask about the unit where a factor of 1000 would bring the value into its bounds."""
     down, up = {"m": ("millimetres", ""), "kg": ("grams", ""), "Pa": ("", "kilopascals")}.get(unit, ("", ""))
     for name, factor in ((down, 1e-3), (up, 1e3)):
-        if name and math.isfinite(value) and low <= value * factor <= high:
+        if name and low <= value * factor <= high:
             return f": did you write {name}? That would be {value * factor:g} {unit}"
     return ": correct it"
 

@@ -104,7 +104,7 @@ def _block(file: str, lines: list[str], header: str, first_row: int) -> FloatArr
 
 def _slow_block(file: str, lines: list[str], header: str, first_row: int) -> FloatArray:
     names = header.split(",")
-    numbers = []
+    numbers: list[float] = []
     for row, line in enumerate(lines, first_row):
         cells = _cells(file, line, header, row)
         numbers.extend(_number(file, cell, row, key) for cell, key in zip(cells, names, strict=True))
