@@ -1,0 +1,176 @@
+"""Registration: robot to phantom from touches, camera to phantom from the rest cloud, each with what is doubtful about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from core.dataset import Dataset
+from core.frames import FloatArray, Transform
+from core.progress import Report, silent
+from core.registration.camera import CameraFit, fit_camera
+from core.registration.heading import tool_misfit
+from core.registration.pairing import TouchProposal, propose
+from core.registration.pose import motion_jacobian, small_motion
+from core.registration.robot import RobotFit, fit_robot
+from core.registration.uncertainty import PRIOR
+from core.setup import Box, Material, Sensor, Setup, Tool
+
+__all__ = [
+    "CameraFit",
+    "Registration",
+    "RobotFit",
+    "TouchProposal",
+    "fit_camera",
+    "fit_robot",
+    "motion_jacobian",
+    "propose",
+    "register",
+    "setup_from",
+    "small_motion",
+]
+
+DOUBTFUL_TOUCHES = 2.0e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Registration:
+    """How the frames of a dataset relate, and how surely.
+
+    A covariance (6, 6) is that of (translation [m], rotation vector [rad]) along the phantom's axes, of the small motion about the
+    pivot (3,) [m] that leads from the stated pose to the true one: `small_motion(vector, pivot) @ phantom_from_...`.
+
+    Attributes:
+        phantom_from_robot, robot_covariance, robot_pivot: from the touches; the pivot is their landmarks' centroid.
+        touch_residuals: (n, 3) [m], phantom frame, moved touch minus landmark.
+        touch_rms: root mean square length of the residuals [m].
+        phantom_from_camera, camera_covariance, camera_pivot: from the rest cloud; the pivot is the centre of the block's top.
+        weak_directions: of the camera's pose, in words.
+        warnings: what a person should look at.
+        proposal: another pairing or size of the touches that would fit better; never applied.
+        camera: the camera fit with its statistics; None without a rest cloud.
+    """
+
+    phantom_from_robot: Transform
+    robot_covariance: FloatArray
+    robot_pivot: FloatArray
+    touch_residuals: FloatArray
+    touch_rms: float
+    phantom_from_camera: Transform
+    camera_covariance: FloatArray
+    camera_pivot: FloatArray
+    weak_directions: tuple[str, ...]
+    warnings: tuple[str, ...]
+    proposal: TouchProposal | None
+    camera: CameraFit | None
+
+
+def register(dataset: Dataset, report: Report = silent) -> Registration:
+    """Relate robot, camera and phantom; raises RegistrationError where that is impossible, warns where it is doubtful."""
+    report(0.0, "robot to phantom from touches")
+    robot, proposal = _register_robot(dataset)
+    warnings = _touch_warnings(robot, proposal)
+    report(0.2, "camera to phantom from the rest cloud")
+    camera = None
+    if dataset.has_rest:
+        config = dataset.config
+        camera = fit_camera(dataset.rest_cloud(), config.size, config.depth_sigma, config.to_phantom)
+        report(0.7, "which way round the block lies")
+        camera = _settle_heading(dataset, robot.phantom_from_robot, camera)
+        warnings += camera.warnings
+    report(1.0, "registered")
+    return Registration(
+        phantom_from_robot=robot.phantom_from_robot,
+        robot_covariance=robot.covariance,
+        robot_pivot=robot.pivot,
+        touch_residuals=robot.residuals,
+        touch_rms=robot.rms,
+        phantom_from_camera=camera.phantom_from_camera if camera else Transform(),
+        camera_covariance=camera.covariance if camera else np.diag(PRIOR**2),
+        camera_pivot=camera.pivot if camera else np.array([0.0, 0.0, dataset.config.size[2]]),
+        weak_directions=camera.weak_directions if camera else (),
+        warnings=warnings,
+        proposal=proposal,
+        camera=camera,
+    )
+
+
+def setup_from(dataset: Dataset, registration: Registration) -> Setup:
+    """What the experimenter believes, with the registrations found."""
+    config = dataset.config
+    return Setup(
+        geometry=Box(size=config.size),
+        tool=Tool(radius=config.tool_radius),
+        material=Material(young_modulus=config.young_modulus, poisson_ratio=config.poisson_ratio),
+        sensor=Sensor(depth_sigma=config.depth_sigma),
+        mass=config.mass,
+        phantom_from_robot=registration.phantom_from_robot,
+        phantom_from_camera=registration.phantom_from_camera,
+    )
+
+
+def _register_robot(dataset: Dataset) -> tuple[RobotFit, TouchProposal | None]:
+    config, touches = dataset.config, dataset.touches
+    lift = np.array([0.0, 0.0, config.touch_offset])
+    expected = {name: np.asarray(place) + lift for name, place in config.landmarks.items()}
+    robot = fit_robot(touches.positions, np.array([expected[name] for name in touches.names]))
+    return robot, propose(touches.names, touches.positions, expected, config.size, _tool_starts(dataset))
+
+
+def _tool_starts(dataset: Dataset) -> FloatArray:
+    """Where each sequence begins (k, 3) [m], robot frame."""
+    return np.array([dataset.sequence(name).kinematics.position[0] for name in dataset.sequences])
+
+
+def _touch_warnings(robot: RobotFit, proposal: TouchProposal | None) -> tuple[str, ...]:
+    warnings: tuple[str, ...] = (proposal.sentence,) if proposal else ()
+    if robot.rms > DOUBTFUL_TOUCHES:
+        worst = np.linalg.norm(robot.residuals, axis=1)
+        warnings += (
+            f"The touches miss their landmarks by {robot.rms * 1e3:.1f} mm RMS (at most {worst.max() * 1e3:.1f} mm, "
+            f"row {worst.argmax() + 1}; under {DOUBTFUL_TOUCHES * 1e3:.0f} mm is expected): "
+            "what is found from this registration is doubtful.",
+        )
+    return warnings
+
+
+def _doubt_tool(dataset: Dataset, camera: CameraFit, misfit: float) -> CameraFit:
+    """Warn where camera and kinematics put the tool in different places."""
+    expected = dataset.config.tool_radius + 0.01
+    if not misfit > expected:
+        return camera
+    doubt = (
+        f"The camera sees the tool {misfit * 1e3:.0f} mm from where the kinematics put its centre, "
+        f"at most {expected * 1e3:.0f} mm is expected: check touches.csv, [camera] to_phantom and that both clocks agree."
+    )
+    return replace(camera, warnings=(*camera.warnings, doubt))
+
+
+def _settle_heading(dataset: Dataset, phantom_from_robot: Transform, camera: CameraFit) -> CameraFit:
+    """Let the tool in the clouds decide between the two headings of a plain block; a given first guess is only doubted."""
+    as_is, turned = tool_misfit(dataset, phantom_from_robot, [camera.phantom_from_camera, camera.turned])
+    decided = abs(as_is - turned) > 3.0e-3
+    if not camera.automatic:
+        if decided and turned < as_is:
+            doubt = (
+                f"The camera sees the tool {as_is * 1e3:.0f} mm from where the kinematics put it, and {turned * 1e3:.0f} mm "
+                "with the block half a turn about z: the landmarks in touches.csv or [camera] to_phantom are half a turn off."
+            )
+            return replace(camera, warnings=(*camera.warnings, doubt))
+        return _doubt_tool(dataset, camera, as_is)
+    if not decided:
+        return camera
+    settled = tuple(text for text in camera.warnings if "half a turn" not in text)
+    if as_is < turned:
+        return replace(camera, warnings=settled)
+    half = np.diag([-1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
+    swap = {"-x": "+x", "+x": "-x", "-y": "+y", "+y": "-y"}
+    return replace(
+        camera,
+        phantom_from_camera=camera.turned,
+        covariance=half @ camera.covariance @ half,
+        face_counts={swap.get(face, face): count for face, count in camera.face_counts.items()},
+        face_offsets={swap.get(face, face): offset for face, offset in camera.face_offsets.items()},
+        warnings=settled,
+    )

@@ -1,0 +1,107 @@
+"""The planes that a rest cloud can be laid against: the block's top, the sides that the camera sees, and the table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from core.frames import FloatArray
+
+IndexArray = np.ndarray[Any, np.dtype[np.int64]]
+Mask = np.ndarray[Any, np.dtype[np.bool_]]
+
+__all__ = ["EDGE", "FACES", "TABLE_REACH", "Assignment", "Planes", "assign", "box_distance", "camera_planes"]
+
+FACES = ("top", "-x", "+x", "-y", "+y", "table")
+NORMALS = np.array([[0, 0, 1], [-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+EDGE = 2.0e-3
+"""Points nearer to an edge than this [m] are left out: noise carries them over it, and a real edge is round."""
+TABLE_REACH = 0.08
+GRAZING = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Planes:
+    """The six planes n.x = d of a block of `size` [m] on its table; `visible` (6,) tells which the camera sees from its front."""
+
+    size: FloatArray
+    offsets: FloatArray
+    visible: Mask
+
+
+@dataclass(frozen=True, eq=False)
+class Assignment:
+    """Points that lie on a plane, phantom frame.
+
+    Attributes:
+        rows: (k,) which points of the cloud.
+        face: (k,) index into FACES.
+        points: (k, 3) [m].
+        distance: (k,) [m] signed, positive outside.
+        slant: (k,) cosine between normal and line of sight, at least 0.2; depth noise shows times this in `distance`.
+    """
+
+    rows: IndexArray
+    face: IndexArray
+    points: FloatArray
+    distance: FloatArray
+    slant: FloatArray
+
+    @property
+    def normals(self) -> FloatArray:
+        """(k, 3) unit normals."""
+        return np.asarray(NORMALS[self.face])
+
+    def only(self, keep: Mask) -> Assignment:
+        """The points for which `keep` (k,) is true."""
+        return Assignment(self.rows[keep], self.face[keep], self.points[keep], self.distance[keep], self.slant[keep])
+
+
+def camera_planes(size: tuple[float, float, float], camera: FloatArray) -> Planes:
+    """The planes as a camera at (3,) [m], phantom frame, sees them."""
+    x, y, z = size
+    offsets = np.array([z, x / 2, x / 2, y / 2, y / 2, 0.0])
+    before = NORMALS @ camera - offsets
+    return Planes(np.asarray(size), offsets, before > 0.1 * np.linalg.norm(camera))
+
+
+def assign(points: FloatArray, planes: Planes, camera: FloatArray, gate: float) -> Assignment:
+    """Give points (n, 3) [m], phantom frame, the plane they lie on within `gate` [m], away from edges; leave the others out."""
+    half = planes.size[:2] / 2
+    distance = points @ NORMALS.T - planes.offsets
+    across = np.abs(points[:, :2]) - half
+    in_height = (points[:, 2] > EDGE) & (points[:, 2] < planes.size[2] - EDGE)
+    over_base = (across < -EDGE).all(axis=1)
+    beside = across.max(axis=1)
+    inside = np.empty((len(points), 6), dtype=bool)
+    inside[:, 0] = over_base
+    inside[:, 1:3] = (in_height & (across[:, 1] < -EDGE))[:, None]
+    inside[:, 3:5] = (in_height & (across[:, 0] < -EDGE))[:, None]
+    inside[:, 5] = (beside > 2 * EDGE) & (beside < TABLE_REACH)
+    far = np.where(inside & planes.visible, np.abs(distance), np.inf)
+    face = far.argmin(axis=1)
+    rows = np.flatnonzero(far[np.arange(len(points)), face] < gate)
+    face, kept = face[rows], points[rows]
+    sight = kept - camera
+    slant = np.abs((sight * NORMALS[face]).sum(axis=1)) / np.linalg.norm(sight, axis=1)
+    found = Assignment(rows, face, kept, distance[rows, face], np.maximum(slant, GRAZING))
+    return found.only(_populated(found, planes)[found.face])
+
+
+def _populated(found: Assignment, planes: Planes) -> Mask:
+    """Which faces (6,) hold a believable number of points: a few strays do not make a side."""
+    x, y, z = planes.size
+    areas = np.array([x * y, y * z, y * z, x * z, x * z, np.inf])
+    seen = np.bincount(found.face, weights=1 / found.slant, minlength=6)
+    seen[5] = 0.0
+    counts = np.bincount(found.face, minlength=6)
+    return np.asarray((counts >= 20) & ((seen / areas > 0.1 * (seen / areas).max()) | (np.arange(6) == 5)))
+
+
+def box_distance(points: FloatArray, size: FloatArray) -> FloatArray:
+    """Signed distance (n,) [m] of points (n, 3), phantom frame, to the surface of the block, positive outside."""
+    half = np.asarray(size) / 2
+    outside = np.abs(points - np.array([0.0, 0.0, half[2]])) - half
+    return np.asarray(np.linalg.norm(np.maximum(outside, 0.0), axis=1) + np.minimum(outside.max(axis=1), 0.0))

@@ -1,0 +1,59 @@
+"""Which way round a plain block lies: the tool, seen by the camera and known from the kinematics, tells."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from core.dataset import Dataset
+from core.frames import FloatArray, Transform
+from core.registration.faces import box_distance
+
+__all__ = ["tool_misfit"]
+
+ASIDE = 6.0e-3
+FRAMES = 12
+FARTHEST = 0.03
+
+
+def tool_misfit(dataset: Dataset, phantom_from_robot: Transform, headings: list[Transform]) -> FloatArray:
+    """Mean distance [m] between where the kinematics put the tool and where the camera sees it, for each phantom_from_camera.
+
+    NaN where no frame shows a tool. Distances beyond 30 mm count as 30 mm.
+    """
+    distances = [
+        _frame_misfits(cloud, centre, dataset.config.size, headings) for cloud, centre in _frames(dataset, phantom_from_robot)
+    ]
+    known = [row for row in distances if np.isfinite(row).all()]
+    return np.mean(known, axis=0) if known else np.full(len(headings), np.nan)
+
+
+def _frames(dataset: Dataset, phantom_from_robot: Transform) -> list[tuple[FloatArray, FloatArray]]:
+    """Clouds (n, 3), camera frame, and tool centres (3,), phantom frame [m], of frames with the tool far from the block's axis."""
+    places: list[tuple[float, str, int, FloatArray]] = []
+    for name in dataset.sequences:
+        sequence = dataset.sequence(name)
+        if len(sequence) == 0:
+            continue
+        centres = phantom_from_robot.apply(sequence.kinematics.position_at(sequence.cloud_times))
+        aside = np.linalg.norm(centres[:, :2], axis=1)
+        near = box_distance(centres, np.array(dataset.config.size)) < 0.03
+        index = int(np.argmax(np.where(near, aside, -1.0)))
+        places.append((float(aside[index]), name, index, centres[index]))
+    places.sort(key=lambda place: -place[0])
+    return [(dataset.sequence(name).cloud(index), centre) for _, name, index, centre in places[:FRAMES]]
+
+
+def _frame_misfits(
+    cloud: FloatArray, centre: FloatArray, size: tuple[float, float, float], headings: list[Transform]
+) -> FloatArray:
+    found = []
+    for heading in headings:
+        points = heading.apply(cloud)
+        apart = box_distance(points, np.array(size))
+        tool = points[(apart > ASIDE) & (apart < 0.15) & (points[:, 2] > ASIDE)]
+        if len(tool) < 10:
+            return np.full(len(headings), np.nan)
+        # The tenth nearest, since single strays lie anywhere.
+        nearest = np.partition(np.linalg.norm(tool - centre, axis=1), 9)[9]
+        found.append(min(float(nearest), FARTHEST))
+    return np.array(found)
