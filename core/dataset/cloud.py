@@ -172,7 +172,7 @@ def _check_size(file: str, header: PlyHeader, size: int, rest: list[_Element]) -
     present = size - header.start + (1 if header.order == "=" else 0)
     if present < header.count * record:
         text = (
-            f"the header announces {header.count} points ({header.count * record} bytes) but {max(present, 0)} bytes follow; "
+            f"element vertex announces {header.count} points ({header.count * record} bytes) but {max(present, 0)} bytes follow; "
             "expected all of them: the file is cut off, export or copy it again"
         )
         raise problem(file, text, key="vertex", value=header.count)
@@ -180,7 +180,7 @@ def _check_size(file: str, header: PlyHeader, size: int, rest: list[_Element]) -
         return
     expected = header.count * record + sum(element.count * element.record for element in rest)
     if present != expected:
-        text = f"{expected} bytes announced in the header, {present} found after it; expected the same: export or copy it again"
+        text = f"element vertex and what follows take {expected} bytes by the header, {present} are there; export or copy it again"
         raise problem(file, text, key="vertex", value=header.count)
 
 
@@ -217,5 +217,5 @@ def _ascii_points(file: str, header: PlyHeader, data: bytes) -> FloatArray:
 
 
 def _short(file: str, header: PlyHeader, found: int) -> DatasetError:
-    text = f"the header announces {header.count} points, {found} follow; the file is cut off, export or copy it again"
+    text = f"element vertex announces {header.count} points, {found} follow; the file is cut off, export or copy it again"
     return problem(file, text, row=found + 1, key="vertex", value=header.count)

@@ -13,9 +13,12 @@ __all__ = ["open_inside", "problem", "read_text"]
 
 
 def problem(file: str, text: str, *, row: int | None = None, key: str | None = None, value: object = None) -> DatasetError:
-    """The error for a place in a dataset; `file` is relative to the dataset, `row` is the line in it (the header is row 1)."""
+    """The error for a place in a dataset; `file` is relative to the dataset, `row` is the line in it (the header is row 1).
+
+    The text names the key itself, where that reads best.
+    """
     shown = value if value is None or isinstance(value, int | str) else str(value)
-    place = file + (f", row {row}" if row is not None else "") + (f", {key}" if key is not None else "")
+    place = file + (f", row {row}" if row is not None else "")
     return DatasetError(f"{place}: {text}", file=file, row=row, key=key, value=shown)
 
 

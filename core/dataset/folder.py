@@ -71,6 +71,10 @@ class Sequence:
     def __len__(self) -> int:
         return len(self.cloud_files)
 
+    def count(self, index: int) -> int:
+        """Number of points of a cloud, from its header."""
+        return read_header(self.root, self.cloud_files[index], within=f"sequences/{self.name}").count
+
     def cloud(self, index: int) -> FloatArray:
         """The raw cloud (k, 3) [m], camera frame, read from disk at each call."""
         return read_cloud(self.root, self.cloud_files[index], within=f"sequences/{self.name}")
@@ -139,7 +143,7 @@ def open_dataset(path: Path | str) -> Dataset:
     _check_splits(config, [sequence.name for sequence in sequences])
     observed = any(len(sequence) for sequence in sequences)
     if observed and not config.has_camera:
-        raise problem(FILE, "is missing, yet there are clouds; expected this table: add it", key="camera")
+        raise problem(FILE, "camera is missing, yet there are clouds; expected this table: add it", key="camera")
     has_rest = observed or (root / "rest.ply").exists()
     if has_rest:
         read_header(root, "rest.ply")
@@ -182,7 +186,7 @@ def _read_touches(root: Path, config: DatasetConfig) -> Touches:
 def _check_touch_scale(file: str, positions: FloatArray, landmarks: FloatArray) -> None:
     touched, stated = (float(np.linalg.norm(points - points.mean(0), axis=1).max()) for points in (positions, landmarks))
     if stated == 0:
-        raise problem(FILE, "all touched landmarks are the same point; expected distinct ones: correct them", key="landmarks")
+        raise problem(FILE, "landmarks: all touched ones are the same point; expected distinct ones: correct them", key="landmarks")
     if not 0.1 < touched / stated < 10:
         text = f"the touches reach {touched:.3g} m from their centre, the landmarks {stated:.3g} m; expected the same unit, metres"
         raise problem(file, text + ": convert one of them", row=FIRST_ROW, value=f"{touched:.3g}")
@@ -209,7 +213,12 @@ def _check_splits(config: DatasetConfig, names: list[str]) -> None:
     for split in ("train", "validation", "test"):
         for name in getattr(config, split):
             if name not in names:
-                raise problem(FILE, f"there is no sequence '{name}'; {nearest(name, names)}", key=f"splits.{split}", value=name)
+                raise problem(
+                    FILE,
+                    f"splits.{split} names '{name}', no sequence here; {nearest(name, names)}",
+                    key=f"splits.{split}",
+                    value=name,
+                )
 
 
 def _read_sequence(root: Path, name: str) -> Sequence:
@@ -235,7 +244,7 @@ def _read_kinematics(root: Path, file: str) -> Kinematics:
     norms = np.linalg.norm(quaternion, axis=1)
     if len(bad := np.flatnonzero(np.abs(norms - 1) > 1e-2)):
         at = int(bad[0])
-        text = f"the quaternion has norm {norms[at]:.4g}; expected 1: are the columns in the order of the header, position first?"
+        text = f"the quaternion qx,qy,qz,qw has norm {norms[at]:.4g}; expected 1: are the columns in the order of the header?"
         raise problem(file, text, row=at + FIRST_ROW, key="qx,qy,qz,qw", value=f"{norms[at]:.4g}")
     return Kinematics(time, position, quaternion)
 
@@ -248,10 +257,12 @@ def _read_cloud_list(root: Path, home: str, file: str, clock: FloatArray) -> tup
     for row, name in enumerate(names, FIRST_ROW):
         path = PurePosixPath(name)
         if path.is_absolute() or ".." in path.parts or "\\" in name or not name.isprintable():
-            text = f"'{name[:80]}' leads out of the sequence; expected a path inside such as clouds/000000.ply: move it there"
+            text = (
+                f"file = '{name[:80]}' leads out of the sequence; expected a path inside such as clouds/000000.ply: move it there"
+            )
             raise problem(file, text, row=row, key="file", value=name[:80])
         if str(path) in seen:
-            text = f"'{name}' is in row {seen[str(path)]} already; expected one cloud per frame: remove one row"
+            text = f"file = '{name}' is in row {seen[str(path)]} already; expected one cloud per frame: remove one row"
             raise problem(file, text, row=row, key="file", value=name)
         seen[str(path)] = row
         _check_cloud(root, home, file, row, name)
@@ -279,6 +290,7 @@ def _read_forces(root: Path, file: str) -> Forces:
     check_increasing(file, time)
     if len(bad := np.argwhere(np.abs(force) > LARGEST_FORCE)):
         at, axis = (int(index) for index in bad[0])
-        text = f"{force[at, axis]:g} N; expected at most {LARGEST_FORCE:g} N on soft tissue: did you write millinewtons?"
-        raise problem(file, text, row=at + FIRST_ROW, key=("fx", "fy", "fz")[axis], value=f"{force[at, axis]:g}")
+        key = ("fx", "fy", "fz")[axis]
+        text = f"{key} = {force[at, axis]:g} N; expected at most {LARGEST_FORCE:g} N on soft tissue: did you write millinewtons?"
+        raise problem(file, text, row=at + FIRST_ROW, key=key, value=f"{force[at, axis]:g}")
     return Forces(time, force)

@@ -103,17 +103,17 @@ class _Keys:
 
     def wrong(self, key: str, value: object, expected: str) -> DatasetError:
         shown = None if value is None else _shown(value)
-        found = "found" if shown is None else f"= {shown}"
-        return problem(FILE, f"{found}; expected {expected}", key=self.prefix + key, value=shown)
+        found = "" if shown is None else f" = {shown}"
+        return problem(FILE, f"{self.prefix}{key}{found}; expected {expected}", key=self.prefix + key, value=shown)
 
     def only(self, known: tuple[str, ...]) -> None:
         for key in self.values:
             if key not in known:
-                raise problem(FILE, f"is an unknown key; {nearest(key, known)}", key=self.prefix + key)
+                raise problem(FILE, f"{self.prefix}{key} is an unknown key; {nearest(key, known)}", key=self.prefix + key)
 
     def take(self, key: str) -> Any:
         if key not in self.values:
-            raise problem(FILE, "is missing; expected this key: add it", key=self.prefix + key)
+            raise problem(FILE, f"{self.prefix}{key} is missing; expected this key: add it", key=self.prefix + key)
         return self.values[key]
 
     def table(self, key: str) -> _Keys:
@@ -231,8 +231,9 @@ def _pose(keys: _Keys, key: str) -> Transform:
         raise keys.wrong(key, matrix[3], "0, 0, 0, 1 in the last row: write the matrix row by row")
     try:
         return Transform.from_matrix(matrix)
-    except SetupError as error:
-        raise keys.wrong(key, None, f"a pose: {error.message}; write a right-handed rotation with a translation") from None
+    except SetupError:
+        expected = "a rotation in its upper left 3x3, right-handed and without scale: correct the signs and the unit"
+        raise keys.wrong(key, matrix, expected) from None
 
 
 def _splits(keys: _Keys) -> dict[str, Any]:

@@ -1,0 +1,194 @@
+"""`palpate check`: what a dataset holds, how regular its clocks are, what is doubtful in it and what it lacks."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from core.dataset.folder import Dataset, Sequence
+from core.dataset.motion import Motion, motion_of
+from core.dataset.protocol import Lack, lacks
+from core.frames import FloatArray, Transform
+from core.progress import Report, part, silent
+
+__all__ = ["ClockSummary", "DatasetSummary", "SequenceSummary", "check_dataset"]
+
+DROPOUT = 1.8  # intervals longer than this times the median lost at least one
+HARMLESS_GAP = 0.02  # s; in the kinematics, the tool hardly moves in less
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClockSummary:
+    """One column of stamps.
+
+    Attributes:
+        count: of stamps.
+        rate: one over the median interval [Hz]; 0 for fewer than two stamps.
+        jitter: standard deviation of the intervals without drop-outs [s].
+        dropouts: intervals in which at least one stamp is missing.
+        longest: interval [s].
+    """
+
+    count: int
+    rate: float
+    jitter: float
+    dropouts: int
+    longest: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class SequenceSummary:
+    """One sequence.
+
+    Attributes:
+        split: where dataset.toml puts it; "none" is nowhere.
+        duration: of the kinematics [s].
+        clouds_outside: clouds stamped before or after the kinematics, where the tool's place is unknown.
+        points: fewest, median and most per cloud; None without clouds.
+        motion: None where robot and phantom have not been related.
+    """
+
+    name: str
+    split: Literal["train", "validation", "test", "none"]
+    duration: float
+    kinematics: ClockSummary
+    clouds: ClockSummary
+    clouds_outside: int
+    points: tuple[int, int, int] | None
+    forces: ClockSummary | None
+    motion: Motion | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class DatasetSummary:
+    """A whole dataset; `warnings` are sentences for a person, `lacks` say which cause could not be told from it."""
+
+    name: str
+    path: str
+    size: tuple[float, float, float]
+    tool_radius: float
+    touches: tuple[str, ...]
+    rest_points: int | None
+    sequences: tuple[SequenceSummary, ...]
+    lacks: tuple[Lack, ...]
+    warnings: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON, SI units."""
+        return asdict(self)
+
+
+def check_dataset(dataset: Dataset, phantom_from_robot: Transform | None = None, report: Report = silent) -> DatasetSummary:
+    """Read all of it once and sum it up; with a registration also what the motions do and lack."""
+    dataset.validate(part(report, 0.0, 0.9))
+    summaries = []
+    for index, name in enumerate(dataset.sequences):
+        report(0.9 + 0.1 * index / len(dataset.sequences), f"looking at {name}")
+        summaries.append(_summary(dataset, dataset.sequence(name), phantom_from_robot))
+    motions = {summary.name: summary.motion for summary in summaries if summary.motion is not None}
+    observed = any(summary.clouds.count for summary in summaries)
+    forces = any(summary.forces is not None for summary in summaries)
+    report(1.0, "checked")
+    return DatasetSummary(
+        name=dataset.name,
+        path=str(dataset.path),
+        size=dataset.config.size,
+        tool_radius=dataset.config.tool_radius,
+        touches=dataset.touches.names,
+        rest_points=len(dataset.rest_cloud()) if dataset.has_rest else None,
+        sequences=tuple(summaries),
+        lacks=lacks(motions, observed, forces),
+        warnings=(*_doubts(dataset), *(f"{one.name}: {text}" for one in summaries for text in _sequence_doubts(dataset, one))),
+    )
+
+
+def _summary(dataset: Dataset, sequence: Sequence, phantom_from_robot: Transform | None) -> SequenceSummary:
+    clock, times = sequence.kinematics.time, sequence.cloud_times
+    counts = [sequence.count(index) for index in range(len(sequence))]
+    return SequenceSummary(
+        name=sequence.name,
+        split=_split(dataset, sequence.name),
+        duration=float(clock[-1] - clock[0]),
+        kinematics=_clock(clock, HARMLESS_GAP),
+        clouds=_clock(times),
+        clouds_outside=int(((times < clock[0]) | (times > clock[-1])).sum()),
+        points=(min(counts), int(np.median(counts)), max(counts)) if counts else None,
+        forces=_clock(sequence.forces.time, HARMLESS_GAP) if sequence.forces else None,
+        motion=motion_of(dataset, sequence, phantom_from_robot) if phantom_from_robot else None,
+    )
+
+
+def _clock(times: FloatArray, harmless: float = 0.0) -> ClockSummary:
+    if len(times) < 2:
+        return ClockSummary(count=len(times), rate=0.0, jitter=0.0, dropouts=0, longest=0.0)
+    intervals = np.diff(times)
+    median = float(np.median(intervals))
+    lost = intervals > max(DROPOUT * median, harmless)
+    jitter = float(intervals[~lost].std())
+    return ClockSummary(
+        count=len(times), rate=1 / median, jitter=jitter, dropouts=int(lost.sum()), longest=float(intervals.max())
+    )  # fmt: skip
+
+
+def _split(dataset: Dataset, name: str) -> Literal["train", "validation", "test", "none"]:
+    for split in ("train", "validation", "test"):
+        if name in getattr(dataset.config, split):
+            return split
+    return "none"
+
+
+def _doubts(dataset: Dataset) -> list[str]:
+    doubts = []
+    if not dataset.config.test:
+        doubts.append("no sequence is kept for the test, so no gain can be shown: name one in splits.test")
+    listed = {file for name in dataset.sequences for file in dataset.sequence(name).cloud_files}
+    present = {path.relative_to(dataset.path).as_posix() for path in dataset.path.glob("sequences/*/clouds/*.ply")}
+    if stray := len(present - listed):
+        doubts.append(f"{stray} clouds lie in clouds folders without a row in clouds.csv: they are left out")
+    return doubts
+
+
+def _sequence_doubts(dataset: Dataset, summary: SequenceSummary) -> list[str]:
+    """Sentences about one sequence."""
+    doubts = []
+    if summary.split == "none":
+        doubts.append("is in no split, so it is neither fitted nor tested: add it to one in dataset.toml")
+    if summary.clouds_outside:
+        doubts.append(
+            f"{summary.clouds_outside} of {summary.clouds.count} clouds are stamped outside the kinematics, where the tool's place "
+            "is unknown: do both stamps come from the same clock?"
+        )
+    doubts += _clock_doubts(summary)
+    if summary.points and summary.points[0] < 0.5 * summary.points[1]:
+        doubts.append(
+            f"the smallest cloud has {summary.points[0]} points, the median one {summary.points[1]}: is the view blocked?"
+        )
+    extent = float(np.ptp(dataset.sequence(summary.name).kinematics.position, axis=0).max())
+    if extent < 1e-3:
+        doubts.append(f"the tool moves by {1e3 * extent:.3f} mm only: is the unit of kinematics.csv the metre?")
+    return doubts + _motion_doubts(dataset, summary.motion)
+
+
+def _clock_doubts(summary: SequenceSummary) -> list[str]:
+    doubts = []
+    for name, clock in (("clouds", summary.clouds), ("kinematics", summary.kinematics), ("forces", summary.forces)):
+        if clock and clock.dropouts:
+            times = "once" if clock.dropouts == 1 else f"{clock.dropouts} times"
+            doubts.append(f"the {name} pause {times}, at most {clock.longest:.2f} s: frames were lost there")
+    if summary.kinematics.rate < summary.clouds.rate:
+        doubts.append(f"kinematics at {summary.kinematics.rate:.1f} Hz are slower than the clouds at {summary.clouds.rate:.1f} Hz")
+    return doubts
+
+
+def _motion_doubts(dataset: Dataset, motion: Motion | None) -> list[str]:
+    if motion is None:
+        return []
+    if motion.kind == "none":
+        return [
+            f"the tool never touches the phantom, it stays {-1e3 * motion.depth:.1f} mm away: are touches and tool radius right?"
+        ]
+    if motion.depth > 0.6 * min(dataset.config.size):
+        return [f"the tool goes {1e3 * motion.depth:.1f} mm into the phantom as stated: are touches, size and radius right?"]
+    return []
