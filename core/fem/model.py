@@ -1,0 +1,196 @@
+"""The potential of a block under a tool: elastic energy, own weight, bonded or detached base, contact.
+
+Everything is over E, so stiffness cancels where only positions are given; forces are multiplied by E when they leave.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from core.fem.contact import FACE_GRADIENTS, FACE_SHAPES, assemble_contact, contact_energy, face_weights
+from core.fem.elastic import LAWS, assemble_elastic, elastic_energy, gauss_gradients, lame
+from core.fem.linear import SparseCholesky, face_slots, upper_pattern
+from core.frames import FloatArray
+from core.mesh import BoxMesh, GridSpec, IntArray, box_mesh
+from core.setup import Detachment, Inclusion, Setup
+
+__all__ = ["CONTACT_STIFFNESS", "Assembly", "BlockModel", "Probe", "Topology", "topology"]
+
+CONTACT_STIFFNESS = 5e4
+"""Contact pressure over E per penetration [1/m]: 0.02 mm at a pressure equal to E."""
+BOND_STIFFNESS = 2e4
+"""The same for a bonded base that is not simply held [1/m]."""
+_BOND_EDGE = 1e-3
+"""Width over which a bond ends at a detached strip's edge [m]: the result changes smoothly with the strip's extent."""
+_EMPTY = np.empty(0)
+
+
+@dataclass(frozen=True, eq=False)
+class Probe:
+    """The tool at one instant: centre (3,) [m] in the phantom frame, radius [m]."""
+
+    centre: FloatArray
+    radius: float
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """Residual (u,) [m^2], entries of the tangent [m], push of the tool on the body (3,) [m^2] (all over E), penetration [m]."""
+
+    residual: FloatArray
+    data: FloatArray
+    push: FloatArray
+    penetration: float
+
+
+class Topology:
+    """What grids of one shape share whatever their coordinates: numbering, matrix pattern, symbolic factorisation."""
+
+    def __init__(self, nodes: tuple[int, int, int], held: bool) -> None:
+        mesh = box_mesh((1.0, 1.0, 1.0), GridSpec(nodes=nodes))
+        self.hexahedra = np.ascontiguousarray(mesh.hexahedra)
+        self.surface = np.ascontiguousarray(mesh.free_surface)
+        self.base = np.ascontiguousarray(mesh.faces["-z"])
+        free = np.ones((len(mesh.nodes), 3), dtype=bool)
+        if held:
+            free[mesh.base_nodes] = False
+        self.free = free
+        self.unknown = np.where(free, np.cumsum(free).reshape(free.shape) - 1, -1)
+        pattern, self.slots = upper_pattern(self.hexahedra, self.unknown)
+        self.surface_slots = face_slots(pattern, self.surface, self.unknown)
+        self.base_slots = face_slots(pattern, self.base, self.unknown)
+        self.entries = pattern.nnz
+        rows = np.repeat(np.arange(pattern.shape[0]), np.diff(pattern.indptr))
+        self.diagonal = np.flatnonzero(rows == pattern.indices)
+        self.factor = SparseCholesky(pattern)
+
+
+@lru_cache(maxsize=8)
+def topology(nodes: tuple[int, int, int], held: bool) -> Topology:
+    """The shared part of all grids with these numbers of nodes; `held` leaves the base nodes out of the unknowns."""
+    return Topology(nodes, held)
+
+
+def _stiffness_factor(inclusions: tuple[Inclusion, ...], corners: FloatArray) -> FloatArray:
+    """Stiffness over the matrix's per element (e,), geometric mean by volume; smooth in the lump's place and size."""
+    log_factor = np.zeros(len(corners))
+    if not inclusions:
+        return np.ones(len(corners))
+    low, high = corners[:, 0], corners[:, 7]
+    steps = (np.arange(4) + 0.5) / 4
+    offsets = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    points = low[:, None] + offsets * (high - low)[:, None]
+    width = np.cbrt(np.prod(high - low, axis=1))[:, None] / 8
+    for lump in inclusions:
+        distance = np.linalg.norm(points - np.array([lump.x, lump.y, lump.z]), axis=2)
+        inside = 0.5 * (1 - np.tanh((distance - lump.radius) / width))
+        log_factor += inside.mean(axis=1) * np.log(lump.stiffness_ratio)
+    return np.asarray(np.exp(log_factor))
+
+
+def _held_share(detached: tuple[Detachment, ...], size: tuple[float, float, float], points: FloatArray) -> FloatArray:
+    """Share of the bond (0 to 1) left at base points (..., 3) [m]."""
+    held = np.ones(points.shape[:-1])
+    for strip in detached:
+        axis, sign = "xy".index(strip.edge[1]), -1 if strip.edge[0] == "-" else 1
+        inwards = size[axis] / 2 - sign * points[..., axis]
+        held *= 0.5 * (1 + np.tanh((inwards - strip.extent) / _BOND_EDGE))
+    return held
+
+
+class BlockModel:
+    """One block on one mesh: energy, residual and tangent as functions of the node positions (n, 3) [m] and the probe."""
+
+    def __init__(self, setup: Setup, mesh: BoxMesh) -> None:
+        self.mesh, self.setup = mesh, setup
+        self.topology = topology(mesh.shape, held=not setup.support.detached)
+        self.law = LAWS[setup.material.law]
+        corners = mesh.nodes[self.topology.hexahedra]
+        self.gradients, self.weights = gauss_gradients(corners)
+        mu, bulk = lame(setup.material.law, setup.material.poisson_ratio)
+        factor = _stiffness_factor(setup.material.inclusions, corners)
+        self.mu, self.bulk = mu * factor, bulk * factor
+        self.areas = face_weights(mesh.nodes[self.topology.surface])
+        self.weight_force = self._weight(setup.load.specific_weight_over_stiffness)
+        self._prepare_base(setup)
+
+    def _weight(self, specific: float) -> FloatArray:
+        """Weight at the nodes over E (n,) [m^2]."""
+        share = np.zeros(len(self.mesh.nodes))
+        np.add.at(share, self.topology.hexahedra, np.repeat(self.weights.sum(axis=1)[:, None] / 8, 8, axis=1))
+        return specific * share
+
+    def _prepare_base(self, setup: Setup) -> None:
+        self.detached = bool(setup.support.detached)
+        if not self.detached:
+            return
+        corners = self.mesh.nodes[self.topology.base]
+        areas = face_weights(corners)
+        points = np.einsum("qa,fai->fqi", FACE_SHAPES, corners)
+        self.base_areas = areas
+        held = areas * _held_share(setup.support.detached, setup.geometry.size, points)
+        self.bond = BOND_STIFFNESS * np.einsum("fq,qa,qb->fab", held, FACE_SHAPES, FACE_SHAPES)
+
+    def _bond_gradient(self, positions: FloatArray) -> FloatArray:
+        """Gradient of the bond's energy at the base faces' nodes (f, 4, 3) [m^2]."""
+        moved = (positions - self.mesh.nodes)[self.topology.base]
+        return np.asarray(np.einsum("fab,fbi->fai", self.bond, moved))
+
+    def energy(self, positions: FloatArray, probe: Probe | None) -> float:
+        """Total potential over E [m^3]; infinite when an element is inverted."""
+        top = self.topology
+        total = float(elastic_energy(self.law, self.gradients, self.weights, top.hexahedra, self.mu, self.bulk, positions))
+        if not np.isfinite(total):
+            return np.inf
+        total += float(self.weight_force @ (positions[:, 2] - self.mesh.nodes[:, 2]))
+        if probe is not None:
+            total += contact_energy(
+                top.surface, self.areas, FACE_SHAPES, FACE_GRADIENTS, positions, probe.centre, probe.radius, False, CONTACT_STIFFNESS
+            )
+        if self.detached:
+            moved = (positions - self.mesh.nodes)[top.base]
+            total += 0.5 * float(np.vdot(moved, self._bond_gradient(positions)))
+            total += contact_energy(
+                top.base, self.base_areas, FACE_SHAPES, FACE_GRADIENTS, positions, np.zeros(3), 0.0, True, CONTACT_STIFFNESS
+            )
+        return total
+
+    def assemble(self, positions: FloatArray, probe: Probe | None, *, tangent: bool = True, bending: bool = True) -> Assembly:
+        """Residual and, if wanted, tangent at these positions; without `bending` the contact's tangent is positive."""
+        top = self.topology
+        force = np.zeros_like(positions)
+        data = np.zeros(top.entries) if tangent else _EMPTY
+        push, penetration = np.zeros(3), 0.0
+        assemble_elastic(
+            self.law, self.gradients, self.weights, top.hexahedra, self.mu, self.bulk, positions, top.slots, force, data
+        )
+        force[:, 2] += self.weight_force
+        if probe is not None:
+            penetration = assemble_contact(
+                top.surface, self.areas, FACE_SHAPES, FACE_GRADIENTS, positions, probe.centre, probe.radius, False,
+                CONTACT_STIFFNESS, bending, top.surface_slots, force, data, push,
+            )  # fmt: skip
+        if self.detached:
+            self._assemble_base(positions, force, data)
+        return Assembly(force[top.free], data, push, penetration)
+
+    def _assemble_base(self, positions: FloatArray, force: FloatArray, data: FloatArray) -> None:
+        top = self.topology
+        np.add.at(force, top.base, self._bond_gradient(positions))
+        if len(data):
+            blocks = np.einsum("fab,ij->faibj", self.bond, np.eye(3)).reshape(len(self.bond), 12, 12)
+            used = top.base_slots >= 0
+            np.add.at(data, top.base_slots[used], blocks[used])
+        assemble_contact(
+            top.base, self.base_areas, FACE_SHAPES, FACE_GRADIENTS, positions, np.zeros(3), 0.0, True,
+            CONTACT_STIFFNESS, False, top.base_slots, force, data, np.zeros(3),
+        )  # fmt: skip
+
+    def depth_inside(self, positions: FloatArray, probe: Probe) -> float:
+        """How deep the deepest node of the free surface lies inside the tool [m], whichever way it faces."""
+        surface: IntArray = self.topology.surface
+        distance = np.linalg.norm(positions[surface.ravel()] - probe.centre, axis=1)
+        return max(0.0, probe.radius - float(distance.min()))

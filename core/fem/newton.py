@@ -1,0 +1,145 @@
+"""Equilibrium by Newton's method with a line search on the energy; a motion that is too much at once is split."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from core.fem.linear import NotPositiveDefinite
+from core.fem.model import Assembly, BlockModel, Probe
+from core.frames import FloatArray
+
+__all__ = ["Outcome", "Solution", "solve"]
+
+RELATIVE_TOLERANCE = 1e-6
+"""Converged: the residual's norm is below this share of the tool's push and of the body's internal forces."""
+MAX_ITERATIONS = 40
+MAX_SPLITS = 6
+MAX_PENETRATION = 4e-4
+
+
+class Outcome(Enum):
+    """How a solve ended, as the sentence a user reads."""
+
+    CONVERGED = "converged"
+    ITERATIONS = "no equilibrium within the allowed iterations; the motion between frames is too large or the load too high"
+    INDEFINITE = "the stiffness stayed indefinite: the block buckles or an element is almost inverted"
+    INVERTED = "an element is inverted at the start of the solve"
+    INSIDE_TOOL = "the material came to rest inside the tool"
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Equilibrium positions (n, 3) [m], push of the tool on the body over E (3,) [m^2], and how it was reached."""
+
+    positions: FloatArray
+    push: FloatArray
+    outcome: Outcome
+    iterations: int
+    residual: float
+    penetration: float
+
+    @property
+    def converged(self) -> bool:
+        """Whether this is an equilibrium."""
+        return self.outcome is Outcome.CONVERGED
+
+
+def _scale(model: BlockModel, state: Assembly) -> float:
+    """Force scale [m^2] to which residuals are compared: the push, the weight, and a tiny share of E times the base."""
+    size = model.setup.geometry.size
+    return float(np.linalg.norm(state.push) + model.weight_force.sum() + 1e-5 * size[0] * size[1])
+
+
+def _direction(model: BlockModel, probe: Probe | None, positions: FloatArray, state: Assembly) -> FloatArray | None:
+    """Newton step of the unknowns; an indefinite tangent loses the contact's curvature, then is shifted until it has a factor."""
+    top = model.topology
+    data = state.data
+    for shift in (None, 0.0, 1e-2, 1e-1, 1.0, 10.0):
+        if shift == 0.0:
+            data = model.assemble(positions, probe, bending=False).data
+        elif shift is not None:
+            data = data.copy()
+            data[top.diagonal] += shift * float(np.median(np.abs(data[top.diagonal])))
+        try:
+            top.factor.factorise(data)
+        except NotPositiveDefinite:
+            continue
+        return -top.factor.solve(state.residual)
+    return None
+
+
+def _search(model: BlockModel, probe: Probe | None, positions: FloatArray, step: FloatArray, slope: float, energy: float) -> tuple[FloatArray, float]:
+    """Halve the step until the energy falls as it should (Armijo); near equilibrium rounding decides, so the whole step is taken."""
+    move = np.zeros_like(positions)
+    move[model.topology.free] = step
+    length = 1.0
+    for _ in range(12):
+        trial = positions + length * move
+        value = model.energy(trial, probe)
+        if value <= energy + 1e-4 * length * slope + 1e-13 * abs(energy):
+            return trial, value
+        length /= 2
+    return positions, energy
+
+
+def _newton(model: BlockModel, probe: Probe | None, start: FloatArray, tolerance: float) -> Solution:
+    positions, energy = start, model.energy(start, probe)
+    if not np.isfinite(energy):
+        return Solution(start, np.zeros(3), Outcome.INVERTED, 0, np.inf, 0.0)
+    residual, state, outcome = np.inf, model.assemble(start, probe), Outcome.ITERATIONS
+    for iteration in range(MAX_ITERATIONS + 1):
+        residual = float(np.linalg.norm(state.residual)) / _scale(model, state)
+        if residual <= tolerance:
+            outcome = Outcome.CONVERGED
+            break
+        step = _direction(model, probe, positions, state)
+        if step is None:
+            outcome = Outcome.INDEFINITE
+            break
+        trial, energy = _search(model, probe, positions, step, float(state.residual @ step), energy)
+        if trial is positions:
+            break
+        positions = trial
+        state = model.assemble(positions, probe)
+    if outcome is Outcome.CONVERGED and probe is not None and model.depth_inside(positions, probe) > MAX_PENETRATION:
+        outcome = Outcome.INSIDE_TOOL
+    return Solution(positions, state.push, outcome, iteration, residual, state.penetration)
+
+
+def solve(
+    model: BlockModel,
+    probe: Probe | None,
+    start: FloatArray,
+    before: Probe | None = None,
+    tolerance: float = RELATIVE_TOLERANCE,
+) -> Solution:
+    """Find the equilibrium next to `start` with the tool at `probe`.
+
+    Args:
+        model: the block. probe: the tool, or None without one.
+        start: (n, 3) positions [m] to begin from, usually those of the frame before.
+        before: the tool in that frame; when the whole motion at once finds no equilibrium, it is split between the two.
+        tolerance: residual at which to stop, over the push of the tool.
+
+    Returns:
+        the solution; look at `outcome`. With a failure the positions are the last ones reached.
+    """
+    solution = _newton(model, probe, start, tolerance)
+    if solution.converged or before is None or probe is None:
+        return solution
+    for splits in range(1, MAX_SPLITS + 1):
+        positions, iterations = start, solution.iterations
+        for share in np.linspace(0, 1, 2**splits + 1)[1:]:
+            centre = before.centre + share * (probe.centre - before.centre)
+            solution = _newton(model, Probe(centre, before.radius + share * (probe.radius - before.radius)), positions, tolerance)
+            iterations += solution.iterations
+            positions = solution.positions
+            if not solution.converged:
+                break
+        solution = Solution(positions, solution.push, solution.outcome, iterations, solution.residual, solution.penetration)
+        if solution.converged:
+            return solution
+    return solution

@@ -1,0 +1,265 @@
+"""Replay a tool's motion: one converged equilibrium per frame, or a sentence saying why not.
+
+The block keeps no memory, except for a sliding base, whose place depends on the pushes before. A graded mesh follows the tool:
+each frame has its own node coordinates, and starts from the frame before, interpolated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from core.errors import SolveError
+from core.fem.model import BlockModel, Probe
+from core.fem.newton import RELATIVE_TOLERANCE, Outcome, Solution, solve
+from core.frames import FloatArray
+from core.mesh import BoxMesh, GridSpec, box_mesh
+from core.progress import Report, silent
+from core.setup import Setup
+
+__all__ = ["GRAVITY", "Equilibrium", "Replay", "replay", "require_converged", "rest"]
+
+GRAVITY = 9.81
+"""Acceleration of free fall [m/s^2]."""
+_FOCUS_STEP = 2e-4
+_FREE_STEP = 1.5e-3
+"""Longest motion in contact [m] that is tried at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """The block in one frame.
+
+    Attributes:
+        mesh: its grid. displacement: (n, 3) of the nodes against the stated shape [m], without `slip`.
+        slip: (2,) how far the base has slid along x and y [m].
+        probe: the tool (true centre and radius), phantom frame.
+        force: (3,) of the block on the tool [N]. outcome, iterations, residual, penetration: how it was reached.
+    """
+
+    mesh: BoxMesh
+    displacement: FloatArray
+    slip: FloatArray
+    probe: Probe
+    force: FloatArray
+    outcome: Outcome
+    iterations: int
+    residual: float
+    penetration: float
+    in_contact: bool
+
+    @cached_property
+    def _moved(self) -> FloatArray:
+        return np.asarray(self.displacement + np.append(self.slip, 0.0))
+
+    def move(self, points: FloatArray) -> FloatArray:
+        """Current positions of material points given by their rest positions (m, 3) [m]."""
+        return points + self.mesh.interpolate(self._moved, points)
+
+
+@lru_cache(maxsize=64)
+def _mesh(size: tuple[float, float, float], grid: GridSpec, focus: tuple[float, float, float]) -> BoxMesh:
+    return box_mesh(size, grid, np.array(focus))
+
+
+def _focused_mesh(setup: Setup, grid: GridSpec, centre: FloatArray) -> BoxMesh:
+    """The grid refined towards the surface point next to the tool, in small steps so that neighbouring frames share it."""
+    size = setup.geometry.size
+    if grid.spacing is None:
+        return _mesh(size, grid, (0.0, 0.0, size[2]))
+    half = np.array([size[0] / 2, size[1] / 2])
+    low, high = np.append(-half, 0.0), np.append(half, size[2])
+    focus = np.clip(np.round(centre / _FOCUS_STEP) * _FOCUS_STEP, low, high)
+    inside = np.all((focus > low) & (focus < high))
+    if inside:  # a centre pushed below the surface: refine the nearest side, from above if in doubt
+        gaps = np.concatenate([focus - low, high - focus])
+        gaps[2] = np.inf
+        side = int(np.argmin(gaps))
+        focus[side % 3] = high[side % 3] if side >= 3 else low[side % 3]
+    return _mesh(size, grid, (float(focus[0]), float(focus[1]), float(focus[2])))
+
+
+def _focus(mesh: BoxMesh) -> FloatArray:
+    """Where the grid is finest (3,) [m]; the same place for all even grids of one block."""
+    return np.array([axis[int(np.argmin(np.gradient(axis)))] for axis in mesh.axes])
+
+
+def _away(setup: Setup, probe: Probe) -> bool:
+    """Whether the tool cannot touch the block, sagging and bulging allowed for."""
+    size = np.array(setup.geometry.size)
+    slack = 5e-4 if setup.load.specific_weight_over_stiffness else 0.0
+    nearest = np.clip(probe.centre, [-size[0] / 2, -size[1] / 2, 0], [size[0] / 2, size[1] / 2, size[2]])
+    return bool(np.linalg.norm(probe.centre - nearest) > probe.radius + slack)
+
+
+class Replay:
+    """A block that is led through the tool's positions one after another.
+
+    Args:
+        setup: what is believed. grid: the mesh. tolerance: residual at which a frame counts as converged, over the push.
+    """
+
+    def __init__(self, setup: Setup, grid: GridSpec, tolerance: float = RELATIVE_TOLERANCE) -> None:
+        self.setup, self.grid, self.tolerance = setup, grid, tolerance
+        self._offset = np.array(setup.tool.offset)
+        self._model: BlockModel | None = None
+        self.slip = np.zeros(2)
+
+    def model(self, mesh: BoxMesh) -> BlockModel:
+        """The block's potential on this mesh; the last one is kept."""
+        if self._model is None or self._model.mesh is not mesh:
+            self._model = BlockModel(self.setup, mesh)
+        return self._model
+
+    @cached_property
+    def _free(self) -> Equilibrium:
+        """The block without the tool: sagging under gravity, otherwise as stated."""
+        size = self.setup.geometry.size
+        mesh = _focused_mesh(self.setup, self.grid, np.array([0.0, 0.0, size[2]]))
+        away = Probe(np.array([0.0, 0.0, 10.0]), self.setup.tool.radius)
+        if not self.setup.load.specific_weight_over_stiffness:
+            still = np.zeros_like(mesh.nodes)
+            return Equilibrium(mesh, still, np.zeros(2), away, np.zeros(3), Outcome.CONVERGED, 0, 0.0, 0.0, False)
+        return self._equilibrium(solve(self.model(mesh), None, mesh.nodes, None, self.tolerance), mesh, away)
+
+    def _equilibrium(self, solution: Solution, mesh: BoxMesh, probe: Probe) -> Equilibrium:
+        force = -solution.push * self.setup.material.young_modulus
+        touched = bool(np.linalg.norm(solution.push) > 0)
+        displacement = solution.positions - mesh.nodes
+        return Equilibrium(
+            mesh, displacement, self.slip.copy(), probe, force, solution.outcome, solution.iterations, solution.residual,
+            solution.penetration, touched,
+        )  # fmt: skip
+
+    def _held(self, probe: Probe, start: Equilibrium) -> Equilibrium:
+        """Equilibrium with the base where it is; `probe` in the frame of the slid block."""
+        local = Probe(probe.centre - np.append(self.slip, 0.0), probe.radius)
+        if _away(self.setup, local):
+            return replace(self._free, slip=self.slip.copy(), probe=probe)
+        mesh = _focused_mesh(self.setup, self.grid, local.centre)
+        model = self.model(mesh)
+        # The dent travels with the tool, so the field is carried along with the grid's focus before it is read.
+        carried = _focus(mesh) - _focus(start.mesh) if start.in_contact else np.zeros(3)
+        displacement = start.displacement
+        if start.mesh is not mesh:
+            displacement = start.mesh.interpolate(start.displacement, mesh.nodes - carried)
+            displacement[mesh.base_nodes] *= 0.0 if not self.setup.support.detached else 1.0
+        before = Probe(start.probe.centre - np.append(start.slip, 0.0) + carried, start.probe.radius)
+        solution = self._lead(model, mesh.nodes + displacement, before, local, start.in_contact)
+        return self._equilibrium(solution, mesh, probe)
+
+    def _lead(self, model: BlockModel, positions: FloatArray, before: Probe, probe: Probe, touched: bool) -> Solution:
+        """Go from one tool position to the next in steps short enough for Newton's method."""
+        if not touched:  # begin where the straight way in first touches, not from afar
+            before = self._first_touch(before, probe)
+        travel = float(np.linalg.norm(probe.centre - before.centre))
+        steps = max(1, int(np.ceil(travel / _FREE_STEP)))
+        solution, iterations = None, 0
+        for share in (np.arange(steps) + 1) / steps:
+            stage = Probe(before.centre + share * (probe.centre - before.centre), probe.radius)
+            solution = solve(model, stage, positions, before if steps == 1 else None, self.tolerance)
+            positions, iterations = solution.positions, iterations + solution.iterations
+            if not solution.converged:
+                break
+        if solution is None:
+            raise SolveError("no step was taken")
+        if not solution.converged and steps > 1:
+            solution = solve(model, probe, positions, stage, self.tolerance)
+            iterations += solution.iterations
+        return replace(solution, iterations=iterations)
+
+    def _first_touch(self, before: Probe, probe: Probe) -> Probe:
+        """The last place on the way to `probe` that is clear of the block."""
+        low, high = 0.0, 1.0
+        if np.linalg.norm(before.centre - probe.centre) > 1.0 or not _away(self.setup, before):
+            size = np.array(self.setup.geometry.size)
+            middle = np.array([0.0, 0.0, size[2] / 2])
+            before = Probe(probe.centre + (probe.centre - middle) / np.linalg.norm(probe.centre - middle) * 0.05, probe.radius)
+        for _ in range(12):
+            share = (low + high) / 2
+            clear = _away(self.setup, Probe(before.centre + share * (probe.centre - before.centre), probe.radius))
+            low, high = (share, high) if clear else (low, share)
+        return Probe(before.centre + low * (probe.centre - before.centre), probe.radius)
+
+    def step(self, stated_centre: FloatArray, start: Equilibrium | None = None) -> Equilibrium:
+        """Equilibrium with the tool at a stated centre (3,) [m], phantom frame; slides the base if it cannot hold."""
+        probe = Probe(stated_centre + self._offset, self.setup.tool.radius)
+        frame = self._held(probe, self._free if start is None else start)
+        if self.setup.support.friction_coefficient is None:
+            return frame
+        return self._slide(probe, frame)
+
+    def _slide(self, probe: Probe, frame: Equilibrium) -> Equilibrium:
+        """Move the base until friction holds: Coulomb, with the weight and the push as its load."""
+        friction = self.setup.support.friction_coefficient or 0.0
+        weight = self.setup.mass * GRAVITY
+        for _ in range(12):
+            push = -frame.force
+            pull, load = float(np.linalg.norm(push[:2])), max(weight - push[2], 0.0)
+            excess = pull - friction * load
+            if excess <= 1e-3 * friction * weight or not frame.outcome is Outcome.CONVERGED:
+                break
+            stiffness = self._lateral_stiffness(frame)
+            self.slip = self.slip + push[:2] / pull * min(excess / stiffness, 1e-3)
+            frame = self._held(probe, frame)
+        return frame
+
+    def _lateral_stiffness(self, frame: Equilibrium) -> float:
+        """How fast the sideways push falls as the base gives way [N/m], from the last factor."""
+        push = -frame.force[:2]
+        return float(np.linalg.norm(push)) / max(self._reach(frame), 2e-4)
+
+    def _reach(self, frame: Equilibrium) -> float:
+        """Sideways indentation [m] that the push stands for: the tool's displacement of the material it touches."""
+        surface = frame.mesh.nodes + frame.displacement
+        nearest = int(np.argmin(np.linalg.norm(surface - (frame.probe.centre - np.append(self.slip, 0.0)), axis=1)))
+        return float(np.linalg.norm(frame.displacement[nearest, :2]))
+
+
+def rest(setup: Setup, grid: GridSpec) -> Equilibrium:
+    """The block without the tool."""
+    return Replay(setup, grid)._free
+
+
+def replay(
+    setup: Setup,
+    centres: FloatArray,
+    grid: GridSpec,
+    *,
+    starts: Sequence[Equilibrium] | None = None,
+    tolerance: float = RELATIVE_TOLERANCE,
+    report: Report = silent,
+) -> list[Equilibrium]:
+    """One equilibrium per frame.
+
+    Args:
+        setup: what is believed. centres: (f, 3) stated tool centres [m], phantom frame, in the order of time.
+        grid: the mesh. starts: equilibria of a similar setup at the same frames to begin from; else each begins from the one before.
+        tolerance: residual at which a frame counts as converged, over the push. report: progress.
+
+    A frame without equilibrium is returned with its outcome, never raised: look at `outcome`, or call `require_converged`.
+    """
+    block, frames = Replay(setup, grid, tolerance), []
+    previous: Equilibrium | None = None
+    for number, centre in enumerate(centres):
+        report(number / len(centres), f"frame {number + 1} of {len(centres)}")
+        start = starts[number] if starts is not None and starts[number].in_contact else previous
+        frame = block.step(np.asarray(centre, dtype=float), start)
+        if frame.outcome is not Outcome.CONVERGED and start is not previous:
+            frame = block.step(np.asarray(centre, dtype=float), previous)
+        frames.append(frame)
+        previous = frame if frame.outcome is Outcome.CONVERGED else None
+    return frames
+
+
+def require_converged(frames: Sequence[Equilibrium]) -> None:
+    """Raise SolveError that names the first frame without equilibrium, its residual and the cause."""
+    for number, frame in enumerate(frames):
+        if frame.outcome is not Outcome.CONVERGED:
+            raise SolveError(
+                f"frame {number}: {frame.outcome.value} (relative residual {frame.residual:.2g} after {frame.iterations} iterations)",
+                frame=number, residual=frame.residual, outcome=frame.outcome.name,
+            )  # fmt: skip
