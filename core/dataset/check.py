@@ -185,10 +185,10 @@ def _clock_doubts(summary: SequenceSummary) -> list[str]:
 def _motion_doubts(dataset: Dataset, motion: Motion | None) -> list[str]:
     if motion is None:
         return []
-    if motion.kind == "none":
+    if not motion.contacts:
         return [
-            f"the tool never touches the phantom, it stays {-1e3 * motion.depth:.1f} mm away: are touches and tool radius right?"
+            f"the tool never touches the phantom, it stays {1e3 * motion.nearest:.1f} mm away: are touches and tool radius right?"
         ]
-    if motion.depth > 0.6 * min(dataset.config.size):
-        return [f"the tool goes {1e3 * motion.depth:.1f} mm into the phantom as stated: are touches, size and radius right?"]
+    if -motion.nearest > 0.6 * min(dataset.config.size):
+        return [f"the tool goes {-1e3 * motion.nearest:.1f} mm into the phantom as stated: are touches, size and radius right?"]
     return []

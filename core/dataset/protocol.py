@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from core.dataset.motion import Motion
+from core.dataset.motion import ContactKind, Motion
 
 __all__ = ["Lack", "lacks"]
 
@@ -47,21 +47,21 @@ def _of_measurements(observed: bool, forces: bool) -> Iterable[Lack]:
 
 
 def _of_kinds(motions: list[Motion]) -> Iterable[Lack]:
-    needed: dict[str, tuple[str, tuple[str, ...]]] = {
+    needed: dict[ContactKind, tuple[str, tuple[str, ...]]] = {
         "top": ("poke from above", ("stiff_inclusion", "tool_radius", "poisson_ratio")),
         "side": ("push from the side", ("base_slip", "base_detachment")),
         "drag": ("drag along the surface", ("tool_friction", "time_offset")),
     }
     for kind, (name, effects) in needed.items():
-        count = sum(motion.kind == kind for motion in motions)
+        count = sum(motion.has(kind) for motion in motions)
         if count == 0:
             yield Lack(effects, f"no {name}: add two, elsewhere each")
         elif count == 1:
-            yield Lack(effects, f"only one {name}: repeat it elsewhere, so that one can be kept for the test")
+            yield Lack(effects, f"only one sequence with a {name}: repeat it elsewhere, so that one can be kept for the test")
 
 
 def _of_variety(motions: list[Motion]) -> Iterable[Lack]:
-    pushes = [motion for motion in motions if motion.kind in ("top", "side")]
+    pushes = [contact for motion in motions for contact in motion.contacts if contact.kind != "drag"]
     if len(pushes) < 2:
         return
     depths, speeds = ([getattr(motion, name) for motion in pushes] for name in ("depth", "speed"))
@@ -78,7 +78,7 @@ def _of_variety(motions: list[Motion]) -> Iterable[Lack]:
 
 
 def _of_rests(motions: dict[str, Motion]) -> Iterable[Lack]:
-    touching = {name: motion for name, motion in motions.items() if motion.kind != "none"}
+    touching = {name: motion for name, motion in motions.items() if motion.contacts}
     if early := [name for name, motion in touching.items() if motion.untouched_before < FEW_UNTOUCHED]:
         text = (
             f"fewer than {FEW_UNTOUCHED} untouched clouds before the first contact in {', '.join(early)}: start recording earlier"

@@ -1,0 +1,158 @@
+"""What `palpate check` tells about a dataset that can be read."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from small_dataset import ply_bytes, small_cloud, write_valid_dataset
+
+from core.dataset import open_dataset
+from core.dataset.check import DatasetSummary, check_dataset
+from core.dataset.coverage import coverage_picture
+from core.errors import DatasetError
+from core.frames import Transform
+
+POKE = "sequences/poke-01"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return write_valid_dataset(tmp_path / "block")
+
+
+def registration(folder: Path) -> Transform:
+    """Closed form from the touches, whose error is zero here."""
+    dataset = open_dataset(folder)
+    landmarks = np.array([dataset.config.landmarks[name] for name in dataset.touches.names])
+    touches = dataset.touches.positions
+    rotation, _ = Rotation.align_vectors(landmarks - landmarks.mean(0), touches - touches.mean(0))
+    return Transform(rotation.as_matrix(), landmarks.mean(0) - rotation.apply(touches.mean(0)))
+
+
+def check(folder: Path) -> DatasetSummary:
+    return check_dataset(open_dataset(folder), registration(folder))
+
+
+def test_rates_counts_and_motions_of_a_whole_dataset(folder: Path) -> None:
+    summary = check(folder)
+    drag, poke = summary.sequences
+    assert (poke.name, poke.split, drag.split) == ("poke-01", "train", "test")
+    assert poke.points == (192, 192, 192)
+    assert summary.rest_points == 192
+    np.testing.assert_allclose([poke.kinematics.rate, poke.clouds.rate, poke.duration], [200, 5, 0.995], rtol=1e-6)
+    assert poke.kinematics.jitter < 1e-5
+    assert poke.kinematics.dropouts == poke.clouds.dropouts == poke.clouds_outside == 0
+    assert poke.motion is not None
+    assert drag.motion is not None
+    assert [contact.kind for contact in poke.motion.contacts] == ["top"]
+    np.testing.assert_allclose(poke.motion.nearest, -0.003, atol=2e-4)
+    assert summary.warnings == ()
+
+
+def test_the_summary_is_plain_json(folder: Path) -> None:
+    plain = json.loads(json.dumps(check(folder).as_dict(), allow_nan=False))
+    assert plain["sequences"][1]["motion"]["contacts"][0]["kind"] == "top"
+
+
+def test_without_a_registration_no_motion_is_guessed(folder: Path) -> None:
+    summary = check_dataset(open_dataset(folder))
+    assert all(sequence.motion is None for sequence in summary.sequences)
+    assert all("poke" not in lack.sentence for lack in summary.lacks)
+
+
+def test_missing_kinds_of_motion_are_told_with_the_effects_they_would_show(folder: Path) -> None:
+    found = {lack.sentence.partition(":")[0]: lack.effects for lack in check(folder).lacks}
+    assert found["no push from the side"] == ("base_slip", "base_detachment")
+    assert "no drag along the surface" in found
+    assert any("untouched clouds before" in sentence for sentence in found)
+    assert any("longest rest" in sentence for sentence in found)
+    assert all("young_modulus" not in effects for effects in found.values())
+
+
+def test_without_forces_the_modulus_is_told_to_be_unseen(folder: Path) -> None:
+    (folder / POKE / "forces.csv").unlink()
+    assert [lack.effects for lack in check(folder).lacks if "forces" in lack.sentence] == [("young_modulus",)]
+
+
+def test_lost_clouds_and_a_pause_of_the_robot_are_counted(folder: Path) -> None:
+    for file, rows in (("clouds.csv", slice(3, 4)), ("kinematics.csv", slice(60, 90))):
+        path = folder / POKE / file
+        lines = path.read_text().splitlines()
+        del lines[rows]
+        path.write_text("\n".join(lines) + "\n")
+    summary = check(folder)
+    poke = summary.sequences[1]
+    assert (poke.clouds.dropouts, poke.kinematics.dropouts) == (1, 1)
+    np.testing.assert_allclose([poke.clouds.longest, poke.kinematics.longest], [0.4, 0.155], atol=1e-6)
+    text = "\n".join(summary.warnings)
+    assert "poke-01: the clouds pause once, at most 0.40 s" in text
+    assert "poke-01: the kinematics pause once, at most 0.15 s" in text or "at most 0.16 s" in text
+    assert "1 clouds lie in clouds folders without a row" in text
+
+
+def test_clouds_stamped_beyond_the_motion_are_counted(folder: Path) -> None:
+    path = folder / POKE / "clouds.csv"
+    path.write_text(path.read_text().replace("100.90000", "101.90000"))
+    summary = check(folder)
+    assert summary.sequences[1].clouds_outside == 1
+    assert any("1 of 5 clouds are stamped outside the kinematics" in text for text in summary.warnings)
+
+
+def test_a_blocked_view_is_noticed(folder: Path) -> None:
+    (folder / POKE / "clouds/000002.ply").write_bytes(ply_bytes(small_cloud()[:40]))
+    assert any("the smallest cloud has 40 points, the median one 192" in text for text in check(folder).warnings)
+
+
+def test_sequences_outside_the_splits_and_an_empty_test_are_told(folder: Path) -> None:
+    path = folder / "dataset.toml"
+    path.write_text(path.read_text().replace('test = ["drag-01"]', "test = []"))
+    text = "\n".join(check(folder).warnings)
+    assert "no sequence is kept for the test" in text
+    assert "drag-01: is in no split" in text
+
+
+def test_a_tool_that_never_touches_is_told_with_its_distance(folder: Path) -> None:
+    raised = Transform(translation=np.array([0, 0, 0.02])) @ registration(folder)
+    summary = check_dataset(open_dataset(folder), raised)
+    assert any("poke-01: the tool never touches the phantom, it stays 17." in text for text in summary.warnings)
+
+
+def test_a_tool_that_hardly_moves_is_told_with_its_path(folder: Path) -> None:
+    path = folder / POKE / "kinematics.csv"
+    header, *rows = path.read_text().splitlines()
+    path.write_text("\n".join([header, *(f"{row.partition(',')[0]},{rows[0].partition(',')[2]}" for row in rows)]) + "\n")
+    assert any("poke-01: the tool moves by 0.000 mm only" in text for text in check(folder).warnings)
+
+
+def test_a_broken_cloud_is_found_by_the_check(folder: Path) -> None:
+    points = small_cloud()
+    points[5] = np.nan
+    (folder / POKE / "clouds/000004.ply").write_bytes(ply_bytes(points))
+    with pytest.raises(DatasetError, match="row 6"):
+        check(folder)
+
+
+def test_the_coverage_picture_is_a_picture_and_the_only_new_file(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    coverage_picture(open_dataset(folder), registration(folder), out / "coverage.png")
+    assert [path.name for path in out.iterdir()] == ["coverage.png"]
+    data = (out / "coverage.png").read_bytes()
+    assert data.startswith(b"\x89PNG")
+    width, height = (int.from_bytes(data[at : at + 4], "big") for at in (16, 20))
+    assert 1000 < width < 3000
+    assert 700 < height < 3000
+
+
+def test_a_picture_of_paths_that_never_touch_can_be_drawn(folder: Path, tmp_path: Path) -> None:
+    shutil.rmtree(folder / "sequences/drag-01")
+    path = folder / "dataset.toml"
+    path.write_text(path.read_text().replace('"drag-01"', ""))
+    raised = Transform(translation=np.array([0, 0, 0.02])) @ registration(folder)
+    coverage_picture(open_dataset(folder), raised, tmp_path / "coverage.png")
+    assert (tmp_path / "coverage.png").stat().st_size > 10_000
