@@ -201,6 +201,13 @@ _TABLES = {
     "kinematics in millimetres": Breakage(
         scale_columns(_KINEMATICS, range(1, 4), 1e3), {"file": _KINEMATICS, "row": 2}, ("millimetres", "10 m")
     ),
+    "kinematics in milliseconds": Breakage(
+        scale_columns(_KINEMATICS, range(1), 1e3), {"file": _KINEMATICS, "row": 3, "key": "t"}, ("steps by 5 s", "milliseconds")
+    ),
+    "kinematics in nanoseconds": Breakage(
+        scale_columns(_KINEMATICS, range(1), 1e9), {"file": _KINEMATICS, "row": 3, "key": "t"}, ("nanoseconds",)
+    ),
+    "quaternion beyond all bounds": Breakage(set_cell(_KINEMATICS, 7, 5, "1e300"), {"file": _KINEMATICS, "row": 7}, ("norm inf",)),
     "forces header": Breakage(replace(_FORCES, "t,fx,fy,fz", "time,fx,fy,fz"), {"file": _FORCES, "row": 1}, ("expected 't,fx",)),
     "force of nan": Breakage(set_cell(_FORCES, 12, 2, "nan"), {"file": _FORCES, "row": 12, "key": "fy"}, ("'nan'",)),
     "forces in millinewtons": Breakage(

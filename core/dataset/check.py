@@ -7,9 +7,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from core.dataset.folder import Dataset, Sequence
+from core.dataset.folder import Dataset
 from core.dataset.motion import Motion, motion_of
 from core.dataset.protocol import Lack, lacks
+from core.dataset.sequence import Sequence
 from core.frames import FloatArray, Transform
 from core.progress import Report, part, silent
 

@@ -28,6 +28,7 @@ _TYPES = {
     "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
 }  # fmt: skip
 _ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": "="}
+_BARE = tuple(tuple((axis, kind) for axis in "xyz") for kind in ("f4", "f8"))
 _Order = Literal["<", ">", "="]
 
 
@@ -186,11 +187,13 @@ def _check_size(file: str, header: PlyHeader, size: int, rest: list[_Element]) -
 
 def _binary_points(file: str, header: PlyHeader, data: bytes) -> FloatArray:
     records = np.frombuffer(data, dtype=header.layout, count=header.count)
-    if [name for name, _ in header.fields] == ["x", "y", "z"] and len({kind for _, kind in header.fields}) == 1:
-        return records.view(header.layout["x"]).reshape(-1, 3).astype(np.float64)
     points = np.empty((header.count, 3))
-    for axis, name in enumerate("xyz"):
-        points[:, axis] = records[name]
+    with np.errstate(invalid="ignore"):  # a NaN may be of the signalling kind; it is found afterwards
+        if header.fields in _BARE:
+            points[:] = records.view(header.layout["x"]).reshape(-1, 3)
+        else:
+            for axis, name in enumerate("xyz"):
+                points[:, axis] = records[name]
     return points
 
 

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 import numpy as np
 
 from core.dataset.cloud import read_cloud, read_header
 from core.dataset.files import problem
 from core.dataset.schema import FILE, DatasetConfig, nearest, read_config
-from core.dataset.table import FIRST_ROW, check_coordinates, check_increasing, read_labelled, read_numbers
+from core.dataset.sequence import Sequence, read_sequence
+from core.dataset.table import FIRST_ROW, check_coordinates, read_labelled
 from core.errors import DatasetError
 from core.frames import FloatArray
 from core.progress import Report, silent
 
-__all__ = ["Dataset", "Forces", "Kinematics", "Sequence", "Touches", "open_dataset"]
+__all__ = ["Dataset", "Touches", "open_dataset"]
 
 FEWEST_TOUCHES = 4
-LARGEST_FORCE = 1000.0  # N; beyond any bench for soft tissue, so another unit
 _BAGS = (".bag", ".db3", ".mcap")
 
 
@@ -29,55 +29,6 @@ class Touches:
 
     names: tuple[str, ...]
     positions: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Kinematics:
-    """The tool's path: time (n,) [s], position (n, 3) [m] and quaternion (n, 4) (x, y, z, w), robot frame."""
-
-    time: FloatArray
-    position: FloatArray
-    quaternion: FloatArray
-
-    def position_at(self, times: FloatArray) -> FloatArray:
-        """Tool centres (m, 3) [m], robot frame, at these times (m,) [s]; linear between rows, beyond the ends the end itself."""
-        return np.stack([np.interp(times, self.time, self.position[:, axis]) for axis in range(3)], axis=-1)
-
-
-@dataclass(frozen=True, eq=False)
-class Forces:
-    """Force on the tool: time (n,) [s], force (n, 3) [N], robot frame."""
-
-    time: FloatArray
-    force: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Sequence:
-    """One motion of the tool; its length is the number of clouds.
-
-    Attributes:
-        cloud_times: (m,) [s], the clock of the kinematics as far as the experimenter knows.
-        cloud_files: (m) paths relative to the dataset.
-    """
-
-    root: Path
-    name: str
-    kinematics: Kinematics
-    cloud_times: FloatArray
-    cloud_files: tuple[str, ...]
-    forces: Forces | None
-
-    def __len__(self) -> int:
-        return len(self.cloud_files)
-
-    def count(self, index: int) -> int:
-        """Number of points of a cloud, from its header."""
-        return read_header(self.root, self.cloud_files[index], within=f"sequences/{self.name}").count
-
-    def cloud(self, index: int) -> FloatArray:
-        """The raw cloud (k, 3) [m], camera frame, read from disk at each call."""
-        return read_cloud(self.root, self.cloud_files[index], within=f"sequences/{self.name}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +90,7 @@ def open_dataset(path: Path | str) -> Dataset:
     _check_folder(root)
     config = read_config(root)
     touches = _read_touches(root, config)
-    sequences = tuple(_read_sequence(root, name) for name in _sequence_names(root))
+    sequences = tuple(read_sequence(root, name) for name in _sequence_names(root))
     _check_splits(config, [sequence.name for sequence in sequences])
     observed = any(len(sequence) for sequence in sequences)
     if observed and not config.has_camera:
@@ -219,78 +170,3 @@ def _check_splits(config: DatasetConfig, names: list[str]) -> None:
                     key=f"splits.{split}",
                     value=name,
                 )
-
-
-def _read_sequence(root: Path, name: str) -> Sequence:
-    home = f"sequences/{name}"
-    kinematics = _read_kinematics(root, f"{home}/kinematics.csv")
-    times, files = np.empty(0), tuple[str, ...]()
-    clouds, forces = f"{home}/clouds.csv", f"{home}/forces.csv"
-    has_forces = (root / forces).exists()
-    if (root / clouds).exists() or (root / home / "clouds").exists():
-        times, files = _read_cloud_list(root, home, clouds, kinematics.time)
-    elif not has_forces:
-        raise problem(home, "has neither clouds.csv nor forces.csv; expected at least one: add what was measured")
-    return Sequence(root, name, kinematics, times, files, _read_forces(root, forces) if has_forces else None)
-
-
-def _read_kinematics(root: Path, file: str) -> Kinematics:
-    table = read_numbers(root, file, "t,x,y,z,qx,qy,qz,qw")
-    if len(table) < 2:
-        raise problem(file, "has one row; expected a motion of at least two: export this sequence again", row=FIRST_ROW + 1)
-    time, position, quaternion = table[:, 0].copy(), table[:, 1:4], table[:, 4:]
-    check_increasing(file, time)
-    check_coordinates(file, position)
-    norms = np.linalg.norm(quaternion, axis=1)
-    if len(bad := np.flatnonzero(np.abs(norms - 1) > 1e-2)):
-        at = int(bad[0])
-        text = f"the quaternion qx,qy,qz,qw has norm {norms[at]:.4g}; expected 1: are the columns in the order of the header?"
-        raise problem(file, text, row=at + FIRST_ROW, key="qx,qy,qz,qw", value=f"{norms[at]:.4g}")
-    return Kinematics(time, position, quaternion)
-
-
-def _read_cloud_list(root: Path, home: str, file: str, clock: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
-    names, numbers = read_labelled(root, file, "t,file", label=1)
-    times = numbers[:, 0]
-    check_increasing(file, times)
-    seen: dict[str, int] = {}
-    for row, name in enumerate(names, FIRST_ROW):
-        path = PurePosixPath(name)
-        if path.is_absolute() or ".." in path.parts or "\\" in name or not name.isprintable():
-            text = (
-                f"file = '{name[:80]}' leads out of the sequence; expected a path inside such as clouds/000000.ply: move it there"
-            )
-            raise problem(file, text, row=row, key="file", value=name[:80])
-        if str(path) in seen:
-            text = f"file = '{name}' is in row {seen[str(path)]} already; expected one cloud per frame: remove one row"
-            raise problem(file, text, row=row, key="file", value=name)
-        seen[str(path)] = row
-        _check_cloud(root, home, file, row, name)
-    if times[-1] < clock[0] or times[0] > clock[-1]:
-        text = (
-            f"clouds from t = {times[0]:.3f} to {times[-1]:.3f} s, kinematics from {clock[0]:.3f} to {clock[-1]:.3f} s; "
-            "expected the same clock and an overlap: convert the stamps to one clock"
-        )
-        raise problem(file, text, row=FIRST_ROW, key="t", value=f"{times[0]:.3f}")
-    return times, tuple(f"{home}/{name}" for name in names)
-
-
-def _check_cloud(root: Path, home: str, file: str, row: int, name: str) -> None:
-    try:
-        read_header(root, f"{home}/{name}", within=home)
-    except DatasetError as error:
-        # Both places matter: the broken cloud is the file, the row is the one that asks for it.
-        where = {"row": row, **error.where}
-        raise DatasetError(f"{error.message} (asked for by {file}, row {row})", **where) from None
-
-
-def _read_forces(root: Path, file: str) -> Forces:
-    table = read_numbers(root, file, "t,fx,fy,fz")
-    time, force = table[:, 0], table[:, 1:]
-    check_increasing(file, time)
-    if len(bad := np.argwhere(np.abs(force) > LARGEST_FORCE)):
-        at, axis = (int(index) for index in bad[0])
-        key = ("fx", "fy", "fz")[axis]
-        text = f"{key} = {force[at, axis]:g} N; expected at most {LARGEST_FORCE:g} N on soft tissue: did you write millinewtons?"
-        raise problem(file, text, row=at + FIRST_ROW, key=key, value=f"{force[at, axis]:g}")
-    return Forces(time, force)

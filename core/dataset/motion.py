@@ -10,7 +10,8 @@ from typing import Literal
 
 import numpy as np
 
-from core.dataset.folder import Dataset, Sequence
+from core.dataset.folder import Dataset
+from core.dataset.sequence import Sequence
 from core.frames import FloatArray, Transform
 
 __all__ = ["Contact", "ContactKind", "Motion", "box_gap", "motion_of", "smooth_path"]

@@ -19,6 +19,7 @@ __all__ = ["FIRST_ROW", "LARGEST_COORDINATE", "check_coordinates", "check_increa
 
 FIRST_ROW = 2
 LARGEST_COORDINATE = 10.0  # m; a bench is a metre across, so more is another unit
+LATEST = 1e11  # s; since 1970 it is 1.8e9 s, so more is another unit
 _LIMIT = 2**29
 _CHUNK = 20_000
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -53,7 +54,11 @@ def read_labelled(root: Path, file: str, header: str, label: int) -> tuple[list[
 
 
 def check_increasing(file: str, time: FloatArray) -> None:
-    """Refuse a time column (n,) [s] that stands still or goes back."""
+    """Refuse a time column (n,) [s] that stands still or goes back, or is not in seconds."""
+    if len(late := np.flatnonzero(np.abs(time) > LATEST)):
+        value = f"{time[late[0]]:g}"
+        text = f"t = {value} s; expected seconds, since any start: did you write milliseconds or nanoseconds?"
+        raise problem(file, text, row=int(late[0]) + FIRST_ROW, key="t", value=value)
     bad = np.flatnonzero(np.diff(time) <= 0)
     if len(bad):
         at = int(bad[0])
