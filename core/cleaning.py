@@ -88,7 +88,7 @@ class Cleaner:
         reason = np.zeros(len(points), dtype=np.int8)
         height = points @ self.table[0] - self.table[1]
         apart = box_distance(points, np.asarray(self.size))
-        thickness = max(SIGMAS * self.noise, 1.0e-3)
+        thickness = max(SIGMAS * self.noise * self._table_slant(), 1.0e-3)
         reason[apart > self.bulge] = REASONS.index("background")
         on_table = np.abs(height) < thickness
         reason[height < thickness] = REASONS.index("background")
@@ -108,6 +108,11 @@ class Cleaner:
             points[on_table & (apart > thickness) & (apart < TABLE_REACH)],
             {name: int(count) for name, count in zip(REASONS, counts, strict=True)},
         )
+
+    def _table_slant(self) -> float:
+        """Cosine between the table's normal and the line of sight to the block: how much of the depth noise is height."""
+        sight = self.phantom_from_camera.translation
+        return float(abs(self.table[0] @ sight) / max(float(np.linalg.norm(sight)), 1e-9))
 
     def _tool_points(self, points: FloatArray, tool: ToolPose) -> tuple[Mask, Mask]:
         """Which points (n, 3), phantom frame, lie on the sphere, and which on the shaft, as the camera sees them.

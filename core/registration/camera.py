@@ -167,7 +167,7 @@ def _refine(cloud: FloatArray, size: tuple[float, float, float], pose: Transform
         weighted = jacobian * (weights / (_noise(found) * found.slant) ** 2)[:, None]
         drift = pose @ guess.inverse()
         pull = np.concatenate([drift.apply(pivot) - pivot, drift.rotation_vector]) / PRIOR**2
-        step_vector = -np.linalg.solve(weighted.T @ jacobian + np.diag(1 / PRIOR**2), weighted.T @ found.distance + 1e-3 * pull)
+        step_vector = -np.linalg.solve(weighted.T @ jacobian + np.diag(1 / PRIOR**2), weighted.T @ found.distance + pull)
         pose = small_motion(step_vector, pivot) @ pose
         if step > 10 and np.abs(step_vector[:3]).max() < 1e-7 and np.abs(step_vector[3:]).max() < 1e-6:
             break

@@ -14,9 +14,9 @@ __all__ = ["FLOOR", "RobotFit", "fit_robot", "rigid_fits", "similarity"]
 
 FLOOR = 1.0e-4
 """No touch is trusted better than this [m]."""
-USUAL, USUAL_WORTH = 3.0e-4, 3.0
+USUAL, USUAL_WORTH = 3.0e-4, 2.0
 """Four touches leave six degrees of freedom, and agree by luck now and then: the variance is estimated together with the usual
-error of a careful touch [m], which counts as this many degrees of freedom (posterior mean under an inverse gamma prior)."""
+error of a careful touch [m], which counts as this many residuals (posterior mean under an inverse gamma prior)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ def fit_robot(touches: FloatArray, landmarks: FloatArray) -> RobotFit:
     rotation, translation, rms = rigid_fits(touches, landmarks[None])
     fit = Transform(rotation[0], translation[0])
     residuals = fit.apply(touches) - landmarks
-    freedom = 3 * len(touches) - 6 + USUAL_WORTH - 2
+    freedom = 3 * len(touches) - 6 + USUAL_WORTH - 2.0
     sigma = max(FLOOR, float(np.sqrt(((residuals**2).sum() + USUAL_WORTH * USUAL**2) / freedom)))
     pivot = landmarks.mean(axis=0)
     jacobian = motion_jacobian(landmarks, pivot).reshape(-1, 6)
