@@ -1,0 +1,35 @@
+"""Datasets by folder name: what there is, and whether it is in order."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter
+
+from app.desk import DeskOf
+from app.summaries import dataset_summary
+
+__all__ = ["router"]
+
+router = APIRouter(prefix="/datasets", tags=["datasets"])
+
+
+@router.get("")
+def listed(desk: DeskOf) -> dict[str, Any]:
+    """The folder that is looked into and the names found there."""
+    return {"folder": str(desk.settings.datasets), "datasets": desk.library.names()}
+
+
+@router.get("/{name}")
+def one(name: str, desk: DeskOf) -> dict[str, Any]:
+    """Phantom, tool, splits and sequences of one dataset, after the checks that opening makes."""
+    return dataset_summary(desk.library.open(name))
+
+
+@router.get("/{name}/check")
+def check(name: str, desk: DeskOf) -> dict[str, Any]:
+    """The same after reading every file; 422 with place and expectation if anything is off."""
+    dataset = desk.library.open(name)
+    dataset.validate()
+    return dataset_summary(dataset)
+

@@ -1,0 +1,46 @@
+"""Diagnoses: start one, see the list, read a report."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter
+
+from app.desk import DeskOf
+from app.problems import Conflict
+from app.records import JobState
+from app.schemas import DiagnosisRequest, JobOut
+
+__all__ = ["router"]
+
+router = APIRouter(prefix="/diagnoses", tags=["diagnoses"])
+
+
+@router.post("", status_code=202)
+def start(request: DiagnosisRequest, desk: DeskOf) -> JobOut:
+    """Check the dataset completely, then queue its diagnosis; the answer's id names the job now and the run later."""
+    dataset = desk.library.open(request.dataset)
+    dataset.validate()
+    return JobOut.of(desk.diagnose(dataset.path, request.dataset, request.seed))
+
+
+@router.get("")
+def listed(desk: DeskOf) -> list[JobOut]:
+    """All diagnoses that were asked for here, the newest first."""
+    return [JobOut.of(job) for job in desk.jobs.list() if job.kind == "diagnosis"]
+
+
+@router.get("/{identity}")
+def one(identity: str, desk: DeskOf) -> JobOut:
+    """One diagnosis."""
+    return JobOut.of(desk.jobs.get(identity))
+
+
+@router.get("/{identity}/report")
+def report(identity: str, desk: DeskOf) -> dict[str, Any]:
+    """The report of a finished diagnosis; 409 while there is none."""
+    job = desk.jobs.get(identity)
+    if job.state is not JobState.DONE:
+        reason = f": {job.error['message']}" if job.error else ""
+        raise Conflict(f"diagnosis {identity} is {job.state.value} and has no report{reason}", job=identity, state=job.state.value)
+    return desk.runs.get(identity).report

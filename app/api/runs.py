@@ -1,0 +1,104 @@
+"""Finished diagnoses: reports, patterns, pictures, and the numbers of each frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fastapi import APIRouter
+from fastapi.responses import FileResponse
+
+from app.colours import nice_limit
+from app.desk import DeskOf
+from app.runs import Run
+from app.sentences import verdict_sentence
+from app.summaries import finite
+
+__all__ = ["router"]
+
+router = APIRouter(prefix="/runs", tags=["runs"])
+
+
+@router.get("")
+def listed(desk: DeskOf) -> list[dict[str, Any]]:
+    """All whole runs, the newest first, each with its verdict."""
+    return [_heading(run) for run in desk.runs.list()]
+
+
+@router.get("/{name}")
+def one(name: str, desk: DeskOf) -> dict[str, Any]:
+    """One run: verdict sentence, phantom and, per sequence, its split and its mean errors [m]."""
+    run = desk.runs.get(name)
+    replays = [run.replay(sequence) for sequence in run.sequences]
+    size = [round(float(edge), 6) for edge in replays[0].size] if replays else None
+    return {
+        **_heading(run),
+        "sentence": verdict_sentence(run.report, size),
+        "size": size,
+        "has_clouds": Path(run.origin.get("dataset", "")).is_dir() and "dataset" in run.origin,
+        "sequences": [
+            {
+                "name": replay.name,
+                "frames": len(replay),
+                "seconds": round(float(replay["time"][-1] - replay["time"][0]), 3) if len(replay) else 0.0,
+                "split": run.origin.get("splits", {}).get(replay.name),
+                "distance_raw": finite(np.nanmean(replay["distance_raw"])),
+                "distance_extended": finite(np.nanmean(replay["distance_extended"])),
+            }
+            for replay in replays
+        ],
+    }
+
+
+@router.get("/{name}/report")
+def report(name: str, desk: DeskOf) -> dict[str, Any]:
+    """The report, as written."""
+    return desk.runs.get(name).report
+
+
+@router.get("/{name}/model")
+def model(name: str, desk: DeskOf) -> dict[str, Any]:
+    """The extended model with its lineage."""
+    return desk.runs.get(name).model
+
+
+@router.get("/{name}/patterns")
+def patterns(name: str, desk: DeskOf) -> dict[str, Any]:
+    """Patch centres and normals and the measured and predicted error pattern, all [m], null where unseen; `limit` is the end of their common scale."""
+    arrays = desk.runs.get(name).patterns()
+    values = {key: finite(arrays[key], digits=7) for key in ("centres", "normals", "measured", "predicted")}
+    return {**values, "limit": nice_limit(np.concatenate([arrays["measured"], arrays["predicted"]]))}
+
+
+@router.get("/{name}/pictures/{picture}")
+def picture(name: str, picture: str, desk: DeskOf) -> FileResponse:
+    """A picture of the run."""
+    return FileResponse(desk.runs.get(name).picture(picture))
+
+
+@router.get("/{name}/sequences/{sequence}")
+def sequence(name: str, sequence: str, desk: DeskOf) -> dict[str, Any]:
+    """Times [s] and errors [m] of each frame of one sequence, and the automatic end of its error scale [m]."""
+    reel = desk.sessions.reel(name, sequence)
+    replay = reel.replay
+    series = ("distance_raw", "distance_extended", "paper_raw", "paper_extended")
+    return {
+        "name": sequence,
+        "time": finite(replay["time"] - replay["time"][0], digits=5),
+        **{key: finite(replay[key], digits=8) for key in series},
+        "noise_floor": finite(replay["noise_floor"]),
+        "outcome": [int(code) for code in replay["outcome"]],
+        "automatic_limit": reel.limit,
+    }
+
+
+def _heading(run: Run) -> dict[str, Any]:
+    report = run.report
+    return {
+        "id": run.name,
+        "dataset": report.get("dataset", "?"),
+        "verdict": report.get("verdict", "?"),
+        "causes": [cause["effect"] for cause in report.get("causes", [])],
+        "created": run.origin.get("created", run.path.stat().st_mtime),
+    }

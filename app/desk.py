@@ -1,0 +1,64 @@
+"""Everything the endpoints share, made once per server."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import Depends
+from starlette.requests import HTTPConnection
+
+from app.jobs import Jobs
+from app.library import Library
+from app.records import Job
+from app.runs import Runs
+from app.sessions import Sessions
+from app.settings import Settings
+from app.stage import Stage
+
+__all__ = ["Desk", "DeskOf"]
+
+
+@dataclass(frozen=True)
+class Desk:
+    """The parts of a running server."""
+
+    settings: Settings
+    library: Library
+    runs: Runs
+    jobs: Jobs
+    sessions: Sessions
+    stage: Stage
+
+    @classmethod
+    def open(cls, settings: Settings, targets: dict[str, str]) -> Desk:
+        """Start the job queue and the inner viewer."""
+        runs = Runs(settings.runs)
+        sessions = Sessions(runs)
+        return cls(
+            settings=settings,
+            library=Library(settings.datasets),
+            runs=runs,
+            jobs=Jobs(settings.runs, targets, settings.preload),
+            sessions=sessions,
+            stage=Stage(sessions.join, sessions.leave),
+        )
+
+    def diagnose(self, dataset: Path, name: str, seed: int) -> Job:
+        """Queue the diagnosis of a dataset folder; the job's id will be the run's."""
+        request = {"dataset": str(dataset), "name": name, "runs": str(self.settings.runs), "workers": self.settings.workers, "seed": seed}
+        return self.jobs.submit("diagnosis", request, label=name)
+
+    def close(self) -> None:
+        """Cancel what runs and stop the inner viewer."""
+        self.jobs.close()
+        self.stage.close()
+
+
+def _desk(connection: HTTPConnection) -> Desk:
+    desk: Desk = connection.app.state.desk
+    return desk
+
+
+DeskOf = Annotated[Desk, Depends(_desk)]

@@ -1,0 +1,43 @@
+"""The datasets that the page may name: folders directly below one folder, nothing outside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.problems import Missing
+from app.runs import NAME
+from core.errors import DatasetError
+
+if TYPE_CHECKING:
+    from core.dataset import Dataset
+
+__all__ = ["Library"]
+
+
+class Library:
+    """Names and opens the datasets below `folder`."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def names(self) -> list[str]:
+        """The folders that hold a dataset.toml, sorted."""
+        return sorted(path.parent.name for path in self.folder.glob("*/dataset.toml") if NAME.fullmatch(path.parent.name))
+
+    def path(self, name: str) -> Path:
+        """The folder of one dataset; a name that leads elsewhere is refused."""
+        if not NAME.fullmatch(name):
+            raise DatasetError(f"{name!r} is not the name of a dataset folder: letters, digits, dot, dash and underscore", key="dataset")
+        path = (self.folder / name).resolve()
+        if path.parent != self.folder.resolve():
+            raise DatasetError(f"{name} leads out of the datasets folder; copy the data into it", key="dataset")
+        if not path.is_dir():
+            raise Missing(f"there is no dataset {name}; GET /api/datasets lists those there are", dataset=name)
+        return path
+
+    def open(self, name: str) -> Dataset:
+        """One dataset, validated as far as opening does."""
+        from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
+
+        return open_dataset(self.path(name))

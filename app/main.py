@@ -1,0 +1,65 @@
+"""The web service: `create_app(settings)`; nothing happens at import."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import FileResponse, JSONResponse
+from fastapi.staticfiles import StaticFiles
+from starlette.exceptions import HTTPException
+
+from app import relay
+from app.api import datasets, diagnoses, effects, jobs, runs, sessions
+from app.desk import Desk
+from app.guard import Guard
+from app.problems import as_dict, status_code
+from app.settings import Settings, require_loopback
+from app.work import TARGETS
+from core.errors import PalpateError
+
+__all__ = ["create_app"]
+
+
+def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> FastAPI:
+    """The service for one folder of runs and one of datasets; `targets` names the function of each kind of job."""
+    require_loopback(settings.host)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        app.state.desk = Desk.open(settings, dict(targets))
+        yield
+        app.state.desk.close()
+
+    app = FastAPI(title="Palpate", lifespan=lifespan, docs_url=None, redoc_url=None)
+    app.add_middleware(Guard)
+    for module in (datasets, diagnoses, jobs, runs, sessions, effects):
+        app.include_router(module.router, prefix="/api")
+    app.include_router(relay.router)
+    _answer_problems(app)
+
+    @app.get("/", include_in_schema=False)
+    def page() -> FileResponse:
+        return FileResponse(settings.static / "index.html", headers={"cache-control": "no-cache"})
+
+    app.mount("/static", StaticFiles(directory=settings.static), name="static")
+    return app
+
+
+def _answer_problems(app: FastAPI) -> None:
+    @app.exception_handler(PalpateError)
+    def problem(_: Request, error: PalpateError) -> JSONResponse:
+        return JSONResponse(as_dict(error), status_code=status_code(error))
+
+    @app.exception_handler(RequestValidationError)
+    def unreadable(_: Request, error: RequestValidationError) -> JSONResponse:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        return JSONResponse({"kind": "RequestError", "message": f"{place}: {first['msg']}", "where": {"key": place}}, status_code=422)
+
+    @app.exception_handler(HTTPException)
+    def http(request: Request, error: HTTPException) -> JSONResponse:
+        message = f"{request.method} {request.url.path}: {error.detail}"
+        return JSONResponse({"kind": "HttpError", "message": message, "where": {}}, status_code=error.status_code)

@@ -1,0 +1,137 @@
+"""Results on disk: one folder per finished diagnosis, as the diagnosis wrote it."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.problems import Missing
+from core.errors import RunError
+from core.frames import FloatArray, Transform
+
+__all__ = ["NAME", "Replay", "Run", "Runs"]
+
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+FIELDS = (
+    *("time", "cloud_index", "faces", "rest", "raw", "extended", "tool_raw", "tool_extended", "tool_radius_raw"),
+    *("tool_radius_extended", "error_raw", "error_extended", "distance_raw", "distance_extended", "paper_raw"),
+    *("paper_extended", "noise_floor", "camera_raw", "camera_extended", "outcome"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """One sequence as measured and as both models replay it; `arrays` holds what the run folder's contract names."""
+
+    name: str
+    arrays: dict[str, Any]
+
+    def __getitem__(self, key: str) -> Any:
+        return self.arrays[key]
+
+    def __len__(self) -> int:
+        return len(self.arrays["time"])
+
+    @property
+    def size(self) -> FloatArray:
+        """(3,) edge lengths of the phantom's bounding box [m]."""
+        rest = self.arrays["rest"]
+        return np.asarray(rest.max(axis=0) - rest.min(axis=0), dtype=float)
+
+    def camera(self, model: str) -> Transform:
+        """phantom_from_camera as the `raw` or the `extended` model holds it."""
+        return Transform.from_matrix(self.arrays[f"camera_{model}"])
+
+
+@dataclass(frozen=True)
+class Run:
+    """One finished diagnosis."""
+
+    path: Path
+
+    @property
+    def name(self) -> str:
+        """The folder's name, which is the id of the diagnosis."""
+        return self.path.name
+
+    @cached_property
+    def report(self) -> dict[str, Any]:
+        """The report, as in the design's contract."""
+        return self._json("report.json")
+
+    @cached_property
+    def model(self) -> dict[str, Any]:
+        """The extended model with its lineage."""
+        return self._json("model.json")
+
+    @cached_property
+    def origin(self) -> dict[str, Any]:
+        """Where the data lie and when the run was made; empty for a folder that does not say."""
+        return self._json("origin.json") if (self.path / "origin.json").is_file() else {}
+
+    @property
+    def sequences(self) -> tuple[str, ...]:
+        """The names of the replayed sequences, sorted."""
+        return tuple(sorted(path.stem for path in (self.path / "replays").glob("*.npz")))
+
+    def replay(self, name: str) -> Replay:
+        """The replay of one sequence."""
+        if name not in self.sequences:
+            raise Missing(f"run {self.name} has no sequence {name}; it has {', '.join(self.sequences)}", run=self.name, sequence=name)
+        return Replay(name, self._arrays(f"replays/{name}.npz", FIELDS))
+
+    def patterns(self) -> dict[str, Any]:
+        """Patch centres and normals (P, 3) and the measured and predicted error (P,) [m], phantom frame."""
+        return self._arrays("patterns.npz", ("centres", "normals", "measured", "predicted"))
+
+    def picture(self, name: str) -> Path:
+        """The file of a picture."""
+        path = self.path / "pictures" / name
+        if not NAME.fullmatch(name) or not path.is_file():
+            raise Missing(f"run {self.name} has no picture {name}", run=self.name, picture=name)
+        return path
+
+    def _json(self, name: str) -> dict[str, Any]:
+        try:
+            value = json.loads((self.path / name).read_text())
+        except (OSError, ValueError) as error:
+            raise RunError(f"run {self.name}: {name} cannot be read ({error}); make the run again", run=self.name, file=name) from error
+        if not isinstance(value, dict):
+            raise RunError(f"run {self.name}: {name} holds {type(value).__name__}, expected an object", run=self.name, file=name)
+        return value
+
+    def _arrays(self, name: str, fields: tuple[str, ...]) -> dict[str, Any]:
+        try:
+            with np.load(self.path / name, allow_pickle=False) as stored:
+                arrays = {field: stored[field] for field in stored.files}
+        except (OSError, ValueError, EOFError) as error:
+            raise RunError(f"run {self.name}: {name} cannot be read ({error}); make the run again", run=self.name, file=name) from error
+        missing = [field for field in fields if field not in arrays]
+        if missing:
+            raise RunError(f"run {self.name}: {name} lacks {', '.join(missing)}; make the run again", run=self.name, file=name)
+        return arrays
+
+
+class Runs:
+    """The folder of runs."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def list(self) -> list[Run]:
+        """All whole runs, the newest first."""
+        found = [path.parent for path in self.folder.glob("*/report.json") if NAME.fullmatch(path.parent.name)]
+        return [Run(path) for path in sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)]
+
+    def get(self, name: str) -> Run:
+        """One run, or Missing."""
+        path = self.folder / name
+        if not NAME.fullmatch(name) or not (path / "report.json").is_file():
+            raise Missing(f"there is no run {name}; GET /api/runs lists those there are", run=name)
+        return Run(path)

@@ -1,0 +1,95 @@
+"""A report said in words: one sentence of verdict, the same in the terminal and on the page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+__all__ = ["cause_phrase", "quantity", "verdict_sentence"]
+
+NARROW = "\N{NO-BREAK SPACE}"
+Values = dict[str, float]
+SHOWN = {"m": (1e3, "mm"), "Pa": (1e-3, "kPa"), "s": (1e3, "ms"), "rad": (180.0 / math.pi, "°"), "1/m": (1.0, "1/m"), "1": (1.0, "")}
+SIDES = {"-x": "the left short side", "+x": "the right short side", "-y": "the front side", "+y": "the back side"}
+
+
+def quantity(value: Any, unit: str, digits: int = 2) -> str:
+    """A number in the unit people read, with sensible digits: 0.00043 m is 0.43 mm."""
+    if not isinstance(value, (int, float)):
+        return str(value)
+    factor, shown = SHOWN.get(unit, (1.0, unit))
+    scaled = float(value) * factor
+    places = max(0, digits - 1 - math.floor(math.log10(abs(scaled)))) if scaled and math.isfinite(scaled) else 0
+    text = f"{scaled:.{min(places, 4)}f}"
+    return f"{text}{'' if shown in ('', '°') else NARROW}{shown}"
+
+
+def verdict_sentence(report: dict[str, Any], size: Sequence[float] | None = None) -> str:
+    """What a diagnosis says; `size` (x, y, z) [m] of the phantom places things below its top."""
+    verdict = report.get("verdict")
+    phrases = [cause_phrase(cause, size) for cause in report.get("causes", [])]
+    if verdict == "none":
+        return "The simulation misses nothing that this data could show: what is left is noise and the stated accuracies."
+    if verdict == "unexplained":
+        return "Structured error remains that no known effect removes."
+    if verdict == "ambiguous":
+        return f"Several causes explain the data equally well: {_listed(phrases, 'or')}."
+    return f"The simulation misses {_listed(phrases, 'and')}{_gain(report)}."
+
+
+def cause_phrase(cause: dict[str, Any], size: Sequence[float] | None = None) -> str:
+    """One cause as a noun phrase."""
+    values = {name: entry.get("value") for name, entry in cause.get("parameters", {}).items()}
+    phrase = PHRASES.get(cause["effect"])
+    try:
+        return phrase(values, size) if phrase else f"an effect called {cause['effect'].replace('_', ' ')}"
+    except (KeyError, TypeError):
+        return f"an effect called {cause['effect'].replace('_', ' ')}"
+
+
+def _gain(report: dict[str, Any]) -> str:
+    removed = (report.get("gain") or {}).get("reducible_removed") or {}
+    if not isinstance(removed.get("value"), (int, float)):
+        return ""
+    naming = "naming it" if len(report.get("causes", [])) == 1 else "naming them"
+    return f"; {naming} removes {100 * removed['value']:.0f}{NARROW}% of the error that can be removed"
+
+
+def _listed(phrases: list[str], word: str) -> str:
+    return phrases[0] if len(phrases) == 1 else f"{', '.join(phrases[:-1])} {word} {phrases[-1]}" if phrases else "something"
+
+
+def _lump(values: Values, size: Sequence[float] | None) -> str:
+    kind = "stiff" if values["stiffness_ratio"] >= 1.0 else "soft"
+    place = "" if size is None else f", {quantity(size[2] - values['z'], 'm')} under the top"
+    return f"a {kind} lump, {quantity(2 * values['radius'], 'm')} across{place}"
+
+
+def _shift(values: Values, _: Sequence[float] | None) -> str:
+    distance = math.hypot(values["dx"], values["dy"], values["dz"])
+    return f"that the tool's centre is {quantity(distance, 'm')} away from where the robot says"
+
+
+def _camera(values: Values, _: Sequence[float] | None) -> str:
+    turn = f" and {quantity(values['rotation'], 'rad')}" if values.get("rotation") else ""
+    return f"that the camera stands {quantity(values['translation'], 'm')}{turn} off its registration"
+
+
+def _late(values: Values, _: Sequence[float] | None) -> str:
+    early = "late" if values["offset"] > 0 else "early"
+    return f"that the camera's clock runs {quantity(abs(values['offset']), 's')} {early}"
+
+
+PHRASES: dict[str, Callable[[Any, Sequence[float] | None], str]] = {
+    "stiff_inclusion": _lump,
+    "tool_offset": _shift,
+    "camera_registration": _camera,
+    "time_offset": _late,
+    "poisson_ratio": lambda v, _: f"another compressibility: Poisson's ratio is {v['nu']:.3g}",
+    "tool_radius": lambda v, _: f"the size of the tool: its radius is {quantity(v['radius'], 'm')}",
+    "base_slip": lambda v, _: f"that the base slides on the table, with a friction coefficient of {v['friction_coefficient']:.2g}",
+    "base_detachment": lambda v, _: f"that the base is loose {quantity(v['extent'], 'm')} inwards from {SIDES.get(v['edge'], v['edge'])}",
+    "gravity": lambda v, _: f"the phantom's own weight, ρg/E = {v['specific_weight_over_stiffness']:.2g} per metre",
+    "surface_layer": lambda v, _: f"a skin {quantity(v['thickness'], 'm')} thick, {v['stiffness_ratio']:.2g} times as stiff",
+}

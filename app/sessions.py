@@ -1,0 +1,145 @@
+"""What each open page shows: the wanted view in, a picture in the scene out; the newest wish wins."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from app.picture import Picture, Reel
+from app.problems import Missing
+from app.runs import Run, Runs
+from app.scene import Scene
+from app.schemas import View
+from core.errors import PalpateError
+from core.frames import FloatArray
+
+__all__ = ["Session", "Sessions"]
+
+log = logging.getLogger(__name__)
+REELS = 6
+SESSIONS = 32
+
+
+class Session:
+    """One page: its view, the picture of it, and the browsers' scenes that show it."""
+
+    def __init__(self, identity: str, reel_of: Callable[[str, str], Reel]) -> None:
+        self.identity = identity
+        self.view: View | None = None
+        self.picture: Picture | None = None
+        self._reel_of = reel_of
+        self._scenes: list[Scene] = []
+        self._framed: str | None = None
+        self._lock = threading.Lock()
+
+    def show(self, view: View) -> dict[str, Any]:
+        """Draw this view in all scenes of the page and return what is held now."""
+        with self._lock:
+            reel = self._reel_of(view.run, view.sequence)
+            frame = min(view.frame, len(reel.replay) - 1)
+            picture = reel.picture(frame, frozenset(view.layers), view.colour, view.limit, view.crop)
+            self.view, self.picture = view.model_copy(update={"frame": frame}), picture
+            for scene in self._scenes:
+                scene.draw(picture)
+            if self._framed != view.run:
+                self._look()
+            self._framed = view.run
+        return self.state()
+
+    def look(self) -> None:
+        """Turn the cameras of all scenes to the phantom."""
+        with self._lock:
+            self._look()
+
+    def _look(self) -> None:
+        if self.view is not None:
+            replay = self._reel_of(self.view.run, self.view.sequence).replay
+            for scene in self._scenes:
+                scene.frame(replay.size, replay.camera("raw").translation)
+
+    def join(self, scene: Scene) -> None:
+        """A browser's scene was opened: show it what the page shows."""
+        with self._lock:
+            self._scenes.append(scene)
+            if self.view is None or self.picture is None:
+                self._framed = None
+                return
+            self._look()
+            scene.draw(self.picture)
+
+    def leave(self, scene: Scene) -> None:
+        """A browser's scene was closed."""
+        with self._lock:
+            self._scenes = [other for other in self._scenes if other is not scene]
+
+    def state(self) -> dict[str, Any]:
+        """The view as held here and counts and a digest of the arrays drawn."""
+        if self.view is None or self.picture is None:
+            return {"view": None, "drawn": None, "scenes": len(self._scenes)}
+        return {"view": self.view.model_dump(), "drawn": self.picture.summary(), "scenes": len(self._scenes)}
+
+
+class Sessions:
+    """All open pages, the oldest forgotten beyond a few dozen, and the last few sequences looked at."""
+
+    def __init__(self, runs: Runs, clouds_of: Callable[[Run, str], Callable[[int], FloatArray] | None] | None = None) -> None:
+        self._runs = runs
+        self._clouds_of = clouds_of or measured_clouds
+        self._sessions: OrderedDict[str, Session] = OrderedDict()
+        self._reels: OrderedDict[tuple[str, str], Reel] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def get(self, identity: str) -> Session:
+        """The session of a page that has shown something, or Missing."""
+        with self._lock:
+            if identity not in self._sessions:
+                raise Missing(f"no page with the id {identity} is open", session=identity)
+            return self._sessions[identity]
+
+    def open(self, identity: str) -> Session:
+        """The session of a page, made if need be."""
+        with self._lock:
+            session = self._sessions.pop(identity, None) or Session(identity, self.reel)
+            self._sessions[identity] = session
+            while len(self._sessions) > SESSIONS:
+                self._sessions.popitem(last=False)
+            return session
+
+    def join(self, identity: str, scene: Scene) -> None:
+        """A browser's scene belongs to this page."""
+        self.open(identity).join(scene)
+
+    def leave(self, identity: str, scene: Scene) -> None:
+        """A browser's scene is gone."""
+        self.open(identity).leave(scene)
+
+    def reel(self, run: str, sequence: str) -> Reel:
+        """The sequence of a run, ready to be drawn."""
+        with self._lock:
+            key = (run, sequence)
+            reel = self._reels.pop(key, None)
+            if reel is None:
+                found = self._runs.get(run)
+                reel = Reel(found.replay(sequence), self._clouds_of(found, sequence))
+            self._reels[key] = reel
+            while len(self._reels) > REELS:
+                self._reels.popitem(last=False)
+            return reel
+
+
+def measured_clouds(run: Run, sequence: str) -> Callable[[int], FloatArray] | None:
+    """The raw clouds of a sequence from the run's dataset, or None when the data are not where the run says."""
+    from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
+
+    folder = run.origin.get("dataset")
+    if folder is None or not Path(folder).is_dir():
+        return None
+    try:
+        return open_dataset(Path(folder)).sequence(sequence).cloud
+    except PalpateError as error:
+        log.warning("run %s: the measured clouds are not shown: %s", run.name, error.message)
+        return None

@@ -1,0 +1,33 @@
+// The right panel on a dataset: what it holds, whether it is in order, and the way to its diagnosis.
+import { get } from "./api.js";
+import { element, fill } from "./dom.js";
+import { mm } from "./format.js";
+
+export async function showDataset(name, diagnose) {
+  const panel = document.getElementById("panel");
+  fill(panel, element("div", { class: "eyebrow" }, "Dataset"), element("h1", { class: "verdict" }, name), element("p", { class: "gain-note" }, "Reading every file …"));
+  let summary;
+  try { summary = await get(`/datasets/${encodeURIComponent(name)}/check`); } catch (problem) {
+    fill(panel, element("div", { class: "eyebrow" }, "Dataset"), element("h1", { class: "verdict" }, name), broken(problem));
+    return;
+  }
+  const start = element("button", { class: "button strong", type: "button", onclick: async () => {
+    start.disabled = true;
+    start.textContent = "Started: see the jobs on the left";
+    await diagnose(name).catch(() => { start.disabled = false; start.textContent = "Diagnose"; });
+  } }, "Diagnose");
+  const size = summary.size.map((edge) => mm(edge, false)).join(" × ");
+  fill(panel, element("div", { class: "eyebrow" }, "Dataset"), element("h1", { class: "verdict" }, name),
+    element("p", { class: "gain-note" }, "Every file was read and is in order."),
+    element("div", { class: "actions" }, start),
+    element("section", {}, element("h2", {}, "Setup as stated"), element("table", {}, element("tbody", {},
+      fact("Name", summary.name), fact("Phantom", `${size} mm`), fact("Mass", `${(summary.mass * 1e3).toFixed(1)} g`),
+      fact("Tool radius", mm(summary.tool_radius)), fact("Touches", summary.touches), fact("Rest cloud", summary.has_rest ? "yes" : "no")))),
+    element("section", {}, element("h2", {}, "Sequences"), element("table", {}, element("tbody", {},
+      summary.sequences.map(({ name: sequence, clouds, split }) => element("tr", {}, element("th", {}, sequence), element("td", {}, split ?? "no split"), element("td", { class: "number" }, `${clouds} clouds`)))))));
+}
+
+const fact = (label, value) => element("tr", {}, element("th", {}, label), element("td", { class: "number" }, String(value)));
+
+const broken = ({ message, where }) => element("div", { class: "note-card bad" }, element("strong", {}, "This dataset is not in order"), message,
+  Object.keys(where ?? {}).length ? element("div", { class: "where" }, Object.entries(where).map(([key, value]) => `${key}: ${value}`).join("  ")) : null);

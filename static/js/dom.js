@@ -1,0 +1,38 @@
+// Elements from plain calls; text is always text, never markup.
+export function element(name, attributes = {}, ...children) {
+  const node = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) {
+    if (value === false || value === null || value === undefined) continue;
+    if (key.startsWith("on")) node.addEventListener(key.slice(2), value);
+    else if (key === "style") Object.assign(node.style, value);
+    else node.setAttribute(key, value === true ? "" : value);
+  }
+  node.append(...children.flat().filter((child) => child !== null && child !== undefined && child !== false));
+  return node;
+}
+
+export function fill(id, ...children) {
+  const node = typeof id === "string" ? document.getElementById(id) : id;
+  node.replaceChildren(...children.flat().filter(Boolean));
+  return node;
+}
+
+const SHAPES = {
+  play: '<path class="full" d="M7 4.5v15l12-7.5z"/>', pause: '<path class="full" d="M6 4.5h4v15H6zM14 4.5h4v15h-4z"/>',
+  back: '<path d="M14 6l-6 6 6 6"/>', forth: '<path d="M10 6l6 6-6 6"/>', first: '<path d="M17 6l-6 6 6 6M7 6v12"/>',
+  last: '<path d="M7 6l6 6-6 6M17 6v12"/>', close: '<path d="M6 6l12 12M18 6L6 18"/>',
+  sun: '<circle cx="12" cy="12" r="4"/><path d="M12 3v2M12 19v2M3 12h2M19 12h2M5.6 5.6L7 7M17 17l1.4 1.4M5.6 18.4L7 17M17 7l1.4-1.4"/>',
+  moon: '<path d="M20 14.5A8.5 8.5 0 0 1 9.5 4 8.5 8.5 0 1 0 20 14.5z"/>',
+  target: '<path d="M4 9V5h4M20 9V5h-4M4 15v4h4M20 15v4h-4"/><circle cx="12" cy="12" r="2.5"/>',
+  cloud: '<g class="full"><circle cx="6" cy="7" r="1.5"/><circle cx="12" cy="5" r="1.5"/><circle cx="18" cy="8" r="1.5"/><circle cx="5" cy="14" r="1.5"/><circle cx="11" cy="12" r="1.5"/><circle cx="18" cy="15" r="1.5"/><circle cx="9" cy="19" r="1.5"/><circle cx="15" cy="20" r="1.5"/></g>',
+};
+
+export function icon(name) {
+  const holder = document.createElement("template");
+  holder.innerHTML = `<svg viewBox="0 0 24 24" aria-hidden="true">${SHAPES[name]}</svg>`;
+  return holder.content.firstChild;
+}
+
+export function swatch(thing, line = false) {
+  return element("i", { class: line ? "swatch line" : "swatch", style: { background: `var(--${thing})` } });
+}

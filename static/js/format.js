@@ -1,0 +1,37 @@
+// Numbers as people read them.
+const UNITS = { m: [1e3, "mm"], Pa: [1e-3, "kPa"], s: [1e3, "ms"], rad: [180 / Math.PI, "°"], "1/m": [1, "/m"], 1: [1, ""] };
+
+export const words = (name) => name.replaceAll("_", " ");
+
+/** Millimetres from metres: two decimals below 10 mm. */
+export function mm(metres, unit = true) {
+  if (metres === null || metres === undefined || !Number.isFinite(metres)) return "–";
+  const value = metres * 1e3;
+  return value.toFixed(Math.abs(value) < 9.995 ? 2 : 1) + (unit ? " mm" : "");
+}
+
+/** A parameter and its interval, with as many decimals as the interval's width deserves. */
+export function parameter({ value, unit, low, high }) {
+  if (typeof value !== "number") return { value: String(value), unit: "", interval: "" };
+  const [factor, shown] = UNITS[unit] ?? [1, unit];
+  const open = typeof low !== "number" || typeof high !== "number";
+  const width = open ? Math.abs(value * factor) / 5 : Math.abs(high - low) * factor;
+  const places = Math.min(4, Math.max(0, 1 - Math.floor(Math.log10(width || 1)), 1 - Math.floor(Math.log10(Math.abs(value * factor) || 1))));
+  const text = (number) => (number * factor).toFixed(places).replace("-", "−");
+  return { value: text(value), unit: shown, interval: open ? "" : `${text(low)} to ${text(high)}` };
+}
+
+export function percent(fraction, digits = 0) {
+  if (typeof fraction !== "number") return "–";
+  if (fraction > 0 && fraction < 0.005 && !digits) return "<1 %";
+  return `${(100 * fraction).toFixed(digits)} %`;
+}
+
+export function duration(seconds) {
+  const whole = Math.max(0, Math.round(seconds));
+  return whole < 60 ? `${whole} s` : `${Math.floor(whole / 60)} min ${String(whole % 60).padStart(2, "0")} s`;
+}
+
+export function when(epoch) {
+  return new Date(epoch * 1e3).toLocaleString(undefined, { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" });
+}

@@ -1,0 +1,70 @@
+// Starts the parts and follows what is chosen.
+import { get, toast } from "./api.js";
+import { fill, icon } from "./dom.js";
+import * as rail from "./rail.js";
+import { showProblem, showReport, showWelcome } from "./report.js";
+import * as scene from "./scene.js";
+import { on, set, state } from "./store.js";
+import * as timeline from "./timeline.js";
+
+const THEMES = { light: "moon", dark: "sun" };
+
+function startTheme() {
+  const draw = () => fill("theme", icon(THEMES[state().theme]));
+  document.getElementById("theme").addEventListener("click", () => {
+    const theme = state().theme === "dark" ? "light" : "dark";
+    localStorage.setItem("palpate.theme", theme);
+    document.documentElement.dataset.theme = theme;
+    set({ theme });
+  });
+  on(["theme"], draw);
+  draw();
+}
+
+async function openRun(id) {
+  set({ playing: false });
+  try {
+    const [heading, report, patterns] = await Promise.all([get(`/runs/${id}`), get(`/runs/${id}/report`), get(`/runs/${id}/patterns`).catch(() => null)]);
+    const known = heading.sequences.map(({ name }) => name);
+    const sequence = state().run === id && known.includes(state().sequence) ? state().sequence : preferred(heading.sequences);
+    showReport(heading, report, patterns, state().palette);
+    if (state().run !== id || state().sequence !== sequence) set({ frame: 0, series: null });
+    set({ run: id, sequence, heading, report });
+    await openSequence();
+  } catch (problem) { showProblem(problem); }
+}
+
+/** The test sequence on which naming the cause changes most: what a visitor should see first. */
+function preferred(sequences) {
+  const tested = sequences.filter(({ split }) => split === "test");
+  const gain = ({ distance_raw: raw, distance_extended: extended }) => (raw ?? 0) - (extended ?? 0);
+  return [...(tested.length ? tested : sequences)].sort((a, b) => gain(b) - gain(a))[0]?.name ?? null;
+}
+
+async function openSequence() {
+  const { run, sequence } = state();
+  if (!run || !sequence) return;
+  const series = await get(`/runs/${run}/sequences/${encodeURIComponent(sequence)}`);
+  if (state().run !== run || state().sequence !== sequence) return;
+  const fresh = state().series === null || state().series.name !== sequence;
+  set({ series });
+  if (fresh && state().frame === 0) timeline.go(worst(series.distance_raw));
+}
+
+/** The frame with the largest raw error: there is nothing to see in an untouched one. */
+const worst = (errors) => errors.reduce((best, value, index) => ((value ?? 0) > (errors[best] ?? 0) ? index : best), 0);
+
+async function start() {
+  startTheme();
+  const palette = await get("/palette");
+  set({ palette });
+  timeline.start();
+  scene.start();
+  on(["sequence"], () => { set({ series: null, frame: 0 }); openSequence().catch(toast); });
+  const datasets = await rail.start(openRun);
+  const wanted = new URLSearchParams(location.search).get("run") ?? state().run;
+  const run = rail.newestRun(wanted);
+  if (run) await openRun(run); else { set({ run: null, sequence: null }); showWelcome(datasets); }
+}
+
+start().catch(toast);

@@ -1,0 +1,83 @@
+// The right panel on a diagnosis: the verdict first, then cause, gain, patterns, rivals, and what cannot be told.
+import { element, fill } from "./dom.js";
+import { parameter, percent, when, words } from "./format.js";
+import { patternSection } from "./patterns.js";
+
+const panel = () => document.getElementById("panel");
+
+export function showReport(heading, report, patterns, palette) {
+  const causes = report.causes ?? [];
+  fill(panel(),
+    element("div", { class: "eyebrow" }, element("span", { class: `verdict-tag ${report.verdict}` }, report.verdict), `${heading.dataset} · ${when(heading.created)}`),
+    element("h1", { class: "verdict" }, heading.sentence),
+    causes.length ? section(causes.length > 1 ? "Causes" : "Cause", "interval", causes.map(cause)) : null,
+    report.gain ? section("Error on sequences not fitted on", report.gain.unit ?? "mm", gain(report.gain)) : null,
+    patterns ? section("The error and its explanation", "", patternSection(patterns, heading.size, palette)) : null,
+    report.ranking?.length ? section("Ranking", "", ranking(report.ranking, causes.map(({ effect }) => effect))) : null,
+    report.unexplained ? section("Unexplained", "", unexplained(report.unexplained)) : null,
+    report.not_identifiable?.length ? section("Cannot be told from this data", "", report.not_identifiable.map(blind)) : null);
+  panel().scrollTop = 0;
+}
+
+export function showProblem(problem) {
+  fill(panel(), element("div", { class: "note-card bad" }, element("strong", {}, "This run cannot be shown"), problem.message));
+}
+
+export function showWelcome(hasDatasets) {
+  fill(panel(), element("div", { class: "empty-panel" },
+    element("h1", {}, "No diagnosis yet"),
+    hasDatasets ? "Choose a dataset on the left, check it, and start its diagnosis. It takes a few minutes; the page shows how far it is."
+      : element("ol", {},
+        element("li", {}, "Put a dataset folder into the datasets folder, or start with ", element("code", {}, "palpate serve --datasets DIR"), "."),
+        element("li", {}, "No data at hand? ", element("code", {}, "palpate demo"), " makes a phantom with a hidden effect and finds it."))));
+}
+
+const section = (title, aside, ...children) => element("section", {}, element("h2", {}, title, aside ? element("small", {}, aside) : null), ...children);
+
+function cause({ effect, probability, parameters }) {
+  const rows = Object.entries(parameters ?? {}).map(([name, entry]) => {
+    const shown = parameter(entry);
+    return element("tr", {}, element("th", {}, words(name)),
+      element("td", { class: "number" }, element("b", {}, shown.value), shown.unit ? ` ${shown.unit}` : ""),
+      element("td", { class: "number interval" }, shown.interval));
+  });
+  return element("div", { class: "cause" },
+    element("div", { class: "cause-head" }, element("strong", {}, capital(words(effect))), element("span", {}, `probability ${percent(probability)}`)),
+    element("table", {}, element("tbody", {}, rows)));
+}
+
+function gain({ baseline, extended, noise_floor: floor, unit = "mm", reducible_removed: removed, paper_metric: paper, split, ...others }) {
+  const steps = [["Raw model", baseline, "raw"], ["Raw + network", others.baseline_network, "corrected"], ["Extended", extended, "extended"],
+    ["Extended + network", others.extended_network, "corrected"], ["Noise floor", floor, "floor"]].filter(([, value]) => typeof value === "number");
+  const most = Math.max(...steps.map(([, value]) => value));
+  const number = (value) => (value < 10 ? value.toFixed(value < 1 ? 3 : 2) : value.toFixed(1));
+  const range = removed && typeof removed.low === "number" ? ` (${percent(removed.low)} to ${percent(removed.high)})` : "";
+  return element("div", {},
+    element("div", { class: "ladder" }, steps.flatMap(([label, value, thing]) => [
+      element("span", {}, label),
+      element("div", { class: "bar" }, element("i", { style: { width: `${100 * value / most}%`, background: `var(--${thing})` } })),
+      element("span", { class: "bar-value" }, `${number(value)}`)])),
+    element("p", { class: "gain-note" },
+      removed && typeof removed.value === "number" ? [element("b", {}, percent(removed.value)), `${range} of the error above the noise floor is gone on the ${split} sequences. `] : null,
+      paper ? `Mean distance as in the literature: ${number(paper.baseline)} → ${number(paper.extended)} ${unit}.` : null));
+}
+
+function ranking(entries, named) {
+  const most = Math.max(0.01, ...entries.map(({ error_removed: removed }) => removed ?? 0));
+  return element("div", { class: "ranking" },
+    element("span", { class: "head" }, "effect"), element("span", { class: "head" }, "error removed"), element("span"), element("span", { class: "head number" }, "prob."),
+    entries.slice(0, 8).flatMap(({ effect, probability, error_removed: removed }) => [
+      element("span", {}, words(effect)),
+      element("div", { class: named.includes(effect) ? "bar first" : "bar" }, element("i", { style: { width: `${Math.max(0, 100 * (removed ?? 0) / most)}%` } })),
+      element("span", { class: "number" }, percent(removed)), element("span", { class: "number" }, percent(probability))]));
+}
+
+function unexplained({ fraction, where, when: time }) {
+  const place = [where, time].filter(Boolean).join("; ");
+  return element("p", { class: "gain-note" }, element("b", {}, percent(fraction)), ` of the structured error is left${place ? `: ${place}` : ""}.`);
+}
+
+const blind = ({ effect, why, measure_instead: instead }) => element("div", { class: "note-card" },
+  element("strong", {}, capital(words(effect))), why ? `${capital(why)}. ` : "", instead ? `Measure instead: ${instead}.` : "");
+
+const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);

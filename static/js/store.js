@@ -1,0 +1,28 @@
+// What the page shows, in one place; parts subscribe to the keys they draw. Some keys outlive the page.
+const KEPT = ["run", "sequence", "layers", "colour", "speed", "limit", "crop"];
+
+const kept = () => {
+  try { return JSON.parse(localStorage.getItem("palpate.view")) ?? {}; } catch { return {}; }
+};
+
+const values = {
+  run: null, sequence: null, frame: 0, playing: false,
+  layers: ["measured", "raw", "tool"], colour: "raw", limit: null, crop: true, speed: 1,
+  report: null, heading: null, series: null, palette: null, held: null, theme: document.documentElement.dataset.theme,
+  ...kept(),
+};
+const listeners = [];
+
+export const state = () => values;
+
+export function set(changes) {
+  const changed = Object.keys(changes).filter((key) => JSON.stringify(values[key]) !== JSON.stringify(changes[key]));
+  if (!changed.length) return;
+  Object.assign(values, changes);
+  if (changed.some((key) => KEPT.includes(key))) {
+    localStorage.setItem("palpate.view", JSON.stringify(Object.fromEntries(KEPT.map((key) => [key, values[key]]))));
+  }
+  for (const [keys, listener] of listeners) if (changed.some((key) => keys.includes(key))) listener(values);
+}
+
+export function on(keys, listener) { listeners.push([keys, listener]); }
