@@ -1,0 +1,166 @@
+"""The block as quadratic tetrahedra, graded towards where it is touched. Mesh, elements and quadrature are scikit-fem's."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from core.errors import MeshError
+from core.frames import FloatArray
+
+__all__ = ["Block", "Grading", "Sampling", "mesh_block"]
+
+IntArray = np.ndarray[Any, np.dtype[np.int64]]
+_PAIRS = [(a, b) for a in range(4) for b in range(a)]
+
+
+@dataclass(frozen=True)
+class Grading:
+    """How large an element may be: its longest edge is at most `coarse`, and `fine + growth * distance` from any of `points`.
+
+    Attributes:
+        points: (n, 3) where the grid is fine, phantom frame [m].
+        reach: (n,) [m] distance from each point up to which `fine` holds.
+        fine, coarse: longest edge [m].
+        growth: longest edge per distance [1].
+    """
+
+    points: FloatArray
+    reach: FloatArray
+    fine: float = 2.6e-3
+    coarse: float = 12e-3
+    growth: float = 0.6
+
+    def allowed(self, places: FloatArray) -> FloatArray:
+        """The longest edge (n,) [m] allowed at `places` (n, 3)."""
+        edge = np.full(len(places), np.inf)
+        for point, reach in zip(self.points, self.reach, strict=True):
+            distance = np.maximum(np.linalg.norm(places - point, axis=1) - reach, 0.0)
+            edge = np.minimum(edge, self.fine + self.growth * distance)
+        return edge
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Points on the surface that something acts on.
+
+    Attributes:
+        owner: (f,) element of each facet.
+        values: (f, q, 10) shape functions of the owner at the points.
+        weights: (f, q) [m^2].
+    """
+
+    owner: IntArray
+    values: FloatArray
+    weights: FloatArray
+
+
+@dataclass(frozen=True)
+class Block:
+    """Quadratic tetrahedra of one block, phantom frame.
+
+    Attributes:
+        nodes: (n, 3) [m].
+        elements: (e, 10).
+        gradients: (e, 4, 10, 3) of the shape functions at the volume points [1/m].
+        weights: (e, 4) [m^3].
+        places: (e, 4, 3) of the volume points [m].
+        skin: points of the sides and the top, where the tool acts.
+        sole: points of the base, where the table acts.
+        surface: (s, n) operator from nodal values to the points of the drawn surface.
+        surface_rest: (s, 3) [m].
+        surface_faces: (t, 3) triangles of the drawn surface, without the base.
+    """
+
+    nodes: FloatArray
+    elements: IntArray
+    gradients: FloatArray
+    weights: FloatArray
+    places: FloatArray
+    skin: Sampling
+    sole: Sampling
+    surface: Any
+    surface_rest: FloatArray
+    surface_faces: IntArray
+
+
+def mesh_block(size: tuple[float, float, float], grading: Grading) -> Block:
+    """Fill the block with tetrahedra that are as small as `grading` asks; raises MeshError beyond 60 000 elements."""
+    from skfem import Basis, ElementTetP2, FacetBasis  # noqa: PLC0415
+
+    logging.getLogger("skfem").setLevel(logging.ERROR)
+    mesh = _refined(size, grading)
+    element = ElementTetP2()
+    basis = Basis(mesh, element, intorder=2)
+    base = mesh.facets_satisfying(lambda x: x[2] < 1e-9, boundaries_only=True)
+    skin = np.setdiff1d(mesh.boundary_facets(), base)
+    lattice, triangles = _lattice(3)
+    drawn = FacetBasis(mesh, element, facets=skin, quadrature=(lattice, np.ones(lattice.shape[1])))
+    nodes = np.ascontiguousarray(basis.doflocs.T)
+    elements = np.ascontiguousarray(basis.element_dofs.T).astype(np.int64)
+    surface = _operator(drawn, elements, len(nodes))
+    offsets = np.arange(len(skin))[:, None, None] * lattice.shape[1]
+    return Block(
+        nodes=nodes,
+        elements=elements,
+        gradients=np.ascontiguousarray(np.transpose([part[0].grad for part in basis.basis], (2, 3, 0, 1))),
+        weights=np.ascontiguousarray(basis.dx),
+        places=np.ascontiguousarray(np.transpose(basis.global_coordinates().value, (1, 2, 0))),
+        skin=_sampling(FacetBasis(mesh, element, facets=skin, intorder=4)),
+        sole=_sampling(FacetBasis(mesh, element, facets=base, intorder=4)),
+        surface=surface,
+        surface_rest=np.asarray(surface @ nodes),
+        surface_faces=(triangles[None] + offsets).reshape(-1, 3),
+    )
+
+
+def _refined(size: tuple[float, float, float], grading: Grading) -> Any:
+    from skfem import MeshTet  # noqa: PLC0415
+
+    cells = np.maximum(np.ceil(np.array(size) / grading.coarse).astype(int), 2)
+    x, y, z = (np.linspace(0.0, length, count + 1) for length, count in zip(size, cells, strict=True))
+    mesh = MeshTet.init_tensor(x - size[0] / 2, y - size[1] / 2, z)
+    for _ in range(40):
+        corners = mesh.p[:, mesh.t]
+        longest = np.max([np.linalg.norm(corners[:, a] - corners[:, b], axis=0) for a, b in _PAIRS], axis=0)
+        large = np.nonzero(longest > 1.7 * grading.allowed(corners.mean(axis=1).T))[0]
+        if not len(large):
+            return mesh
+        if mesh.t.shape[1] > 60_000:
+            break
+        mesh = mesh.refined(large)
+    raise MeshError(f"{mesh.t.shape[1]} elements do not reach edges of {grading.fine * 1e3:.2g} mm; ask for a coarser grid")
+
+
+def _sampling(basis: Any) -> Sampling:
+    values = np.array([np.broadcast_to(part[0].value, basis.dx.shape) for part in basis.basis])
+    return Sampling(
+        owner=np.asarray(basis.tind, dtype=np.int64),
+        values=np.ascontiguousarray(np.transpose(values, (1, 2, 0))),
+        weights=np.ascontiguousarray(basis.dx),
+    )
+
+
+def _operator(basis: Any, elements: IntArray, count: int) -> Any:
+    sampling = _sampling(basis)
+    facets, points, _ = sampling.values.shape
+    rows = np.repeat(np.arange(facets * points), 10)
+    columns = np.repeat(elements[sampling.owner], points, axis=0).ravel()
+    return sparse.csr_matrix((sampling.values.ravel(), (rows, columns)), shape=(facets * points, count))
+
+
+def _lattice(divisions: int) -> tuple[FloatArray, IntArray]:
+    """Points (2, k) of a regularly divided reference triangle and its (t, 3) small triangles."""
+    index = {(i, j): 0 for j in range(divisions + 1) for i in range(divisions + 1 - j)}
+    index = {key: number for number, key in enumerate(index)}
+    triangles = []
+    for i, j in index:
+        if i + j < divisions:
+            triangles.append((index[i, j], index[i + 1, j], index[i, j + 1]))
+        if i + j < divisions - 1:
+            triangles.append((index[i + 1, j], index[i + 1, j + 1], index[i, j + 1]))
+    return np.array(list(index), dtype=float).T / divisions, np.array(triangles, dtype=np.int64)

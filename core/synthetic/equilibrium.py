@@ -1,0 +1,289 @@
+"""Equilibria of the block under a rigid sphere that is moved by position: Newton with line search, and steps split where needed."""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from core.errors import SolveError
+from core.frames import FloatArray
+from core.synthetic.block import Block, IntArray, Sampling
+from core.synthetic.law import assemble_obstacle, assemble_solid, constants, solid_energy
+
+__all__ = ["Equilibrium", "Solid", "State"]
+
+PENALTY_OVER_E = 4e4
+_UNUSED = (np.zeros((1, 10, 10, 3, 3)), np.zeros((1, 3)), np.zeros(3), np.zeros((1, 3, 3)), np.zeros((3, 3)))
+_NOWHERE = np.array([0.0, 0.0, 10.0])
+
+
+@dataclass(frozen=True)
+class Solid:
+    """What the block really is.
+
+    Attributes:
+        young_modulus: (e, 4) at the volume points [Pa].
+        poisson_ratio: [1].
+        weight: per volume [N/m^3].
+        held: (n,) bool, nodes that do not move.
+        tool_radius: [m].
+        lifts: whether some of the base may lift off the table.
+    """
+
+    young_modulus: FloatArray
+    poisson_ratio: float
+    weight: float
+    held: Any
+    tool_radius: float
+    lifts: bool
+
+
+@dataclass(frozen=True)
+class State:
+    """One equilibrium.
+
+    Attributes:
+        displacement: (n, 3) [m].
+        centre: (3,) of the tool [m].
+        push: (3,) force of the tool on the block [N].
+        compliance: (3, 3) d push / d centre with everything else in equilibrium [N/m].
+        penetration: the deepest surface point inside the tool [m].
+    """
+
+    displacement: FloatArray
+    centre: FloatArray
+    push: FloatArray
+    compliance: FloatArray
+    penetration: float
+
+
+class _System:
+    """The upper triangle of the tangent in one fixed pattern, and its factor."""
+
+    def __init__(self, elements: IntArray, free: IntArray) -> None:
+        count = int(free.max()) + 1
+        local = free[elements]
+        low = np.minimum(local[:, :, None], local[:, None, :])
+        high = np.maximum(local[:, :, None], local[:, None, :])
+        upper = np.triu(np.ones((10, 10), dtype=bool))
+        wanted = (low >= 0) & upper
+        keys, blocks = np.unique(low[wanted] * count + high[wanted], return_inverse=True)
+        rows, columns = keys // count, keys % count
+        per_row = np.bincount(rows, minlength=count)
+        first = np.concatenate([[0], np.cumsum(per_row)])
+        lengths = np.repeat(3 * per_row, 3) - np.tile([0, 1, 2], count)
+        pointers = np.concatenate([[0], np.cumsum(lengths)])
+        rank = np.arange(len(keys)) - first[rows]
+        i, k = np.indices((3, 3))
+        target = pointers[3 * rows][:, None, None]
+        target = pointers[3 * rows[:, None, None] + i] + 3 * rank[:, None, None] + k - i
+        target = np.where((rows == columns)[:, None, None] & (k < i), -1, target)
+        indices = np.empty(pointers[-1], dtype=np.int32)
+        valid = target >= 0
+        indices[target[valid]] = np.broadcast_to(3 * columns[:, None, None] + k, target.shape)[valid]
+        swapped = np.broadcast_to((local[:, :, None] > local[:, None, :]), wanted.shape)[wanted]
+        scatter = np.where(swapped[:, None, None], np.swapaxes(target[blocks], 1, 2), target[blocks])
+        self._wanted = np.nonzero(wanted.ravel())[0]
+        self._scatter = np.where(scatter < 0, pointers[-1], scatter).ravel()
+        self._matrix = sparse.csr_matrix((np.zeros(pointers[-1]), indices, pointers.astype(np.int32)), shape=(3 * count, 3 * count))
+        self._solver = _pardiso()
+        self._analysed = False
+
+    def factorise(self, stiffness: FloatArray) -> None:
+        """Take element stiffness (e, 10, 10, 3, 3) and factor the sum."""
+        blocks = stiffness.reshape(-1, 9)[self._wanted].ravel()
+        size = len(self._matrix.data)
+        self._matrix.data[:] = np.bincount(self._scatter, weights=blocks, minlength=size + 1)[:size]
+        right = np.zeros((self._matrix.shape[0], 1))
+        if not self._analysed:
+            self._solver.set_phase(11)
+            self._solver._call_pardiso(self._matrix, right)
+            self._analysed = True
+        self._solver.set_phase(22)
+        self._solver._call_pardiso(self._matrix, right)
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """With the last factor; right is (3 free,) or (3 free, k)."""
+        self._solver.set_phase(33)
+        return np.asarray(self._solver._call_pardiso(self._matrix, np.asfortranarray(right.reshape(len(right), -1)))).reshape(
+            right.shape
+        )
+
+    def close(self) -> None:
+        """Give the factor's memory back."""
+        self._solver.free_memory(everything=True)
+
+
+class Equilibrium:
+    """Solves one block for one tool position after the other, starting each from the last."""
+
+    def __init__(self, block: Block, solid: Solid) -> None:
+        self.block = block
+        self.solid = solid
+        self.modulus = float(np.median(solid.young_modulus))
+        self._constants = self._elastic()
+        free = np.full(len(block.nodes), -1, dtype=np.int64)
+        self._free = np.nonzero(~solid.held)[0]
+        free[self._free] = np.arange(len(self._free))
+        self._system = _System(block.elements, free)
+        self._stiffness = np.zeros((len(block.elements), 10, 10, 3, 3))
+        self._load = self._own_weight()
+        self._tolerance = 1e-4 * self.modulus * solid.tool_radius**2
+        self.iterations = 0
+        self.rest = self._advance(np.zeros_like(block.nodes), _NOWHERE, 0)
+
+    def _elastic(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        c10, c01, lame = constants(self.solid.young_modulus, self.solid.poisson_ratio)
+        return c10, c01, np.average(lame, axis=1, weights=self.block.weights)
+
+    def _own_weight(self) -> FloatArray:
+        load = np.zeros_like(self.block.nodes)
+        bary = _shape_values()
+        nodal = np.einsum("eq,qa->ea", self.block.weights, bary)
+        np.add.at(load[:, 2], self.block.elements, -self.solid.weight * nodal)
+        return load
+
+    def state(self, centre: FloatArray, start: State) -> State:
+        """The equilibrium with the tool's centre at `centre` [m]; the way from `start` is split where Newton does not get there."""
+        return self._advance(start.displacement, centre, 0, start.centre)
+
+    def guess(self, displacement: FloatArray, centre: FloatArray, start: State) -> State:
+        """As `state`, trying first from `displacement` (an extrapolation)."""
+        try:
+            return self._newton(displacement, centre)
+        except SolveError:
+            return self.state(centre, start)
+
+    def _advance(self, displacement: FloatArray, centre: FloatArray, depth: int, before: FloatArray | None = None) -> State:
+        try:
+            return self._newton(displacement, centre)
+        except SolveError:
+            if before is None or depth > 6:
+                raise
+            half = self._advance(displacement, 0.5 * (before + centre), depth + 1, before)
+            return self._advance(half.displacement, centre, depth + 1, half.centre)
+
+    def _newton(self, displacement: FloatArray, centre: FloatArray, limit: int = 14) -> State:
+        u = displacement.copy()
+        energy = np.inf
+        norm = np.inf
+        for iteration in range(limit + 1):
+            energy, force, push, coupling, total, deepest = self._assemble(u, centre)
+            if not np.isfinite(energy):
+                break
+            residual = -force[self._free].ravel()
+            norm = float(np.linalg.norm(residual))
+            if norm < self._tolerance:
+                return self._converged(u, centre, push, coupling, total, deepest, iteration)
+            if iteration == limit:
+                break
+            self.iterations += 1
+            self._system.factorise(self._stiffness)
+            step = np.zeros_like(u)
+            step[self._free] = self._system.solve(residual).reshape(-1, 3)
+            length = self._search(u, step, centre, energy, float(step[self._free].ravel() @ residual))
+            if length == 0.0:
+                break
+            u += length * step
+        raise SolveError(
+            f"no equilibrium of the virtual block with the tool at {np.round(centre * 1e3, 2)} mm: residual {norm:.2g} N; "
+            "use a finer grid or a shallower push",
+            residual=norm,
+        )
+
+    def _converged(
+        self,
+        u: FloatArray,
+        centre: FloatArray,
+        push: FloatArray,
+        coupling: FloatArray,
+        total: FloatArray,
+        deepest: float,
+        iteration: int,
+    ) -> State:
+        compliance = np.zeros((3, 3))
+        if np.any(total):
+            if iteration == 0:
+                self._system.factorise(self._stiffness)
+            right = coupling[self._free].reshape(-1, 3)
+            compliance = total - right.T @ self._system.solve(right)
+        return State(u, centre, push, compliance, deepest)
+
+    def _search(self, u: FloatArray, step: FloatArray, centre: FloatArray, energy: float, slope: float) -> float:
+        """How much of the step to take: none where even a small part does not lower the energy."""
+        length = 1.0
+        for _ in range(8):
+            trial = self._energy(u + length * step, centre)
+            if trial <= energy - 1e-4 * length * slope + 1e-9 * abs(energy):
+                return length
+            length *= 0.5
+        return 0.0
+
+    def _energy(self, u: FloatArray, centre: FloatArray) -> float:
+        block = self.block
+        energy = solid_energy(u, block.elements, block.gradients, block.weights, *self._constants)
+        if np.isfinite(energy):
+            for sampling, where, radius in self._obstacles(centre):
+                energy += self._press(u, sampling, where, radius, False, _UNUSED)[0]
+        return energy - float(np.sum(self._load * u))
+
+    def _assemble(self, u: FloatArray, centre: FloatArray) -> tuple[float, FloatArray, FloatArray, FloatArray, FloatArray, float]:
+        block = self.block
+        force = -self._load
+        self._stiffness[:] = 0.0
+        energy = solid_energy(u, block.elements, block.gradients, block.weights, *self._constants)
+        push, coupling, total, deepest = np.zeros(3), np.zeros((len(u), 3, 3)), np.zeros((3, 3)), 0.0
+        if np.isfinite(energy):
+            assemble_solid(u, block.elements, block.gradients, block.weights, *self._constants, self._stiffness, force)
+            for sampling, where, radius in self._obstacles(centre):
+                of_tool = (push, coupling, total) if radius > 0 else (np.zeros(3), np.zeros_like(coupling), np.zeros((3, 3)))
+                part, depth = self._press(u, sampling, where, radius, True, (self._stiffness, force, *of_tool))
+                energy += part
+                deepest = max(deepest, depth)
+        return energy - float(np.sum(self._load * u)), force, push, coupling, total, deepest
+
+    def _obstacles(self, centre: FloatArray) -> list[tuple[Sampling, FloatArray, float]]:
+        tool = (self.block.skin, centre, self.solid.tool_radius)
+        return [tool, (self.block.sole, np.zeros(3), 0.0)] if self.solid.lifts else [tool]
+
+    def _press(
+        self, u: FloatArray, sampling: Sampling, centre: FloatArray, radius: float, derivative: bool, out: tuple[FloatArray, ...]
+    ) -> tuple[float, float]:
+        penalty = PENALTY_OVER_E * self.modulus
+        block = self.block
+        parts = (u, block.nodes, block.elements, sampling.owner, sampling.values, sampling.weights)
+        energy, deepest = assemble_obstacle(*parts, centre, radius, penalty, derivative, *out)
+        return float(energy), float(deepest)
+
+    def close(self) -> None:
+        """Give the factor's memory back."""
+        self._system.close()
+
+
+@cache
+def _library() -> Any:
+    from pypardiso import PyPardisoSolver  # noqa: PLC0415
+
+    return PyPardisoSolver(mtype=-2)
+
+
+def _pardiso() -> Any:
+    """A solver of its own; looking the library up again would take longer than a factorisation."""
+    solver = copy(_library())
+    solver.pt, solver.iparm, solver.perm = solver.pt * 0, solver.iparm * 0, solver.perm.copy()
+    return solver
+
+
+def _shape_values() -> FloatArray:
+    """(4, 10) shape functions of the ten-node tetrahedron at its four volume points, scikit-fem's order."""
+    from skfem import ElementTetP2  # noqa: PLC0415
+    from skfem.quadrature import get_quadrature  # noqa: PLC0415
+
+    element = ElementTetP2()
+    places, _ = get_quadrature(element, 2)
+    return np.array([element.lbasis(places, number)[0] for number in range(10)]).T

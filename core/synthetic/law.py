@@ -1,0 +1,218 @@
+"""Ciarlet's compressible Mooney-Rivlin law on ten-node tetrahedra with a mean dilatation, assembled with numba.
+
+W(F) = c10 (I1 - 3) + c01 (I2 - 3) - (2 c10 + 4 c01) ln J,   plus per element   V U(Jm),   U(J) = l/4 (J^2 - 1 - 2 ln J)
+
+with Jm the element's mean of J, which keeps nearly incompressible tetrahedra from locking. At small strain the shear modulus is
+2 (c10 + c01) and Lame's first constant l + 4 c01. A replay that assumes another law with the same E and nu differs from this one at
+large strain only, as it would from a real gel.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from core.frames import FloatArray
+
+__all__ = ["SECOND_INVARIANT_SHARE", "assemble_obstacle", "assemble_solid", "constants", "solid_energy"]
+
+SECOND_INVARIANT_SHARE = 0.1
+_FAST = {"contract", "reassoc", "arcp", "nsz"}
+
+
+def constants(young_modulus: FloatArray, poisson_ratio: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """c10, c01 and l [Pa] with the given E [Pa] and nu [1] at small strain."""
+    shear = young_modulus / (2 * (1 + poisson_ratio))
+    lame = young_modulus * poisson_ratio / ((1 + poisson_ratio) * (1 - 2 * poisson_ratio))
+    c01 = 0.5 * shear * SECOND_INVARIANT_SHARE
+    return 0.5 * shear - c01, c01, lame - 4 * c01
+
+
+@njit(cache=True, fastmath=_FAST)
+def _gradient(u: Any, nodes: Any, g: Any, f: Any) -> float:
+    """Fill the deformation gradient f (3, 3) and return its determinant."""
+    for i in range(3):
+        for j in range(3):
+            f[i, j] = 1.0 if i == j else 0.0
+    for a in range(10):
+        for i in range(3):
+            v = u[nodes[a], i]
+            for j in range(3):
+                f[i, j] += v * g[a, j]
+    return float(
+        f[0, 0] * (f[1, 1] * f[2, 2] - f[1, 2] * f[2, 1])
+        - f[0, 1] * (f[1, 0] * f[2, 2] - f[1, 2] * f[2, 0])
+        + f[0, 2] * (f[1, 0] * f[2, 1] - f[1, 1] * f[2, 0])
+    )
+
+
+@njit(cache=True, fastmath=_FAST)
+def solid_energy(u: Any, elements: Any, gradients: Any, weights: Any, c10: Any, c01: Any, lame: Any) -> float:
+    """Stored energy [J] of displacements u (n, 3) [m]; infinite where an element is turned inside out."""
+    f = np.empty((3, 3))
+    total = 0.0
+    for e in range(elements.shape[0]):
+        volume = 0.0
+        mean = 0.0
+        for q in range(weights.shape[1]):
+            det = _gradient(u, elements[e], gradients[e, q], f)
+            if det <= 1e-3:
+                return np.inf
+            w = weights[e, q]
+            volume += w
+            mean += w * det
+            c = f.T @ f
+            i1 = c[0, 0] + c[1, 1] + c[2, 2]
+            i2 = 0.5 * (i1 * i1 - (c * c).sum())
+            d = 2 * c10[e, q] + 4 * c01[e, q]
+            total += w * (c10[e, q] * (i1 - 3) + c01[e, q] * (i2 - 3) - d * np.log(det))
+        mean /= volume
+        total += volume * lame[e] / 4 * (mean * mean - 1 - 2 * np.log(mean))
+    return total
+
+
+@njit(cache=True, fastmath=_FAST)
+def assemble_solid(
+    u: Any, elements: Any, gradients: Any, weights: Any, c10: Any, c01: Any, lame: Any, stiffness: Any, force: Any
+) -> None:
+    """Add to element stiffness (e, 10, 10, 3, 3) [N/m], upper node pairs only, and to force (n, 3) [N]."""
+    points = weights.shape[1]
+    fs = np.empty((points, 3, 3))
+    dets = np.empty(points)
+    fa = np.empty((10, 3))
+    ha = np.empty((10, 3))
+    mean_gradient = np.empty((10, 3))
+    for e in range(elements.shape[0]):
+        volume = 0.0
+        mean = 0.0
+        for q in range(points):
+            dets[q] = _gradient(u, elements[e], gradients[e, q], fs[q])
+            volume += weights[e, q]
+            mean += weights[e, q] * dets[q]
+        mean /= volume
+        pressure = 0.5 * lame[e] * (mean - 1 / mean)
+        mean_gradient[:] = 0.0
+        for q in range(points):
+            f = fs[q]
+            det = dets[q]
+            w = weights[e, q]
+            a10 = 2 * c10[e, q]
+            a01 = 2 * c01[e, q]
+            d = a10 + 2 * a01
+            inverse = np.linalg.inv(f)
+            b = f @ f.T
+            i1 = b[0, 0] + b[1, 1] + b[2, 2]
+            pj = pressure * det
+            for a in range(10):
+                for i in range(3):
+                    fa[a, i] = f[i, 0] * gradients[e, q, a, 0] + f[i, 1] * gradients[e, q, a, 1] + f[i, 2] * gradients[e, q, a, 2]
+                    ha[a, i] = (
+                        inverse[0, i] * gradients[e, q, a, 0]
+                        + inverse[1, i] * gradients[e, q, a, 1]
+                        + inverse[2, i] * gradients[e, q, a, 2]
+                    )
+                for i in range(3):
+                    bf = b[i, 0] * fa[a, 0] + b[i, 1] * fa[a, 1] + b[i, 2] * fa[a, 2]
+                    force[elements[e, a], i] += w * ((a10 + a01 * i1) * fa[a, i] - a01 * bf + (pj - d) * ha[a, i])
+                    mean_gradient[a, i] += w * det / volume * ha[a, i]
+            for m in range(10):
+                for n in range(m, 10):
+                    alpha = 0.0
+                    beta = 0.0
+                    for i in range(3):
+                        alpha += gradients[e, q, m, i] * gradients[e, q, n, i]
+                        beta += fa[m, i] * fa[n, i]
+                    plain = w * ((a10 + a01 * i1) * alpha - a01 * beta)
+                    wa = w * a01
+                    for i in range(3):
+                        for k in range(3):
+                            stiffness[e, m, n, i, k] += (
+                                wa * (2 * fa[m, i] * fa[n, k] - fa[n, i] * fa[m, k] - alpha * b[i, k])
+                                + w * pj * ha[m, i] * ha[n, k]
+                                + w * (d - pj) * ha[n, i] * ha[m, k]
+                            )
+                        stiffness[e, m, n, i, i] += plain
+        second = 0.5 * lame[e] * (1 + 1 / (mean * mean)) * volume
+        for m in range(10):
+            for n in range(m, 10):
+                for i in range(3):
+                    for k in range(3):
+                        stiffness[e, m, n, i, k] += second * mean_gradient[m, i] * mean_gradient[n, k]
+
+
+@njit(cache=True, fastmath=_FAST)
+def assemble_obstacle(
+    u: Any,
+    nodes: Any,
+    elements: Any,
+    owner: Any,
+    values: Any,
+    areas: Any,
+    centre: Any,
+    radius: float,
+    penalty: float,
+    derivative: bool,
+    stiffness: Any,
+    force: Any,
+    push: Any,
+    coupling: Any,
+    total: Any,
+) -> tuple[float, float]:
+    """A rigid sphere, or with radius 0 the table z = 0, pressing on surface points; frictionless penalty [Pa/m].
+
+    Adds to element stiffness, nodal force, push (3,) the force on the block [N], coupling (n, 3, 3) = -d force / d centre,
+    and total (3, 3) its sum, where `derivative`; returns energy [J] and deepest penetration [m].
+    """
+    energy = 0.0
+    deepest = 0.0
+    x = np.empty(3)
+    n = np.empty(3)
+    t = np.empty((3, 3))
+    for s in range(owner.shape[0]):
+        element = elements[owner[s]]
+        for q in range(areas.shape[1]):
+            x[:] = 0.0
+            for a in range(10):
+                value = values[s, q, a]
+                for i in range(3):
+                    x[i] += value * (nodes[element[a], i] + u[element[a], i])
+            n[:] = 0.0
+            if radius > 0:
+                distance = np.sqrt((x[0] - centre[0]) ** 2 + (x[1] - centre[1]) ** 2 + (x[2] - centre[2]) ** 2)
+                gap = radius - distance
+                if gap <= 0 or distance < 1e-9:
+                    continue
+                for i in range(3):
+                    n[i] = (x[i] - centre[i]) / distance
+                bend = gap / distance if gap < 0.02 * radius else 0.0
+            else:
+                gap = -x[2]
+                if gap <= 0:
+                    continue
+                n[2] = 1.0
+                bend = 0.0
+            deepest = max(deepest, gap)
+            stiff = penalty * areas[s, q]
+            energy += 0.5 * stiff * gap * gap
+            if not derivative:
+                continue
+            for i in range(3):
+                push[i] += stiff * gap * n[i]
+                for k in range(3):
+                    t[i, k] = stiff * ((1 + bend) * n[i] * n[k] - (bend if i == k else 0.0))
+                    total[i, k] += t[i, k]
+            for a in range(10):
+                va = values[s, q, a]
+                if va == 0.0:
+                    continue
+                for i in range(3):
+                    force[element[a], i] -= stiff * gap * n[i] * va
+                    for k in range(3):
+                        coupling[element[a], i, k] += va * t[i, k]
+                for b in range(a, 10):
+                    for i in range(3):
+                        for k in range(3):
+                            stiffness[owner[s], a, b, i, k] += va * values[s, q, b] * t[i, k]
+    return energy, deepest

@@ -1,0 +1,198 @@
+"""A whole virtual dataset: the folder a bench would export, and the truth beside it."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from core.errors import RunError
+from core.frames import FloatArray, Transform
+from core.progress import Report, part, silent
+from core.synthetic.bench import Track, neutral_displacement, perform, rest_surface, true_offset, true_radius
+from core.synthetic.camera import DepthCamera, Scene, place_camera
+from core.synthetic.motion import Motion, draw_motion
+from core.synthetic.scenario import Scenario
+from core.synthetic.truth import Truth, truth_path
+from core.synthetic.visibility import changed, visible_weights
+from core.synthetic.writing import write_clouds, write_config, write_kinematics, write_ply, write_touches
+
+__all__ = ["make_dataset"]
+
+KINEMATICS_NOISE = 0.05e-3
+TOUCH_NOISE = 0.15e-3
+MARGIN = 0.35
+
+
+@dataclass(frozen=True)
+class _Job:
+    scenario: Scenario
+    motion: Motion
+    camera: DepthCamera
+    robot_from_phantom: Transform
+    camera_shift: Transform
+    seen: FloatArray
+    folder: Path
+    seed: int
+
+
+def make_dataset(folder: Path, scenario: Scenario, seed: int, workers: int = 1, report: Report = silent) -> Truth:
+    """Make the dataset `folder` and its truth `<folder>.truth.json`: both whole or neither.
+
+    The same scenario and seed give the same files, whatever the number of workers. Raises RunError where `folder` exists.
+    """
+    if folder.exists():
+        raise RunError(f"{folder} exists already; choose another name or remove it", path=str(folder))
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        truth = _fill(aside, scenario, seed, workers, report)
+        aside.chmod(0o755)
+        truth.save(truth_path(folder))
+        aside.rename(folder)
+    except BaseException:
+        shutil.rmtree(aside, ignore_errors=True)
+        raise
+    report(1.0, f"made {folder.name}")
+    return truth
+
+
+def _fill(folder: Path, scenario: Scenario, seed: int, workers: int, report: Report) -> Truth:
+    rng = np.random.default_rng([seed, 1])
+    seen = rng.choice([-1.0, 1.0], size=2)
+    robot_from_phantom = Transform(Rotation.random(rng=rng).as_matrix(), rng.uniform(-0.25, 0.25, 3))
+    report(0.0, "letting the block settle")
+    rest, settled, faces = rest_surface(scenario)
+    camera = place_camera(
+        rng, scenario.size, (rest + settled, faces), seen, scenario.density, scenario.noise * rng.uniform(0.9, 1.1)
+    )
+    shift = _camera_shift(scenario, rng)
+    write_ply(folder / "rest.ply", camera.cloud(Scene((rest + settled, faces), None, np.array([0.0, 0.0, -1.0]), 1.0), rng))
+    _write_touches(folder, scenario, robot_from_phantom, (rest, settled), rng)
+    guess = Transform.from_vector(rng.normal(size=3) * 2.5e-3, rng.normal(size=3) * 0.02) @ camera.phantom_from_camera
+    write_config(folder / "dataset.toml", f"block-{rng.integers(16**4):04x}", scenario, _landmarks(scenario), guess)
+    jobs = [
+        _Job(scenario, motion, camera, robot_from_phantom, shift, seen, folder / "sequences" / motion.name, seed)
+        for motion in _motions(scenario, seen, seed)
+    ]
+    squares: list[float] = []
+    for done, part_squares in enumerate(_all(jobs, workers, part(report, 0.05, 1.0))):
+        squares += part_squares
+        report(0.05 + 0.95 * (done + 1) / len(jobs), f"recorded {done + 1} of {len(jobs)} sequences")
+    visibility = float(np.sqrt(np.mean(squares))) if squares else 0.0
+    return Truth(scenario.effects, visibility, camera.phantom_from_camera, robot_from_phantom, shift)
+
+
+def _motions(scenario: Scenario, seen: FloatArray, seed: int) -> list[Motion]:
+    kinds = [name.rpartition("-")[0] for name in scenario.sequences]
+    return [
+        draw_motion(name, kinds[:place].count(kinds[place]), scenario.size, scenario.tool_radius, seen, seed)
+        for place, name in enumerate(scenario.sequences)
+    ]
+
+
+def _all(jobs: list[_Job], workers: int, report: Report) -> Iterator[list[float]]:
+    if workers <= 1:
+        yield from (_record(job) for job in jobs)
+        return
+    with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=get_context("forkserver")) as pool:
+        futures = [pool.submit(_record, job) for job in jobs]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+
+
+def _camera_shift(scenario: Scenario, rng: np.random.Generator) -> Transform:
+    """How the camera moved after `rest.ply`: the stated magnitudes along random directions."""
+    step, turn = rng.normal(size=(2, 3))
+    hidden = scenario.hidden("camera_registration")
+    if hidden is None:
+        return Transform()
+    step *= hidden.value("translation") / np.linalg.norm(step)
+    return Transform.from_vector(step, turn * hidden.value("rotation") / np.linalg.norm(turn))
+
+
+def _landmarks(scenario: Scenario) -> dict[str, FloatArray]:
+    signs = ((1, 1), (1, -1), (-1, -1), (-1, 1))
+    x, y, z = scenario.size
+    return {f"corner_{number}": np.array([a * x / 2, b * y / 2, z]) for number, (a, b) in enumerate(signs)}
+
+
+def _write_touches(
+    folder: Path,
+    scenario: Scenario,
+    robot_from_phantom: Transform,
+    surface: tuple[FloatArray, FloatArray],
+    rng: np.random.Generator,
+) -> None:
+    """Touches of the corners where they really are, with the error of a careful hand."""
+    landmarks, (rest, settled) = _landmarks(scenario), surface
+    corners = np.array([place + settled[np.argmin(np.linalg.norm(rest - place, axis=1))] for place in landmarks.values()])
+    touched = corners + (0.0, 0.0, scenario.touch_offset) + rng.normal(size=(4, 3)) * TOUCH_NOISE
+    write_touches(folder / "touches.csv", list(landmarks), robot_from_phantom.apply(touched))
+
+
+def _record(job: _Job) -> list[float]:
+    """Solve one sequence and write its files; returns the mean squares by which the hidden effects change the surface [m^2]."""
+    track = perform(job.scenario, job.motion)
+    rng = np.random.default_rng([job.seed, 2, *job.motion.name.encode()])
+    (job.folder / "clouds").mkdir(parents=True)
+    start = rng.uniform(5.0, 45.0)
+    _write_kinematics(job, start, rng)
+    hidden = job.scenario.hidden("time_offset")
+    count = int((job.motion.duration - 2 * MARGIN) * job.scenario.rate)
+    instants = MARGIN + np.arange(count) / job.scenario.rate + rng.uniform(-0.6e-3, 0.6e-3, count)
+    instants = instants[rng.random(count) >= 0.02]
+    files = [f"clouds/{number:06d}.ply" for number in range(len(instants))]
+    stamps = start + instants + (hidden.value("offset") if hidden else 0.0) + rng.uniform(-1e-3, 1e-3, len(instants))
+    write_clouds(job.folder / "clouds.csv", stamps, files)
+    camera = _moved(job)
+    for file, instant in zip(files, instants.tolist(), strict=True):
+        write_ply(job.folder / file, camera.cloud(_scene(job, track, instant), rng))
+    return _visibility(job, track)
+
+
+def _moved(job: _Job) -> DepthCamera:
+    camera = job.camera
+    pose = job.camera_shift @ camera.phantom_from_camera
+    return DepthCamera(pose, camera.rays, camera.shape, camera.bias, camera.sigma, camera.density, camera.on_block)
+
+
+def _scene(job: _Job, track: Track, instant: float) -> Scene:
+    centre = job.motion.centre(np.array([instant]))[0] + true_offset(job.scenario)
+    return Scene((track.surface(instant), track.faces), centre, job.motion.axis, true_radius(job.scenario))
+
+
+def _write_kinematics(job: _Job, start: float, rng: np.random.Generator) -> None:
+    """The stated poses: about 1 kHz with jitter; the last axis of the orientation points from the shaft to the tip."""
+    count = int(job.motion.duration * job.scenario.robot_rate)
+    times = np.cumsum(np.clip(1 + 0.15 * rng.normal(size=count), 0.3, 1.7)) / job.scenario.robot_rate
+    times = np.unique(np.round(start + times[times < job.motion.duration], 5))
+    centres = job.motion.centre(times - start) + rng.normal(size=(len(times), 3)) * KINEMATICS_NOISE
+    turn = Rotation.align_vectors(job.motion.axis[None], [[0.0, 0.0, 1.0]])[0] * Rotation.from_euler("z", rng.uniform(0, 2 * np.pi))
+    quaternion = (Rotation.from_matrix(job.robot_from_phantom.rotation) * turn).as_quat()
+    write_kinematics(job.folder / "kinematics.csv", times, job.robot_from_phantom.apply(centres), quaternion)
+
+
+def _visibility(job: _Job, track: Track) -> list[float]:
+    """Mean squares over the visible surface, at one deep and one moving instant of the deepest probe [m^2]."""
+    if not job.scenario.effects:
+        return []
+    hidden = job.scenario.hidden("time_offset")
+    late = hidden.value("offset") if hidden else 0.0
+    weights = visible_weights(track.rest, track.faces, job.scenario.size, job.seen)
+    squares = []
+    for instant in track.touched:
+        believed = neutral_displacement(job.scenario, job.motion, track, instant + late)
+        squares.append(changed(track.rest, track.displacement(instant), believed, job.camera_shift, weights))
+    return squares

@@ -1,0 +1,153 @@
+"""What a virtual experiment is: what everybody believes about it, and what is hidden in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from core.errors import EffectError
+
+__all__ = ["HIDDEN", "HiddenEffect", "Scenario", "draw_scenario"]
+
+HIDDEN: Mapping[str, Mapping[str, str]] = {
+    "poisson_ratio": {"nu": "1"},
+    "stiff_inclusion": {"x": "m", "y": "m", "z": "m", "radius": "m", "stiffness_ratio": "1"},
+    "tool_radius": {"radius": "m"},
+    "tool_offset": {"dx": "m", "dy": "m", "dz": "m"},
+    "base_slip": {"friction_coefficient": "1"},
+    "base_detachment": {"edge": "", "extent": "m"},
+    "gravity": {"specific_weight_over_stiffness": "1/m"},
+    "time_offset": {"offset": "s"},
+    "camera_registration": {"translation": "m", "rotation": "rad"},
+}
+"""The effects that the virtual bench can hide, with the unit of each parameter; names are those of the catalogue."""
+
+
+@dataclass(frozen=True)
+class HiddenEffect:
+    """One cause by its name in the catalogue, with its parameters in SI units (an edge is a word)."""
+
+    effect: str
+    parameters: Mapping[str, float | str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.effect not in HIDDEN:
+            raise EffectError(f"the virtual bench cannot hide {self.effect!r}; it knows {', '.join(HIDDEN)}", effect=self.effect)
+        if set(self.parameters) != set(HIDDEN[self.effect]):
+            wanted, got = ", ".join(HIDDEN[self.effect]), ", ".join(self.parameters) or "none"
+            raise EffectError(f"{self.effect} needs the parameters {wanted}, got {got}", effect=self.effect)
+
+    def value(self, name: str) -> float:
+        """A numeric parameter."""
+        return float(self.parameters[name])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """Beliefs shared by all, the hidden effects, and how densely the sensors sample.
+
+    Attributes:
+        effects: what is really there and believed by nobody.
+        sequences: names; what stands before the number is the kind of motion: poke-top, poke-side or drag.
+        size: of the block [m].
+        mass: [kg].
+        young_modulus: true and believed [Pa].
+        poisson_ratio: believed [1].
+        tool_radius: believed [m].
+        touch_offset: tool centre above the landmark at touch [m].
+        density: points on the phantom in one cloud, about.
+        rate: clouds per second [1/s].
+        robot_rate: tool poses per second [1/s].
+        noise: standard deviation of a depth at 0.35 m [m].
+        fine: longest element edge at the contact [m].
+    """
+
+    effects: tuple[HiddenEffect, ...] = ()
+    sequences: tuple[str, ...] = ("poke-top-01", "poke-top-02", "poke-top-03", "poke-side-01", "poke-side-02", "drag-01", "drag-02")
+    size: tuple[float, float, float] = (0.0687, 0.0393, 0.0358)
+    mass: float = 0.10401
+    young_modulus: float = 5.0e3
+    poisson_ratio: float = 0.45
+    tool_radius: float = 0.005
+    touch_offset: float = 0.005
+    density: int = 2600
+    rate: float = 3.75
+    robot_rate: float = 1000.0
+    noise: float = 0.7e-3
+    fine: float = 2.6e-3
+
+    def hidden(self, effect: str) -> HiddenEffect | None:
+        """The effect of that name, if it is hidden here."""
+        return next((hidden for hidden in self.effects if hidden.effect == effect), None)
+
+
+_Draw = Callable[[np.random.Generator], dict[str, float | str]]
+
+
+def _between(rng: np.random.Generator, low: float, high: float, decimals: int = 4) -> float:
+    return round(float(rng.uniform(low, high)), decimals)
+
+
+def _either(rng: np.random.Generator, *ranges: tuple[float, float], decimals: int = 4) -> float:
+    low, high = ranges[int(rng.integers(len(ranges)))]
+    return _between(rng, low, high, decimals)
+
+
+def _inclusion(rng: np.random.Generator) -> dict[str, float | str]:
+    radius = _between(rng, 6.5e-3, 9e-3)
+    return {
+        "x": _between(rng, -0.018, 0.018),
+        "y": _between(rng, -0.006, 0.006),
+        "z": round(0.0358 - radius - _between(rng, 1.5e-3, 4e-3), 4),
+        "radius": radius,
+        "stiffness_ratio": _between(rng, 4.0, 10.0, 1),
+    }
+
+
+def _offset(rng: np.random.Generator) -> dict[str, float | str]:
+    direction = rng.normal(size=3)
+    step = direction / np.linalg.norm(direction) * rng.uniform(1.2e-3, 2.5e-3)
+    return {name: round(float(part), 5) for name, part in zip(("dx", "dy", "dz"), step, strict=True)}
+
+
+_CLEAR: Mapping[str, _Draw] = {
+    "poisson_ratio": lambda rng: {"nu": _either(rng, (0.28, 0.36), (0.488, 0.492), decimals=3)},
+    "stiff_inclusion": _inclusion,
+    "tool_radius": lambda rng: {"radius": _either(rng, (3.5e-3, 4.2e-3), (5.8e-3, 6.5e-3))},
+    "tool_offset": _offset,
+    "base_slip": lambda rng: {"friction_coefficient": _between(rng, 0.08, 0.2, 3)},
+    "base_detachment": lambda rng: {"edge": str(rng.choice(["-x", "+x", "-y", "+y"])), "extent": _between(rng, 10e-3, 20e-3)},
+    "gravity": lambda rng: {"specific_weight_over_stiffness": _between(rng, 1.2, 2.6, 2)},
+    "time_offset": lambda rng: {"offset": _either(rng, (0.08, 0.25), (-0.25, -0.08), decimals=3)},
+    "camera_registration": lambda rng: {"translation": _between(rng, 1.5e-3, 4e-3), "rotation": _between(rng, 0.018, 0.044)},
+}
+
+
+def draw_scenario(seed: int, effects: int = 1, clear: bool = True) -> Scenario:
+    """A scenario with that many different hidden effects, of sizes well above the sensor's noise.
+
+    With `clear` false each effect is drawn a third as far from its neutral value: visible to some diagnoses only.
+    """
+    rng = np.random.default_rng([seed, 7919])
+    names = rng.choice(list(_CLEAR), size=effects, replace=False)
+    hidden = tuple(HiddenEffect(str(name), _CLEAR[str(name)](rng)) for name in names)
+    return Scenario(effects=hidden if clear else tuple(_fainter(one) for one in hidden))
+
+
+_NEUTRAL: Mapping[str, float] = {"nu": 0.45, "tool_radius": 0.005, "stiffness_ratio": 1.0}
+_SHRINKING = ("dx", "dy", "dz", "extent", "specific_weight_over_stiffness", "offset", "translation", "rotation")
+
+
+def _fainter(hidden: HiddenEffect) -> HiddenEffect:
+    parameters = dict(hidden.parameters)
+    for name, value in parameters.items():
+        key = hidden.effect if hidden.effect == "tool_radius" else name
+        if key in _NEUTRAL:
+            parameters[name] = round(_NEUTRAL[key] + (float(value) - _NEUTRAL[key]) / 3, 6)
+        elif name in _SHRINKING:
+            parameters[name] = round(float(value) / 3, 6)
+        elif name == "friction_coefficient":
+            parameters[name] = round(float(value) * 1.5, 4)
+    return HiddenEffect(hidden.effect, parameters)

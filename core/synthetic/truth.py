@@ -1,0 +1,68 @@
+"""What is hidden in a virtual dataset, as the file that stands beside it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from core.frames import Transform
+from core.synthetic.scenario import HIDDEN, HiddenEffect
+
+__all__ = ["Truth", "truth_path"]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The hidden effects and the true registrations.
+
+    Attributes:
+        effects: empty where the verdict is none.
+        visibility: root mean square change of the visible surface by the hidden effects while it is touched [m].
+        phantom_from_camera: as `rest.ply` was taken.
+        robot_from_phantom: of the robot's true frame.
+        camera_shift: phantom frame; `camera_shift @ phantom_from_camera` holds in the sequences.
+    """
+
+    effects: tuple[HiddenEffect, ...]
+    visibility: float
+    phantom_from_camera: Transform
+    robot_from_phantom: Transform
+    camera_shift: Transform = field(default_factory=Transform)
+
+    @property
+    def verdict(self) -> str:
+        """What a perfect diagnosis says: found or none."""
+        return "found" if self.effects else "none"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values: each parameter with its unit, the visibility in mm."""
+        return {
+            "verdict": self.verdict,
+            "effects": [_described(hidden) for hidden in self.effects],
+            "visibility_mm": round(self.visibility * 1e3, 4),
+            "registration": {
+                "phantom_from_camera": self.phantom_from_camera.matrix.tolist(),
+                "robot_from_phantom_R": self.robot_from_phantom.rotation.tolist(),
+                "robot_from_phantom_t": self.robot_from_phantom.translation.tolist(),
+                "camera_shift": self.camera_shift.matrix.tolist(),
+            },
+        }
+
+    def save(self, path: Path) -> None:
+        """Write JSON."""
+        path.write_text(json.dumps(self.as_dict(), indent=1) + "\n")
+
+
+def truth_path(folder: Path) -> Path:
+    """Where the truth of the dataset in `folder` stands: beside it, never in it."""
+    return folder.with_name(folder.name + ".truth.json")
+
+
+def _described(hidden: HiddenEffect) -> dict[str, Any]:
+    units = HIDDEN[hidden.effect]
+    return {
+        "effect": hidden.effect,
+        "parameters": {name: {"value": value, "unit": units[name]} for name, value in hidden.parameters.items()},
+    }
