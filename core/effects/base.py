@@ -1,0 +1,113 @@
+"""What an effect is: parameters with unit, bounds and prior, and one pure function from setup to setup."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, ClassVar, Self
+
+from core.errors import EffectError
+from core.setup import Setup
+
+__all__ = ["Effect", "Parameter", "Slot", "parameter"]
+
+
+class Slot(Enum):
+    """The part of the experiment an effect enters; SENSOR changes only the observation, so nothing is solved anew."""
+
+    GEOMETRY = "geometry"
+    MATERIAL = "material"
+    LOAD = "load"
+    SUPPORT = "support"
+    TOOL = "tool"
+    SENSOR = "sensor"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """What fit, REST, slider and report need to know of a parameter.
+
+    Attributes:
+        name, unit: as in effects.md, SI. low, high: bounds. scale: a step that matters, for trust regions and differences.
+        choices: allowed words, for a parameter that is not a number.
+    """
+
+    name: str
+    unit: str
+    low: float = -math.inf
+    high: float = math.inf
+    scale: float = 1.0
+    choices: tuple[str, ...] = ()
+
+
+def parameter(unit: str, *, low: float = 0.0, high: float = 0.0, scale: float = 1.0, choices: tuple[str, ...] = ()) -> Any:
+    """A dataclass field that carries a Parameter."""
+    return dataclasses.field(metadata={"unit": unit, "low": low, "high": high, "scale": scale, "choices": choices})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effect(ABC):
+    """One cause. A subclass is a frozen dataclass whose fields are made by `parameter`, and `apply`."""
+
+    name: ClassVar[str]
+    enters: ClassVar[Slot]
+    summary: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        for item in self.parameters():
+            value = getattr(self, item.name)
+            if item.choices:
+                if value not in item.choices:
+                    raise EffectError(
+                        f"{self.name}: {item.name} = {value!r} is none of {', '.join(item.choices)}", parameter=item.name, value=value
+                    )
+            elif not (math.isfinite(value) and item.low <= value <= item.high):
+                raise EffectError(
+                    f"{self.name}: {item.name} = {value:g} {item.unit} is outside {item.low:g} to {item.high:g} {item.unit}",
+                    parameter=item.name, value=value, low=item.low, high=item.high,
+                )  # fmt: skip
+
+    @classmethod
+    def parameters(cls) -> tuple[Parameter, ...]:
+        """The parameters in the order of the fields."""
+        return tuple(Parameter(name=field.name, **field.metadata) for field in dataclasses.fields(cls))
+
+    @classmethod
+    def numbers(cls) -> tuple[Parameter, ...]:
+        """The parameters that are numbers, which a fit may move."""
+        return tuple(item for item in cls.parameters() if not item.choices)
+
+    @classmethod
+    @abstractmethod
+    def neutral(cls, setup: Setup) -> Self:
+        """The instance that changes nothing in this setup."""
+
+    @classmethod
+    @abstractmethod
+    def starts(cls, setup: Setup) -> Sequence[Self]:
+        """Finite sizes from which a search begins, spread over what is plausible for this setup."""
+
+    @abstractmethod
+    def apply(self, setup: Setup) -> Setup:
+        """The setup with this cause in it."""
+
+    def values(self) -> dict[str, float | str]:
+        """Name to value, SI."""
+        return {item.name: getattr(self, item.name) for item in self.parameters()}
+
+    def reported(self) -> dict[str, tuple[float | str, str]]:
+        """Name to (value, unit) as a report states them; more than the fields where that helps the reader."""
+        return {item.name: (getattr(self, item.name), item.unit) for item in self.parameters()}
+
+    def moved(self, values: Sequence[float]) -> Self:
+        """The same effect with other numbers, brought back into their bounds."""
+        pairs = zip(self.numbers(), values, strict=True)
+        return dataclasses.replace(self, **{item.name: min(max(float(v), item.low), item.high) for item, v in pairs})
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values from which `core.effects.from_json` makes the same effect."""
+        return {"effect": self.name, "parameters": self.values()}

@@ -1,0 +1,56 @@
+"""Causes at the tool."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+from core.effects.base import Effect, Slot, parameter
+from core.setup import Setup
+
+__all__ = ["ToolOffset", "ToolRadius"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToolRadius(Effect):
+    """A tool of another size."""
+
+    name, enters = "tool_radius", Slot.TOOL
+    summary = "the tool has another size than stated"
+    radius: float = parameter("m", low=1e-3, high=2e-2, scale=3e-4)
+
+    @classmethod
+    def neutral(cls, setup: Setup) -> Self:
+        return cls(radius=setup.tool.radius)
+
+    @classmethod
+    def starts(cls, setup: Setup) -> Sequence[Self]:
+        return [cls(radius=setup.tool.radius * factor) for factor in (0.82, 1.2)]
+
+    def apply(self, setup: Setup) -> Setup:
+        return replace(setup, tool=replace(setup.tool, radius=self.radius))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToolOffset(Effect):
+    """The tool's centre is not where the kinematics say, though the touches were right: true minus stated, phantom frame."""
+
+    name, enters = "tool_offset", Slot.TOOL
+    summary = "the tool's centre is not where the kinematics say"
+    dx: float = parameter("m", low=-5e-3, high=5e-3, scale=5e-4)
+    dy: float = parameter("m", low=-5e-3, high=5e-3, scale=5e-4)
+    dz: float = parameter("m", low=-5e-3, high=5e-3, scale=5e-4)
+
+    @classmethod
+    def neutral(cls, setup: Setup) -> Self:
+        return cls(dx=0.0, dy=0.0, dz=0.0)
+
+    @classmethod
+    def starts(cls, setup: Setup) -> Sequence[Self]:
+        """From where it is stated; the directions come from the sensitivities."""
+        return [cls.neutral(setup)]
+
+    def apply(self, setup: Setup) -> Setup:
+        offset = setup.tool.offset
+        return replace(setup, tool=replace(setup.tool, offset=(offset[0] + self.dx, offset[1] + self.dy, offset[2] + self.dz)))

@@ -1,0 +1,231 @@
+"""What the camera sees of a replay, and where the two differ.
+
+A measured point lies somewhere along its camera ray, since a depth camera errs along the ray. So the model's point for it is
+where that ray meets the simulated surface, not the nearest one: nearest points follow the noise and turn it into bias on
+curved or slanted parts. The difference is then taken along the surface normal. 45 000 noisy points become a few hundred
+averages over patches of the rest surface, which move with the material.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from core.frames import FloatArray
+from core.mesh import IntArray
+from core.replay import Equilibrium
+from core.setup import Box
+
+__all__ = ["Gaps", "PatchMeans", "Surface", "gaps", "patch_means"]
+
+SIDES = ("+z", "-y", "+y", "-x", "+x")
+_GRAZING = 0.3
+"""Cosine between ray and normal below which a depth error counts for too much along the surface."""
+_EDGE = 1.5e-3
+"""Points this near to an edge of the block [m] are left out: depth cameras round edges off."""
+_OUTLIER = 8e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """The free surface of a block as a triangle mesh of material points, and its patches.
+
+    Attributes:
+        geometry: the block. spacing: of the vertices, at most [m]. patch: edge length of a patch, about [m].
+    """
+
+    geometry: Box
+    spacing: float = 1.5e-3
+    patch: float = 4e-3
+
+    def _axes(self, side: str) -> tuple[int, int, int]:
+        """Normal axis and the two axes in the plane, right-handed about the outward normal."""
+        normal = "xyz".index(side[1])
+        first, second = [(1, 2), (2, 0), (0, 1)][normal]
+        return (normal, first, second) if side[0] == "+" else (normal, second, first)
+
+    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+        x, y, z = self.geometry.size
+        return np.array([-x / 2, -y / 2, 0.0]), np.array([x / 2, y / 2, z])
+
+    @cached_property
+    def _mesh(self) -> tuple[FloatArray, IntArray, IntArray]:
+        low, high = self._bounds()
+        vertices, faces, sides, count = [], [], [], 0
+        for number, side in enumerate(SIDES):
+            normal, first, second = self._axes(side)
+            steps = [max(2, int(np.ceil((high[a] - low[a]) / self.spacing)) + 1) for a in (first, second)]
+            grid = np.meshgrid(*(np.linspace(low[a], high[a], n) for a, n in zip((first, second), steps, strict=True)), indexing="ij")
+            points = np.empty((grid[0].size, 3))
+            points[:, first], points[:, second] = grid[0].ravel(), grid[1].ravel()
+            points[:, normal] = (high if side[0] == "+" else low)[normal]
+            index = np.arange(len(points)).reshape(steps) + count
+            a, b, c, d = (index[s, t].ravel() for s, t in ((np.s_[:-1], np.s_[:-1]), (np.s_[1:], np.s_[:-1]), (np.s_[1:], np.s_[1:]), (np.s_[:-1], np.s_[1:])))
+            quads = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+            vertices.append(points)
+            faces.append(quads)
+            sides.append(np.full(len(quads), number))
+            count += len(points)
+        return np.concatenate(vertices), np.concatenate(faces).astype(np.int32), np.concatenate(sides)
+
+    @property
+    def vertices(self) -> FloatArray:
+        """(v, 3) rest positions [m]; vertices on an edge stand once per side."""
+        return self._mesh[0]
+
+    @property
+    def faces(self) -> IntArray:
+        """(t, 3) triangles, counter-clockwise from outside."""
+        return self._mesh[1]
+
+    @property
+    def side(self) -> IntArray:
+        """(t,) number in SIDES of each triangle."""
+        return self._mesh[2]
+
+    @cached_property
+    def _layout(self) -> tuple[list[tuple[int, int]], IntArray]:
+        low, high = self._bounds()
+        shapes = []
+        for side in SIDES:
+            _, first, second = self._axes(side)
+            nx, ny = (max(1, round((high[a] - low[a]) / self.patch)) for a in (first, second))
+            shapes.append((nx, ny))
+        return shapes, np.concatenate([[0], np.cumsum([a * b for a, b in shapes])])
+
+    @property
+    def patches(self) -> int:
+        """Number of patches on all sides."""
+        return int(self._layout[1][-1])
+
+    def patch_of(self, points: FloatArray, side: IntArray) -> IntArray:
+        """Patch (m,) of rest positions (m, 3) [m] that lie on these sides (m,)."""
+        low, high = self._bounds()
+        shapes, offsets = self._layout
+        result = np.empty(len(points), dtype=np.int64)
+        for number, name in enumerate(SIDES):
+            here = side == number
+            _, *plane = self._axes(name)
+            cell = [
+                np.clip(((points[here, a] - low[a]) / (high[a] - low[a]) * n).astype(int), 0, n - 1)
+                for a, n in zip(plane, shapes[number], strict=True)
+            ]
+            result[here] = offsets[number] + cell[0] * shapes[number][1] + cell[1]
+        return result
+
+    @cached_property
+    def patch_centres(self) -> FloatArray:
+        """(p, 3) rest positions of the patches' centres [m]."""
+        low, high = self._bounds()
+        centres = []
+        for name, (nx, ny) in zip(SIDES, self._layout[0], strict=True):
+            normal, first, second = self._axes(name)
+            points = np.empty((nx * ny, 3))
+            for a, n, order in ((first, nx, np.arange(nx * ny) // ny), (second, ny, np.arange(nx * ny) % ny)):
+                points[:, a] = low[a] + (order + 0.5) / n * (high[a] - low[a])
+            points[:, normal] = (high if name[0] == "+" else low)[normal]
+            centres.append(points)
+        return np.concatenate(centres)
+
+    @cached_property
+    def patch_normals(self) -> FloatArray:
+        """(p, 3) outward normals of the patches at rest."""
+        normals = []
+        for name, (nx, ny) in zip(SIDES, self._layout[0], strict=True):
+            normal = np.zeros(3)
+            normal["xyz".index(name[1])] = 1.0 if name[0] == "+" else -1.0
+            normals.append(np.tile(normal, (nx * ny, 1)))
+        return np.concatenate(normals)
+
+    def edge_distance(self, points: FloatArray, side: IntArray) -> FloatArray:
+        """Distance (m,) [m] of rest positions to the nearest edge of their side; the base counts as one."""
+        low, high = self._bounds()
+        inside = np.minimum(points - low, high - points)
+        normal_axis = np.array(["xyz".index(name[1]) for name in SIDES])[side]
+        inside[np.arange(len(points)), normal_axis] = np.inf
+        return np.asarray(inside.min(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Gaps:
+    """Signed distances of measured points to a simulated surface.
+
+    Attributes:
+        index: (m,) which of the given points met the surface. gap: (m,) measured minus simulated along the outward normal [m].
+        foot: (m, 3) rest positions of the material points they met. normal: (m, 3) outward, of the deformed surface.
+        patch: (m,). side: (m,).
+    """
+
+    index: IntArray
+    gap: FloatArray
+    foot: FloatArray
+    normal: FloatArray
+    patch: IntArray
+    side: IntArray
+
+
+def gaps(points: FloatArray, camera: FloatArray, frame: Equilibrium, surface: Surface) -> Gaps:
+    """Compare measured points with the surface of one frame, along the camera's rays.
+
+    Args:
+        points: (n, 3) [m], phantom frame, cleaned. camera: (3,) optical centre [m], phantom frame.
+        frame: the simulated block. surface: its material points.
+
+    Points whose ray misses the block, grazes it, passes near an edge, or ends more than 8 mm away are left out.
+    """
+    import open3d as o3d
+
+    moved = frame.move(surface.vertices)
+    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
+    scene.add_triangles(o3d.core.Tensor(moved.astype(np.float32)), o3d.core.Tensor(surface.faces.astype(np.uint32)))
+    rays = points - camera
+    length = np.linalg.norm(rays, axis=1)
+    rays = rays / length[:, None]
+    cast = scene.cast_rays(o3d.core.Tensor(np.hstack([np.broadcast_to(camera, points.shape), rays]).astype(np.float32)))
+    triangle = cast["primitive_ids"].numpy().astype(np.int64)
+    hit = np.flatnonzero(np.isfinite(cast["t_hit"].numpy()))
+    triangle, rays = triangle[hit], rays[hit]
+    u, v = cast["primitive_uvs"].numpy()[hit].T
+    corners = surface.faces[triangle]
+    weights = np.stack([1 - u - v, u, v], axis=1)
+    foot = np.einsum("ma,mai->mi", weights, surface.vertices[corners])
+    normal = np.cross(moved[corners[:, 1]] - moved[corners[:, 0]], moved[corners[:, 2]] - moved[corners[:, 0]])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    # The triangles are chords of the curved surface; the gap is taken to the finite elements' own point.
+    gap = np.einsum("mi,mi->m", points[hit] - frame.move(foot), normal)
+    side = surface.side[triangle]
+    facing = -np.einsum("mi,mi->m", rays, normal)
+    good = (facing > _GRAZING) & (surface.edge_distance(foot, side) > _EDGE) & (np.abs(gap) < _OUTLIER)
+    foot, side = foot[good], side[good]
+    return Gaps(hit[good], gap[good], foot, normal[good], surface.patch_of(foot, side), side)
+
+
+@dataclass(frozen=True, eq=False)
+class PatchMeans:
+    """Robust averages over patches: mean (p,) [m], NaN where fewer than the least number of points; count (p,); spread (p,) [m]."""
+
+    mean: FloatArray
+    count: IntArray
+    spread: FloatArray
+
+
+def patch_means(values: FloatArray, patch: IntArray, patches: int, least: int = 2) -> PatchMeans:
+    """Average values (m,) [m] by patch (m,), leaving out what is more than four robust deviations from the patch's median."""
+    centre = np.zeros(patches)
+    order = np.argsort(patch, kind="stable")
+    groups = np.split(values[order], np.flatnonzero(np.diff(patch[order])) + 1) if len(values) else []
+    names = patch[order][np.concatenate([[0], np.flatnonzero(np.diff(patch[order])) + 1])] if len(values) else []
+    for name, group in zip(names, groups, strict=True):
+        centre[name] = np.median(group)
+    away = np.abs(values - centre[patch])
+    scale = 1.4826 * float(np.median(away)) if len(values) else 0.0
+    kept = away <= 4 * scale
+    count = np.bincount(patch[kept], minlength=patches)
+    total = np.bincount(patch[kept], values[kept], minlength=patches)
+    square = np.bincount(patch[kept], values[kept] ** 2, minlength=patches)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.where(count >= least, total / count, np.nan)
+        spread = np.sqrt(np.maximum(square / count - (total / count) ** 2, 0) * count / np.maximum(count - 1, 1))
+    return PatchMeans(mean, count, spread)

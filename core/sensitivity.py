@@ -1,0 +1,99 @@
+"""How a frame's displacement changes with anything in the Setup: one extra solve on a factor that is there already.
+
+At equilibrium the residual R(u, p) vanishes, so du/dp = -K^-1 dR/dp (implicit function theorem). dR/dp is taken by asking the
+changed Setup for its residual at the same displacement; thus any effect has its sensitivity without knowing the solver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from core.fem.linear import NotPositiveDefinite
+from core.fem.model import BlockModel, Probe
+from core.frames import FloatArray
+from core.replay import Equilibrium, Replay
+from core.setup import Setup
+
+__all__ = ["TOOL_STEP", "displacement_changes", "element_sensitivity", "factorise_at"]
+
+TOOL_STEP = 2e-5
+"""Motion of the tool [m] over which residuals are differenced; contact quadrature makes shorter ones no better."""
+
+
+def factorise_at(block: Replay, frame: Equilibrium) -> BlockModel | None:
+    """Factorise the tangent at a frame's equilibrium; None when it has no Cholesky factor."""
+    model = block.model(frame.mesh)
+    state = model.assemble(frame.mesh.nodes + frame.displacement, _local(frame))
+    try:
+        model.topology.factor.factorise(state.data)
+    except NotPositiveDefinite:
+        return None
+    return model
+
+
+def _local(frame: Equilibrium) -> Probe:
+    """The tool as the slid block sees it."""
+    return Probe(frame.probe.centre - np.append(frame.slip, 0.0), frame.probe.radius)
+
+
+def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[tuple[Setup, FloatArray]]) -> FloatArray:
+    """Displacements that small changes bring about, to first order.
+
+    Args:
+        block: what made the frame. frame: an equilibrium in contact, or under its own weight.
+        changes: (setup, move) pairs: a Setup that differs a little from the block's, and how the tool's stated centre
+            moves with it (3,) [m]. The base may not change between held and partly detached.
+
+    Returns:
+        (len(changes), n, 3) changes of the nodes' displacement [m]; zero where nothing holds the tool against the block.
+    """
+    result = np.zeros((len(changes), *frame.displacement.shape))
+    model = factorise_at(block, frame) if frame.in_contact or block.setup.load.specific_weight_over_stiffness else None
+    if model is None or not changes:
+        return result
+    positions, here = frame.mesh.nodes + frame.displacement, _local(frame)
+    residual = model.assemble(positions, here, tangent=False).residual
+    right = np.empty((len(residual), len(changes)))
+    for column, (setup, move) in enumerate(changes):
+        same = setup.material == block.setup.material and setup.load == block.setup.load and setup.support == block.setup.support
+        other = model if same else BlockModel(setup, frame.mesh)
+        shift = np.array(setup.tool.offset) - np.array(block.setup.tool.offset) + move
+        probe = Probe(here.centre + shift, here.radius + setup.tool.radius - block.setup.tool.radius)
+        right[:, column] = residual - other.assemble(positions, probe, tangent=False).residual
+    solved = model.topology.factor.solve(right)
+    result[:, model.topology.free] = solved.T
+    return result
+
+
+def element_sensitivity(block: Replay, frame: Equilibrium, observe: FloatArray) -> FloatArray:
+    """Change of some observed quantities when one element's stiffness grows by the factor e, to first order.
+
+    Args:
+        observe: (m, n, 3) the quantities as linear functions of the displacement.
+
+    Returns:
+        (m, elements), by the adjoint: one solve per quantity, none per element.
+    """
+    model = factorise_at(block, frame) if frame.in_contact else None
+    if model is None:
+        return np.zeros((len(observe), len(block.model(frame.mesh).mu)))
+    adjoint = np.zeros_like(observe)
+    adjoint[:, model.topology.free] = model.topology.factor.solve(observe[:, model.topology.free].T).T
+    forces = element_forces(model, frame.mesh.nodes + frame.displacement)
+    return -np.asarray(np.einsum("meai,eai->me", adjoint[:, model.topology.hexahedra], forces))
+
+
+def element_forces(model: BlockModel, positions: FloatArray) -> FloatArray:
+    """Internal forces over E that each element puts on its own nodes (e, 8, 3) [m^2]."""
+    from core.fem.elastic import assemble_elastic
+
+    count = len(model.mu)
+    apart = np.arange(8 * count).reshape(count, 8)
+    force = np.zeros((8 * count, 3))
+    assemble_elastic(
+        model.law, model.gradients, model.weights, apart, model.mu, model.bulk,
+        positions[model.topology.hexahedra].reshape(-1, 3), np.empty((count, 24, 24), np.int32), force, np.empty(0),
+    )  # fmt: skip
+    return force.reshape(count, 8, 3)
