@@ -10,7 +10,7 @@ from core.dataset import Dataset
 from core.frames import FloatArray, Transform
 from core.progress import Report, silent
 from core.registration.camera import CameraFit, fit_camera
-from core.registration.heading import tool_misfit
+from core.registration.heading import tool_misfit, turned_fit
 from core.registration.pairing import TouchProposal, propose
 from core.registration.pose import motion_jacobian, small_motion
 from core.registration.robot import RobotFit, fit_robot
@@ -164,13 +164,4 @@ def _settle_heading(dataset: Dataset, phantom_from_robot: Transform, camera: Cam
     settled = tuple(text for text in camera.warnings if "half a turn" not in text)
     if as_is < turned:
         return replace(camera, warnings=settled)
-    half = np.diag([-1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
-    swap = {"-x": "+x", "+x": "-x", "-y": "+y", "+y": "-y"}
-    return replace(
-        camera,
-        phantom_from_camera=camera.turned,
-        covariance=half @ camera.covariance @ half,
-        face_counts={swap.get(face, face): count for face, count in camera.face_counts.items()},
-        face_offsets={swap.get(face, face): offset for face, offset in camera.face_offsets.items()},
-        warnings=settled,
-    )
+    return replace(turned_fit(camera), warnings=settled)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,6 +28,7 @@ class CameraFit:
         phantom_from_camera: the fit.
         covariance: (6, 6) [m, rad] of a small motion about `pivot` (see core.registration.pose), smooth sensor bias included.
         pivot: (3,) [m] centre of the block's top, phantom frame.
+        lever: half the block's diagonal [m], by which rotations are weighed against translations.
         rms: of point-to-plane distances that count [m].
         noise, bias: the sensor's white noise along the line of sight, and the size of its smooth error [m].
         face_counts: points on each face used.
@@ -43,6 +44,7 @@ class CameraFit:
     phantom_from_camera: Transform
     covariance: FloatArray
     pivot: FloatArray
+    lever: float
     rms: float
     noise: float
     bias: float
@@ -202,9 +204,12 @@ def _conclude(
 ) -> CameraFit:
     """Last step with the correlated noise model, covariance, and everything worth saying."""
     pivot = _pivot(size)
-    found, weights = _weighted(cloud, size, pose, gate)
-    last = estimate(make_patches(found, weights, _noise(found), pose.translation, pivot))
-    pose = small_motion(last.motion, pivot) @ pose
+    # Twice, since a block that sags has pulled the pose along, and with it which point counts.
+    for _ in range(2):
+        found, weights = _weighted(cloud, size, pose, gate)
+        patches = make_patches(found, weights, pose.translation, pivot)
+        last = estimate(patches)
+        pose = small_motion(last.motion, pivot) @ pose
     found, weights = _weighted(cloud, size, pose, gate)
     kept = found.only(weights > 0)
     counts = {name: int((kept.face == k).sum()) for k, name in enumerate(FACES) if (kept.face == k).any()}
@@ -213,18 +218,19 @@ def _conclude(
         for k, name in enumerate(FACES)
         if name in counts
     }
-    weak = weak_directions(last.covariance, counts, float(np.linalg.norm(size)) / 2)
+    lever = float(np.linalg.norm(size)) / 2
     return CameraFit(
         phantom_from_camera=pose,
         covariance=last.covariance,
         pivot=pivot,
+        lever=lever,
         rms=float(np.sqrt(np.average(found.distance**2, weights=weights))),
-        noise=_noise(found),
+        noise=patches.noise,
         bias=last.bias,
         face_counts=counts,
         face_offsets=offsets,
         table_height=offsets.get("table", float("nan")),
-        weak_directions=weak,
+        weak_directions=weak_directions(last.covariance, counts, lever),
         explained=share,
         automatic=automatic,
         warnings=tuple(_doubts(share, pose, guess, pivot, offsets, last.bias)),
@@ -232,8 +238,11 @@ def _conclude(
 
 
 def _weighted(cloud: FloatArray, size: tuple[float, float, float], pose: Transform, gate: float) -> tuple[Assignment, FloatArray]:
+    """Points on planes with robust weights (k,) about each plane's own median: a face that lies off as a whole is no outlier."""
     found = assign(pose.apply(cloud), camera_planes(size, pose.translation), pose.translation, gate)
-    return found, _weights(found, _noise(found), tukey=True)
+    medians = np.array([np.median(found.distance[found.face == k]) if (found.face == k).any() else 0.0 for k in range(len(FACES))])
+    centred = replace(found, distance=found.distance - medians[found.face])
+    return found, _weights(centred, _noise(centred), tukey=True)
 
 
 def _doubts(
@@ -257,9 +266,10 @@ def _doubts(
             doubts.append(
                 f"The fit lies {shift * 1e3:.1f} mm and {np.degrees(turn):.1f} degrees from [camera] to_phantom: check that guess."
             )
-    if "top" in offsets and "table" in offsets and abs(offsets["top"] - offsets["table"]) > max(1.0e-3, 3 * bias):
+    if "top" in offsets and "table" in offsets and abs(offsets["top"] - offsets["table"]) > max(6.0e-4, 2 * bias):
         doubts.append(
             f"The top lies {abs(offsets['top'] - offsets['table']) * 1e3:.1f} mm "
-            f"{'higher' if offsets['top'] > offsets['table'] else 'lower'} over the table than [phantom] size says."
+            f"{'higher' if offsets['top'] > offsets['table'] else 'lower'} over the table than [phantom] size says: "
+            "it sags under its weight, has another size, or something lies under it."
         )
     return doubts

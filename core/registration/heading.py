@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from core.dataset import Dataset
 from core.frames import FloatArray, Transform
+from core.registration.camera import CameraFit
 from core.registration.faces import box_distance
+from core.registration.uncertainty import weak_directions
 
-__all__ = ["tool_misfit"]
+__all__ = ["tool_misfit", "turned_fit"]
 
 ASIDE = 6.0e-3
 FRAMES = 12
@@ -57,3 +61,19 @@ def _frame_misfits(
         nearest = np.partition(np.linalg.norm(tool - centre, axis=1), 9)[9]
         found.append(min(float(nearest), FARTHEST))
     return np.array(found)
+
+
+def turned_fit(fit: CameraFit) -> CameraFit:
+    """The same fit with the block half a turn about z away: every statement about x and y changes sides."""
+    half = np.diag([-1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
+    swap = {"-x": "+x", "+x": "-x", "-y": "+y", "+y": "-y"}
+    covariance = half @ fit.covariance @ half
+    counts = {swap.get(face, face): count for face, count in fit.face_counts.items()}
+    return replace(
+        fit,
+        phantom_from_camera=fit.turned,
+        covariance=covariance,
+        face_counts=counts,
+        face_offsets={swap.get(face, face): offset for face, offset in fit.face_offsets.items()},
+        weak_directions=weak_directions(covariance, counts, fit.lever),
+    )

@@ -4,6 +4,10 @@ A depth camera's error is white noise plus a bias that changes smoothly over the
 counting them as independent gives a pose that is several times too sure. Here patch averages are fitted by generalised least
 squares with covariance sigma^2 / n + b^2 exp(-d^2 / 2 L^2) along the line of sight; the bias' size b and reach L are averaged over,
 weighted by how well each explains the averages (Rasmussen and Williams 2006, section 2.7: explicit basis functions, wide prior).
+
+A soft block sags and bulges, and a table does not. So the block's faces may as a whole lie off their stated planes: by nothing, a
+little or much, weighted in the same way. Where top and table agree this costs little; where they do not, the table holds the pose.
+Without a table the block itself is all there is to refer to.
 """
 
 from __future__ import annotations
@@ -23,6 +27,10 @@ CELL = 8.0e-3
 PRIOR = np.array([0.01] * 3 + [np.radians(10.0)] * 3)
 """What is known of a direction that the data do not touch: standard deviations [m, rad] about the first guess."""
 BIAS_SIZES = np.array([0.02, 0.06, 0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.0]) * 1e-3
+BIAS_USUAL = 0.5e-3
+TOP_OFFSETS, OFFSET_ODDS = (0.0, 0.5e-3, 2.0e-3), 0.15
+SIDE_OFFSET = 0.3
+"""Sides bulge by about this part of what the top sags (Poisson's ratio times width over height)."""
 BIAS_REACHES = (0.008, 0.016, 0.03, 0.06)
 WEAK = 0.5e-3
 NAMES = (
@@ -37,14 +45,25 @@ NAMES = (
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Averages over cells of 8 mm on each plane: distance (p,) [m], jacobian (p, 6), white variance (p,) [m^2], slant (p,),
-    and place (p, 3) [m] across the line of sight at the mean range."""
+    """Averages over cells of 8 mm on each plane, seen through one camera.
 
+    Attributes:
+        face: (p,) index into FACES.
+        distance: (p,) [m] from the plane, positive outside.
+        jacobian: (p, 6) of the distance.
+        variance: (p,) [m^2] white noise of the distance.
+        slant: (p,) how much of an error along the line of sight the distance shows.
+        place: (p, 3) [m] across the line of sight at the mean range.
+        noise: white noise along the line of sight [m].
+    """
+
+    face: IndexArray
     distance: FloatArray
     jacobian: FloatArray
     variance: FloatArray
     slant: FloatArray
     place: FloatArray
+    noise: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,32 +75,41 @@ class PoseEstimate:
     bias: float
 
 
-def make_patches(found: Assignment, weights: FloatArray, sigma: float, camera: FloatArray, pivot: FloatArray) -> Patches:
-    """Average points with robust `weights` (k,) and depth noise `sigma` [m], seen from `camera` (3,), for motions about `pivot`."""
-    cells = np.column_stack([found.face, np.floor((found.points + EDGE) / _cell_sizes(found.face)[:, None])]).astype(int)
-    cells[found.face == 0, 3] = cells[found.face == 5, 3] = 0
-    for first, axis in ((1, 1), (3, 2)):
-        cells[(found.face == first) | (found.face == first + 1), axis] = 0
-    _, patch = np.unique(cells, axis=0, return_inverse=True)
-    patch = patch.ravel()
-    total = np.bincount(patch, weights)
+def make_patches(found: Assignment, weights: FloatArray, camera: FloatArray, pivot: FloatArray) -> Patches:
+    """Average points with robust `weights` (k,), seen from `camera` (3,) [m], phantom frame, for motions about `pivot` (3,) [m]."""
+    patch = _patch_of(found)
+    total = np.maximum(np.bincount(patch, weights), 1e-9)
     sight = found.points - camera
     reach = np.linalg.norm(sight, axis=1)
 
     def mean(values: FloatArray) -> FloatArray:
         columns = values.reshape(len(values), -1)
-        return np.column_stack([np.bincount(patch, weights * column) / np.maximum(total, 1e-9) for column in columns.T])
+        return np.column_stack([np.bincount(patch, weights * column) / total for column in columns.T])
 
     jacobian = np.einsum("ki,kij->kj", found.normals, motion_jacobian(found.points, pivot))
-    slant = mean(found.slant)[:, 0]
+    slant, distance = mean(found.slant)[:, 0], mean(found.distance)[:, 0]
+    # The scatter within patches is free of bias and of faces that lie off their planes.
+    local = (found.distance - distance[patch]) / found.slant * np.sqrt(total / np.maximum(total - 1, 0.5))[patch]
+    noise = max(1.0e-5, 1.4826 * float(np.median(np.abs(local[total[patch] > 3]))) if (total > 3).any() else 1.0e-3)
     heavy = total > 2.0
     return Patches(
-        mean(found.distance)[heavy, 0],
+        np.round(mean(found.face.astype(float))[heavy, 0]).astype(np.int64),
+        distance[heavy],
         mean(jacobian)[heavy],
-        ((sigma * slant) ** 2 / np.maximum(total, 1e-9))[heavy],
+        ((noise * slant) ** 2 / total)[heavy],
         slant[heavy],
         mean(sight / reach[:, None] * reach.mean())[heavy],
+        noise,
     )
+
+
+def _patch_of(found: Assignment) -> IndexArray:
+    """Which patch (k,) each point belongs to."""
+    cells = np.column_stack([found.face, np.floor((found.points + EDGE) / _cell_sizes(found.face)[:, None])]).astype(int)
+    cells[found.face == 0, 3] = cells[found.face == 5, 3] = 0
+    for first, axis in ((1, 1), (3, 2)):
+        cells[(found.face == first) | (found.face == first + 1), axis] = 0
+    return np.asarray(np.unique(cells, axis=0, return_inverse=True)[1]).ravel()
 
 
 def _cell_sizes(face: IndexArray) -> FloatArray:
@@ -89,29 +117,42 @@ def _cell_sizes(face: IndexArray) -> FloatArray:
 
 
 def estimate(patches: Patches) -> PoseEstimate:
-    """The motion that remains after a fit, with a covariance that counts the sensor's smooth bias."""
-    a, r = patches.jacobian, patches.distance
+    """The motion that remains after a fit, with a covariance that counts smooth sensor bias and a block off its stated shape."""
     distance = np.linalg.norm(patches.place[:, None] - patches.place[None], axis=2)
-    found: list[tuple[float, FloatArray, FloatArray, float]] = []
-    for reach in BIAS_REACHES:
-        kernel = np.exp(-0.5 * (distance / reach) ** 2) * patches.slant[:, None] * patches.slant[None]
-        for bias in BIAS_SIZES:
-            factor = cho_factor(bias**2 * kernel + np.diag(patches.variance))
-            weighted = cho_solve(factor, np.column_stack([a, r]))
-            information = a.T @ weighted[:, :6] + np.diag(1 / PRIOR**2)
-            covariance = np.asarray(np.linalg.inv(information), dtype=float)
-            motion = -covariance @ (a.T @ weighted[:, 6])
-            misfit = r @ weighted[:, 6] - motion @ information @ motion
-            log_determinants = 2 * np.log(np.diag(factor[0])).sum() + np.linalg.slogdet(information)[1]
-            found.append((-0.5 * (misfit + log_determinants), motion, covariance, float(bias)))
-    evidence = np.array([item[0] for item in found])
+    has_table = bool((patches.face == FACES.index("table")).any())
+    models = []
+    for offset in TOP_OFFSETS if has_table else TOP_OFFSETS[:1]:
+        fixed = np.diag(patches.variance) + _shape_covariance(patches.face, offset)
+        for reach in BIAS_REACHES:
+            kernel = np.exp(-0.5 * (distance / reach) ** 2) * patches.slant[:, None] * patches.slant[None]
+            models += [(*_fit_patches(patches, fixed + bias**2 * kernel, bias), bias, offset) for bias in BIAS_SIZES]
+    evidence = np.array([model[0] + (np.log(OFFSET_ODDS) if model[4] else 0.0) for model in models])
     weights = np.exp(evidence - evidence.max())
     weights /= weights.sum()
-    motions = np.array([item[1] for item in found])
+    motions = np.array([model[1] for model in models])
     motion = weights @ motions
     spread = motions - motion
-    covariance = np.einsum("m,mij->ij", weights, np.array([item[2] for item in found])) + (spread.T * weights) @ spread
-    return PoseEstimate(motion, covariance, float(weights @ np.array([item[3] for item in found])))
+    covariance = np.einsum("m,mij->ij", weights, np.array([model[2] for model in models])) + (spread.T * weights) @ spread
+    return PoseEstimate(motion, covariance, float(weights @ np.array([model[3] for model in models])))
+
+
+def _shape_covariance(face: IndexArray, top_offset: float) -> FloatArray:
+    """Covariance (p, p) [m^2] of patches whose faces lie off their planes as a whole; the table does not."""
+    sizes = np.array([1.0, *[SIDE_OFFSET] * 4, 0.0])[face] * top_offset
+    return np.where(face[:, None] == face[None], sizes[:, None] * sizes[None], 0.0)
+
+
+def _fit_patches(patches: Patches, noise: FloatArray, bias: float) -> tuple[float, FloatArray, FloatArray]:
+    """Log evidence of one model of the errors (p, p), the motion (6,) it gives, and its covariance (6, 6)."""
+    a, r = patches.jacobian, patches.distance
+    factor = cho_factor(noise)
+    weighted = cho_solve(factor, np.column_stack([a, r]))
+    information = a.T @ weighted[:, :6] + np.diag(1 / PRIOR**2)
+    covariance = np.asarray(np.linalg.inv(information), dtype=float)
+    motion = -covariance @ (a.T @ weighted[:, 6])
+    misfit = float(r @ weighted[:, 6] - motion @ information @ motion) + (bias / BIAS_USUAL) ** 2
+    log_determinants = 2 * np.log(np.diag(factor[0])).sum() + np.linalg.slogdet(information)[1]
+    return -0.5 * (misfit + float(log_determinants)), motion, covariance
 
 
 def weak_directions(covariance: FloatArray, counts: dict[str, int], lever: float) -> tuple[str, ...]:

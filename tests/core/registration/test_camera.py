@@ -89,6 +89,17 @@ def test_a_view_of_top_and_two_sides_has_no_weak_direction(scene):
     assert fit.explained > 0.95 and abs(fit.table_height) < 3e-4
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_block_that_sags_by_a_millimetre_does_not_drag_the_pose_along(scene, seed):
+    view = scene(size=(SIZE[0], SIZE[1], SIZE[2] - 1.0e-3), pixels=150).look(seed)
+    fit = fit_camera(view.cloud, SIZE, 0.002, guessed(view.pose, seed))
+    off = error(fit, view.pose)
+    assert np.linalg.norm(off[:3]) < 3e-4
+    assert np.degrees(np.linalg.norm(off[3:])) < 0.2
+    assert fit.face_offsets["top"] < -5e-4
+    assert np.abs(off / np.sqrt(np.diag(fit.covariance))).max() < 4.0
+
+
 def test_a_block_lower_than_stated_is_said_in_millimetres(scene):
     view = scene(size=(SIZE[0], SIZE[1], SIZE[2] - 2.5e-3)).look(seed=10)
     fit = fit_camera(view.cloud, SIZE, 0.002, view.pose)
