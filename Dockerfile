@@ -1,7 +1,7 @@
 # Build:  docker build -t palpate .
-# Run:    docker run --rm -p 127.0.0.1:8000:8000 -e PALPATE_TOKEN=... -v "$PWD/datasets:/data:ro" palpate
-# Inside a container the page has to listen on all interfaces, and that is refused without a token: set PALPATE_TOKEN.
-# Any other verb:  docker run --rm -v "$PWD/datasets:/data:ro" palpate check /data/gel-block
+# Check:  docker run --rm -v "$PWD/my-block:/data:ro" palpate check /data
+# Page:   docker run --rm --network host -v "$PWD/datasets:/home/palpate/datasets:ro" -v palpate-runs:/home/palpate/runs palpate
+# The page has no login, so it listens on the loopback address only: with --network host that is the host's own.
 FROM python:3.11-slim
 
 RUN apt-get update \
@@ -20,7 +20,7 @@ RUN pip install --no-cache-dir -e . -c constraints.txt
 
 USER palpate
 WORKDIR /home/palpate
+RUN mkdir -p datasets runs
 ENV OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
-EXPOSE 8000
 ENTRYPOINT ["palpate"]
-CMD ["serve", "--host", "0.0.0.0", "--port", "8000"]
+CMD ["serve"]
