@@ -32,6 +32,7 @@ POSE_ERROR = 5.0e-4
 """What the tool's stated place may be off [m] after `locate_tool`; widens the tests on tool and shaft."""
 FARTHEST_SHIFT = 6.0e-3
 TABLE_REACH = 0.08
+FARTHEST_TABLE, FEWEST_ON_TABLE = 8.0e-3, 100
 SHAFT_LENGTH = 0.3
 VOXEL = 2.0e-3
 LONELY = 0.2
@@ -72,6 +73,7 @@ class Cleaner:
         tool_radius: of the sphere, and at most of the shaft [m].
         noise: standard deviation of depth along the line of sight [m].
         table: normal (3,) and offset [m] of the table, phantom frame; the plane z = 0 unless the rest cloud says otherwise.
+            Each frame that shows enough of the table corrects it.
         bulge: how far [m] the deformed or slid phantom may reach beyond the box.
     """
 
@@ -86,8 +88,8 @@ class Cleaner:
         """Take the phantom's points out of a raw cloud (n, 3) [m], camera frame; without a tool nothing is removed for it."""
         points = self.phantom_from_camera.apply(cloud)
         reason = np.zeros(len(points), dtype=np.int8)
-        height = points @ self.table[0] - self.table[1]
         apart = box_distance(points, np.asarray(self.size))
+        height = self._height(points, apart)
         thickness = max(SIGMAS * self.noise * self._table_slant(), 1.0e-3)
         reason[apart > self.bulge] = REASONS.index("background")
         on_table = np.abs(height) < thickness
@@ -108,6 +110,22 @@ class Cleaner:
             points[on_table & (apart > thickness) & (apart < TABLE_REACH)],
             {name: int(count) for name, count in zip(REASONS, counts, strict=True)},
         )
+
+    def _height(self, points: FloatArray, apart: FloatArray) -> FloatArray:
+        """Height (n,) [m] over the table as this frame shows it: a camera that was bumped sees it tilted and shifted."""
+        height = points @ self.table[0] - self.table[1]
+        around = np.flatnonzero((np.abs(height) < FARTHEST_TABLE) & (apart > FARTHEST_TABLE) & (apart < TABLE_REACH))
+        if len(around) < FEWEST_ON_TABLE:
+            return np.asarray(height)
+        around = around[:: len(around) // 2000 + 1]
+        basis = np.column_stack([points[around, :2], np.ones(len(around))])
+        plane: FloatArray = np.zeros(3)
+        for _ in range(8):
+            residual = height[around] - basis @ plane
+            sigma = max(1.4826 * float(np.median(np.abs(residual))), 1e-5)
+            weighted = basis / (1 + (residual / (2 * sigma)) ** 2)[:, None]
+            plane = np.linalg.solve(weighted.T @ basis + 1e-12 * np.eye(3), weighted.T @ height[around])
+        return np.asarray(height - points[:, :2] @ plane[:2] - plane[2])
 
     def _table_slant(self) -> float:
         """Cosine between the table's normal and the line of sight to the block: how much of the depth noise is height."""
@@ -196,7 +214,8 @@ def _circle_centre(points: FloatArray, radius: float) -> FloatArray:
 def cleaner_for(dataset: Dataset, registration: Registration) -> Cleaner:
     """The cleaner of a dataset: its table from the rest cloud, its noise from the table."""
     pose, config = registration.phantom_from_camera, dataset.config
-    noise = registration.camera.noise if registration.camera else config.depth_sigma
+    camera = registration.camera
+    noise = float(np.hypot(camera.noise, camera.bias)) if camera else config.depth_sigma
     stated = Cleaner(size=config.size, phantom_from_camera=pose, tool_radius=config.tool_radius, noise=noise)
     if not dataset.has_rest:
         return stated
