@@ -124,7 +124,7 @@ class Cleaner:
             residual = height[around] - basis @ plane
             sigma = max(1.4826 * float(np.median(np.abs(residual))), 1e-5)
             weighted = basis / (1 + (residual / (2 * sigma)) ** 2)[:, None]
-            plane = np.linalg.solve(weighted.T @ basis + 1e-12 * np.eye(3), weighted.T @ height[around])
+            plane = np.asarray(np.linalg.solve(weighted.T @ basis + 1e-12 * np.eye(3), weighted.T @ height[around]), dtype=float)
         return np.asarray(height - points[:, :2] @ plane[:2] - plane[2])
 
     def _table_slant(self) -> float:
