@@ -47,7 +47,8 @@ class Desk:
 
     def diagnose(self, dataset: Path, name: str, seed: int) -> Job:
         """Queue the diagnosis of a dataset folder; the job's id will be the run's."""
-        request = {"dataset": str(dataset), "name": name, "runs": str(self.settings.runs), "workers": self.settings.workers, "seed": seed}
+        places = {"dataset": str(dataset), "runs": str(self.settings.runs)}
+        request = {**places, "name": name, "workers": self.settings.workers, "seed": seed}
         return self.jobs.submit("diagnosis", request, label=name)
 
     def close(self) -> None:

@@ -17,7 +17,8 @@ PAGE_POLICY = (
 )
 VIEWER_POLICY = (
     "default-src 'self' data: blob:; script-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:; "
-    "worker-src blob: data:; style-src 'self' 'unsafe-inline'; connect-src 'self' data: blob:; frame-ancestors 'self'; object-src 'none'"
+    "worker-src blob: data:; style-src 'self' 'unsafe-inline'; connect-src 'self' data: blob:; "
+    "frame-ancestors 'self'; object-src 'none'"
 )
 
 
@@ -66,6 +67,7 @@ async def _refuse(scope: Scope, receive: Receive, send: Send, headers: dict[str,
         await receive()
         await send({"type": "websocket.close", "code": 1008})
         return
-    message = f"requests from {headers.get('origin') or headers.get('host')} are refused; open the page by its own address on this machine"
+    source = headers.get("origin") or headers.get("host")
+    message = f"requests from {source} are refused; open the page by its own address on this machine"
     body = {"kind": "Refused", "message": message, "where": {}}
     await JSONResponse(body, status_code=403)(scope, receive, send)

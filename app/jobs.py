@@ -61,9 +61,9 @@ class Jobs:
         """One job."""
         return self._records.get(identity)
 
-    def list(self) -> list[Job]:
+    def all(self) -> list[Job]:
         """All jobs, the newest first."""
-        return self._records.list()
+        return self._records.all()
 
     def cancel(self, identity: str) -> Job:
         """Stop a job that waits or runs."""

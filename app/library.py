@@ -28,7 +28,7 @@ class Library:
     def path(self, name: str) -> Path:
         """The folder of one dataset; a name that leads elsewhere is refused."""
         if not NAME.fullmatch(name):
-            raise DatasetError(f"{name!r} is not the name of a dataset folder: letters, digits, dot, dash and underscore", key="dataset")
+            raise DatasetError(f"{name!r} is no name of a dataset folder: letters, digits, dot, dash, underscore", key="dataset")
         path = (self.folder / name).resolve()
         if path.parent != self.folder.resolve():
             raise DatasetError(f"{name} leads out of the datasets folder; copy the data into it", key="dataset")

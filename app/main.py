@@ -57,7 +57,8 @@ def _answer_problems(app: FastAPI) -> None:
     def unreadable(_: Request, error: RequestValidationError) -> JSONResponse:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
-        return JSONResponse({"kind": "RequestError", "message": f"{place}: {first['msg']}", "where": {"key": place}}, status_code=422)
+        body = {"kind": "RequestError", "message": f"{place}: {first['msg']}", "where": {"key": place}}
+        return JSONResponse(body, status_code=422)
 
     @app.exception_handler(HTTPException)
     def http(request: Request, error: HTTPException) -> JSONResponse:

@@ -14,10 +14,11 @@ from app.runs import Replay
 from app.surface import FineSurface, IntArray, grid_edges, refine
 from core.frames import FloatArray
 
-__all__ = ["Ball", "Colouring", "Layer", "Mesh", "Picture", "Reel"]
+__all__ = ["Ball", "Colouring", "Layer", "Mesh", "Picture", "PointArray", "Reel"]
 
 Layer = Literal["measured", "raw", "extended", "tool"]
 Colouring = Literal["plain", "raw", "extended"]
+PointArray = np.ndarray[Any, np.dtype[np.float32]]
 Rgb = tuple[int, int, int]
 MARGIN = 0.008
 MOST_POINTS = 20_000
@@ -28,7 +29,7 @@ PARTS = 4
 class Mesh:
     """A surface of one colour: vertices (n, 3) [m], faces (m, 3)."""
 
-    vertices: FloatArray
+    vertices: PointArray
     faces: IntArray
     colour: Rgb
 
@@ -56,7 +57,7 @@ class Picture:
     """
 
     frame: int
-    cloud: FloatArray | None
+    cloud: PointArray | None
     points: int
     meshes: dict[str, Mesh]
     wire: tuple[FloatArray, Rgb] | None
@@ -128,7 +129,7 @@ class Reel:
             meshes[name] = Mesh(vertices[used], faces.reshape(-1, 3), colours.UNSEEN if unseen else colours.SIGNED[number])
         return meshes
 
-    def _cloud(self, frame: int, model: str, crop: bool) -> tuple[FloatArray | None, int]:
+    def _cloud(self, frame: int, model: str, crop: bool) -> tuple[PointArray | None, int]:
         if self._clouds is None:
             return None, 0
         points = self.replay.camera(model).apply(self._clouds(int(self.replay["cloud_index"][frame])))

@@ -93,7 +93,7 @@ class Records:
             return job
         raise Missing(f"there is no job {identity}", job=identity)
 
-    def list(self) -> list[Job]:
+    def all(self) -> list[Job]:
         """All jobs, the newest first."""
         return self._select("order by created desc", [])
 
@@ -121,4 +121,5 @@ def _job(row: tuple[Any, ...]) -> Job:
     values = dict(zip(COLUMNS, row, strict=True))
     for name in JSON_COLUMNS:
         values[name] = None if values[name] is None else json.loads(values[name])
-    return Job(**{**values, "state": JobState(values["state"])})
+    values["state"] = JobState(values["state"])
+    return Job(**values)

@@ -6,11 +6,12 @@ import asyncio
 import contextlib
 from functools import lru_cache
 from pathlib import Path
+from typing import Annotated
 
 import websockets
-from fastapi import APIRouter, Path as Parameter, WebSocket, WebSocketDisconnect
+from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+from fastapi import Path as Parameter
 from fastapi.responses import HTMLResponse
-from typing import Annotated
 from websockets.asyncio.client import ClientConnection
 from websockets.typing import Subprotocol
 
@@ -19,6 +20,7 @@ __all__ = ["PageId", "router"]
 router = APIRouter()
 PageId = Annotated[str, Parameter(pattern=r"^[A-Za-z0-9-]{8,64}$")]
 
+SENDABLE = (1000, 1001, 1002, 1003, 1008, 1011, 1012, 1013)
 # The viewer's own panel, logo and notices would lie over the scene; the page around it has all controls.
 STYLE = """<style>
 [data-floating-window], [data-dock-leaf], .mantine-Notifications-root, .mantine-Notification-root { display: none !important; }
@@ -48,7 +50,12 @@ async def relay(websocket: WebSocket, page: PageId) -> None:
     offered = [Subprotocol(name) for name in websocket.scope.get("subprotocols", [])]
     try:
         upstream = await websockets.connect(
-            f"ws://127.0.0.1:{port}/{page}", subprotocols=offered or None, max_size=None, compression=None, ping_interval=None, proxy=None
+            f"ws://127.0.0.1:{port}/{page}",
+            subprotocols=offered or None,
+            max_size=None,
+            compression=None,
+            ping_interval=None,
+            proxy=None,
         )
     except (OSError, websockets.WebSocketException):
         await websocket.close(code=1013)
@@ -61,7 +68,7 @@ async def relay(websocket: WebSocket, page: PageId) -> None:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
     with contextlib.suppress(RuntimeError, WebSocketDisconnect):
-        await websocket.close()
+        await websocket.close(code=upstream.close_code if upstream.close_code in SENDABLE else 1000)
 
 
 async def _up(websocket: WebSocket, upstream: ClientConnection) -> None:

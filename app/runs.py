@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -83,7 +84,8 @@ class Run:
     def replay(self, name: str) -> Replay:
         """The replay of one sequence."""
         if name not in self.sequences:
-            raise Missing(f"run {self.name} has no sequence {name}; it has {', '.join(self.sequences)}", run=self.name, sequence=name)
+            known = ", ".join(self.sequences)
+            raise Missing(f"run {self.name} has no sequence {name}; it has {known}", run=self.name, sequence=name)
         return Replay(name, self._arrays(f"replays/{name}.npz", FIELDS))
 
     def patterns(self) -> dict[str, Any]:
@@ -101,21 +103,24 @@ class Run:
         try:
             value = json.loads((self.path / name).read_text())
         except (OSError, ValueError) as error:
-            raise RunError(f"run {self.name}: {name} cannot be read ({error}); make the run again", run=self.name, file=name) from error
+            raise self._broken(name, f"cannot be read ({error})") from error
         if not isinstance(value, dict):
-            raise RunError(f"run {self.name}: {name} holds {type(value).__name__}, expected an object", run=self.name, file=name)
+            raise self._broken(name, f"holds {type(value).__name__}, expected an object")
         return value
 
     def _arrays(self, name: str, fields: tuple[str, ...]) -> dict[str, Any]:
         try:
-            with np.load(self.path / name, allow_pickle=False) as stored:
+            with (self.path / name).open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
                 arrays = {field: stored[field] for field in stored.files}
-        except (OSError, ValueError, EOFError) as error:
-            raise RunError(f"run {self.name}: {name} cannot be read ({error}); make the run again", run=self.name, file=name) from error
+        except (OSError, ValueError, EOFError, BadZipFile) as error:
+            raise self._broken(name, f"cannot be read ({error})") from error
         missing = [field for field in fields if field not in arrays]
         if missing:
-            raise RunError(f"run {self.name}: {name} lacks {', '.join(missing)}; make the run again", run=self.name, file=name)
+            raise self._broken(name, f"lacks {', '.join(missing)}")
         return arrays
+
+    def _broken(self, file: str, what: str) -> RunError:
+        return RunError(f"run {self.name}: {file} {what}; make the run again", run=self.name, file=file)
 
 
 class Runs:
@@ -124,7 +129,7 @@ class Runs:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def list(self) -> list[Run]:
+    def all(self) -> list[Run]:
         """All whole runs, the newest first."""
         found = [path.parent for path in self.folder.glob("*/report.json") if NAME.fullmatch(path.parent.name)]
         return [Run(path) for path in sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)]

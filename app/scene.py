@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from app import colours
-from app.picture import Ball, Mesh, Picture
+from app.picture import Ball, Mesh, Picture, PointArray
 from core.frames import FloatArray
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ class ViserScene:
             camera.position = centre + direction * reach / np.sin(FIELD_OF_VIEW / 2) * 1.2
             camera.look_at = centre
 
-    def _cloud(self, points: FloatArray | None) -> None:
+    def _cloud(self, points: PointArray | None) -> None:
         node = self._nodes.get("/cloud")
         if points is None:
             if node is not None:
@@ -92,7 +92,13 @@ class ViserScene:
             return
         if node is None or node.points.shape != points.shape:
             self._nodes["/cloud"] = self._client.scene.add_point_cloud(
-                "/cloud", points, colours.MEASURED, point_size=POINT_SIZE, point_shape="circle", precision="float32", point_shading="flat"
+                "/cloud",
+                points,
+                colours.MEASURED,
+                point_size=POINT_SIZE,
+                point_shape="circle",
+                precision="float32",
+                point_shading="flat",
             )
             return
         node.points = points

@@ -10,7 +10,7 @@ __all__ = ["cause_phrase", "quantity", "verdict_sentence"]
 
 NARROW = "\N{NO-BREAK SPACE}"
 Values = dict[str, float]
-SHOWN = {"m": (1e3, "mm"), "Pa": (1e-3, "kPa"), "s": (1e3, "ms"), "rad": (180.0 / math.pi, "°"), "1/m": (1.0, "1/m"), "1": (1.0, "")}
+SHOWN = {"m": (1e3, "mm"), "Pa": (1e-3, "kPa"), "s": (1e3, "ms"), "rad": (180.0 / math.pi, "°"), "1": (1.0, ""), "": (1.0, "")}
 SIDES = {"-x": "the left short side", "+x": "the right short side", "-y": "the front side", "+y": "the back side"}
 
 
@@ -19,7 +19,7 @@ def quantity(value: Any, unit: str, digits: int = 2) -> str:
     if not isinstance(value, (int, float)):
         return str(value)
     factor, shown = SHOWN.get(unit, (1.0, unit))
-    scaled = float(value) * factor
+    scaled = float(f"{float(value) * factor:.{digits}g}")
     places = max(0, digits - 1 - math.floor(math.log10(abs(scaled)))) if scaled and math.isfinite(scaled) else 0
     text = f"{scaled:.{min(places, 4)}f}"
     return f"{text}{'' if shown in ('', '°') else NARROW}{shown}"
@@ -89,7 +89,7 @@ PHRASES: dict[str, Callable[[Any, Sequence[float] | None], str]] = {
     "poisson_ratio": lambda v, _: f"another compressibility: Poisson's ratio is {v['nu']:.3g}",
     "tool_radius": lambda v, _: f"the size of the tool: its radius is {quantity(v['radius'], 'm')}",
     "base_slip": lambda v, _: f"that the base slides on the table, with a friction coefficient of {v['friction_coefficient']:.2g}",
-    "base_detachment": lambda v, _: f"that the base is loose {quantity(v['extent'], 'm')} inwards from {SIDES.get(v['edge'], v['edge'])}",
+    "base_detachment": lambda v, _: f"that the base is loose {quantity(v['extent'], 'm')} inwards from {SIDES[v['edge']]}",
     "gravity": lambda v, _: f"the phantom's own weight, ρg/E = {v['specific_weight_over_stiffness']:.2g} per metre",
     "surface_layer": lambda v, _: f"a skin {quantity(v['thickness'], 'm')} thick, {v['stiffness_ratio']:.2g} times as stiff",
 }

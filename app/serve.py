@@ -31,6 +31,10 @@ def serve(settings: Settings, started: Callable[[str], None]) -> None:
         host = f"[{settings.host}]" if ":" in settings.host else settings.host
         started(f"http://{host}:{listener.getsockname()[1]}")
         config = uvicorn.Config(
-            create_app(settings), log_level="warning", ws_per_message_deflate=False, ws_max_size=64 * 2**20, timeout_graceful_shutdown=2
+            create_app(settings),
+            log_level="warning",
+            ws_per_message_deflate=False,
+            ws_max_size=64 * 2**20,
+            timeout_graceful_shutdown=2,
         )
         uvicorn.Server(config).run(sockets=[listener])

@@ -67,7 +67,7 @@ def grid_edges(rest: Any, faces: Any) -> IntArray:
     unique, inverse = np.unique(edges, axis=0, return_inverse=True)
     count = np.bincount(inverse.reshape(-1))
     hypotenuses = np.bincount(inverse.reshape(-1), weights=longest.reshape(-1))
-    return unique[~((count == 2) & (hypotenuses == 2))]
+    return np.asarray(unique[~((count == 2) & (hypotenuses == 2))])
 
 
 def _side(rest: FloatArray, faces: IntArray) -> IntArray:
@@ -75,4 +75,4 @@ def _side(rest: FloatArray, faces: IntArray) -> IntArray:
     a, b, c = (rest[faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     axis = np.abs(normal).argmax(axis=1)
-    return axis * 2 + (np.take_along_axis(normal, axis[:, None], axis=1)[:, 0] > 0)
+    return np.asarray(axis * 2 + (np.take_along_axis(normal, axis[:, None], axis=1)[:, 0] > 0))

@@ -44,4 +44,4 @@ def diagnose_into(dataset: Path, run: Path, scratch: Path, *, workers: int, seed
     (made / "origin.json").write_text(json.dumps(origin, indent=1))
     run.parent.mkdir(parents=True, exist_ok=True)
     os.rename(made, run)
-    return result
+    return dict(result)

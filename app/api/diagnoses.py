@@ -27,7 +27,7 @@ def start(request: DiagnosisRequest, desk: DeskOf) -> JobOut:
 @router.get("")
 def listed(desk: DeskOf) -> list[JobOut]:
     """All diagnoses that were asked for here, the newest first."""
-    return [JobOut.of(job) for job in desk.jobs.list() if job.kind == "diagnosis"]
+    return [JobOut.of(job) for job in desk.jobs.all() if job.kind == "diagnosis"]
 
 
 @router.get("/{identity}")

@@ -22,7 +22,7 @@ KEEP_ALIVE = 15.0
 @router.get("")
 def listed(desk: DeskOf) -> list[JobOut]:
     """All jobs, the newest first."""
-    return [JobOut.of(job) for job in desk.jobs.list()]
+    return [JobOut.of(job) for job in desk.jobs.all()]
 
 
 @router.get("/events")
@@ -48,7 +48,7 @@ async def _changes(request: Request, desk: Desk) -> AsyncIterator[str]:
     while not await request.is_disconnected():
         version = desk.jobs.version
         if version != seen:
-            jobs = await asyncio.to_thread(desk.jobs.list)
+            jobs = await asyncio.to_thread(desk.jobs.all)
             yield f"data: {json.dumps([JobOut.of(job).model_dump() for job in jobs])}\n\n"
             seen, quiet = version, 0.0
         elif quiet >= KEEP_ALIVE:

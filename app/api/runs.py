@@ -14,6 +14,7 @@ from app.desk import DeskOf
 from app.runs import Run
 from app.sentences import verdict_sentence
 from app.summaries import finite
+from core.errors import RunError
 
 __all__ = ["router"]
 
@@ -22,8 +23,8 @@ router = APIRouter(prefix="/runs", tags=["runs"])
 
 @router.get("")
 def listed(desk: DeskOf) -> list[dict[str, Any]]:
-    """All whole runs, the newest first, each with its verdict."""
-    return [_heading(run) for run in desk.runs.list()]
+    """All runs, the newest first, each with its verdict; one whose report cannot be read says so."""
+    return [_listed(run) for run in desk.runs.all()]
 
 
 @router.get("/{name}")
@@ -65,7 +66,7 @@ def model(name: str, desk: DeskOf) -> dict[str, Any]:
 
 @router.get("/{name}/patterns")
 def patterns(name: str, desk: DeskOf) -> dict[str, Any]:
-    """Patch centres and normals and the measured and predicted error pattern, all [m], null where unseen; `limit` is the end of their common scale."""
+    """Patches with the measured and predicted error pattern, all [m], null where unseen; `limit` ends their common scale."""
     arrays = desk.runs.get(name).patterns()
     values = {key: finite(arrays[key], digits=7) for key in ("centres", "normals", "measured", "predicted")}
     return {**values, "limit": nice_limit(np.concatenate([arrays["measured"], arrays["predicted"]]))}
@@ -91,6 +92,13 @@ def sequence(name: str, sequence: str, desk: DeskOf) -> dict[str, Any]:
         "outcome": [int(code) for code in replay["outcome"]],
         "automatic_limit": reel.limit,
     }
+
+
+def _listed(run: Run) -> dict[str, Any]:
+    try:
+        return _heading(run)
+    except RunError:
+        return {"id": run.name, "dataset": "?", "verdict": "unreadable", "causes": [], "created": run.path.stat().st_mtime}
 
 
 def _heading(run: Run) -> dict[str, Any]:

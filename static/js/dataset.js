@@ -20,6 +20,7 @@ export async function showDataset(name, diagnose) {
   fill(panel, element("div", { class: "eyebrow" }, "Dataset"), element("h1", { class: "verdict" }, name),
     element("p", { class: "gain-note" }, "Every file was read and is in order."),
     element("div", { class: "actions" }, start),
+    notes("Doubtful", summary.warnings), notes("Missing for some causes", summary.lacks),
     element("section", {}, element("h2", {}, "Setup as stated"), element("table", {}, element("tbody", {},
       fact("Name", summary.name), fact("Phantom", `${size} mm`), fact("Mass", `${(summary.mass * 1e3).toFixed(1)} g`),
       fact("Tool radius", mm(summary.tool_radius)), fact("Touches", summary.touches), fact("Rest cloud", summary.has_rest ? "yes" : "no")))),
@@ -28,6 +29,9 @@ export async function showDataset(name, diagnose) {
 }
 
 const fact = (label, value) => element("tr", {}, element("th", {}, label), element("td", { class: "number" }, String(value)));
+
+const notes = (title, sentences) => (sentences.length
+  ? element("section", {}, element("h2", {}, title), sentences.map((text) => element("div", { class: "note-card" }, text))) : null);
 
 const broken = ({ message, where }) => element("div", { class: "note-card bad" }, element("strong", {}, "This dataset is not in order"), message,
   Object.keys(where ?? {}).length ? element("div", { class: "where" }, Object.entries(where).map(([key, value]) => `${key}: ${value}`).join("  ")) : null);

@@ -1,0 +1,67 @@
+"""The terminal: `palpate VERB`, the same verbs as REST and the page."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from types import FrameType
+from typing import NoReturn
+
+import typer
+
+from app.commands import blind, data, demo, diagnosis, service
+from app.console import errors, print_problem
+from core.errors import Cancelled, PalpateError
+
+__all__ = ["app", "main"]
+
+BAD_INPUT = 2
+CANCELLED = 130
+
+app = typer.Typer(
+    name="palpate",
+    help="Replay palpation of soft tissue, see what the simulation gets wrong, and name the cause.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+)
+app.command()(demo.demo)
+app.command()(data.check)
+app.command()(data.register)
+app.command()(data.replay)
+app.command()(diagnosis.diagnose)
+app.command()(blind.blind)
+app.command()(service.serve)
+
+
+def main() -> NoReturn:
+    """Run a verb: 0 when it is done, 2 with one clear message for bad input, 130 when it was stopped."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    signal.signal(signal.SIGTERM, _stop)
+    try:
+        app()
+    except PalpateError as error:
+        print_problem(error)
+        sys.exit(BAD_INPUT)
+    except (Cancelled, KeyboardInterrupt):
+        sys.exit(_cancelled())
+    except SystemExit as end:
+        if end.code == CANCELLED:
+            _cancelled()
+        raise
+    sys.exit(0)
+
+
+def _stop(number: int, frame: FrameType | None) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def _cancelled() -> int:
+    errors.print("cancelled; nothing was left half done", highlight=False)
+    return CANCELLED
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,54 @@
+"""`palpate blind`: how often the verdict is right when nobody knows what is hidden."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from app.console import out, parameters_text, progress
+from core.blind import Case, Result, all_cases, run_suite
+
+__all__ = ["blind"]
+
+
+def blind(
+    folder: Annotated[Path, typer.Option(help="Where the results go; what stands there is not done again.")] = Path("runs/blind"),
+    seed: Annotated[int, typer.Option(min=0, help="All hidden parameters follow from it.")] = 0,
+    controls: Annotated[int, typer.Option(min=0, help="Datasets in which nothing is hidden.")] = 10,
+    workers: Annotated[int, typer.Option(min=1, help="Datasets at the same time.")] = 2,
+    only: Annotated[str | None, typer.Option(help="Only cases whose name contains this.")] = None,
+) -> None:
+    """Hide each effect once at a clear size, and nothing ten times; print what was said. Can be stopped and taken up again."""
+    cases = [case for case in all_cases(seed, controls) if only is None or only in case.name]
+    with progress("blind suite") as report:
+        results = run_suite(folder, cases, workers, report)
+    out.print(_table(cases, results))
+    effects = [result for result in results if result.hidden]
+    named = [result for result in results if not result.hidden and result.verdict != "none"]
+    out.print(
+        f"{sum(result.right for result in effects)} of {len(effects)} effects right; "
+        f"{len(named)} of {len(results) - len(effects)} controls named",
+        highlight=False,
+    )
+
+
+def _table(cases: list[Case], results: list[Result]) -> Table:
+    table = Table(title="blind suite", header_style="bold")
+    for column in ("case", "hidden", "verdict", "named", "reducible error removed", "time", ""):
+        table.add_column(column, overflow="fold")
+    for result in results:
+        removed = "–" if result.removed is None else f"{100 * result.removed:.0f} %"
+        table.add_row(
+            result.name, _causes(result.hidden) or "nothing", result.verdict, _causes(result.named) or "–",
+            removed, f"{result.seconds:.0f} s", "[green]✓[/]" if result.right else "[red]✗[/]",
+        )  # fmt: skip
+    if len(results) < len(cases):
+        table.caption = f"{len(cases) - len(results)} cases without a result"
+    return table
+
+
+def _causes(causes: list[dict[str, Any]]) -> str:
+    return "; ".join(f"{cause['effect']}: {parameters_text(cause)}" for cause in causes)

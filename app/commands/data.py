@@ -1,0 +1,185 @@
+"""`palpate check`, `register` and `replay`: what is there, how the frames relate, what the simulation says."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+from rich.box import SIMPLE
+from rich.markup import escape
+from rich.table import Table
+
+from app.console import out, print_problem, progress
+from core.errors import DatasetError, PalpateError, RegistrationError
+from core.progress import part
+
+if TYPE_CHECKING:
+    from core.dataset import Dataset
+    from core.dataset.check import DatasetSummary
+    from core.registration import Registration
+
+__all__ = ["check", "register", "replay"]
+
+Folder = Annotated[Path, typer.Argument(help="A dataset folder.", show_default=False)]
+
+
+def check(
+    datasets: Annotated[list[Path], typer.Argument(help="Dataset folders.", show_default=False)],
+    picture: Annotated[Path | None, typer.Option(help="Write a picture of where the tool touched (one dataset only).")] = None,
+) -> None:
+    """Read everything in a dataset and say what it holds, what is doubtful, and what it cannot tell."""
+    if picture is not None and len(datasets) != 1:
+        raise DatasetError(f"--picture shows one dataset, {len(datasets)} were named; check them one by one")
+    broken = 0
+    for path in datasets:
+        try:
+            _check_one(path, picture)
+        except PalpateError as error:
+            broken += 1
+            print_problem(error, f" in {path}")
+    if broken:
+        raise typer.Exit(2)
+
+
+def register(dataset: Folder) -> None:
+    """Relate robot, camera and phantom, each with its uncertainty."""
+    from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
+    from core.registration import register as relate  # noqa: PLC0415 (heavy)
+
+    with progress("register") as report:
+        found = relate(open_dataset(dataset), report)
+    table = Table(title=f"{dataset.name}: registration", header_style="bold")
+    for column in ("", "translation", "rotation", "standard deviations"):
+        table.add_column(column)
+    table.add_row("phantom from robot", *_pose(found.phantom_from_robot, found.robot_covariance))
+    table.add_row("phantom from camera", *_pose(found.phantom_from_camera, found.camera_covariance))
+    out.print(table)
+    out.print(f"touches miss their landmarks by {1e3 * found.touch_rms:.2f} mm RMS", highlight=False)
+    if found.weak_directions:
+        out.print(f"weakly determined: {', '.join(found.weak_directions)}", highlight=False)
+    _print_warnings(found.warnings)
+
+
+def replay(
+    dataset: Folder,
+    sequence: Annotated[str, typer.Option(help="Which sequence.", show_default=False)],
+    file: Annotated[Path, typer.Option("--out", help="Where the frames go (.npz).", show_default=False)],
+    grid: Annotated[str, typer.Option(help="Nodes along x, y, z.")] = "13x5x5",
+) -> None:
+    """Simulate one sequence as the setup states it: one equilibrium per cloud, written to an .npz file.
+
+    Frames without equilibrium are named, marked in the file, and make the exit code 1.
+    """
+    import core.registration as registration  # noqa: PLC0415, PLR0402 (heavy)
+    import core.replay as simulation  # noqa: PLC0415 (heavy)
+    from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
+    from core.fem.newton import Outcome  # noqa: PLC0415 (heavy)
+    from core.mesh import GridSpec  # noqa: PLC0415 (heavy)
+
+    spec, opened = GridSpec.parse(grid), open_dataset(dataset)
+    kinematics = opened.sequence(sequence).kinematics
+    times = opened.sequence(sequence).cloud_times
+    times = times if len(times) else kinematics.time
+    with progress(f"replay {sequence}") as report:
+        setup = registration.setup_from(opened, registration.register(opened, part(report, 0.0, 0.1)))
+        centres = setup.phantom_from_robot.apply(kinematics.position_at(times))
+        frames = simulation.replay(setup, centres, spec, report=part(report, 0.1, 1.0))
+    used, quads = np.unique(frames[0].mesh.free_surface, return_inverse=True)
+    rest = frames[0].mesh.nodes[used]
+    _save(
+        file, time=times, tool=centres, rest=rest, faces=quads.reshape(-1, 4),
+        vertices=np.stack([frame.move(rest) for frame in frames]), force=np.stack([frame.force for frame in frames]),
+        residual=np.array([frame.residual for frame in frames]), outcome=np.array([frame.outcome.name for frame in frames]),
+    )  # fmt: skip
+    failed = [number for number, frame in enumerate(frames) if frame.outcome is not Outcome.CONVERGED]
+    out.print(f"{len(frames)} frames on {grid} nodes, {len(frames) - len(failed)} converged: {file}", highlight=False)
+    for number in failed:
+        out.print(
+            f"[yellow]frame {number}[/] {frames[number].outcome.value} (residual {frames[number].residual:.2g})", highlight=False
+        )
+    if failed:
+        raise typer.Exit(1)
+
+
+def _check_one(path: Path, picture: Path | None) -> None:
+    from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
+    from core.dataset.check import check_dataset  # noqa: PLC0415 (heavy)
+    from core.registration import register as relate  # noqa: PLC0415 (heavy)
+
+    dataset = open_dataset(path)
+    found: Registration | None = None
+    with progress(f"check {path.name}") as report:
+        dataset.validate(part(report, 0.0, 0.4))
+        try:
+            found = relate(dataset, part(report, 0.4, 0.6))
+            warnings = found.warnings
+        except RegistrationError as error:
+            warnings = (error.message,)
+        summary = check_dataset(dataset, found.phantom_from_robot if found else None, part(report, 0.6, 1.0))
+    _print_summary(dataset, summary, found)
+    _print_warnings((*summary.warnings, *warnings))
+    if picture is not None and found is not None:
+        from core.dataset.coverage import coverage_picture  # noqa: PLC0415 (heavy)
+
+        coverage_picture(dataset, found.phantom_from_robot, picture)
+        out.print(f"coverage: {picture}", highlight=False)
+
+
+def _print_summary(dataset: Dataset, summary: DatasetSummary, found: Registration | None) -> None:
+    title = f"{dataset.path.name} · {summary.name}"
+    table = Table(title=title, header_style="bold", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
+    for column in ("sequence", "split", "length", "robot", "clouds", "lost", "points", "motion"):
+        table.add_column(
+            column, justify="left" if column in ("sequence", "split", "motion") else "right", no_wrap=column == "sequence"
+        )
+    for one in summary.sequences:
+        table.add_row(
+            one.name, one.split, f"{one.duration:.1f} s", f"{one.kinematics.rate:.0f} Hz",
+            f"{one.clouds.count}, {one.clouds.rate:.1f} Hz" if one.clouds.count else "–", str(one.clouds.dropouts),
+            "–" if one.points is None else str(one.points[1]), _motion(one.motion),
+        )  # fmt: skip
+    out.print(table)
+    size = " × ".join(f"{1e3 * edge:.1f}" for edge in summary.size)
+    touches = f", missing their landmarks by {1e3 * found.touch_rms:.2f} mm RMS" if found else ""
+    tool = f"tool radius {1e3 * summary.tool_radius:.1f} mm"
+    out.print(f"phantom {size} mm, {tool}, {len(summary.touches)} touches{touches}", highlight=False)
+    for lack in summary.lacks:
+        out.print(f"[yellow]lacks[/] {escape(lack.sentence)}", highlight=False)
+
+
+def _motion(motion: Any) -> str:
+    if motion is None:
+        return "–"
+    kinds = ", ".join(dict.fromkeys(contact.kind for contact in motion.contacts)) or "no contact"
+    return f"{kinds}, {max(0.0, -1e3 * motion.nearest):.1f} mm"
+
+
+def _print_warnings(warnings: tuple[str, ...]) -> None:
+    for warning in warnings:
+        out.print(f"[yellow]warning[/] {escape(warning)}", highlight=False)
+
+
+def _pose(transform: Any, covariance: Any) -> tuple[str, str, str]:
+    deviations = np.sqrt(np.diag(covariance))
+    return (
+        ", ".join(f"{1e3 * value:.2f}" for value in transform.translation) + " mm",
+        f"{np.rad2deg(np.linalg.norm(transform.rotation_vector)):.2f}°",
+        ", ".join(f"{1e3 * value:.2f}" for value in deviations[:3])
+        + " mm; "
+        + ", ".join(f"{np.rad2deg(value):.2f}" for value in deviations[3:])
+        + "°",
+    )
+
+
+def _save(file: Path, **arrays: Any) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    aside = file.with_name(f".{file.name}.part")
+    try:
+        with aside.open("wb") as stream:
+            np.savez(stream, **arrays)
+        os.replace(aside, file)
+    finally:
+        aside.unlink(missing_ok=True)

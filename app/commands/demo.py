@@ -1,0 +1,55 @@
+"""`palpate demo`: hide an effect, find it, and open the page on it."""
+
+from __future__ import annotations
+
+import secrets
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from app.commands.diagnosis import print_report, run_diagnosis
+from app.commands.service import announce
+from app.console import out, progress, verdict_cells, verdict_table
+from app.settings import Settings
+
+__all__ = ["demo"]
+
+
+def demo(
+    seed: Annotated[int | None, typer.Option(min=0, help="What is hidden follows from it; drawn at random if not given.")] = None,
+    effects: Annotated[int, typer.Option(min=0, max=2, help="How many effects to hide.")] = 1,
+    show: Annotated[bool, typer.Option("--serve/--no-serve", help="Open the page afterwards.")] = True,
+    folder: Annotated[Path, typer.Option(help="Where dataset and run go.")] = Path("runs/demo"),
+    port: Annotated[int, typer.Option(min=0, max=65535)] = 8321,
+    workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
+) -> None:
+    """Make a virtual phantom with a hidden effect, run the whole loop, and compare the verdict with the truth."""
+    chosen = secrets.randbelow(1_000_000) if seed is None else seed
+    out.print(f"seed [bold]{chosen}[/]  (the same again: palpate demo --seed {chosen})", highlight=False)
+    dataset = folder / "datasets" / f"demo-{chosen}-{effects}"
+    truth = _make(dataset, chosen, effects, workers)
+    run = folder / "runs" / f"{dataset.name}-{time.strftime('%Y%m%d-%H%M%S')}"
+    report, seconds = run_diagnosis(dataset, run, workers, chosen)
+    print_report(report)
+    table = verdict_table(with_truth=True, title="the verdict beside the truth")
+    table.add_row(*verdict_cells(dataset.name, report, seconds, truth, True))
+    out.print(table)
+    if show:
+        from app.serve import serve  # noqa: PLC0415 (heavy)
+
+        settings = Settings(port=port, runs=folder / "runs", datasets=folder / "datasets", workers=workers)
+        serve(settings, lambda address: announce(address, f"/?run={run.name}"))
+
+
+def _make(dataset: Path, seed: int, effects: int, workers: int) -> dict[str, Any]:
+    """The dataset of this seed with its truth; one that is there already is the same and is kept."""
+    from app.commands.diagnosis import truth_beside  # noqa: PLC0415
+    from core.synthetic import draw_scenario, make_dataset  # noqa: PLC0415 (heavy)
+
+    known = truth_beside(dataset) if dataset.is_dir() else None
+    if known is not None:
+        return known
+    with progress("make the phantom") as report:
+        return make_dataset(dataset, draw_scenario(seed, effects), seed, workers, report).as_dict()

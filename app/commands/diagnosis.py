@@ -1,0 +1,127 @@
+"""`palpate diagnose`: name what the simulation misses, for one dataset or several."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Group
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from app.console import out, progress, verdict_cells, verdict_table, write_json
+from app.sentences import verdict_sentence
+from core.errors import DatasetError, RunError
+
+__all__ = ["diagnose", "print_report", "run_diagnosis", "truth_beside"]
+
+
+def diagnose(
+    datasets: Annotated[list[Path], typer.Argument(help="Dataset folders.", show_default=False)],
+    file: Annotated[Path | None, typer.Option("--out", help="The report (JSON); of several datasets a folder of them.")] = None,
+    run: Annotated[Path | None, typer.Option(help="Keep the run folder here; of several datasets a folder of them.")] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all random draws.")] = 0,
+) -> None:
+    """Name what the simulation of each dataset misses, and what naming it gains on sequences nothing was fitted on."""
+    several = len(datasets) > 1
+    _refuse_broken(datasets)
+    truths = {path: truth_beside(path) for path in datasets}
+    with_truth = any(truths.values())
+    table = verdict_table(with_truth)
+    for path in datasets:
+        with _kept(run / path.name if run and several else run, path.name) as place:
+            report, seconds = run_diagnosis(path, place, workers, seed)
+        table.add_row(*verdict_cells(path.name, report, seconds, truths[path], with_truth))
+        if file is not None:
+            write_json(file / f"{path.name}.json" if several else file, report)
+        if several:
+            out.print(f"{path.name}: {verdict_sentence(report)}", highlight=False)
+        else:
+            print_report(report)
+    out.print(table)
+
+
+def run_diagnosis(dataset: Path, run: Path, workers: int, seed: int) -> tuple[dict[str, Any], float]:
+    """Diagnose with a progress bar; the run folder is whole at `run`, or not there at all. Returns report and seconds."""
+    from app.work import diagnose_into  # noqa: PLC0415 (heavy)
+
+    began = time.monotonic()
+    run.parent.mkdir(parents=True, exist_ok=True)
+    scratch = Path(tempfile.mkdtemp(prefix=".making-", dir=run.parent))
+    try:
+        with progress(f"diagnose {dataset.name}") as report:
+            result = diagnose_into(dataset, run, scratch, workers=workers, seed=seed, report=report)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+    return result, time.monotonic() - began
+
+
+def truth_beside(dataset: Path) -> dict[str, Any] | None:
+    """What is known to be hidden, from `<dataset>.truth.json`; only ever compared with, never used."""
+    path = dataset.resolve().with_name(f"{dataset.resolve().name}.truth.json")
+    try:
+        truth = json.loads(path.read_text())
+        return truth if "verdict" in truth and "effects" in truth else None
+    except (OSError, ValueError, TypeError):
+        return None
+
+
+def print_report(report: dict[str, Any]) -> None:
+    """The verdict in one sentence, then what it rests on."""
+    lines: list[Any] = [Text(verdict_sentence(report), style="bold")]
+    gain = report.get("gain") or {}
+    if "baseline" in gain:
+        steps = (
+            f"{gain[key]:.3g} {gain.get('unit', 'mm')} {key.replace('_', ' ')}" for key in ("baseline", "extended", "noise_floor")
+        )
+        lines.append(Text(f"error on the {gain.get('split', 'test')} sequences: {', '.join(steps)}"))
+    for one in report.get("not_identifiable", []):
+        lines.append(Text(f"not identifiable: {one['effect']}: {one.get('why', '')}", style="dim"))
+    out.print(Panel(Group(*lines), expand=False))
+    if report.get("ranking"):
+        out.print(_ranking(report["ranking"]))
+
+
+def _ranking(entries: list[dict[str, Any]]) -> Table:
+    table = Table(header_style="bold")
+    table.add_column("effect")
+    table.add_column("error removed", justify="right")
+    table.add_column("probability", justify="right")
+    for entry in entries[:8]:
+        removed, probability = entry.get("error_removed"), entry.get("probability")
+        table.add_row(entry["effect"], *("–" if value is None else f"{100 * value:.1f} %" for value in (removed, probability)))
+    return table
+
+
+def _refuse_broken(datasets: list[Path]) -> None:
+    from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
+
+    names = [path.name for path in datasets]
+    if len(set(names)) < len(names):
+        raise DatasetError(f"two of the datasets have the same folder name: {', '.join(sorted(names))}; diagnose them one by one")
+    for path in datasets:
+        try:
+            open_dataset(path).validate()
+        except DatasetError as error:
+            raise DatasetError(f"{path}: {error.message}", **{"dataset": path.name, **error.where}) from error
+
+
+@contextmanager
+def _kept(run: Path | None, name: str) -> Iterator[Path]:
+    """The run folder to be kept, or one in a temporary place that is gone afterwards."""
+    if run is not None:
+        if run.exists():
+            raise RunError(f"{run} exists already; name another folder or move it away", file=str(run))
+        yield run
+        return
+    with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
+        yield Path(folder) / name

@@ -1,0 +1,112 @@
+"""What all verbs of the terminal share: where they print, how they show progress, and how a verdict looks."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from app.sentences import quantity
+from core.errors import PalpateError
+from core.progress import Report
+
+__all__ = ["errors", "out", "parameters_text", "print_problem", "progress", "verdict_cells", "verdict_table", "write_json"]
+
+out = Console()
+errors = Console(stderr=True)
+
+
+@contextmanager
+def progress(title: str) -> Iterator[Report]:
+    """A bar with elapsed and remaining time on the error channel, so that the output can be piped."""
+    columns = (
+        TextColumn("[bold]{task.fields[title]}"), BarColumn(bar_width=28), TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(), TimeRemainingColumn(), TextColumn("[dim]{task.description}", markup=True),
+    )  # fmt: skip
+    with Progress(*columns, console=errors, transient=errors.is_terminal) as bar:
+        task = bar.add_task("", total=1.0, title=title)
+
+        def report(fraction: float, text: str) -> None:
+            bar.update(task, completed=min(1.0, fraction), description=escape(text))
+
+        yield report
+
+
+def verdict_table(with_truth: bool, title: str | None = None) -> Table:
+    """The columns of a table of verdicts."""
+    table = Table(title=title, header_style="bold", expand=False)
+    for name in ("dataset", "verdict", "cause", "parameters"):
+        table.add_column(name, overflow="fold")
+    table.add_column("reducible error removed", justify="right")
+    table.add_column("time", justify="right")
+    if with_truth:
+        table.add_column("truth", overflow="fold")
+        table.add_column("")
+    return table
+
+
+def verdict_cells(name: str, report: dict[str, Any], seconds: float, truth: dict[str, Any] | None, with_truth: bool) -> list[str]:
+    """One row of that table."""
+    causes = report.get("causes", [])
+    cells = [
+        name,
+        str(report.get("verdict")),
+        "\n".join(cause["effect"] for cause in causes) or "–",
+        "\n".join(parameters_text(cause) for cause in causes) or "–",
+        _removed(report),
+        f"{seconds:.0f} s",
+    ]
+    if not with_truth:
+        return cells
+    if truth is None:
+        return [*cells, "unknown", ""]
+    hidden = "\n".join(f"{one['effect']}: {parameters_text(one)}" for one in truth["effects"]) or "none"
+    return [*cells, hidden, "[green]✓[/]" if agrees(report, truth) else "[red]✗[/]"]
+
+
+def agrees(report: dict[str, Any], truth: dict[str, Any]) -> bool:
+    """Whether verdict and causes are those of the truth, in any order."""
+    named = {cause["effect"] for cause in report.get("causes", [])}
+    return report.get("verdict") == truth["verdict"] and named == {one["effect"] for one in truth["effects"]}
+
+
+def print_problem(error: PalpateError, place: str = "") -> None:
+    """One clear message on the error channel."""
+    errors.print(f"[bold red]{type(error).__name__}[/]{escape(place)}: {escape(error.message)}", soft_wrap=True, highlight=False)
+
+
+def parameters_text(cause: dict[str, Any]) -> str:
+    """`radius 4.2 mm (4.1 to 4.3), ...` of a cause or of a hidden effect."""
+    return ", ".join(_parameter(name, entry) for name, entry in cause.get("parameters", {}).items())
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write aside and rename, so that a reader never sees half of it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    aside = path.with_name(f".{path.name}.part")
+    aside.write_text(json.dumps(value, indent=1) + "\n")
+    os.replace(aside, path)
+
+
+def _parameter(name: str, entry: dict[str, Any]) -> str:
+    unit = entry.get("unit", "1")
+    text = f"{name} {quantity(entry['value'], unit)}"
+    if not isinstance(entry.get("low"), (int, float)):
+        return text
+    low = quantity(entry["low"], unit).split("\N{NO-BREAK SPACE}")[0]
+    return f"{text} ({low} to {quantity(entry['high'], unit)})"
+
+
+def _removed(report: dict[str, Any]) -> str:
+    removed = (report.get("gain") or {}).get("reducible_removed") or {}
+    if not isinstance(removed.get("value"), (int, float)) or report.get("verdict") == "none":
+        return "–"
+    return f"{100 * removed['value']:.0f} % ({100 * removed['low']:.0f} to {100 * removed['high']:.0f})"

@@ -1,0 +1,166 @@
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from broken_datasets import BREAKAGES, write_valid_dataset
+
+from app import console
+from app.cli import main
+from app.console import agrees, parameters_text, verdict_cells, verdict_table, write_json
+
+Palpate = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def palpate(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Palpate:
+    """Run a verb in this process: exit code, output and errors."""
+    before = signal.getsignal(signal.SIGTERM)
+    monkeypatch.setattr(console.out, "width", 200)
+
+    def run(*arguments: str | Path) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["palpate", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        signal.signal(signal.SIGTERM, before)
+        text = capsys.readouterr()
+        return int(end.value.code or 0), text.out, text.err
+
+    return run
+
+
+@pytest.fixture
+def dataset(tmp_path: Path) -> Path:
+    return write_valid_dataset(tmp_path / "data" / "small")
+
+
+def files(folder: Path) -> dict[str, int]:
+    return {str(path): path.lstat().st_mtime_ns for path in folder.rglob("*")}
+
+
+def test_help_names_every_verb(palpate: Palpate) -> None:
+    code, out, _ = palpate("--help")
+    assert code == 0
+    assert all(verb in out for verb in ("demo", "check", "register", "replay", "diagnose", "blind", "serve"))
+
+
+@pytest.mark.parametrize(
+    "arguments", [("nonsense",), ("check",), ("diagnose", "x", "--workers", "0"), ("serve", "--port", "99999")]
+)
+def test_wrong_arguments_are_exit_code_2(palpate: Palpate, arguments: tuple[str, ...]) -> None:
+    assert palpate(*arguments)[0] == 2
+
+
+@pytest.mark.parametrize("kind", sorted(BREAKAGES))
+def test_broken_dataset_is_one_clear_message_and_exit_code_2(palpate: Palpate, dataset: Path, kind: str) -> None:
+    BREAKAGES[kind](dataset)
+    before = files(dataset.parent)
+    for verb in ("check", "diagnose"):
+        code, out, err = palpate(verb, dataset)
+        assert (code, out) == (2, "")
+        lines = [line for line in err.splitlines() if "Error" in line]
+        assert len(lines) == 1
+        assert "Traceback" not in err
+        assert all(word in err for word in BREAKAGES[kind].says)
+    assert files(dataset.parent) == before
+
+
+def test_check_goes_on_after_a_broken_dataset_and_says_so_in_the_end(palpate: Palpate, dataset: Path, tmp_path: Path) -> None:
+    code, out, err = palpate("check", tmp_path / "nothing", dataset)
+    assert code == 2
+    assert "nothing does not exist" in err
+    assert "small-block" in out
+    assert "poke-01" in out
+
+
+def test_two_datasets_of_one_name_are_refused_before_any_computing(palpate: Palpate, dataset: Path, tmp_path: Path) -> None:
+    code, _, err = palpate("diagnose", dataset, write_valid_dataset(tmp_path / "other" / "small"))
+    assert code == 2
+    assert "same folder name" in err
+
+
+def test_run_folder_that_exists_is_not_overwritten(palpate: Palpate, dataset: Path, tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    code, _, err = palpate("diagnose", dataset, "--run", tmp_path / "run")
+    assert code == 2
+    assert "exists already" in err
+    assert list((tmp_path / "run").iterdir()) == []
+
+
+def test_serving_to_other_machines_is_refused(palpate: Palpate) -> None:
+    code, _, err = palpate("serve", "--host", "0.0.0.0")
+    assert code == 2
+    assert "no login yet" in err
+
+
+def test_replay_writes_one_equilibrium_per_cloud(palpate: Palpate, dataset: Path, tmp_path: Path) -> None:
+    code, out, err = palpate("replay", dataset, "--sequence", "poke-01", "--grid", "7x5x4", "--out", tmp_path / "frames.npz")
+    assert code == 0, err
+    assert "5 converged" in out
+    with (tmp_path / "frames.npz").open("rb") as stream, np.load(stream) as frames:
+        assert frames["vertices"].shape == (5, len(frames["rest"]), 3)
+        lowest = (frames["vertices"] - frames["rest"])[..., 2].min(axis=1)
+        assert lowest[2] < -1e-3
+        assert lowest[0] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "words"), [("--grid", "13x5", "13x5x5"), ("--sequence", "poke-99", "no such sequence")]
+)
+def test_replay_tells_what_it_cannot_replay(
+    palpate: Palpate, dataset: Path, tmp_path: Path, option: str, value: str, words: str
+) -> None:
+    code, _, err = palpate("replay", dataset, "--sequence", "poke-01", "--out", tmp_path / "frames.npz", option, value)
+    assert code == 2
+    assert words in err
+    assert not (tmp_path / "frames.npz").exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_stopped_verb_ends_with_130_and_leaves_nothing(dataset: Path, tmp_path: Path, number: signal.Signals) -> None:
+    for index in range(400):
+        name = f"{index + 5:06d}.ply"
+        (dataset / "sequences" / "poke-01" / "clouds" / name).write_bytes((dataset / "rest.ply").read_bytes())
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    command = [sys.executable, "-m", "app.cli", "replay", str(dataset), "--sequence", "poke-01", "--grid", "41x25x25", "--out"]
+    with subprocess.Popen([*command, str(tmp_path / "frames.npz")], stderr=subprocess.PIPE, text=True, env=environment) as process:
+        time.sleep(4.0)
+        process.send_signal(number)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "nothing was left half done" in err
+    assert not list(tmp_path.glob("*frames*"))
+
+
+def test_verdict_is_compared_with_the_truth_by_name(report: dict[str, Any]) -> None:
+    lump = {"effect": "stiff_inclusion", "parameters": {"radius": {"value": 0.008, "unit": "m"}}}
+    assert agrees(report, {"verdict": "found", "effects": [lump]})
+    assert not agrees(report, {"verdict": "found", "effects": [{**lump, "effect": "gravity"}]})
+    assert not agrees(report, {"verdict": "none", "effects": []})
+    assert agrees({**report, "verdict": "none", "causes": []}, {"verdict": "none", "effects": []})
+
+
+def test_table_of_verdicts_has_a_cell_for_every_column(report: dict[str, Any]) -> None:
+    truth = {"verdict": "none", "effects": []}
+    for with_truth in (False, True):
+        cells = verdict_cells("small", report, 61.2, truth if with_truth else None, with_truth)
+        assert len(cells) == len(verdict_table(with_truth).columns)
+        assert "93 % (90 to 96)" in cells
+    assert "radius 7.5\N{NO-BREAK SPACE}mm (7.0 to 8.0\N{NO-BREAK SPACE}mm)" in parameters_text(report["causes"][0])
+
+
+def test_json_appears_whole_or_not_at_all(tmp_path: Path) -> None:
+    write_json(tmp_path / "deep" / "report.json", {"a": 1})
+    assert json.loads((tmp_path / "deep" / "report.json").read_text()) == {"a": 1}
+    with pytest.raises(TypeError):
+        write_json(tmp_path / "deep" / "report.json", {"a": object()})
+    assert [path.name for path in (tmp_path / "deep").iterdir()] == ["report.json"]

@@ -1,0 +1,66 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.sentences import PHRASES, cause_phrase, quantity, verdict_sentence
+from core.synthetic import HIDDEN, draw_scenario
+
+
+def plain(text: str) -> str:
+    return text.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_verdict_names_size_place_and_gain(report: dict[str, Any]) -> None:
+    assert plain(verdict_sentence(report, (0.0687, 0.0393, 0.0358))) == (
+        "The simulation misses a stiff lump, 15 mm across, 10 mm under the top; "
+        "naming it removes 93 % of the error that can be removed."
+    )
+
+
+def test_two_causes_are_named_in_one_sentence(report: dict[str, Any]) -> None:
+    report["causes"].append({"effect": "tool_radius", "parameters": {"radius": {"value": 0.0042, "unit": "m"}}})
+    sentence = plain(verdict_sentence(report))
+    assert "across and the size of the tool: its radius is 4.2 mm; naming them removes" in sentence
+
+
+@pytest.mark.parametrize(
+    ("verdict", "words"), [("none", "misses nothing"), ("unexplained", "no known effect"), ("ambiguous", "equally well")]
+)
+def test_other_verdicts_say_so(report: dict[str, Any], verdict: str, words: str) -> None:
+    assert words in verdict_sentence({**report, "verdict": verdict})
+
+
+def test_every_effect_the_bench_can_hide_has_its_own_words() -> None:
+    drawn = {hidden.effect: hidden for seed in range(120) for hidden in draw_scenario(seed).effects}
+    assert set(drawn) == set(HIDDEN) <= set(PHRASES)
+    for hidden in drawn.values():
+        parameters = {name: {"value": value} for name, value in hidden.parameters.items()}
+        assert "an effect called" not in cause_phrase({"effect": hidden.effect, "parameters": parameters}, (0.07, 0.04, 0.036))
+
+
+def test_effect_of_somebody_else_is_called_by_its_name() -> None:
+    assert cause_phrase({"effect": "frozen_core", "parameters": {}}) == "an effect called frozen core"
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.000429871, "m", "0.43 mm"),
+        (0.0151, "m", "15 mm"),
+        (0.083, "s", "83 ms"),
+        (0.0349, "rad", "2.0°"),
+        (6.04, "1", "6.0"),
+        ("-x", "", "-x"),
+    ],
+)
+def test_quantities_have_the_unit_people_read_and_two_digits(value: Any, unit: str, text: str) -> None:
+    assert plain(quantity(value, unit)) == text
+
+
+def test_report_on_disk_and_sentence_need_no_more_than_json(report: dict[str, Any], tmp_path: Path) -> None:
+    (tmp_path / "report.json").write_text(json.dumps(report))
+    assert verdict_sentence(json.loads((tmp_path / "report.json").read_text())) == verdict_sentence(report)

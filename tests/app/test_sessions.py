@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from app.problems import Missing
+from app.runs import Runs
+from app.scene import NullScene
+from app.schemas import View
+from app.sessions import Sessions
+
+
+@pytest.fixture
+def sessions(place: Any) -> Sessions:
+    return Sessions(Runs(place.runs))
+
+
+def view(run: str, **changes: Any) -> View:
+    return View(run=run, sequence="poke-01", **changes)
+
+
+def test_every_scene_of_a_page_gets_the_picture(sessions: Sessions, run_name: str) -> None:
+    scenes = [NullScene(), NullScene()]
+    for scene in scenes:
+        sessions.join("page-one", scene)
+    state = sessions.open("page-one").show(view(run_name, frame=1))
+    assert [scene.pictures[-1].checksum() for scene in scenes] == [state["drawn"]["checksum"]] * 2
+    assert state["scenes"] == 2
+
+
+def test_a_scene_that_joins_late_sees_what_the_page_shows(sessions: Sessions, run_name: str) -> None:
+    sessions.open("page-one").show(view(run_name, frame=3))
+    scene = NullScene()
+    sessions.join("page-one", scene)
+    assert scene.pictures[0].frame == 3
+    assert len(scene.looked_at) == 1
+
+
+def test_camera_is_turned_to_the_phantom_once_per_run_and_on_request(sessions: Sessions, run_name: str) -> None:
+    scene = NullScene()
+    sessions.join("page-one", scene)
+    session = sessions.open("page-one")
+    for frame in range(3):
+        session.show(view(run_name, frame=frame))
+    assert len(scene.looked_at) == 1
+    session.look()
+    assert len(scene.looked_at) == 2
+
+
+def test_a_scene_that_left_gets_nothing_more(sessions: Sessions, run_name: str) -> None:
+    scene = NullScene()
+    sessions.join("page-one", scene)
+    sessions.leave("page-one", scene)
+    sessions.open("page-one").show(view(run_name))
+    assert scene.pictures == []
+
+
+def test_frame_beyond_the_end_shows_the_last_one(sessions: Sessions, run_name: str) -> None:
+    state = sessions.open("page-one").show(view(run_name, frame=99))
+    assert state["view"]["frame"] == 4
+
+
+def test_measured_cloud_comes_from_the_dataset_of_the_run(sessions: Sessions, run_name: str) -> None:
+    assert sessions.open("page-one").show(view(run_name, crop=False))["drawn"]["points"] == 192
+
+
+def test_run_without_its_dataset_is_shown_without_the_cloud(sessions: Sessions, place: Any, run_name: str) -> None:
+    place.datasets.joinpath("small").rename(place.datasets / "elsewhere")
+    state = sessions.open("page-one").show(view(run_name))
+    assert state["drawn"]["points"] == 0
+    assert state["drawn"]["triangles"]
+
+
+def test_unknown_sequence_is_named_with_those_there_are(sessions: Sessions, run_name: str) -> None:
+    with pytest.raises(Missing, match="no sequence poke-99; it has drag-01, poke-01"):
+        sessions.open("page-one").show(View(run=run_name, sequence="poke-99"))
+
+
+def test_only_a_few_dozen_pages_are_remembered(sessions: Sessions) -> None:
+    for number in range(40):
+        sessions.open(f"page-{number}")
+    with pytest.raises(Missing):
+        sessions.get("page-0")
+    assert sessions.get("page-39").view is None
