@@ -60,9 +60,9 @@ class Stage:
         server.scene.configure_environment_map(hdri=None)
         # Mostly ambient light, so that every side shows the colours of the legend; two soft lamps give the shape.
         server.scene.configure_default_lights(False)
-        server.scene.add_light_ambient("/lamps/around", intensity=2.3)
-        server.scene.add_light_directional("/lamps/above", intensity=0.9, position=(0.1, -0.2, 1.0))
-        server.scene.add_light_directional("/lamps/side", intensity=0.5, position=(-1.0, 0.6, 0.4))
+        server.scene.add_light_ambient("/lamps/around", intensity=1.9)
+        server.scene.add_light_directional("/lamps/above", intensity=1.2, position=(0.1, -0.2, 1.0))
+        server.scene.add_light_directional("/lamps/side", intensity=0.7, position=(-1.0, 0.6, 0.4))
         server.scene.add_grid(
             "/table", 0.24, 0.24, cell_size=0.01, section_size=0.05, cell_color=(138, 145, 156), section_color=(128, 135, 146),
             cell_thickness=0.35, section_thickness=0.7, fade_distance=0.6, position=(0.0, 0.0, -0.0004), shadow_opacity=0.0,

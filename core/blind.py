@@ -16,7 +16,7 @@ from typing import Any
 from core.errors import RunError
 from core.progress import Report, silent
 
-__all__ = ["Case", "Result", "all_cases", "run_case", "run_suite"]
+__all__ = ["Case", "Result", "all_cases", "run_case", "run_suite", "scenario_of"]
 
 TRIES = 400
 

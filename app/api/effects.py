@@ -1,10 +1,13 @@
-"""The causes that can be named, with parameters, units and bounds."""
+"""The causes that can be named, with parameters, units and bounds, straight from the catalogue."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from fastapi import APIRouter
+
+from core.effects import CATALOGUE, Effect, Parameter
 
 __all__ = ["router"]
 
@@ -13,5 +16,19 @@ router = APIRouter(prefix="/effects", tags=["effects"])
 
 @router.get("")
 def listed() -> list[dict[str, Any]]:
-    """The catalogue."""
-    return []
+    """The catalogue; bounds are SI, null where there is none."""
+    return [_described(effect) for effect in CATALOGUE]
+
+
+def _described(effect: type[Effect]) -> dict[str, Any]:
+    return {
+        "name": effect.name,
+        "enters": effect.enters.value,
+        "summary": effect.summary,
+        "parameters": [_parameter(item) for item in effect.parameters()],
+    }
+
+
+def _parameter(item: Parameter) -> dict[str, Any]:
+    low, high = (None if item.choices or not math.isfinite(bound) else bound for bound in (item.low, item.high))
+    return {"name": item.name, "unit": item.unit, "low": low, "high": high, "choices": list(item.choices)}

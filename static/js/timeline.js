@@ -94,7 +94,7 @@ function draw() {
   scrub.max = Math.max(0, count() - 1);
   scrub.value = frame;
   const at = Math.min(frame, count() - 1);
-  fill("clock", series ? [element("strong", {}, `${series.time[at].toFixed(2)} s`), ` · frame ${at + 1} of ${count()}`] : [sequence ? "…" : ""]);
+  fill("clock", series ? [element("strong", {}, `${series.time[at].toFixed(2)} s`), element("span", { class: "frames" }, ` · frame ${at + 1} of ${count()}`)] : [sequence ? "…" : ""]);
   fill("readout", series ? [
     element("span", {}, swatch("raw", true), "Raw", element("b", {}, mm(series.distance_raw[at], false))),
     element("span", {}, swatch("extended", true), "Extended", element("b", {}, mm(series.distance_extended[at], false))),

@@ -16,16 +16,19 @@ import httpx
 import numpy as np
 import pytest
 import uvicorn
+from scipy.spatial.transform import Rotation
 from small_dataset import SIZE, write_valid_dataset
 
 from app.main import create_app
 from app.settings import Settings
 from app.work import TARGETS
+from core.frames import Transform
 from core.mesh import GridSpec, box_mesh
 
 RUN = "small-block-1"
 FRAMES = 5
-CAMERA = np.array([[1.0, 0, 0, 0.01], [0, -1.0, 0, -0.02], [0, 0, -1.0, 0.3], [0, 0, 0, 1.0]])
+CAMERA = Transform(Rotation.from_euler("xyz", [2.5, 0.1, 0.2]).as_matrix(), np.array([0.01, 0.02, 0.35])).inverse().matrix
+"""phantom_from_camera of the small dataset"""
 REPORT: dict[str, Any] = {
     "format": 1,
     "dataset": "small-block",

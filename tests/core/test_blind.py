@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from core.blind import Case, Result, all_cases, run_suite, scenario_of
+from core.errors import RunError
+from core.synthetic import HIDDEN
+
+
+def result(name: str, hidden: list[str], verdict: str, named: list[str]) -> Result:
+    return Result(name, 0, [{"effect": one} for one in hidden], verdict, [{"effect": one} for one in named], 0.9, 1.0)
+
+
+def test_suite_hides_every_effect_once_and_nothing_ten_times() -> None:
+    cases = all_cases(seed=3)
+    assert [case.effect for case in cases if case.effect] == list(HIDDEN)
+    assert sum(case.effect is None for case in cases) == 10
+    assert len({case.name for case in cases}) == len({case.seed for case in cases}) == len(cases)
+
+
+@pytest.mark.parametrize("effect", HIDDEN)
+def test_case_hides_its_effect_and_the_same_one_each_time(effect: str) -> None:
+    case = Case("case", 7, effect)
+    scenario = scenario_of(case)
+    assert [hidden.effect for hidden in scenario.effects] == [effect]
+    assert scenario == scenario_of(case)
+    assert scenario != scenario_of(Case("case", 8, effect))
+
+
+def test_control_hides_nothing() -> None:
+    assert scenario_of(Case("control", 1, None)).effects == ()
+
+
+@pytest.mark.parametrize(
+    ("hidden", "verdict", "named", "right"),
+    [
+        (["gravity"], "found", ["gravity"], True),
+        (["gravity"], "found", ["tool_offset"], False),
+        (["gravity"], "none", [], False),
+        (["gravity"], "ambiguous", ["gravity"], False),
+        (["gravity"], "found", ["gravity", "tool_offset"], False),
+        ([], "none", [], True),
+        ([], "unexplained", [], False),
+        ([], "found", ["gravity"], False),
+    ],
+)
+def test_only_the_hidden_effect_alone_is_right(hidden: list[str], verdict: str, named: list[str], right: bool) -> None:
+    assert result("case", hidden, verdict, named).right is right
+
+
+def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
+    cases = all_cases(seed=0, controls=1)
+    done = [result(case.name, [], "none", []) for case in reversed(cases)]
+    (tmp_path / "results.jsonl").write_text("".join(json.dumps(asdict(one)) + "\n" for one in done))
+    told: list[Any] = []
+    found = run_suite(tmp_path, cases, workers=2, report=lambda fraction, text: told.append((fraction, text)))
+    assert [one.name for one in found] == [case.name for case in cases]
+    assert told == [(1.0, f"{len(cases)} of {len(cases)} were there already")]
+
+
+def test_torn_row_of_results_is_told_with_its_number(tmp_path: Path) -> None:
+    whole = json.dumps(asdict(result("a", [], "none", [])))
+    (tmp_path / "results.jsonl").write_text(f"{whole}\n{whole[:40]}\n")
+    with pytest.raises(RunError, match="row 2 is not a result"):
+        run_suite(tmp_path, [], workers=1)
