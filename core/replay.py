@@ -248,8 +248,9 @@ def replay(
         report(number / len(centres), f"frame {number + 1} of {len(centres)}")
         start = starts[number] if starts is not None and starts[number].in_contact else previous
         frame = block.step(np.asarray(centre, dtype=float), start)
-        if frame.outcome is not Outcome.CONVERGED and start is not previous:
-            frame = block.step(np.asarray(centre, dtype=float), previous)
+        for other in (previous, None):  # a long jump may lead through the block; from rest the tool comes in from outside
+            if frame.outcome is not Outcome.CONVERGED and other is not start:
+                start, frame = other, block.step(np.asarray(centre, dtype=float), other)
         frames.append(frame)
         previous = frame if frame.outcome is Outcome.CONVERGED else None
     return frames

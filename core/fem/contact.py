@@ -14,7 +14,7 @@ from numba import njit
 
 from core.frames import FloatArray
 
-__all__ = ["FACE_GRADIENTS", "FACE_SHAPES", "assemble_contact", "contact_energy", "face_weights"]
+__all__ = ["FACE_GRADIENTS", "FACE_SHAPES", "assemble_contact", "contact_energy", "face_weights", "turns_around"]
 
 _GAUSS = np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)])
 _GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 9.0
@@ -140,3 +140,27 @@ def assemble_contact(
                             if slot >= 0:
                                 data[slot] += value * shapes[q, a] * shapes[q, b]
     return deepest
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def turns_around(faces: Any, positions: Any, point: Any) -> float:
+    """How often quadrilaterals (f, 4) wind around a point (3,): over a closed surface 1 inside and 0 outside.
+
+    Sum of the triangles' solid angles (van Oosterom and Strackee 1983) over that of the sphere.
+    """
+    total, arms, lengths = 0.0, np.empty((3, 3)), np.empty(3)
+    for f in range(faces.shape[0]):
+        for second in (1, 2):
+            for corner, a in enumerate((0, second, second + 1)):
+                for i in range(3):
+                    arms[corner, i] = positions[faces[f, a], i] - point[i]
+                lengths[corner] = np.sqrt(arms[corner, 0] ** 2 + arms[corner, 1] ** 2 + arms[corner, 2] ** 2)
+            a, b, c = arms[0], arms[1], arms[2]
+            across = (
+                a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+            )
+            along = lengths[0] * lengths[1] * lengths[2]
+            for i in range(3):
+                along += a[i] * b[i] * lengths[2] + b[i] * c[i] * lengths[0] + c[i] * a[i] * lengths[1]
+            total += 2 * np.arctan2(across, along)
+    return total / (4 * np.pi)  # type: ignore[no-any-return]

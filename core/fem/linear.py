@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import weakref
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,15 +17,55 @@ __all__ = ["NotPositiveDefinite", "SparseCholesky"]
 
 _POSITIVE_DEFINITE = 2
 _ANALYSE, _FACTORISE, _SOLVE, _RELEASE = 11, 22, 33, -1
+_ZERO_PIVOT = -4
+_DOUBLES, _INTEGERS = ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_int32)
 
 
 class NotPositiveDefinite(Exception):
     """The matrix has no Cholesky factor."""
 
 
-def _release(solver: Any, matrix: sp.csr_matrix) -> None:
-    solver.set_phase(_RELEASE)
-    solver._call_pardiso(matrix, np.zeros(matrix.shape[0]))
+@lru_cache(maxsize=1)
+def _pardiso() -> Any:
+    """MKL's entry point; looking for the library takes most of a second, so it is done once."""
+    from pypardiso import PyPardisoSolver
+
+    return PyPardisoSolver()._mkl_pardiso
+
+
+class _Handle:
+    """One matrix in MKL's memory, with everything its calls need that does not change between them."""
+
+    def __init__(self, pattern: sp.csr_matrix) -> None:
+        self.matrix = pattern
+        self.size = pattern.shape[0]
+        self.rows = pattern.indptr.astype(np.int32) + 1
+        self.columns = pattern.indices.astype(np.int32) + 1
+        self.memory = np.zeros(64, dtype=np.int64)
+        self.options = np.zeros(64, dtype=np.int32)
+        self.order = np.zeros(self.size, dtype=np.int32)
+        self.call = _pardiso()
+
+    def run(self, phase: int, right: FloatArray) -> FloatArray:
+        """Carry out a phase; returns the solution (n,) or (n, m) in column order where the phase has one."""
+        solution, error = np.zeros_like(right), ctypes.c_int32(0)
+        number = [ctypes.byref(ctypes.c_int32(value)) for value in (1, _POSITIVE_DEFINITE, phase, self.size)]
+        columns = ctypes.byref(ctypes.c_int32(1 if right.ndim == 1 else right.shape[1]))
+        self.call(
+            self.memory.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)), number[0], number[0], number[1], number[2], number[3],
+            self.matrix.data.ctypes.data_as(_DOUBLES), self.rows.ctypes.data_as(_INTEGERS), self.columns.ctypes.data_as(_INTEGERS),
+            self.order.ctypes.data_as(_INTEGERS), columns, self.options.ctypes.data_as(_INTEGERS), ctypes.byref(ctypes.c_int32(0)),
+            right.ctypes.data_as(_DOUBLES), solution.ctypes.data_as(_DOUBLES), ctypes.byref(error),
+        )  # fmt: skip
+        if error.value == _ZERO_PIVOT:
+            raise NotPositiveDefinite("the matrix has no Cholesky factor")
+        if error.value:
+            raise RuntimeError(f"MKL Pardiso failed in phase {phase} with error {error.value}")
+        return solution
+
+
+def _release(handle: _Handle) -> None:
+    handle.run(_RELEASE, np.zeros(handle.size))
 
 
 class SparseCholesky:
@@ -34,32 +76,21 @@ class SparseCholesky:
     """
 
     def __init__(self, pattern: sp.csr_matrix) -> None:
-        from pypardiso import PyPardisoSolver
-
         self._matrix = pattern
-        self._solver = PyPardisoSolver(mtype=_POSITIVE_DEFINITE)
-        self._run(_ANALYSE, np.zeros(pattern.shape[0]))
+        self._handle = _Handle(pattern)
+        self._idle = np.zeros(pattern.shape[0])
+        self._handle.run(_ANALYSE, self._idle)
         # At interpreter exit the memory goes anyway, and the library may be gone first.
-        weakref.finalize(self, _release, self._solver, pattern).atexit = False
-
-    def _run(self, phase: int, right: FloatArray) -> FloatArray:
-        # The public solve() compares and copies the matrix at each call, which costs more than the back substitution.
-        self._solver.set_phase(phase)
-        return np.asarray(self._solver._call_pardiso(self._matrix, right))
+        weakref.finalize(self, _release, self._handle).atexit = False
 
     def factorise(self, data: FloatArray) -> None:
         """Factorise the matrix with these entries; raises NotPositiveDefinite."""
-        from pypardiso.pardiso_wrapper import PyPardisoError
-
         self._matrix.data[:] = data
-        try:
-            self._run(_FACTORISE, np.zeros(self._matrix.shape[0]))
-        except PyPardisoError as error:
-            raise NotPositiveDefinite(str(error)) from None
+        self._handle.run(_FACTORISE, self._idle)
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve for one (n,) or several (n, m) right sides with the last factor."""
-        return self._run(_SOLVE, np.asfortranarray(right))
+        return np.ascontiguousarray(self._handle.run(_SOLVE, np.asfortranarray(right, dtype=float)))
 
 
 def upper_pattern(elements: IntArray, unknown: IntArray) -> tuple[sp.csr_matrix, IntArray]:

@@ -10,14 +10,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from core.fem.contact import FACE_GRADIENTS, FACE_SHAPES, assemble_contact, contact_energy, face_weights
+from core.fem.contact import FACE_GRADIENTS, FACE_SHAPES, assemble_contact, contact_energy, face_weights, turns_around
 from core.fem.elastic import LAWS, assemble_elastic, elastic_energy, gauss_gradients, lame
 from core.fem.linear import SparseCholesky, face_slots, upper_pattern
 from core.frames import FloatArray
 from core.mesh import BoxMesh, GridSpec, IntArray, box_mesh
 from core.setup import Detachment, Inclusion, Setup
 
-__all__ = ["CONTACT_STIFFNESS", "Assembly", "BlockModel", "Probe", "Topology", "topology"]
+__all__ = ["CONTACT_STIFFNESS", "Assembly", "BlockModel", "Probe", "Topology", "log_stiffness", "topology"]
 
 CONTACT_STIFFNESS = 5e4
 """Contact pressure over E per penetration [1/m]: 0.02 mm at a pressure equal to E."""
@@ -74,11 +74,11 @@ def topology(nodes: tuple[int, int, int], held: bool) -> Topology:
     return Topology(nodes, held)
 
 
-def _stiffness_factor(inclusions: tuple[Inclusion, ...], corners: FloatArray) -> FloatArray:
-    """Stiffness over the matrix's per element (e,), geometric mean by volume; smooth in the lump's place and size."""
+def log_stiffness(inclusions: tuple[Inclusion, ...], corners: FloatArray) -> FloatArray:
+    """Logarithm of stiffness over the matrix's per element (e,), averaged by volume; smooth in the lump's place and size."""
     log_factor = np.zeros(len(corners))
     if not inclusions:
-        return np.ones(len(corners))
+        return log_factor
     low, high = corners[:, 0], corners[:, 7]
     steps = (np.arange(4) + 0.5) / 4
     offsets = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -88,7 +88,7 @@ def _stiffness_factor(inclusions: tuple[Inclusion, ...], corners: FloatArray) ->
         distance = np.linalg.norm(points - np.array([lump.x, lump.y, lump.z]), axis=2)
         inside = 0.5 * (1 - np.tanh((distance - lump.radius) / width))
         log_factor += inside.mean(axis=1) * np.log(lump.stiffness_ratio)
-    return np.asarray(np.exp(log_factor))
+    return log_factor
 
 
 def _held_share(detached: tuple[Detachment, ...], size: tuple[float, float, float], points: FloatArray) -> FloatArray:
@@ -111,7 +111,7 @@ class BlockModel:
         corners = mesh.nodes[self.topology.hexahedra]
         self.gradients, self.weights = gauss_gradients(corners)
         mu, bulk = lame(setup.material.law, setup.material.poisson_ratio)
-        factor = _stiffness_factor(setup.material.inclusions, corners)
+        factor = np.exp(log_stiffness(setup.material.inclusions, corners))
         self.mu, self.bulk = mu * factor, bulk * factor
         self.areas = face_weights(mesh.nodes[self.topology.surface])
         self.weight_force = self._weight(setup.load.specific_weight_over_stiffness)
@@ -194,3 +194,9 @@ class BlockModel:
         surface: IntArray = self.topology.surface
         distance = np.linalg.norm(positions[surface.ravel()] - probe.centre, axis=1)
         return max(0.0, probe.radius - float(distance.min()))
+
+    def encloses(self, positions: FloatArray, probe: Probe) -> bool:
+        """Whether the tool's centre lies within the deformed block, where no contact would be felt."""
+        top = self.topology
+        around = turns_around(top.surface, positions, probe.centre) + turns_around(top.base, positions, probe.centre)
+        return bool(around > 0.5)

@@ -27,7 +27,7 @@ class Outcome(Enum):
     ITERATIONS = "no equilibrium within the allowed iterations; the motion between frames is too large or the load too high"
     INDEFINITE = "the stiffness stayed indefinite: the block buckles or an element is almost inverted"
     INVERTED = "an element is inverted at the start of the solve"
-    INSIDE_TOOL = "the material came to rest inside the tool"
+    INSIDE_TOOL = "the material came to rest inside the tool, or the tool inside the material"
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +104,9 @@ def _newton(model: BlockModel, probe: Probe | None, start: FloatArray, tolerance
             break
         positions = trial
         state = model.assemble(positions, probe)
-    if outcome is Outcome.CONVERGED and probe is not None and model.depth_inside(positions, probe) > MAX_PENETRATION:
-        outcome = Outcome.INSIDE_TOOL
+    if outcome is Outcome.CONVERGED and probe is not None:
+        if model.depth_inside(positions, probe) > MAX_PENETRATION or model.encloses(positions, probe):
+            outcome = Outcome.INSIDE_TOOL
     return Solution(positions, state.push, outcome, iteration, residual, state.penetration)
 
 

@@ -1,0 +1,91 @@
+"""A body of hexahedra whose supports the test chooses, built from the same assembly as the replay's blocks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from core.fem.elastic import LAWS, assemble_elastic, elastic_energy, gauss_gradients, lame
+from core.fem.linear import SparseCholesky, upper_pattern
+from core.frames import FloatArray
+from core.mesh import BoxMesh, GridSpec, box_mesh
+
+__all__ = ["FreeBody", "distorted", "grid"]
+
+
+def grid(size: tuple[float, float, float], nodes: tuple[int, int, int]) -> BoxMesh:
+    """An even grid; edge lengths [m]."""
+    return box_mesh(size, GridSpec(nodes=nodes))
+
+
+def distorted(mesh: BoxMesh, share: float, seed: int) -> FloatArray:
+    """Nodes (n, 3) [m] whose inner ones are moved at random by up to `share` of an element's edge."""
+    nodes = mesh.nodes.copy()
+    edge = np.array([np.diff(axis).min() for axis in mesh.axes])
+    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    inside = np.all((nodes > low + 1e-12) & (nodes < high - 1e-12), axis=1)
+    nodes[inside] += np.random.default_rng(seed).uniform(-share, share, (inside.sum(), 3)) * edge
+    return nodes
+
+
+@dataclass(frozen=True, eq=False)
+class FreeBody:
+    """Modulus one: forces are over E [m^2], energies too [m^3].
+
+    Attributes:
+        mesh: which nodes form which element. nodes: (n, 3) rest positions [m]. held: (n, 3) where the displacement is given.
+    """
+
+    mesh: BoxMesh
+    nodes: FloatArray
+    law: str
+    poisson_ratio: float
+    held: np.ndarray
+
+    @cached_property
+    def _parts(self):
+        mu, bulk = lame(self.law, self.poisson_ratio)
+        ones = np.ones(len(self.mesh.hexahedra))
+        return *gauss_gradients(self.nodes[self.mesh.hexahedra]), np.ascontiguousarray(self.mesh.hexahedra), mu * ones, bulk * ones
+
+    @cached_property
+    def _system(self):
+        unknown = np.where(self.held, -1, np.cumsum(~self.held).reshape(self.held.shape) - 1)
+        pattern, slots = upper_pattern(self.mesh.hexahedra, unknown)
+        return pattern, slots, SparseCholesky(pattern)
+
+    def energy(self, positions: FloatArray) -> float:
+        """Over E [m^3]."""
+        return elastic_energy(LAWS[self.law], *self._parts, positions)
+
+    def assemble(self, positions: FloatArray):
+        """Internal forces (n, 3) over E [m^2] and the entries of the tangent of the unknowns [m]."""
+        pattern, slots, _ = self._system
+        force, data = np.zeros_like(positions), np.zeros(pattern.nnz)
+        assemble_elastic(LAWS[self.law], *self._parts, positions, slots, force, data)
+        return force, data
+
+    def tangent(self, positions: FloatArray) -> np.ndarray:
+        """The whole symmetric matrix (u, u) [m]."""
+        pattern, _, _ = self._system
+        upper = pattern.copy()
+        upper.data = self.assemble(positions)[1]
+        dense = upper.toarray()
+        return dense + np.triu(dense, 1).T
+
+    def equilibrium(
+        self, start: FloatArray, load: FloatArray | float = 0.0, tolerance: float = 1e-11
+    ) -> tuple[FloatArray, FloatArray]:
+        """Positions and internal forces (n, 3) under nodal loads over E [m^2], by Newton's method from `start`."""
+        positions, free = start.copy(), ~self.held
+        factor = self._system[2]
+        for _ in range(25):
+            force, data = self.assemble(positions)
+            residual = (force - load)[free]
+            if np.linalg.norm(residual) < tolerance * np.linalg.norm(force):
+                return positions, force
+            factor.factorise(data)
+            positions[free] -= factor.solve(residual)
+        raise AssertionError(f"no equilibrium: residual {np.linalg.norm(residual):.2g}")
