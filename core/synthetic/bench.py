@@ -1,14 +1,12 @@
-"""The virtual block under a whole motion: its true surface and slip at any time."""
+"""The virtual block under a whole motion: solved at key places along the way, with its base held or slipping."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from scipy.interpolate import LinearNDInterpolator, PchipInterpolator
+from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay, cKDTree
 
 from core.errors import SolveError
@@ -17,92 +15,13 @@ from core.synthetic.block import Block, Grading, IntArray, mesh_block
 from core.synthetic.equilibrium import Equilibrium, Solid, State
 from core.synthetic.motion import Motion, Probe
 from core.synthetic.scenario import Scenario
+from core.synthetic.track import Moment, Passage, Stretch, Track
 
-__all__ = ["Moment", "Track", "neutral_displacement", "perform", "rest_surface", "true_offset", "true_radius"]
+__all__ = ["neutral_displacement", "perform", "rest_surface", "true_offset", "true_radius"]
 
 KEY_SPACING = 1.0e-3
+SLIDING_SPACING = 1.3e-3
 GRAVITY = 9.81
-
-
-@dataclass(frozen=True)
-class Moment:
-    """A key of the motion that was solved.
-
-    Attributes:
-        surface: (s, 3) displacement of the drawn surface from the stated shape, slip included [m].
-        slip: (2,) of the base in the plane [m].
-        push: (3,) force of the tool on the block [N].
-        penetration: the deepest surface point inside the tool [m].
-    """
-
-    surface: FloatArray
-    slip: FloatArray
-    push: FloatArray
-    penetration: float
-
-
-@dataclass(frozen=True)
-class Passage:
-    """One straight run along a probe: `moments` at growing arc lengths `arcs` [m], from `begin` to `end` [s]."""
-
-    begin: float
-    end: float
-    arcs: FloatArray
-    moments: tuple[Moment, ...]
-
-    @cached_property
-    def _between(self) -> Any:
-        return PchipInterpolator(self.arcs, np.stack([moment.surface for moment in self.moments]))
-
-    def surface(self, arc: float) -> FloatArray:
-        """Displacement (s, 3) [m] at an arc length [m], by monotone cubics between the keys."""
-        return np.asarray(self._between(np.clip(arc, self.arcs[0], self.arcs[-1])))
-
-
-@dataclass(frozen=True)
-class Track:
-    """What the block does during one motion.
-
-    Attributes:
-        rest: (s, 3) drawn surface of the stated shape [m].
-        faces: (t, 3).
-        settled: (s, 3) displacement before any touch [m].
-    """
-
-    motion: Motion
-    rest: FloatArray
-    faces: IntArray
-    settled: FloatArray
-    passages: tuple[tuple[Passage, ...], ...]
-
-    def surface(self, time: float) -> FloatArray:
-        """The drawn surface (s, 3) [m] at a time [s]."""
-        return self.rest + self.displacement(time)
-
-    def displacement(self, time: float) -> FloatArray:
-        """Displacement of the drawn surface (s, 3) from the stated shape [m] at a time [s]."""
-        last = self.settled
-        for probe, passages in zip(self.motion.probes, self.passages, strict=True):
-            for passage in passages:
-                if time < passage.begin:
-                    return last
-                if time < passage.end:
-                    return passage.surface(float(probe.arc(np.array([time]))[0]))
-                last = passage.surface(float(probe.arc(np.array([passage.end]))[0]))
-        return last
-
-    @property
-    def moments(self) -> list[Moment]:
-        """All solved keys."""
-        return [moment for passages in self.passages for passage in passages for moment in passage.moments]
-
-    @property
-    def touched(self) -> list[float]:
-        """Two instants [s] of the probe that presses hardest: on the way in, and at its end."""
-        hardest = max(range(len(self.passages)), key=lambda number: np.linalg.norm(self.passages[number][0].moments[-1].push))
-        probe, first = self.motion.probes[hardest], self.passages[hardest][0]
-        way = np.linspace(first.begin, first.end, 200)
-        return [float(way[np.argmax(probe.arc(way) > 0.8 * probe.arcs.max())]), float(probe.times[-1] + probe.times[0]) / 2]
 
 
 def true_radius(scenario: Scenario) -> float:
@@ -118,69 +37,78 @@ def true_offset(scenario: Scenario) -> FloatArray:
 
 
 def perform(scenario: Scenario, motion: Motion, fine: float | None = None) -> Track:
-    """Solve one motion of a scenario; the grid is fine wherever its probes touch."""
-    block = mesh_block(scenario.size, _grading(scenario, motion, fine or scenario.fine))
-    bench = _Bench(scenario, block)
-    try:
-        passages = tuple(bench.probe(probe) for probe in motion.probes)
-        return Track(motion, block.surface_rest, block.surface_faces, bench.settled, passages)
-    finally:
-        bench.close()
+    """Solve one motion of a scenario; every probe gets a grid that is fine where it touches."""
+    slip, stretches = np.zeros(3), []
+    for probe in motion.probes:
+        block = mesh_block(scenario.size, _grading(scenario, probe, fine or scenario.fine))
+        bench = _Bench(scenario, block, slip)
+        try:
+            settled, passages = bench.settled + slip, bench.passages(probe)
+        finally:
+            bench.close()
+        stretches.append(Stretch(probe, block.surface_rest, block.surface_faces, settled, passages))
+        slip = bench.slip
+    return Track(motion, tuple(stretches))
 
 
-def neutral_displacement(scenario: Scenario, motion: Motion, track: Track, time: float) -> FloatArray:
-    """Where the drawn surface (s, 3) [m] of `track` would be if nothing but the sensors had hidden effects."""
-    mechanical = [hidden for hidden in scenario.effects if hidden.effect not in ("time_offset", "camera_registration")]
-    if not mechanical:
-        return track.displacement(time)
-    centre = motion.centre(np.array([time]))[0]
-    bench = _Bench(replace(scenario, effects=()), mesh_block(scenario.size, _grading(scenario, motion, scenario.fine)))
+def neutral_displacement(scenario: Scenario, stretch: Stretch, centre: FloatArray) -> FloatArray:
+    """Displacement (s, 3) [m] of the drawn surface of `stretch` with no hidden effect and the tool's stated centre (3,) [m]."""
+    low, high = _bounds(scenario)
+    bench = _Bench(
+        replace(scenario, effects=()), mesh_block(scenario.size, _grading(scenario, stretch.probe, scenario.fine)), np.zeros(3)
+    )
     try:
-        outwards = centre - np.clip(
-            centre, [-0.5 * scenario.size[0], -0.5 * scenario.size[1], 0], np.array(scenario.size) * (0.5, 0.5, 1.0)
-        )
-        outwards = -motion.axis if not np.any(outwards) else outwards / np.linalg.norm(outwards)
-        moments = [bench.moment(centre + outwards * clear) for clear in np.arange(8e-3, -1e-9, -1.6e-3)]
-        return moments[-1].surface
+        outwards = centre - np.clip(centre, low, high)
+        outwards = outwards / np.linalg.norm(outwards) if np.any(outwards) else stretch.probe.outwards
+        return [bench.moment(centre + outwards * clear) for clear in np.arange(8e-3, -1e-9, -1.6e-3)][-1].surface
     finally:
         bench.close()
 
 
 def rest_surface(scenario: Scenario) -> tuple[FloatArray, FloatArray, IntArray]:
     """The untouched block: drawn surface of the stated shape (s, 3), its displacement (s, 3) [m], and triangles (t, 3)."""
-    block = mesh_block(scenario.size, Grading(np.zeros((1, 3)), np.zeros(1), 8e-3, 8e-3, 0.5))
-    bench = _Bench(scenario, block)
+    block = mesh_block(scenario.size, Grading(np.zeros((1, 3)), np.zeros(1), np.full(1, 8e-3), 8e-3, 0.5))
+    bench = _Bench(scenario, block, np.zeros(3))
     bench.close()
     return block.surface_rest, bench.settled, block.surface_faces
 
 
-def _grading(scenario: Scenario, motion: Motion, fine: float) -> Grading:
-    offset, radius = true_offset(scenario), true_radius(scenario)
-    places, reach = [], []
-    for probe in motion.probes:
-        way = probe.place(np.arange(0.0, probe.corners[-1] + 1e-3, 1.5e-3)) + offset
-        low, high = np.array([-scenario.size[0] / 2, -scenario.size[1] / 2, 0.0]), np.array(scenario.size) * (0.5, 0.5, 1.0)
-        nearest = np.clip(way, low, high)
-        touching = np.linalg.norm(way - nearest, axis=1) < radius
-        centres = nearest[touching]
-        surface = np.where((way[touching] > low) & (way[touching] < high), way[touching], centres)
-        places.append(surface if len(probe.waypoints) > 2 else centres[:1])
-        reach.append(np.full(len(places[-1]), 0.6 * radius if len(probe.waypoints) > 2 else 0.8 * radius))
+def _bounds(scenario: Scenario) -> tuple[FloatArray, FloatArray]:
+    x, y, z = scenario.size
+    return np.array([-x / 2, -y / 2, 0.0]), np.array([x / 2, y / 2, z])
+
+
+def _grading(scenario: Scenario, probe: Probe, fine: float) -> Grading:
+    """Fine where the probe first touches, and along a drag; a lump gets elements of half its radius."""
+    low, high = _bounds(scenario)
+    radius = true_radius(scenario)
+    way = probe.place(np.arange(0.0, probe.corners[-1] + 1e-3, 1.0e-3)) + true_offset(scenario)
+    touching = way[np.linalg.norm(way - np.clip(way, low, high), axis=1) < radius]
+    touching = touching if len(touching) else way[-1:]
+    shallow = touching[:1] if len(probe.waypoints) == 2 else touching[touching[:, 2] < touching[:, 2].min() + 1e-4]
+    points = _on_surface(shallow, low, high)
+    reach = np.full(len(points), (0.8 if len(points) == 1 else 0.5) * radius)
+    edges = np.full(len(points), fine if len(points) == 1 else 1.2 * fine)
     lump = scenario.hidden("stiff_inclusion")
-    grading = Grading(np.concatenate(places), np.concatenate(reach), fine)
-    if lump is None:
-        return grading
-    ball = np.array([[lump.value(axis) for axis in "xyz"]])
-    shell = max(0.0, lump.value("radius") - fine)
-    return Grading(
-        np.concatenate([grading.points, ball]), np.concatenate([grading.reach, [shell]]), fine, grading.coarse, grading.growth
-    )
+    if lump is not None:
+        points = np.concatenate([points, [[lump.value(axis) for axis in "xyz"]]])
+        reach = np.append(reach, lump.value("radius"))
+        edges = np.append(edges, max(fine, 0.5 * lump.value("radius")))
+    return Grading(points, reach, edges)
+
+
+def _on_surface(centres: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """The points (n, 3) of the block's faces next to tool centres (n, 3), inside or outside [m]."""
+    points = np.clip(centres, low, high)
+    inside = np.all((centres > low) & (centres < high), axis=1)
+    points[inside, 2] = high[2]
+    return points
 
 
 class _Bench:
     """One block with its solver, and how far it has slipped."""
 
-    def __init__(self, scenario: Scenario, block: Block) -> None:
+    def __init__(self, scenario: Scenario, block: Block, slip: FloatArray) -> None:
         self.block = block
         self.solver = Equilibrium(block, _solid(scenario, block))
         self.offset = true_offset(scenario)
@@ -188,7 +116,7 @@ class _Bench:
         hidden = scenario.hidden("base_slip")
         self.friction = hidden.value("friction_coefficient") if hidden else None
         self.weight = scenario.mass * GRAVITY
-        self.slip = np.zeros(3)
+        self.slip = slip
         self.settled = np.asarray(block.surface @ self.solver.rest.displacement)
         self._tree = cKDTree(block.surface_rest + self.settled)
         self._last = self._before = self.solver.rest
@@ -197,7 +125,7 @@ class _Bench:
     def close(self) -> None:
         self.solver.close()
 
-    def probe(self, probe: Probe) -> tuple[Passage, ...]:
+    def passages(self, probe: Probe) -> tuple[Passage, ...]:
         """All passages of one probe in order of time; without slip the way back is the way in."""
         passages: list[Passage] = []
         for number, (first, last) in enumerate(pairwise(probe.arcs)):
@@ -216,13 +144,15 @@ class _Bench:
         return tuple(passages)
 
     def _keys(self, probe: Probe, low: float, high: float) -> FloatArray:
-        """Where to solve: denser where contact begins, since the surface starts to move there with a vertical tangent of its own."""
+        """Where to solve: evenly while the tool presses, and once more just after contact begins."""
         fine = np.linspace(low, high, 2 + int((high - low) / 5e-5))
         touching = np.nonzero(self._gap(probe.place(fine) + self.offset) < 0)[0]
         if not len(touching):
             return np.array([low, high])
         begin, end = fine[max(touching[0] - 1, 0)], fine[min(touching[-1] + 1, len(fine) - 1)]
-        keys = [np.array([low, high]), np.linspace(begin, end, 2 + int((end - begin) / KEY_SPACING))]
+        sliding = begin == low and end == high
+        spacing = SLIDING_SPACING if sliding else KEY_SPACING
+        keys = [np.array([low, high]), np.linspace(begin, end, 2 + int((end - begin) / spacing))]
         keys += [begin + np.array([0.3e-3])] if begin > low else []
         keys += [end - np.array([0.3e-3])] if end < high else []
         return np.unique(np.clip(np.concatenate(keys), low, high))
@@ -270,15 +200,15 @@ class _Bench:
     def _from_last(self, centre: FloatArray) -> State:
         step, before = centre - self._last.centre, self._last.centre - self._before.centre
         if np.linalg.norm(step) > 2e-3:
-            self._last = State(self.solver.rest.displacement, centre + (0, 0, 1e-3), np.zeros(3), np.zeros((3, 3)), 0.0)
+            self._last = State(self.solver.rest.displacement, centre, np.zeros(3), np.zeros((3, 3)), 0.0)
             return self.solver.state(centre, self._last)
         if abs(step[2]) < 0.3 * np.linalg.norm(step) and np.any(self._last.push):
-            return self.solver.guess(self._carried(step), centre, self._last)
+            return self.solver.state(centre, self._last, self._carried(step))
         ratio = float(step @ before) / max(float(before @ before), 1e-12)
         if not (0.2 < ratio < 2.5 and np.any(self._before.push)):
             return self.solver.state(centre, self._last)
         guess = self._last.displacement + ratio * (self._last.displacement - self._before.displacement)
-        return self.solver.guess(guess, centre, self._last)
+        return self.solver.state(centre, self._last, guess)
 
     def _carried(self, step: FloatArray) -> FloatArray:
         """The last displacement, moved along with the tool: near the truth while the tool slides."""

@@ -20,27 +20,28 @@ _PAIRS = [(a, b) for a in range(4) for b in range(a)]
 
 @dataclass(frozen=True)
 class Grading:
-    """How large an element may be: its longest edge is at most `coarse`, and `fine + growth * distance` from any of `points`.
+    """How large an element may be: its longest edge is at most `coarse`, and `fine + growth * distance` from each of `points`.
 
     Attributes:
         points: (n, 3) where the grid is fine, phantom frame [m].
         reach: (n,) [m] distance from each point up to which `fine` holds.
-        fine, coarse: longest edge [m].
+        fine: (n,) longest edge there [m].
+        coarse: longest edge anywhere [m].
         growth: longest edge per distance [1].
     """
 
     points: FloatArray
     reach: FloatArray
-    fine: float = 2.6e-3
+    fine: FloatArray
     coarse: float = 12e-3
     growth: float = 0.6
 
     def allowed(self, places: FloatArray) -> FloatArray:
         """The longest edge (n,) [m] allowed at `places` (n, 3)."""
         edge = np.full(len(places), np.inf)
-        for point, reach in zip(self.points, self.reach, strict=True):
+        for point, reach, fine in zip(self.points, self.reach, self.fine, strict=True):
             distance = np.maximum(np.linalg.norm(places - point, axis=1) - reach, 0.0)
-            edge = np.minimum(edge, self.fine + self.growth * distance)
+            edge = np.minimum(edge, fine + self.growth * distance)
         return edge
 
 
@@ -133,7 +134,7 @@ def _refined(size: tuple[float, float, float], grading: Grading) -> Any:
         if mesh.t.shape[1] > 60_000:
             break
         mesh = mesh.refined(large)
-    raise MeshError(f"{mesh.t.shape[1]} elements do not reach edges of {grading.fine * 1e3:.2g} mm; ask for a coarser grid")
+    raise MeshError(f"{mesh.t.shape[1]} elements do not reach edges of {grading.fine.min() * 1e3:.2g} mm; ask for a coarser grid")
 
 
 def _sampling(basis: Any) -> Sampling:

@@ -57,14 +57,14 @@ class DepthCamera:
 
     def depth(self, scene: Scene) -> tuple[FloatArray, Any]:
         """True depth of each pixel [m], infinite for nothing, and what it sees: 0 the block, 1 the table, more the tool."""
-        import open3d as o3d  # noqa: PLC0415
+        import open3d as o3d
 
         cast = o3d.t.geometry.RaycastingScene(nthreads=1)
         into = self.phantom_from_camera.inverse()
         for vertices, triangles in _meshes(scene):
-            cast.add_triangles(into.apply(vertices).astype(np.float32), triangles.astype(np.uint32))
+            cast.add_triangles(_tensor(into.apply(vertices).astype(np.float32)), _tensor(triangles.astype(np.uint32)))
         rays = np.concatenate([np.zeros_like(self.rays), self.rays], axis=1).astype(np.float32)
-        hit = cast.cast_rays(o3d.core.Tensor(rays), nthreads=1)
+        hit = cast.cast_rays(_tensor(rays), nthreads=1)
         return hit["t_hit"].numpy().astype(float), hit["geometry_ids"].numpy()
 
     def cloud(self, scene: Scene, rng: np.random.Generator) -> FloatArray:
@@ -157,13 +157,19 @@ def _smooth(places: FloatArray, width: float, rng: np.random.Generator, amplitud
 
 def tool_solid(centre: FloatArray, axis: FloatArray, radius: float) -> list[tuple[FloatArray, Any]]:
     """Triangles of the ball and of the shaft that rises from it, away from the tip."""
-    import open3d as o3d  # noqa: PLC0415
+    import open3d as o3d
 
     ball = o3d.geometry.TriangleMesh.create_sphere(radius, resolution=16)
     shaft = o3d.geometry.TriangleMesh.create_cylinder(min(SHAFT_RADIUS, 0.8 * radius), SHAFT_LENGTH, resolution=16, split=1)
     turn = Rotation.align_vectors(-axis[None], [[0.0, 0.0, 1.0]])[0].as_matrix()
-    rod = (np.asarray(shaft.vertices) + (0, 0, SHAFT_LENGTH / 2)) @ turn.T + centre
+    rod = (np.asarray(shaft.vertices) + np.array([0.0, 0.0, SHAFT_LENGTH / 2])) @ turn.T + centre
     return [(np.asarray(ball.vertices) + centre, np.asarray(ball.triangles)), (rod, np.asarray(shaft.triangles))]
+
+
+def _tensor(array: Any) -> Any:
+    import open3d as o3d
+
+    return o3d.core.Tensor.from_numpy(np.ascontiguousarray(array))
 
 
 def _meshes(scene: Scene) -> list[tuple[FloatArray, Any]]:

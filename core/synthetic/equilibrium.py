@@ -18,6 +18,7 @@ from core.synthetic.law import assemble_obstacle, assemble_solid, constants, sol
 __all__ = ["Equilibrium", "Solid", "State"]
 
 PENALTY_OVER_E = 4e4
+SOFTER = 1 / 12
 _UNUSED = (np.zeros((1, 10, 10, 3, 3)), np.zeros((1, 3)), np.zeros(3), np.zeros((1, 3, 3)), np.zeros((3, 3)))
 _NOWHERE = np.array([0.0, 0.0, 10.0])
 
@@ -135,6 +136,7 @@ class Equilibrium:
         self._load = self._own_weight()
         self._tolerance = 1e-4 * self.modulus * solid.tool_radius**2
         self.iterations = 0
+        self._penalty = 0.0
         self.rest = self._advance(np.zeros_like(block.nodes), _NOWHERE, 0)
 
     def _elastic(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -148,16 +150,20 @@ class Equilibrium:
         np.add.at(load[:, 2], self.block.elements, -self.solid.weight * nodal)
         return load
 
-    def state(self, centre: FloatArray, start: State) -> State:
-        """The equilibrium with the tool's centre at `centre` [m]; the way from `start` is split where Newton does not get there."""
-        return self._advance(start.displacement, centre, 0, start.centre)
+    def state(self, centre: FloatArray, start: State, guess: FloatArray | None = None) -> State:
+        """The equilibrium with the tool's centre at `centre` [m], from `start` or a nearer `guess` of the displacement (n, 3) [m].
 
-    def guess(self, displacement: FloatArray, centre: FloatArray, start: State) -> State:
-        """As `state`, trying first from `displacement` (an extrapolation)."""
+        Where Newton does not get there, it goes through a softer contact, and then in smaller steps from `start`.
+        """
+        displacement = start.displacement if guess is None else guess
         try:
-            return self._newton(displacement, centre)
+            return self._newton(displacement, centre, 10)
         except SolveError:
-            return self.state(centre, start)
+            pass
+        try:
+            return self._newton(self._newton(displacement, centre, 12, SOFTER).displacement, centre)
+        except SolveError:
+            return self._advance(start.displacement, centre, 0, start.centre)
 
     def _advance(self, displacement: FloatArray, centre: FloatArray, depth: int, before: FloatArray | None = None) -> State:
         try:
@@ -168,7 +174,8 @@ class Equilibrium:
             half = self._advance(displacement, 0.5 * (before + centre), depth + 1, before)
             return self._advance(half.displacement, centre, depth + 1, half.centre)
 
-    def _newton(self, displacement: FloatArray, centre: FloatArray, limit: int = 14) -> State:
+    def _newton(self, displacement: FloatArray, centre: FloatArray, limit: int = 14, softness: float = 1.0) -> State:
+        self._penalty = softness * PENALTY_OVER_E * self.modulus
         u = displacement.copy()
         energy = np.inf
         norm = np.inf
@@ -178,7 +185,7 @@ class Equilibrium:
                 break
             residual = -force[self._free].ravel()
             norm = float(np.linalg.norm(residual))
-            if norm < self._tolerance:
+            if norm < self._tolerance * (1.0 if softness == 1.0 else 30.0):
                 return self._converged(u, centre, push, coupling, total, deepest, iteration)
             if iteration == limit:
                 break
@@ -254,10 +261,9 @@ class Equilibrium:
     def _press(
         self, u: FloatArray, sampling: Sampling, centre: FloatArray, radius: float, derivative: bool, out: tuple[FloatArray, ...]
     ) -> tuple[float, float]:
-        penalty = PENALTY_OVER_E * self.modulus
         block = self.block
         parts = (u, block.nodes, block.elements, sampling.owner, sampling.values, sampling.weights)
-        energy, deepest = assemble_obstacle(*parts, centre, radius, penalty, derivative, *out)
+        energy, deepest = assemble_obstacle(*parts, centre, radius, self._penalty, derivative, *out)
         return float(energy), float(deepest)
 
     def close(self) -> None:

@@ -74,7 +74,7 @@ def solid_energy(u: Any, elements: Any, gradients: Any, weights: Any, c10: Any, 
 
 
 @njit(cache=True, fastmath=_FAST)
-def assemble_solid(
+def assemble_solid(  # noqa: PLR0912
     u: Any, elements: Any, gradients: Any, weights: Any, c10: Any, c01: Any, lame: Any, stiffness: Any, force: Any
 ) -> None:
     """Add to element stiffness (e, 10, 10, 3, 3) [N/m], upper node pairs only, and to force (n, 3) [N]."""
@@ -143,7 +143,7 @@ def assemble_solid(
 
 
 @njit(cache=True, fastmath=_FAST)
-def assemble_obstacle(
+def assemble_obstacle(  # noqa: PLR0912
     u: Any,
     nodes: Any,
     elements: Any,

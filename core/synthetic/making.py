@@ -16,10 +16,11 @@ from scipy.spatial.transform import Rotation
 from core.errors import RunError
 from core.frames import FloatArray, Transform
 from core.progress import Report, part, silent
-from core.synthetic.bench import Track, neutral_displacement, perform, rest_surface, true_offset, true_radius
+from core.synthetic.bench import neutral_displacement, perform, rest_surface, true_offset, true_radius
 from core.synthetic.camera import DepthCamera, Scene, place_camera
 from core.synthetic.motion import Motion, draw_motion
 from core.synthetic.scenario import Scenario
+from core.synthetic.track import Track
 from core.synthetic.truth import Truth, truth_path
 from core.synthetic.visibility import changed, visible_weights
 from core.synthetic.writing import write_clouds, write_config, write_kinematics, write_ply, write_touches
@@ -170,7 +171,7 @@ def _moved(job: _Job) -> DepthCamera:
 
 def _scene(job: _Job, track: Track, instant: float) -> Scene:
     centre = job.motion.centre(np.array([instant]))[0] + true_offset(job.scenario)
-    return Scene((track.surface(instant), track.faces), centre, job.motion.axis, true_radius(job.scenario))
+    return Scene(track.surface(instant), centre, job.motion.axis, true_radius(job.scenario))
 
 
 def _write_kinematics(job: _Job, start: float, rng: np.random.Generator) -> None:
@@ -185,14 +186,17 @@ def _write_kinematics(job: _Job, start: float, rng: np.random.Generator) -> None
 
 
 def _visibility(job: _Job, track: Track) -> list[float]:
-    """Mean squares over the visible surface, at one deep and one moving instant of the deepest probe [m^2]."""
+    """Mean squares over the visible surface, where it is pushed hardest [m^2]."""
     if not job.scenario.effects:
         return []
     hidden = job.scenario.hidden("time_offset")
     late = hidden.value("offset") if hidden else 0.0
-    weights = visible_weights(track.rest, track.faces, job.scenario.size, job.seen)
+    mechanical = any(effect.effect not in ("time_offset", "camera_registration") for effect in job.scenario.effects)
+    stretch = track.hardest
+    weights = visible_weights(stretch.rest, stretch.faces, job.scenario.size, job.seen)
     squares = []
-    for instant in track.touched:
-        believed = neutral_displacement(job.scenario, job.motion, track, instant + late)
-        squares.append(changed(track.rest, track.displacement(instant), believed, job.camera_shift, weights))
+    for instant in stretch.deepest[1:] if mechanical else stretch.deepest:
+        centre = job.motion.centre(np.array([instant + late]))[0]
+        believed = neutral_displacement(job.scenario, stretch, centre) if mechanical else stretch.displacement(instant + late)
+        squares.append(changed(stretch.rest, stretch.displacement(instant), believed, job.camera_shift, weights))
     return squares

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -32,6 +33,12 @@ class Probe:
     def corners(self) -> FloatArray:
         """(k,) arc length at each waypoint [m]."""
         return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1))])
+
+    @property
+    def outwards(self) -> FloatArray:
+        """(3,) unit vector against the first run: out of the block."""
+        way = self.waypoints[0] - self.waypoints[1]
+        return np.asarray(way / np.linalg.norm(way))
 
     def place(self, arcs: FloatArray) -> FloatArray:
         """Tool centre (n, 3) [m] at the arc lengths (n,)."""
@@ -138,20 +145,20 @@ def _drag(
 ) -> tuple[list[FloatArray], FloatArray]:
     along = int(number % 2)
     depth = rng.uniform(3.5e-3, 5e-3)
-    length = (0.024, 0.014)[along] * rng.uniform(0.9, 1.1)
+    length = (0.018, 0.013)[along] * rng.uniform(0.9, 1.1)
     start = np.zeros(3)
     start[1 - along] = rng.uniform(-0.004, 0.004)
     start[along] = -length / 2 * (1 if rng.random() < 0.5 else -1)
     start[2] = size[2] + radius - depth
     end = start.copy()
     end[along] = -start[along]
-    return [np.array([start + [0, 0, depth + HOVER], start, end])], _tilted(rng)
+    return [np.array([start + np.array([0.0, 0.0, depth + HOVER]), start, end])], _tilted(rng)
 
 
 def _tilted(rng: np.random.Generator) -> FloatArray:
     lean = rng.uniform(-0.17, 0.17)
     axis = np.array([lean, 0.0, -1.0]) if rng.random() < 0.5 else np.array([0.0, lean, -1.0])
-    return axis / np.linalg.norm(axis)
+    return np.asarray(axis / np.linalg.norm(axis))
 
 
 def _timed(name: str, paths: list[FloatArray], axis: FloatArray, rng: np.random.Generator) -> Motion:
@@ -163,9 +170,9 @@ def _timed(name: str, paths: list[FloatArray], axis: FloatArray, rng: np.random.
         speed = rng.uniform(4.5e-3, 6.5e-3) if slow else rng.uniform(10e-3, 15e-3)
         corners = Probe(path, np.zeros(1), np.zeros(1)).corners
         steps = [(0.0, 0.0)]
-        for low, high in zip(corners[:-1], corners[1:], strict=True):
+        for low, high in pairwise(corners):
             steps += [((high - low) / speed, high), (rng.uniform(0.5, 1.0), high)]
-        for high, low in zip(corners[:0:-1], corners[-2::-1], strict=True):
+        for high, low in pairwise(corners[::-1]):
             steps += [((high - low) / (1.6 * speed), low)]
         durations, arcs = np.array(steps).T
         probes.append(Probe(path, time + np.cumsum(durations), arcs))

@@ -20,7 +20,8 @@ def visible_weights(rest: FloatArray, faces: Any, size: tuple[float, float, floa
     shown = middle[:, 2] > size[2] - 1e-6
     for axis in range(2):
         shown |= seen[axis] * middle[:, axis] > size[axis] / 2 - 1e-6
-    return np.bincount(faces.ravel(), weights=np.repeat(np.where(shown, areas / 3, 0.0), 3), minlength=len(rest))
+    area = np.bincount(faces.ravel(), weights=np.repeat(np.where(shown, areas / 3, 0.0), 3), minlength=len(rest))
+    return np.asarray(area, dtype=float)
 
 
 def changed(rest: FloatArray, true: FloatArray, believed: FloatArray, camera_shift: Transform, weights: FloatArray) -> float:

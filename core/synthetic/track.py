@@ -1,0 +1,116 @@
+"""What the block truly does during one motion, at any time between the solved keys."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from core.frames import FloatArray
+from core.synthetic.block import IntArray
+from core.synthetic.motion import Motion, Probe
+
+__all__ = ["Moment", "Passage", "Stretch", "Track"]
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A key of the motion that was solved.
+
+    Attributes:
+        surface: (s, 3) displacement of the drawn surface from the stated shape, slip included [m].
+        slip: (2,) of the base in the plane [m].
+        push: (3,) force of the tool on the block [N].
+        penetration: the deepest surface point inside the tool [m].
+    """
+
+    surface: FloatArray
+    slip: FloatArray
+    push: FloatArray
+    penetration: float
+
+
+@dataclass(frozen=True)
+class Passage:
+    """One straight run along a probe: `moments` at growing arc lengths `arcs` [m], from `begin` to `end` [s]."""
+
+    begin: float
+    end: float
+    arcs: FloatArray
+    moments: tuple[Moment, ...]
+
+    @cached_property
+    def _between(self) -> Any:
+        return PchipInterpolator(self.arcs, np.stack([moment.surface for moment in self.moments]))
+
+    def surface(self, arc: float) -> FloatArray:
+        """Displacement (s, 3) [m] at an arc length [m], by monotone cubics between the keys."""
+        return np.asarray(self._between(np.clip(arc, self.arcs[0], self.arcs[-1])))
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """One probe, solved on a grid of its own.
+
+    Attributes:
+        rest: (s, 3) drawn surface of the stated shape [m].
+        faces: (t, 3).
+        settled: (s, 3) displacement before the probe, slip included [m].
+    """
+
+    probe: Probe
+    rest: FloatArray
+    faces: IntArray
+    settled: FloatArray
+    passages: tuple[Passage, ...]
+
+    def displacement(self, time: float) -> FloatArray:
+        """Displacement (s, 3) from the stated shape [m] at a time [s]."""
+        last = self.settled
+        for passage in self.passages:
+            if time < passage.begin:
+                return last
+            instant = min(time, passage.end)
+            last = passage.surface(float(self.probe.arc(np.array([instant]))[0]))
+            if time < passage.end:
+                return last
+        return last
+
+    @property
+    def deepest(self) -> list[float]:
+        """Two instants [s]: on the way in, and half way through."""
+        first = self.passages[0]
+        way = np.linspace(first.begin, first.end, 200)
+        arcs = self.probe.arc(way)
+        return [float(way[np.argmax(arcs > 0.85 * arcs.max())]), float(self.probe.times[0] + self.probe.times[-1]) / 2]
+
+
+@dataclass(frozen=True)
+class Track:
+    """All probes of one motion, one stretch each."""
+
+    motion: Motion
+    stretches: tuple[Stretch, ...]
+
+    def at(self, time: float) -> Stretch:
+        """The stretch whose grid holds at a time [s]: the last that has begun."""
+        begun = [stretch for stretch in self.stretches if stretch.probe.times[0] <= time]
+        return begun[-1] if begun else self.stretches[0]
+
+    def surface(self, time: float) -> tuple[FloatArray, IntArray]:
+        """The drawn surface at a time [s]: vertices (s, 3) [m] and triangles (t, 3)."""
+        stretch = self.at(time)
+        return stretch.rest + stretch.displacement(time), stretch.faces
+
+    @property
+    def moments(self) -> list[Moment]:
+        """All solved keys."""
+        return [moment for stretch in self.stretches for passage in stretch.passages for moment in passage.moments]
+
+    @property
+    def hardest(self) -> Stretch:
+        """The stretch with the strongest push."""
+        return max(self.stretches, key=lambda stretch: float(np.linalg.norm(stretch.passages[0].moments[-1].push)))
