@@ -220,7 +220,8 @@ def patch_means(values: FloatArray, patch: IntArray, patches: int, least: int = 
     for name, group in zip(names, groups, strict=True):
         centre[name] = np.median(group)
     away = np.abs(values - centre[patch])
-    scale = 1.4826 * float(np.median(away)) if len(values) else 0.0
+    crowded = np.bincount(patch, minlength=patches)[patch] > 2  # a lone point lies on its own median and says nothing of noise
+    scale = 1.4826 * float(np.median(away[crowded])) if crowded.any() else np.inf
     kept = away <= 4 * scale
     count = np.bincount(patch[kept], minlength=patches)
     total = np.bincount(patch[kept], values[kept], minlength=patches)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -65,12 +66,19 @@ def test_push_to_two_fifths_of_the_height_is_followed():
     frames = replay(SETUP, _poke(0.4 * TOP, 25), EVEN)
     require_converged(frames)
     pushes = [frame.force[2] for frame in frames]
-    assert all(later > earlier for earlier, later in zip(pushes[1:], pushes[2:], strict=False))
+    assert all(later > earlier for earlier, later in itertools.pairwise(pushes))
 
 
 def test_tool_that_jumps_between_frames_is_followed():
     centres = np.array(
-        [(0, 0, TOP + 6e-3), (0, 0, TOP + 1e-3), (5e-3, 0, TOP + 1e-3), (5e-3, 5e-3, TOP - 3e-3), (0, 0, TOP - 3e-3), (-0.01, 0, TOP + 1e-3)]
+        [
+            (0, 0, TOP + 6e-3),
+            (0, 0, TOP + 1e-3),
+            (5e-3, 0, TOP + 1e-3),
+            (5e-3, 5e-3, TOP - 3e-3),
+            (0, 0, TOP - 3e-3),
+            (-0.01, 0, TOP + 1e-3),
+        ]
     )
     frames = replay(SETUP, centres, GRADED)
     require_converged(frames)
@@ -99,7 +107,11 @@ def test_top_moves_as_on_a_finer_grid():
 
 
 def test_grid_error_falls_as_the_grid_is_refined():
-    grids = [GridSpec(nodes=(7, 5, 4), spacing=3e-3), GridSpec(nodes=(11, 9, 7), spacing=1.5e-3), GridSpec(nodes=(17, 15, 11), spacing=8e-4)]
+    grids = [
+        GridSpec(nodes=(7, 5, 4), spacing=3e-3),
+        GridSpec(nodes=(11, 9, 7), spacing=1.5e-3),
+        GridSpec(nodes=(17, 15, 11), spacing=8e-4),
+    ]
     tops = [_top(replay(SETUP, _poke(4e-3, 3), grid)[-1]) for grid in grids]
     assert _relative(tops[0], tops[2]) > 2 * _relative(tops[1], tops[2])
 
@@ -190,7 +202,9 @@ def test_sliding_base_obeys_coulomb_and_stays_where_it_slid():
 
 
 def test_rough_base_does_not_slide():
-    rough, held = (replay(replace(SETUP, support=support), SIDE, EVEN) for support in (Support(friction_coefficient=3.0), Support()))
+    rough, held = (
+        replay(replace(SETUP, support=support), SIDE, EVEN) for support in (Support(friction_coefficient=3.0), Support())
+    )
     for first, second in zip(rough, held, strict=True):
         assert not first.slip.any()
         assert np.array_equal(first.displacement, second.displacement)
@@ -222,9 +236,9 @@ def test_lifted_base_never_goes_below_the_table_and_lifts_more_the_wider_the_str
         assert base[:, 2].min() > -2e-5
         lifts.append(base[:, 2].max())
         shapes.append(_top(frame))
-    assert lifts[0] == 0 and all(later > earlier + 2e-4 for earlier, later in zip(lifts, lifts[1:], strict=False))
+    assert lifts[0] == 0 and all(later > earlier + 2e-4 for earlier, later in itertools.pairwise(lifts))
     changes = [np.linalg.norm(shape - shapes[0]) for shape in shapes]
-    assert all(later > earlier for earlier, later in zip(changes, changes[1:], strict=False))
+    assert all(later > earlier for earlier, later in itertools.pairwise(changes))
 
 
 def test_strip_of_no_width_is_nearly_a_held_base():

@@ -52,7 +52,15 @@ def test_contact_force_is_the_gradient_of_its_energy_and_pushes_back_on_the_tool
 
     def energy(at: np.ndarray) -> float:
         return contact_energy(
-            model.topology.surface, model.areas, FACE_SHAPES, FACE_GRADIENTS, at, probe.centre, probe.radius, False, CONTACT_STIFFNESS
+            model.topology.surface,
+            model.areas,
+            FACE_SHAPES,
+            FACE_GRADIENTS,
+            at,
+            probe.centre,
+            probe.radius,
+            False,
+            CONTACT_STIFFNESS,
         )
 
     direction, step = np.random.default_rng(1).normal(size=positions.shape), 1e-9

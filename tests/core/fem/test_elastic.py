@@ -137,9 +137,7 @@ def test_neo_hooke_bar_pulls_as_the_closed_form(stretch, poisson_ratio):
     def stress(across: float) -> tuple[float, float]:
         volume, square = stretch * across**2, stretch**2 + 2 * across**2
         pressure = kappa / 2 * (volume - 1 / volume)
-        along, aside = (
-            mu * volume ** (-2 / 3) * (one - square / (3 * one)) + pressure * volume / one for one in (stretch, across)
-        )
+        along, aside = (mu * volume ** (-2 / 3) * (one - square / (3 * one)) + pressure * volume / one for one in (stretch, across))
         return along, aside
 
     across = brentq(lambda value: stress(value)[1], 0.3, 2.0, xtol=1e-14)

@@ -1,0 +1,218 @@
+"""What every effect of the catalogue must keep, whoever wrote it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.effects import CATALOGUE, Effect, Slot, effect_named, from_json
+from core.effects.sensor import CameraRegistration
+from core.effects.support import BaseDetachment
+from core.effects.tool import ToolOffset
+from core.errors import EffectError
+from core.mesh import GridSpec
+from core.replay import Equilibrium, Replay, replay
+from core.sensitivity import displacement_changes
+from core.setup import Box, Load, Material, Setup, Support, Tool
+
+SETUP = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3), mass=0.104)
+GRID = GridSpec(nodes=(9, 7, 6), spacing=2e-3)
+POKE = np.array([[5e-3, 2e-3, 0.0358 + 5e-3 - depth] for depth in (1e-3, 3e-3, 5e-3)])
+
+# The vocabulary: name of each effect, and name and unit of each parameter that a report states.
+VOCABULARY = {
+    "poisson_ratio": {"nu": "1"},
+    "stiff_inclusion": {"x": "m", "y": "m", "z": "m", "radius": "m", "stiffness_ratio": "1"},
+    "gravity": {"specific_weight_over_stiffness": "1/m"},
+    "base_slip": {"friction_coefficient": "1"},
+    "base_detachment": {"edge": "", "extent": "m"},
+    "tool_radius": {"radius": "m"},
+    "tool_offset": {"dx": "m", "dy": "m", "dz": "m"},
+    "camera_registration": {"translation": "m", "rotation": "rad"},
+    "time_offset": {"offset": "s"},
+}
+
+# One finite size of each, for the tests that need a change.
+EXAMPLES: dict[str, dict[str, float | str]] = {
+    "poisson_ratio": {"nu": 0.40},
+    "stiff_inclusion": {"x": 6e-3, "y": 1e-3, "z": 0.024, "radius": 6e-3, "stiffness_ratio": 4.0},
+    "gravity": {"specific_weight_over_stiffness": 1.5},
+    "base_slip": {"friction_coefficient": 0.1},
+    "base_detachment": {"edge": "+x", "extent": 0.02},
+    "tool_radius": {"radius": 4e-3},
+    "tool_offset": {"dx": 1e-3, "dy": 0.0, "dz": -5e-4},
+    "camera_registration": {"tx": 1e-3, "ty": 0.0, "tz": -2e-3, "rx": 0.01, "ry": 0.0, "rz": -0.02},
+    "time_offset": {"offset": 0.05},
+}
+EACH = pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
+
+
+def _example(effect: type[Effect]) -> Effect:
+    return from_json({"effect": effect.name, "parameters": EXAMPLES[effect.name]})
+
+
+def _setup_as_text(setup: Setup) -> str:
+    return json.dumps(setup.as_dict(), sort_keys=True)
+
+
+@pytest.fixture(scope="module")
+def baseline() -> list[Equilibrium]:
+    """A poke without any effect."""
+    return replay(SETUP, POKE, GRID)
+
+
+def test_catalogue_speaks_the_vocabulary():
+    assert {effect.name for effect in CATALOGUE} == set(VOCABULARY)
+    assert len(CATALOGUE) == len(VOCABULARY)
+
+
+@EACH
+def test_report_states_the_parameters_by_name_and_unit(effect):
+    reported = {name: unit for name, (_, unit) in _example(effect).reported().items()}
+    assert VOCABULARY[effect.name].items() <= reported.items()
+
+
+@EACH
+def test_parameters_have_unit_bounds_and_a_scale_within_them(effect):
+    assert effect.summary and isinstance(effect.enters, Slot)
+    for item in effect.parameters():
+        if item.choices:
+            assert item.unit == ""
+            continue
+        assert item.unit
+        assert item.low < item.high and np.isfinite([item.low, item.high]).all()
+        assert 0 < item.scale < item.high - item.low
+
+
+@EACH
+def test_neutral_changes_nothing_in_a_replay(effect, baseline):
+    setup = effect.neutral(SETUP).apply(SETUP)
+    for frame, wanted in zip(replay(setup, POKE, GRID), baseline, strict=True):
+        assert np.allclose(frame.displacement, wanted.displacement, atol=1e-9)
+        assert np.allclose(frame.slip, wanted.slip) and np.allclose(frame.force, wanted.force, rtol=1e-6, atol=1e-9)
+    assert setup.sensor.time_offset == SETUP.sensor.time_offset
+    assert np.allclose(setup.sensor.camera_shift.matrix, np.eye(4))
+
+
+@EACH
+def test_example_changes_replay_or_sensor(effect):
+    side = np.array([[0.0343 + 5e-3 - depth, 0.0, 0.02] for depth in (2e-3, 6e-3)])  # slides a base
+    setup = _example(effect).apply(SETUP)
+    if effect.enters is Slot.SENSOR:
+        assert _setup_as_text(replace(setup, sensor=SETUP.sensor)) == _setup_as_text(SETUP)
+        assert _setup_as_text(setup) != _setup_as_text(SETUP)
+        return
+    way = side if effect.enters is Slot.SUPPORT else POKE
+    found, without = replay(setup, way, GRID)[-1], replay(SETUP, way, GRID)[-1]
+    point = np.array([[3e-3, 1e-3, 0.0358]])
+    assert np.linalg.norm(found.move(point) - without.move(point)) > 2e-5
+
+
+@EACH
+def test_json_gives_the_same_effect_back(effect):
+    for one in (_example(effect), effect.neutral(SETUP)):
+        assert from_json(json.loads(json.dumps(one.to_json()))) == one
+
+
+@EACH
+def test_value_out_of_bounds_is_an_error_that_names_everything(effect):
+    values = EXAMPLES[effect.name]
+    for item in effect.parameters():
+        wrong = "up" if item.choices else item.high + 1
+        with pytest.raises(EffectError) as caught:
+            from_json({"effect": effect.name, "parameters": {**values, item.name: wrong}})
+        told = [effect.name, item.name, *(item.choices or (f"{item.high + 1:g}", f"{item.low:g}", f"{item.high:g}", item.unit))]
+        assert all(part in caught.value.message for part in told), caught.value.message
+        assert caught.value.where["parameter"] == item.name and caught.value.where["value"] == wrong
+    for item in effect.numbers():
+        with pytest.raises(EffectError, match=item.name):
+            from_json({"effect": effect.name, "parameters": {**values, item.name: float("nan")}})
+
+
+@EACH
+def test_apply_leaves_the_setup_alone_and_repeats_itself(effect):
+    before = _setup_as_text(SETUP)
+    first, second = (_setup_as_text(_example(effect).apply(SETUP)) for _ in range(2))
+    assert _setup_as_text(SETUP) == before and first == second != before
+
+
+@EACH
+def test_effect_composes_with_every_other(effect):
+    for other in CATALOGUE:
+        if other is effect:
+            continue
+        both = _setup_as_text(_example(effect).apply(_example(other).apply(SETUP)))
+        turned = _setup_as_text(_example(other).apply(_example(effect).apply(SETUP)))
+        assert both == turned
+        assert both not in (_setup_as_text(_example(one).apply(SETUP)) for one in (effect, other))
+
+
+@EACH
+def test_starts_lie_within_bounds_and_change_the_setup(effect):
+    starts = effect.starts(SETUP)
+    assert starts
+    for start in starts:
+        assert from_json(start.to_json()) == start
+    if effect not in (ToolOffset, CameraRegistration):  # these are linear enough to begin at zero
+        assert all(_setup_as_text(start.apply(SETUP)) != _setup_as_text(SETUP) for start in starts)
+
+
+@EACH
+def test_moved_keeps_words_and_stays_within_bounds(effect):
+    example = _example(effect)
+    far = example.moved([item.high + 1 for item in effect.numbers()])
+    assert [getattr(far, item.name) for item in effect.numbers()] == [item.high for item in effect.numbers()]
+    assert all(getattr(far, item.name) == getattr(example, item.name) for item in effect.parameters() if item.choices)
+
+
+def test_unknown_effect_is_an_error_that_lists_the_known():
+    with pytest.raises(EffectError, match="no effect is called 'magic'.*poisson_ratio.*camera_registration"):
+        effect_named("magic")
+
+
+def _with_detachment(extent: float) -> Setup:
+    return BaseDetachment(edge="+x", extent=extent).apply(SETUP)
+
+
+def _with_lump(ratio: float = 4.0, x: float = 6e-3, radius: float = 6e-3) -> Setup:
+    return from_json(
+        {"effect": "stiff_inclusion", "parameters": {"x": x, "y": 1e-3, "z": 0.024, "radius": radius, "stiffness_ratio": ratio}}
+    ).apply(SETUP)
+
+
+CHANGES = {
+    "poisson_ratio": (SETUP, replace(SETUP, material=Material(poisson_ratio=0.4501))),
+    "stiff_inclusion ratio": (_with_lump(), _with_lump(ratio=4.004)),
+    "stiff_inclusion x": (_with_lump(), _with_lump(x=6.005e-3)),
+    "stiff_inclusion radius": (_with_lump(), _with_lump(radius=6.003e-3)),
+    "gravity": (
+        replace(SETUP, load=Load(specific_weight_over_stiffness=1.5)),
+        replace(SETUP, load=Load(specific_weight_over_stiffness=1.501)),
+    ),
+    "gravity from none": (SETUP, replace(SETUP, load=Load(specific_weight_over_stiffness=1e-3))),
+    "base_detachment": (_with_detachment(0.02), _with_detachment(0.02001)),
+    "tool_radius": (SETUP, replace(SETUP, tool=Tool(radius=5.0005e-3))),
+    "tool_offset dx": (SETUP, replace(SETUP, tool=Tool(radius=5e-3, offset=(5e-7, 0.0, 0.0)))),
+    "tool_offset dz": (SETUP, replace(SETUP, tool=Tool(radius=5e-3, offset=(0.0, 0.0, 5e-7)))),
+    "base_slip": (SETUP, replace(SETUP, support=Support(friction_coefficient=2.0))),
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_sensitivity_is_the_difference_of_two_solves(name):
+    setup, changed = CHANGES[name]
+    block, other = Replay(setup, GRID, tolerance=1e-10), Replay(changed, GRID, tolerance=1e-10)
+    frame = None
+    for centre in POKE:
+        frame = block.step(centre, frame)
+    solved = other.step(POKE[-1], frame)
+    wanted = solved.displacement - frame.displacement
+    found = displacement_changes(block, frame, [(changed, np.zeros(3))])[0]
+    if name == "base_slip":
+        assert np.abs(found).max() < 1e-9 and np.abs(wanted).max() < 1e-9
+        return
+    assert np.linalg.norm(wanted) > 1e-7
+    assert np.linalg.norm(found - wanted) < 0.02 * np.linalg.norm(wanted)
