@@ -109,4 +109,7 @@ def _removed(report: dict[str, Any]) -> str:
     removed = (report.get("gain") or {}).get("reducible_removed") or {}
     if not isinstance(removed.get("value"), (int, float)) or report.get("verdict") == "none":
         return "–"
-    return f"{100 * removed['value']:.0f} % ({100 * removed['low']:.0f} to {100 * removed['high']:.0f})"
+    text = f"{100 * removed['value']:.0f} %"
+    if not all(isinstance(removed.get(end), (int, float)) for end in ("low", "high")):
+        return text
+    return f"{text} ({100 * removed['low']:.0f} to {100 * removed['high']:.0f})"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 
@@ -34,6 +35,7 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
         app.state.desk.close()
 
     app = FastAPI(title="Palpate", lifespan=lifespan, docs_url=None, redoc_url=None)
+    app.state.ending = threading.Event()
     app.add_middleware(Guard)
     for module in (datasets, diagnoses, jobs, runs, sessions, effects):
         app.include_router(module.router, prefix="/api")

@@ -22,7 +22,7 @@ PointArray = np.ndarray[Any, np.dtype[np.float32]]
 Rgb = tuple[int, int, int]
 MARGIN = 0.008
 MOST_POINTS = 20_000
-PARTS = 4
+MOST_TRIANGLES = 25_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ class Reel:
         self.replay = replay
         self._clouds = clouds
         self._coarse: FineSurface = refine(replay["rest"], replay["faces"], 1)
-        self._fine: FineSurface = refine(replay["rest"], replay["faces"], PARTS)
+        self._fine: FineSurface = refine(replay["rest"], replay["faces"], _parts(len(replay["faces"])))
         self._edges = grid_edges(replay["rest"], replay["faces"])
         self._points = 0
         self.limit = colours.nice_limit(replay["error_raw"])
@@ -145,6 +145,11 @@ class Reel:
 
     def _tool(self, frame: int, model: str) -> Ball:
         return Ball(np.asarray(self.replay[f"tool_{model}"][frame], dtype=float), float(self.replay[f"tool_radius_{model}"]))
+
+
+def _parts(faces: int) -> int:
+    """How finely each triangle is cut for smooth bands: as many triangles as a browser draws with ease."""
+    return int(np.clip(np.sqrt(MOST_TRIANGLES / faces), 1, 10))
 
 
 def _near_box(points: FloatArray, size: FloatArray) -> Any:

@@ -45,7 +45,7 @@ def cancel(identity: str, desk: DeskOf) -> JobOut:
 
 async def _changes(request: Request, desk: Desk) -> AsyncIterator[str]:
     seen, quiet = -1, 0.0
-    while not await request.is_disconnected():
+    while not request.app.state.ending.is_set() and not await request.is_disconnected():
         version = desk.jobs.version
         if version != seen:
             jobs = await asyncio.to_thread(desk.jobs.all)

@@ -98,7 +98,14 @@ def _listed(run: Run) -> dict[str, Any]:
     try:
         return _heading(run)
     except RunError:
-        return {"id": run.name, "dataset": "?", "verdict": "unreadable", "causes": [], "created": run.path.stat().st_mtime}
+        return {
+            "id": run.name,
+            "dataset": "?",
+            "folder": None,
+            "verdict": "unreadable",
+            "causes": [],
+            "created": run.path.stat().st_mtime,
+        }
 
 
 def _heading(run: Run) -> dict[str, Any]:
@@ -106,6 +113,7 @@ def _heading(run: Run) -> dict[str, Any]:
     return {
         "id": run.name,
         "dataset": report.get("dataset", "?"),
+        "folder": Path(run.origin["dataset"]).name if "dataset" in run.origin else None,
         "verdict": report.get("verdict", "?"),
         "causes": [cause["effect"] for cause in report.get("causes", [])],
         "created": run.origin.get("created", run.path.stat().st_mtime),

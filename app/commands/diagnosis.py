@@ -79,11 +79,12 @@ def print_report(report: dict[str, Any]) -> None:
     """The verdict in one sentence, then what it rests on."""
     lines: list[Any] = [Text(verdict_sentence(report), style="bold")]
     gain = report.get("gain") or {}
-    if "baseline" in gain:
-        steps = (
-            f"{gain[key]:.3g} {gain.get('unit', 'mm')} {key.replace('_', ' ')}" for key in ("baseline", "extended", "noise_floor")
-        )
-        lines.append(Text(f"error on the {gain.get('split', 'test')} sequences: {', '.join(steps)}"))
+    steps = {key.replace("_", " "): gain.get(key) for key in ("baseline", "extended", "noise_floor")}
+    shown = ", ".join(
+        f"{value:.3g} {gain.get('unit', 'mm')} {name}" for name, value in steps.items() if isinstance(value, (int, float))
+    )
+    if shown:
+        lines.append(Text(f"error on the {gain.get('split', 'test')} sequences: {shown}"))
     for one in report.get("not_identifiable", []):
         lines.append(Text(f"not identifiable: {one['effect']}: {one.get('why', '')}", style="dim"))
     out.print(Panel(Group(*lines), expand=False))

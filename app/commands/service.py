@@ -30,3 +30,4 @@ def serve(
 def announce(address: str, path: str = "/") -> None:
     """Say where the page is."""
     out.print(f"Palpate is at [bold]{address}{path}[/]  (Ctrl-C ends it)", highlight=False)
+    out.file.flush()

@@ -1,7 +1,7 @@
 // The right panel on a dataset: what it holds, whether it is in order, and the way to its diagnosis.
 import { get } from "./api.js";
 import { element, fill } from "./dom.js";
-import { mm } from "./format.js";
+import { capital, mm } from "./format.js";
 
 export async function showDataset(name, diagnose) {
   const panel = document.getElementById("panel");
@@ -31,7 +31,7 @@ export async function showDataset(name, diagnose) {
 const fact = (label, value) => element("tr", {}, element("th", {}, label), element("td", { class: "number" }, String(value)));
 
 const notes = (title, sentences) => (sentences.length
-  ? element("section", {}, element("h2", {}, title), sentences.map((text) => element("div", { class: "note-card" }, text))) : null);
+  ? element("section", {}, element("h2", {}, title), sentences.map((text) => element("div", { class: "note-card" }, capital(text)))) : null);
 
 const broken = ({ message, where }) => element("div", { class: "note-card bad" }, element("strong", {}, "This dataset is not in order"), message,
   Object.keys(where ?? {}).length ? element("div", { class: "where" }, Object.entries(where).map(([key, value]) => `${key}: ${value}`).join("  ")) : null);

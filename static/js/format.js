@@ -1,7 +1,11 @@
 // Numbers as people read them.
 const UNITS = { m: [1e3, "mm"], Pa: [1e-3, "kPa"], s: [1e3, "ms"], rad: [180 / Math.PI, "°"], "1/m": [1, "/m"], 1: [1, ""] };
 
-export const words = (name) => name.replaceAll("_", " ");
+export const words = (name) => NAMES[name] ?? name.replaceAll("_", " ");
+
+export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+const NAMES = { poisson_ratio: "Poisson’s ratio", young_modulus: "Young’s modulus", nu: "ν", specific_weight_over_stiffness: "ρg/E" };
 
 /** Millimetres from metres: two decimals below 10 mm. */
 export function mm(metres, unit = true) {

@@ -29,10 +29,10 @@ async function refreshRuns() { runs = await get("/runs"); drawRuns(); return run
 export const newestRun = (wanted) => (runs.find(({ id }) => id === wanted) ?? runs[0])?.id ?? null;
 
 function drawRuns() {
-  fill("runs", runs.length ? runs.map(({ id, verdict, causes, created, dataset }) => element("button", {
+  fill("runs", runs.length ? runs.map(({ id, verdict, causes, created, dataset, folder }) => element("button", {
     class: "row", type: "button", "aria-current": String(id === state().run), "data-run": id, title: id, onclick: () => openRun(id),
   }, element("span", { class: "stack" }, element("span", { class: "name" }, causes.length ? causes.map(words).join(" + ") : verdict === "none" ? "nothing wrong" : verdict),
-    element("span", { class: "sub" }, `${dataset} · ${when(created)}`))))
+    element("span", { class: "sub" }, `${folder ?? dataset} · ${when(created)}`))))
     : element("p", { class: "empty" }, "None yet. Choose a dataset below and start one."));
 }
 

@@ -1,6 +1,6 @@
 // The right panel on a diagnosis: the verdict first, then cause, gain, patterns, rivals, and what cannot be told.
 import { element, fill } from "./dom.js";
-import { parameter, percent, when, words } from "./format.js";
+import { capital, parameter, percent, when, words } from "./format.js";
 import { patternSection } from "./patterns.js";
 
 const panel = () => document.getElementById("panel");
@@ -8,7 +8,7 @@ const panel = () => document.getElementById("panel");
 export function showReport(heading, report, patterns, palette) {
   const causes = report.causes ?? [];
   fill(panel(),
-    element("div", { class: "eyebrow" }, element("span", { class: `verdict-tag ${report.verdict}` }, report.verdict), `${heading.dataset} · ${when(heading.created)}`),
+    element("div", { class: "eyebrow" }, element("span", { class: `verdict-tag ${report.verdict}` }, report.verdict), `${heading.folder ?? heading.dataset} · ${when(heading.created)}`),
     element("h1", { class: "verdict" }, heading.sentence),
     causes.length ? section(causes.length > 1 ? "Causes" : "Cause", "interval", causes.map(cause)) : null,
     report.gain ? section("Error on sequences not fitted on", report.gain.unit ?? "mm", gain(report.gain)) : null,
@@ -59,7 +59,7 @@ function gain({ baseline, extended, noise_floor: floor, unit = "mm", reducible_r
       element("span", { class: "bar-value" }, `${number(value)}`)])),
     element("p", { class: "gain-note" },
       removed && typeof removed.value === "number" ? [element("b", {}, percent(removed.value)), `${range} of the error above the noise floor is gone on the ${split} sequences. `] : null,
-      paper ? `Mean distance as in the literature: ${number(paper.baseline)} → ${number(paper.extended)} ${unit}.` : null));
+      typeof paper?.baseline === "number" && typeof paper?.extended === "number" ? `Mean distance as in the literature: ${number(paper.baseline)} → ${number(paper.extended)} ${unit}.` : null));
 }
 
 function ranking(entries, named) {
@@ -79,5 +79,3 @@ function unexplained({ fraction, where, when: time }) {
 
 const blind = ({ effect, why, measure_instead: instead }) => element("div", { class: "note-card" },
   element("strong", {}, capital(words(effect))), why ? `${capital(why)}. ` : "", instead ? `Measure instead: ${instead}.` : "");
-
-const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import socket
 import threading
 import time
@@ -15,11 +16,11 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
-import uvicorn
 from scipy.spatial.transform import Rotation
 from small_dataset import SIZE, write_valid_dataset
 
 from app.main import create_app
+from app.serve import Server
 from app.settings import Settings
 from app.work import TARGETS
 from core.frames import Transform
@@ -95,10 +96,7 @@ def serve() -> Any:
 def running(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Iterator[httpx.Client]:
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
-        config = uvicorn.Config(
-            create_app(settings, targets), log_level="warning", ws_per_message_deflate=False, timeout_graceful_shutdown=2
-        )
-        server = uvicorn.Server(config)
+        server = Server(create_app(settings, targets))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
         thread.start()
         try:
@@ -106,7 +104,7 @@ def running(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Iterato
                 wait_for(lambda: server.started or not thread.is_alive())
                 yield client
         finally:
-            server.should_exit = True
+            server.handle_exit(signal.SIGINT, None)
             thread.join(timeout=20)
             assert not thread.is_alive()
 

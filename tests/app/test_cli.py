@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -10,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import httpx
 import numpy as np
 import pytest
 from broken_datasets import BREAKAGES, write_valid_dataset
@@ -139,6 +141,36 @@ def test_stopped_verb_ends_with_130_and_leaves_nothing(dataset: Path, tmp_path: 
     assert process.returncode == 130
     assert "nothing was left half done" in err
     assert not list(tmp_path.glob("*frames*"))
+
+
+def test_served_page_ends_with_ctrl_c_though_somebody_is_listening(tmp_path: Path, place: Any) -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "app.cli",
+        "serve",
+        "--port",
+        "0",
+        "--runs",
+        str(place.runs),
+        "--datasets",
+        str(place.datasets),
+    ]
+    environment = {**os.environ, "PALPATE_PRELOAD": "[]", "COLUMNS": "200"}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        try:
+            assert process.stdout is not None
+            address = re.search(r"http://127\.0\.0\.1:\d+", process.stdout.readline())
+            assert address is not None
+            with httpx.Client(base_url=address[0], timeout=30) as client, client.stream("GET", "/api/jobs/events") as events:
+                assert next(events.iter_lines()) == "data: []"
+                began = time.monotonic()
+                process.send_signal(signal.SIGINT)
+                process.wait(timeout=30)
+        finally:
+            process.kill()
+    assert process.returncode == 0
+    assert time.monotonic() - began < 15
 
 
 def test_verdict_is_compared_with_the_truth_by_name(report: dict[str, Any]) -> None:
