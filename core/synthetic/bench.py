@@ -79,7 +79,7 @@ def _bounds(scenario: Scenario) -> tuple[FloatArray, FloatArray]:
 
 
 def _grading(scenario: Scenario, probe: Probe, fine: float) -> Grading:
-    """Fine where the probe first touches, and along a drag; a lump gets elements of half its radius."""
+    """Fine where the probe first touches, and along a drag; a lump gets elements smaller than its radius."""
     low, high = _bounds(scenario)
     radius = true_radius(scenario)
     way = probe.place(np.arange(0.0, probe.corners[-1] + 1e-3, 1.0e-3)) + true_offset(scenario)
@@ -93,7 +93,7 @@ def _grading(scenario: Scenario, probe: Probe, fine: float) -> Grading:
     if lump is not None:
         points = np.concatenate([points, [[lump.value(axis) for axis in "xyz"]]])
         reach = np.append(reach, lump.value("radius"))
-        edges = np.append(edges, max(fine, 0.5 * lump.value("radius")))
+        edges = np.append(edges, max(fine, 0.7 * lump.value("radius")))
     return Grading(points, reach, edges)
 
 
@@ -174,17 +174,21 @@ class _Bench:
         return float(np.linalg.norm(state.push[:2])) - self.friction * max(self.weight - float(state.push[2]), 0.0)
 
     def _slide(self, centre: FloatArray, state: State) -> State:
-        """Move the base along the push until friction holds it: Newton on the length of the slide."""
+        """Move the base along the push until friction holds it: Newton on the length of the slide, within a bracket."""
         assert self.friction is not None
         direction = np.array([*state.push[:2], 0.0]) / np.linalg.norm(state.push[:2])
-        start, length = self.slip, 0.0
-        for _ in range(25):
+        start, length, short, long = self.slip, 0.0, 0.0, np.inf
+        for _ in range(40):
             excess = self._excess(state)
-            if abs(excess) < 5e-4 * self.friction * self.weight:
+            if abs(excess) < 1e-3 * self.friction * self.weight or (excess < 0 and long - short < 1e-6):
                 return state
+            short, long = (max(short, length), long) if excess > 0 else (short, min(long, length))
             change = state.compliance @ direction
             rate = float(change @ direction) + self.friction * float(change[2])
-            length = max(length + np.clip(excess / max(rate, 1e-3 * self.solver.modulus * self.radius), -1e-3, 1e-3), 0.0)
+            step = excess / max(rate, 1e-2 * self.solver.modulus * self.radius)
+            length += float(np.clip(step, -0.7e-3, 0.7e-3))
+            if not short < length < long:
+                length = 0.5 * (short + long) if np.isfinite(long) else short + 0.3e-3
             self.slip = start + length * direction
             state = self._elastic(centre - self.slip)
         raise SolveError(f"the base of the virtual block finds no rest after sliding {length * 1e3:.2g} mm", residual=excess)

@@ -110,7 +110,7 @@ def mesh_block(size: tuple[float, float, float], grading: Grading) -> Block:
         elements=elements,
         gradients=np.ascontiguousarray(np.transpose([part[0].grad for part in basis.basis], (2, 3, 0, 1))),
         weights=np.ascontiguousarray(basis.dx),
-        places=np.ascontiguousarray(np.transpose(basis.global_coordinates().value, (1, 2, 0))),
+        places=np.ascontiguousarray(np.transpose(np.asarray(basis.global_coordinates()), (1, 2, 0))),
         skin=_sampling(FacetBasis(mesh, element, facets=skin, intorder=4)),
         sole=_sampling(FacetBasis(mesh, element, facets=base, intorder=4)),
         surface=surface,
@@ -138,7 +138,7 @@ def _refined(size: tuple[float, float, float], grading: Grading) -> Any:
 
 
 def _sampling(basis: Any) -> Sampling:
-    values = np.array([np.broadcast_to(part[0].value, basis.dx.shape) for part in basis.basis])
+    values = np.array([np.broadcast_to(np.asarray(part[0]), basis.dx.shape) for part in basis.basis])
     return Sampling(
         owner=np.asarray(basis.tind, dtype=np.int64),
         values=np.ascontiguousarray(np.transpose(values, (1, 2, 0))),

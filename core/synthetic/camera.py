@@ -56,7 +56,7 @@ class DepthCamera:
     on_block: Any
 
     def depth(self, scene: Scene) -> tuple[FloatArray, Any]:
-        """True depth of each pixel [m], infinite for nothing, and what it sees: 0 the block, 1 the table, more the tool."""
+        """True depth of each pixel [m], infinite for nothing, and what it sees: 0 block, 1 table, more the tool, -1 nothing."""
         import open3d as o3d
 
         cast = o3d.t.geometry.RaycastingScene(nthreads=1)
@@ -65,7 +65,7 @@ class DepthCamera:
             cast.add_triangles(_tensor(into.apply(vertices).astype(np.float32)), _tensor(triangles.astype(np.uint32)))
         rays = np.concatenate([np.zeros_like(self.rays), self.rays], axis=1).astype(np.float32)
         hit = cast.cast_rays(_tensor(rays), nthreads=1)
-        return hit["t_hit"].numpy().astype(float), hit["geometry_ids"].numpy()
+        return hit["t_hit"].numpy().astype(float), hit["geometry_ids"].numpy().astype(np.int32)
 
     def cloud(self, scene: Scene, rng: np.random.Generator) -> FloatArray:
         """One raw cloud (k, 3), camera frame [m]: block, table, tool and stray points together."""

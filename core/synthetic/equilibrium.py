@@ -17,7 +17,7 @@ from core.synthetic.law import assemble_obstacle, assemble_solid, constants, sol
 
 __all__ = ["Equilibrium", "Solid", "State"]
 
-PENALTY_OVER_E = 4e4
+PENALTY_OVER_E = 4.5e4
 SOFTER = 1 / 12
 _UNUSED = (np.zeros((1, 10, 10, 3, 3)), np.zeros((1, 3)), np.zeros(3), np.zeros((1, 3, 3)), np.zeros((3, 3)))
 _NOWHERE = np.array([0.0, 0.0, 10.0])
@@ -127,6 +127,7 @@ class Equilibrium:
         self.block = block
         self.solid = solid
         self.modulus = float(np.median(solid.young_modulus))
+        self._hardest = PENALTY_OVER_E * float(np.sqrt(self.modulus * solid.young_modulus.max()))
         self._constants = self._elastic()
         free = np.full(len(block.nodes), -1, dtype=np.int64)
         self._free = np.nonzero(~solid.held)[0]
@@ -175,7 +176,7 @@ class Equilibrium:
             return self._advance(half.displacement, centre, depth + 1, half.centre)
 
     def _newton(self, displacement: FloatArray, centre: FloatArray, limit: int = 14, softness: float = 1.0) -> State:
-        self._penalty = softness * PENALTY_OVER_E * self.modulus
+        self._penalty = softness * self._hardest
         u = displacement.copy()
         energy = np.inf
         norm = np.inf

@@ -19,6 +19,7 @@ from core.frames import FloatArray
 __all__ = ["SECOND_INVARIANT_SHARE", "assemble_obstacle", "assemble_solid", "constants", "solid_energy"]
 
 SECOND_INVARIANT_SHARE = 0.1
+SOFT_GAP = 0.03e-3
 _FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 
@@ -162,6 +163,8 @@ def assemble_obstacle(  # noqa: PLR0912
 ) -> tuple[float, float]:
     """A rigid sphere, or with radius 0 the table z = 0, pressing on surface points; frictionless penalty [Pa/m].
 
+    The pressure sets in quadratically over SOFT_GAP: a kink there makes Newton jump between sets of touching points.
+
     Adds to element stiffness, nodal force, push (3,) the force on the block [N], coupling (n, 3, 3) = -d force / d centre,
     and total (3, 3) its sum, where `derivative`; returns energy [J] and deepest penetration [m].
     """
@@ -179,6 +182,7 @@ def assemble_obstacle(  # noqa: PLR0912
                 for i in range(3):
                     x[i] += value * (nodes[element[a], i] + u[element[a], i])
             n[:] = 0.0
+            distance = 1.0
             if radius > 0:
                 distance = np.sqrt((x[0] - centre[0]) ** 2 + (x[1] - centre[1]) ** 2 + (x[2] - centre[2]) ** 2)
                 gap = radius - distance
@@ -186,29 +190,35 @@ def assemble_obstacle(  # noqa: PLR0912
                     continue
                 for i in range(3):
                     n[i] = (x[i] - centre[i]) / distance
-                bend = gap / distance if gap < 0.02 * radius else 0.0
             else:
                 gap = -x[2]
                 if gap <= 0:
                     continue
                 n[2] = 1.0
-                bend = 0.0
             deepest = max(deepest, gap)
             stiff = penalty * areas[s, q]
-            energy += 0.5 * stiff * gap * gap
+            if gap < SOFT_GAP:
+                pressure = 0.5 * stiff * gap * gap / SOFT_GAP
+                energy += pressure * gap / 3
+                slope = stiff * gap / SOFT_GAP
+            else:
+                pressure = stiff * (gap - 0.5 * SOFT_GAP)
+                energy += stiff * (0.5 * gap * (gap - SOFT_GAP) + SOFT_GAP * SOFT_GAP / 6)
+                slope = stiff
             if not derivative:
                 continue
+            bend = pressure / distance if radius > 0 and gap < 0.02 * radius else 0.0
             for i in range(3):
-                push[i] += stiff * gap * n[i]
+                push[i] += pressure * n[i]
                 for k in range(3):
-                    t[i, k] = stiff * ((1 + bend) * n[i] * n[k] - (bend if i == k else 0.0))
+                    t[i, k] = (slope + bend) * n[i] * n[k] - (bend if i == k else 0.0)
                     total[i, k] += t[i, k]
             for a in range(10):
                 va = values[s, q, a]
                 if va == 0.0:
                     continue
                 for i in range(3):
-                    force[element[a], i] -= stiff * gap * n[i] * va
+                    force[element[a], i] -= pressure * n[i] * va
                     for k in range(3):
                         coupling[element[a], i, k] += va * t[i, k]
                 for b in range(a, 10):
