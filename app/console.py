@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from rich.box import SIMPLE
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -41,11 +42,11 @@ def progress(title: str) -> Iterator[Report]:
 
 
 def verdict_table(with_truth: bool, title: str | None = None) -> Table:
-    """The columns of a table of verdicts."""
-    table = Table(title=title, header_style="bold", expand=False)
-    for name in ("dataset", "verdict", "cause", "parameters"):
+    """The columns of a table of verdicts; "removed" is the share of the reducible error that naming the cause removes."""
+    table = Table(title=title, header_style="bold", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False, show_lines=False)
+    for name in ("dataset", "verdict", "cause"):
         table.add_column(name, overflow="fold")
-    table.add_column("reducible error removed", justify="right")
+    table.add_column("removed", justify="right")
     table.add_column("time", justify="right")
     if with_truth:
         table.add_column("truth", overflow="fold")
@@ -59,8 +60,7 @@ def verdict_cells(name: str, report: dict[str, Any], seconds: float, truth: dict
     cells = [
         name,
         str(report.get("verdict")),
-        "\n".join(cause["effect"] for cause in causes) or "–",
-        "\n".join(parameters_text(cause) for cause in causes) or "–",
+        _causes(causes) or "–",
         _removed(report),
         f"{seconds:.0f} s",
     ]
@@ -68,8 +68,7 @@ def verdict_cells(name: str, report: dict[str, Any], seconds: float, truth: dict
         return cells
     if truth is None:
         return [*cells, "unknown", ""]
-    hidden = "\n".join(f"{one['effect']}: {parameters_text(one)}" for one in truth["effects"]) or "none"
-    return [*cells, hidden, "[green]✓[/]" if agrees(report, truth) else "[red]✗[/]"]
+    return [*cells, _causes(truth["effects"]) or "none", "[green]✓[/]" if agrees(report, truth) else "[red]✗[/]"]
 
 
 def agrees(report: dict[str, Any], truth: dict[str, Any]) -> bool:
@@ -85,7 +84,7 @@ def print_problem(error: PalpateError, place: str = "") -> None:
 
 def parameters_text(cause: dict[str, Any]) -> str:
     """`radius 4.2 mm (4.1 to 4.3), ...` of a cause or of a hidden effect."""
-    return ", ".join(_parameter(name, entry) for name, entry in cause.get("parameters", {}).items())
+    return ", ".join(_parameters(cause))
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -96,13 +95,21 @@ def write_json(path: Path, value: Any) -> None:
     os.replace(aside, path)
 
 
+def _causes(causes: list[dict[str, Any]]) -> str:
+    return "\n".join(line for cause in causes for line in (cause["effect"], *_parameters(cause)))
+
+
+def _parameters(cause: dict[str, Any]) -> list[str]:
+    return [_parameter(name, entry) for name, entry in cause.get("parameters", {}).items()]
+
+
 def _parameter(name: str, entry: dict[str, Any]) -> str:
     unit = entry.get("unit", "1")
     text = f"{name} {quantity(entry['value'], unit)}"
     if not isinstance(entry.get("low"), (int, float)):
         return text
-    low = quantity(entry["low"], unit).split("\N{NO-BREAK SPACE}")[0]
-    return f"{text} ({low} to {quantity(entry['high'], unit)})"
+    low, high = (quantity(entry[end], unit).split("\N{NO-BREAK SPACE}")[0] for end in ("low", "high"))
+    return f"{text} ({low} to {high})"
 
 
 def _removed(report: dict[str, Any]) -> str:
@@ -112,4 +119,4 @@ def _removed(report: dict[str, Any]) -> str:
     text = f"{100 * removed['value']:.0f} %"
     if not all(isinstance(removed.get(end), (int, float)) for end in ("low", "high")):
         return text
-    return f"{text} ({100 * removed['low']:.0f} to {100 * removed['high']:.0f})"
+    return f"{text}\n({100 * removed['low']:.0f} to {100 * removed['high']:.0f})"

@@ -186,8 +186,8 @@ def test_table_of_verdicts_has_a_cell_for_every_column(report: dict[str, Any]) -
     for with_truth in (False, True):
         cells = verdict_cells("small", report, 61.2, truth if with_truth else None, with_truth)
         assert len(cells) == len(verdict_table(with_truth).columns)
-        assert "93 % (90 to 96)" in cells
-    assert "radius 7.5\N{NO-BREAK SPACE}mm (7.0 to 8.0\N{NO-BREAK SPACE}mm)" in parameters_text(report["causes"][0])
+        assert "93 %\n(90 to 96)" in cells
+    assert "radius 7.5\N{NO-BREAK SPACE}mm (7.0 to 8.0)" in parameters_text(report["causes"][0])
 
 
 def test_json_appears_whole_or_not_at_all(tmp_path: Path) -> None:
