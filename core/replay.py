@@ -106,6 +106,7 @@ class Replay:
         self.setup, self.grid, self.tolerance = setup, grid, tolerance
         self._offset = np.array(setup.tool.offset)
         self._model: BlockModel | None = None
+        self._before: tuple[Equilibrium, Equilibrium] | None = None
         self.slip = np.zeros(2)
 
     def model(self, mesh: BoxMesh) -> BlockModel:
@@ -148,8 +149,26 @@ class Replay:
             displacement = start.mesh.interpolate(start.displacement, mesh.nodes - carried)
             displacement[mesh.base_nodes] *= 0.0 if not self.setup.support.detached else 1.0
         before = Probe(start.probe.centre - np.append(start.slip, 0.0) + carried, start.probe.radius)
-        solution = self._lead(model, mesh.nodes + displacement, before, local, start.in_contact)
-        return self._equilibrium(solution, mesh, probe)
+        positions = self._extrapolated(model, start, mesh.nodes + displacement, local)
+        solution = self._lead(model, positions, before, local, start.in_contact)
+        frame = self._equilibrium(solution, mesh, probe)
+        self._before = (start, frame)
+        return frame
+
+    def _extrapolated(self, model: BlockModel, start: Equilibrium, positions: FloatArray, probe: Probe) -> FloatArray:
+        """Where the last two frames point to, if that lies lower in energy than the last frame itself."""
+        if self._before is None or self._before[1] is not start:
+            return positions
+        earlier = self._before[0]
+        if not (earlier.in_contact and earlier.mesh is start.mesh is model.mesh):
+            return positions
+        here = start.probe.centre - np.append(start.slip, 0.0)
+        last, now = here - (earlier.probe.centre - np.append(earlier.slip, 0.0)), probe.centre - here
+        if not last.any() or max(np.linalg.norm(last), np.linalg.norm(now)) > _FREE_STEP:
+            return positions
+        share = float(now @ last / (last @ last))
+        guess = positions + min(max(share, -1.0), 1.5) * (start.displacement - earlier.displacement)
+        return guess if model.energy(guess, probe) < model.energy(positions, probe) else positions
 
     def _lead(self, model: BlockModel, positions: FloatArray, before: Probe, probe: Probe, touched: bool) -> Solution:
         """Go from one tool position to the next in steps short enough for Newton's method."""
@@ -200,7 +219,7 @@ class Replay:
             push = -frame.force
             pull, load = float(np.linalg.norm(push[:2])), max(weight - push[2], 0.0)
             excess = pull - friction * load
-            if excess <= 1e-3 * friction * weight or not frame.outcome is Outcome.CONVERGED:
+            if excess <= 1e-3 * friction * weight or frame.outcome is not Outcome.CONVERGED:
                 break
             stiffness = self._lateral_stiffness(frame)
             self.slip = self.slip + push[:2] / pull * min(excess / stiffness, 1e-3)
@@ -237,7 +256,7 @@ def replay(
 
     Args:
         setup: what is believed. centres: (f, 3) stated tool centres [m], phantom frame, in the order of time.
-        grid: the mesh. starts: equilibria of a similar setup at the same frames to begin from; else each begins from the one before.
+        grid: the mesh. starts: equilibria of a similar setup at the same frames to begin from; else from the frame before.
         tolerance: residual at which a frame counts as converged, over the push. report: progress.
 
     A frame without equilibrium is returned with its outcome, never raised: look at `outcome`, or call `require_converged`.
@@ -261,6 +280,7 @@ def require_converged(frames: Sequence[Equilibrium]) -> None:
     for number, frame in enumerate(frames):
         if frame.outcome is not Outcome.CONVERGED:
             raise SolveError(
-                f"frame {number}: {frame.outcome.value} (relative residual {frame.residual:.2g} after {frame.iterations} iterations)",
+                f"frame {number}: {frame.outcome.value} "
+                f"(relative residual {frame.residual:.2g} after {frame.iterations} iterations)",
                 frame=number, residual=frame.residual, outcome=frame.outcome.name,
             )  # fmt: skip

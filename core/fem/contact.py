@@ -23,7 +23,9 @@ _POINT_WEIGHTS = np.array([a * b for b in _GAUSS_WEIGHTS for a in _GAUSS_WEIGHTS
 _QUAD = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 FACE_SHAPES = np.ascontiguousarray(((1 + _POINTS[:, None] * _QUAD[None]) / 2).prod(axis=2))
 FACE_GRADIENTS = np.ascontiguousarray(
-    np.stack([_QUAD[:, 0] / 2 * (1 + _POINTS[:, 1:] * _QUAD[:, 1]) / 2, _QUAD[:, 1] / 2 * (1 + _POINTS[:, :1] * _QUAD[:, 0]) / 2], axis=2)
+    np.stack(
+        [_QUAD[:, 0] / 2 * (1 + _POINTS[:, 1:] * _QUAD[:, 1]) / 2, _QUAD[:, 1] / 2 * (1 + _POINTS[:, :1] * _QUAD[:, 0]) / 2], axis=2
+    )
 )
 
 
@@ -34,7 +36,7 @@ def face_weights(corners: FloatArray) -> FloatArray:
     return np.asarray(area * _POINT_WEIGHTS)
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _gap(positions: Any, face: Any, shapes: Any, gradients: Any, centre: Any, radius: float, flat: bool, direction: Any) -> float:
     """Signed gap of a surface point [m], negative inside the obstacle; `direction` gets the unit vector that opens the gap."""
     x, s, t = np.zeros(3), np.zeros(3), np.zeros(3)
@@ -61,7 +63,7 @@ def _gap(positions: Any, face: Any, shapes: Any, gradients: Any, centre: Any, ra
     return distance - radius  # type: ignore[no-any-return]
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _in_reach(positions: Any, face: Any, centre: Any, radius: float, flat: bool) -> bool:
     """Cheap test that spares most faces the quadrature."""
     if flat:
@@ -76,7 +78,7 @@ def _in_reach(positions: Any, face: Any, centre: Any, radius: float, flat: bool)
     return np.sqrt(nearest) < radius + np.sqrt(edge)  # type: ignore[no-any-return]
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def contact_energy(
     faces: Any, areas: Any, shapes: Any, gradients: Any, positions: Any, centre: Any, radius: float, flat: bool, stiffness: float
 ) -> float:
@@ -92,7 +94,7 @@ def contact_energy(
     return total
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def assemble_contact(
     faces: Any,
     areas: Any,
@@ -109,7 +111,7 @@ def assemble_contact(
     data: Any,
     resultant: Any,
 ) -> float:
-    """Add the penalty's gradient over E to `force` (n, 3) [m^2], its tangent to `data` [m], the push on the body to `resultant` (3,).
+    """Add the penalty's gradient over E to `force` (n, 3) [m^2], its tangent to `data` [m], the push on the body to `resultant`.
 
     `slots` (f, 12, 12) as in `assemble_elastic`; an empty `data` leaves the tangent out,
     `bending` False the part from the sphere's curvature, which is not positive. Returns the deepest penetration [m].
@@ -142,7 +144,7 @@ def assemble_contact(
     return deepest
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def turns_around(faces: Any, positions: Any, point: Any) -> float:
     """How often quadrilaterals (f, 4) wind around a point (3,): over a closed surface 1 inside and 0 outside.
 
@@ -156,11 +158,9 @@ def turns_around(faces: Any, positions: Any, point: Any) -> float:
                     arms[corner, i] = positions[faces[f, a], i] - point[i]
                 lengths[corner] = np.sqrt(arms[corner, 0] ** 2 + arms[corner, 1] ** 2 + arms[corner, 2] ** 2)
             a, b, c = arms[0], arms[1], arms[2]
-            across = (
-                a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
-            )
+            across = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
             along = lengths[0] * lengths[1] * lengths[2]
             for i in range(3):
                 along += a[i] * b[i] * lengths[2] + b[i] * c[i] * lengths[0] + c[i] * a[i] * lengths[1]
             total += 2 * np.arctan2(across, along)
-    return total / (4 * np.pi)  # type: ignore[no-any-return]
+    return total / (4 * np.pi)

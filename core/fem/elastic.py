@@ -51,7 +51,7 @@ def gauss_gradients(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.ascontiguousarray(gradients), np.ascontiguousarray(np.linalg.det(jacobian))
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _deformation(gradients: Any, positions: Any, nodes: Any, out: Any) -> None:
     out[:] = 0.0
     for a in range(8):
@@ -60,7 +60,7 @@ def _deformation(gradients: Any, positions: Any, nodes: Any, out: Any) -> None:
                 out[i, j] += positions[nodes[a], i] * gradients[a, j]
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _cofactor(f: Any, cof: Any) -> float:
     for i in range(3):
         for j in range(3):
@@ -69,7 +69,7 @@ def _cofactor(f: Any, cof: Any) -> float:
     return f[0, 0] * cof[0, 0] + f[0, 1] * cof[0, 1] + f[0, 2] * cof[0, 2]  # type: ignore[no-any-return]
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _polar(f: Any, rotation: Any) -> None:
     """The rotation nearest to f, by Higham's scaled Newton iteration."""
     rotation[:] = f
@@ -87,12 +87,12 @@ def _polar(f: Any, rotation: Any) -> None:
             break
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _dilatation(law: int, f: Any, work: Any) -> float:
     """The scalar whose element mean carries the volumetric energy; `work` gets its derivative by F. NaN when inverted."""
     if law == 0:
         det = _cofactor(f, work)
-        return det if det > 0 else np.nan  # type: ignore[no-any-return]
+        return det if det > 0 else np.nan
     if _cofactor(f, work) <= 0:
         return np.nan
     _polar(f, work)
@@ -103,7 +103,7 @@ def _dilatation(law: int, f: Any, work: Any) -> float:
     return trace
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _volumetric(law: int, theta: float) -> tuple[float, float, float]:
     """Energy density, its first and its second derivative by theta, for a volumetric stiffness of one."""
     if law == 0:
@@ -111,7 +111,7 @@ def _volumetric(law: int, theta: float) -> tuple[float, float, float]:
     return 0.5 * theta * theta, theta, 1.0
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _density(law: int, f: Any, dilatation: float, work: Any) -> float:
     """Energy density of the part at a point, over mu."""
     total = 0.0
@@ -119,14 +119,14 @@ def _density(law: int, f: Any, dilatation: float, work: Any) -> float:
         for i in range(3):
             for j in range(3):
                 total += f[i, j] * f[i, j]
-        return 0.5 * (dilatation ** (-2.0 / 3.0) * total - 3.0)
+        return 0.5 * (dilatation ** (-2.0 / 3.0) * total - 3.0)  # type: ignore[no-any-return]
     for i in range(3):
         for j in range(3):
             total += (f[i, j] - work[i, j]) ** 2
     return total
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def elastic_energy(law: int, gradients: Any, weights: Any, nodes: Any, mu: Any, bulk: Any, positions: Any) -> float:
     """Elastic energy over E [m^3]; infinite when an element is inverted at a quadrature point.
 
@@ -150,9 +150,9 @@ def elastic_energy(law: int, gradients: Any, weights: Any, nodes: Any, mu: Any, 
     return total
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _neo_hooke(f: Any, det: float, cof: Any, mu: float, pressure: float, stress: Any, tangent: Any) -> None:
-    """First Piola stress of the isochoric part and the tangent of both parts at a fixed pressure."""
+@njit(cache=True)
+def _neo_hooke(f: Any, det: float, cof: Any, mu: float, pressure: float, wanted: bool, stress: Any, tangent: Any) -> None:
+    """First Piola stress of the isochoric part and, if wanted, the tangent of both parts at a fixed pressure."""
     inv = cof / det  # F^-T
     square = 0.0
     for i in range(3):
@@ -162,27 +162,30 @@ def _neo_hooke(f: Any, det: float, cof: Any, mu: float, pressure: float, stress:
     for i in range(3):
         for j in range(3):
             stress[i, j] = scale * (f[i, j] - square / 3 * inv[i, j])
+    if not wanted:
+        return
+    crossed = scale * square / 3 - pressure * det
     for i in range(3):
         for j in range(3):
+            by_volume = pressure * det * inv[i, j] - 2.0 / 3.0 * stress[i, j]
+            by_shape = -2.0 / 3.0 * scale * inv[i, j]
             for k in range(3):
                 for m in range(3):
-                    a = -2.0 / 3.0 * (stress[i, j] * inv[k, m] + scale * inv[i, j] * f[k, m])
-                    a += (scale * square / 3 - pressure * det) * inv[i, m] * inv[k, j]
-                    a += pressure * det * inv[i, j] * inv[k, m]
-                    if i == k and j == m:
-                        a += scale
-                    tangent[i, j, k, m] = a
+                    tangent[i, j, k, m] = by_volume * inv[k, m] + by_shape * f[k, m] + crossed * inv[k, j] * inv[i, m]
+            tangent[i, j, i, j] += scale
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _corotational(f: Any, rotation: Any, mu: float, pressure: float, stress: Any, tangent: Any) -> None:
+@njit(cache=True)
+def _corotational(f: Any, rotation: Any, mu: float, pressure: float, wanted: bool, stress: Any, tangent: Any) -> None:
     """As `_neo_hooke`. dR = R [w]x with (tr S - S) w the axial vector of R^T dF - dF^T R, exact (not the usual dR = 0)."""
-    stretch = rotation.T @ f
-    inverse = np.linalg.inv((stretch[0, 0] + stretch[1, 1] + stretch[2, 2]) * np.eye(3) - stretch)
-    axial, spin = np.empty(3), np.zeros((3, 3))
     for i in range(3):
         for j in range(3):
             stress[i, j] = 2 * mu * (f[i, j] - rotation[i, j])
+    if not wanted:
+        return
+    stretch = rotation.T @ f
+    inverse = np.linalg.inv((stretch[0, 0] + stretch[1, 1] + stretch[2, 2]) * np.eye(3) - stretch)
+    axial, spin = np.empty(3), np.zeros((3, 3))
     for k in range(3):
         for m in range(3):
             # R^T dF for the unit dF at (k, m) has row vector R[k, :] in column m
@@ -199,8 +202,8 @@ def _corotational(f: Any, rotation: Any, mu: float, pressure: float, stress: Any
             tangent[k, m, k, m] += 2 * mu
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def assemble_elastic(
+@njit(cache=True)
+def assemble_elastic(  # noqa: PLR0912 (one pass over the elements)
     law: int, gradients: Any, weights: Any, nodes: Any, mu: Any, bulk: Any, positions: Any, slots: Any, force: Any, data: Any
 ) -> None:
     """Add the energy's gradient over E to `force` (n, 3) [m^2] and, if `data` is not empty, its tangent [m] to it.
@@ -210,7 +213,7 @@ def assemble_elastic(
     """
     f, stress, tangent = np.empty((8, 3, 3)), np.empty((3, 3)), np.empty((3, 3, 3, 3))
     work, dilatation, mean_gradient = np.empty((8, 3, 3)), np.empty(8), np.empty((8, 3))
-    half = np.empty((3, 8, 3, 3))
+    half = np.empty((3, 3, 24))
     matrix = np.empty((24, 24))
     wanted = data.shape[0] > 0
     for e in range(nodes.shape[0]):
@@ -231,9 +234,9 @@ def assemble_elastic(
         for q in range(8):
             w = weights[e, q]
             if law == 0:
-                _neo_hooke(f[q], dilatation[q], work[q], mu[e], pressure, stress, tangent)
+                _neo_hooke(f[q], dilatation[q], work[q], mu[e], pressure, wanted, stress, tangent)
             else:
-                _corotational(f[q], work[q], mu[e], pressure, stress, tangent)
+                _corotational(f[q], work[q], mu[e], pressure, wanted, stress, tangent)
             for a in range(8):
                 for i in range(3):
                     for j in range(3):
@@ -247,27 +250,24 @@ def assemble_elastic(
             _scatter(matrix, mean_gradient, bulk[e] * curvature / volume, slots[e], data)
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
 def _add_point(tangent: Any, gradients: Any, weight: float, half: Any, matrix: Any) -> None:
-    """Add one quadrature point's B^T A B to the upper blocks of the element's matrix."""
+    """Add one quadrature point's B^T A B to the upper blocks of the element's matrix; rows are long, for vector instructions."""
     for b in range(8):
-        for i in range(3):
-            for j in range(3):
-                for k in range(3):
-                    half[j, b, i, k] = weight * (
-                        tangent[i, j, k, 0] * gradients[b, 0]
-                        + tangent[i, j, k, 1] * gradients[b, 1]
-                        + tangent[i, j, k, 2] * gradients[b, 2]
-                    )
-    for a in range(8):
-        g0, g1, g2 = gradients[a, 0], gradients[a, 1], gradients[a, 2]
-        for b in range(a, 8):
+        g0, g1, g2 = weight * gradients[b, 0], weight * gradients[b, 1], weight * gradients[b, 2]
+        for j in range(3):
             for i in range(3):
                 for k in range(3):
-                    matrix[3 * a + i, 3 * b + k] += g0 * half[0, b, i, k] + g1 * half[1, b, i, k] + g2 * half[2, b, i, k]
+                    half[j, i, 3 * b + k] = tangent[i, j, k, 0] * g0 + tangent[i, j, k, 1] * g1 + tangent[i, j, k, 2] * g2
+    for a in range(8):
+        g0, g1, g2 = gradients[a, 0], gradients[a, 1], gradients[a, 2]
+        for i in range(3):
+            row, h0, h1, h2 = matrix[3 * a + i], half[0, i], half[1, i], half[2, i]
+            for c in range(3 * a, 24):
+                row[c] += g0 * h0[c] + g1 * h1[c] + g2 * h2[c]
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _scatter(matrix: Any, mean_gradient: Any, factor: float, slots: Any, data: Any) -> None:
     """Add the volumetric rank-one part and write the element's matrix where its entries belong."""
     for a in range(8):

@@ -28,7 +28,7 @@ class NotPositiveDefinite(Exception):
 @lru_cache(maxsize=1)
 def _pardiso() -> Any:
     """MKL's entry point; looking for the library takes most of a second, so it is done once."""
-    from pypardiso import PyPardisoSolver
+    from pypardiso import PyPardisoSolver  # noqa: PLC0415 (heavy)
 
     return PyPardisoSolver()._mkl_pardiso
 

@@ -148,7 +148,15 @@ class BlockModel:
         total += float(self.weight_force @ (positions[:, 2] - self.mesh.nodes[:, 2]))
         if probe is not None:
             total += contact_energy(
-                top.surface, self.areas, FACE_SHAPES, FACE_GRADIENTS, positions, probe.centre, probe.radius, False, CONTACT_STIFFNESS
+                top.surface,
+                self.areas,
+                FACE_SHAPES,
+                FACE_GRADIENTS,
+                positions,
+                probe.centre,
+                probe.radius,
+                False,
+                CONTACT_STIFFNESS,
             )
         if self.detached:
             moved = (positions - self.mesh.nodes)[top.base]

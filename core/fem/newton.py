@@ -71,8 +71,10 @@ def _direction(model: BlockModel, probe: Probe | None, positions: FloatArray, st
     return None
 
 
-def _search(model: BlockModel, probe: Probe | None, positions: FloatArray, step: FloatArray, slope: float, energy: float) -> tuple[FloatArray, float]:
-    """Halve the step until the energy falls as it should (Armijo); near equilibrium rounding decides, so the whole step is taken."""
+def _search(
+    model: BlockModel, probe: Probe | None, positions: FloatArray, step: FloatArray, slope: float, energy: float
+) -> tuple[FloatArray, float]:
+    """Halve the step until the energy falls as it should (Armijo), rounding allowed for; the same positions when it never does."""
     move = np.zeros_like(positions)
     move[model.topology.free] = step
     length = 1.0
@@ -89,8 +91,8 @@ def _newton(model: BlockModel, probe: Probe | None, start: FloatArray, tolerance
     positions, energy = start, model.energy(start, probe)
     if not np.isfinite(energy):
         return Solution(start, np.zeros(3), Outcome.INVERTED, 0, np.inf, 0.0)
-    residual, state, outcome = np.inf, model.assemble(start, probe), Outcome.ITERATIONS
-    for iteration in range(MAX_ITERATIONS + 1):
+    residual, state, outcome, iteration = np.inf, model.assemble(start, probe), Outcome.ITERATIONS, 0
+    for iteration in range(MAX_ITERATIONS + 1):  # noqa: B007
         residual = float(np.linalg.norm(state.residual)) / _scale(model, state)
         if residual <= tolerance:
             outcome = Outcome.CONVERGED

@@ -98,7 +98,7 @@ def test_weights_of_a_point_add_up_to_one():
 
 def test_grid_reads_from_text_and_says_what_it_expected():
     assert GridSpec.parse("25X9x9") == GridSpec(nodes=(25, 9, 9))
-    with pytest.raises(MeshError, match="reads like 13x5x5.*'13x5'"):
+    with pytest.raises(MeshError, match=r"reads like 13x5x5.*'13x5'"):
         GridSpec.parse("13x5")
     with pytest.raises(MeshError, match="2 to 400 nodes"):
         GridSpec(nodes=(1, 5, 5))

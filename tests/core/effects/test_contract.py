@@ -84,7 +84,7 @@ def test_parameters_have_unit_bounds_and_a_scale_within_them(effect):
             continue
         assert item.unit
         assert item.low < item.high and np.isfinite([item.low, item.high]).all()
-        assert 0 < item.scale < item.high - item.low
+        assert 0 < item.scale < (np.log(item.high / item.low) if item.log else item.high - item.low)
 
 
 @EACH
@@ -169,7 +169,7 @@ def test_moved_keeps_words_and_stays_within_bounds(effect):
 
 
 def test_unknown_effect_is_an_error_that_lists_the_known():
-    with pytest.raises(EffectError, match="no effect is called 'magic'.*poisson_ratio.*camera_registration"):
+    with pytest.raises(EffectError, match=r"no effect is called 'magic'.*poisson_ratio.*camera_registration"):
         effect_named("magic")
 
 

@@ -1,0 +1,31 @@
+"""`python -m benchmarks [NAME ...]` runs all benchmarks, or those named."""
+
+from __future__ import annotations
+
+import sys
+
+from rich.console import Console
+
+from benchmarks import cleaning, dataset, measurement, replay
+
+ALL = {"replay": replay.run, "measurement": measurement.run, "cleaning": cleaning.run, "dataset": dataset.run}
+
+
+def main(names: list[str]) -> int:
+    """Run benchmarks by name, print their tables; 1 when a result is wrong, 2 when a name is unknown."""
+    console, outcome = Console(), 0
+    unknown = [name for name in names if name not in ALL]
+    if unknown:
+        console.print(f"no benchmark is called {', '.join(unknown)}; known are {', '.join(ALL)}")
+        return 2
+    for name in names or ALL:
+        try:
+            console.print(*ALL[name](), sep="\n")
+        except RuntimeError as error:
+            console.print(f"[bold red]{name}[/]: {error}")
+            outcome = 1
+    return outcome
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
