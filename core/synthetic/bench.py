@@ -206,7 +206,8 @@ class _Bench:
         if np.linalg.norm(step) > 2e-3:
             self._last = State(self.solver.rest.displacement, centre, np.zeros(3), np.zeros((3, 3)), 0.0)
             return self.solver.state(centre, self._last)
-        if abs(step[2]) < 0.3 * np.linalg.norm(step) and np.any(self._last.push):
+        push = self._last.push
+        if np.any(push) and abs(step @ push) < 0.3 * np.linalg.norm(step) * np.linalg.norm(push):
             return self.solver.state(centre, self._last, self._carried(step))
         ratio = float(step @ before) / max(float(before @ before), 1e-12)
         if not (0.2 < ratio < 2.5 and np.any(self._before.push)):
