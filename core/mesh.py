@@ -91,6 +91,10 @@ class BoxMesh:
 
     axes: tuple[FloatArray, FloatArray, FloatArray]
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Only the axes travel between processes; the rest is made again when asked for."""
+        return {"axes": self.axes}
+
     @cached_property
     def shape(self) -> tuple[int, int, int]:
         """Number of nodes along x, y, z."""

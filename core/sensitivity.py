@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy.sparse as sp
 
 from core.fem.linear import NotPositiveDefinite
 from core.fem.model import BlockModel, Probe
@@ -16,10 +17,10 @@ from core.frames import FloatArray
 from core.replay import Equilibrium, Replay
 from core.setup import Setup
 
-__all__ = ["TOOL_STEP", "displacement_changes", "element_sensitivity", "factorise_at"]
+__all__ = ["TOOL_STEP", "displacement_changes", "factorise_at", "stiffness_changes"]
 
-TOOL_STEP = 2e-5
-"""Motion of the tool [m] over which residuals are differenced; contact quadrature makes shorter ones no better."""
+TOOL_STEP = 5e-7
+"""Motion of the tool [m] over which residuals are differenced: so short that no further surface point comes into touch."""
 
 
 def factorise_at(block: Replay, frame: Equilibrium) -> BlockModel | None:
@@ -67,22 +68,26 @@ def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[tu
     return result
 
 
-def element_sensitivity(block: Replay, frame: Equilibrium, observe: FloatArray) -> FloatArray:
-    """Change of some observed quantities when one element's stiffness grows by the factor e, to first order.
+def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray) -> FloatArray:
+    """Displacements that small changes of the elements' stiffness bring about, to first order.
 
     Args:
-        observe: (m, n, 3) the quantities as linear functions of the displacement.
+        log_factors: (m, elements) logarithm of new over old stiffness, on the frame's mesh.
 
     Returns:
-        (m, elements), by the adjoint: one solve per quantity, none per element.
+        (m, n, 3) [m]; cheap in m, since an element's share of the residual is its own internal force.
     """
+    result = np.zeros((len(log_factors), *frame.displacement.shape))
     model = factorise_at(block, frame) if frame.in_contact else None
     if model is None:
-        return np.zeros((len(observe), len(block.model(frame.mesh).mu)))
-    adjoint = np.zeros_like(observe)
-    adjoint[:, model.topology.free] = model.topology.factor.solve(observe[:, model.topology.free].T).T
-    forces = element_forces(model, frame.mesh.nodes + frame.displacement)
-    return -np.asarray(np.einsum("meai,eai->me", adjoint[:, model.topology.hexahedra], forces))
+        return result
+    forces = element_forces(model, frame.mesh.nodes + frame.displacement).reshape(len(model.mu), -1)
+    unknown = model.topology.unknown[model.topology.hexahedra].reshape(len(model.mu), -1)
+    used = unknown >= 0
+    count = int(model.topology.unknown.max()) + 1
+    gather = sp.csr_matrix((forces[used], (unknown[used], np.nonzero(used)[0])), shape=(count, len(model.mu)))
+    result[:, model.topology.free] = -model.topology.factor.solve(gather @ log_factors.T).T
+    return result
 
 
 def element_forces(model: BlockModel, positions: FloatArray) -> FloatArray:

@@ -111,6 +111,7 @@ class Setup:
 
     Attributes:
         mass: of the phantom [kg].
+        landmarks: (x, y, z) [m] of the points whose touches gave phantom_from_robot; they sag with the block.
         phantom_from_robot, phantom_from_camera: the stated registrations.
     """
 
@@ -121,6 +122,7 @@ class Setup:
     support: Support = field(default_factory=Support)
     sensor: Sensor = field(default_factory=Sensor)
     mass: float = 0.1
+    landmarks: tuple[tuple[float, float, float], ...] = ()
     phantom_from_robot: Transform = field(default_factory=Transform)
     phantom_from_camera: Transform = field(default_factory=Transform)
 

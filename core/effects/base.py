@@ -33,7 +33,8 @@ class Parameter:
 
     Attributes:
         name, unit: as in effects.md, SI. low, high: bounds. scale: a step that matters, for trust regions and differences.
-        choices: allowed words, for a parameter that is not a number.
+        choices: allowed words, for a parameter that is not a number. log: whether it is searched by its logarithm; then
+            `scale` is a step of the logarithm.
     """
 
     name: str
@@ -42,11 +43,22 @@ class Parameter:
     high: float = math.inf
     scale: float = 1.0
     choices: tuple[str, ...] = ()
+    log: bool = False
+
+    def coordinate(self, value: float) -> float:
+        """What a search moves instead of the value."""
+        return math.log(value) if self.log else value
+
+    def value(self, coordinate: float) -> float:
+        """The inverse of `coordinate`, brought back into the bounds."""
+        return min(max(math.exp(min(coordinate, 700.0)) if self.log else coordinate, self.low), self.high)
 
 
-def parameter(unit: str, *, low: float = 0.0, high: float = 0.0, scale: float = 1.0, choices: tuple[str, ...] = ()) -> Any:
+def parameter(
+    unit: str, *, low: float = 0.0, high: float = 0.0, scale: float = 1.0, choices: tuple[str, ...] = (), log: bool = False
+) -> Any:
     """A dataclass field that carries a Parameter."""
-    return dataclasses.field(metadata={"unit": unit, "low": low, "high": high, "scale": scale, "choices": choices})
+    return dataclasses.field(metadata={"unit": unit, "low": low, "high": high, "scale": scale, "choices": choices, "log": log})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,6 +119,15 @@ class Effect(ABC):
         """The same effect with other numbers, brought back into their bounds."""
         pairs = zip(self.numbers(), values, strict=True)
         return dataclasses.replace(self, **{item.name: min(max(float(v), item.low), item.high) for item, v in pairs})
+
+    @property
+    def coordinates(self) -> list[float]:
+        """Where a search stands: the numbers, or their logarithms."""
+        return [item.coordinate(getattr(self, item.name)) for item in self.numbers()]
+
+    def at(self, coordinates: Sequence[float]) -> Self:
+        """The same effect at other search coordinates, brought back into the bounds."""
+        return self.moved([item.value(float(c)) for item, c in zip(self.numbers(), coordinates, strict=True)])
 
     def to_json(self) -> dict[str, Any]:
         """Plain values from which `core.effects.from_json` makes the same effect."""

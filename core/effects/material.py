@@ -41,8 +41,8 @@ class StiffInclusion(Effect):
     x: float = parameter("m", low=-0.5, high=0.5, scale=3e-3)
     y: float = parameter("m", low=-0.5, high=0.5, scale=3e-3)
     z: float = parameter("m", low=0.0, high=0.5, scale=3e-3)
-    radius: float = parameter("m", low=2e-3, high=2e-2, scale=2e-3)
-    stiffness_ratio: float = parameter("1", low=0.02, high=50.0, scale=2.0)
+    radius: float = parameter("m", low=2e-3, high=2e-2, scale=0.25, log=True)
+    stiffness_ratio: float = parameter("1", low=0.02, high=50.0, scale=0.5, log=True)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

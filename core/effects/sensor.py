@@ -21,7 +21,7 @@ class TimeOffset(Effect):
 
     name, enters = "time_offset", Slot.SENSOR
     summary = "the camera's clock and the robot's differ"
-    offset: float = parameter("s", low=-1.0, high=1.0, scale=0.02)
+    offset: float = parameter("s", low=-1.0, high=1.0, scale=0.05)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

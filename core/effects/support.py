@@ -20,7 +20,7 @@ class BaseSlip(Effect):
 
     name, enters = "base_slip", Slot.SUPPORT
     summary = "the base slides on the table"
-    friction_coefficient: float = parameter("1", low=0.01, high=3.0, scale=0.05)
+    friction_coefficient: float = parameter("1", low=0.01, high=3.0, scale=0.2, log=True)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

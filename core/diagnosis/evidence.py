@@ -1,0 +1,93 @@
+"""Gaussian evidence from quadratic forms: once a sequence is linearised, a few small matrices hold all it can say.
+
+Residuals and columns of one block of data (a sequence, or the rest cloud) are whitened, and each patch's own constant is
+projected out (the camera's fixed pattern). What remains is the Gram matrix of [residual, columns]; fits, predictive densities of
+left-out blocks and draws under the null hypothesis all come from sums of such matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.frames import FloatArray
+
+__all__ = ["Block", "Fit", "fit", "gram", "log_evidence", "predictive_gain", "predictive_score"]
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """One block of data: `gram` (1 + k, 1 + k) of the whitened residual and its k columns; `values` counts independent values."""
+
+    name: str
+    gram: FloatArray
+    values: float
+
+
+def gram(residual: FloatArray, columns: FloatArray, weights: FloatArray) -> tuple[FloatArray, float]:
+    """Gram matrix of residual and columns with each patch's weighted mean over the groups taken out.
+
+    Args:
+        residual: (g, p) [m]. columns: (g, p, k). weights: (g, p) inverse variances [1/m^2], zero where unseen.
+
+    Returns:
+        (1 + k, 1 + k) matrix, and the number of values less the constants taken out.
+    """
+    stacked = np.concatenate([np.where(weights > 0, residual, 0.0)[..., None], columns], axis=2)
+    total = weights.sum(axis=0)
+    mean = np.einsum("gp,gpk->pk", weights, stacked) / np.maximum(total, 1e-300)[:, None]
+    centred = (stacked - mean) * np.sqrt(weights)[..., None]
+    flat = centred.reshape(-1, centred.shape[2])
+    return np.asarray(flat.T @ flat), float((weights > 0).sum() - (total > 0).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Most probable change (k,) of the columns' factors, their covariance (k, k), and the misfit that is left."""
+
+    change: FloatArray
+    covariance: FloatArray
+    misfit: float
+
+
+def _parts(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[float, FloatArray, FloatArray]:
+    total = np.sum([block.gram for block in blocks], axis=0)
+    index = np.asarray(columns, dtype=int) + 1
+    return float(total[0, 0]), total[index, 0], total[np.ix_(index, index)]
+
+
+def fit(blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray, offset: FloatArray | None = None) -> Fit:
+    """Least squares with Gaussian priors.
+
+    Args:
+        columns: which to use. precision: (k, k) of their priors. offset: (k,) prior mean of the change; zero without it.
+    """
+    square, right, matrix = _parts(blocks, columns)
+    mean = np.zeros(len(right)) if offset is None else offset
+    covariance = np.linalg.inv(matrix + precision)
+    change = covariance @ (precision @ mean - right)
+    misfit = square + 2 * right @ change + change @ matrix @ change
+    return Fit(change, covariance, float(misfit))
+
+
+def log_evidence(blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray) -> float:
+    """Log density of the blocks' residuals with the columns' factors integrated out, up to a constant of the data [nats]."""
+    square, right, matrix = _parts(blocks, columns)
+    full = matrix + precision
+    explained = right @ np.linalg.solve(full, right)
+    occam = np.linalg.slogdet(full)[1] - np.linalg.slogdet(precision)[1]
+    return float(-0.5 * (square - explained) - 0.5 * occam)
+
+
+def predictive_score(blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray) -> FloatArray:
+    """Log predictive density (b,) of each block given all the others [nats]."""
+    whole = log_evidence(blocks, columns, precision)
+    return np.array([whole - log_evidence([*blocks[:i], *blocks[i + 1 :]], columns, precision) for i in range(len(blocks))])
+
+
+def predictive_gain(score: FloatArray, baseline: FloatArray) -> tuple[float, float]:
+    """Total gain [nats] and its standard error from the blocks' paired differences."""
+    difference = score - baseline
+    return float(difference.sum()), float(difference.std(ddof=1) * np.sqrt(len(difference)))

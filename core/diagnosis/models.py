@@ -1,0 +1,329 @@
+"""Hypotheses: the stated setup with some causes in it, evaluated on the data and refitted by Gauss-Newton."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from core.diagnosis.evidence import Block, fit, log_evidence, predictive_score
+from core.diagnosis.noise import Noise, noises
+from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted
+from core.diagnosis.static import StaticChannel
+from core.diagnosis.workers import Workers
+from core.effects import Effect
+from core.effects.material import PoissonRatio
+from core.effects.sensor import CameraRegistration, TimeOffset
+from core.effects.support import BaseSlip
+from core.effects.tool import ToolRadius
+from core.frames import FloatArray
+from core.measurement import Surface
+from core.mesh import GridSpec
+from core.progress import Report, silent
+from core.registration import Registration
+from core.setup import Inclusion, Setup
+
+__all__ = ["Bench", "Model", "Nuisances"]
+
+PRIOR_STEPS = 4.0
+"""Prior standard deviation of a search coordinate, in its scales."""
+_SMALL = 1e-3
+_SLIDING_STEP = 0.05
+_TRUST = 2.5
+_ITERATIONS = 4
+TIP = 1e-4
+RADIUS = 1e-4
+NU = 0.01
+CAMERA = np.array([1e-4] * 3 + [2e-3] * 3)
+"""Accuracies that are no finding: tool tip and radius [m], Poisson's ratio [1], camera beyond its covariance [m, rad]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Nuisances:
+    """What is known only to its stated accuracy: prior precision (n, n) of the columns every model has."""
+
+    precision: FloatArray
+
+    @classmethod
+    def of(cls, registration: Registration) -> Nuisances:
+        robot = registration.robot_covariance.copy()
+        robot[:3, :3] += TIP**2 * np.eye(3)
+        camera = registration.camera_covariance + np.diag(CAMERA**2)
+        precision = np.zeros((15, 15))
+        precision[:6, :6] = np.linalg.inv(robot)
+        precision[6, 6], precision[7, 7] = RADIUS**-2, NU**-2
+        precision[8:14, 8:14] = np.linalg.inv(camera)
+        precision[14, 14] = 1.0
+        return cls(precision)
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """One hypothesis on the data.
+
+    Attributes:
+        effects: its causes. setup: the stated setup with them. predictions: per sequence. blocks: quadratic forms.
+        columns: index of the column of each search coordinate of each effect, in order.
+        extra: further columns by name. nuisance: columns of the nuisances.
+    """
+
+    effects: tuple[Effect, ...]
+    setup: Setup
+    predictions: tuple[Prediction, ...]
+    blocks: tuple[Block, ...]
+    columns: tuple[int, ...]
+    extra: dict[str, tuple[int, ...]]
+    nuisance: tuple[int, ...]
+
+    @property
+    def scales(self) -> FloatArray:
+        """Step that matters of each search coordinate."""
+        return np.array([item.scale for effect in self.effects for item in effect.numbers()])
+
+    @property
+    def coordinates(self) -> FloatArray:
+        """Search coordinates of all effects."""
+        return np.array([value for effect in self.effects for value in effect.coordinates])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effects' names."""
+        return tuple(effect.name for effect in self.effects)
+
+
+class Bench:
+    """Evaluates hypotheses about one dataset: stated setup, workers, noise and priors in one place."""
+
+    def __init__(
+        self,
+        setup: Setup,
+        registration: Registration,
+        workers: Workers,
+        names: Sequence[str],
+        static: StaticChannel | None,
+        grid: GridSpec,
+        fine: GridSpec,
+        report: Report = silent,
+    ) -> None:
+        self.setup, self.registration, self.workers, self.static = setup, registration, workers, static
+        self.names, self.report = tuple(names), report
+        self.grid, self.fine = grid, fine
+        self.nuisances = Nuisances.of(registration)
+        self.surface = Surface(setup.geometry)
+        self.temperature = 1.0
+        self._noises: list[Noise] = []
+        self._support = static.support(setup, grid) if static else np.zeros(0)
+        self.evaluations = 0
+
+    # -- evaluation -------------------------------------------------------------------------------------------------------------
+
+    def _moved(self, effects: Sequence[Effect], index: int, number: int) -> tuple[Setup, float]:
+        """The setup with one search coordinate a little larger, and the step."""
+        effect = effects[index]
+        item = effect.numbers()[number]
+        coordinates = effect.coordinates
+        step = _SMALL * item.scale
+        if item.coordinate(item.high) - coordinates[number] < step:
+            step = -step
+        coordinates[number] += step
+        return self._apply([*effects[:index], effect.at(coordinates), *effects[index + 1 :]]), step
+
+    def _apply(self, effects: Sequence[Effect]) -> Setup:
+        setup = self.setup
+        for effect in effects:
+            setup = effect.apply(setup)
+        return setup
+
+    def _nuisance_setups(self, setup: Setup) -> list[tuple[Setup, float]]:
+        """A slightly larger tool, a slightly other Poisson ratio, and the camera moved and turned."""
+        step = _SMALL * 3e-4
+        found: list[tuple[Setup, float]] = [(ToolRadius(radius=setup.tool.radius + step).apply(setup), step)]
+        nu = setup.material.poisson_ratio
+        change = -2e-4 if nu > 0.494 else 2e-4
+        found.append((PoissonRatio(nu=nu + change).apply(setup), change))
+        camera = CameraRegistration.neutral(setup)
+        for number, item in enumerate(camera.numbers()):
+            values = [0.0] * 6
+            values[number] = _SMALL * item.scale
+            found.append((camera.moved(values).apply(setup), values[number]))
+        return found
+
+    def _wanted(self, effects: Sequence[Effect], setup: Setup, extras: Sequence[Effect], lumps: Sequence[Inclusion]) -> Wanted:
+        pairs = self._nuisance_setups(setup)
+        for index, effect in enumerate(effects):
+            for number in range(len(effect.numbers())):
+                pairs.append((setup, 1.0) if isinstance(effect, BaseSlip) else self._moved(effects, index, number))
+        for extra in extras:
+            for number, item in enumerate(extra.numbers()):
+                coordinates = extra.coordinates
+                coordinates[number] += _SMALL * item.scale
+                pairs.append((extra.at(coordinates).apply(setup), _SMALL * item.scale))
+        return Wanted(
+            setups=tuple(s for s, _ in pairs), steps=tuple(h for _, h in pairs), lumps=tuple(lumps),
+            pivot=self.registration.robot_pivot,
+        )  # fmt: skip
+
+    def predict(
+        self, effects: Sequence[Effect], wanted: Wanted | None, starts: Sequence[Prediction] | None, grid: GridSpec | None = None
+    ) -> list[Future[Prediction]]:
+        """Begin the replays of all sequences with these effects."""
+        self.evaluations += 1
+        return self.workers.submit(self.names, self._apply(effects), grid or self.grid, wanted, starts)
+
+    def evaluate(
+        self,
+        effects: Sequence[Effect],
+        starts: Sequence[Prediction] | None = None,
+        extras: Sequence[Effect] = (),
+        lumps: Sequence[Inclusion] = (),
+    ) -> Model:
+        """The hypothesis with these effects; `extras` are effects at their present value whose columns are wanted too."""
+        setup = self._apply(effects)
+        predictions = [f.result() for f in self.predict(effects, self._wanted(effects, setup, extras, lumps), starts)]
+        predictions = self._sliding_columns(effects, predictions)
+        return self.assemble(tuple(effects), setup, predictions, extras, len(lumps))
+
+    def _sliding_columns(self, effects: Sequence[Effect], predictions: list[Prediction]) -> list[Prediction]:
+        """Friction's columns by a second replay: where a base slid depends on all pushes before."""
+        column = TOOL_COLUMNS + 8
+        for index, effect in enumerate(effects):
+            if isinstance(effect, BaseSlip):
+                rougher = effect.at([effect.coordinates[0] + _SLIDING_STEP])
+                others = [f.result() for f in self.predict([*effects[:index], rougher, *effects[index + 1 :]], None, predictions)]
+                for number, (here, there) in enumerate(zip(predictions, others, strict=True)):
+                    columns = here.columns.copy()
+                    columns[..., column] = np.nan_to_num((there.gap - here.gap) / _SLIDING_STEP)
+                    predictions[number] = replace(here, columns=columns)
+            column += len(effect.numbers())
+        return predictions
+
+    def assemble(
+        self, effects: tuple[Effect, ...], setup: Setup, predictions: Sequence[Prediction], extras: Sequence[Effect], lumps: int
+    ) -> Model:
+        """Quadratic forms and the meaning of their columns."""
+        count = predictions[0].columns.shape[2]
+        at = TOOL_COLUMNS + 8
+        own = sum(len(effect.numbers()) for effect in effects)
+        columns, at = tuple(range(at, at + own)), at + own
+        extra: dict[str, tuple[int, ...]] = {}
+        for item in extras:
+            extra[item.name], at = tuple(range(at, at + len(item.numbers()))), at + len(item.numbers())
+        extra["lumps"] = tuple(range(at, at + lumps))
+        nuisance = (*range(TOOL_COLUMNS + 8), count)
+        if not self._noises:
+            return Model(effects, setup, tuple(predictions), (), columns, extra, nuisance)
+        blocks = [noise.block(item) for noise, item in zip(self._noises, predictions, strict=True)]
+        if self.static:
+            blocks.append(self.static.block(setup, self.grid, count + 1, self._own_static(effects, columns), self._support))
+        return Model(effects, setup, tuple(predictions), tuple(blocks), columns, extra, nuisance)
+
+    def _own_static(self, effects: tuple[Effect, ...], columns: tuple[int, ...]) -> dict[int, tuple[Setup, float]]:
+        """Columns of the effects that change the rest shape, with the setup a little changed and the step."""
+        varied, at = {}, 0
+        for index, effect in enumerate(effects):
+            for number in range(len(effect.numbers())):
+                if effect.enters.value == "load":
+                    varied[columns[at]] = self._moved(effects, index, number)
+                at += 1
+        return varied
+
+    # -- baseline and noise -----------------------------------------------------------------------------------------------------
+
+    def baseline(self, lumps: Sequence[Inclusion]) -> Model:
+        """The stated setup on two meshes; from here on the noise is known."""
+        time = [TimeOffset.neutral(self.setup)]
+        model = self.evaluate((), extras=time, lumps=lumps)
+        fine = [f.result() for f in self.predict((), None, model.predictions, self.fine)]
+        places = model.extra["lumps"]
+        self._noises = noises(model.predictions, fine, self.surface, slice(places[0], places[-1] + 1))
+        model = self.assemble((), self.setup, model.predictions, time, len(lumps))
+        self.temperature = self.misfit(model)
+        return model
+
+    def block_with(self, model: Model, signatures: Sequence[tuple[Effect, Sequence[Prediction]]], origin: Model) -> Model:
+        """The model with finite-size signatures as further columns before the last.
+
+        Args:
+            signatures: effects of a finite size and their predictions, whose difference from `origin` is the column.
+        """
+        blocks, count = [], model.predictions[0].columns.shape[2]
+        for number, noise in enumerate(self._noises):
+            here, zero = model.predictions[number], origin.predictions[number]
+            added = [np.nan_to_num(other[number].gap - zero.gap)[..., None] for _, other in signatures]
+            blocks.append(noise.block(replace(here, columns=np.concatenate([here.columns, *added], axis=2))))
+        places = tuple(range(count, count + len(signatures)))
+        if self.static:
+            varied = {
+                place: (effect.apply(model.setup), 1.0)
+                for place, (effect, _) in zip(places, signatures, strict=True)
+                if effect.enters.value == "load"
+            }
+            varied |= self._own_static(model.effects, model.columns)
+            blocks.append(self.static.block(model.setup, self.grid, count + len(signatures) + 1, varied, self._support))
+        nuisance = (*model.nuisance[:-1], count + len(signatures))
+        return replace(model, blocks=tuple(blocks), nuisance=nuisance, extra={**model.extra, "signatures": places})
+
+    # -- scores -----------------------------------------------------------------------------------------------------------------
+
+    def precision(self, model: Model) -> FloatArray:
+        """Prior precision of nuisances and search coordinates."""
+        size = len(model.nuisance) + len(model.columns)
+        precision = np.zeros((size, size))
+        precision[: len(model.nuisance), : len(model.nuisance)] = self.nuisances.precision
+        own = np.arange(len(model.nuisance), size)
+        precision[own, own] = (PRIOR_STEPS * model.scales) ** -2 if len(own) else 0
+        return precision
+
+    def tempered(self, model: Model) -> list[Block]:
+        """Blocks divided by the misfit per value that the present best model leaves."""
+        return [
+            Block(block.name, block.gram / (self.temperature if block.name != "rest" else 1.0), block.values)
+            for block in model.blocks
+        ]
+
+    def misfit(self, model: Model) -> float:
+        """Misfit per value with nuisances at their best; one when only noise is left."""
+        blocks = [block for block in model.blocks if block.name != "rest"]
+        best = fit(blocks, [*model.nuisance, *model.columns], self.precision(model))
+        return best.misfit / sum(block.values for block in blocks)
+
+    def score(self, model: Model) -> FloatArray:
+        """Log predictive density of each block given the others [nats]."""
+        return predictive_score(self.tempered(model), [*model.nuisance, *model.columns], self.precision(model))
+
+    def objective(self, model: Model) -> float:
+        """Log evidence at these values of the search coordinates [nats]."""
+        return log_evidence(self.tempered(model), model.nuisance, self.nuisances.precision)
+
+    def refit(self, effects: Sequence[Effect], starts: Sequence[Prediction] | None) -> Model:
+        """Gauss-Newton with a trust region from these values; returns the best model met."""
+        self.report(0.0, f"fitting {' and '.join(effect.name for effect in effects)}")
+        model = self.evaluate(effects, starts)
+        best, radius = self.objective(model), _TRUST
+        for _ in range(_ITERATIONS):
+            solution = fit(self.tempered(model), [*model.nuisance, *model.columns], self.precision(model))
+            change = solution.change[len(model.nuisance) :]
+            if np.abs(change / model.scales).max() < 0.05:
+                break
+            step = change * min(1.0, radius / np.abs(change / model.scales).max())
+            trial = self.evaluate(self._shift(model, step), model.predictions)
+            value = self.objective(trial)
+            if value > best:
+                gained, model, best = value - best, trial, value
+                if gained < 1.0:
+                    break
+            else:
+                radius = 0.3 * np.abs(step / model.scales).max()
+                if radius < 0.1:
+                    break
+        return model
+
+    def _shift(self, model: Model, step: FloatArray) -> list[Effect]:
+        effects, at = [], 0
+        for effect in model.effects:
+            number = len(effect.numbers())
+            effects.append(effect.at(np.array(effect.coordinates) + step[at : at + number]))
+            at += number
+        return effects

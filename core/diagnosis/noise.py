@@ -1,0 +1,102 @@
+"""What residuals look like when nothing is wrong: the sensor's noise, the mesh's error, and the engine's own accuracy.
+
+A cause may only be named for what none of these explains. The engine's accuracy is stated as two random fields, drawn anew for
+each sequence: displacements are right to a few percent, and so is the stiffness of any part of the block (a coarse contact
+zone acts like a stiffer one, another law at large strain like a softer one). Without them, an unsuspicious block is given lumps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.diagnosis.evidence import Block, gram
+from core.diagnosis.prediction import Prediction
+from core.frames import FloatArray
+from core.measurement import Surface
+
+__all__ = ["DISPLACEMENT_ERROR", "STIFFNESS_ERROR", "Noise", "noises", "patch_variance"]
+
+DISPLACEMENT_ERROR = 0.03
+"""Standard deviation of the engine's relative error of displacement, smooth over FIELD_LENGTH along the surface [1]."""
+STIFFNESS_ERROR = 0.12
+"""Standard deviation of the logarithm of local stiffness that stands for discretisation and law [1]."""
+FIELD_LENGTH = 8e-3
+_WHITE_FLOOR = 2e-5
+
+
+def patch_variance(predictions: Sequence[Prediction]) -> FloatArray:
+    """Variance (p,) [m^2] of single points about their patch's mean, pooled over all groups; scattered patches get the median."""
+    freedom = np.sum([np.maximum(item.count - 1, 0).sum(axis=0) for item in predictions], axis=0)
+    squares = np.sum([np.nansum(item.spread**2 * np.maximum(item.count - 1, 0), axis=0) for item in predictions], axis=0)
+    enough = freedom > 50
+    variance = np.where(enough, squares / np.maximum(freedom, 1), np.nan)
+    typical = float(np.nanmedian(variance)) if enough.any() else float(squares.sum() / max(freedom.sum(), 1))
+    return np.where(enough, variance, typical)
+
+
+def _smooth_basis(centres: FloatArray) -> FloatArray:
+    """Normalised Gaussian bumps (p, b) about every FIELD_LENGTH along the surface; their squares add up to one."""
+    chosen = [0]
+    nearest = np.linalg.norm(centres - centres[0], axis=1)
+    while nearest.max() > FIELD_LENGTH:
+        chosen.append(int(nearest.argmax()))
+        nearest = np.minimum(nearest, np.linalg.norm(centres - centres[chosen[-1]], axis=1))
+    bumps = np.exp(-0.5 * (np.linalg.norm(centres[:, None] - centres[chosen], axis=2) / (0.8 * FIELD_LENGTH)) ** 2)
+    return np.asarray(bumps / np.linalg.norm(bumps, axis=1, keepdims=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """The noise of one sequence under the baseline; the same weights serve every model, so that scores compare.
+
+    Attributes:
+        weights: (g, p) inverse variances [1/m^2]. residual: (g, p) of the baseline [m], zero where unseen.
+        mesh: (g, p) fine minus default mesh [m]. discrepancy: (g, p, d) columns of the engine's own error, unit variance.
+    """
+
+    weights: FloatArray
+    residual: FloatArray
+    mesh: FloatArray
+    discrepancy: FloatArray
+
+    @classmethod
+    def of(cls, baseline: Prediction, fine: Prediction, surface: Surface, variance: FloatArray, lumps: slice) -> Noise:
+        """From the baseline on two meshes; `lumps` are the baseline's columns for a softer or stiffer spot."""
+        seen = np.isfinite(baseline.gap) & np.isfinite(fine.gap)
+        seen[list(set(baseline.failed) | set(fine.failed))] = False
+        mesh = np.where(seen, fine.gap - baseline.gap, 0.0)
+        scatter = variance / np.maximum(baseline.count, 1) + _WHITE_FLOOR**2 + (0.5 * mesh) ** 2
+        centres = surface.patch_centres
+        size = np.array([
+            np.linalg.norm(frame.move(centres) - centres, axis=1) if frame.in_contact else np.zeros(len(centres))
+            for frame in baseline.equilibria
+        ])  # fmt: skip
+        displacement = DISPLACEMENT_ERROR * size[..., None] * _smooth_basis(centres)
+        stiffness = STIFFNESS_ERROR * baseline.columns[..., lumps].astype(float)
+        weights = np.where(seen, 1 / scatter, 0.0)
+        return cls(weights, np.where(seen, baseline.gap, 0.0), mesh, np.concatenate([displacement, stiffness], axis=2))
+
+    def block(self, prediction: Prediction) -> Block:
+        """Quadratic form of a model's residual and columns (mesh error last), with the discrepancy integrated out.
+
+        Where a model lost sight of a patch or found no equilibrium, the baseline's residual stands: nothing is gained there.
+        """
+        usable = np.isfinite(prediction.gap) & (self.weights > 0)
+        usable[list(prediction.failed)] = False
+        residual = np.where(usable, prediction.gap, self.residual) + self.mesh
+        columns = np.where(usable[..., None], prediction.columns, 0.0)
+        stacked = np.concatenate([columns, self.mesh[..., None], self.discrepancy], axis=2)
+        matrix, values = gram(residual, stacked, self.weights)
+        kept = matrix.shape[0] - self.discrepancy.shape[2]
+        cross, inner = matrix[:kept, kept:], matrix[kept:, kept:]
+        reduced = matrix[:kept, :kept] - cross @ np.linalg.solve(inner + np.eye(len(inner)), cross.T)
+        return Block(prediction.name, reduced, values)
+
+
+def noises(baseline: Sequence[Prediction], fine: Sequence[Prediction], surface: Surface, lumps: slice) -> list[Noise]:
+    """The noise of every sequence."""
+    variance = patch_variance(baseline)
+    return [Noise.of(b, f, surface, variance, lumps) for b, f in zip(baseline, fine, strict=True)]

@@ -1,0 +1,139 @@
+"""What a sequence says, grouped: frames with the tool at nearly one place share one equilibrium and one set of patch averages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Ordered
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.cleaning import Cleaner, cleaner_for, find_shaft_axis, tool_poses
+from core.dataset import Dataset, Kinematics, Sequence
+from core.frames import FloatArray
+from core.progress import Report, silent
+from core.registration import Registration
+from core.setup import Setup
+
+__all__ = ["Group", "Observations", "clear_of", "observe", "observe_all", "smooth_centres"]
+
+CLEARANCE = 1.5e-3
+"""A tool farther than this from the stated block [m] does not touch it, whatever is slightly wrong."""
+TRAVEL = 7e-4
+"""Frames whose tool moved less than this [m] are one group."""
+SMOOTHING = 0.02
+"""Half the time [s] over which the robot's pose is averaged: streams carry noise of some hundredths of a millimetre."""
+MOST_POINTS = 20000
+FAR = np.array([0.0, 0.0, 10.0])
+"""Where the tool is said to be when there is none [m]."""
+
+
+def smooth_centres(kinematics: Kinematics, times: FloatArray) -> FloatArray:
+    """Tool centres (m, 3) [m] in the robot frame at `times` (m,) [s], averaged over a few hundredths of a second."""
+    t, x = kinematics.time, kinematics.position
+    integral = np.concatenate([np.zeros((1, 3)), np.cumsum((x[1:] + x[:-1]) / 2 * np.diff(t)[:, None], axis=0)])
+
+    def until(at: FloatArray) -> FloatArray:
+        return np.stack([np.interp(at, t, integral[:, axis]) for axis in range(3)], axis=-1)
+
+    low, high = np.clip(times - SMOOTHING, t[0], t[-1]), np.clip(times + SMOOTHING, t[0], t[-1])
+    width = (high - low)[..., None]
+    mean = (until(high) - until(low)) / np.maximum(width, 1e-9)
+    return np.where(width > 1e-6, mean, np.stack([np.interp(times, t, x[:, axis]) for axis in range(3)], axis=-1))
+
+
+def clear_of(size: tuple[float, float, float], centres: FloatArray) -> FloatArray:
+    """Distance (m,) [m] of points (m, 3) to the stated block; zero inside."""
+    low, high = np.array([-size[0] / 2, -size[1] / 2, 0.0]), np.array([size[0] / 2, size[1] / 2, size[2]])
+    return np.asarray(np.linalg.norm(centres - np.clip(centres, low, high), axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Frames that share one place of the tool.
+
+    Attributes:
+        frames: their numbers. points: (n, 3) cleaned points of all of them [m], camera frame.
+        free: whether the tool is surely clear of the block. reference: whether this is the rest cloud instead, taken when the
+            camera was registered and without a tool. probe: which push of the sequence this belongs to.
+    """
+
+    frames: tuple[int, ...]
+    points: FloatArray
+    free: bool
+    reference: bool = False
+    probe: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """One sequence as the diagnosis sees it.
+
+    Attributes:
+        times: (f,) cloud stamps [s]. kinematics: the robot's stream. groups: in the order of time.
+    """
+
+    name: str
+    times: FloatArray
+    kinematics: Kinematics
+    groups: tuple[Group, ...]
+
+    def centres(self, setup: Setup) -> FloatArray:
+        """Stated tool centre (g, 3) [m] of each group, phantom frame, under the setup's clock and registration."""
+        poses = setup.phantom_from_robot.apply(smooth_centres(self.kinematics, self.times - setup.sensor.time_offset))
+        return np.array([poses[list(g.frames)].mean(axis=0) if g.frames else FAR for g in self.groups])
+
+
+def _split(centres: FloatArray, free: np.ndarray) -> list[list[int]]:
+    """Runs of frames: all clear of the block, or within TRAVEL of the run's first."""
+    runs: list[list[int]] = []
+    for frame, centre in enumerate(centres):
+        last = runs[-1] if runs else None
+        joins = last is not None and free[last[0]] == free[frame]
+        if joins and last is not None and (free[frame] or np.linalg.norm(centre - centres[last[0]]) < TRAVEL):
+            last.append(frame)
+        else:
+            runs.append([frame])
+    return runs
+
+
+def _thin(runs: list[list[int]], free: np.ndarray, most: int) -> list[list[int]]:
+    """Keep all runs clear of the block and at most `most` of the others, evenly spread."""
+    touched = [run for run in runs if not free[run[0]]]
+    if len(touched) <= most:
+        return runs
+    kept = {id(touched[i]) for i in np.unique(np.linspace(0, len(touched) - 1, most).round().astype(int))}
+    return [run for run in runs if free[run[0]] or id(run) in kept]
+
+
+def observe(
+    sequence: Sequence, setup: Setup, cleaner: Cleaner, shaft: FloatArray | None, most: int, rest: FloatArray | None = None
+) -> Observations:
+    """Group a sequence's frames and clean their clouds; at most `most` groups with the tool near the block; `rest` is the rest cloud."""
+    kinematics, times = sequence.kinematics, np.asarray(sequence.cloud_times)
+    centres = setup.phantom_from_robot.apply(smooth_centres(kinematics, times))
+    free = clear_of(setup.geometry.size, centres) > setup.tool.radius + CLEARANCE
+    poses = tool_poses(kinematics, times, setup.phantom_from_robot, shaft)
+    groups = [Group((), rest[cleaner.clean(rest).indices], True, True)] if rest is not None else []
+    probes = np.cumsum(np.diff(free.astype(int), prepend=1) < 0)
+    runs = _thin(_split(centres, free), free, most)
+    for number, run in enumerate(runs):
+        picked = run if len(run) <= 12 else [run[i] for i in np.linspace(0, len(run) - 1, 12).round().astype(int)]
+        clouds = [sequence.cloud(frame) for frame in picked]
+        points = np.concatenate([raw[cleaner.clean(raw, poses[frame]).indices] for frame, raw in zip(picked, clouds, strict=True)])
+        if len(points) > MOST_POINTS:
+            points = points[np.random.default_rng(number).choice(len(points), MOST_POINTS, replace=False)]
+        groups.append(Group(tuple(picked), points, bool(free[run[0]]), probe=int(probes[run[0]])))
+    return Observations(sequence.name, times, kinematics, tuple(groups))
+
+
+def observe_all(
+    dataset: Dataset, names: Ordered[str], setup: Setup, registration: Registration, most: int, report: Report = silent
+) -> list[Observations]:
+    """Observations of these sequences."""
+    cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration)
+    rest = dataset.rest_cloud() if dataset.has_rest else None
+    found = []
+    for number, name in enumerate(names):
+        report(number / len(names), f"reading {name}")
+        found.append(observe(dataset.sequence(name), setup, cleaner, shaft, most, rest))
+    return found

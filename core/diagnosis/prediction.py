@@ -1,0 +1,173 @@
+"""One sequence under one setup: gaps by group and patch, and how they would change with anything that might be wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from core.diagnosis.observations import Group, Observations
+from core.fem.model import log_stiffness
+from core.fem.newton import Outcome
+from core.frames import FloatArray, Transform
+from core.measurement import Gaps, PatchMeans, Surface, gaps, patch_means
+from core.mesh import GridSpec
+from core.registration.robot import fit_robot
+from core.replay import Equilibrium, Replay, rest
+from core.sensitivity import TOOL_STEP, displacement_changes, stiffness_changes
+from core.setup import Inclusion, Setup
+
+__all__ = ["TOOL_COLUMNS", "Prediction", "Wanted", "predict", "touch_correction"]
+
+TOOL_COLUMNS = 6
+"""Columns that always come first: the tool moved along x, y, z and turned about the robot registration's pivot."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Wanted:
+    """Which changes a prediction shall state.
+
+    Attributes:
+        setups: setups that differ a little. steps: by how much, each; the column is the change over the step.
+        lumps: inclusions, whose columns are the change per unit logarithm of their stiffness ratio.
+        pivot: (3,) [m] about which the robot registration turns.
+    """
+
+    setups: tuple[Setup, ...] = ()
+    steps: tuple[float, ...] = ()
+    lumps: tuple[Inclusion, ...] = ()
+    pivot: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """One sequence under one setup.
+
+    Attributes:
+        gap: (g, p) mean of measured minus simulated [m], NaN where unseen. count: (g, p) points. spread: (g, p) [m].
+        columns: (g, p, k) change of gap: TOOL_COLUMNS, then setups, then lumps.
+        equilibria: of each group.
+    """
+
+    name: str
+    gap: FloatArray
+    count: FloatArray
+    spread: FloatArray
+    columns: FloatArray
+    equilibria: tuple[Equilibrium, ...]
+
+    @property
+    def failed(self) -> tuple[int, ...]:
+        """Groups without equilibrium."""
+        return tuple(i for i, frame in enumerate(self.equilibria) if frame.outcome is not Outcome.CONVERGED)
+
+
+def touch_correction(setup: Setup, grid: GridSpec) -> Transform:
+    """Stated to true phantom_from_robot: the touched landmarks had sagged, while the registration took them for unloaded."""
+    if not setup.load.specific_weight_over_stiffness or len(setup.landmarks) < 3:
+        return Transform()
+    landmarks = np.array(setup.landmarks)
+    return fit_robot(landmarks, rest(setup, grid).move(landmarks)).phantom_from_robot
+
+
+def _average(values: FloatArray, seen: Gaps, means: PatchMeans) -> FloatArray:
+    """Plain patch averages (p, k) of (m, k) values, zero where unseen."""
+    total = np.zeros((len(means.mean), values.shape[1]))
+    np.add.at(total, seen.patch, values)
+    points = np.bincount(seen.patch, minlength=len(means.mean))
+    return np.asarray(total / np.maximum(points, 1)[:, None])
+
+
+def _camera_changes(setup: Setup, wanted: Wanted, points: FloatArray, seen: Gaps) -> FloatArray:
+    """How the gaps change (m, s) because the setups see the same points elsewhere."""
+    here = setup.phantom_from_camera_true
+    columns = np.zeros((len(seen.gap), len(wanted.setups)))
+    for number, other in enumerate(wanted.setups):
+        if other.sensor.camera_shift is not setup.sensor.camera_shift:
+            there = other.phantom_from_camera_true @ here.inverse()
+            moved = there.apply(points[seen.index]) - points[seen.index]
+            columns[:, number] = np.einsum("mi,mi->m", moved, seen.normal)
+    return columns
+
+
+class _Columns:
+    """Changes of a group's displacement, projected on what is seen of it."""
+
+    def __init__(self, block: Replay, wanted: Wanted) -> None:
+        self.block, self.wanted = block, wanted
+
+    def displacement(self, frame: Equilibrium, moves: FloatArray) -> FloatArray:
+        """(k, n, 3) for the tool's motion, the setups and the lumps; `moves` (s, 3) are the setups' own tool motions [m]."""
+        setup, wanted = self.block.setup, self.wanted
+        steps = [(setup, TOOL_STEP * axis) for axis in np.eye(3)]
+        steps += [(other, move) for other, move in zip(wanted.setups, moves, strict=True)]
+        changed = displacement_changes(self.block, frame, steps)
+        tool = changed[:3] / TOOL_STEP
+        arm = frame.probe.centre - wanted.pivot
+        turned = [np.tensordot(np.cross(axis, arm), tool, axes=1) for axis in np.eye(3)]
+        scaled = changed[3:] / np.array(wanted.steps)[:, None, None] if wanted.steps else changed[3:]
+        corners = frame.mesh.nodes[frame.mesh.hexahedra] if wanted.lumps else np.empty((0, 8, 3))
+        factors = np.array([log_stiffness((replace(lump, stiffness_ratio=np.e),), corners) for lump in wanted.lumps])
+        lumps = stiffness_changes(self.block, frame, factors) if wanted.lumps else changed[:0]
+        return np.concatenate([tool, np.array(turned), scaled, lumps])
+
+    def project(
+        self, frame: Equilibrium, moves: FloatArray, points: FloatArray, seen: Gaps, means: PatchMeans, reference: bool
+    ) -> FloatArray:
+        """(p, k) changes of the patch averages; the reference was seen before the camera could move."""
+        fields = self.displacement(frame, moves)
+        nodes, weights = frame.mesh.locate(seen.foot)
+        values = -np.einsum("ma,kmai,mi->mk", weights, fields[:, nodes], seen.normal, optimize=True)
+        camera = _camera_changes(self.block.setup, self.wanted, points, seen)
+        if self.wanted.steps and not reference:
+            values[:, TOOL_COLUMNS : TOOL_COLUMNS + camera.shape[1]] += camera / np.array(self.wanted.steps)
+        return _average(values, seen, means)
+
+
+def _compare(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) -> tuple[FloatArray, Gaps, PatchMeans]:
+    pose = setup.phantom_from_camera if group.reference else setup.phantom_from_camera_true
+    points = pose.apply(group.points)
+    seen = gaps(points, pose.translation, frame, surface)
+    return points, seen, patch_means(seen.gap, seen.patch, surface.patches)
+
+
+def predict(
+    data: Observations,
+    setup: Setup,
+    grid: GridSpec,
+    wanted: Wanted | None = None,
+    starts: Sequence[Equilibrium] | None = None,
+    tolerance: float = 1e-4,
+    patch: float = 4e-3,
+) -> Prediction:
+    """Replay a sequence's groups and compare each with its points.
+
+    Args:
+        starts: equilibria of a similar setup, one per group, to begin from.
+        wanted: changes to state; none without it.
+    """
+    surface, block = Surface(setup.geometry, patch=patch), Replay(setup, grid, tolerance)
+    true_from_stated = touch_correction(setup, grid)
+    centres = true_from_stated.apply(data.centres(setup))
+    moves = np.zeros((len(wanted.setups) if wanted else 0, len(data.groups), 3))
+    for number, other in enumerate(wanted.setups if wanted else ()):
+        moves[number] = touch_correction(other, grid).apply(data.centres(other)) - centres
+    columns = _Columns(block, wanted) if wanted else None
+    gap, count, spread, changes, frames = [], [], [], [], []
+    previous: Equilibrium | None = None
+    for number, (group, centre) in enumerate(zip(data.groups, centres, strict=True)):
+        start = starts[number] if starts is not None and starts[number].in_contact else previous
+        frame = block.step(centre, start)
+        if frame.outcome is not Outcome.CONVERGED and start is not previous:
+            frame = block.step(centre, previous)
+        previous = frame if frame.outcome is Outcome.CONVERGED else None
+        points, seen, means = _compare(group, setup, frame, surface)
+        gap.append(means.mean)
+        count.append(means.count)
+        spread.append(means.spread)
+        frames.append(frame)
+        if columns is not None:
+            changes.append(columns.project(frame, moves[:, number], points, seen, means, group.reference).astype(np.float32))
+    stacked = np.stack(changes) if changes else np.zeros((len(gap), surface.patches, 0))
+    return Prediction(data.name, np.array(gap), np.array(count, dtype=float), np.array(spread), stacked, tuple(frames))

@@ -1,0 +1,88 @@
+"""Which causes deserve a refit, and how large a gain chance alone can give.
+
+All effects of the catalogue are columns of one linear problem: those with a derivative by their sensitivities, the others by the
+difference that a finite size makes. The gain of each is the predictive score of left-out blocks against the model without it;
+the same gains on data drawn from the noise model alone give the bound that a cause must exceed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from core.diagnosis.evidence import Block
+from core.effects import Effect
+from core.frames import FloatArray
+
+__all__ = ["Candidate", "linear_gains", "null_gains", "right_sides"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Candidate:
+    """An effect as columns: `columns` with prior standard deviations `spread`; `widened` are nuisances with a wider prior instead."""
+
+    start: Effect
+    columns: tuple[int, ...] = ()
+    spread: tuple[float, ...] = ()
+    widened: dict[int, float] = field(default_factory=dict)
+
+    def precision(self, nuisance: Sequence[int], known: FloatArray) -> tuple[list[int], FloatArray]:
+        """Columns to use and their prior precision, given those of the nuisances."""
+        covariance = np.linalg.inv(known)
+        for column, spread in self.widened.items():
+            covariance[nuisance.index(column), nuisance.index(column)] += spread**2
+        size = len(nuisance) + len(self.columns)
+        precision = np.zeros((size, size))
+        precision[: len(nuisance), : len(nuisance)] = np.linalg.inv(covariance)
+        own = np.arange(len(nuisance), size)
+        precision[own, own] = np.array(self.spread) ** -2.0
+        return [*nuisance, *self.columns], precision
+
+
+def right_sides(blocks: Sequence[Block]) -> FloatArray:
+    """The data's own right sides (1, b, k)."""
+    return np.array([[block.gram[1:, 0] for block in blocks]])
+
+
+def _values(blocks: Sequence[Block], rights: FloatArray, columns: Sequence[int], precision: FloatArray) -> FloatArray:
+    """Sum over blocks of the log predictive density (d,) less what no column changes."""
+    index = np.asarray(columns)
+    grams = np.array([block.gram[1:, 1:][np.ix_(index, index)] for block in blocks])
+    rights = rights[:, :, index]
+    prior = np.linalg.slogdet(precision)[1]
+
+    def evidence(matrix: FloatArray, right: FloatArray) -> FloatArray:
+        full = matrix + precision
+        explained = np.einsum("di,ij,dj->d", right, np.linalg.inv(full), right)
+        return np.asarray(0.5 * explained - 0.5 * (np.linalg.slogdet(full)[1] - prior))
+
+    matrix, right = grams.sum(axis=0), rights.sum(axis=1)
+    total = len(blocks) * evidence(matrix, right)
+    for number in range(len(blocks)):
+        total -= evidence(matrix - grams[number], right - rights[:, number])
+    return np.asarray(total)
+
+
+def linear_gains(
+    blocks: Sequence[Block], rights: FloatArray, nuisance: Sequence[int], known: FloatArray, candidates: Sequence[Candidate]
+) -> FloatArray:
+    """Gain (d, c) [nats] of each candidate for each set of right sides (d, b, k)."""
+    baseline = _values(blocks, rights, nuisance, known)
+    return np.stack([_values(blocks, rights, *c.precision(list(nuisance), known)) - baseline for c in candidates], axis=1)
+
+
+def null_gains(
+    blocks: Sequence[Block], nuisance: Sequence[int], known: FloatArray, candidates: Sequence[Candidate], draws: int, seed: int
+) -> FloatArray:
+    """Best-of-catalogue gains (d,) [nats] on draws from the noise model: white noise, discrepancy and nuisances, no cause."""
+    random = np.random.default_rng(seed)
+    shift = random.multivariate_normal(np.zeros(len(nuisance)), np.linalg.inv(known), size=draws)
+    rights = np.empty((draws, len(blocks), blocks[0].gram.shape[0] - 1))
+    for number, block in enumerate(blocks):
+        inner = block.gram[1:, 1:]
+        values, vectors = np.linalg.eigh(inner)
+        root = vectors * np.sqrt(np.maximum(values, 0))
+        rights[:, number] = random.standard_normal((draws, len(values))) @ root.T + shift @ inner[:, list(nuisance)].T
+    return np.asarray(linear_gains(blocks, rights, nuisance, known, candidates).max(axis=1))

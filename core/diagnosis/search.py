@@ -1,0 +1,238 @@
+"""The search for causes: screen the catalogue, refit what deserves it, accept what chance cannot give, one after another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from core.diagnosis.evidence import fit, predictive_gain
+from core.diagnosis.models import PRIOR_STEPS, Bench, Model
+from core.diagnosis.prediction import TOOL_COLUMNS, Prediction
+from core.diagnosis.screening import Candidate, linear_gains, null_gains, right_sides
+from core.effects import Effect
+from core.effects.load import Gravity
+from core.effects.material import PoissonRatio, StiffInclusion
+from core.effects.sensor import CameraRegistration, TimeOffset
+from core.effects.support import BaseDetachment, BaseSlip
+from core.effects.tool import ToolOffset, ToolRadius
+from core.setup import Inclusion
+
+__all__ = ["MOST_CAUSES", "Findings", "Trial", "lump_places", "search"]
+
+MOST_CAUSES = 2
+NULL_DRAWS = 400
+NULL_QUANTILE = 0.99
+LEAST_GAIN = 10.0
+"""No cause is named for less [nats], whatever the null says: the noise model itself is only known so well."""
+SHORTLIST = 3
+RIVAL = 8.0
+"""Rivals this close to the best [nats] are named too: the difference of two log densities that differ by d has a spread of
+about sqrt(2 d), so 8 nats are two of its standard deviations."""
+_FINITE: tuple[type[Effect], ...] = (BaseSlip, BaseDetachment, Gravity)
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A refitted model and its gain over the baseline [nats], with the misfit per value it leaves."""
+
+    model: Model
+    gain: float
+    misfit: float
+
+
+@dataclass(eq=False)
+class Findings:
+    """What the search found.
+
+    Attributes:
+        baseline: the stated setup. best: the model accepted, or None. trials: every refitted model, best first.
+        bound: least gain of a cause [nats]. misfit: of the baseline, per value. screened: linear gain by effect name.
+    """
+
+    baseline: Model
+    best: Trial | None = None
+    trials: list[Trial] = field(default_factory=list)
+    bound: float = LEAST_GAIN
+    misfit: float = 1.0
+    screened: dict[str, float] = field(default_factory=dict)
+
+    def rivals(self) -> list[Trial]:
+        """Other sets of as many causes that explain the data about as well as the best."""
+        if self.best is None:
+            return []
+        best = self.best
+        named = {best.model.names}
+        close = []
+        for trial in self.trials:
+            names = trial.model.names
+            if len(names) == len(best.model.names) and names not in named and best.gain - trial.gain < RIVAL:
+                named.add(names)
+                close.append(trial)
+        return close
+
+
+def lump_places(bench: Bench) -> tuple[Inclusion, ...]:
+    """Places of the coarse grid of inclusions."""
+    return tuple(
+        Inclusion(x=s.x, y=s.y, z=s.z, radius=s.radius, stiffness_ratio=s.stiffness_ratio) for s in StiffInclusion.starts(bench.setup)
+    )
+
+
+def _signatures(bench: Bench, baseline: Model) -> list[tuple[Effect, list[Prediction]]]:
+    """What effects without a derivative at their neutral value do at finite sizes."""
+    starts = [effect for kind in _FINITE for effect in kind.starts(bench.setup)]
+    pending = [(effect, bench.predict([effect], None, baseline.predictions)) for effect in starts]
+    found = []
+    for number, (effect, futures) in enumerate(pending):
+        bench.report(0.15 + 0.25 * number / len(pending), f"what {effect.name} would do")
+        found.append((effect, [future.result() for future in futures]))
+    return found
+
+
+def _candidates(model: Model, bench: Bench, signatures: Sequence[tuple[Effect, list[Prediction]]]) -> list[Candidate]:
+    """Every effect of the catalogue that is not in the model yet, as columns of it."""
+    setup, found = model.setup, []
+    camera = tuple(range(TOOL_COLUMNS + 2, TOOL_COLUMNS + 8))
+    widened: list[tuple[Effect, tuple[int, ...]]] = [
+        (ToolOffset.neutral(setup), (0, 1, 2)),
+        (ToolRadius.neutral(setup), (TOOL_COLUMNS,)),
+        (PoissonRatio.neutral(setup), (TOOL_COLUMNS + 1,)),
+        (CameraRegistration.neutral(setup), camera),
+    ]
+    for effect, columns in widened:
+        spreads = [PRIOR_STEPS * item.scale for item in effect.numbers()]
+        found.append(Candidate(start=effect, widened=dict(zip(columns, spreads, strict=True))))
+    if "time_offset" in model.extra:
+        time = TimeOffset.neutral(setup)
+        found.append(Candidate(start=time, columns=model.extra["time_offset"], spread=(PRIOR_STEPS * time.numbers()[0].scale,)))
+    for place, lump in zip(model.extra["lumps"], lump_places(bench), strict=True):
+        start = StiffInclusion(x=lump.x, y=lump.y, z=lump.z, radius=lump.radius, stiffness_ratio=1.0)
+        found.append(Candidate(start=start, columns=(place,), spread=(2.0,)))
+    for place, (effect, predictions) in zip(model.extra.get("signatures", ()), signatures, strict=True):
+        if any(np.any(p.columns.shape) and np.isfinite(p.gap).any() for p in predictions):
+            found.append(Candidate(start=effect, columns=(place,), spread=(1.0,)))
+    return [candidate for candidate in found if candidate.start.name not in model.names]
+
+
+def _start(candidate: Candidate, model: Model, bench: Bench) -> Effect:
+    """Where to begin the refit: for a lump, the stiffness that the linear fit asks for."""
+    if not isinstance(candidate.start, StiffInclusion):
+        return candidate.start
+    columns, precision = candidate.precision(list(model.nuisance), bench.nuisances.precision)
+    log_ratio = float(fit(bench.tempered(model), columns, precision).change[-1])
+    return replace(candidate.start, stiffness_ratio=float(np.exp(np.clip(1.5 * log_ratio, -1.8, 1.8))))
+
+
+def _shortlist(gains: np.ndarray, candidates: Sequence[Candidate], least: float) -> list[Candidate]:
+    """The best start of each promising effect, best first; two places for a lump."""
+    chosen: list[Candidate] = []
+    for number in np.argsort(-gains):
+        candidate = candidates[number]
+        taken = [c for c in chosen if c.start.name == candidate.start.name]
+        apart = all(_distance(candidate.start, other.start) > 0.015 for other in taken)
+        room = not taken or (isinstance(candidate.start, StiffInclusion) and len(taken) < 2 and apart)
+        if gains[number] > least and room and (taken or len({c.start.name for c in chosen}) < SHORTLIST):
+            chosen.append(candidate)
+    return chosen
+
+
+def _distance(one: Effect, other: Effect) -> float:
+    if isinstance(one, StiffInclusion) and isinstance(other, StiffInclusion):
+        return float(np.linalg.norm([one.x - other.x, one.y - other.y, one.z - other.z]))
+    return 0.0
+
+
+def _screen(
+    bench: Bench, model: Model, signatures: Sequence[tuple[Effect, list[Prediction]]], origin: Model
+) -> tuple[Model, list[Candidate], np.ndarray]:
+    with_columns = bench.block_with(model, signatures, origin)
+    candidates = _candidates(with_columns, bench, signatures)
+    blocks = bench.tempered(with_columns)
+    nuisance = (*with_columns.nuisance, *with_columns.columns)
+    gains = linear_gains(blocks, right_sides(blocks), nuisance, bench.precision(with_columns), candidates)[0]
+    return with_columns, candidates, gains
+
+
+def _trial(bench: Bench, effects: Sequence[Effect], starts: Sequence[Prediction], against: Model) -> Trial:
+    model = bench.refit(effects, starts)
+    gain = predictive_gain(bench.score(model), bench.score(against))[0]
+    return Trial(model, gain, bench.misfit(model))
+
+
+def search(bench: Bench, seed: int) -> Findings:
+    """Find up to MOST_CAUSES causes."""
+    bench.report(0.02, "replaying the stated setup on two meshes")
+    baseline = bench.baseline(lump_places(bench))
+    findings = Findings(baseline, misfit=bench.misfit(baseline))
+    signatures = _signatures(bench, baseline)
+    screened, candidates, gains = _screen(bench, baseline, signatures, baseline)
+    blocks = bench.tempered(screened)
+    chance = null_gains(blocks, screened.nuisance, bench.nuisances.precision, candidates, NULL_DRAWS, seed)
+    findings.bound = max(float(np.quantile(chance, NULL_QUANTILE)), LEAST_GAIN)
+    for candidate, gain in zip(candidates, gains, strict=True):
+        name = candidate.start.name
+        findings.screened[name] = max(float(gain), findings.screened.get(name, -np.inf))
+    current = Trial(baseline, 0.0, findings.misfit)
+    for order in range(MOST_CAUSES):
+        bench.report(0.45 + 0.25 * order, "fitting the most promising causes" if order == 0 else "looking for a second cause")
+        if order:
+            screened, candidates, gains = _again(bench, current.model, signatures, baseline)
+        step = _forward(bench, findings, current, screened, candidates, gains)
+        if step is None:
+            break
+        current = findings.best = step
+        bench.temperature = max(1.0, current.misfit)
+    if findings.best is not None and len(findings.best.model.effects) > 1:
+        findings.best = _backward(bench, findings, findings.best)
+    _rescore(bench, findings)
+    return findings
+
+
+def _again(
+    bench: Bench, model: Model, signatures: Sequence[tuple[Effect, list[Prediction]]], baseline: Model
+) -> tuple[Model, list[Candidate], np.ndarray]:
+    """Screen the catalogue on top of a model that has causes already."""
+    time = [] if "time_offset" in model.names else [TimeOffset.neutral(model.setup)]
+    extended = bench.evaluate(model.effects, model.predictions, extras=time, lumps=lump_places(bench))
+    return _screen(bench, extended, signatures, baseline)
+
+
+def _forward(
+    bench: Bench, findings: Findings, current: Trial, screened: Model, candidates: list[Candidate], gains: np.ndarray
+) -> Trial | None:
+    """The best further cause if it gains more than the bound, else None."""
+    trials = []
+    for candidate in _shortlist(gains, candidates, 0.5 * findings.bound):
+        effects = [*current.model.effects, _start(candidate, screened, bench)]
+        trials.append(_trial(bench, effects, current.model.predictions, current.model))
+    trials.sort(key=lambda trial: -trial.gain)
+    findings.trials.extend(trials)
+    if not trials or trials[0].gain <= findings.bound:
+        return None
+    return trials[0]
+
+
+def _backward(bench: Bench, findings: Findings, best: Trial) -> Trial:
+    """Drop each cause in turn: what a later one explains as well need not stay."""
+    for index in range(len(best.model.effects)):
+        rest = [effect for number, effect in enumerate(best.model.effects) if number != index]
+        trial = _trial(bench, rest, best.model.predictions, findings.baseline)
+        findings.trials.append(trial)
+        lost = predictive_gain(bench.score(best.model), bench.score(trial.model))[0]
+        if lost <= findings.bound:
+            return trial
+    return best
+
+
+def _rescore(bench: Bench, findings: Findings) -> None:
+    """Gains of all trials over the baseline at one temperature, that of the model accepted, so that they compare."""
+    reference = bench.score(findings.baseline)
+    rescored = []
+    for trial in findings.trials:
+        rescored.append(replace(trial, gain=predictive_gain(bench.score(trial.model), reference)[0]))
+    best = findings.best
+    findings.trials = sorted(rescored, key=lambda trial: -trial.gain)
+    if best is not None:
+        findings.best = next(trial for trial in findings.trials if trial.model is best.model)

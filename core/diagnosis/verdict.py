@@ -1,0 +1,177 @@
+"""From findings to the report: verdict, causes with intervals, ranking, what this data cannot tell, and what is left."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from core.dataset import Dataset
+from core.diagnosis.evidence import fit
+from core.diagnosis.gain import Ladder
+from core.diagnosis.models import Bench, Model
+from core.diagnosis.search import Findings, Trial
+from core.effects import CATALOGUE
+from core.effects.sensor import CameraRegistration
+
+__all__ = ["UNEXPLAINED_MISFIT", "intervals", "report_of", "verdict_of"]
+
+UNEXPLAINED_MISFIT = 1.25
+"""Misfit per value above which structured error is left: the engine's own accuracy is in the noise already."""
+_TEMPERATURE = 4.0
+"""Gains are divided by this before they become probabilities: predictive densities of a model that is not true are over-sure."""
+_NORMAL_95 = 1.96
+_INTERVAL_STEPS = 400
+
+
+def verdict_of(findings: Findings) -> str:
+    """One of found, none, ambiguous, unexplained."""
+    left = findings.best.misfit if findings.best else findings.misfit
+    if findings.best is None:
+        return "unexplained" if left > UNEXPLAINED_MISFIT else "none"
+    if findings.rivals():
+        return "ambiguous"
+    return "found"
+
+
+def intervals(bench: Bench, model: Model) -> list[dict[str, dict[str, Any]]]:
+    """For each effect: name to value, unit and 95 % interval (Laplace; magnitudes by sampling)."""
+    solution = fit(bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model))
+    own = slice(len(model.nuisance), None)
+    spread = np.sqrt(np.diag(solution.covariance)[own])
+    found, at = [], 0
+    for effect in model.effects:
+        number = len(effect.numbers())
+        entry: dict[str, dict[str, Any]] = {}
+        for item, value, sd in zip(effect.numbers(), effect.coordinates, spread[at : at + number], strict=True):
+            low, high = item.value(value - _NORMAL_95 * sd), item.value(value + _NORMAL_95 * sd)
+            entry[item.name] = {"value": item.value(value), "unit": item.unit, "low": low, "high": high}
+        for name, (reported, unit) in effect.reported().items():
+            entry.setdefault(name, {"value": reported, "unit": unit})
+        if isinstance(effect, CameraRegistration):
+            entry = _magnitudes(effect, spread[at : at + number]) | entry
+        found.append(entry)
+        at += number
+    return found
+
+
+def _magnitudes(effect: CameraRegistration, spread: np.ndarray) -> dict[str, dict[str, Any]]:
+    drawn = np.array(effect.coordinates) + spread * np.random.default_rng(0).standard_normal((_INTERVAL_STEPS, 6))
+    found = {}
+    for name, part, unit in (("translation", slice(0, 3), "m"), ("rotation", slice(3, 6), "rad")):
+        low, high = np.quantile(np.linalg.norm(drawn[:, part], axis=1), [0.025, 0.975])
+        value = float(np.linalg.norm(np.array(effect.coordinates)[part]))
+        found[name] = {"value": value, "unit": unit, "low": float(low), "high": float(high)}
+    return found
+
+
+def _probabilities(findings: Findings) -> dict[tuple[str, ...], float]:
+    """Softmax of tempered gains over the models tried and none; not calibrated on a suite yet."""
+    gains = {(): findings.bound}
+    for trial in findings.trials:
+        gains[trial.model.names] = max(trial.gain, gains.get(trial.model.names, -np.inf))
+    names = list(gains)
+    logits = np.array([gains[name] for name in names]) / _TEMPERATURE
+    weights = np.exp(logits - logits.max())
+    return {name: float(w) for name, w in zip(names, weights / weights.sum(), strict=True)}
+
+
+def _removed(findings: Findings, misfit: float) -> float:
+    """Share of the misfit above noise that a model removes on the sequences it was fitted on."""
+    return float(np.clip((findings.misfit - misfit) / max(findings.misfit - 1.0, 1e-9), 0.0, 1.0))
+
+
+def _causes(bench: Bench, findings: Findings, trials: list[Trial]) -> list[dict[str, Any]]:
+    chances, found = _probabilities(findings), []
+    for trial in trials:
+        for effect, entry in zip(trial.model.effects, intervals(bench, trial.model), strict=True):
+            chance = sum(p for names, p in chances.items() if effect.name in names)
+            found.append({"effect": effect.name, "probability": round(chance, 4), "parameters": entry})
+    return found
+
+
+def _ranking(findings: Findings, named: set[str]) -> list[dict[str, Any]]:
+    chances = _probabilities(findings)
+    rows = []
+    for kind in CATALOGUE:
+        if kind.name in named:
+            continue
+        alone = [t for t in findings.trials if t.model.names == (kind.name,)]
+        row: dict[str, Any] = {
+            "effect": kind.name,
+            "probability": round(sum(p for names, p in chances.items() if kind.name in names), 4),
+            "error_removed": round(max((_removed(findings, t.misfit) for t in alone), default=0.0), 4),
+            "gain_nats": round(max([t.gain for t in alone] or [findings.screened.get(kind.name, 0.0)]), 2),
+            "refitted": bool(alone),
+        }
+        rows.append(row)
+    return sorted(rows, key=lambda row: -row["gain_nats"])
+
+
+def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
+    """How much of the misfit is left, and where and when it sits."""
+    model = findings.best.model if findings.best else findings.baseline
+    left = bench.misfit(model)
+    worst = {block.name: block.gram[0, 0] / max(block.values, 1) for block in model.blocks if block.name != "rest"}
+    when = max(worst, key=lambda name: worst[name])
+    patch, share = _worst_patch(model, bench)
+    fraction = max(left - 1.0, 0.0) / max(findings.misfit, left)
+    place = bench.surface.patch_centres[patch] * 1e3
+    where = f"most of it ({100 * share:.0f} %) within 8 mm of ({place[0]:.0f}, {place[1]:.0f}, {place[2]:.0f}) mm"
+    return {"fraction": round(fraction, 4), "where": where, "when": f"most in {when}", "misfit_per_value": round(left, 4)}
+
+
+def _worst_patch(model: Model, bench: Bench) -> tuple[int, float]:
+    """Patch with the largest squared residual around it, and its share of the whole."""
+    total = np.zeros(bench.surface.patches)
+    for item in model.predictions:
+        touched = np.array([frame.in_contact for frame in item.equilibria])
+        away = np.nan_to_num(item.gap - np.nanmean(np.where(touched[:, None], np.nan, item.gap), axis=0)) if (~touched).any() else 0
+        total += (np.nan_to_num(away) ** 2 * item.count * touched[:, None]).sum(axis=0)
+    centres = bench.surface.patch_centres
+    near = np.linalg.norm(centres[:, None] - centres, axis=2) < 8e-3
+    around = near @ total
+    worst = int(around.argmax())
+    return worst, float(around[worst] / max(total.sum(), 1e-300))
+
+
+def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder | None, split: str) -> dict[str, Any]:
+    """The report contract."""
+    verdict = verdict_of(findings)
+    best = [findings.best] if findings.best else []
+    trials = [*best, *findings.rivals()] if verdict == "ambiguous" else best
+    causes = _causes(bench, findings, trials)
+    named = {cause["effect"] for cause in causes}
+    report: dict[str, Any] = {
+        "format": 1, "dataset": dataset.name, "verdict": verdict, "causes": causes, "ranking": _ranking(findings, named),
+        "not_identifiable": _not_identifiable(dataset), "unexplained": _unexplained(bench, findings), "gain": None,
+        "evidence": {
+            "gain_nats": round(findings.best.gain, 2) if findings.best else 0.0, "bound_nats": round(findings.bound, 2),
+            "baseline_misfit": round(findings.misfit, 4), "evaluations": bench.evaluations,
+            "fitted_on": list(bench.names),
+        },
+        "warnings": list(bench.registration.warnings),
+    }  # fmt: skip
+    if gain is not None:
+        value, low, high = gain.removed
+        report["gain"] = {
+            "split": split, "unit": "mm", "baseline": round(gain.baseline * 1e3, 4), "extended": round(gain.extended * 1e3, 4),
+            "noise_floor": round(gain.noise_floor * 1e3, 4),
+            "reducible_removed": {"value": round(value, 4), "low": round(low, 4), "high": round(high, 4)},
+            "paper_metric": {"baseline": round(gain.paper[0] * 1e3, 4), "extended": round(gain.paper[1] * 1e3, 4)},
+            "probes": gain.probes,
+        }  # fmt: skip
+    return report
+
+
+def _not_identifiable(dataset: Dataset) -> list[dict[str, str]]:
+    """Young's modulus on position-driven data without forces."""
+    if all(dataset.sequence(name).forces is not None for name in dataset.sequences):
+        return []
+    return [
+        {
+            "effect": "young_modulus",
+            "why": "the tool is driven by position and no force was measured: a block of any stiffness takes the same shape",
+            "measure_instead": "the force on the tool (forces.csv), or a drop of known weight on the block",
+        }
+    ]

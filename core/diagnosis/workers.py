@@ -1,0 +1,81 @@
+"""Replays of all sequences under one setup, spread over processes that keep the measurements."""
+
+from __future__ import annotations
+
+import ctypes
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from types import TracebackType
+from typing import ParamSpec, Self, TypeVar
+
+from core.diagnosis.observations import Observations
+from core.diagnosis.prediction import Prediction, Wanted, predict
+from core.mesh import GridSpec
+from core.replay import Equilibrium
+from core.setup import Setup
+
+__all__ = ["Workers"]
+
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+_DIE_WITH_PARENT = 1
+P = ParamSpec("P")
+T = TypeVar("T")
+_DATA: dict[str, Observations] = {}
+
+
+def _begin(data: Sequence[Observations]) -> None:
+    """Keep the measurements in this process, and end with the one that started it (Linux)."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(ctypes, "CDLL") and os.name == "posix" and os.uname().sysname == "Linux":
+        ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGTERM)
+    _DATA.update({item.name: item for item in data})
+
+
+def _task(
+    name: str, setup: Setup, grid: GridSpec, wanted: Wanted | None, starts: Sequence[Equilibrium] | None, tolerance: float
+) -> Prediction:
+    return predict(_DATA[name], setup, grid, wanted, starts, tolerance)
+
+
+class Workers:
+    """A pool of processes that predict sequences; use as a context manager.
+
+    Args:
+        data: measurements of each sequence. count: number of processes.
+    """
+
+    def __init__(self, data: Sequence[Observations], count: int) -> None:
+        # One thread each: the processes are the parallelism, and small factorisations only lose by sharing cores.
+        for name in _THREADS:
+            os.environ.setdefault(name, "1")
+        self._pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _begin, (data,))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+        processes = list(getattr(self._pool, "_processes", {}).values())
+        self._pool.shutdown(wait=kind is None, cancel_futures=True)
+        if kind is not None:
+            for process in processes:
+                process.terminate()
+
+    def submit(
+        self,
+        names: Sequence[str],
+        setup: Setup,
+        grid: GridSpec,
+        wanted: Wanted | None = None,
+        starts: Sequence[Prediction] | None = None,
+        tolerance: float = 1e-4,
+    ) -> list[Future[Prediction]]:
+        """Begin predicting these sequences under a setup; `starts` are predictions to begin from, in the same order."""
+        firsts = [None] * len(names) if starts is None else [item.equilibria for item in starts]
+        return [self._pool.submit(_task, n, setup, grid, wanted, s, tolerance) for n, s in zip(names, firsts, strict=True)]
+
+    def run(self, task: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Begin any other task of a module's top level."""
+        return self._pool.submit(task, *args, **kwargs)
