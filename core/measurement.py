@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -18,8 +19,9 @@ from core.mesh import IntArray
 from core.replay import Equilibrium
 from core.setup import Box
 
-__all__ = ["Gaps", "PatchMeans", "Surface", "gaps", "patch_means"]
+__all__ = ["Gaps", "PatchMeans", "Surface", "gaps", "patch_means", "plain_means", "within_spread"]
 
+MaskArray = np.ndarray[Any, np.dtype[np.bool_]]
 SIDES = ("+z", "-y", "+y", "-x", "+x")
 _GRAZING = 0.3
 """Cosine between ray and normal below which a depth error counts for too much along the surface."""
@@ -166,14 +168,14 @@ class Gaps:
     side: IntArray
 
 
-def gaps(points: FloatArray, camera: FloatArray, frame: Equilibrium, surface: Surface) -> Gaps:
+def gaps(points: FloatArray, camera: FloatArray, frame: Equilibrium, surface: Surface, *, everything: bool = False) -> Gaps:
     """Compare measured points with the surface of one frame, along the camera's rays.
 
     Args:
         points: (n, 3) [m], phantom frame, cleaned. camera: (3,) optical centre [m], phantom frame.
-        frame: the simulated block. surface: its material points.
+        frame: the simulated block. surface: its material points. everything: keep all points whose ray meets the block.
 
-    Points whose ray misses the block, grazes it, passes near an edge, or ends more than 8 mm away are left out.
+    Otherwise points whose ray grazes it, passes near an edge, or ends more than 8 mm away are left out, too.
     """
     import open3d as o3d
 
@@ -198,6 +200,7 @@ def gaps(points: FloatArray, camera: FloatArray, frame: Equilibrium, surface: Su
     side = surface.side[triangle]
     facing = -np.einsum("mi,mi->m", rays, normal)
     good = (facing > _GRAZING) & (surface.edge_distance(foot, side) > _EDGE) & (np.abs(gap) < _OUTLIER)
+    good |= everything
     foot, side = foot[good], side[good]
     return Gaps(hit[good], gap[good], foot, normal[good], surface.patch_of(foot, side), side)
 
@@ -211,22 +214,33 @@ class PatchMeans:
     spread: FloatArray
 
 
-def patch_means(values: FloatArray, patch: IntArray, patches: int, least: int = 2) -> PatchMeans:
-    """Average values (m,) [m] by patch (m,), leaving out what is more than four robust deviations from the patch's median."""
+def within_spread(values: FloatArray, patch: IntArray, patches: int) -> MaskArray:
+    """Which values (m,) lie within four robust deviations of their patch's median; one deviation for all patches."""
+    if not len(values):
+        return np.zeros(0, dtype=bool)
     centre = np.zeros(patches)
     order = np.argsort(patch, kind="stable")
-    groups = np.split(values[order], np.flatnonzero(np.diff(patch[order])) + 1) if len(values) else []
-    names = patch[order][np.concatenate([[0], np.flatnonzero(np.diff(patch[order])) + 1])] if len(values) else []
-    for name, group in zip(names, groups, strict=True):
+    edges = np.flatnonzero(np.diff(patch[order])) + 1
+    for name, group in zip(patch[order][np.concatenate([[0], edges])], np.split(values[order], edges), strict=True):
         centre[name] = np.median(group)
     away = np.abs(values - centre[patch])
     crowded = np.bincount(patch, minlength=patches)[patch] > 2  # a lone point lies on its own median and says nothing of noise
     scale = 1.4826 * float(np.median(away[crowded])) if crowded.any() else np.inf
-    kept = away <= 4 * scale
-    count = np.bincount(patch[kept], minlength=patches)
-    total = np.bincount(patch[kept], values[kept], minlength=patches)
-    square = np.bincount(patch[kept], values[kept] ** 2, minlength=patches)
+    return np.asarray(away <= 4 * scale)
+
+
+def plain_means(values: FloatArray, patch: IntArray, patches: int, least: int = 2) -> PatchMeans:
+    """Averages of values (m,) [m] by patch (m,)."""
+    count = np.bincount(patch, minlength=patches)
+    total = np.bincount(patch, values, minlength=patches)
+    square = np.bincount(patch, values**2, minlength=patches)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.where(count >= least, total / count, np.nan)
         spread = np.sqrt(np.maximum(square / count - (total / count) ** 2, 0) * count / np.maximum(count - 1, 1))
     return PatchMeans(mean, count, spread)
+
+
+def patch_means(values: FloatArray, patch: IntArray, patches: int, least: int = 2) -> PatchMeans:
+    """Average values (m,) [m] by patch (m,), leaving out what is more than four robust deviations from the patch's median."""
+    kept = within_spread(values, patch, patches)
+    return plain_means(values[kept], patch[kept], patches, least)

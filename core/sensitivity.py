@@ -59,8 +59,11 @@ def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[tu
     right = np.empty((len(residual), len(changes)))
     for column, (setup, move) in enumerate(changes):
         same = setup.material == block.setup.material and setup.load == block.setup.load and setup.support == block.setup.support
-        other = model if same else BlockModel(setup, frame.mesh)
         shift = np.array(setup.tool.offset) - np.array(block.setup.tool.offset) + move
+        if same and setup.tool.radius == block.setup.tool.radius and not shift.any():  # only the sensor differs
+            right[:, column] = 0.0
+            continue
+        other = model if same else BlockModel(setup, frame.mesh)
         probe = Probe(here.centre + shift, here.radius + setup.tool.radius - block.setup.tool.radius)
         right[:, column] = residual - other.assemble(positions, probe, tangent=False).residual
     solved = model.topology.factor.solve(right)

@@ -14,7 +14,7 @@ import numpy as np
 
 from core.frames import FloatArray
 
-__all__ = ["Block", "Fit", "fit", "gram", "log_evidence", "predictive_gain", "predictive_score"]
+__all__ = ["FLAT", "Block", "Fit", "fit", "gram", "log_evidence", "predictive_gain", "predictive_score"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,10 +81,21 @@ def log_evidence(blocks: Sequence[Block], columns: Sequence[int], precision: Flo
     return float(-0.5 * (square - explained) - 0.5 * occam)
 
 
-def predictive_score(blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray) -> FloatArray:
-    """Log predictive density (b,) of each block given all the others [nats]."""
+FLAT = 1e-6
+"""Factor on a prior's precision that makes it say nothing."""
+
+
+def predictive_score(blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray, stated: int) -> FloatArray:
+    """Log predictive density (b + 1,) of each block given all the others, and of the stated accuracies given the blocks [nats].
+
+    The first `stated` columns are nuisances. What was stated of them (touches, calliper, data sheet) is a measurement like any
+    other, and is left out in its turn: a model that explains the data only by breaking it must not come off well.
+    """
     whole = log_evidence(blocks, columns, precision)
-    return np.array([whole - log_evidence([*blocks[:i], *blocks[i + 1 :]], columns, precision) for i in range(len(blocks))])
+    scores = [whole - log_evidence([*blocks[:i], *blocks[i + 1 :]], columns, precision) for i in range(len(blocks))]
+    free = precision.copy()
+    free[:stated, :stated] *= FLAT
+    return np.array([*scores, whole - log_evidence(blocks, columns, free)])
 
 
 def predictive_gain(score: FloatArray, baseline: FloatArray) -> tuple[float, float]:

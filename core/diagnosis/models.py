@@ -34,7 +34,7 @@ _SLIDING_STEP = 0.05
 _TRUST = 2.5
 _ITERATIONS = 4
 TIP = 1e-4
-RADIUS = 1e-4
+RADIUS = 5e-5
 NU = 0.01
 CAMERA = np.array([1e-4] * 3 + [2e-3] * 3)
 """Accuracies that are no finding: tool tip and radius [m], Poisson's ratio [1], camera beyond its covariance [m, rad]."""
@@ -291,7 +291,7 @@ class Bench:
 
     def score(self, model: Model) -> FloatArray:
         """Log predictive density of each block given the others [nats]."""
-        return predictive_score(self.tempered(model), [*model.nuisance, *model.columns], self.precision(model))
+        return predictive_score(self.tempered(model), [*model.nuisance, *model.columns], self.precision(model), len(model.nuisance))
 
     def objective(self, model: Model) -> float:
         """Log evidence at these values of the search coordinates [nats]."""

@@ -19,9 +19,9 @@ from core.measurement import Surface
 
 __all__ = ["DISPLACEMENT_ERROR", "STIFFNESS_ERROR", "Noise", "noises", "patch_variance"]
 
-DISPLACEMENT_ERROR = 0.03
+DISPLACEMENT_ERROR = 0.02
 """Standard deviation of the engine's relative error of displacement, smooth over FIELD_LENGTH along the surface [1]."""
-STIFFNESS_ERROR = 0.12
+STIFFNESS_ERROR = 0.08
 """Standard deviation of the logarithm of local stiffness that stands for discretisation and law [1]."""
 FIELD_LENGTH = 8e-3
 _WHITE_FLOOR = 2e-5

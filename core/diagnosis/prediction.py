@@ -6,22 +6,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from core.diagnosis.observations import Group, Observations
 from core.fem.model import log_stiffness
 from core.fem.newton import Outcome
 from core.frames import FloatArray, Transform
-from core.measurement import Gaps, PatchMeans, Surface, gaps, patch_means
-from core.mesh import GridSpec
+from core.measurement import Gaps, PatchMeans, Surface, gaps, plain_means, within_spread
+from core.mesh import GridSpec, IntArray
 from core.registration.robot import fit_robot
 from core.replay import Equilibrium, Replay, rest
 from core.sensitivity import TOOL_STEP, displacement_changes, stiffness_changes
 from core.setup import Inclusion, Setup
 
-__all__ = ["TOOL_COLUMNS", "Prediction", "Wanted", "predict", "touch_correction"]
+__all__ = ["TOOL_COLUMNS", "Prediction", "Sample", "Wanted", "predict", "touch_correction"]
 
 TOOL_COLUMNS = 6
 """Columns that always come first: the tool moved along x, y, z and turned about the robot registration's pivot."""
+
+FARTHEST_CHANGE = 8e-3
+"""A point's gap that changes by more than this [m] between models has met another side of the block: its old gap stands."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -41,13 +45,29 @@ class Wanted:
 
 
 @dataclass(frozen=True, eq=False)
+class Sample:
+    """Which of a group's points are averaged where: settled by the baseline and kept for every other model.
+
+    Were each model to choose anew, points would change patches with the model, and the noise they carry would look like a
+    difference between models.
+
+    Attributes:
+        index: (m,) of the group's points. patch: (m,). gap: (m,) of the baseline [m], which stands where a model's ray misses.
+    """
+
+    index: IntArray
+    patch: IntArray
+    gap: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class Prediction:
     """One sequence under one setup.
 
     Attributes:
         gap: (g, p) mean of measured minus simulated [m], NaN where unseen. count: (g, p) points. spread: (g, p) [m].
         columns: (g, p, k) change of gap: TOOL_COLUMNS, then setups, then lumps.
-        equilibria: of each group.
+        equilibria: of each group. samples: of each group, for the predictions of other models.
     """
 
     name: str
@@ -56,6 +76,7 @@ class Prediction:
     spread: FloatArray
     columns: FloatArray
     equilibria: tuple[Equilibrium, ...]
+    samples: tuple[Sample, ...]
 
     @property
     def failed(self) -> tuple[int, ...]:
@@ -116,20 +137,52 @@ class _Columns:
         self, frame: Equilibrium, moves: FloatArray, points: FloatArray, seen: Gaps, means: PatchMeans, reference: bool
     ) -> FloatArray:
         """(p, k) changes of the patch averages; the reference was seen before the camera could move."""
-        fields = self.displacement(frame, moves)
-        nodes, weights = frame.mesh.locate(seen.foot)
-        values = -np.einsum("ma,kmai,mi->mk", weights, fields[:, nodes], seen.normal, optimize=True)
-        camera = _camera_changes(self.block.setup, self.wanted, points, seen)
+        values = np.zeros((len(means.mean), TOOL_COLUMNS + len(self.wanted.setups) + len(self.wanted.lumps)))
+        if frame.in_contact or self.block.setup.load.specific_weight_over_stiffness:
+            fields = self.displacement(frame, moves)
+            values = -(_observe(frame, seen, len(means.mean)) @ fields.reshape(len(fields), -1).T)
         if self.wanted.steps and not reference:
+            camera = _average(_camera_changes(self.block.setup, self.wanted, points, seen), seen, means)
             values[:, TOOL_COLUMNS : TOOL_COLUMNS + camera.shape[1]] += camera / np.array(self.wanted.steps)
-        return _average(values, seen, means)
+        return values
 
 
-def _compare(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) -> tuple[FloatArray, Gaps, PatchMeans]:
-    pose = setup.phantom_from_camera if group.reference else setup.phantom_from_camera_true
-    points = pose.apply(group.points)
+def _observe(frame: Equilibrium, seen: Gaps, patches: int) -> sp.csr_matrix:
+    """Patch averages of the displacement along the normal as a linear function of the nodes' displacement (p, 3n)."""
+    nodes, weights = frame.mesh.locate(seen.foot)
+    share = 1.0 / np.maximum(np.bincount(seen.patch, minlength=patches), 1)[seen.patch]
+    entries = (weights[:, :, None] * seen.normal[:, None, :] * share[:, None, None]).ravel()
+    columns = (3 * nodes[:, :, None] + np.arange(3)).ravel()
+    rows = np.repeat(seen.patch, 24)
+    return sp.coo_matrix((entries, (rows, columns)), shape=(patches, 3 * len(frame.mesh.nodes))).tocsr()
+
+
+def _chosen(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) -> Sample:
+    """The points to average, by the model at hand: those on clear parts of the surface, without stray ones."""
+    points, pose = _placed(group, setup)
     seen = gaps(points, pose.translation, frame, surface)
-    return points, seen, patch_means(seen.gap, seen.patch, surface.patches)
+    kept = within_spread(seen.gap, seen.patch, surface.patches)
+    return Sample(seen.index[kept].astype(np.int32), seen.patch[kept].astype(np.int32), seen.gap[kept].astype(np.float32))
+
+
+def _placed(group: Group, setup: Setup) -> tuple[FloatArray, Transform]:
+    """The group's points in the phantom frame, and the camera's pose; the reference was seen before the camera could move."""
+    pose = setup.phantom_from_camera if group.reference else setup.phantom_from_camera_true
+    return pose.apply(group.points), pose
+
+
+def _compare(
+    group: Group, setup: Setup, frame: Equilibrium, surface: Surface, sample: Sample
+) -> tuple[FloatArray, Gaps, PatchMeans]:
+    """The sample's points, where they meet the surface, and their averages."""
+    points, pose = _placed(group, setup)
+    points = points[sample.index]
+    seen = gaps(points, pose.translation, frame, surface, everything=True)
+    values = sample.gap.astype(float)
+    near = np.abs(seen.gap - values[seen.index]) < FARTHEST_CHANGE
+    values[seen.index[near]] = seen.gap[near]
+    seen = replace(seen, patch=sample.patch[seen.index])
+    return points, seen, plain_means(values, sample.patch, surface.patches)
 
 
 def predict(
@@ -138,23 +191,23 @@ def predict(
     grid: GridSpec,
     wanted: Wanted | None = None,
     starts: Sequence[Equilibrium] | None = None,
-    tolerance: float = 1e-4,
-    patch: float = 4e-3,
+    tolerance: float = 3e-4,
+    samples: Sequence[Sample] | None = None,
 ) -> Prediction:
     """Replay a sequence's groups and compare each with its points.
 
     Args:
         starts: equilibria of a similar setup, one per group, to begin from.
-        wanted: changes to state; none without it.
+        wanted: changes to state; none without it. samples: which points to average; chosen anew without them.
     """
-    surface, block = Surface(setup.geometry, patch=patch), Replay(setup, grid, tolerance)
+    surface, block = Surface(setup.geometry), Replay(setup, grid, tolerance)
     true_from_stated = touch_correction(setup, grid)
     centres = true_from_stated.apply(data.centres(setup))
     moves = np.zeros((len(wanted.setups) if wanted else 0, len(data.groups), 3))
     for number, other in enumerate(wanted.setups if wanted else ()):
         moves[number] = touch_correction(other, grid).apply(data.centres(other)) - centres
     columns = _Columns(block, wanted) if wanted else None
-    gap, count, spread, changes, frames = [], [], [], [], []
+    gap, count, spread, changes, frames, chosen = [], [], [], [], [], []
     previous: Equilibrium | None = None
     for number, (group, centre) in enumerate(zip(data.groups, centres, strict=True)):
         start = starts[number] if starts is not None and starts[number].in_contact else previous
@@ -162,7 +215,9 @@ def predict(
         if frame.outcome is not Outcome.CONVERGED and start is not previous:
             frame = block.step(centre, previous)
         previous = frame if frame.outcome is Outcome.CONVERGED else None
-        points, seen, means = _compare(group, setup, frame, surface)
+        sample = samples[number] if samples is not None else _chosen(group, setup, frame, surface)
+        points, seen, means = _compare(group, setup, frame, surface, sample)
+        chosen.append(sample)
         gap.append(means.mean)
         count.append(means.count)
         spread.append(means.spread)
@@ -170,4 +225,4 @@ def predict(
         if columns is not None:
             changes.append(columns.project(frame, moves[:, number], points, seen, means, group.reference).astype(np.float32))
     stacked = np.stack(changes) if changes else np.zeros((len(gap), surface.patches, 0))
-    return Prediction(data.name, np.array(gap), np.array(count, dtype=float), np.array(spread), stacked, tuple(frames))
+    return Prediction(data.name, np.array(gap), np.array(count, dtype=float), np.array(spread), stacked, tuple(frames), tuple(chosen))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from core.diagnosis.evidence import Block
+from core.diagnosis.evidence import FLAT, Block
 from core.effects import Effect
 from core.frames import FloatArray
 
@@ -46,31 +46,35 @@ def right_sides(blocks: Sequence[Block]) -> FloatArray:
     return np.array([[block.gram[1:, 0] for block in blocks]])
 
 
-def _values(blocks: Sequence[Block], rights: FloatArray, columns: Sequence[int], precision: FloatArray) -> FloatArray:
-    """Sum over blocks of the log predictive density (d,) less what no column changes."""
+def _values(
+    blocks: Sequence[Block], rights: FloatArray, columns: Sequence[int], precision: FloatArray, known: FloatArray
+) -> FloatArray:
+    """Sum over blocks, and the stated accuracies, of the log predictive density (d,) less what no column changes."""
     index = np.asarray(columns)
     grams = np.array([block.gram[1:, 1:][np.ix_(index, index)] for block in blocks])
     rights = rights[:, :, index]
-    prior = np.linalg.slogdet(precision)[1]
 
-    def evidence(matrix: FloatArray, right: FloatArray) -> FloatArray:
-        full = matrix + precision
+    def evidence(matrix: FloatArray, right: FloatArray, prior: FloatArray) -> FloatArray:
+        full = matrix + prior
         explained = np.einsum("di,ij,dj->d", right, np.linalg.inv(full), right)
-        return np.asarray(0.5 * explained - 0.5 * (np.linalg.slogdet(full)[1] - prior))
+        return np.asarray(0.5 * explained - 0.5 * (np.linalg.slogdet(full)[1] - np.linalg.slogdet(prior)[1]))
 
     matrix, right = grams.sum(axis=0), rights.sum(axis=1)
-    total = len(blocks) * evidence(matrix, right)
+    total = (len(blocks) + 1) * evidence(matrix, right, precision)
     for number in range(len(blocks)):
-        total -= evidence(matrix - grams[number], right - rights[:, number])
-    return np.asarray(total)
+        total -= evidence(matrix - grams[number], right - rights[:, number], precision)
+    # The same flat prior for every candidate, whatever it widens, so that the scores compare.
+    free = precision.copy()
+    free[: len(known), : len(known)] = FLAT * known
+    return np.asarray(total - evidence(matrix, right, free))
 
 
 def linear_gains(
     blocks: Sequence[Block], rights: FloatArray, nuisance: Sequence[int], known: FloatArray, candidates: Sequence[Candidate]
 ) -> FloatArray:
     """Gain (d, c) [nats] of each candidate for each set of right sides (d, b, k)."""
-    baseline = _values(blocks, rights, nuisance, known)
-    return np.stack([_values(blocks, rights, *c.precision(list(nuisance), known)) - baseline for c in candidates], axis=1)
+    baseline = _values(blocks, rights, nuisance, known, known)
+    return np.stack([_values(blocks, rights, *c.precision(list(nuisance), known), known) - baseline for c in candidates], axis=1)
 
 
 def null_gains(

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import ParamSpec, Self, TypeVar
 
 from core.diagnosis.observations import Observations
-from core.diagnosis.prediction import Prediction, Wanted, predict
+from core.diagnosis.prediction import Prediction, Sample, Wanted, predict
 from core.mesh import GridSpec
 from core.replay import Equilibrium
 from core.setup import Setup
@@ -35,9 +35,15 @@ def _begin(data: Sequence[Observations]) -> None:
 
 
 def _task(
-    name: str, setup: Setup, grid: GridSpec, wanted: Wanted | None, starts: Sequence[Equilibrium] | None, tolerance: float
+    name: str,
+    setup: Setup,
+    grid: GridSpec,
+    wanted: Wanted | None,
+    starts: Sequence[Equilibrium] | None,
+    samples: Sequence[Sample] | None,
+    tolerance: float,
 ) -> Prediction:
-    return predict(_DATA[name], setup, grid, wanted, starts, tolerance)
+    return predict(_DATA[name], setup, grid, wanted, starts, tolerance, samples)
 
 
 class Workers:
@@ -70,11 +76,20 @@ class Workers:
         grid: GridSpec,
         wanted: Wanted | None = None,
         starts: Sequence[Prediction] | None = None,
-        tolerance: float = 1e-4,
+        tolerance: float = 3e-4,
+        same_points: bool = True,
     ) -> list[Future[Prediction]]:
-        """Begin predicting these sequences under a setup; `starts` are predictions to begin from, in the same order."""
-        firsts = [None] * len(names) if starts is None else [item.equilibria for item in starts]
-        return [self._pool.submit(_task, n, setup, grid, wanted, s, tolerance) for n, s in zip(names, firsts, strict=True)]
+        """Begin predicting these sequences under a setup.
+
+        Args:
+            starts: predictions to begin from, in the same order. same_points: average the same points in the same patches as they.
+        """
+        pending = []
+        for number, name in enumerate(names):
+            begin = None if starts is None else starts[number].equilibria
+            points = None if starts is None or not same_points else starts[number].samples
+            pending.append(self._pool.submit(_task, name, setup, grid, wanted, begin, points, tolerance))
+        return pending
 
     def run(self, task: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Begin any other task of a module's top level."""

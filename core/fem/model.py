@@ -82,12 +82,15 @@ def log_stiffness(inclusions: tuple[Inclusion, ...], corners: FloatArray) -> Flo
     low, high = corners[:, 0], corners[:, 7]
     steps = (np.arange(4) + 0.5) / 4
     offsets = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
-    points = low[:, None] + offsets * (high - low)[:, None]
     width = np.cbrt(np.prod(high - low, axis=1))[:, None] / 8
+    reach = np.linalg.norm(high - low, axis=1)
     for lump in inclusions:
-        distance = np.linalg.norm(points - np.array([lump.x, lump.y, lump.z]), axis=2)
-        inside = 0.5 * (1 - np.tanh((distance - lump.radius) / width))
-        log_factor += inside.mean(axis=1) * np.log(lump.stiffness_ratio)
+        centre = np.array([lump.x, lump.y, lump.z])
+        near = np.linalg.norm((low + high) / 2 - centre, axis=1) < lump.radius + reach
+        points = low[near, None] + offsets * (high - low)[near, None]
+        distance = np.linalg.norm(points - centre, axis=2)
+        inside = 0.5 * (1 - np.tanh((distance - lump.radius) / width[near]))
+        log_factor[near] += inside.mean(axis=1) * np.log(lump.stiffness_ratio)
     return log_factor
 
 

@@ -1,0 +1,150 @@
+"""Diagnosis: what the simulation gets wrong, the cause by name, the extended model, and the gain on data nothing was fitted on."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from core.cleaning import cleaner_for, find_shaft_axis
+from core.dataset import Dataset
+from core.diagnosis.gain import Ladder, ladder
+from core.diagnosis.models import Bench
+from core.diagnosis.observations import Observations, observe_all
+from core.diagnosis.patterns import draw_patterns, patterns
+from core.diagnosis.recording import record
+from core.diagnosis.search import Findings, search
+from core.diagnosis.static import StaticChannel
+from core.diagnosis.verdict import report_of
+from core.diagnosis.workers import Workers
+from core.errors import DiagnosisError, RunError
+from core.mesh import GridSpec
+from core.progress import Report, part, silent
+from core.registration import Registration, register, setup_from
+from core.setup import Setup
+
+__all__ = ["DIAGNOSIS_GRID", "FINE_GRID", "diagnose"]
+
+DIAGNOSIS_GRID = GridSpec(nodes=(15, 11, 9), spacing=1.2e-3)
+FINE_GRID = GridSpec(nodes=(23, 17, 13), spacing=0.65e-3)
+"""For a tool of 5 mm; both are scaled with the stated radius."""
+FIT_GROUPS = 20
+TEST_GROUPS = 32
+_LEAST_BIAS = 1.5e-4
+_USUAL_RADIUS = 5e-3
+
+
+def _scaled(grid: GridSpec, radius: float) -> GridSpec:
+    return replace(grid, spacing=(grid.spacing or 1e-3) * radius / _USUAL_RADIUS)
+
+
+def diagnose(dataset: Dataset, out: Path, *, workers: int = 2, report: Report = silent, seed: int = 0) -> dict[str, Any]:
+    """Find what the stated simulation of a dataset gets wrong; write the run folder `out` and return the report.
+
+    Args:
+        dataset: as opened. out: folder to make; written aside and renamed, so it is whole or not there.
+        workers: number of processes. report: progress; may raise Cancelled. seed: of the null draws and the bootstrap.
+
+    Fits and choices use the train and validation sequences, the gain the test sequences. Raises DiagnosisError where the data
+    cannot carry a diagnosis, DatasetError and RegistrationError where they are off.
+    """
+    out = Path(out)
+    if out.exists():
+        raise RunError(f"{out} exists already; name another folder or move it away", file=str(out))
+    fitted, tested = _splits(dataset)
+    report(0.0, "reading every cloud")
+    dataset.validate(part(report, 0.0, 0.02))
+    registration = register(dataset)
+    setup = _stated(dataset, registration)
+    data = observe_all(dataset, fitted, setup, registration, FIT_GROUPS, part(report, 0.02, 0.04))
+    unseen = observe_all(dataset, tested, setup, registration, TEST_GROUPS, part(report, 0.04, 0.05))
+    out.parent.mkdir(parents=True, exist_ok=True)
+    making = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
+    try:
+        with Workers([*data, *unseen], workers) as pool:
+            result = _run(dataset, registration, setup, (data, unseen), pool, making, report, seed)
+        os.rename(making, out)
+    finally:
+        shutil.rmtree(making, ignore_errors=True)
+    report(1.0, "done")
+    return result
+
+
+def _splits(dataset: Dataset) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    config = dataset.config
+    fitted = (*config.train, *config.validation)
+    if len(fitted) < 2:
+        raise DiagnosisError(
+            f"a diagnosis fits on some sequences and judges on others: train and validation name {len(fitted)}, at least 2 are needed",
+            key="splits",
+        )
+    if not dataset.has_rest:
+        raise DiagnosisError("rest.ply is missing: without it the camera cannot be registered; record one raw cloud of the untouched phantom")
+    if any(not len(dataset.sequence(name)) for name in (*fitted, *config.test)):
+        raise DiagnosisError("sequences without clouds cannot be diagnosed yet; leave them out of [splits]", key="splits")
+    return fitted, tuple(config.test)
+
+
+def _stated(dataset: Dataset, registration: Registration) -> Setup:
+    landmarks = tuple(dataset.config.landmarks[name] for name in dataset.touches.names)
+    return replace(setup_from(dataset, registration), landmarks=landmarks)
+
+
+def _run(
+    dataset: Dataset,
+    registration: Registration,
+    setup: Setup,
+    data: tuple[list[Observations], list[Observations]],
+    pool: Workers,
+    making: Path,
+    report: Report,
+    seed: int,
+) -> dict[str, Any]:
+    fitted, unseen = data
+    cleaner = cleaner_for(dataset, registration)
+    bias = registration.camera.bias if registration.camera else _LEAST_BIAS
+    static = StaticChannel.of(dataset.rest_cloud(), cleaner, max(bias, _LEAST_BIAS))
+    grid, fine = _scaled(DIAGNOSIS_GRID, setup.tool.radius), _scaled(FINE_GRID, setup.tool.radius)
+    names = [item.name for item in fitted]
+    bench = Bench(setup, registration, pool, names, static, grid, fine, part(report, 0.05, 0.75))
+    findings = search(bench, seed)
+    model = findings.best.model if findings.best else findings.baseline
+    report(0.75, "measuring the gain on test sequences")
+    gain = _gain(unseen, pool, setup, model.setup, grid, seed) if unseen else None
+    result = report_of(dataset, bench, findings, gain, "test")
+    (making / "replays").mkdir()
+    (making / "pictures").mkdir()
+    shaft = find_shaft_axis(dataset, registration)
+    tasks = [
+        pool.run(record, dataset.path, name, setup, model.setup, cleaner, shaft, grid, making / "replays" / f"{name}.npz")
+        for name in dataset.sequences
+    ]
+    for number, task in enumerate(tasks):
+        report(0.8 + 0.2 * number / len(tasks), "replaying every sequence for the page")
+        task.result()
+    pictured = patterns(bench, findings.baseline, model)
+    pictured.save(making / "patterns.npz")
+    draw_patterns(pictured, bench.surface, making / "pictures" / "patterns.png")
+    (making / "model.json").write_text(json.dumps(_model(dataset, model.setup, findings, names), indent=1))
+    (making / "report.json").write_text(json.dumps(result, indent=1))
+    return result
+
+
+def _gain(unseen: list[Observations], pool: Workers, stated: Setup, found: Setup, grid: GridSpec, seed: int) -> Ladder:
+    names = [item.name for item in unseen]
+    baseline = [future.result() for future in pool.submit(names, stated, grid)]
+    extended = baseline if found is stated else [future.result() for future in pool.submit(names, found, grid, None, baseline, same_points=False)]
+    return ladder(unseen, baseline, extended, stated, found, seed)
+
+
+def _model(dataset: Dataset, setup: Setup, findings: Findings, fitted: list[str]) -> dict[str, Any]:
+    """The extended model and where it comes from."""
+    effects = [effect.to_json() for effect in findings.best.model.effects] if findings.best else []
+    return {
+        "format": 1, "version": 1, "dataset": dataset.name, "parent": None, "fitted_on": fitted, "effects": effects,
+        "setup": setup.as_dict(), "grid": {"nodes": list(DIAGNOSIS_GRID.nodes), "spacing": DIAGNOSIS_GRID.spacing},
+    }  # fmt: skip

@@ -1,0 +1,108 @@
+"""What the page shows of one sequence: surfaces, tool and errors of the stated and of the extended model, frame by frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from core.cleaning import Cleaner, tool_poses
+from core.dataset import open_dataset
+from core.diagnosis.observations import smooth_centres
+from core.diagnosis.prediction import touch_correction
+from core.frames import FloatArray
+from core.measurement import Gaps, Surface, gaps
+from core.mesh import GridSpec
+from core.metrics import paper_distance
+from core.replay import Equilibrium, replay
+from core.setup import Setup
+
+__all__ = ["Recorded", "record"]
+
+MOST_FRAMES = 150
+VERTEX_SPACING = 2.5e-3
+_REACH = 3.5e-3
+_LEAST = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """One model's side of a recording; arrays over frames (f, ...), SI, phantom frame."""
+
+    surface: FloatArray
+    tool: FloatArray
+    error: FloatArray
+    distance: FloatArray
+    paper: FloatArray
+    outcome: FloatArray
+    free: FloatArray
+
+
+def _vertex_errors(seen: Gaps, surface: Surface) -> FloatArray:
+    """Mean gap (v,) [m] of the points around each material vertex on its own side; NaN where too few were seen."""
+    errors = np.full(len(surface.vertices), np.nan)
+    if not len(seen.gap):
+        return errors
+    # Points on another side of an edge are near in space but say nothing of this side.
+    lift = 0.05
+    side_of = np.zeros(len(surface.vertices))
+    side_of[surface.faces.ravel()] = np.repeat(surface.side, 3)
+    tree = cKDTree(np.column_stack([seen.foot, lift * seen.side]))
+    for vertex, near in enumerate(tree.query_ball_point(np.column_stack([surface.vertices, lift * side_of]), _REACH)):
+        if len(near) >= _LEAST:
+            errors[vertex] = seen.gap[near].mean()
+    return errors
+
+
+def _side(setup: Setup, frames: list[Equilibrium], clouds: list[FloatArray]) -> Recorded:
+    surface, pose = Surface(setup.geometry, spacing=VERTEX_SPACING), setup.phantom_from_camera_true
+    moved, errors, distance, paper = [], [], [], []
+    for frame, cloud in zip(frames, clouds, strict=True):
+        points = pose.apply(cloud)
+        seen = gaps(points, pose.translation, frame, surface)
+        moved.append(frame.move(surface.vertices))
+        errors.append(_vertex_errors(seen, surface))
+        distance.append(float(np.sqrt(np.mean(seen.gap**2))) if len(seen.gap) else np.nan)
+        paper.append(paper_distance(points[::2], frame, surface))
+    return Recorded(
+        np.array(moved), np.array([frame.probe.centre for frame in frames]), np.array(errors), np.array(distance), np.array(paper),
+        np.array([0 if frame.outcome.name == "CONVERGED" else 1 for frame in frames], dtype=np.int8),
+        np.array([not frame.in_contact for frame in frames]),
+    )  # fmt: skip
+
+
+def record(
+    folder: Path, name: str, stated: Setup, found: Setup, cleaner: Cleaner, shaft: FloatArray | None, grid: GridSpec, target: Path
+) -> str:
+    """Replay one sequence under both models and write `target`; returns the sequence's name."""
+    sequence = open_dataset(folder).sequence(name)
+    total = len(sequence)
+    index = np.unique(np.linspace(0, total - 1, min(total, MOST_FRAMES)).round().astype(int))
+    times = np.asarray(sequence.cloud_times)[index]
+    poses = tool_poses(sequence.kinematics, times, stated.phantom_from_robot, shaft)
+    raw = [sequence.cloud(int(i)) for i in index]
+    clouds = [cloud[cleaner.clean(cloud, pose).indices] for cloud, pose in zip(raw, poses, strict=True)]
+    sides = []
+    for setup in (stated, found):
+        if sides and found is stated:
+            sides.append(sides[0])
+            continue
+        robot = touch_correction(setup, grid) @ setup.phantom_from_robot
+        centres = robot.apply(smooth_centres(sequence.kinematics, times - setup.sensor.time_offset))
+        sides.append(_side(setup, replay(setup, centres, grid, tolerance=1e-4), clouds))
+    before, after = sides
+    surface = Surface(stated.geometry, spacing=VERTEX_SPACING)
+    floor = after.distance[after.free] if after.free.any() else after.distance
+    np.savez_compressed(
+        target, time=times, cloud_index=index, faces=surface.faces, rest=surface.vertices.astype(np.float32),
+        raw=before.surface.astype(np.float32), extended=after.surface.astype(np.float32),
+        tool_raw=before.tool, tool_extended=after.tool,
+        tool_radius_raw=np.array(stated.tool.radius), tool_radius_extended=np.array(found.tool.radius),
+        error_raw=before.error.astype(np.float32), error_extended=after.error.astype(np.float32),
+        distance_raw=before.distance, distance_extended=after.distance, paper_raw=before.paper, paper_extended=after.paper,
+        noise_floor=np.array(float(np.nanmean(floor))), camera_raw=stated.phantom_from_camera_true.matrix,
+        camera_extended=found.phantom_from_camera_true.matrix, outcome=np.maximum(before.outcome, after.outcome),
+    )  # fmt: skip
+    return name
