@@ -59,12 +59,13 @@ class Surface:
         for number, side in enumerate(SIDES):
             normal, first, second = self._axes(side)
             steps = [max(2, int(np.ceil((high[a] - low[a]) / self.spacing)) + 1) for a in (first, second)]
-            grid = np.meshgrid(*(np.linspace(low[a], high[a], n) for a, n in zip((first, second), steps, strict=True)), indexing="ij")
+            lines = [np.linspace(low[a], high[a], n) for a, n in zip((first, second), steps, strict=True)]
+            grid = np.meshgrid(*lines, indexing="ij")
             points = np.empty((grid[0].size, 3))
             points[:, first], points[:, second] = grid[0].ravel(), grid[1].ravel()
             points[:, normal] = (high if side[0] == "+" else low)[normal]
             index = np.arange(len(points)).reshape(steps) + count
-            a, b, c, d = (index[s, t].ravel() for s, t in ((np.s_[:-1], np.s_[:-1]), (np.s_[1:], np.s_[:-1]), (np.s_[1:], np.s_[1:]), (np.s_[:-1], np.s_[1:])))
+            a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
             quads = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
             vertices.append(points)
             faces.append(quads)
@@ -181,11 +182,14 @@ def gaps(points: FloatArray, camera: FloatArray, frame: Equilibrium, surface: Su
 
     moved = frame.move(surface.vertices)
     scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-    scene.add_triangles(o3d.core.Tensor(moved.astype(np.float32)), o3d.core.Tensor(surface.faces.astype(np.uint32)))
+    scene.add_triangles(
+        o3d.core.Tensor.from_numpy(moved.astype(np.float32)), o3d.core.Tensor.from_numpy(surface.faces.astype(np.uint32))
+    )
     rays = points - camera
     length = np.linalg.norm(rays, axis=1)
     rays = rays / length[:, None]
-    cast = scene.cast_rays(o3d.core.Tensor(np.hstack([np.broadcast_to(camera, points.shape), rays]).astype(np.float32)))
+    lines = np.hstack([np.broadcast_to(camera, points.shape), rays]).astype(np.float32)
+    cast = scene.cast_rays(o3d.core.Tensor.from_numpy(lines))
     triangle = cast["primitive_ids"].numpy().astype(np.int64)
     hit = np.flatnonzero(np.isfinite(cast["t_hit"].numpy()))
     triangle, rays = triangle[hit], rays[hit]

@@ -147,10 +147,10 @@ class BoxMesh:
     @cached_property
     def base_nodes(self) -> IntArray:
         """Nodes at z = 0."""
-        return self._numbers[0].ravel()
+        return np.asarray(self._numbers[0].ravel())
 
     def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Elements' nodes and trilinear weights, both (m, 8), at rest positions (m, 3) [m]; points outside are moved to the block."""
+        """Elements' nodes and trilinear weights, both (m, 8), at rest positions (m, 3) [m]; outside is moved to the block."""
         cell, local = [], []
         for axis, coordinates in enumerate(self.axes):
             value = np.clip(points[:, axis], coordinates[0], coordinates[-1])

@@ -43,4 +43,5 @@ def paper_distance(points: FloatArray, frame: Equilibrium, surface: Surface) -> 
     """Mean distance [m] of measured points (n, 3) to the nearest super-sampled vertex (Wu, Kazanzides and Unberath 2020)."""
     if not len(points):
         return float("nan")
-    return float(cKDTree(supersampled(frame, surface)).query(points)[0].mean())
+    distance, _ = cKDTree(supersampled(frame, surface)).query(points)
+    return float(np.mean(distance))

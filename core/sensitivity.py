@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
+from core.fem.elastic import assemble_elastic
 from core.fem.linear import NotPositiveDefinite
 from core.fem.model import BlockModel, Probe
 from core.frames import FloatArray
@@ -89,14 +90,12 @@ def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray
     used = unknown >= 0
     count = int(model.topology.unknown.max()) + 1
     gather = sp.csr_matrix((forces[used], (unknown[used], np.nonzero(used)[0])), shape=(count, len(model.mu)))
-    result[:, model.topology.free] = -model.topology.factor.solve(gather @ log_factors.T).T
+    result[:, model.topology.free] = -model.topology.factor.solve(np.asarray(gather @ log_factors.T)).T
     return result
 
 
 def element_forces(model: BlockModel, positions: FloatArray) -> FloatArray:
     """Internal forces over E that each element puts on its own nodes (e, 8, 3) [m^2]."""
-    from core.fem.elastic import assemble_elastic
-
     count = len(model.mu)
     apart = np.arange(8 * count).reshape(count, 8)
     force = np.zeros((8 * count, 3))

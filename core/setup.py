@@ -17,7 +17,8 @@ Edge = Literal["-x", "+x", "-y", "+y"]
 
 def _within(key: str, value: float, low: float, high: float, unit: str) -> None:
     if not (math.isfinite(value) and low <= value <= high):
-        raise SetupError(f"{key} = {value:g} {unit} is outside {low:g} to {high:g} {unit}", key=key, value=value, low=low, high=high)
+        message = f"{key} = {value:g} {unit} is outside {low:g} to {high:g} {unit}"
+        raise SetupError(message, key=key, value=value, low=low, high=high)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -79,11 +79,14 @@ def _splits(dataset: Dataset) -> tuple[tuple[str, ...], tuple[str, ...]]:
     fitted = (*config.train, *config.validation)
     if len(fitted) < 2:
         raise DiagnosisError(
-            f"a diagnosis fits on some sequences and judges on others: train and validation name {len(fitted)}, at least 2 are needed",
+            f"[splits] train and validation name {len(fitted)} sequences, at least 2 are needed: causes are fitted on some "
+            "and judged on others",
             key="splits",
         )
     if not dataset.has_rest:
-        raise DiagnosisError("rest.ply is missing: without it the camera cannot be registered; record one raw cloud of the untouched phantom")
+        raise DiagnosisError(
+            "rest.ply is missing: without it the camera cannot be registered; record one raw cloud of the untouched phantom"
+        )
     if any(not len(dataset.sequence(name)) for name in (*fitted, *config.test)):
         raise DiagnosisError("sequences without clouds cannot be diagnosed yet; leave them out of [splits]", key="splits")
     return fitted, tuple(config.test)
@@ -137,7 +140,11 @@ def _run(
 def _gain(unseen: list[Observations], pool: Workers, stated: Setup, found: Setup, grid: GridSpec, seed: int) -> Ladder:
     names = [item.name for item in unseen]
     baseline = [future.result() for future in pool.submit(names, stated, grid)]
-    extended = baseline if found is stated else [future.result() for future in pool.submit(names, found, grid, None, baseline, same_points=False)]
+    extended = (
+        baseline
+        if found is stated
+        else [future.result() for future in pool.submit(names, found, grid, None, baseline, same_points=False)]
+    )
     return ladder(unseen, baseline, extended, stated, found, seed)
 
 

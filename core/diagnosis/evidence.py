@@ -69,7 +69,7 @@ def fit(blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray, 
     covariance = np.linalg.inv(matrix + precision)
     change = covariance @ (precision @ mean - right)
     misfit = square + 2 * right @ change + change @ matrix @ change
-    return Fit(change, covariance, float(misfit))
+    return Fit(np.asarray(change, dtype=float), np.asarray(covariance, dtype=float), float(misfit))
 
 
 def log_evidence(blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray) -> float:

@@ -53,7 +53,12 @@ def _share(baseline: FloatArray, extended: FloatArray, floor: FloatArray) -> Flo
 
 
 def ladder(
-    data: Sequence[Observations], baseline: Sequence[Prediction], extended: Sequence[Prediction], stated: Setup, found: Setup, seed: int
+    data: Sequence[Observations],
+    baseline: Sequence[Prediction],
+    extended: Sequence[Prediction],
+    stated: Setup,
+    found: Setup,
+    seed: int,
 ) -> Ladder:
     """Compare two models on test sequences, groups in touch only; probes are resampled whole."""
     rows, free = [], []

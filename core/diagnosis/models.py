@@ -324,6 +324,6 @@ class Bench:
         effects, at = [], 0
         for effect in model.effects:
             number = len(effect.numbers())
-            effects.append(effect.at(np.array(effect.coordinates) + step[at : at + number]))
+            effects.append(effect.at((np.array(effect.coordinates) + step[at : at + number]).tolist()))
             at += number
         return effects

@@ -108,7 +108,11 @@ def _thin(runs: list[list[int]], free: np.ndarray, most: int) -> list[list[int]]
 def observe(
     sequence: Sequence, setup: Setup, cleaner: Cleaner, shaft: FloatArray | None, most: int, rest: FloatArray | None = None
 ) -> Observations:
-    """Group a sequence's frames and clean their clouds; at most `most` groups with the tool near the block; `rest` is the rest cloud."""
+    """Group a sequence's frames and clean their clouds.
+
+    Args:
+        most: groups with the tool near the block, at most. rest: the raw rest cloud, which becomes the first group.
+    """
     kinematics, times = sequence.kinematics, np.asarray(sequence.cloud_times)
     centres = setup.phantom_from_robot.apply(smooth_centres(kinematics, times))
     free = clear_of(setup.geometry.size, centres) > setup.tool.radius + CLEARANCE

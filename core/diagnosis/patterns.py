@@ -87,4 +87,6 @@ def _unfold(axes: Any, found: Patterns, values: FloatArray, surface: Surface, li
     seen = np.isfinite(values)
     size = (surface.patch * 1e3 * 1.55) ** 2
     axes.scatter(*(1e3 * place[~seen]).T, s=size, c="0.93", marker="s", linewidths=0)
-    return axes.scatter(*(1e3 * place[seen]).T, s=size, c=values[seen], cmap="RdBu_r", vmin=-limit, vmax=limit, marker="s", linewidths=0)
+    return axes.scatter(
+        *(1e3 * place[seen]).T, s=size, c=values[seen], cmap="RdBu_r", vmin=-limit, vmax=limit, marker="s", linewidths=0
+    )

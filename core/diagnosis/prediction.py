@@ -224,5 +224,7 @@ def predict(
         frames.append(frame)
         if columns is not None:
             changes.append(columns.project(frame, moves[:, number], points, seen, means, group.reference).astype(np.float32))
-    stacked = np.stack(changes) if changes else np.zeros((len(gap), surface.patches, 0))
-    return Prediction(data.name, np.array(gap), np.array(count, dtype=float), np.array(spread), stacked, tuple(frames), tuple(chosen))
+    stacked: FloatArray = np.stack(changes) if changes else np.zeros((len(gap), surface.patches, 0))
+    return Prediction(
+        data.name, np.array(gap), np.array(count, dtype=float), np.array(spread), stacked, tuple(frames), tuple(chosen)
+    )

@@ -50,7 +50,8 @@ def _vertex_errors(seen: Gaps, surface: Surface) -> FloatArray:
     side_of = np.zeros(len(surface.vertices))
     side_of[surface.faces.ravel()] = np.repeat(surface.side, 3)
     tree = cKDTree(np.column_stack([seen.foot, lift * seen.side]))
-    for vertex, near in enumerate(tree.query_ball_point(np.column_stack([surface.vertices, lift * side_of]), _REACH)):
+    around = tree.query_ball_point(np.column_stack([surface.vertices, lift * side_of]), _REACH)
+    for vertex, near in enumerate(np.asarray(around, dtype=object)):
         if len(near) >= _LEAST:
             errors[vertex] = seen.gap[near].mean()
     return errors
@@ -84,7 +85,7 @@ def record(
     poses = tool_poses(sequence.kinematics, times, stated.phantom_from_robot, shaft)
     raw = [sequence.cloud(int(i)) for i in index]
     clouds = [cloud[cleaner.clean(cloud, pose).indices] for cloud, pose in zip(raw, poses, strict=True)]
-    sides = []
+    sides: list[Recorded] = []
     for setup in (stated, found):
         if sides and found is stated:
             sides.append(sides[0])

@@ -21,7 +21,7 @@ __all__ = ["Candidate", "linear_gains", "null_gains", "right_sides"]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Candidate:
-    """An effect as columns: `columns` with prior standard deviations `spread`; `widened` are nuisances with a wider prior instead."""
+    """An effect as columns: `columns` with prior deviations `spread`; `widened` are nuisances with a wider prior instead."""
 
     start: Effect
     columns: tuple[int, ...] = ()

@@ -76,7 +76,8 @@ class Findings:
 def lump_places(bench: Bench) -> tuple[Inclusion, ...]:
     """Places of the coarse grid of inclusions."""
     return tuple(
-        Inclusion(x=s.x, y=s.y, z=s.z, radius=s.radius, stiffness_ratio=s.stiffness_ratio) for s in StiffInclusion.starts(bench.setup)
+        Inclusion(x=s.x, y=s.y, z=s.z, radius=s.radius, stiffness_ratio=s.stiffness_ratio)
+        for s in StiffInclusion.starts(bench.setup)
     )
 
 

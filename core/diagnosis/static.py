@@ -57,7 +57,9 @@ class StaticChannel:
         places = means[good] * np.array([1.0, 1.0, 0.0])
         return cls(cloud[clean.indices], places, means[good, 2], spread**2 / count[good], bias)
 
-    def block(self, setup: Setup, grid: GridSpec, columns: int, varied: dict[int, tuple[Setup, float]], support: FloatArray) -> Block:
+    def block(
+        self, setup: Setup, grid: GridSpec, columns: int, varied: dict[int, tuple[Setup, float]], support: FloatArray
+    ) -> Block:
         """Quadratic form with the pose and the bias integrated out.
 
         Args:

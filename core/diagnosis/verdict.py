@@ -67,7 +67,7 @@ def _magnitudes(effect: CameraRegistration, spread: np.ndarray) -> dict[str, dic
 
 def _probabilities(findings: Findings) -> dict[tuple[str, ...], float]:
     """Softmax of tempered gains over the models tried and none; not calibrated on a suite yet."""
-    gains = {(): findings.bound}
+    gains: dict[tuple[str, ...], float] = {(): findings.bound}
     for trial in findings.trials:
         gains[trial.model.names] = max(trial.gain, gains.get(trial.model.names, -np.inf))
     names = list(gains)

@@ -75,7 +75,9 @@ class Effect(ABC):
             if item.choices:
                 if value not in item.choices:
                     raise EffectError(
-                        f"{self.name}: {item.name} = {value!r} is none of {', '.join(item.choices)}", parameter=item.name, value=value
+                        f"{self.name}: {item.name} = {value!r} is none of {', '.join(item.choices)}",
+                        parameter=item.name,
+                        value=value,
                     )
             elif not (math.isfinite(value) and item.low <= value <= item.high):
                 raise EffectError(
