@@ -1,0 +1,131 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pushed_block import POSE, SETUP, dwelling, poke, prediction, seen_points
+
+from core.diagnosis.gain import Ladder, ladder
+from core.diagnosis.observations import Group, Observations
+from core.diagnosis.prediction import Prediction
+from core.frames import FloatArray
+from core.measurement import Surface
+from core.mesh import GridSpec
+from core.metrics import paper_distance
+from core.replay import rest
+
+PATCHES, POINTS = 5, 10.0
+CLOUD = seen_points(rest(SETUP, GridSpec()), 300, 3e-4, 0)
+FLOOR = 1e-3
+
+
+def _observations(probes: list[int], name: str = "poke-01") -> Observations:
+    """Groups of these probes; 0 stands for an untouched one."""
+    times, stream = dwelling(np.array([poke(2e-3)] * len(probes)))
+    groups = [Group((number,), CLOUD, probe == 0, probe=probe) for number, probe in enumerate(probes)]
+    return Observations(name, times, stream, tuple(groups))
+
+
+def _model(sizes: list[float], name: str = "poke-01", points: float = POINTS, failed: tuple[int, ...] = ()) -> Prediction:
+    """Gaps of these sizes [m] in each group, of either sign."""
+    signs = np.array([1.0, -1.0, 1.0, -1.0, np.nan])
+    return prediction(np.array(sizes)[:, None] * signs, name=name, count=points, failed=failed)
+
+
+def _ladder(probes: list[int], before: list[float], after: list[float], failed: tuple[int, ...] = ()) -> Ladder:
+    return ladder([_observations(probes)], [_model(before)], [_model(after, failed=failed)], SETUP, SETUP, seed=0)
+
+
+def test_share_of_the_reducible_error_is_known():
+    found = _ladder([0, 1, 2, 0], [5e-3, 3e-3, 3e-3, 5e-3], [FLOOR, 1.5e-3, 1.5e-3, FLOOR])
+    assert found.baseline == pytest.approx(3e-3) and found.extended == pytest.approx(1.5e-3)
+    assert found.noise_floor == pytest.approx(FLOOR)
+    assert found.removed == pytest.approx((0.75, 0.75, 0.75))
+    assert found.probes == 2
+
+
+def test_spread_of_single_points_counts_as_error():
+    spread = 2e-3
+    item = _observations([0, 1])
+    before = replace(_model([0.0, 1e-3]), spread=np.full((2, PATCHES), spread))
+    found = ladder([item], [before], [before], SETUP, SETUP, seed=0)
+    assert found.baseline == pytest.approx(np.sqrt(1e-3**2 + spread**2 * (POINTS - 1) / POINTS))
+    assert found.noise_floor == pytest.approx(spread * np.sqrt((POINTS - 1) / POINTS))
+
+
+def test_groups_are_weighed_by_their_points():
+    item, counts = _observations([0, 1, 2]), np.array([[10.0], [30.0], [10.0]]) * np.ones(PATCHES)
+    before, after = (replace(_model(sizes), count=counts) for sizes in ([0.0, 1e-3, 3e-3], [0.0, 1e-3, 1e-3]))
+    found = ladder([item], [before], [after], SETUP, SETUP, seed=0)
+    assert found.baseline == pytest.approx(np.sqrt((30 * 1e-6 + 10 * 9e-6) / 40))
+
+
+def _many(seed: int, probes: int) -> Ladder:
+    """Probes whose errors vary by chance; half of the reducible error is removed in the long run."""
+    before, after = _varied(seed, probes)
+    return _ladder([0, *range(1, probes + 1)], [FLOOR, *before], [FLOOR, *after])
+
+
+def _varied(seed: int, probes: int) -> tuple[FloatArray, FloatArray]:
+    random = np.random.default_rng(seed)
+    before = random.uniform(2e-3, 4e-3, probes)
+    return before, random.uniform(0.3, 0.9, probes) * before
+
+
+def test_interval_brackets_the_share_of_endless_data():
+    before, after = _varied(0, 200000)
+    wanted = (np.sqrt(np.mean(before**2)) - np.sqrt(np.mean(after**2))) / (np.sqrt(np.mean(before**2)) - FLOOR)
+    found = [_many(seed, 24).removed for seed in range(1, 41)]
+    inside = np.mean([low <= wanted <= high for _, low, high in found])
+    assert inside >= 0.85
+    assert all(low < value < high for value, low, high in found)
+
+
+def test_more_probes_make_the_interval_narrower():
+    (_, low, high), (_, low_4, high_4) = _many(1, 10).removed, _many(1, 90).removed
+    assert high_4 - low_4 < 0.6 * (high - low)
+
+
+def test_probes_are_resampled_whole():
+    before, after = _varied(3, 8)
+    whole = _ladder([0, *range(1, 9)], [FLOOR, *before], [FLOOR, *after])
+    # Each probe seen in six groups instead of one tells no more.
+    probes = [0, *np.repeat(np.arange(1, 9), 6)]
+    parts = _ladder(probes, [FLOOR, *np.repeat(before, 6)], [FLOOR, *np.repeat(after, 6)])
+    assert parts.probes == whole.probes == 8
+    assert parts.removed == pytest.approx(whole.removed)
+
+
+def test_pushes_of_different_sequences_are_different_probes():
+    items = [_observations([0, 1], name) for name in ("a", "b")]
+    models = [_model([FLOOR, size], name) for name, size in (("a", 3e-3), ("b", 4e-3))]
+    assert ladder(items, models, models, SETUP, SETUP, seed=0).probes == 2
+
+
+def test_nothing_is_removed_where_nothing_is_reducible():
+    found = _ladder([0, 1, 2], [FLOOR] * 3, [FLOOR, 0.9 * FLOOR, 0.9 * FLOOR])
+    assert found.removed == (0.0, 0.0, 0.0)
+
+
+def test_model_that_is_worse_removes_less_than_nothing():
+    found = _ladder([0, 1, 2], [FLOOR, 2e-3, 2e-3], [FLOOR, 3e-3, 3e-3])
+    assert found.removed[0] == pytest.approx(-1.0)
+
+
+def test_group_that_one_model_fails_in_counts_for_neither():
+    found = _ladder([0, 1, 2], [FLOOR, 2e-3, 9e-3], [FLOOR, 1e-3, 9e-3], failed=(2,))
+    assert found.baseline == pytest.approx(2e-3) and found.extended == pytest.approx(1e-3)
+    assert found.probes == 1
+
+
+def test_rest_cloud_is_no_part_of_the_noise_floor():
+    item, before = _observations([0, 0, 1]), _model([9e-3, FLOOR, 3e-3])
+    groups = (replace(item.groups[0], reference=True), *item.groups[1:])
+    assert ladder([replace(item, groups=groups)], [before], [before], SETUP, SETUP, seed=0).noise_floor == pytest.approx(FLOOR)
+
+
+def test_papers_metric_is_the_mean_over_touched_groups():
+    found = _ladder([0, 1, 2], [FLOOR, 2e-3, 3e-3], [FLOOR, 2e-3, 3e-3])
+    wanted = paper_distance(POSE.apply(CLOUD), rest(SETUP, GridSpec()), Surface(SETUP.geometry))
+    assert found.paper == pytest.approx((wanted, wanted))

@@ -1,0 +1,157 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pushed_block import GRID, SETUP, SIZE, TOP, dwelling, observed, poke, seen_points
+
+from core.diagnosis.noise import Noise
+from core.diagnosis.observations import Group, Observations
+from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted, predict, touch_correction
+from core.effects.sensor import CameraRegistration
+from core.frames import FloatArray
+from core.measurement import Surface
+from core.registration import small_motion
+from core.replay import rest
+from core.setup import Inclusion, Load, Setup, Tool
+
+PIVOT = np.array([0.0, 0.0, TOP])
+CENTRES = np.array([poke(-8e-3), poke(2e-3), poke(4e-3)])
+TRUTH = replace(SETUP, tool=Tool(radius=5.3e-3, offset=(2e-4, 0.0, 1e-4)))
+LUMP = Inclusion(x=5e-3, y=0.0, z=0.024, radius=7e-3, stiffness_ratio=5.0)
+RADIUS_STEP, CAMERA_STEP, MOVE = 3e-7, 1e-6, 1e-5
+TIGHT = 1e-8
+
+
+def _wider(step: float) -> Setup:
+    return replace(SETUP, tool=Tool(radius=SETUP.tool.radius + step))
+
+
+def _camera_lifted(step: float) -> Setup:
+    return replace(CameraRegistration.neutral(SETUP), tz=step).apply(SETUP)
+
+
+WANTED = Wanted(
+    setups=(_wider(RADIUS_STEP), _camera_lifted(CAMERA_STEP)), steps=(RADIUS_STEP, CAMERA_STEP), lumps=(LUMP,), pivot=PIVOT
+)
+
+# Column, the setup changed by a finite step, and the step.
+CHANGES: dict[str, tuple[int, Setup, float]] = {
+    **{
+        f"tool along {'xyz'[axis]}": (axis, replace(SETUP, tool=Tool(radius=5e-3, offset=tuple(MOVE * np.eye(3)[axis]))), MOVE)
+        for axis in range(3)
+    },
+    **{
+        f"robot turned about {'xyz'[axis]}": (
+            3 + axis,
+            replace(SETUP, phantom_from_robot=small_motion(np.append(np.zeros(3), 2e-3 * np.eye(3)[axis]), PIVOT)),
+            2e-3,
+        )
+        for axis in range(3)
+    },
+    "radius": (TOOL_COLUMNS, _wider(MOVE), MOVE),
+    "camera": (TOOL_COLUMNS + 1, _camera_lifted(1e-4), 1e-4),
+    "lump": (
+        TOOL_COLUMNS + 2,
+        replace(SETUP, material=replace(SETUP.material, inclusions=(replace(LUMP, stiffness_ratio=np.exp(0.02)),))),
+        0.02,
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def data() -> Observations:
+    """Two pushes, and a look at the untouched block, just as the stated setup has them."""
+    return observed(SETUP, CENTRES, noise=0.0)
+
+
+@pytest.fixture(scope="module")
+def baseline(data) -> Prediction:
+    """The stated setup, with every kind of column."""
+    return predict(data, SETUP, GRID, WANTED, tolerance=TIGHT)
+
+
+def _again(data: Observations, setup: Setup, baseline: Prediction) -> Prediction:
+    return predict(data, setup, GRID, None, baseline.equilibria, TIGHT, baseline.samples)
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_column_is_the_difference_of_two_predictions(data, baseline, name):
+    column, changed, step = CHANGES[name]
+    after = _again(data, changed, baseline)
+    assert not after.failed
+    difference = (after.gap - baseline.gap) / step
+    seen = np.isfinite(difference)
+    found = np.where(seen, baseline.columns[..., column], 0.0)
+    wanted = np.where(seen, difference, 0.0)
+    touched = np.linalg.norm(wanted[1:])
+    assert touched > 0
+    assert np.linalg.norm(found[1:] - wanted[1:]) < 0.02 * touched
+    if name != "camera":
+        assert not wanted[0].any() and not found[0].any()
+
+
+def test_truth_leaves_only_noise_and_the_stated_setup_more():
+    item = observed(TRUTH, CENTRES, noise=2e-4)
+    found, stated = predict(item, TRUTH, GRID), predict(item, SETUP, GRID, WANTED)
+    white = found.spread / np.sqrt(np.maximum(found.count, 1))
+
+    def misfit(gap: FloatArray) -> float:
+        return float(np.sqrt(np.nanmean(np.where(found.count >= 8, gap / np.maximum(white, 1e-9), np.nan)[1:] ** 2)))
+
+    assert misfit(found.gap) == pytest.approx(1.0, abs=0.15)
+    assert misfit(stated.gap) > 1.25 * misfit(found.gap)
+    # The columns lead from the stated setup most of the way to the truth.
+    change = np.array([2e-4, 0.0, 1e-4, 0.0, 0.0, 0.0, 3e-4, 0.0, 0.0])
+    assert misfit(stated.gap + stated.columns @ change) < 1.15 * misfit(found.gap)
+
+
+def test_same_points_give_a_difference_without_their_noise():
+    clean, noisy = (observed(SETUP, CENTRES[2:], noise=noise, count=9000) for noise in (0.0, 8e-4))
+    changed = replace(SETUP, tool=Tool(radius=5e-3, offset=(0.0, 0.0, -3e-4)))
+    quiet, loud = predict(clean, SETUP, GRID), predict(noisy, SETUP, GRID)
+    wanted = _again(clean, changed, quiet).gap - quiet.gap
+    same, anew = _again(noisy, changed, loud).gap - loud.gap, predict(noisy, changed, GRID).gap - loud.gap
+    scatter = np.nanmedian(loud.spread / np.sqrt(np.maximum(loud.count, 1)))
+    assert np.nanmedian(np.abs(wanted)) > 0
+    assert np.nanstd(same - wanted) < 0.3 * scatter
+    assert np.nanstd(same - wanted) < 0.7 * np.nanstd(anew - wanted)
+
+
+def test_reference_group_does_not_feel_the_cameras_later_shift(data):
+    groups = (replace(data.groups[0], frames=(), reference=True), data.groups[0])
+    item = replace(data, groups=groups)
+    before, after = predict(item, SETUP, GRID, WANTED), predict(item, _camera_lifted(1e-3), GRID)
+    top = Surface(SETUP.geometry).patch_normals[:, 2] > 0.5
+    assert not before.columns[0].any() and np.nanmean(before.columns[1, top, TOOL_COLUMNS + 1]) > 0.5
+    moved = after.gap - before.gap
+    assert np.nanmax(np.abs(moved[0])) == 0
+    assert np.nanmedian(moved[1, top]) == pytest.approx(1e-3, rel=0.05)
+
+
+def test_group_without_equilibrium_is_named_and_gains_nothing():
+    centres = np.array([poke(2e-3), poke(0.7 * TOP), poke(2e-3)])
+    times, stream = dwelling(centres)
+    points = seen_points(rest(SETUP, GRID), 3000, 2e-4, 0)
+    item = Observations("deep", times, stream, tuple(Group((n,), points, False) for n in range(3)))
+    found = predict(item, SETUP, GRID, WANTED)
+    assert found.failed == (1,)
+    surface = Surface(SETUP.geometry)
+    # A baseline that did find its equilibrium there: in that group the failed model changes nothing.
+    honest = replace(found, equilibria=(found.equilibria[0],) * 3, gap=np.nan_to_num(found.gap))
+    noise = Noise.of(honest, honest, surface, np.full(surface.patches, 1e-7), slice(TOOL_COLUMNS + 2, TOOL_COLUMNS + 3))
+    other, quiet = found.gap.copy(), found.columns.copy()
+    other[1], quiet[1] = noise.residual[1], 0.0
+    wanted = noise.block(replace(honest, gap=other, columns=quiet))
+    assert np.allclose(noise.block(found).gram, wanted.gram)
+
+
+def test_sagged_landmarks_correct_the_touches():
+    landmarks = tuple((x * SIZE[0] / 2, y * SIZE[1] / 2, TOP) for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1)))
+    sagging = replace(SETUP, landmarks=landmarks, load=Load(specific_weight_over_stiffness=1.5))
+    found = touch_correction(sagging, GRID)
+    corners = np.array(landmarks)
+    assert np.allclose(found.apply(corners).mean(axis=0), rest(sagging, GRID).move(corners).mean(axis=0), atol=1e-9)
+    assert found.translation[2] < -1e-4
+    assert np.array_equal(touch_correction(replace(sagging, load=Load()), GRID).matrix, np.eye(4))

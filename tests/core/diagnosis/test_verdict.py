@@ -1,0 +1,248 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pushed_block import SETUP, prediction, registration
+from small_dataset import write_valid_dataset
+
+from core.dataset import Dataset, open_dataset
+from core.diagnosis.evidence import Block, gram
+from core.diagnosis.gain import Ladder
+from core.diagnosis.models import Bench, Model
+from core.diagnosis.patterns import draw_patterns, patterns
+from core.diagnosis.prediction import TOOL_COLUMNS
+from core.diagnosis.search import RIVAL, Findings, Trial
+from core.diagnosis.verdict import UNEXPLAINED_MISFIT, intervals, report_of, verdict_of
+from core.diagnosis.workers import Workers
+from core.effects import CATALOGUE, Effect
+from core.effects.load import Gravity
+from core.effects.material import PoissonRatio, StiffInclusion
+from core.effects.sensor import CameraRegistration
+from core.effects.support import BaseDetachment
+from core.effects.tool import ToolRadius
+from core.frames import FloatArray
+from core.mesh import GridSpec
+
+NUISANCES = TOOL_COLUMNS + 9
+GROUPS = 4
+LUMP = StiffInclusion(x=0.01, y=-0.002, z=0.024, radius=6e-3, stiffness_ratio=4.0)
+RADIUS, NU = ToolRadius(radius=4.4e-3), PoissonRatio(nu=0.40)
+CAMERA = CameraRegistration(tx=2e-3, ty=0.0, tz=-1e-3, rx=0.0, ry=0.02, rz=0.0)
+LADDER = Ladder(
+    baseline=1.92e-3, extended=0.61e-3, noise_floor=0.55e-3, removed=(0.956, 0.93, 0.98), paper=(2.4e-3, 1.3e-3), probes=9
+)
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    """Two sequences, one of them without forces."""
+    return open_dataset(write_valid_dataset(tmp_path_factory.mktemp("data") / "small-block"))
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Bench]:
+    """The stated setup with its priors; nothing is replayed here."""
+    with Workers([], 1) as workers:
+        yield Bench(SETUP, registration(), workers, ["poke-01"], None, GridSpec(), GridSpec())
+
+
+def _model(bench: Bench, *effects: Effect, seed: int = 0) -> Model:
+    """A model whose blocks are noise with sizeable columns."""
+    random = np.random.default_rng(seed)
+    own = sum(len(effect.numbers()) for effect in effects)
+    scales = np.array([item.scale for effect in effects for item in effect.numbers()])
+    shape = (GROUPS, bench.surface.patches)
+    size = np.concatenate([np.full(NUISANCES - 1, 1e-4), 1e-5 / scales, [1e-5]])
+    columns = size * random.standard_normal((*shape, NUISANCES + own))
+    gap = 1e-4 * random.standard_normal(shape)
+    gap[:, :3] = np.nan
+    weights = np.where(np.isfinite(gap), 1e8, 0.0)
+    setup = SETUP
+    for effect in effects:
+        setup = effect.apply(setup)
+    blocks = [Block("poke-01", *gram(gap, columns, weights)), Block("poke-02", *gram(2 * gap, columns, weights))]
+    at = NUISANCES - 1
+    return Model(
+        effects, setup, (prediction(gap),), tuple(blocks), tuple(range(at, at + own)), {}, (*range(at), at + own)
+    )  # fmt: skip
+
+
+Tried = tuple[tuple[Effect, ...], float, float]
+
+
+def _findings(bench: Bench, *trials: Tried, accepted: bool = True, misfit: float = 2.0) -> Findings:
+    """Trials as (effects, gain, misfit left), best first; the first is accepted or not."""
+    made = [Trial(_model(bench, *effects), gain, left) for effects, gain, left in trials]
+    screened = {kind.name: 0.5 * number for number, kind in enumerate(CATALOGUE)}
+    return Findings(_model(bench), made[0] if accepted and made else None, made, 12.0, misfit, screened)
+
+
+def test_one_cause_far_ahead_is_found(bench):
+    assert verdict_of(_findings(bench, ((LUMP,), 90.0, 1.05), ((RADIUS,), 90.0 - 1.1 * RIVAL, 1.4))) == "found"
+
+
+def test_two_causes_about_as_good_are_ambiguous(bench):
+    assert verdict_of(_findings(bench, ((LUMP,), 90.0, 1.05), ((RADIUS,), 90.0 - 0.9 * RIVAL, 1.1))) == "ambiguous"
+
+
+def test_same_cause_from_another_start_is_no_rival(bench):
+    assert verdict_of(_findings(bench, ((LUMP,), 90.0, 1.05), ((LUMP,), 89.0, 1.1))) == "found"
+
+
+def test_part_of_a_pair_is_no_rival(bench):
+    assert verdict_of(_findings(bench, ((LUMP, RADIUS), 90.0, 1.05), ((LUMP,), 89.0, 1.1))) == "found"
+
+
+@pytest.mark.parametrize(("left", "wanted"), [(1.02, "none"), (UNEXPLAINED_MISFIT + 0.2, "unexplained")])
+def test_without_a_cause_it_depends_on_what_is_left(bench, left, wanted):
+    assert verdict_of(_findings(bench, ((LUMP,), 3.0, 1.0), accepted=False, misfit=left)) == wanted
+    assert verdict_of(_findings(bench, accepted=False, misfit=left)) == wanted
+
+
+@pytest.mark.parametrize("effect", [LUMP, RADIUS, NU, CAMERA, Gravity(specific_weight_over_stiffness=1.2)], ids=lambda e: e.name)
+def test_interval_holds_the_value_within_the_bounds(bench, effect):
+    entry = intervals(bench, _model(bench, effect))[0]
+    assert set(entry) == set(effect.reported())
+    for item in effect.numbers():
+        stated = entry[item.name]
+        assert item.low <= stated["low"] < stated["value"] < stated["high"] <= item.high
+        assert stated["value"] == pytest.approx(getattr(effect, item.name)) and stated["unit"] == item.unit
+
+
+def test_interval_is_the_fits_deviation(bench):
+    model = _model(bench, RADIUS)
+    # Columns of 1e-5 m per scale at 1e-4 m noise, over all seen patches of the two blocks.
+    values = sum(block.values for block in model.blocks)
+    deviation = RADIUS.numbers()[0].scale / np.sqrt(0.1**2 * values)
+    entry = intervals(bench, model)[0]["radius"]
+    assert entry["high"] - entry["low"] == pytest.approx(2 * 1.96 * deviation, rel=0.1)
+
+
+def test_place_of_a_detached_edge_is_stated_without_interval(bench):
+    entry = intervals(bench, _model(bench, BaseDetachment(edge="+x", extent=0.02)))[0]
+    assert entry["edge"] == {"value": "+x", "unit": ""}
+    assert entry["extent"]["low"] < 0.02 < entry["extent"]["high"]
+
+
+def test_camera_is_reported_by_its_magnitudes(bench):
+    entry = intervals(bench, _model(bench, CAMERA))[0]
+    assert entry["translation"]["value"] == pytest.approx(np.hypot(2e-3, 1e-3))
+    assert entry["rotation"]["value"] == pytest.approx(0.02)
+    assert entry["translation"]["low"] <= entry["translation"]["value"] <= entry["translation"]["high"]
+
+
+def test_magnitude_near_zero_lies_in_its_interval(bench):
+    entry = intervals(bench, _model(bench, CAMERA.moved([2e-3, 0.0, 0.0, 1e-6, 0.0, 0.0])))[0]["rotation"]
+    assert entry["low"] <= entry["value"] < entry["high"]
+
+
+def test_intervals_of_several_causes_keep_to_their_columns(bench):
+    lump, radius = intervals(bench, _model(bench, LUMP, RADIUS))
+    assert lump["stiffness_ratio"]["value"] == pytest.approx(4.0)
+    assert radius["radius"]["value"] == pytest.approx(4.4e-3)
+
+
+def test_report_keeps_the_contract(bench, dataset):
+    findings = _findings(bench, ((LUMP,), 90.0, 1.05), ((RADIUS,), 40.0, 1.5))
+    report = report_of(dataset, bench, findings, LADDER, "test")
+    assert json.loads(json.dumps(report)) == report
+    assert (report["format"], report["dataset"], report["verdict"]) == (1, "small-block", "found")
+    (cause,) = report["causes"]
+    assert cause["effect"] == "stiff_inclusion" and cause["probability"] > 0.99
+    assert set(cause["parameters"]) == {"x", "y", "z", "radius", "stiffness_ratio"}
+    assert all({"value", "unit", "low", "high"} == set(entry) for entry in cause["parameters"].values())
+    assert {row["effect"] for row in report["ranking"]} == {kind.name for kind in CATALOGUE} - {"stiff_inclusion"}
+    assert all({"effect", "probability", "error_removed"} <= set(row) for row in report["ranking"])
+    assert report["ranking"][0]["effect"] == "tool_radius" and report["ranking"][0]["error_removed"] == pytest.approx(0.5)
+    assert {"fraction", "where", "when"} <= set(report["unexplained"])
+    assert report["warnings"] == ["the touches disagree"]
+    assert report["gain"] == {
+        "split": "test", "unit": "mm", "baseline": 1.92, "extended": 0.61, "noise_floor": 0.55,
+        "reducible_removed": {"value": 0.956, "low": 0.93, "high": 0.98}, "paper_metric": {"baseline": 2.4, "extended": 1.3},
+        "probes": 9,
+    }  # fmt: skip
+
+
+def test_stiffness_is_not_identifiable_without_forces(bench, dataset):
+    (entry,) = report_of(dataset, bench, _findings(bench, accepted=False, misfit=1.0), None, "test")["not_identifiable"]
+    assert entry["effect"] == "young_modulus"
+    assert "force" in entry["measure_instead"] and entry["why"]
+
+
+def test_report_without_a_cause_names_none(bench, dataset):
+    report = report_of(dataset, bench, _findings(bench, ((LUMP,), 2.0, 1.0), accepted=False, misfit=1.0), None, "test")
+    assert report["verdict"] == "none" and report["causes"] == [] and report["gain"] is None
+    assert len(report["ranking"]) == len(CATALOGUE)
+
+
+def test_ambiguous_report_names_every_rival(bench, dataset):
+    findings = _findings(bench, ((LUMP,), 90.0, 1.05), ((RADIUS,), 88.0, 1.1), ((NU,), 20.0, 1.9))
+    report = report_of(dataset, bench, findings, None, "test")
+    assert [cause["effect"] for cause in report["causes"]] == ["stiff_inclusion", "tool_radius"]
+    first, second = (cause["probability"] for cause in report["causes"])
+    assert 0.5 < first < 0.75 and second == pytest.approx(1 - first, abs=1e-3)
+
+
+@pytest.mark.parametrize("accepted", [True, False])
+def test_probabilities_of_exclusive_causes_add_up_to_at_most_one(bench, dataset, accepted):
+    trials = (((LUMP,), 20.0, 1.1), ((RADIUS,), 16.0, 1.2), ((NU,), 13.0, 1.2), ((LUMP,), 18.0, 1.2))
+    report = report_of(dataset, bench, _findings(bench, *trials, accepted=accepted), None, "test")
+    chances = [row["probability"] for row in (*report["causes"], *report["ranking"])]
+    assert all(0 <= chance <= 1 for chance in chances)
+    assert sum(chances) <= 1 + 1e-3
+    assert sum(chances) < 0.99  # that there is no cause has a probability, too
+
+
+def test_what_is_left_is_told_by_place_and_sequence(bench, dataset):
+    findings = _findings(bench, accepted=False, misfit=3.0)
+    left = report_of(dataset, bench, findings, None, "test")["unexplained"]
+    assert left["when"] == "most in poke-02"
+    assert 0 <= left["fraction"] <= 1 and "mm" in left["where"]
+
+
+def _pictured(bench: Bench, gap: FloatArray, count: FloatArray) -> Model:
+    return Model((), SETUP, (prediction(gap, count=count),), (), (), {}, ())
+
+
+def test_patterns_are_the_error_and_what_the_cause_explains_of_it(bench, tmp_path):
+    random = np.random.default_rng(1)
+    patches = bench.surface.patches
+    camera, error, cause = 1e-4 * random.standard_normal((3, patches))
+    # The rest cloud, an untouched frame, and two in which the cause matters.
+    size = np.array([0.0, 0.0, 1.0, 2.0])[:, None]
+    before, count = camera + size * error, np.full((4, patches), 10.0)
+    after = before - size * cause
+    after[2, 5] = np.nan
+    before[0, 8] = np.nan
+    found = patterns(bench, _pictured(bench, before, count), _pictured(bench, after, count))
+    clear = np.delete(np.arange(patches), [5, 8])
+    assert np.allclose(found.measured[clear], 1.5 * error[clear])
+    assert np.allclose(found.predicted[clear], 1.5 * cause[clear])
+    assert found.measured[5] == pytest.approx(2 * error[5])  # only the frame in which both models see it
+    assert np.isnan(found.measured[8]) and np.isnan(found.predicted[8])
+    found.save(tmp_path / "patterns.npz")
+    with np.load(tmp_path / "patterns.npz") as saved:
+        assert set(saved) == {"centres", "normals", "measured", "predicted"}
+        assert saved["centres"].shape == saved["normals"].shape == (patches, 3)
+
+
+def test_patterns_of_few_points_are_left_open(bench):
+    gap = np.full((3, bench.surface.patches), 1e-4)
+    gap[0] = 0.0
+    count = np.full(gap.shape, 10.0)
+    count[:, 4] = 1.0
+    found = patterns(bench, _pictured(bench, gap, count), _pictured(bench, np.zeros_like(gap), count))
+    assert np.isnan(found.measured[4]) and np.isfinite(np.delete(found.measured, 4)).all()
+
+
+def test_patterns_are_drawn_as_png(bench, tmp_path: Path):
+    gap = 1e-3 * np.random.default_rng(2).standard_normal((4, bench.surface.patches))
+    count = np.full(gap.shape, 10.0)
+    found = patterns(bench, _pictured(bench, gap, count), _pictured(bench, 0.2 * gap, count))
+    draw_patterns(found, bench.surface, tmp_path / "patterns.png")
+    assert (tmp_path / "patterns.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "patterns.png").stat().st_size > 10_000

@@ -1,0 +1,148 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pushed_block import GRID, SETUP, poke
+
+from core.fem.elastic import elastic_energy
+from core.fem.model import BlockModel, log_stiffness
+from core.fem.newton import solve
+from core.frames import FloatArray
+from core.replay import Equilibrium, Replay
+from core.sensitivity import TOOL_STEP, displacement_changes, element_forces, factorise_at, stiffness_changes
+from core.setup import Inclusion, Load, Sensor, Setup
+
+TIGHT = 1e-10
+SMALL = 1e-3
+
+
+@pytest.fixture(scope="module")
+def pushed() -> tuple[Replay, Equilibrium]:
+    """A ball pressed in by 4 mm, solved to the last digits."""
+    block = Replay(SETUP, GRID, TIGHT)
+    return block, block.step(poke(4e-3), block.step(poke(2e-3)))
+
+
+def _relative(found: FloatArray, wanted: FloatArray) -> float:
+    assert np.linalg.norm(wanted) > 0
+    return float(np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
+
+
+def _stiffened(frame: Equilibrium, log_factor: FloatArray) -> FloatArray:
+    """Displacement (n, 3) [m] when the elements' stiffness is multiplied, by a full solve."""
+    model = BlockModel(SETUP, frame.mesh)
+    model.mu, model.bulk = model.mu * np.exp(log_factor), model.bulk * np.exp(log_factor)
+    solution = solve(model, frame.probe, frame.mesh.nodes + frame.displacement, None, TIGHT)
+    assert solution.converged
+    return solution.positions - frame.mesh.nodes
+
+
+def test_stiffness_changes_are_those_of_full_solves(pushed):
+    block, frame = pushed
+    corners = frame.mesh.nodes[frame.mesh.hexahedra]
+    near = int(np.argmin(np.linalg.norm(corners.mean(axis=1) - poke(14e-3), axis=1)))
+    alone = np.zeros(len(corners))
+    alone[near] = 1.0
+    lump = log_stiffness((Inclusion(x=8e-3, y=0.0, z=0.022, radius=7e-3, stiffness_ratio=np.e),), corners)
+    field = np.random.default_rng(0).standard_normal(len(corners))
+    found = stiffness_changes(block, frame, np.array([alone, lump, field]))
+    for factor, change in zip((alone, lump, field), found, strict=True):
+        wanted = (_stiffened(frame, SMALL * factor) - _stiffened(frame, -SMALL * factor)) / (2 * SMALL)
+        assert _relative(change, wanted) < 0.01
+
+
+def test_stiffness_everywhere_the_same_moves_only_against_the_contact(pushed):
+    block, frame = pushed
+    whole = stiffness_changes(block, frame, np.ones((1, len(frame.mesh.hexahedra))))[0]
+    # Position-driven: a stiffer block takes the same shape, but for the softness of the contact.
+    assert np.abs(whole).max() < 0.05 * np.abs(frame.displacement).max()
+
+
+def test_lump_of_the_setup_is_what_its_column_says(pushed):
+    block, frame = pushed
+    lump = Inclusion(x=8e-3, y=0.0, z=0.022, radius=7e-3, stiffness_ratio=np.e)
+    corners = frame.mesh.nodes[frame.mesh.hexahedra]
+    found = stiffness_changes(block, frame, log_stiffness((lump,), corners)[None])[0]
+    setups = [
+        replace(SETUP, material=replace(SETUP.material, inclusions=(replace(lump, stiffness_ratio=np.exp(step)),)))
+        for step in (SMALL, -SMALL)
+    ]
+    stiffer, softer = (Replay(setup, GRID, TIGHT).step(poke(4e-3), frame).displacement for setup in setups)
+    assert _relative(found, (stiffer - softer) / (2 * SMALL)) < 0.01
+
+
+def test_element_forces_are_gradients_of_each_elements_energy(pushed):
+    block, frame = pushed
+    model = block.model(frame.mesh)
+    positions = frame.mesh.nodes + frame.displacement
+    forces = element_forces(model, positions)
+    random = np.random.default_rng(1)
+    for element in random.choice(len(forces), 5, replace=False):
+        only = slice(element, element + 1)
+
+        def energy(where: FloatArray, only: slice = only) -> float:
+            return float(
+                elastic_energy(
+                    model.law, model.gradients[only], model.weights[only], model.topology.hexahedra[only],
+                    model.mu[only], model.bulk[only], where,
+                )
+            )  # fmt: skip
+
+        for corner, axis in ((0, 2), (5, 0), (7, 1)):
+            step = np.zeros_like(positions)
+            step[model.topology.hexahedra[element, corner], axis] = 1e-7
+            wanted = (energy(positions + step) - energy(positions - step)) / 2e-7
+            assert forces[element, corner, axis] == pytest.approx(wanted, rel=1e-3, abs=1e-5 * np.abs(forces).max())
+
+
+def test_element_forces_add_up_to_the_residual_and_balance(pushed):
+    block, frame = pushed
+    model = block.model(frame.mesh)
+    positions = frame.mesh.nodes + frame.displacement
+    forces = element_forces(model, positions)
+    total = np.zeros_like(positions)
+    np.add.at(total, model.topology.hexahedra, forces)
+    assert np.allclose(total[model.topology.free], model.assemble(positions, None).residual, atol=1e-16)
+    assert np.abs(forces.sum(axis=1)).max() < 1e-9 * np.abs(forces).max()
+
+
+def test_tool_motion_is_that_of_full_solves(pushed):
+    block, frame = pushed
+    found = displacement_changes(block, frame, [(SETUP, TOOL_STEP * axis) for axis in np.eye(3)]) / TOOL_STEP
+    for axis, change in zip(np.eye(3), found, strict=True):
+        ahead, behind = (block.step(poke(4e-3) + sign * 1e-6 * axis, frame).displacement for sign in (1, -1))
+        assert _relative(change, (ahead - behind) / 2e-6) < 0.02
+
+
+def test_sensor_alone_moves_nothing(pushed):
+    block, frame = pushed
+    late = replace(SETUP, sensor=Sensor(time_offset=0.1))
+    assert not displacement_changes(block, frame, [(late, np.zeros(3))]).any()
+
+
+def test_changes_are_linear_in_the_step(pushed):
+    block, frame = pushed
+
+    def softer(change: float) -> Setup:
+        return replace(SETUP, material=replace(SETUP.material, poisson_ratio=0.45 + change))
+
+    one, two = displacement_changes(block, frame, [(softer(1e-4), np.zeros(3)), (softer(2e-4), np.zeros(3))])
+    assert _relative(two, 2 * one) < 5e-3
+
+
+def test_untouched_block_answers_to_weight_only():
+    block = Replay(SETUP, GRID)
+    frame = block.step(poke(-9e-3))
+    assert not displacement_changes(block, frame, [(SETUP, np.array([0.0, 0.0, TOOL_STEP]))]).any()
+    assert not stiffness_changes(block, frame, np.ones((2, len(frame.mesh.hexahedra)))).any()
+    sagging = Replay(replace(SETUP, load=Load(specific_weight_over_stiffness=1.5)), GRID)
+    heavier = replace(SETUP, load=Load(specific_weight_over_stiffness=1.501))
+    assert displacement_changes(sagging, sagging.step(poke(-9e-3)), [(heavier, np.zeros(3))])[0, :, 2].min() < 0
+
+
+def test_no_changes_ask_for_no_solve(pushed):
+    block, frame = pushed
+    assert displacement_changes(block, frame, []).shape == (0, *frame.displacement.shape)
+    assert factorise_at(block, frame) is not None
