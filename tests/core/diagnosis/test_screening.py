@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from pushed_block import SETUP
+from scipy.stats import ks_2samp
 
 from core.diagnosis.evidence import FLAT, Block, gram, log_evidence, predictive_score
 from core.diagnosis.screening import Candidate, linear_gains, null_gains, right_sides
@@ -79,6 +80,19 @@ def test_chance_stays_below_its_own_quantile_in_fresh_data():
     best = linear_gains(blocks, rights, NUISANCE, KNOWN, CATALOGUE).max(axis=1)
     assert 0.975 < np.mean(best < bound) < 0.999
     assert np.median(best) < 0.5 * bound
+
+
+def test_null_draws_are_distributed_like_fresh_data():
+    # Wider priors only: here the nuisances' own stated deviations decide.
+    wide = [
+        Candidate(start=ToolOffset.neutral(SETUP), widened={0: 2.0, 1: 2.0}),
+        Candidate(start=ToolRadius.neutral(SETUP), widened={2: 2.0}),
+    ]
+    drawn = null_gains(_blocks({}, seed=3), NUISANCE, KNOWN, wide, 1000, seed=4)
+    blocks = _blocks({}, seed=3)
+    rights = np.concatenate([right_sides(_blocks({}, seed)) for seed in range(100, 600)])
+    fresh = linear_gains(blocks, rights, NUISANCE, KNOWN, wide).max(axis=1)
+    assert ks_2samp(drawn, fresh).pvalue > 0.01
 
 
 def test_planted_column_is_found_far_above_chance():

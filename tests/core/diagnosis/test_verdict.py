@@ -230,6 +230,16 @@ def test_patterns_are_the_error_and_what_the_cause_explains_of_it(bench, tmp_pat
         assert saved["centres"].shape == saved["normals"].shape == (patches, 3)
 
 
+def test_rest_cloud_is_the_zero_of_the_patterns_and_no_part_of_them(bench):
+    random = np.random.default_rng(3)
+    error, cause = 1e-4 * random.standard_normal((2, bench.surface.patches))
+    before = np.array([[0.0], [0.0], [1.0], [2.0], [2.5]]) * error
+    after = before - np.array([[3.0], [0.0], [1.0], [2.0], [2.5]]) * cause  # a cause that changes the rest shape most of all
+    count = np.full(before.shape, 10.0)
+    found = patterns(bench, _pictured(bench, before, count), _pictured(bench, after, count))
+    assert np.allclose(found.measured, 2.5 * error) and np.allclose(found.predicted, 2.5 * cause)
+
+
 def test_patterns_of_few_points_are_left_open(bench):
     gap = np.full((3, bench.surface.patches), 1e-4)
     gap[0] = 0.0
