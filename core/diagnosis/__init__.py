@@ -30,9 +30,9 @@ from core.setup import Setup
 __all__ = ["DIAGNOSIS_GRID", "FINE_GRID", "diagnose"]
 
 DIAGNOSIS_GRID = GridSpec(nodes=(15, 11, 9), spacing=1.2e-3)
-FINE_GRID = GridSpec(nodes=(23, 17, 13), spacing=0.65e-3)
+FINE_GRID = GridSpec(nodes=(21, 15, 12), spacing=0.75e-3)
 """For a tool of 5 mm; both are scaled with the stated radius."""
-FIT_GROUPS = 20
+FIT_GROUPS = 14
 TEST_GROUPS = 32
 _LEAST_BIAS = 1.5e-4
 _USUAL_RADIUS = 5e-3

@@ -9,6 +9,7 @@ import numpy as np
 
 from core.diagnosis.observations import Observations
 from core.diagnosis.prediction import Prediction
+from core.errors import DiagnosisError
 from core.frames import FloatArray
 from core.measurement import Surface
 from core.metrics import paper_distance
@@ -25,7 +26,8 @@ class Ladder:
     """RMS of signed distance [m] in touched frames, and the share of the reducible error that is removed.
 
     Attributes:
-        baseline, extended: of the stated and the extended model. noise_floor: of the extended model in untouched frames.
+        baseline, extended: of the stated and the extended model.
+        noise_floor: of the extended model in untouched frames, in the same patches.
         removed: (value, low, high) of (baseline - extended) / (baseline - noise floor); 95 % interval from resampled probes.
         paper: the paper's metric (baseline, extended) [m]. probes: how many pushes of the tool were resampled.
     """
@@ -39,11 +41,10 @@ class Ladder:
 
 
 def _squares(prediction: Prediction) -> tuple[FloatArray, FloatArray]:
-    """Sum of squared gaps [m^2] and number of points of each group."""
+    """Sum of squared gaps (g, p) [m^2] and number of points (g, p)."""
     count = np.where(np.isfinite(prediction.gap), prediction.count, 0.0)
     within = np.where(count > 0, prediction.spread**2 * np.maximum(count - 1, 0), 0.0)
-    total = np.nan_to_num(prediction.gap) ** 2 * count + np.nan_to_num(within)
-    return total.sum(axis=1), count.sum(axis=1)
+    return np.asarray(np.nan_to_num(prediction.gap) ** 2 * count + np.nan_to_num(within)), count
 
 
 def _share(baseline: FloatArray, extended: FloatArray, floor: FloatArray) -> FloatArray:
@@ -61,31 +62,39 @@ def ladder(
     seed: int,
 ) -> Ladder:
     """Compare two models on test sequences, groups in touch only; probes are resampled whole."""
-    rows, free = [], []
+    rows, quiet, seen = [], 0.0, 0.0
     for item, before, after in zip(data, baseline, extended, strict=True):
         (square_0, count_0), (square_1, count_1) = _squares(before), _squares(after)
         for number, group in enumerate(item.groups):
-            entry = (square_0[number], count_0[number], square_1[number], count_1[number])
             if group.free and not group.reference:
-                free.append(entry)
+                quiet, seen = quiet + square_1[number], seen + count_1[number]
             elif not group.free and number not in before.failed and number not in after.failed:
-                rows.append((f"{item.name}/{group.probe}", *entry))
+                rows.append((f"{item.name}/{group.probe}", square_0[number], count_0[number], square_1[number], count_1[number]))
+    if not rows:
+        raise DiagnosisError("the test sequences have no frame in which the tool touches the phantom; name others in [splits] test")
+    if not np.sum(seen):
+        raise DiagnosisError(
+            "the test sequences have no untouched frame, so their noise floor is unknown; name others in [splits] test"
+        )
+    # Each patch has its own noise (slant, distance, bias): the floor is that of the patches seen while touched.
+    level = np.where(seen > 0, quiet / np.maximum(seen, 1), np.sum(quiet) / np.sum(seen))
+    sums = np.array([[before.sum(), n_0.sum(), after.sum(), n_1.sum(), (level * n_1).sum()] for _, before, n_0, after, n_1 in rows])
     names = np.array([row[0] for row in rows])
-    values = np.array([row[1:] for row in rows], dtype=float).reshape(-1, 4)
-    probes = np.array([values[names == name].sum(axis=0) for name in np.unique(names)]).reshape(-1, 4)
-    untouched = np.array(free, dtype=float).reshape(-1, 4)
-    floor = float(np.sqrt(untouched[:, 2].sum() / max(untouched[:, 3].sum(), 1)))
+    probes = np.array([sums[names == name].sum(axis=0) for name in np.unique(names)])
     chosen = np.random.default_rng(seed).integers(0, len(probes), size=(_DRAWS, len(probes)))
-    drawn = probes[chosen].sum(axis=1)
-    whole = probes.sum(axis=0)
-    rms = [float(np.sqrt(whole[i] / max(whole[i + 1], 1))) for i in (0, 2)]
-    shares = _share(np.sqrt(drawn[:, 0] / drawn[:, 1]), np.sqrt(drawn[:, 2] / drawn[:, 3]), np.full(_DRAWS, floor))
-    share = float(_share(np.array(rms[0]), np.array(rms[1]), np.array(floor)))
-    low, high = np.quantile(shares, [0.025, 0.975])
+    drawn, whole = _rms(probes[chosen].sum(axis=1)), _rms(probes.sum(axis=0)[None])
+    low, high = np.quantile(_share(*drawn), [0.025, 0.975])
     return Ladder(
-        baseline=rms[0], extended=rms[1], noise_floor=floor, removed=(share, float(low), float(high)),
+        baseline=float(whole[0][0]), extended=float(whole[1][0]), noise_floor=float(whole[2][0]),
+        removed=(float(_share(*whole)[0]), float(low), float(high)),
         paper=(_paper(data, baseline, stated), _paper(data, extended, found)), probes=len(probes),
     )  # fmt: skip
+
+
+def _rms(sums: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """RMS of baseline, extended model and noise floor (d,) [m] from sums (d, 5)."""
+    before, after = np.maximum(sums[:, 1], 1), np.maximum(sums[:, 3], 1)
+    return np.sqrt(sums[:, 0] / before), np.sqrt(sums[:, 2] / after), np.sqrt(sums[:, 4] / after)
 
 
 def _paper(data: Sequence[Observations], predictions: Sequence[Prediction], setup: Setup) -> float:

@@ -297,12 +297,17 @@ class Bench:
         """Log evidence at these values of the search coordinates [nats]."""
         return log_evidence(self.tempered(model), model.nuisance, self.nuisances.precision)
 
-    def refit(self, effects: Sequence[Effect], starts: Sequence[Prediction] | None) -> Model:
-        """Gauss-Newton with a trust region from these values; returns the best model met."""
+    def refit(self, effects: Sequence[Effect], starts: Sequence[Prediction] | None, hopeless: float = -np.inf) -> Model:
+        """Gauss-Newton with a trust region from these values; returns the best model met.
+
+        A model whose log evidence stays below `hopeless` after two steps is given up.
+        """
         self.report(0.0, f"fitting {' and '.join(effect.name for effect in effects)}")
         model = self.evaluate(effects, starts)
         best, radius = self.objective(model), _TRUST
-        for _ in range(_ITERATIONS):
+        for iteration in range(_ITERATIONS):
+            if iteration == 2 and best < hopeless:
+                break
             solution = fit(self.tempered(model), [*model.nuisance, *model.columns], self.precision(model))
             change = solution.change[len(model.nuisance) :]
             if np.abs(change / model.scales).max() < 0.05:

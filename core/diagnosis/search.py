@@ -27,6 +27,11 @@ NULL_QUANTILE = 0.99
 LEAST_GAIN = 10.0
 """No cause is named for less [nats], whatever the null says: the noise model itself is only known so well."""
 SHORTLIST = 3
+PROMISING = 0.5
+"""Share of the bound that a first cause must reach in the linear screening to be refitted; its refit may find more."""
+SECOND_FACTOR, SECOND_SHARE = 3.0, 0.25
+HOPELESS = 60.0
+"""A candidate this far behind the best one [nats] after two steps of its fit is not fitted further."""
 RIVAL = 8.0
 """Rivals this close to the best [nats] are named too: the difference of two log densities that differ by d has a spread of
 about sqrt(2 d), so 8 nats are two of its standard deviations."""
@@ -156,8 +161,10 @@ def _screen(
     return with_columns, candidates, gains
 
 
-def _trial(bench: Bench, effects: Sequence[Effect], starts: Sequence[Prediction], against: Model) -> Trial:
-    model = bench.refit(effects, starts)
+def _trial(
+    bench: Bench, effects: Sequence[Effect], starts: Sequence[Prediction], against: Model, hopeless: float = -np.inf
+) -> Trial:
+    model = bench.refit(effects, starts, hopeless)
     gain = predictive_gain(bench.score(model), bench.score(against))[0]
     return Trial(model, gain, bench.misfit(model))
 
@@ -204,15 +211,27 @@ def _forward(
     bench: Bench, findings: Findings, current: Trial, screened: Model, candidates: list[Candidate], gains: np.ndarray
 ) -> Trial | None:
     """The best further cause if it gains more than the bound, else None."""
-    trials = []
-    for candidate in _shortlist(gains, candidates, 0.5 * findings.bound):
+    trials: list[Trial] = []
+    for candidate in _shortlist(gains, candidates, PROMISING * _needed(findings, current)):
         effects = [*current.model.effects, _start(candidate, screened, bench)]
-        trials.append(_trial(bench, effects, current.model.predictions, current.model))
+        hopeless = max((bench.objective(trial.model) for trial in trials), default=np.inf) - HOPELESS
+        trials.append(_trial(bench, effects, current.model.predictions, current.model, hopeless if trials else -np.inf))
     trials.sort(key=lambda trial: -trial.gain)
     findings.trials.extend(trials)
-    if not trials or trials[0].gain <= findings.bound:
+    if not trials or trials[0].gain <= _needed(findings, current):
         return None
     return trials[0]
+
+
+def _needed(findings: Findings, current: Trial) -> float:
+    """Least gain [nats] of the next cause.
+
+    The mesh's error is known for the stated setup only; a found cause changes it, and what changes with it could pass for
+    another cause. So a second one must gain a good deal more than chance, and a fair share of what the first gained.
+    """
+    if not current.model.effects:
+        return findings.bound
+    return max(SECOND_FACTOR * findings.bound, SECOND_SHARE * current.gain)
 
 
 def _backward(bench: Bench, findings: Findings, best: Trial) -> Trial:

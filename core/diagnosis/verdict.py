@@ -26,9 +26,8 @@ _INTERVAL_STEPS = 400
 
 def verdict_of(findings: Findings) -> str:
     """One of found, none, ambiguous, unexplained."""
-    left = findings.best.misfit if findings.best else findings.misfit
     if findings.best is None:
-        return "unexplained" if left > UNEXPLAINED_MISFIT else "none"
+        return "unexplained" if findings.misfit > UNEXPLAINED_MISFIT else "none"
     if findings.rivals():
         return "ambiguous"
     return "found"
@@ -49,7 +48,7 @@ def intervals(bench: Bench, model: Model) -> list[dict[str, dict[str, Any]]]:
         for name, (reported, unit) in effect.reported().items():
             entry.setdefault(name, {"value": reported, "unit": unit})
         if isinstance(effect, CameraRegistration):
-            entry = _magnitudes(effect, spread[at : at + number]) | entry
+            entry |= _magnitudes(effect, spread[at : at + number])
         found.append(entry)
         at += number
     return found
@@ -61,7 +60,8 @@ def _magnitudes(effect: CameraRegistration, spread: np.ndarray) -> dict[str, dic
     for name, part, unit in (("translation", slice(0, 3), "m"), ("rotation", slice(3, 6), "rad")):
         low, high = np.quantile(np.linalg.norm(drawn[:, part], axis=1), [0.025, 0.975])
         value = float(np.linalg.norm(np.array(effect.coordinates)[part]))
-        found[name] = {"value": value, "unit": unit, "low": float(low), "high": float(high)}
+        # Noise only ever lengthens a short vector, so that the draws may all lie above its value.
+        found[name] = {"value": value, "unit": unit, "low": min(float(low), value), "high": max(float(high), value)}
     return found
 
 
@@ -82,9 +82,12 @@ def _removed(findings: Findings, misfit: float) -> float:
 
 
 def _causes(bench: Bench, findings: Findings, trials: list[Trial]) -> list[dict[str, Any]]:
-    chances, found = _probabilities(findings), []
+    chances = _probabilities(findings)
+    found: list[dict[str, Any]] = []
     for trial in trials:
         for effect, entry in zip(trial.model.effects, intervals(bench, trial.model), strict=True):
+            if any(row["effect"] == effect.name for row in found):
+                continue  # rival pairs share a cause
             chance = sum(p for names, p in chances.items() if effect.name in names)
             found.append({"effect": effect.name, "probability": round(chance, 4), "parameters": entry})
     return found
@@ -117,7 +120,7 @@ def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
     patch, share = _worst_patch(model, bench)
     fraction = max(left - 1.0, 0.0) / max(findings.misfit, left)
     place = bench.surface.patch_centres[patch] * 1e3
-    where = f"most of it ({100 * share:.0f} %) within 8 mm of ({place[0]:.0f}, {place[1]:.0f}, {place[2]:.0f}) mm"
+    where = f"{100 * share:.0f} % of it within 8 mm of ({place[0]:.0f}, {place[1]:.0f}, {place[2]:.0f}) mm"
     return {"fraction": round(fraction, 4), "where": where, "when": f"most in {when}", "misfit_per_value": round(left, 4)}
 
 
@@ -126,8 +129,10 @@ def _worst_patch(model: Model, bench: Bench) -> tuple[int, float]:
     total = np.zeros(bench.surface.patches)
     for item in model.predictions:
         touched = np.array([frame.in_contact for frame in item.equilibria])
-        away = np.nan_to_num(item.gap - np.nanmean(np.where(touched[:, None], np.nan, item.gap), axis=0)) if (~touched).any() else 0
-        total += (np.nan_to_num(away) ** 2 * item.count * touched[:, None]).sum(axis=0)
+        still = np.isfinite(item.gap) & ~touched[:, None]
+        zero = np.where(still, item.gap, 0.0).sum(axis=0) / np.maximum(still.sum(axis=0), 1)
+        away = np.where(still.any(axis=0), np.nan_to_num(item.gap - zero), 0.0)
+        total += (away**2 * item.count * touched[:, None]).sum(axis=0)
     centres = bench.surface.patch_centres
     near = np.linalg.norm(centres[:, None] - centres, axis=2) < 8e-3
     around = near @ total

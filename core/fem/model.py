@@ -104,6 +104,14 @@ def _held_share(detached: tuple[Detachment, ...], size: tuple[float, float, floa
     return held
 
 
+@lru_cache(maxsize=32)
+def _quadrature(mesh: BoxMesh) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Corners of the elements, gradients and weights at their points, and weights on the free surface: the mesh's alone."""
+    corners = mesh.nodes[mesh.hexahedra]
+    gradients, weights = gauss_gradients(corners)
+    return corners, gradients, weights, face_weights(mesh.nodes[mesh.free_surface])
+
+
 class BlockModel:
     """One block on one mesh: energy, residual and tangent as functions of the node positions (n, 3) [m] and the probe."""
 
@@ -111,18 +119,18 @@ class BlockModel:
         self.mesh, self.setup = mesh, setup
         self.topology = topology(mesh.shape, held=not setup.support.detached)
         self.law = LAWS[setup.material.law]
-        corners = mesh.nodes[self.topology.hexahedra]
-        self.gradients, self.weights = gauss_gradients(corners)
+        corners, self.gradients, self.weights, self.areas = _quadrature(mesh)
         mu, bulk = lame(setup.material.law, setup.material.poisson_ratio)
         factor = np.exp(log_stiffness(setup.material.inclusions, corners))
         self.mu, self.bulk = mu * factor, bulk * factor
-        self.areas = face_weights(mesh.nodes[self.topology.surface])
         self.weight_force = self._weight(setup.load.specific_weight_over_stiffness)
         self._prepare_base(setup)
 
     def _weight(self, specific: float) -> FloatArray:
         """Weight at the nodes over E (n,) [m^2]."""
         share = np.zeros(len(self.mesh.nodes))
+        if not specific:
+            return share
         np.add.at(share, self.topology.hexahedra, np.repeat(self.weights.sum(axis=1)[:, None] / 8, 8, axis=1))
         return specific * share
 

@@ -113,7 +113,7 @@ def _offset(rng: np.random.Generator) -> dict[str, float | str]:
 
 
 _CLEAR: Mapping[str, _Draw] = {
-    "poisson_ratio": lambda rng: {"nu": _either(rng, (0.28, 0.36), (0.488, 0.492), decimals=3)},
+    "poisson_ratio": lambda rng: {"nu": _between(rng, 0.28, 0.35, 3)},
     "stiff_inclusion": _inclusion,
     "tool_radius": lambda rng: {"radius": _either(rng, (3.5e-3, 4.2e-3), (5.8e-3, 6.5e-3))},
     "tool_offset": _offset,
