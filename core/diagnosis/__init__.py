@@ -31,7 +31,8 @@ __all__ = ["DIAGNOSIS_GRID", "FINE_GRID", "diagnose"]
 
 DIAGNOSIS_GRID = GridSpec(nodes=(15, 11, 9), spacing=1.2e-3)
 FINE_GRID = GridSpec(nodes=(21, 15, 12), spacing=0.75e-3)
-"""For a tool of 5 mm; both are scaled with the stated radius."""
+PAGE_GRID = GridSpec(nodes=(13, 9, 8), spacing=1.5e-3)
+"""For a tool of 5 mm; all are scaled with the stated radius."""
 FIT_GROUPS = 14
 TEST_GROUPS = 32
 _LEAST_BIAS = 1.5e-4
@@ -121,9 +122,9 @@ def _run(
     result = report_of(dataset, bench, findings, gain, "test")
     (making / "replays").mkdir()
     (making / "pictures").mkdir()
-    shaft = find_shaft_axis(dataset, registration)
+    shaft, page = find_shaft_axis(dataset, registration), _scaled(PAGE_GRID, setup.tool.radius)
     tasks = [
-        pool.run(record, dataset.path, name, setup, model.setup, cleaner, shaft, grid, making / "replays" / f"{name}.npz")
+        pool.run(record, dataset.path, name, setup, model.setup, cleaner, shaft, page, making / "replays" / f"{name}.npz")
         for name in dataset.sequences
     ]
     for number, task in enumerate(tasks):
@@ -140,11 +141,7 @@ def _run(
 def _gain(unseen: list[Observations], pool: Workers, stated: Setup, found: Setup, grid: GridSpec, seed: int) -> Ladder:
     names = [item.name for item in unseen]
     baseline = [future.result() for future in pool.submit(names, stated, grid)]
-    extended = (
-        baseline
-        if found is stated
-        else [future.result() for future in pool.submit(names, found, grid, None, baseline, same_points=False)]
-    )
+    extended = baseline if found is stated else [future.result() for future in pool.submit(names, found, grid, None, baseline)]
     return ladder(unseen, baseline, extended, stated, found, seed)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from core.diagnosis.noise import patch_variance
 from core.diagnosis.observations import Observations
 from core.diagnosis.prediction import Prediction
 from core.errors import DiagnosisError
@@ -19,15 +20,17 @@ __all__ = ["Ladder", "ladder"]
 
 _DRAWS = 2000
 _PAPER_POINTS = 4000
+_LEAST_POINTS = 5
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ladder:
-    """RMS of signed distance [m] in touched frames, and the share of the reducible error that is removed.
+    """RMS of patch averages of signed distance [m] in touched frames, and the share of the reducible error that is removed.
+
+    The camera's fixed pattern, as the untouched frames and the rest cloud show it, is taken off both models alike.
 
     Attributes:
-        baseline, extended: of the stated and the extended model.
-        noise_floor: of the extended model in untouched frames, in the same patches.
+        baseline, extended: of the stated and the extended model. noise_floor: what the scatter of single points leaves.
         removed: (value, low, high) of (baseline - extended) / (baseline - noise floor); 95 % interval from resampled probes.
         paper: the paper's metric (baseline, extended) [m]. probes: how many pushes of the tool were resampled.
     """
@@ -40,11 +43,12 @@ class Ladder:
     probes: int
 
 
-def _squares(prediction: Prediction) -> tuple[FloatArray, FloatArray]:
-    """Sum of squared gaps (g, p) [m^2] and number of points (g, p)."""
-    count = np.where(np.isfinite(prediction.gap), prediction.count, 0.0)
-    within = np.where(count > 0, prediction.spread**2 * np.maximum(count - 1, 0), 0.0)
-    return np.asarray(np.nan_to_num(prediction.gap) ** 2 * count + np.nan_to_num(within)), count
+def _pattern(item: Observations, model: Prediction) -> tuple[FloatArray, FloatArray]:
+    """The camera's fixed pattern (p,) [m] in the frames clear of the block, and how many points it rests on (p,)."""
+    free = np.array([group.free for group in item.groups])[:, None]
+    count = np.where(free & np.isfinite(model.gap), model.count, 0.0)
+    total = count.sum(axis=0)
+    return (np.nan_to_num(model.gap) * count).sum(axis=0) / np.maximum(total, 1), total
 
 
 def _share(baseline: FloatArray, extended: FloatArray, floor: FloatArray) -> FloatArray:
@@ -62,23 +66,22 @@ def ladder(
     seed: int,
 ) -> Ladder:
     """Compare two models on test sequences, groups in touch only; probes are resampled whole."""
-    rows, quiet, seen = [], 0.0, 0.0
+    variance, rows = patch_variance([*baseline, *extended]), []
     for item, before, after in zip(data, baseline, extended, strict=True):
-        (square_0, count_0), (square_1, count_1) = _squares(before), _squares(after)
+        pattern, known = _pattern(item, after)
+        if not known.sum():
+            raise DiagnosisError(f"{item.name} has no untouched frame, so its noise floor is unknown; name others in [splits] test")
         for number, group in enumerate(item.groups):
-            if group.free and not group.reference:
-                quiet, seen = quiet + square_1[number], seen + count_1[number]
-            elif not group.free and number not in before.failed and number not in after.failed:
-                rows.append((f"{item.name}/{group.probe}", square_0[number], count_0[number], square_1[number], count_1[number]))
+            if group.free or number in before.failed or number in after.failed:
+                continue
+            seen = np.isfinite(before.gap[number]) & np.isfinite(after.gap[number]) & (known >= _LEAST_POINTS)
+            count = after.count[number][seen]
+            errors = [model.gap[number][seen] - pattern[seen] for model in (before, after)]
+            floor = (variance[seen] * (1 + count / known[seen])).sum()
+            rows.append((f"{item.name}/{group.probe}", *((error**2 * count).sum() for error in errors), floor, count.sum()))
     if not rows:
         raise DiagnosisError("the test sequences have no frame in which the tool touches the phantom; name others in [splits] test")
-    if not np.sum(seen):
-        raise DiagnosisError(
-            "the test sequences have no untouched frame, so their noise floor is unknown; name others in [splits] test"
-        )
-    # Each patch has its own noise (slant, distance, bias): the floor is that of the patches seen while touched.
-    level = np.where(seen > 0, quiet / np.maximum(seen, 1), np.sum(quiet) / np.sum(seen))
-    sums = np.array([[before.sum(), n_0.sum(), after.sum(), n_1.sum(), (level * n_1).sum()] for _, before, n_0, after, n_1 in rows])
+    sums = np.array([row[1:] for row in rows])
     names = np.array([row[0] for row in rows])
     probes = np.array([sums[names == name].sum(axis=0) for name in np.unique(names)])
     chosen = np.random.default_rng(seed).integers(0, len(probes), size=(_DRAWS, len(probes)))
@@ -92,9 +95,9 @@ def ladder(
 
 
 def _rms(sums: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """RMS of baseline, extended model and noise floor (d,) [m] from sums (d, 5)."""
-    before, after = np.maximum(sums[:, 1], 1), np.maximum(sums[:, 3], 1)
-    return np.sqrt(sums[:, 0] / before), np.sqrt(sums[:, 2] / after), np.sqrt(sums[:, 4] / after)
+    """RMS of baseline, extended model and noise floor (d,) [m] from sums (d, 4)."""
+    before, after, floor = (np.sqrt(sums[:, column] / np.maximum(sums[:, 3], 1)) for column in range(3))
+    return before, after, floor
 
 
 def _paper(data: Sequence[Observations], predictions: Sequence[Prediction], setup: Setup) -> float:

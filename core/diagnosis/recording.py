@@ -21,7 +21,7 @@ from core.setup import Setup
 
 __all__ = ["Recorded", "record"]
 
-MOST_FRAMES = 150
+MOST_FRAMES = 100
 VERTEX_SPACING = 2.5e-3
 _REACH = 3.5e-3
 _LEAST = 3
@@ -86,13 +86,15 @@ def record(
     raw = [sequence.cloud(int(i)) for i in index]
     clouds = [cloud[cleaner.clean(cloud, pose).indices] for cloud, pose in zip(raw, poses, strict=True)]
     sides: list[Recorded] = []
+    frames: list[Equilibrium] = []
     for setup in (stated, found):
         if sides and found is stated:
             sides.append(sides[0])
             continue
         robot = touch_correction(setup, grid) @ setup.phantom_from_robot
         centres = robot.apply(smooth_centres(sequence.kinematics, times - setup.sensor.time_offset))
-        sides.append(_side(setup, replay(setup, centres, grid, tolerance=1e-4), clouds))
+        frames = replay(setup, centres, grid, starts=frames or None, tolerance=1e-3)
+        sides.append(_side(setup, frames, clouds))
     before, after = sides
     surface = Surface(stated.geometry, spacing=VERTEX_SPACING)
     floor = after.distance[after.free] if after.free.any() else after.distance

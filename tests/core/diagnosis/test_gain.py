@@ -9,6 +9,7 @@ from pushed_block import POSE, SETUP, dwelling, poke, prediction, seen_points
 from core.diagnosis.gain import Ladder, ladder
 from core.diagnosis.observations import Group, Observations
 from core.diagnosis.prediction import Prediction
+from core.errors import DiagnosisError
 from core.frames import FloatArray
 from core.measurement import Surface
 from core.mesh import GridSpec
@@ -34,7 +35,15 @@ def _model(sizes: list[float], name: str = "poke-01", points: float = POINTS, fa
 
 
 def _ladder(probes: list[int], before: list[float], after: list[float], failed: tuple[int, ...] = ()) -> Ladder:
-    return ladder([_observations(probes)], [_model(before)], [_model(after, failed=failed)], SETUP, SETUP, seed=0)
+    """The ladder of these errors, with single points scattered such that the noise floor is FLOOR."""
+    known = POINTS * sum(probe == 0 for probe in probes)
+    scatter = np.full((len(probes), PATCHES), FLOOR / np.sqrt(1 / POINTS + 1 / known))
+    still = [0.0 if probe == 0 else 1.0 for probe in probes]
+    models = [
+        replace(_model(list(np.array(sizes) * still), failed=which), spread=scatter)
+        for sizes, which in ((before, ()), (after, failed))
+    ]
+    return ladder([_observations(probes)], models[:1], models[1:], SETUP, SETUP, seed=0)
 
 
 def test_share_of_the_reducible_error_is_known():
@@ -45,13 +54,19 @@ def test_share_of_the_reducible_error_is_known():
     assert found.probes == 2
 
 
-def test_spread_of_single_points_counts_as_error():
-    spread = 2e-3
+def test_fixed_pattern_of_the_camera_is_no_error():
     item = _observations([0, 1])
+    pattern = _model([2e-3, 2e-3])
+    found = ladder([item], [pattern], [pattern], SETUP, SETUP, seed=0)
+    assert found.baseline == pytest.approx(0.0, abs=1e-12)
+
+
+def test_scatter_of_single_points_makes_the_noise_floor():
+    item, spread = _observations([0, 1]), 2e-3
     before = replace(_model([0.0, 1e-3]), spread=np.full((2, PATCHES), spread))
     found = ladder([item], [before], [before], SETUP, SETUP, seed=0)
-    assert found.baseline == pytest.approx(np.sqrt(1e-3**2 + spread**2 * (POINTS - 1) / POINTS))
-    assert found.noise_floor == pytest.approx(spread * np.sqrt((POINTS - 1) / POINTS))
+    assert found.baseline == pytest.approx(1e-3)
+    assert found.noise_floor == pytest.approx(spread * np.sqrt(2 / POINTS))
 
 
 def test_groups_are_weighed_by_their_points():
@@ -119,10 +134,16 @@ def test_group_that_one_model_fails_in_counts_for_neither():
     assert found.probes == 1
 
 
-def test_rest_cloud_is_no_part_of_the_noise_floor():
-    item, before = _observations([0, 0, 1]), _model([9e-3, FLOOR, 3e-3])
-    groups = (replace(item.groups[0], reference=True), *item.groups[1:])
-    assert ladder([replace(item, groups=groups)], [before], [before], SETUP, SETUP, seed=0).noise_floor == pytest.approx(FLOOR)
+def test_sequence_without_untouched_frames_is_refused():
+    item, model = _observations([1, 2]), _model([1e-3, 1e-3])
+    with pytest.raises(DiagnosisError, match="no untouched frame"):
+        ladder([item], [model], [model], SETUP, SETUP, seed=0)
+
+
+def test_sequences_without_any_touch_are_refused():
+    item, model = _observations([0, 0]), _model([1e-3, 1e-3])
+    with pytest.raises(DiagnosisError, match="no frame in which the tool touches"):
+        ladder([item], [model], [model], SETUP, SETUP, seed=0)
 
 
 def test_papers_metric_is_the_mean_over_touched_groups():
