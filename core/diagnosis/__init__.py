@@ -130,7 +130,7 @@ def _run(
     for number, task in enumerate(tasks):
         report(0.8 + 0.2 * number / len(tasks), "replaying every sequence for the page")
         task.result()
-    pictured = patterns(bench, findings.baseline, model)
+    pictured = patterns(bench, fitted, findings.baseline, model)
     pictured.save(making / "patterns.npz")
     draw_patterns(pictured, bench.surface, making / "pictures" / "patterns.png")
     (making / "model.json").write_text(json.dumps(_model(dataset, model.setup, findings, names), indent=1))

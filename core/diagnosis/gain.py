@@ -16,7 +16,7 @@ from core.measurement import Surface
 from core.metrics import paper_distance
 from core.setup import Setup
 
-__all__ = ["Ladder", "ladder"]
+__all__ = ["Ladder", "fixed_pattern", "ladder"]
 
 _DRAWS = 2000
 _PAPER_POINTS = 4000
@@ -43,7 +43,7 @@ class Ladder:
     probes: int
 
 
-def _pattern(item: Observations, model: Prediction) -> tuple[FloatArray, FloatArray]:
+def fixed_pattern(item: Observations, model: Prediction) -> tuple[FloatArray, FloatArray]:
     """The camera's fixed pattern (p,) [m] in the frames clear of the block, and how many points it rests on (p,)."""
     free = np.array([group.free for group in item.groups])[:, None]
     count = np.where(free & np.isfinite(model.gap), model.count, 0.0)
@@ -52,9 +52,10 @@ def _pattern(item: Observations, model: Prediction) -> tuple[FloatArray, FloatAr
 
 
 def _share(baseline: FloatArray, extended: FloatArray, floor: FloatArray) -> FloatArray:
-    """Removed share; nothing is reducible where the baseline already lies at the floor."""
+    """Removed share, at most all; nothing is reducible where the baseline already lies at the floor."""
     reducible = baseline - floor
-    return np.where(reducible > 1e-6, (baseline - extended) / np.where(reducible > 1e-6, reducible, 1.0), 0.0)
+    share = (baseline - extended) / np.where(reducible > 1e-6, reducible, 1.0)
+    return np.where(reducible > 1e-6, np.minimum(share, 1.0), 0.0)
 
 
 def ladder(
@@ -68,7 +69,7 @@ def ladder(
     """Compare two models on test sequences, groups in touch only; probes are resampled whole."""
     variance, rows = patch_variance([*baseline, *extended]), []
     for item, before, after in zip(data, baseline, extended, strict=True):
-        pattern, known = _pattern(item, after)
+        pattern, known = fixed_pattern(item, after)
         if not known.sum():
             raise DiagnosisError(f"{item.name} has no untouched frame, so its noise floor is unknown; name others in [splits] test")
         for number, group in enumerate(item.groups):

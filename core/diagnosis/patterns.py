@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from core.diagnosis.gain import fixed_pattern
 from core.diagnosis.models import Bench, Model
+from core.diagnosis.observations import Observations
+from core.errors import DiagnosisError
 from core.frames import FloatArray
 from core.measurement import SIDES, Surface
 
 __all__ = ["Patterns", "draw_patterns", "patterns"]
 
-_DEEPEST = 0.35
-_LEAST_POINTS = 8
+_SMOOTHING = 3.5e-3
+_LEAST_POINTS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,29 +36,36 @@ class Patterns:
         np.savez_compressed(path, centres=self.centres, normals=self.normals, measured=self.measured, predicted=self.predicted)
 
 
-def patterns(bench: Bench, baseline: Model, found: Model) -> Patterns:
-    """Averages over the frames in which the cause matters most; the untouched frames are taken off (the camera's own pattern)."""
-    count = bench.surface.patches
-    measured, predicted, weight = np.zeros(count), np.zeros(count), np.zeros(count)
-    for before, after in zip(baseline.predictions, found.predictions, strict=True):
-        seen = np.isfinite(before.gap) & np.isfinite(after.gap)
+def patterns(bench: Bench, data: Sequence[Observations], baseline: Model, found: Model) -> Patterns:
+    """The error of the one push in which the cause matters most, smoothed alike, without the camera's own pattern."""
+    best: tuple[float, FloatArray, FloatArray, FloatArray] | None = None
+    for item, before, after in zip(data, baseline.predictions, found.predictions, strict=True):
+        zero, known = fixed_pattern(item, after)
+        seen = np.isfinite(before.gap) & np.isfinite(after.gap) & (known >= _LEAST_POINTS)
         points = np.where(seen, before.count, 0.0)
-        change = np.where(seen, before.gap - after.gap, 0.0)
-        size = np.sqrt((change**2 * points).sum(axis=1) / np.maximum(points.sum(axis=1), 1))
-        # The first group is the rest cloud, as the camera was registered: the zero to which errors are counted.
-        zero, zero_seen = np.where(seen[0], before.gap[0], 0.0), seen[0]
-        used = size >= np.quantile(size, 1 - _DEEPEST) if size.max() > 0 else np.array([f.in_contact for f in before.equilibria])
-        used[0] = False
-        rows = points * used[:, None] * zero_seen
-        measured += (rows * (np.where(seen, before.gap, 0.0) - zero)).sum(axis=0)
-        predicted += (rows * change).sum(axis=0)
-        weight += rows.sum(axis=0)
-    enough = weight >= _LEAST_POINTS
-    safe = np.where(enough, weight, 1.0)
+        change, error = (np.where(seen, gap, 0.0) for gap in (before.gap - after.gap, before.gap - zero))
+        touched = np.array([0 if group.free else 1 + group.probe for group in item.groups])
+        for probe in np.unique(touched[touched > 0]):
+            rows = points * (touched == probe)[:, None]
+            weight, size = rows.sum(axis=0), float((change**2 * rows).sum())
+            if best is None or size > best[0]:
+                best = (size, (rows * error).sum(axis=0), (rows * change).sum(axis=0), weight)
+    if best is None:
+        raise DiagnosisError("the tool touches the phantom in no sequence that was fitted on")
+    _, error_sum, change_sum, weight = best
+    near = _kernel(bench.surface)
+    total = near @ weight
+    shown = np.where((total >= _LEAST_POINTS) & (weight > 0), total, np.nan)
     return Patterns(
-        bench.surface.patch_centres, bench.surface.patch_normals,
-        np.where(enough, measured / safe, np.nan), np.where(enough, predicted / safe, np.nan),
+        bench.surface.patch_centres, bench.surface.patch_normals, (near @ error_sum) / shown, (near @ change_sum) / shown
     )  # fmt: skip
+
+
+def _kernel(surface: Surface) -> FloatArray:
+    """Gaussian weights (p, p) between patches of one side."""
+    centres, normals = surface.patch_centres, surface.patch_normals
+    distance = np.linalg.norm(centres[:, None] - centres, axis=2)
+    return np.asarray(np.exp(-0.5 * (distance / _SMOOTHING) ** 2) * (normals @ normals.T > 0.5))
 
 
 def draw_patterns(found: Patterns, surface: Surface, path: Path) -> None:
@@ -64,7 +75,9 @@ def draw_patterns(found: Patterns, surface: Surface, path: Path) -> None:
 
     figure = Figure(figsize=(10, 4.6), layout="constrained")
     FigureCanvasAgg(figure)
-    limit = max(1e3 * float(np.nanquantile(np.abs(np.concatenate([found.measured, found.predicted])), 0.98)), 0.05)
+    sizes = np.abs(np.concatenate([found.measured, found.predicted]))
+    seen = sizes[np.isfinite(sizes)]
+    limit = max(1e3 * float(np.quantile(seen, 0.98)), 0.05) if len(seen) else 1.0
     for number, (title, values) in enumerate((("measured error", found.measured), ("predicted by the cause", found.predicted))):
         axes = figure.add_subplot(1, 2, number + 1)
         drawn = _unfold(axes, found, values * 1e3, surface, limit)
