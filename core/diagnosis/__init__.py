@@ -34,7 +34,7 @@ FINE_GRID = GridSpec(nodes=(21, 15, 12), spacing=0.75e-3)
 PAGE_GRID = GridSpec(nodes=(13, 9, 8), spacing=1.5e-3)
 """For a tool of 5 mm; all are scaled with the stated radius."""
 FIT_GROUPS = 14
-TEST_GROUPS = 32
+TEST_GROUPS = 24
 _LEAST_BIAS = 1.5e-4
 _USUAL_RADIUS = 5e-3
 
@@ -118,7 +118,7 @@ def _run(
     findings = search(bench, seed)
     model = findings.best.model if findings.best else findings.baseline
     report(0.75, "measuring the gain on test sequences")
-    gain = _gain(unseen, pool, setup, model.setup, grid, seed) if unseen else None
+    gain = _gain(unseen, pool, setup, model.setup, fine, seed) if unseen else None
     result = report_of(dataset, bench, findings, gain, "test")
     (making / "replays").mkdir()
     (making / "pictures").mkdir()
