@@ -16,8 +16,6 @@ __all__ = ["Outcome", "Solution", "solve"]
 RELATIVE_TOLERANCE = 1e-6
 """Converged: the residual's norm is below this share of the tool's push and of the body's internal forces."""
 MAX_ITERATIONS = 40
-CHORD = 0.25
-"""A step that leaves less than this share of the residual is followed by one with the same factor (chord method)."""
 MAX_SPLITS = 6
 MAX_PENETRATION = 4e-4
 
@@ -93,26 +91,21 @@ def _newton(model: BlockModel, probe: Probe | None, start: FloatArray, tolerance
     positions, energy = start, model.energy(start, probe)
     if not np.isfinite(energy):
         return Solution(start, np.zeros(3), Outcome.INVERTED, 0, np.inf, 0.0)
-    state, outcome, iteration, fresh = model.assemble(start, probe), Outcome.ITERATIONS, 0, True
-    residual = float(np.linalg.norm(state.residual)) / _scale(model, state)
+    residual, state, outcome, iteration = np.inf, model.assemble(start, probe), Outcome.ITERATIONS, 0
     for iteration in range(MAX_ITERATIONS + 1):  # noqa: B007
+        residual = float(np.linalg.norm(state.residual)) / _scale(model, state)
         if residual <= tolerance:
             outcome = Outcome.CONVERGED
             break
-        step = _direction(model, probe, positions, state) if fresh else -model.topology.factor.solve(state.residual)
+        step = _direction(model, probe, positions, state)
         if step is None:
             outcome = Outcome.INDEFINITE
             break
         trial, energy = _search(model, probe, positions, step, float(state.residual @ step), energy)
-        if trial is positions and fresh:
+        if trial is positions:
             break
-        positions, last = trial, residual
-        state = model.assemble(positions, probe, tangent=False)
-        residual = float(np.linalg.norm(state.residual)) / _scale(model, state)
-        # Near equilibrium the last factor serves on: a step with it costs a quarter of one with a new factor.
-        fresh = residual > CHORD * last
-        if fresh and residual > tolerance:
-            state = model.assemble(positions, probe)
+        positions = trial
+        state = model.assemble(positions, probe)
     if outcome is Outcome.CONVERGED and probe is not None:
         if model.depth_inside(positions, probe) > MAX_PENETRATION or model.encloses(positions, probe):
             outcome = Outcome.INSIDE_TOOL
