@@ -53,6 +53,8 @@ def _gain(report: dict[str, Any]) -> str:
     if not isinstance(removed.get("value"), (int, float)):
         return ""
     naming = "naming it" if len(report.get("causes", [])) == 1 else "naming them"
+    if removed["value"] < 0.005:
+        return f"; on the test sequences {naming} removes no error, so that they do not confirm it"
     return f"; {naming} removes {100 * removed['value']:.0f}{NARROW}% of the error that can be removed"
 
 

@@ -12,8 +12,8 @@ from typing import Any
 
 from core.cleaning import cleaner_for, find_shaft_axis
 from core.dataset import Dataset
+from core.diagnosis.bench import Bench
 from core.diagnosis.gain import Ladder, ladder
-from core.diagnosis.models import Bench
 from core.diagnosis.observations import Observations, observe_all
 from core.diagnosis.patterns import draw_patterns, patterns
 from core.diagnosis.recording import record
@@ -43,12 +43,15 @@ def _scaled(grid: GridSpec, radius: float) -> GridSpec:
     return replace(grid, spacing=(grid.spacing or 1e-3) * radius / _USUAL_RADIUS)
 
 
-def diagnose(dataset: Dataset, out: Path, *, workers: int = 2, report: Report = silent, seed: int = 0) -> dict[str, Any]:
+def diagnose(
+    dataset: Dataset, out: Path, *, workers: int = 2, report: Report = silent, seed: int = 0, replays: bool = True
+) -> dict[str, Any]:
     """Find what the stated simulation of a dataset gets wrong; write the run folder `out` and return the report.
 
     Args:
         dataset: as opened. out: folder to make; written aside and renamed, so it is whole or not there.
         workers: number of processes. report: progress; may raise Cancelled. seed: of the null draws and the bootstrap.
+        replays: whether to record every sequence for the page, too.
 
     Fits and choices use the train and validation sequences, the gain the test sequences. Raises DiagnosisError where the data
     cannot carry a diagnosis, DatasetError and RegistrationError where they are off.
@@ -67,7 +70,7 @@ def diagnose(dataset: Dataset, out: Path, *, workers: int = 2, report: Report = 
     making = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
     try:
         with Workers([*data, *unseen], workers) as pool:
-            result = _run(dataset, registration, setup, (data, unseen), pool, making, report, seed)
+            result = _run(dataset, registration, setup, (data, unseen), pool, making, report, seed, replays)
         os.rename(making, out)
     finally:
         shutil.rmtree(making, ignore_errors=True)
@@ -107,6 +110,7 @@ def _run(
     making: Path,
     report: Report,
     seed: int,
+    replays: bool,
 ) -> dict[str, Any]:
     fitted, unseen = data
     cleaner = cleaner_for(dataset, registration)
@@ -122,20 +126,30 @@ def _run(
     result = report_of(dataset, bench, findings, gain, "test")
     (making / "replays").mkdir()
     (making / "pictures").mkdir()
-    shaft, page = find_shaft_axis(dataset, registration), _scaled(PAGE_GRID, setup.tool.radius)
-    tasks = [
-        pool.run(record, dataset.path, name, setup, model.setup, cleaner, shaft, page, making / "replays" / f"{name}.npz")
-        for name in dataset.sequences
-    ]
-    for number, task in enumerate(tasks):
-        report(0.8 + 0.2 * number / len(tasks), "replaying every sequence for the page")
-        task.result()
+    if replays:
+        _record(dataset, registration, (setup, model.setup), pool, making / "replays", part(report, 0.8, 1.0))
     pictured = patterns(bench, fitted, findings.baseline, model)
     pictured.save(making / "patterns.npz")
     draw_patterns(pictured, bench.surface, making / "pictures" / "patterns.png")
     (making / "model.json").write_text(json.dumps(_model(dataset, model.setup, findings, names), indent=1))
     (making / "report.json").write_text(json.dumps(result, indent=1))
     return result
+
+
+def _record(
+    dataset: Dataset, registration: Registration, setups: tuple[Setup, Setup], pool: Workers, folder: Path, report: Report
+) -> None:
+    """Every sequence under the stated and the extended setup, for the page."""
+    stated, found = setups
+    cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration)
+    page = _scaled(PAGE_GRID, stated.tool.radius)
+    tasks = [
+        pool.run(record, dataset.path, name, stated, found, cleaner, shaft, page, folder / f"{name}.npz")
+        for name in dataset.sequences
+    ]
+    for number, task in enumerate(tasks):
+        report(number / len(tasks), "replaying every sequence for the page")
+        task.result()
 
 
 def _gain(unseen: list[Observations], pool: Workers, stated: Setup, found: Setup, grid: GridSpec, seed: int) -> Ladder:

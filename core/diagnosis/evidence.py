@@ -14,7 +14,7 @@ import numpy as np
 
 from core.frames import FloatArray
 
-__all__ = ["FLAT", "Block", "Fit", "fit", "gram", "log_evidence", "predictive_gain", "predictive_score"]
+__all__ = ["FLAT", "Block", "Fit", "draw_rights", "fit", "gram", "log_evidence", "predictive_gain", "predictive_score"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +79,21 @@ def log_evidence(blocks: Sequence[Block], columns: Sequence[int], precision: Flo
     explained = right @ np.linalg.solve(full, right)
     occam = np.linalg.slogdet(full)[1] - np.linalg.slogdet(precision)[1]
     return float(-0.5 * (square - explained) - 0.5 * occam)
+
+
+def draw_rights(
+    blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray, draws: int, random: np.random.Generator
+) -> FloatArray:
+    """Right sides (d, b, k) as the noise model gives them: white noise and discrepancy in each block, and the shared factors of
+    `columns` drawn from their prior of this precision."""
+    shift = random.multivariate_normal(np.zeros(len(columns)), np.linalg.inv(precision), size=draws)
+    rights = np.empty((draws, len(blocks), blocks[0].gram.shape[0] - 1))
+    for number, block in enumerate(blocks):
+        inner = block.gram[1:, 1:]
+        values, vectors = np.linalg.eigh(inner)
+        root = vectors * np.sqrt(np.maximum(values, 0))
+        rights[:, number] = random.standard_normal((draws, len(values))) @ root.T + shift @ inner[:, list(columns)].T
+    return rights
 
 
 FLAT = 1e-6

@@ -8,7 +8,7 @@ zone acts like a stiffer one, another law at large strain like a softer one). Wi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from core.diagnosis.prediction import Prediction
 from core.frames import FloatArray
 from core.measurement import Surface
 
-__all__ = ["DISPLACEMENT_ERROR", "STIFFNESS_ERROR", "Noise", "noises", "patch_variance"]
+__all__ = ["DISPLACEMENT_ERROR", "STIFFNESS_ERROR", "Noise", "noises", "patch_variance", "smooth_basis"]
 
 DISPLACEMENT_ERROR = 0.02
 """Standard deviation of the engine's relative error of displacement, smooth over FIELD_LENGTH along the surface [1]."""
@@ -37,14 +37,14 @@ def patch_variance(predictions: Sequence[Prediction]) -> FloatArray:
     return np.where(enough, variance, typical)
 
 
-def _smooth_basis(centres: FloatArray) -> FloatArray:
-    """Normalised Gaussian bumps (p, b) about every FIELD_LENGTH along the surface; their squares add up to one."""
+def smooth_basis(centres: FloatArray, length: float) -> FloatArray:
+    """Gaussian bumps (p, b) at patch centres (p, 3) about every `length` [m] along the surface; their squares add up to one."""
     chosen = [0]
     nearest = np.linalg.norm(centres - centres[0], axis=1)
-    while nearest.max() > FIELD_LENGTH:
+    while nearest.max() > length:
         chosen.append(int(nearest.argmax()))
         nearest = np.minimum(nearest, np.linalg.norm(centres - centres[chosen[-1]], axis=1))
-    bumps = np.exp(-0.5 * (np.linalg.norm(centres[:, None] - centres[chosen], axis=2) / (0.8 * FIELD_LENGTH)) ** 2)
+    bumps = np.exp(-0.5 * (np.linalg.norm(centres[:, None] - centres[chosen], axis=2) / (0.8 * length)) ** 2)
     return np.asarray(bumps / np.linalg.norm(bumps, axis=1, keepdims=True))
 
 
@@ -74,10 +74,16 @@ class Noise:
             np.linalg.norm(frame.move(centres) - centres, axis=1) if frame.in_contact else np.zeros(len(centres))
             for frame in baseline.equilibria
         ])  # fmt: skip
-        displacement = DISPLACEMENT_ERROR * size[..., None] * _smooth_basis(centres)
+        displacement = DISPLACEMENT_ERROR * size[..., None] * smooth_basis(centres, FIELD_LENGTH)
         stiffness = STIFFNESS_ERROR * baseline.columns[..., lumps].astype(float)
         weights = np.where(seen, 1 / scatter, 0.0)
         return cls(weights, np.where(seen, baseline.gap, 0.0), mesh, np.concatenate([displacement, stiffness], axis=2))
+
+    def remeshed(self, model: Prediction, fine: Prediction) -> Noise:
+        """With the mesh's error as it is in another model; all else stays, so that no patch gains or loses weight."""
+        seen = np.isfinite(model.gap) & np.isfinite(fine.gap) & (self.weights > 0)
+        seen[list(set(model.failed) | set(fine.failed))] = False
+        return replace(self, mesh=np.where(seen, fine.gap - model.gap, self.mesh))
 
     def block(self, prediction: Prediction) -> Block:
         """Quadratic form of a model's residual and columns (mesh error last), with the discrepancy integrated out.

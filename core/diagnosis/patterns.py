@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from core.diagnosis.bench import Bench
 from core.diagnosis.gain import fixed_pattern
-from core.diagnosis.models import Bench, Model
+from core.diagnosis.hypothesis import Model
 from core.diagnosis.observations import Observations
 from core.errors import DiagnosisError
 from core.frames import FloatArray

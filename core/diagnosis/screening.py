@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from core.diagnosis.evidence import FLAT, Block
+from core.diagnosis.evidence import FLAT, Block, draw_rights
 from core.effects import Effect
 from core.frames import FloatArray
 
@@ -81,12 +81,5 @@ def null_gains(
     blocks: Sequence[Block], nuisance: Sequence[int], known: FloatArray, candidates: Sequence[Candidate], draws: int, seed: int
 ) -> FloatArray:
     """Best-of-catalogue gains (d,) [nats] on draws from the noise model: white noise, discrepancy and nuisances, no cause."""
-    random = np.random.default_rng(seed)
-    shift = random.multivariate_normal(np.zeros(len(nuisance)), np.linalg.inv(known), size=draws)
-    rights = np.empty((draws, len(blocks), blocks[0].gram.shape[0] - 1))
-    for number, block in enumerate(blocks):
-        inner = block.gram[1:, 1:]
-        values, vectors = np.linalg.eigh(inner)
-        root = vectors * np.sqrt(np.maximum(values, 0))
-        rights[:, number] = random.standard_normal((draws, len(values))) @ root.T + shift @ inner[:, list(nuisance)].T
+    rights = draw_rights(blocks, nuisance, known, draws, np.random.default_rng(seed))
     return np.asarray(linear_gains(blocks, rights, nuisance, known, candidates).max(axis=1))

@@ -7,10 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from core.diagnosis.bench import PRIOR_STEPS, Bench
 from core.diagnosis.evidence import fit, predictive_gain
-from core.diagnosis.models import PRIOR_STEPS, Bench, Model
+from core.diagnosis.hypothesis import Model
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction
 from core.diagnosis.screening import Candidate, linear_gains, null_gains, right_sides
+from core.diagnosis.structure import NOTHING, Structure, structure_of
 from core.effects import Effect
 from core.effects.load import Gravity
 from core.effects.material import PoissonRatio, StiffInclusion
@@ -29,11 +31,14 @@ LEAST_GAIN = 20.0
 
 A control of the virtual bench whose touches were a little off gave gravity 11 nats."""
 SHORTLIST = 3
+STRAINED = 4.0
+"""A cause that only widens a stated accuracy is refitted, whatever its linear gain, when the data pull that number this many
+standard deviations away: to first order the nuisance explains most of it already, and hides what the rest would gain."""
 PROMISING = 0.5
 """Share of the bound that a first cause must reach in the linear screening to be refitted; its refit may find more."""
 SECOND_FACTOR, SECOND_SHARE = 2.0, 0.25
 HOPELESS = 60.0
-"""A candidate this far behind the best one [nats] after two steps of its fit is not fitted further."""
+"""A candidate this far behind the best one [nats] after two steps of its fit, or behind the model without it, is given up."""
 RIVAL = 8.0
 """Rivals this close to the best [nats] are named too: the difference of two log densities that differ by d has a spread of
 about sqrt(2 d), so 8 nats are two of its standard deviations."""
@@ -56,6 +61,7 @@ class Findings:
     Attributes:
         baseline: the stated setup. best: the model accepted, or None. trials: every refitted model, best first.
         bound: least gain of a cause [nats]. misfit: of the baseline, per value. screened: linear gain by effect name.
+        structure: error of the baseline that is smooth and grows with the push. left: the same of the best model.
     """
 
     baseline: Model
@@ -64,6 +70,8 @@ class Findings:
     bound: float = LEAST_GAIN
     misfit: float = 1.0
     screened: dict[str, float] = field(default_factory=dict)
+    structure: Structure = NOTHING
+    left: Structure = NOTHING
 
     def rivals(self) -> list[Trial]:
         """Other sets of as many causes that explain the data about as well as the best."""
@@ -94,7 +102,7 @@ def _signatures(bench: Bench, baseline: Model) -> list[tuple[Effect, list[Predic
     pending = [(effect, bench.predict([effect], None, baseline.predictions)) for effect in starts]
     found = []
     for number, (effect, futures) in enumerate(pending):
-        bench.report(0.15 + 0.25 * number / len(pending), f"what {effect.name} would do")
+        bench.tell(f"what {effect.name} would do", 0.15 + 0.25 * number / len(pending))
         found.append((effect, [future.result() for future in futures]))
     return found
 
@@ -133,15 +141,30 @@ def _start(candidate: Candidate, model: Model, bench: Bench) -> Effect:
     return replace(candidate.start, stiffness_ratio=float(np.exp(np.clip(1.5 * log_ratio, -1.8, 1.8))))
 
 
-def _shortlist(gains: np.ndarray, candidates: Sequence[Candidate], least: float) -> list[Candidate]:
-    """The best start of each promising effect, best first; two places for a lump."""
-    chosen: list[Candidate] = []
+def _strained(bench: Bench, model: Model, candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The candidate whose accuracy, as stated, the data break most, if any."""
+    change = fit(bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model)).change
+    covariance = np.linalg.inv(bench.nuisances.precision)
+    worst, found = STRAINED**2, []
+    for candidate in candidates:
+        own = [model.nuisance.index(column) for column in candidate.widened]
+        pull = float(change[own] @ np.linalg.solve(covariance[np.ix_(own, own)], change[own])) / max(len(own), 1)
+        if pull > worst:
+            worst, found = pull, [candidate]
+    return found
+
+
+def _shortlist(
+    gains: np.ndarray, candidates: Sequence[Candidate], least: float, strained: Sequence[Candidate] = ()
+) -> list[Candidate]:
+    """The strained ones, then the best start of each promising effect, best first; two places for a lump."""
+    chosen, names = list(strained), SHORTLIST + len(strained)
     for number in np.argsort(-gains):
         candidate = candidates[number]
         taken = [c for c in chosen if c.start.name == candidate.start.name]
         apart = all(_distance(candidate.start, other.start) > 0.015 for other in taken)
         room = not taken or (isinstance(candidate.start, StiffInclusion) and len(taken) < 2 and apart)
-        if gains[number] > least and room and (taken or len({c.start.name for c in chosen}) < SHORTLIST):
+        if gains[number] > least and room and (taken or len({c.start.name for c in chosen}) < names):
             chosen.append(candidate)
     return chosen
 
@@ -173,9 +196,10 @@ def _trial(
 
 def search(bench: Bench, seed: int) -> Findings:
     """Find up to MOST_CAUSES causes."""
-    bench.report(0.02, "replaying the stated setup on two meshes")
+    bench.tell("replaying the stated setup on two meshes", 0.02)
     baseline = bench.baseline(lump_places(bench))
     findings = Findings(baseline, misfit=bench.misfit(baseline))
+    findings.structure = findings.left = structure_of(bench, baseline, seed)
     signatures = _signatures(bench, baseline)
     screened, candidates, gains = _screen(bench, baseline, signatures, baseline)
     blocks = bench.tempered(screened)
@@ -186,7 +210,7 @@ def search(bench: Bench, seed: int) -> Findings:
         findings.screened[name] = max(float(gain), findings.screened.get(name, -np.inf))
     current = Trial(baseline, 0.0, findings.misfit)
     for order in range(MOST_CAUSES):
-        bench.report(0.45 + 0.25 * order, "fitting the most promising causes" if order == 0 else "looking for a second cause")
+        bench.tell("looking for a second cause" if order else "fitting the most promising causes", 0.45 + 0.25 * order)
         if order:
             screened, candidates, gains = _again(bench, current.model, signatures, baseline)
         step = _forward(bench, findings, current, screened, candidates, gains)
@@ -197,6 +221,10 @@ def search(bench: Bench, seed: int) -> Findings:
     if findings.best is not None and len(findings.best.model.effects) > 1:
         findings.best = _backward(bench, findings, findings.best)
     _rescore(bench, findings)
+    if findings.best is not None:
+        refined = bench.refine(findings.best.model)
+        findings.best = replace(findings.best, model=refined, misfit=bench.misfit(refined))
+        findings.left = structure_of(bench, findings.best.model, seed)
     return findings
 
 
@@ -214,10 +242,11 @@ def _forward(
 ) -> Trial | None:
     """The best further cause if it gains more than the bound, else None."""
     trials: list[Trial] = []
-    for candidate in _shortlist(gains, candidates, PROMISING * _needed(findings, current)):
+    strained = [] if current.model.effects else _strained(bench, screened, candidates)
+    for candidate in _shortlist(gains, candidates, PROMISING * _needed(findings, current), strained):
         effects = [*current.model.effects, _start(candidate, screened, bench)]
-        hopeless = max((bench.objective(trial.model) for trial in trials), default=np.inf) - HOPELESS
-        trials.append(_trial(bench, effects, current.model.predictions, current.model, hopeless if trials else -np.inf))
+        hopeless = max([bench.objective(current.model), *(bench.objective(trial.model) - HOPELESS for trial in trials)])
+        trials.append(_trial(bench, effects, current.model.predictions, current.model, hopeless))
     trials.sort(key=lambda trial: -trial.gain)
     findings.trials.extend(trials)
     if not trials or trials[0].gain <= _needed(findings, current):

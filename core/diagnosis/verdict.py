@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from core.dataset import Dataset
+from core.diagnosis.bench import Bench
 from core.diagnosis.evidence import fit
 from core.diagnosis.gain import Ladder
-from core.diagnosis.models import Bench, Model
+from core.diagnosis.hypothesis import Model
 from core.diagnosis.search import Findings, Trial
 from core.effects import CATALOGUE
 from core.effects.sensor import CameraRegistration
@@ -27,7 +28,7 @@ _INTERVAL_STEPS = 400
 def verdict_of(findings: Findings) -> str:
     """One of found, none, ambiguous, unexplained."""
     if findings.best is None:
-        return "unexplained" if findings.misfit > UNEXPLAINED_MISFIT else "none"
+        return "unexplained" if findings.structure.significant or findings.misfit > UNEXPLAINED_MISFIT else "none"
     if findings.rivals():
         return "ambiguous"
     return "found"
@@ -112,16 +113,20 @@ def _ranking(findings: Findings, named: set[str]) -> list[dict[str, Any]]:
 
 
 def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
-    """How much of the misfit is left, and where and when it sits."""
+    """How much of the structured error is left, over what chance gives, and where and when it sits."""
     model = findings.best.model if findings.best else findings.baseline
-    left = bench.misfit(model)
     worst = {block.name: block.gram[0, 0] / max(block.values, 1) for block in model.blocks if block.name != "rest"}
     when = max(worst, key=lambda name: worst[name])
     patch, share = _worst_patch(model, bench)
-    fraction = max(left - 1.0, 0.0) / max(findings.misfit, left)
+    before, left = findings.structure, findings.left
+    fraction = max(left.ratio - 1.0, 0.0) / max(before.ratio, left.ratio, 1.0) if left.significant else 0.0
     place = bench.surface.patch_centres[patch] * 1e3
     where = f"{100 * share:.0f} % of it within 8 mm of ({place[0]:.0f}, {place[1]:.0f}, {place[2]:.0f}) mm"
-    return {"fraction": round(fraction, 4), "where": where, "when": f"most in {when}", "misfit_per_value": round(left, 4)}
+    return {
+        "fraction": round(fraction, 4), "where": where, "when": f"most in {when}", 
+        "misfit_per_value": round(bench.misfit(model), 4), "structure": round(left.ratio, 4),
+        "structure_bound": round(left.bound / left.expected, 4),
+    }  # fmt: skip
 
 
 def _worst_patch(model: Model, bench: Bench) -> tuple[int, float]:
@@ -152,7 +157,8 @@ def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder |
         "not_identifiable": _not_identifiable(dataset), "unexplained": _unexplained(bench, findings), "gain": None,
         "evidence": {
             "gain_nats": round(findings.best.gain, 2) if findings.best else 0.0, "bound_nats": round(findings.bound, 2),
-            "baseline_misfit": round(findings.misfit, 4), "evaluations": bench.evaluations,
+            "baseline_misfit": round(findings.misfit, 4), "structure": round(findings.structure.ratio, 4),
+            "structure_bound": round(findings.structure.bound / findings.structure.expected, 4), "evaluations": bench.evaluations,
             "fitted_on": list(bench.names),
         },
         "warnings": list(bench.registration.warnings),

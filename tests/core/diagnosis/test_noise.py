@@ -129,3 +129,12 @@ def test_group_without_equilibrium_in_the_baseline_has_no_weight():
     noise = Noise.of(prediction(gap, columns=columns, failed=(0,)), fine, surface, np.full(surface.patches, 1e-7), slice(0, 1))
     assert not noise.weights[[0, 2]].any() and noise.weights[1].all()
     assert np.isfinite(noise.block(whole).gram).all()
+
+
+def test_mesh_error_of_another_model_keeps_the_weights():
+    noise, (gap, columns) = _noise(), _model()
+    other = noise.remeshed(prediction(gap, columns=columns), prediction(gap + 0.7))
+    seen = noise.weights > 0
+    assert np.allclose(other.mesh[seen], 0.7)
+    assert np.array_equal(other.mesh[~seen], noise.mesh[~seen])
+    assert np.array_equal(other.weights, noise.weights)

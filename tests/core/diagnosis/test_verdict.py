@@ -10,13 +10,15 @@ from pushed_block import SETUP, dwelling, poke, prediction, registration
 from small_dataset import write_valid_dataset
 
 from core.dataset import Dataset, open_dataset
+from core.diagnosis.bench import Bench
 from core.diagnosis.evidence import Block, gram
 from core.diagnosis.gain import Ladder
-from core.diagnosis.models import Bench, Model
+from core.diagnosis.hypothesis import Model
 from core.diagnosis.observations import Group, Observations
 from core.diagnosis.patterns import draw_patterns, patterns
 from core.diagnosis.prediction import TOOL_COLUMNS
 from core.diagnosis.search import RIVAL, Findings, Trial
+from core.diagnosis.structure import Structure
 from core.diagnosis.verdict import UNEXPLAINED_MISFIT, intervals, report_of, verdict_of
 from core.diagnosis.workers import Workers
 from core.effects import CATALOGUE, Effect
@@ -102,6 +104,14 @@ def test_part_of_a_pair_is_no_rival(bench):
 def test_without_a_cause_it_depends_on_what_is_left(bench, left, wanted):
     assert verdict_of(_findings(bench, ((LUMP,), 3.0, 1.0), accepted=False, misfit=left)) == wanted
     assert verdict_of(_findings(bench, accepted=False, misfit=left)) == wanted
+
+
+def test_structured_error_without_a_cause_is_unexplained(bench):
+    findings = _findings(bench, accepted=False, misfit=1.02)
+    findings.structure = findings.left = Structure(50.0, 20.0, 30.0)
+    assert verdict_of(findings) == "unexplained"
+    findings.structure = findings.left = Structure(29.0, 20.0, 30.0)
+    assert verdict_of(findings) == "none"
 
 
 @pytest.mark.parametrize("effect", [LUMP, RADIUS, NU, CAMERA, Gravity(specific_weight_over_stiffness=1.2)], ids=lambda e: e.name)

@@ -1,14 +1,15 @@
-"""Hypotheses: the stated setup with some causes in it, evaluated on the data and refitted by Gauss-Newton."""
+"""The bench on which hypotheses are evaluated and refitted by Gauss-Newton: setup, workers, noise and priors in one place."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from core.diagnosis.evidence import Block, fit, log_evidence, predictive_score
+from core.diagnosis.hypothesis import Model, Nuisances
 from core.diagnosis.noise import Noise, noises
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted
 from core.diagnosis.static import StaticChannel
@@ -25,7 +26,7 @@ from core.progress import Report, silent
 from core.registration import Registration
 from core.setup import Inclusion, Setup
 
-__all__ = ["Bench", "Model", "Nuisances"]
+__all__ = ["Bench"]
 
 PRIOR_STEPS = 4.0
 """Prior standard deviation of a search coordinate, in its scales."""
@@ -33,64 +34,6 @@ _SMALL = 1e-3
 _SLIDING_STEP = 0.05
 _TRUST = 2.5
 _ITERATIONS = 4
-TIP = 1e-4
-RADIUS = 5e-5
-NU = 0.01
-CAMERA = np.array([1e-4] * 3 + [2e-3] * 3)
-"""Accuracies that are no finding: tool tip and radius [m], Poisson's ratio [1], camera beyond its covariance [m, rad]."""
-
-
-@dataclass(frozen=True, eq=False)
-class Nuisances:
-    """What is known only to its stated accuracy: prior precision (n, n) of the columns every model has."""
-
-    precision: FloatArray
-
-    @classmethod
-    def of(cls, registration: Registration) -> Nuisances:
-        robot = registration.robot_covariance.copy()
-        robot[:3, :3] += TIP**2 * np.eye(3)
-        camera = registration.camera_covariance + np.diag(CAMERA**2)
-        precision = np.zeros((15, 15))
-        precision[:6, :6] = np.linalg.inv(robot)
-        precision[6, 6], precision[7, 7] = RADIUS**-2, NU**-2
-        precision[8:14, 8:14] = np.linalg.inv(camera)
-        precision[14, 14] = 1.0
-        return cls(precision)
-
-
-@dataclass(frozen=True, eq=False)
-class Model:
-    """One hypothesis on the data.
-
-    Attributes:
-        effects: its causes. setup: the stated setup with them. predictions: per sequence. blocks: quadratic forms.
-        columns: index of the column of each search coordinate of each effect, in order.
-        extra: further columns by name. nuisance: columns of the nuisances.
-    """
-
-    effects: tuple[Effect, ...]
-    setup: Setup
-    predictions: tuple[Prediction, ...]
-    blocks: tuple[Block, ...]
-    columns: tuple[int, ...]
-    extra: dict[str, tuple[int, ...]]
-    nuisance: tuple[int, ...]
-
-    @property
-    def scales(self) -> FloatArray:
-        """Step that matters of each search coordinate."""
-        return np.array([item.scale for effect in self.effects for item in effect.numbers()])
-
-    @property
-    def coordinates(self) -> FloatArray:
-        """Search coordinates of all effects."""
-        return np.array([value for effect in self.effects for value in effect.coordinates])
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The effects' names."""
-        return tuple(effect.name for effect in self.effects)
 
 
 class Bench:
@@ -108,14 +51,19 @@ class Bench:
         report: Report = silent,
     ) -> None:
         self.setup, self.registration, self.workers, self.static = setup, registration, workers, static
-        self.names, self.report = tuple(names), report
+        self.names, self._report, self._done = tuple(names), report, 0.0
         self.grid, self.fine = grid, fine
         self.nuisances = Nuisances.of(registration)
         self.surface = Surface(setup.geometry)
         self.temperature = 1.0
-        self._noises: list[Noise] = []
+        self.noises: list[Noise] = []
         self._support = static.support(setup, grid) if static else np.zeros(0)
         self.evaluations = 0
+
+    def tell(self, text: str, done: float = 0.0) -> None:
+        """Report what is being done; the share that is done [1] never falls."""
+        self._done = max(self._done, done)
+        self._report(self._done, text)
 
     # -- evaluation -------------------------------------------------------------------------------------------------------------
 
@@ -212,9 +160,9 @@ class Bench:
             extra[item.name], at = tuple(range(at, at + len(item.numbers()))), at + len(item.numbers())
         extra["lumps"] = tuple(range(at, at + lumps))
         nuisance = (*range(TOOL_COLUMNS + 8), count)
-        if not self._noises:
+        if not self.noises:
             return Model(effects, setup, tuple(predictions), (), columns, extra, nuisance)
-        blocks = [noise.block(item) for noise, item in zip(self._noises, predictions, strict=True)]
+        blocks = [noise.block(item) for noise, item in zip(self.noises, predictions, strict=True)]
         if self.static:
             blocks.append(self.static.block(setup, self.grid, count + 1, self._own_static(effects, columns), self._support))
         return Model(effects, setup, tuple(predictions), tuple(blocks), columns, extra, nuisance)
@@ -237,7 +185,7 @@ class Bench:
         model = self.evaluate((), extras=time, lumps=lumps)
         fine = [f.result() for f in self.predict((), None, model.predictions, self.fine)]
         places = model.extra["lumps"]
-        self._noises = noises(model.predictions, fine, self.surface, slice(places[0], places[-1] + 1))
+        self.noises = noises(model.predictions, fine, self.surface, slice(places[0], places[-1] + 1))
         model = self.assemble((), self.setup, model.predictions, time, len(lumps))
         self.temperature = self.misfit(model)
         return model
@@ -249,7 +197,7 @@ class Bench:
             signatures: effects of a finite size and their predictions, whose difference from `origin` is the column.
         """
         blocks, count = [], model.predictions[0].columns.shape[2]
-        for number, noise in enumerate(self._noises):
+        for number, noise in enumerate(self.noises):
             here, zero = model.predictions[number], origin.predictions[number]
             added = [np.nan_to_num(other[number].gap - zero.gap)[..., None] for _, other in signatures]
             blocks.append(noise.block(replace(here, columns=np.concatenate([here.columns, *added], axis=2))))
@@ -302,8 +250,10 @@ class Bench:
 
         A model whose log evidence stays below `hopeless` after two steps is given up.
         """
-        self.report(0.0, f"fitting {' and '.join(effect.name for effect in effects)}")
-        model = self.evaluate(effects, starts)
+        self.tell(f"fitting {' and '.join(effect.name for effect in effects)}")
+        return self._fitted(self.evaluate(effects, starts), hopeless)
+
+    def _fitted(self, model: Model, hopeless: float) -> Model:
         best, radius = self.objective(model), _TRUST
         for iteration in range(_ITERATIONS):
             if iteration == 2 and best < hopeless:
@@ -324,6 +274,16 @@ class Bench:
                 if radius < 0.1:
                     break
         return model
+
+    def refine(self, model: Model) -> Model:
+        """Fit an accepted model's parameters once more, with the mesh's error measured in it and not in the stated setup.
+
+        From here on models compare no longer with those scored before.
+        """
+        self.tell("fitting the causes once more on two meshes")
+        fine = [f.result() for f in self.predict(model.effects, None, model.predictions, self.fine)]
+        self.noises = [n.remeshed(m, f) for n, m, f in zip(self.noises, model.predictions, fine, strict=True)]
+        return self._fitted(self.assemble(model.effects, model.setup, model.predictions, (), 0), -np.inf)
 
     def _shift(self, model: Model, step: FloatArray) -> list[Effect]:
         effects, at = [], 0

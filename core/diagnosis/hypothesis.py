@@ -1,0 +1,75 @@
+"""A hypothesis: the stated setup with some causes in it, and what is known of everything else only to its stated accuracy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.diagnosis.evidence import Block
+from core.diagnosis.prediction import Prediction
+from core.effects import Effect
+from core.frames import FloatArray
+from core.registration import Registration
+from core.setup import Setup
+
+__all__ = ["Model", "Nuisances"]
+
+TIP = 1e-4
+RADIUS = 5e-5
+NU = 0.01
+CAMERA = np.array([1e-4] * 3 + [2e-3] * 3)
+"""Accuracies that are no finding: tool tip and radius [m], Poisson's ratio [1], camera beyond its covariance [m, rad]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Nuisances:
+    """What is known only to its stated accuracy: prior precision (n, n) of the columns every model has."""
+
+    precision: FloatArray
+
+    @classmethod
+    def of(cls, registration: Registration) -> Nuisances:
+        robot = registration.robot_covariance.copy()
+        robot[:3, :3] += TIP**2 * np.eye(3)
+        camera = registration.camera_covariance + np.diag(CAMERA**2)
+        precision = np.zeros((15, 15))
+        precision[:6, :6] = np.linalg.inv(robot)
+        precision[6, 6], precision[7, 7] = RADIUS**-2, NU**-2
+        precision[8:14, 8:14] = np.linalg.inv(camera)
+        precision[14, 14] = 1.0
+        return cls(precision)
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """One hypothesis on the data.
+
+    Attributes:
+        effects: its causes. setup: the stated setup with them. predictions: per sequence. blocks: quadratic forms.
+        columns: index of the column of each search coordinate of each effect, in order.
+        extra: further columns by name. nuisance: columns of the nuisances.
+    """
+
+    effects: tuple[Effect, ...]
+    setup: Setup
+    predictions: tuple[Prediction, ...]
+    blocks: tuple[Block, ...]
+    columns: tuple[int, ...]
+    extra: dict[str, tuple[int, ...]]
+    nuisance: tuple[int, ...]
+
+    @property
+    def scales(self) -> FloatArray:
+        """Step that matters of each search coordinate."""
+        return np.array([item.scale for effect in self.effects for item in effect.numbers()])
+
+    @property
+    def coordinates(self) -> FloatArray:
+        """Search coordinates of all effects."""
+        return np.array([value for effect in self.effects for value in effect.coordinates])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effects' names."""
+        return tuple(effect.name for effect in self.effects)

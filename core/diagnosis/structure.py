@@ -1,0 +1,105 @@
+"""Is anything wrong? The part of a model's error that is smooth over the surface and grows with the push, against pure noise.
+
+The whitened residual of each sequence is projected on smooth surface modes times the depth of the push (step 3 of the method); the
+same projection of draws from the noise model, with the nuisances fitted anew in each, says how much of it chance gives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from core.diagnosis.bench import Bench
+from core.diagnosis.evidence import Block, draw_rights
+from core.diagnosis.hypothesis import Model
+from core.diagnosis.noise import smooth_basis
+from core.diagnosis.prediction import Prediction
+from core.frames import FloatArray
+
+__all__ = ["NOTHING", "Structure", "explained_by_modes", "structure_of"]
+
+MODE_LENGTH = 12e-3
+"""Distance between surface modes [m]: what a cause inside a block or at its base shows is no finer than this."""
+DRAWS = 400
+QUANTILE = 0.99
+_FAINT = 1e-3
+"""Prior precision of a mode's factor over the largest in the block: keeps modes that nobody saw from being divided by nothing."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Squared whitened residual along the modes.
+
+    Attributes:
+        value: of the data. expected: mean of it when nothing is wrong. bound: its 99 % quantile then.
+    """
+
+    value: float
+    expected: float
+    bound: float
+
+    @property
+    def ratio(self) -> float:
+        """Over what chance gives; about one when nothing is wrong."""
+        return self.value / self.expected
+
+    @property
+    def significant(self) -> bool:
+        """Whether chance alone would rarely give it."""
+        return self.value > self.bound
+
+
+NOTHING = Structure(0.0, 1.0, 1.0)
+
+
+def _depth(item: Prediction) -> FloatArray:
+    """(g,) largest displacement of each group over the largest of the sequence [1]."""
+    size = np.array([np.linalg.norm(frame.displacement, axis=1).max() if frame.in_contact else 0.0 for frame in item.equilibria])
+    return np.asarray(size / max(size.max(), 1e-9))
+
+
+def _with_modes(model: Model, bench: Bench) -> list[Block]:
+    """The model's blocks whose last columns are the modes."""
+    basis, blocks = smooth_basis(bench.surface.patch_centres, MODE_LENGTH), []
+    for noise, item in zip(bench.noises, model.predictions, strict=True):
+        modes = _depth(item)[:, None, None] * basis
+        blocks.append(noise.block(replace(item, columns=np.concatenate([item.columns, modes], axis=2))))
+    return blocks
+
+
+def explained_by_modes(
+    blocks: Sequence[Block], rights: FloatArray, fitted: Sequence[int], precision: FloatArray, modes: Sequence[int]
+) -> FloatArray:
+    """What modes explain (d,) of right sides (d, b, k), after the `fitted` columns were fitted to all blocks together.
+
+    Args:
+        precision: (f, f) prior of the fitted columns. modes: columns of which each block has its own factors.
+    """
+    index, own = np.asarray(fitted), np.asarray(modes)
+    grams = np.array([block.gram[1:, 1:] for block in blocks])
+    total = grams[:, index[:, None], index].sum(axis=0) + precision
+    factors = -np.linalg.solve(total, rights[:, :, index].sum(axis=1).T).T
+    found = np.zeros(len(rights))
+    for number, matrix in enumerate(grams):
+        left = rights[:, number, own] + factors @ matrix[np.ix_(index, own)]
+        inner = matrix[np.ix_(own, own)]
+        inner = inner + _FAINT * np.diag(inner).max() * np.eye(len(own))
+        found += np.einsum("di,ij,dj->d", left, np.linalg.inv(inner), left)
+    return found
+
+
+def structure_of(bench: Bench, model: Model, seed: int) -> Structure:
+    """Structured error that a model leaves."""
+    blocks = _with_modes(model, bench)
+    size = blocks[0].gram.shape[0] - 1
+    first = model.predictions[0].columns.shape[2]
+    fitted = [*model.nuisance[:-1], size - 1, *model.columns]  # the mesh's error is the last column
+    precision = bench.precision(model)
+    modes = range(first, size - 1)
+    data = np.array([[block.gram[1:, 0] for block in blocks]])
+    rights = draw_rights(blocks, fitted, precision, DRAWS, np.random.default_rng(seed))
+    value = float(explained_by_modes(blocks, data, fitted, precision, modes)[0])
+    chance = explained_by_modes(blocks, rights, fitted, precision, modes)
+    return Structure(value, float(chance.mean()), float(np.quantile(chance, QUANTILE)))
