@@ -35,7 +35,6 @@ PAGE_GRID = GridSpec(nodes=(13, 9, 8), spacing=1.5e-3)
 """For a tool of 5 mm; all are scaled with the stated radius."""
 FIT_GROUPS = 14
 TEST_GROUPS = 24
-_LEAST_BIAS = 1.5e-4
 _USUAL_RADIUS = 5e-3
 
 
@@ -113,10 +112,8 @@ def _run(
     replays: bool,
 ) -> dict[str, Any]:
     fitted, unseen = data
-    cleaner = cleaner_for(dataset, registration)
-    bias = registration.camera.bias if registration.camera else _LEAST_BIAS
-    static = StaticChannel.of(dataset.rest_cloud(), cleaner, max(bias, _LEAST_BIAS))
     grid, fine = _scaled(DIAGNOSIS_GRID, setup.tool.radius), _scaled(FINE_GRID, setup.tool.radius)
+    static = StaticChannel.of(dataset.rest_cloud(), cleaner_for(dataset, registration), setup, grid)
     names = [item.name for item in fitted]
     bench = Bench(setup, registration, pool, names, static, grid, fine, part(report, 0.05, 0.75))
     findings = search(bench, seed)

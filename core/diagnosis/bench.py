@@ -57,7 +57,6 @@ class Bench:
         self.surface = Surface(setup.geometry)
         self.temperature = 1.0
         self.noises: list[Noise] = []
-        self._support = static.support(setup, grid) if static else np.zeros(0)
         self.evaluations = 0
 
     def tell(self, text: str, done: float = 0.0) -> None:
@@ -164,7 +163,7 @@ class Bench:
             return Model(effects, setup, tuple(predictions), (), columns, extra, nuisance)
         blocks = [noise.block(item) for noise, item in zip(self.noises, predictions, strict=True)]
         if self.static:
-            blocks.append(self.static.block(setup, self.grid, count + 1, self._own_static(effects, columns), self._support))
+            blocks.append(self.static.block(self.setup, setup, self.grid, count + 1, self._own_static(effects, columns)))
         return Model(effects, setup, tuple(predictions), tuple(blocks), columns, extra, nuisance)
 
     def _own_static(self, effects: tuple[Effect, ...], columns: tuple[int, ...]) -> dict[int, tuple[Setup, float]]:
@@ -209,7 +208,7 @@ class Bench:
                 if effect.enters.value == "load"
             }
             varied |= self._own_static(model.effects, model.columns)
-            blocks.append(self.static.block(model.setup, self.grid, count + len(signatures) + 1, varied, self._support))
+            blocks.append(self.static.block(self.setup, model.setup, self.grid, count + len(signatures) + 1, varied))
         nuisance = (*model.nuisance[:-1], count + len(signatures))
         return replace(model, blocks=tuple(blocks), nuisance=nuisance, extra={**model.extra, "signatures": places})
 

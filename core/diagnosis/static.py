@@ -1,7 +1,8 @@
 """The static channel: the rest cloud against the stated shape, with the table as its floor.
 
 Here alone the sag of gravity shows. The camera's pose is free, since it was fitted to this very cloud, and the camera's smooth
-bias is a random field whose size the registration has estimated.
+bias is a random field. Its size and reach come from the cloud itself, with every side of the block free to bulge, so that a block
+that sags does not pass for a bad camera.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve
 
 from core.cleaning import Cleaner
 from core.diagnosis.evidence import Block
@@ -21,75 +23,123 @@ from core.setup import Setup
 
 __all__ = ["StaticChannel"]
 
-_BIAS_LENGTH = 0.025
+BIAS_SIZES = np.array([0.15, 0.2, 0.3, 0.4, 0.6, 1.0]) * 1e-3
+BIAS_REACHES = np.array([0.01, 0.014, 0.02, 0.028, 0.04, 0.06])
+WHITE_FACTORS = np.array([1.0, 1.5, 2.2])
+"""Standard deviation and length [m] of the camera's smooth bias, and factor on the scatter's variance, that are tried."""
 _TABLE_CELL = 0.012
 _POSE_FREEDOM = 0.05
+_LEAST_POINTS = 3
+_FLOOR = 2e-5
 
 
 @dataclass(frozen=True, eq=False)
 class StaticChannel:
-    """The rest cloud, reduced.
+    """The rest cloud, reduced; every model is compared at the same places.
 
     Attributes:
-        points: (n, 3) cleaned, camera frame [m]. table: (m, 3) places of the table's cells, phantom frame [m].
-        table_gap: (m,) their height above z = 0 [m]. table_variance: (m,) of those [m^2]. bias: of the camera [m].
-        weights: (p,) points per patch in the stated model; the same for all models.
+        patches: (p,) patches of the surface that were seen. centres, normals: (p, 3) of those [m], phantom frame.
+        residual: (p + t,) of the stated model, at the patches and at the table's cells [m].
+        factor: Cholesky factor of its covariance (p + t, p + t) [m^2], the camera's pose and bias included.
+        bias, reach: of the camera's smooth error [m].
     """
 
-    points: FloatArray
-    table: FloatArray
-    table_gap: FloatArray
-    table_variance: FloatArray
+    centres: FloatArray
+    normals: FloatArray
+    residual: FloatArray
+    factor: FloatArray
     bias: float
+    reach: float
 
     @classmethod
-    def of(cls, cloud: FloatArray, cleaner: Cleaner, bias: float) -> StaticChannel:
-        """From the raw rest cloud (n, 3) [m], camera frame."""
+    def of(cls, cloud: FloatArray, cleaner: Cleaner, setup: Setup, grid: GridSpec) -> StaticChannel:
+        """From the raw rest cloud (n, 3) [m], camera frame, under the stated setup."""
         clean = cleaner.clean(cloud)
-        table = clean.table_points
-        cell = np.floor(table[:, :2] / _TABLE_CELL).astype(int)
-        _, index = np.unique(cell, axis=0, return_inverse=True)
-        index = index.ravel()
-        count = np.bincount(index)
-        means = np.stack([np.bincount(index, table[:, axis]) / count for axis in range(3)], axis=1)
-        spread = float(np.median(np.abs(table[:, 2] - means[index, 2]))) * 1.48 if len(table) else 0.0
-        good = count >= 4
-        places = means[good] * np.array([1.0, 1.0, 0.0])
-        return cls(cloud[clean.indices], places, means[good, 2], spread**2 / count[good], bias)
+        places, height, scatter = _table_cells(clean.table_points)
+        surface, pose = Surface(setup.geometry), setup.phantom_from_camera
+        seen = gaps(pose.apply(cloud[clean.indices]), pose.translation, rest(setup, grid), surface)
+        means = patch_means(seen.gap, seen.patch, surface.patches, least=_LEAST_POINTS)
+        used = np.flatnonzero(np.isfinite(means.mean) & (means.count >= _LEAST_POINTS))
+        centres, normals = surface.patch_centres[used], surface.patch_normals[used]
+        white = np.concatenate([float(np.nanmedian(means.spread[used])) ** 2 / np.maximum(means.count[used], 1), scatter])
+        residual = np.concatenate([means.mean[used], height])
+        places = np.concatenate([centres, places])
+        directions = np.concatenate([normals, np.tile([0.0, 0.0, 1.0], (len(height), 1))])
+        pivot = np.array([0.0, 0.0, setup.geometry.size[2]])
+        moved = np.einsum("ni,nij->nj", directions, motion_jacobian(places, pivot))
+        free = np.column_stack([moved, _bulges(places[: len(used)], normals, len(residual))])
+        covariance, bias, reach = _camera_errors(places, white, residual, free)
+        covariance += _POSE_FREEDOM**2 * moved @ np.diag([1, 1, 1, 100, 100, 100]) @ moved.T
+        return cls(centres, normals, residual, cho_factor(covariance)[0], bias, reach)
 
-    def block(
-        self, setup: Setup, grid: GridSpec, columns: int, varied: dict[int, tuple[Setup, float]], support: FloatArray
-    ) -> Block:
+    def block(self, stated: Setup, setup: Setup, grid: GridSpec, columns: int, varied: dict[int, tuple[Setup, float]]) -> Block:
         """Quadratic form with the pose and the bias integrated out.
 
         Args:
+            stated: setup under which the channel was made. setup: of the model.
             columns: total number of columns. varied: column to (setup a little changed, step) for those that change the rest shape.
-            support: (p,) which patches to use, from the baseline.
         """
-        surface, pose = Surface(setup.geometry), setup.phantom_from_camera
-        frame = rest(setup, grid)
-        seen = gaps(pose.apply(self.points), pose.translation, frame, surface)
-        means = patch_means(seen.gap, seen.patch, surface.patches)
-        used = np.flatnonzero(np.isfinite(means.mean) & support)
-        centres, normals = surface.patch_centres[used], surface.patch_normals[used]
-        places = np.concatenate([centres, self.table])
-        directions = np.concatenate([normals, np.tile([0.0, 0.0, 1.0], (len(self.table), 1))])
-        residual = np.concatenate([means.mean[used], self.table_gap])
-        white = float(np.nanmedian(means.spread[used])) ** 2 / np.maximum(means.count[used], 1)
-        distance = np.linalg.norm(places[:, None] - places, axis=2)
-        covariance = self.bias**2 * np.exp(-0.5 * (distance / _BIAS_LENGTH) ** 2)
-        covariance += np.diag(np.concatenate([white, self.table_variance]) + 4e-10)
-        pose_columns = np.einsum("ni,nij->nj", directions, motion_jacobian(places, np.array([0.0, 0.0, setup.geometry.size[2]])))
-        covariance += _POSE_FREEDOM**2 * pose_columns @ np.diag([1, 1, 1, 100, 100, 100]) @ pose_columns.T
-        stacked = np.zeros((len(residual), 1 + columns))
-        stacked[:, 0] = residual
+        here, shape = rest(stated, grid).move(self.centres), rest(setup, grid).move(self.centres)
+        stacked = np.zeros((len(self.residual), 1 + columns))
+        stacked[:, 0] = self.residual
+        stacked[: len(self.centres), 0] -= np.einsum("ni,ni->n", shape - here, self.normals)
         for column, (other, step) in varied.items():
-            change = rest(other, grid).move(centres) - frame.move(centres)
-            stacked[: len(used), 1 + column] = -np.einsum("ni,ni->n", change, normals) / step
-        return Block("rest", stacked.T @ np.linalg.solve(covariance, stacked), float(len(residual)))
+            change = rest(other, grid).move(self.centres) - shape
+            stacked[: len(self.centres), 1 + column] = -np.einsum("ni,ni->n", change, self.normals) / step
+        return Block("rest", stacked.T @ cho_solve((self.factor, False), stacked), float(len(self.residual)))
 
-    def support(self, setup: Setup, grid: GridSpec) -> FloatArray:
-        """(p,) patches with enough points in the stated model."""
-        surface, pose = Surface(setup.geometry), setup.phantom_from_camera
-        seen = gaps(pose.apply(self.points), pose.translation, rest(setup, grid), surface)
-        return np.asarray(patch_means(seen.gap, seen.patch, surface.patches, least=3).count >= 3, dtype=float).astype(bool)
+
+def _table_cells(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Places (t, 3) on the table [m], mean height (t,) there [m], and its variance (t,) [m^2], from points (m, 3)."""
+    _, index = np.unique(np.floor(table[:, :2] / _TABLE_CELL).astype(int), axis=0, return_inverse=True)
+    index = index.ravel()
+    count = np.bincount(index)
+    means = np.stack([np.bincount(index, table[:, axis]) / count for axis in range(3)], axis=1)
+    spread = float(np.median(np.abs(table[:, 2] - means[index, 2]))) * 1.48 if len(table) else 0.0
+    good = count >= 4
+    return means[good] * np.array([1.0, 1.0, 0.0]), means[good, 2], spread**2 / count[good]
+
+
+def _bulges(centres: FloatArray, normals: FloatArray, rows: int) -> FloatArray:
+    """Columns (rows, c) with which each side lies off as a whole and bulges; a smooth bias must not be needed for that."""
+    found = []
+    for side in np.unique(normals, axis=0):
+        here = (normals == side).all(axis=1).astype(float)
+        along = [axis for axis in range(3) if side[axis] == 0]
+        shapes = [here, *(here * centres[:, axis] ** power for axis in along for power in (1, 2))]
+        found += [np.concatenate([shape, np.zeros(rows - len(centres))]) for shape in shapes]
+    return np.column_stack(found) if found else np.zeros((rows, 0))
+
+
+def _camera_errors(
+    places: FloatArray, white: FloatArray, residual: FloatArray, free: FloatArray
+) -> tuple[FloatArray, float, float]:
+    """Covariance (n, n) [m^2] of the camera's errors, with size and reach [m] of its bias, by restricted maximum likelihood.
+
+    Patterson and Thompson 1971: the likelihood of what the `free` columns (n, c) cannot explain.
+    """
+    scale = np.linalg.norm(free, axis=0)
+    basis, sizes, _ = np.linalg.svd(free[:, scale > 0] / scale[scale > 0], full_matrices=False)
+    basis = basis[:, sizes > 1e-6 * sizes[0]]
+    distance = np.linalg.norm(places[:, None] - places, axis=2)
+    best, found = -np.inf, None
+    for reach in BIAS_REACHES:
+        kernel = np.exp(-0.5 * (distance / reach) ** 2)
+        for size in BIAS_SIZES:
+            for factor in WHITE_FACTORS:
+                covariance = size**2 * kernel + np.diag(factor * white + _FLOOR**2)
+                value = _restricted(covariance, residual, basis)
+                if value > best:
+                    best, found = value, (covariance, float(size), float(reach))
+    if found is None:
+        raise np.linalg.LinAlgError("no model of the camera's errors is positive definite")
+    return found
+
+
+def _restricted(covariance: FloatArray, residual: FloatArray, basis: FloatArray) -> float:
+    """Restricted log likelihood of a residual (n,) up to a constant [nats]."""
+    factor = cho_factor(covariance)
+    solved = cho_solve(factor, np.column_stack([basis, residual]))
+    information, right = basis.T @ solved[:, :-1], basis.T @ solved[:, -1]
+    misfit = residual @ solved[:, -1] - right @ np.linalg.solve(information, right)
+    return float(-0.5 * (misfit + 2 * np.log(np.diag(factor[0])).sum() + np.linalg.slogdet(information)[1]))

@@ -70,9 +70,13 @@ def test_an_unknown_sequence_is_answered_with_the_nearest_name(folder: Path) -> 
 
 
 def test_line_ends_and_byte_order_mark_of_other_systems_are_read(folder: Path) -> None:
+    plain = open_dataset(folder).sequence("poke-01").kinematics
     for path in [*folder.rglob("*.csv"), folder / "dataset.toml"]:
         path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
     open_dataset(folder).validate()
+    read = open_dataset(folder).sequence("poke-01").kinematics
+    assert np.array_equal(read.time, plain.time)
+    assert np.array_equal(read.position, plain.position)
 
 
 def test_without_clouds_no_camera_and_no_rest_cloud_are_needed(folder: Path) -> None:
