@@ -36,6 +36,7 @@ class Result:
 
     Attributes:
         hidden, named: effects with their parameters, as in a truth file and in a report.
+        gain, bound: of the named causes, or of the best that was not named, and the least that is [nats].
         removed: share of the reducible error that the named causes remove on test sequences [1], if any.
         seconds: of the diagnosis alone.
     """
@@ -45,6 +46,8 @@ class Result:
     hidden: list[dict[str, Any]]
     verdict: str
     named: list[dict[str, Any]]
+    gain: float
+    bound: float
     removed: float | None
     seconds: float
 
@@ -101,7 +104,12 @@ def run_case(case: Case, folder: Path) -> Result:
     finally:
         shutil.rmtree(place, ignore_errors=True)
     removed = ((said.get("gain") or {}).get("reducible_removed") or {}).get("value")
-    return Result(case.name, case.seed, truth.as_dict()["effects"], said["verdict"], said["causes"], removed, round(seconds, 1))
+    evidence = said["evidence"]
+    gain = evidence["gain_nats"] if said["causes"] else max(row["gain_nats"] for row in said["ranking"])
+    return Result(
+        case.name, case.seed, truth.as_dict()["effects"], said["verdict"], said["causes"], gain, evidence["bound_nats"], removed,
+        round(seconds, 1),
+    )  # fmt: skip
 
 
 def scenario_of(case: Case) -> Any:

@@ -13,7 +13,7 @@ from core.synthetic import HIDDEN
 
 
 def result(name: str, hidden: list[str], verdict: str, named: list[str]) -> Result:
-    return Result(name, 0, [{"effect": one} for one in hidden], verdict, [{"effect": one} for one in named], 0.9, 1.0)
+    return Result(name, 0, [{"effect": one} for one in hidden], verdict, [{"effect": one} for one in named], 40.0, 20.0, 0.9, 1.0)
 
 
 def test_suite_hides_every_effect_once_and_nothing_ten_times() -> None:
