@@ -43,7 +43,8 @@ def _table(cases: list[Case], results: list[Result]) -> Table:
         removed = "–" if result.removed is None else f"{100 * result.removed:.0f} %"
         table.add_row(
             result.name, _causes(result.hidden) or "nothing", result.verdict, _causes(result.named) or "–",
-            f"{result.gain:.0f} ({result.bound:.0f}) nats", removed, f"{result.seconds:.0f} s", "[green]✓[/]" if result.right else "[red]✗[/]",
+            f"{result.gain:.0f} ({result.bound:.0f}) nats", removed, f"{result.seconds:.0f} s",
+            "[green]✓[/]" if result.right else "[red]✗[/]",
         )  # fmt: skip
     if len(results) < len(cases):
         table.caption = f"{len(cases) - len(results)} cases without a result"

@@ -13,6 +13,7 @@ from core.diagnosis.bench import Bench
 from core.diagnosis.gain import fixed_pattern
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.observations import Observations
+from core.diagnosis.prediction import Prediction
 from core.errors import DiagnosisError
 from core.frames import FloatArray
 from core.measurement import SIDES, Surface
@@ -38,28 +39,52 @@ class Patterns:
 
 
 def patterns(bench: Bench, data: Sequence[Observations], baseline: Model, found: Model) -> Patterns:
-    """The error of the one push in which the cause matters most, smoothed alike, without the camera's own pattern."""
-    best: tuple[float, FloatArray, FloatArray, FloatArray] | None = None
-    for item, before, after in zip(data, baseline.predictions, found.predictions, strict=True):
-        zero, known = fixed_pattern(item, after)
-        seen = np.isfinite(before.gap) & np.isfinite(after.gap) & (known >= _LEAST_POINTS)
-        points = np.where(seen, before.count, 0.0)
-        change, error = (np.where(seen, gap, 0.0) for gap in (before.gap - after.gap, before.gap - zero))
-        touched = np.array([0 if group.free else 1 + group.probe for group in item.groups])
+    """The error of the one push in which the cause matters most, and what the cause predicts of it, smoothed alike.
+
+    A cause that shows in the push is compared without what the untouched frames show, the camera's pattern; one that shows in the
+    untouched block already (sag, a camera that was moved) with it.
+    """
+    pairs = list(zip(data, baseline.predictions, found.predictions, strict=True))
+    compared = [_compare(item, before, after, whole=False) for item, before, after in pairs]
+    if sum(still for _, still, _ in compared) > sum((rows.change**2 * rows.points).sum() for _, _, rows in compared):
+        compared = [_compare(item, before, after, whole=True) for item, before, after in pairs]
+    best: tuple[float, _Rows] | None = None
+    for touched, _, rows in compared:
         for probe in np.unique(touched[touched > 0]):
-            rows = points * (touched == probe)[:, None]
-            weight, size = rows.sum(axis=0), float((change**2 * rows).sum())
+            points = rows.points * (touched == probe)[:, None]
+            size = float((rows.change**2 * points).sum())
             if best is None or size > best[0]:
-                best = (size, (rows * error).sum(axis=0), (rows * change).sum(axis=0), weight)
+                best = (size, _Rows(points, rows.error, rows.change))
     if best is None:
         raise DiagnosisError("the tool touches the phantom in no sequence that was fitted on")
-    _, error_sum, change_sum, weight = best
-    near = _kernel(bench.surface)
+    points, error, change = best[1].points, best[1].error, best[1].change
+    near, weight = _kernel(bench.surface), points.sum(axis=0)
     total = near @ weight
     shown = np.where((total >= _LEAST_POINTS) & (weight > 0), total, np.nan)
-    return Patterns(
-        bench.surface.patch_centres, bench.surface.patch_normals, (near @ error_sum) / shown, (near @ change_sum) / shown
-    )  # fmt: skip
+    measured, predicted = (near @ (points * values).sum(axis=0) / shown for values in (error, change))
+    return Patterns(bench.surface.patch_centres, bench.surface.patch_normals, measured, predicted)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Points, error of the stated model and what the cause changes, by group and patch (g, p); zero where unseen."""
+
+    points: FloatArray
+    error: FloatArray
+    change: FloatArray
+
+
+def _compare(item: Observations, before: Prediction, after: Prediction, *, whole: bool) -> tuple[FloatArray, float, _Rows]:
+    """Probe of each touched group (g,), how much the cause changes untouched frames, and the errors in the touched ones."""
+    (own, known), other = fixed_pattern(item, before), fixed_pattern(item, after)[0]
+    seen = np.isfinite(before.gap) & np.isfinite(after.gap) & (known >= _LEAST_POINTS)
+    touched = np.array([0 if group.free else 1 + group.probe for group in item.groups])
+    points = np.where(seen & (touched > 0)[:, None], before.count, 0.0)
+    still = np.where(known >= _LEAST_POINTS, own - other, 0.0)
+    error, change = np.where(seen, before.gap, 0.0), np.where(seen, before.gap - after.gap, 0.0)
+    if not whole:
+        error, change = error - np.where(seen, own, 0.0), change - np.where(seen, still, 0.0)
+    return touched, float((still**2 * points).sum()), _Rows(points, error, change)
 
 
 def _kernel(surface: Surface) -> FloatArray:

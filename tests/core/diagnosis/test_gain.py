@@ -61,6 +61,23 @@ def test_fixed_pattern_of_the_camera_is_no_error():
     assert found.baseline == pytest.approx(0.0, abs=1e-12)
 
 
+def test_pattern_that_only_one_model_has_is_its_error():
+    item, touched = _observations([0, 1]), [0.0, 3e-3]
+    still = replace(_model([2e-3, 0.0]), gap=_model([2e-3, 2e-3]).gap + _model(touched).gap)
+    found = ladder([item], [still], [_model([0.0, 3e-3])], SETUP, SETUP, seed=0)
+    assert found.baseline == pytest.approx(np.hypot(3e-3, 2e-3))
+    assert found.extended == pytest.approx(3e-3)
+    back = ladder([item], [_model([0.0, 3e-3])], [still], SETUP, SETUP, seed=0)
+    assert (back.baseline, back.extended) == pytest.approx((found.extended, found.baseline))
+
+
+def test_pattern_as_large_in_both_models_gains_nothing():
+    item = _observations([0, 1])
+    models = [_model([size, size]) for size in (2e-3, -2e-3)]
+    found = ladder([item], models[:1], models[1:], SETUP, SETUP, seed=0)
+    assert found.baseline == found.extended == pytest.approx(0.0, abs=1e-12)
+
+
 def test_scatter_of_single_points_makes_the_noise_floor():
     item, spread = _observations([0, 1]), 2e-3
     before = replace(_model([0.0, 1e-3]), spread=np.full((2, PATCHES), spread))
