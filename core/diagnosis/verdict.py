@@ -8,21 +8,18 @@ import numpy as np
 
 from core.dataset import Dataset
 from core.diagnosis.bench import Bench
-from core.diagnosis.evidence import fit
 from core.diagnosis.gain import Ladder
 from core.diagnosis.hypothesis import Model
+from core.diagnosis.intervals import intervals
 from core.diagnosis.search import Findings, Trial
 from core.effects import CATALOGUE
-from core.effects.sensor import CameraRegistration
 
-__all__ = ["UNEXPLAINED_MISFIT", "intervals", "report_of", "verdict_of"]
+__all__ = ["UNEXPLAINED_MISFIT", "report_of", "verdict_of"]
 
 UNEXPLAINED_MISFIT = 1.25
 """Misfit per value above which structured error is left: the engine's own accuracy is in the noise already."""
 _TEMPERATURE = 4.0
 """Gains are divided by this before they become probabilities: predictive densities of a model that is not true are over-sure."""
-_NORMAL_95 = 1.96
-_INTERVAL_STEPS = 400
 
 
 def verdict_of(findings: Findings) -> str:
@@ -32,38 +29,6 @@ def verdict_of(findings: Findings) -> str:
     if findings.rivals():
         return "ambiguous"
     return "found"
-
-
-def intervals(bench: Bench, model: Model) -> list[dict[str, dict[str, Any]]]:
-    """For each effect: name to value, unit and 95 % interval (Laplace; magnitudes by sampling)."""
-    solution = fit(bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model))
-    own = slice(len(model.nuisance), None)
-    spread = np.sqrt(np.diag(solution.covariance)[own])
-    found, at = [], 0
-    for effect in model.effects:
-        number = len(effect.numbers())
-        entry: dict[str, dict[str, Any]] = {}
-        for item, value, sd in zip(effect.numbers(), effect.coordinates, spread[at : at + number], strict=True):
-            low, high = item.value(value - _NORMAL_95 * sd), item.value(value + _NORMAL_95 * sd)
-            entry[item.name] = {"value": item.value(value), "unit": item.unit, "low": low, "high": high}
-        for name, (reported, unit) in effect.reported().items():
-            entry.setdefault(name, {"value": reported, "unit": unit})
-        if isinstance(effect, CameraRegistration):
-            entry |= _magnitudes(effect, spread[at : at + number])
-        found.append(entry)
-        at += number
-    return found
-
-
-def _magnitudes(effect: CameraRegistration, spread: np.ndarray) -> dict[str, dict[str, Any]]:
-    drawn = np.array(effect.coordinates) + spread * np.random.default_rng(0).standard_normal((_INTERVAL_STEPS, 6))
-    found = {}
-    for name, part, unit in (("translation", slice(0, 3), "m"), ("rotation", slice(3, 6), "rad")):
-        low, high = np.quantile(np.linalg.norm(drawn[:, part], axis=1), [0.025, 0.975])
-        value = float(np.linalg.norm(np.array(effect.coordinates)[part]))
-        # Noise only ever lengthens a short vector, so that the draws may all lie above its value.
-        found[name] = {"value": value, "unit": unit, "low": min(float(low), value), "high": max(float(high), value)}
-    return found
 
 
 def _probabilities(findings: Findings) -> dict[tuple[str, ...], float]:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +15,13 @@ from core.diagnosis.bench import Bench
 from core.diagnosis.evidence import Block, gram
 from core.diagnosis.gain import Ladder
 from core.diagnosis.hypothesis import Model
+from core.diagnosis.intervals import intervals
 from core.diagnosis.observations import Group, Observations
 from core.diagnosis.patterns import draw_patterns, patterns
 from core.diagnosis.prediction import TOOL_COLUMNS
 from core.diagnosis.search import RIVAL, Findings, Trial
 from core.diagnosis.structure import Structure
-from core.diagnosis.verdict import UNEXPLAINED_MISFIT, intervals, report_of, verdict_of
+from core.diagnosis.verdict import UNEXPLAINED_MISFIT, report_of, verdict_of
 from core.diagnosis.workers import Workers
 from core.effects import CATALOGUE, Effect
 from core.effects.load import Gravity
@@ -124,13 +126,32 @@ def test_interval_holds_the_value_within_the_bounds(bench, effect):
         assert stated["value"] == pytest.approx(getattr(effect, item.name)) and stated["unit"] == item.unit
 
 
-def test_interval_is_the_fits_deviation(bench):
-    model = _model(bench, RADIUS)
-    # Columns of 1e-5 m per scale at 1e-4 m noise, over all seen patches of the two blocks.
-    values = sum(block.values for block in model.blocks)
-    deviation = RADIUS.numbers()[0].scale / np.sqrt(0.1**2 * values)
+def _measured_by(bench: Bench, sizes: FloatArray) -> Model:
+    """A tool's radius that is off by these sizes [search scales] in as many sequences."""
+    model, random = _model(bench, RADIUS), np.random.default_rng(4)
+    shape, column = (GROUPS, bench.surface.patches), model.columns[0]
+    blocks = []
+    for number, size in enumerate(sizes):
+        columns = np.zeros((*shape, NUISANCES + 1))
+        columns[..., column] = 1e-5 / RADIUS.numbers()[0].scale * random.standard_normal(shape)
+        gap = 1e-4 * random.standard_normal(shape) - size * RADIUS.numbers()[0].scale * columns[..., column]
+        blocks.append(Block(f"poke-{number:02d}", *gram(gap, columns, np.full(shape, 1e8))))
+    return replace(model, blocks=tuple(blocks))
+
+
+def test_interval_is_the_fits_deviation_where_sequences_agree(bench):
+    model = _measured_by(bench, np.zeros(20))
+    deviation = RADIUS.numbers()[0].scale / np.sqrt(0.1**2 * sum(block.values for block in model.blocks))
     entry = intervals(bench, model)[0]["radius"]
-    assert entry["high"] - entry["low"] == pytest.approx(2 * 1.96 * deviation, rel=0.1)
+    assert 0.95 < (entry["high"] - entry["low"]) / (2 * 1.96 * deviation) < 1.5
+
+
+def test_interval_holds_what_sequences_disagree_about(bench):
+    sizes = np.array([-0.6, 0.5, 0.8, -0.7])
+    entry = intervals(bench, _measured_by(bench, sizes))[0]["radius"]
+    scale = RADIUS.numbers()[0].scale
+    wanted = 3.18 * scale * sizes.std(ddof=1) / np.sqrt(len(sizes))
+    assert (entry["high"] - entry["low"]) / 2 == pytest.approx(wanted, rel=0.2)
 
 
 def test_place_of_a_detached_edge_is_stated_without_interval(bench):
