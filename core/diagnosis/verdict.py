@@ -88,7 +88,7 @@ def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
     place = bench.surface.patch_centres[patch] * 1e3
     where = f"{100 * share:.0f} % of it within 8 mm of ({place[0]:.0f}, {place[1]:.0f}, {place[2]:.0f}) mm"
     return {
-        "fraction": round(fraction, 4), "where": where, "when": f"most in {when}", 
+        "fraction": round(fraction, 4), "where": where, "when": f"most in {when}",
         "misfit_per_value": round(bench.misfit(model), 4), "structure": round(left.ratio, 4),
         "structure_bound": round(left.bound / left.expected, 4),
     }  # fmt: skip

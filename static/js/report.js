@@ -72,7 +72,9 @@ function ranking(entries, named) {
       element("span", { class: "number" }, percent(removed)), element("span", { class: "number" }, percent(probability))]));
 }
 
-function unexplained({ fraction, where, when: time }) {
+function unexplained({ fraction, where, when: time, structure, structure_bound: bound }) {
+  const times = typeof structure === "number" ? `What is left is ${structure.toFixed(2)} times what chance gives, where more than ${bound.toFixed(2)} would be an error with a pattern.` : "";
+  if (fraction === 0 && times) return element("p", { class: "gain-note" }, element("b", {}, "Nothing"), ` beyond chance. ${times}`);
   const place = [where, time].filter(Boolean).join("; ");
   return element("p", { class: "gain-note" }, element("b", {}, percent(fraction)), ` of the structured error is left${place ? `: ${place}` : ""}.`);
 }

@@ -1,0 +1,86 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from pushed_block import SETUP, prediction, registration
+
+from core.diagnosis.bench import Bench
+from core.diagnosis.evidence import Block, gram
+from core.diagnosis.hypothesis import Model
+from core.diagnosis.prediction import TOOL_COLUMNS
+from core.diagnosis.screening import Candidate
+from core.diagnosis.search import SHORTLIST, _shortlist, _strained
+from core.diagnosis.workers import Workers
+from core.effects.load import Gravity
+from core.effects.material import PoissonRatio, StiffInclusion
+from core.effects.sensor import TimeOffset
+from core.effects.support import BaseSlip
+from core.effects.tool import ToolOffset, ToolRadius
+from core.mesh import GridSpec
+
+NUISANCES, GROUPS = TOOL_COLUMNS + 9, 4
+OFFSET = Candidate(start=ToolOffset.neutral(SETUP), widened={0: 2e-3, 1: 2e-3, 2: 2e-3})
+RADIUS = Candidate(start=ToolRadius.neutral(SETUP), widened={TOOL_COLUMNS: 1e-3})
+NU = Candidate(start=PoissonRatio.neutral(SETUP), widened={TOOL_COLUMNS + 1: 0.1})
+CLOCK = Candidate(start=TimeOffset.neutral(SETUP), columns=(NUISANCES,), spread=(0.2,))
+SAG = Candidate(start=Gravity(specific_weight_over_stiffness=1.5), columns=(NUISANCES,), spread=(1.0,))
+SLIDING = Candidate(start=BaseSlip(friction_coefficient=0.2), columns=(NUISANCES,), spread=(1.0,))
+
+
+def lump(x: float, y: float = 0.0) -> Candidate:
+    return Candidate(start=StiffInclusion(x=x, y=y, z=0.02, radius=7e-3, stiffness_ratio=1.0), columns=(NUISANCES,), spread=(2.0,))
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Bench]:
+    """The stated setup with its priors; nothing is replayed here."""
+    with Workers([], 1) as workers:
+        yield Bench(SETUP, registration(), workers, ["poke-01"], None, GridSpec(), GridSpec())
+
+
+def _pulled(bench: Bench, pulls: dict[int, float]) -> Model:
+    """Data that know every nuisance well, and pull some of them this many of its stated deviations away."""
+    deviations = np.sqrt(np.diag(np.linalg.inv(bench.nuisances.precision)))
+    shape = (GROUPS, bench.surface.patches)
+    columns = 1e-3 / deviations * np.random.default_rng(0).standard_normal((*shape, NUISANCES))
+    size = np.zeros(NUISANCES)
+    for column, pull in pulls.items():
+        size[column] = pull * deviations[column]
+    gap = -(columns @ size)
+    block = Block("poke-01", *gram(gap, columns, np.full(shape, 1e8)))
+    return Model((), SETUP, (prediction(gap),), (block,), (), {}, tuple(range(NUISANCES)))
+
+
+def test_accuracy_that_the_data_break_is_strained(bench):
+    model = _pulled(bench, {0: 9.0, 1: -8.0})
+    assert _strained(bench, model, [SAG, RADIUS, OFFSET, NU]) == [OFFSET]
+
+
+def test_only_the_worst_is_strained(bench):
+    model = _pulled(bench, {TOOL_COLUMNS: 20.0, TOOL_COLUMNS + 1: 6.0})
+    assert _strained(bench, model, [OFFSET, NU, RADIUS]) == [RADIUS]
+
+
+def test_what_lies_within_the_stated_accuracy_strains_nothing(bench):
+    model = _pulled(bench, {0: 2.0, TOOL_COLUMNS: 3.0, TOOL_COLUMNS + 1: -2.5})
+    assert _strained(bench, model, [SAG, RADIUS, OFFSET, NU, CLOCK]) == []
+
+
+def test_strained_one_comes_first_and_takes_nobodys_place():
+    candidates = [SAG, CLOCK, SLIDING, NU, RADIUS]
+    gains = np.array([30.0, 50.0, 40.0, 20.0, -3.0])
+    assert _shortlist(gains, candidates, 10.0) == [CLOCK, SLIDING, SAG][:SHORTLIST]
+    assert _shortlist(gains, candidates, 10.0, [RADIUS]) == [RADIUS, CLOCK, SLIDING, SAG]
+    assert _shortlist(gains, candidates, 10.0, [CLOCK]) == [CLOCK, SLIDING, SAG, NU]
+
+
+def test_only_what_promises_enough_is_fitted():
+    assert _shortlist(np.array([9.0, 11.0, 2.0]), [SAG, CLOCK, NU], 10.0) == [CLOCK]
+
+
+def test_lump_begins_at_two_places_well_apart():
+    candidates = [lump(0.0), lump(0.004), lump(0.02), lump(-0.02), CLOCK]
+    gains = np.array([60.0, 55.0, 50.0, 45.0, 30.0])
+    assert _shortlist(gains, candidates, 10.0) == [candidates[0], candidates[2], CLOCK]
