@@ -18,10 +18,10 @@ const CORNERS = {
   "-y": ([sx, sy, sz]) => [-sx / 2, -sy / 2 - sz, sx / 2, -sy / 2],
 };
 
-export function patternSection(patterns, size, palette) {
+export function patternSection(patterns, size, palette, explained = true) {
   const box = unfold(patterns, size);
   if (!box.faces.length) return element("p", { class: "muted" }, "No patch of the surface was seen often enough to draw a pattern.");
-  const maps = () => element("div", { class: "maps" }, map("Measured error", "measured"), map("Predicted by the cause", "predicted"));
+  const maps = () => element("div", { class: "maps" }, map("Measured error", "measured"), explained ? map("Predicted by the cause", "predicted") : null);
   const map = (caption, key) => {
     const canvas = element("canvas", { "data-pattern": key });
     requestAnimationFrame(() => paint(canvas, box, patterns[key], patterns.limit, palette));

@@ -11,8 +11,8 @@ export function showReport(heading, report, patterns, palette) {
     element("div", { class: "eyebrow" }, element("span", { class: `verdict-tag ${report.verdict}` }, report.verdict), `${heading.folder ?? heading.dataset} · ${when(heading.created)}`),
     element("h1", { class: "verdict" }, heading.sentence),
     causes.length ? section(causes.length > 1 ? "Causes" : "Cause", "interval", causes.map(cause)) : null,
-    report.gain ? section("Error on sequences not fitted on", report.gain.unit ?? "mm", gain(report.gain)) : null,
-    patterns ? section("The error and its explanation", "", patternSection(patterns, heading.size, palette)) : null,
+    report.gain ? section("Error on sequences not fitted on", report.gain.unit ?? "mm", gain(report.gain, causes.length > 0)) : null,
+    patterns ? section(causes.length ? "The error and its explanation" : "The error that is left", "", patternSection(patterns, heading.size, palette, causes.length > 0)) : null,
     report.ranking?.length ? section("Ranking", "", ranking(report.ranking, causes.map(({ effect }) => effect))) : null,
     report.unexplained ? section("Unexplained", "", unexplained(report.unexplained)) : null,
     report.not_identifiable?.length ? section("Cannot be told from this data", "", report.not_identifiable.map(blind)) : null);
@@ -46,8 +46,9 @@ function cause({ effect, probability, parameters }) {
     element("table", {}, element("tbody", {}, rows)));
 }
 
-function gain({ baseline, extended, noise_floor: floor, unit = "mm", reducible_removed: removed, paper_metric: paper, split, ...others }) {
-  const steps = [["Raw model", baseline, "raw"], ["Raw + network", others.baseline_network, "corrected"], ["Extended", extended, "extended"],
+function gain({ baseline, extended, noise_floor: floor, unit = "mm", reducible_removed: removed, paper_metric: paper, split, ...others }, named) {
+  const added = named || typeof others.baseline_network === "number";
+  const steps = [["Raw model", baseline, "raw"], ["Raw + network", others.baseline_network, "corrected"], ["Extended", added ? extended : null, "extended"],
     ["Extended + network", others.extended_network, "corrected"], ["Noise floor", floor, "floor"]].filter(([, value]) => typeof value === "number");
   const most = Math.max(...steps.map(([, value]) => value));
   const number = (value) => (value < 10 ? value.toFixed(value < 1 ? 3 : 2) : value.toFixed(1));
@@ -58,8 +59,8 @@ function gain({ baseline, extended, noise_floor: floor, unit = "mm", reducible_r
       element("div", { class: "bar" }, element("i", { style: { width: `${100 * value / most}%`, background: `var(--${thing})` } })),
       element("span", { class: "bar-value" }, `${number(value)}`)])),
     element("p", { class: "gain-note" },
-      removed && typeof removed.value === "number" ? [element("b", {}, percent(removed.value)), `${range} of the error above the noise floor is gone on the ${split} sequences. `] : null,
-      typeof paper?.baseline === "number" && typeof paper?.extended === "number" ? `Mean distance as in the literature: ${number(paper.baseline)} → ${number(paper.extended)} ${unit}.` : null));
+      !added ? "No cause was named, so the model stays as it was. " : removed && typeof removed.value === "number" ? [element("b", {}, percent(removed.value)), `${range} of the error above the noise floor is gone on the ${split} sequences. `] : null,
+      typeof paper?.baseline === "number" && typeof paper?.extended === "number" ? `Mean distance as in the literature: ${number(paper.baseline)}${added ? ` → ${number(paper.extended)}` : ""} ${unit}.` : null));
 }
 
 function ranking(entries, named) {

@@ -19,7 +19,7 @@ export function start() {
   drawSwitches();
   fill("reset-view", icon("target")).addEventListener("click", () => post(`/sessions/${page}/look`).catch(toast));
   fill("crop", icon("cloud")).addEventListener("click", () => set({ crop: !state().crop }));
-  on(["layers", "colour", "crop"], drawSwitches);
+  on(["layers", "colour", "crop", "heading"], drawSwitches);
   on(["run", "sequence", "frame", "layers", "colour", "limit", "crop"], () => send());
   on(["colour", "limit", "held", "palette"], drawLegend);
   on(["theme"], dress);
@@ -79,8 +79,10 @@ function dress() {
 
 function drawSwitches() {
   const { layers, colour, crop } = state();
+  const absent = state().heading && !state().heading.has_clouds;
   fill("layers", Object.entries(LAYERS).map(([name, label]) => element("button", {
-    class: "chip", type: "button", "aria-pressed": String(layers.includes(name)), "data-layer": name,
+    class: "chip", type: "button", disabled: absent && name === "measured",
+    title: absent && name === "measured" ? "The dataset is not where this run says, so its clouds cannot be shown" : null, "aria-pressed": String(layers.includes(name)), "data-layer": name,
     onclick: () => set({ layers: Object.keys(LAYERS).filter((key) => state().layers.includes(key) !== (key === name)) }),
   }, swatch(name), label)));
   fill("colouring", Object.entries(COLOURINGS).map(([name, label]) => element("button", {
