@@ -24,6 +24,10 @@ __all__ = ["TOOL_COLUMNS", "Prediction", "Sample", "Wanted", "predict", "touch_c
 TOOL_COLUMNS = 6
 """Columns that always come first: the tool moved along x, y, z and turned about the robot registration's pivot."""
 
+TOOL_REACH, CLEARLY = 1.5e-3, 5e-4
+"""A point this near to a model's ball [m], and nearer to it by this much than to the model's surface, is of the tool: clouds are
+cleaned of the tool where it was stated to be, and if it is somewhere else, some of its points remain."""
+
 FARTHEST_CHANGE = 8e-3
 """A point's gap that changes by more than this [m] between models has met another side of the block: its old gap stands."""
 
@@ -92,24 +96,35 @@ def touch_correction(setup: Setup, grid: GridSpec) -> Transform:
     return fit_robot(landmarks, rest(setup, grid).move(landmarks)).phantom_from_robot
 
 
-def _average(values: FloatArray, seen: Gaps, means: PatchMeans) -> FloatArray:
-    """Plain patch averages (p, k) of (m, k) values, zero where unseen."""
-    total = np.zeros((len(means.mean), values.shape[1]))
-    np.add.at(total, seen.patch, values)
-    points = np.bincount(seen.patch, minlength=len(means.mean))
-    return np.asarray(total / np.maximum(points, 1)[:, None])
+@dataclass(frozen=True, eq=False)
+class _Compared:
+    """A group's sample under one model.
 
+    Attributes:
+        points: (m, 3) phantom frame [m]. seen: those that lie on the surface. means: of the gaps, by patch.
+        tool: (t,) those that lie on the tool instead. away: (t, 3) unit vectors from its centre. patch: (t,) where they count.
+    """
 
-def _camera_changes(setup: Setup, wanted: Wanted, points: FloatArray, seen: Gaps) -> FloatArray:
-    """How the gaps change (m, s) because the setups see the same points elsewhere."""
-    here = setup.phantom_from_camera_true
-    columns = np.zeros((len(seen.gap), len(wanted.setups)))
-    for number, other in enumerate(wanted.setups):
-        if other.sensor.camera_shift is not setup.sensor.camera_shift:
-            there = other.phantom_from_camera_true @ here.inverse()
-            moved = there.apply(points[seen.index]) - points[seen.index]
-            columns[:, number] = np.einsum("mi,mi->m", moved, seen.normal)
-    return columns
+    points: FloatArray
+    seen: Gaps
+    means: PatchMeans
+    tool: IntArray
+    away: FloatArray
+    patch: IntArray
+
+    def average(self, values: FloatArray, patch: IntArray) -> FloatArray:
+        """Sums over the points of each patch (p, k) of (n, k) values, over all the patch's points."""
+        total = np.zeros((len(self.means.mean), values.shape[1]))
+        np.add.at(total, patch, values)
+        return np.asarray(total / np.maximum(self.means.count, 1)[:, None])
+
+    def along_sight(self, moved: Transform) -> FloatArray:
+        """Change of the averages (p,) [m] when the camera's points are moved."""
+        shift = moved.apply(self.points) - self.points
+        surface = np.einsum("mi,mi->m", shift[self.seen.index], self.seen.normal)
+        ball = np.einsum("ti,ti->t", shift[self.tool], self.away)
+        values, patch = np.concatenate([surface, ball]), np.concatenate([self.seen.patch, self.patch])
+        return self.average(values[:, None], patch)[:, 0]
 
 
 class _Columns:
@@ -133,24 +148,40 @@ class _Columns:
         lumps = stiffness_changes(self.block, frame, factors) if wanted.lumps else changed[:0]
         return np.concatenate([tool, np.array(turned), scaled, lumps])
 
-    def project(
-        self, frame: Equilibrium, moves: FloatArray, points: FloatArray, seen: Gaps, means: PatchMeans, reference: bool
-    ) -> FloatArray:
+    def of_ball(self, frame: Equilibrium, moves: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """How the ball's centre (k, 3) and radius (k,) change, in the order of `displacement`."""
+        stated, steps = self.block.setup.tool, np.array(self.wanted.steps)[:, None]
+        arm = frame.probe.centre - self.wanted.pivot
+        shifts = [np.subtract(other.tool.offset, stated.offset) for other in self.wanted.setups]
+        growth = [other.tool.radius - stated.radius for other in self.wanted.setups]
+        own = (moves + np.array(shifts)) / steps if shifts else np.zeros((0, 3))
+        lumps = np.zeros((len(self.wanted.lumps), 3))
+        centre = np.concatenate([np.eye(3), np.cross(np.eye(3), arm), own, lumps])
+        radius = np.concatenate([np.zeros(6), np.array(growth) / steps[:, 0] if growth else [], np.zeros(len(lumps))])
+        return centre, radius
+
+    def project(self, frame: Equilibrium, moves: FloatArray, compared: _Compared, reference: bool) -> FloatArray:
         """(p, k) changes of the patch averages; the reference was seen before the camera could move."""
-        values = np.zeros((len(means.mean), TOOL_COLUMNS + len(self.wanted.setups) + len(self.wanted.lumps)))
+        values = np.zeros((len(compared.means.mean), TOOL_COLUMNS + len(self.wanted.setups) + len(self.wanted.lumps)))
         if frame.in_contact or self.block.setup.load.specific_weight_over_stiffness:
             fields = self.displacement(frame, moves)
-            values = -(_observe(frame, seen, len(means.mean)) @ fields.reshape(len(fields), -1).T)
-        if self.wanted.steps and not reference:
-            camera = _average(_camera_changes(self.block.setup, self.wanted, points, seen), seen, means)
-            values[:, TOOL_COLUMNS : TOOL_COLUMNS + camera.shape[1]] += camera / np.array(self.wanted.steps)
+            values = -(_observe(frame, compared) @ fields.reshape(len(fields), -1).T)
+        if len(compared.tool):
+            centre, radius = self.of_ball(frame, moves)
+            values -= compared.average(compared.away @ centre.T + radius, compared.patch)
+        here = self.block.setup.phantom_from_camera_true
+        for number, (other, step) in enumerate(zip(self.wanted.setups, self.wanted.steps, strict=True)):
+            if not reference and other.sensor.camera_shift is not self.block.setup.sensor.camera_shift:
+                moved = other.phantom_from_camera_true @ here.inverse()
+                values[:, TOOL_COLUMNS + number] += compared.along_sight(moved) / step
         return values
 
 
-def _observe(frame: Equilibrium, seen: Gaps, patches: int) -> sp.csr_matrix:
+def _observe(frame: Equilibrium, compared: _Compared) -> sp.csr_matrix:
     """Patch averages of the displacement along the normal as a linear function of the nodes' displacement (p, 3n)."""
+    seen, patches = compared.seen, len(compared.means.mean)
     nodes, weights = frame.mesh.locate(seen.foot)
-    share = 1.0 / np.maximum(np.bincount(seen.patch, minlength=patches), 1)[seen.patch]
+    share = 1.0 / np.maximum(compared.means.count, 1)[seen.patch]
     entries = (weights[:, :, None] * seen.normal[:, None, :] * share[:, None, None]).ravel()
     columns = (3 * nodes[:, :, None] + np.arange(3)).ravel()
     rows = np.repeat(seen.patch, 24)
@@ -171,18 +202,24 @@ def _placed(group: Group, setup: Setup) -> tuple[FloatArray, Transform]:
     return pose.apply(group.points), pose
 
 
-def _compare(
-    group: Group, setup: Setup, frame: Equilibrium, surface: Surface, sample: Sample
-) -> tuple[FloatArray, Gaps, PatchMeans]:
-    """The sample's points, where they meet the surface, and their averages."""
+def _compare(group: Group, setup: Setup, frame: Equilibrium, surface: Surface, sample: Sample) -> _Compared:
+    """The sample's points, where they meet the surface, and their averages; points of the model's tool lie off the tool."""
     points, pose = _placed(group, setup)
     points = points[sample.index]
     seen = gaps(points, pose.translation, frame, surface, everything=True)
     values = sample.gap.astype(float)
     near = np.abs(seen.gap - values[seen.index]) < FARTHEST_CHANGE
     values[seen.index[near]] = seen.gap[near]
-    seen = replace(seen, patch=sample.patch[seen.index])
-    return points, seen, plain_means(values, sample.patch, surface.patches)
+    arm = points - frame.probe.centre
+    distance = np.linalg.norm(arm, axis=1)
+    off_tool = distance - frame.probe.radius
+    on_tool = (np.abs(off_tool) < TOOL_REACH) & (np.abs(off_tool) < np.abs(values) - CLEARLY)
+    values[on_tool] = off_tool[on_tool]
+    kept, tool = ~on_tool[seen.index], np.flatnonzero(on_tool)
+    index = seen.index[kept]
+    seen = Gaps(index, seen.gap[kept], seen.foot[kept], seen.normal[kept], sample.patch[index], seen.side[kept])
+    means = plain_means(values, sample.patch, surface.patches)
+    return _Compared(points, seen, means, tool, arm[tool] / distance[tool, None], sample.patch[tool])
 
 
 def predict(
@@ -216,14 +253,15 @@ def predict(
             frame = block.step(centre, previous)
         previous = frame if frame.outcome is Outcome.CONVERGED else None
         sample = samples[number] if samples is not None else _chosen(group, setup, frame, surface)
-        points, seen, means = _compare(group, setup, frame, surface, sample)
+        compared = _compare(group, setup, frame, surface, sample)
+        means = compared.means
         chosen.append(sample)
         gap.append(means.mean)
         count.append(means.count)
         spread.append(means.spread)
         frames.append(frame)
         if columns is not None:
-            changes.append(columns.project(frame, moves[:, number], points, seen, means, group.reference).astype(np.float32))
+            changes.append(columns.project(frame, moves[:, number], compared, group.reference).astype(np.float32))
     stacked: FloatArray = np.stack(changes) if changes else np.zeros((len(gap), surface.patches, 0))
     return Prediction(
         data.name, np.array(gap), np.array(count, dtype=float), np.array(spread), stacked, tuple(frames), tuple(chosen)
