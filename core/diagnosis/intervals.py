@@ -22,17 +22,20 @@ _INTERVAL_STEPS = 400
 def _spread(bench: Bench, model: Model) -> FloatArray:
     """Half widths of the 95 % intervals over 1.96, one for each search coordinate.
 
-    The larger of two: Laplace's approximation, which trusts the noise model, and the jackknife over whole sequences (Miller 1974),
-    which sees how far they disagree, but knows only as many degrees of freedom as there are sequences, less one.
+    The larger of two: Laplace's approximation, which trusts the noise model, and the robust spread of Liang and Zeger (1986): how
+    far whole sequences pull in different directions, with as many degrees of freedom as there are sequences, less one.
     """
     blocks, columns, precision = bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model)
     own = slice(len(model.nuisance), None)
-    laplace = np.sqrt(np.diag(fit(blocks, columns, precision).covariance)[own])
+    solution = fit(blocks, columns, precision)
+    laplace = np.sqrt(np.diag(solution.covariance)[own])
     sequences = [block for block in blocks if block.name != "rest"]
     if len(sequences) < 2:
         return np.asarray(laplace)
-    left_out = np.array([fit([b for b in blocks if b is not one], columns, precision).change[own] for one in sequences])
-    deviation = np.sqrt((len(sequences) - 1) * left_out.var(axis=0))
+    index = np.array(columns) + 1
+    pulls = np.array([block.gram[index, 0] + block.gram[np.ix_(index, index)] @ solution.change for block in sequences])
+    moved = (pulls @ solution.covariance)[:, own]
+    deviation = np.sqrt((moved**2).sum(axis=0) * len(sequences) / (len(sequences) - 1))
     return np.asarray(np.maximum(laplace, deviation * t.ppf(0.975, len(sequences) - 1) / _NORMAL_95))
 
 
