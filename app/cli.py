@@ -39,7 +39,9 @@ def main() -> NoReturn:
     """Run a verb: 0 when it is done, 2 with one clear message for bad input, 130 when it was stopped."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    signal.signal(signal.SIGTERM, _stop)
+    stop = _Stop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
     try:
         app()
     except PalpateError as error:
@@ -47,6 +49,10 @@ def main() -> NoReturn:
         sys.exit(BAD_INPUT)
     except (Cancelled, KeyboardInterrupt):
         sys.exit(_cancelled())
+    except Exception:
+        if not stop.asked:
+            raise
+        sys.exit(_cancelled())  # a stop in the middle of an import comes out as whatever that import makes of it
     except SystemExit as end:
         if end.code == CANCELLED:
             _cancelled()
@@ -54,8 +60,14 @@ def main() -> NoReturn:
     sys.exit(0)
 
 
-def _stop(number: int, frame: FrameType | None) -> NoReturn:
-    raise KeyboardInterrupt
+class _Stop:
+    """What Ctrl-C and a polite kill do."""
+
+    asked = False
+
+    def __call__(self, number: int, frame: FrameType | None) -> NoReturn:
+        self.asked = True
+        raise KeyboardInterrupt
 
 
 def _cancelled() -> int:
