@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
-from types import FrameType
 from typing import NoReturn
 
 import typer
 
 from app.commands import blind, data, demo, diagnosis, service
 from app.console import errors, print_problem
+from app.stop import stop
 from core.errors import Cancelled, PalpateError
 
 __all__ = ["app", "main"]
@@ -39,9 +38,7 @@ def main() -> NoReturn:
     """Run a verb: 0 when it is done, 2 with one clear message for bad input, 130 when it was stopped."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    stop = _Stop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, stop)
+    stop.listen()
     try:
         app()
     except PalpateError as error:
@@ -58,16 +55,6 @@ def main() -> NoReturn:
             _cancelled()
         raise
     sys.exit(0)
-
-
-class _Stop:
-    """What Ctrl-C and a polite kill do."""
-
-    asked = False
-
-    def __call__(self, number: int, frame: FrameType | None) -> NoReturn:
-        self.asked = True
-        raise KeyboardInterrupt
 
 
 def _cancelled() -> int:

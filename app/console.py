@@ -16,7 +16,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rich.table import Table
 
 from app.sentences import quantity
-from core.errors import PalpateError
+from app.stop import stop
+from core.errors import Cancelled, PalpateError
 from core.progress import Report
 
 __all__ = ["errors", "out", "parameters_text", "print_problem", "progress", "verdict_cells", "verdict_table", "write_json"]
@@ -36,6 +37,8 @@ def progress(title: str) -> Iterator[Report]:
         task = bar.add_task("", total=1.0, title=title)
 
         def report(fraction: float, text: str) -> None:
+            if stop.asked:
+                raise Cancelled
             bar.update(task, completed=min(1.0, fraction), description=escape(text))
 
         yield report

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -18,7 +19,9 @@ from broken_datasets import BREAKAGES, write_valid_dataset
 
 from app import console
 from app.cli import main
-from app.console import agrees, parameters_text, verdict_cells, verdict_table, write_json
+from app.console import agrees, parameters_text, progress, verdict_cells, verdict_table, write_json
+from app.stop import Stop
+from core.errors import Cancelled
 
 Palpate = Callable[..., tuple[int, str, str]]
 
@@ -127,6 +130,16 @@ def test_replay_tells_what_it_cannot_replay(
     assert not (tmp_path / "frames.npz").exists()
 
 
+def test_stop_that_an_import_swallowed_is_remembered() -> None:
+    stop = Stop()
+    with contextlib.suppress(KeyboardInterrupt):
+        stop(signal.SIGINT, None)
+    assert stop.asked
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(Cancelled), progress("a long verb") as report:
+        patch.setattr("app.console.stop", stop)
+        report(0.5, "going on")
+
+
 def _wait_until_at_work(process: subprocess.Popen[str], seconds: float) -> None:
     """Until it has used that much of a core [s], however busy the machine is."""
     used = 0.0
@@ -144,7 +157,7 @@ def test_stopped_verb_ends_with_130_and_leaves_nothing(dataset: Path, tmp_path: 
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-m", "app.cli", "replay", str(dataset), "--sequence", "poke-01", "--grid", "41x25x25", "--out"]
     with subprocess.Popen([*command, str(tmp_path / "frames.npz")], stderr=subprocess.PIPE, text=True, env=environment) as process:
-        _wait_until_at_work(process, seconds=2.5)
+        _wait_until_at_work(process, seconds=6.0)
         process.send_signal(number)
         _, err = process.communicate(timeout=60)
     # Python itself ends by SIGINT, which a shell shows as 130, too, when the stop fell into certain parts of an import.
