@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,6 +16,9 @@ from app.console import out, progress, verdict_cells, verdict_table
 from app.settings import Settings
 
 __all__ = ["demo"]
+
+SEQUENCES = ("poke-top-01", "poke-top-02", "poke-top-03", "poke-side-01", "drag-01")
+"""Every kind of motion to fit on and one poke to test on: more tests would only take longer."""
 
 
 def demo(
@@ -52,4 +56,5 @@ def _make(dataset: Path, seed: int, effects: int, workers: int) -> dict[str, Any
     if known is not None:
         return known
     with progress("make the phantom") as report:
-        return make_dataset(dataset, draw_scenario(seed, effects), seed, workers, report).as_dict()
+        scenario = replace(draw_scenario(seed, effects), sequences=SEQUENCES)
+        return make_dataset(dataset, scenario, seed, workers, report).as_dict()
