@@ -2,8 +2,8 @@
 
 The camera has a fixed pattern of some tenths of a millimetre, which is no error of the simulation. In each model it is what the
 untouched frames show, and it is taken off there. But a model that is wrong about the untouched block, too (sag, a camera that was
-moved), has its error in that very pattern: the part by which one model's pattern is larger than the other's is given back to it.
-Nothing here is fitted in favour of one of the two.
+moved), has its error in that very pattern. What both patterns hold along their own difference is given back to each: a sag of which
+two thirds were named leaves one third in the extended model. Nothing here is fitted in favour of one of the two.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ __all__ = ["Ladder", "fixed_pattern", "ladder"]
 _DRAWS = 2000
 _PAPER_POINTS = 4000
 _LEAST_POINTS = 5
+_SAME_PATTERN = 1e-5
+"""Patterns that differ by less than this [m] are one: the models agree about the untouched block."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -73,7 +75,8 @@ def ladder(
     """Compare two models on test sequences, groups in touch only; probes are resampled whole."""
     variance, rows = patch_variance([*baseline, *extended]), []
     for item, before, after in zip(data, baseline, extended, strict=True):
-        (_, known), patterns = fixed_pattern(item, after), [fixed_pattern(item, model)[0] for model in (before, after)]
+        (own, _), (other, known) = fixed_pattern(item, before), fixed_pattern(item, after)
+        difference = own - other
         if not known.sum():
             raise DiagnosisError(f"{item.name} has no untouched frame, so its noise floor is unknown; name others in [splits] test")
         for number, group in enumerate(item.groups):
@@ -81,15 +84,16 @@ def ladder(
                 continue
             seen = np.isfinite(before.gap[number]) & np.isfinite(after.gap[number]) & (known >= _LEAST_POINTS)
             count = after.count[number][seen]
-            errors = [model.gap[number][seen] - own[seen] for model, own in zip((before, after), patterns, strict=True)]
+            errors = [before.gap[number] - own, after.gap[number] - other]
             floor = (variance[seen] * (1 + count / known[seen])).sum()
-            squares = [(error**2 * count).sum() for error in (*errors, *(own[seen] for own in patterns))]
-            rows.append((f"{item.name}/{group.probe}", *squares, floor, count.sum()))
+            products = [*(error**2 for error in errors), own * difference, difference**2]
+            sums = [(values[seen] * count).sum() for values in products]
+            rows.append((f"{item.name}/{group.probe}", *sums, floor, count.sum()))
     if not rows:
         raise DiagnosisError("the test sequences have no frame in which the tool touches the phantom; name others in [splits] test")
-    sums = np.array([row[1:] for row in rows])
+    table = np.array([row[1:] for row in rows])
     names = np.array([row[0] for row in rows])
-    probes = np.array([sums[names == name].sum(axis=0) for name in np.unique(names)])
+    probes = np.array([table[names == name].sum(axis=0) for name in np.unique(names)])
     chosen = np.random.default_rng(seed).integers(0, len(probes), size=(_DRAWS, len(probes)))
     drawn, whole = _rms(probes[chosen].sum(axis=1)), _rms(probes.sum(axis=0)[None])
     low, high = np.quantile(_share(*drawn), [0.025, 0.975])
@@ -101,9 +105,13 @@ def ladder(
 
 
 def _rms(sums: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """RMS of baseline, extended model and noise floor (d,) [m] from sums (d, 6) of squares: touched, patterns, floor, points."""
-    excess = sums[:, 2:4] - sums[:, 2:4].min(axis=1, keepdims=True)
-    mean = np.column_stack([sums[:, :2] + excess, sums[:, 4]]) / np.maximum(sums[:, 5:], 1)
+    """RMS of baseline, extended model and noise floor (d,) [m] from sums (d, 6): squared errors of both, the stated model's pattern
+    times the patterns' difference, that difference squared, floor, points."""
+    along, size, points = sums[:, 2], sums[:, 3], np.maximum(sums[:, 5], 1)
+    differ = size > _SAME_PATTERN**2 * points
+    share = along / np.where(differ, size, 1.0)
+    still = np.where(differ, size, 0.0)[:, None] * np.stack([share, share - 1], axis=1) ** 2
+    mean = np.column_stack([sums[:, :2] + still, sums[:, 4]]) / points[:, None]
     before, after, floor = np.sqrt(mean).T
     return before, after, floor
 

@@ -75,7 +75,16 @@ def test_pattern_as_large_in_both_models_gains_nothing():
     item = _observations([0, 1])
     models = [_model([size, size]) for size in (2e-3, -2e-3)]
     found = ladder([item], models[:1], models[1:], SETUP, SETUP, seed=0)
-    assert found.baseline == found.extended == pytest.approx(0.0, abs=1e-12)
+    assert found.baseline == pytest.approx(2e-3) and found.extended == pytest.approx(2e-3)
+    assert found.removed == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+
+
+def test_part_of_a_sag_that_was_not_named_stays_an_error():
+    item = _observations([0, 1])
+    stated, named = _model([3e-3, 3e-3]), _model([1e-3, 1e-3])  # two thirds of it
+    found = ladder([item], [stated], [named], SETUP, SETUP, seed=0)
+    assert found.baseline == pytest.approx(3e-3) and found.extended == pytest.approx(1e-3)
+    assert found.removed[0] == pytest.approx(2 / 3)
 
 
 def test_scatter_of_single_points_makes_the_noise_floor():
