@@ -17,9 +17,6 @@ from app.settings import Settings
 
 __all__ = ["demo"]
 
-SEQUENCES = ("poke-top-01", "poke-top-02", "poke-top-03", "poke-side-01", "drag-01")
-"""Every kind of motion to fit on and one poke to test on: more tests would only take longer."""
-
 
 def demo(
     seed: Annotated[int | None, typer.Option(min=0, help="What is hidden follows from it; drawn at random if not given.")] = None,
@@ -50,11 +47,11 @@ def demo(
 def _make(dataset: Path, seed: int, effects: int, workers: int) -> dict[str, Any]:
     """The dataset of this seed with its truth; one that is there already is the same and is kept."""
     from app.commands.diagnosis import truth_beside  # noqa: PLC0415
-    from core.synthetic import draw_scenario, make_dataset  # noqa: PLC0415 (heavy)
+    from core.synthetic import SHORT_PROTOCOL, draw_scenario, make_dataset  # noqa: PLC0415 (heavy)
 
     known = truth_beside(dataset) if dataset.is_dir() else None
     if known is not None:
         return known
     with progress("make the phantom") as report:
-        scenario = replace(draw_scenario(seed, effects), sequences=SEQUENCES)
+        scenario = replace(draw_scenario(seed, effects), sequences=SHORT_PROTOCOL)
         return make_dataset(dataset, scenario, seed, workers, report).as_dict()

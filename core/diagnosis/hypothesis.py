@@ -30,6 +30,7 @@ class Nuisances:
 
     @classmethod
     def of(cls, registration: Registration) -> Nuisances:
+        """From the registrations' covariances and the accuracies above; the last column is the mesh's error."""
         robot = registration.robot_covariance.copy()
         robot[:3, :3] += TIP**2 * np.eye(3)
         camera = registration.camera_covariance + np.diag(CAMERA**2)

@@ -29,7 +29,7 @@ NULL_QUANTILE = 0.99
 LEAST_GAIN = 20.0
 """No cause is named for less [nats], whatever the null says: the noise model itself is only known so well.
 
-A control of the virtual bench whose touches were a little off gave gravity 11 nats."""
+The best that ten controls of the virtual bench offered was 9.9."""
 SHORTLIST = 3
 STRAINED = 4.0
 """A cause that only widens a stated accuracy is refitted, whatever its linear gain, when the data pull that number this many

@@ -9,7 +9,7 @@ import numpy as np
 
 from core.errors import EffectError
 
-__all__ = ["HIDDEN", "HiddenEffect", "Scenario", "draw_scenario"]
+__all__ = ["HIDDEN", "SHORT_PROTOCOL", "HiddenEffect", "Scenario", "draw_scenario"]
 
 HIDDEN: Mapping[str, Mapping[str, str]] = {
     "poisson_ratio": {"nu": "1"},
@@ -23,6 +23,10 @@ HIDDEN: Mapping[str, Mapping[str, str]] = {
     "camera_registration": {"translation": "m", "rotation": "rad"},
 }
 """The effects that the virtual bench can hide, with the unit of each parameter; names are those of the catalogue."""
+
+
+SHORT_PROTOCOL = ("poke-top-01", "poke-top-02", "poke-top-03", "poke-side-01", "drag-01")
+"""Every kind of motion to fit on, and one poke to test on; the full protocol only adds tests."""
 
 
 @dataclass(frozen=True)

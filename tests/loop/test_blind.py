@@ -9,14 +9,11 @@ from typing import Any
 
 from core.dataset import open_dataset
 from core.diagnosis import diagnose
-from core.synthetic import Scenario, draw_scenario, make_dataset
-
-SEQUENCES = ("poke-top-01", "poke-top-02", "poke-top-03", "poke-side-01", "drag-01")
-"""Every kind of motion to fit on, and one poke to test on: what the full protocol has, with fewer tests."""
+from core.synthetic import SHORT_PROTOCOL, Scenario, draw_scenario, make_dataset
 
 
 def _diagnosed(scenario: Scenario, seed: int, folder: Path) -> dict[str, Any]:
-    make_dataset(folder / "hidden", replace(scenario, sequences=SEQUENCES), seed, workers=2)
+    make_dataset(folder / "hidden", replace(scenario, sequences=SHORT_PROTOCOL), seed, workers=2)
     return diagnose(open_dataset(folder / "hidden"), folder / "run", workers=2, replays=False)
 
 

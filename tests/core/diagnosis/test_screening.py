@@ -2,10 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from linear_blocks import linear_blocks
 from pushed_block import SETUP
 from scipy.stats import ks_2samp
 
-from core.diagnosis.evidence import FLAT, Block, gram, log_evidence, predictive_score
+from core.diagnosis.evidence import FLAT, Block, log_evidence, predictive_score
 from core.diagnosis.screening import Candidate, linear_gains, null_gains, right_sides
 from core.effects.material import StiffInclusion
 from core.effects.tool import ToolOffset, ToolRadius
@@ -31,18 +32,8 @@ def _columns() -> list[FloatArray]:
 COLUMNS = _columns()
 
 
-def _blocks(cause: dict[int, float], seed: int) -> list[Block]:
-    """White noise, nuisances as large as they are stated to be, and columns with given factors."""
-    random = np.random.default_rng(seed)
-    factors = np.zeros(15)
-    factors[list(NUISANCE)] = random.multivariate_normal(np.zeros(3), np.linalg.inv(KNOWN))
-    for column, factor in cause.items():
-        factors[column] = factor
-    weights = np.ones((GROUPS, PATCHES))
-    return [
-        Block(str(number), *gram(random.standard_normal(weights.shape) - columns @ factors, columns, weights))
-        for number, columns in enumerate(COLUMNS)
-    ]
+def _blocks(causes: dict[int, float], seed: int) -> list[Block]:
+    return linear_blocks(COLUMNS, NUISANCE, KNOWN, causes, seed)
 
 
 def _gains(blocks: list[Block]) -> FloatArray:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from linear_blocks import linear_blocks
 from scipy.stats import ks_2samp
 
 from core.diagnosis.evidence import Block, draw_rights, gram
@@ -28,15 +29,7 @@ COLUMNS = _columns()
 
 
 def _blocks(size: float, seed: int) -> list[Block]:
-    random = np.random.default_rng(seed)
-    factors = np.zeros(9)
-    factors[list(FITTED)] = random.multivariate_normal(np.zeros(2), np.linalg.inv(PRECISION))
-    factors[CAUSE] = size
-    weights = np.ones((GROUPS, PATCHES))
-    return [
-        Block(str(number), *gram(random.standard_normal(weights.shape) - columns @ factors, columns, weights))
-        for number, columns in enumerate(COLUMNS)
-    ]
+    return linear_blocks(list(COLUMNS), FITTED, PRECISION, {CAUSE: size}, seed)
 
 
 def _value(blocks: list[Block]) -> float:
