@@ -64,12 +64,11 @@ function gain({ baseline, extended, noise_floor: floor, unit = "mm", reducible_r
 }
 
 function ranking(entries, named) {
-  const most = Math.max(0.01, ...entries.map(({ error_removed: removed }) => removed ?? 0));
   return element("div", { class: "ranking" },
     element("span", { class: "head" }, "effect"), element("span", { class: "head" }, "error removed"), element("span"), element("span", { class: "head number" }, "prob."),
     entries.slice(0, 8).flatMap(({ effect, probability, error_removed: removed }) => [
       element("span", {}, words(effect)),
-      element("div", { class: named.includes(effect) ? "bar first" : "bar" }, element("i", { style: { width: `${Math.max(0, 100 * (removed ?? 0) / most)}%` } })),
+      element("div", { class: named.includes(effect) ? "bar first" : "bar" }, element("i", { style: { width: `${100 * Math.max(0, removed ?? 0)}%` } })),
       element("span", { class: "number" }, percent(removed)), element("span", { class: "number" }, percent(probability))]));
 }
 
