@@ -15,6 +15,7 @@ import numpy as np
 from core.errors import SolveError
 from core.fem.model import BlockModel, Probe
 from core.fem.newton import RELATIVE_TOLERANCE, Outcome, Solution, solve
+from core.fem.path import FREE_STEP, lead
 from core.frames import FloatArray
 from core.mesh import BoxMesh, GridSpec, box_mesh
 from core.progress import Report, silent
@@ -25,8 +26,6 @@ __all__ = ["GRAVITY", "Equilibrium", "Replay", "replay", "require_converged", "r
 GRAVITY = 9.81
 """Acceleration of free fall [m/s^2]."""
 _FOCUS_STEP = 2e-4
-_FREE_STEP = 1.5e-3
-"""Longest motion in contact [m] that is tried at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +149,9 @@ class Replay:
             displacement[mesh.base_nodes] *= 0.0 if not self.setup.support.detached else 1.0
         before = Probe(start.probe.centre - np.append(start.slip, 0.0) + carried, start.probe.radius)
         positions = self._extrapolated(model, start, mesh.nodes + displacement, local)
-        solution = self._lead(model, positions, before, local, start.in_contact)
+        if not start.in_contact:  # begin where the straight way in first touches, not from afar
+            before = self._first_touch(before, local)
+        solution = lead(model, positions, before, local, self.tolerance)
         frame = self._equilibrium(solution, mesh, probe)
         self._before = (start, frame)
         return frame
@@ -164,31 +165,11 @@ class Replay:
             return positions
         here = start.probe.centre - np.append(start.slip, 0.0)
         last, now = here - (earlier.probe.centre - np.append(earlier.slip, 0.0)), probe.centre - here
-        if not last.any() or max(np.linalg.norm(last), np.linalg.norm(now)) > _FREE_STEP:
+        if not last.any() or max(np.linalg.norm(last), np.linalg.norm(now)) > FREE_STEP:
             return positions
         share = float(now @ last / (last @ last))
         guess = positions + min(max(share, -1.0), 1.5) * (start.displacement - earlier.displacement)
         return guess if model.energy(guess, probe) < model.energy(positions, probe) else positions
-
-    def _lead(self, model: BlockModel, positions: FloatArray, before: Probe, probe: Probe, touched: bool) -> Solution:
-        """Go from one tool position to the next in steps short enough for Newton's method."""
-        if not touched:  # begin where the straight way in first touches, not from afar
-            before = self._first_touch(before, probe)
-        travel = float(np.linalg.norm(probe.centre - before.centre))
-        steps = max(1, int(np.ceil(travel / _FREE_STEP)))
-        solution, iterations = None, 0
-        for share in (np.arange(steps) + 1) / steps:
-            stage = Probe(before.centre + share * (probe.centre - before.centre), probe.radius)
-            solution = solve(model, stage, positions, before if steps == 1 else None, self.tolerance)
-            positions, iterations = solution.positions, iterations + solution.iterations
-            if not solution.converged:
-                break
-        if solution is None:
-            raise SolveError("no step was taken")
-        if not solution.converged and steps > 1:
-            solution = solve(model, probe, positions, stage, self.tolerance)
-            iterations += solution.iterations
-        return replace(solution, iterations=iterations)
 
     def _first_touch(self, before: Probe, probe: Probe) -> Probe:
         """The last place on the way to `probe` that is clear of the block."""

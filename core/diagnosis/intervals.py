@@ -29,14 +29,16 @@ def _spread(bench: Bench, model: Model) -> FloatArray:
     own = slice(len(model.nuisance), None)
     solution = fit(blocks, columns, precision)
     laplace = np.sqrt(np.diag(solution.covariance)[own])
+    replayed = np.array([item.accuracy for effect in model.effects for item in effect.numbers()])
     sequences = [block for block in blocks if block.name != "rest"]
     if len(sequences) < 2:
-        return np.asarray(laplace)
+        return np.asarray(np.hypot(laplace, replayed))
     index = np.array(columns) + 1
     pulls = np.array([block.gram[index, 0] + block.gram[np.ix_(index, index)] @ solution.change for block in sequences])
     moved = (pulls @ solution.covariance)[:, own]
     deviation = np.sqrt((moved**2).sum(axis=0) * len(sequences) / (len(sequences) - 1))
-    return np.asarray(np.maximum(laplace, deviation * t.ppf(0.975, len(sequences) - 1) / _NORMAL_95))
+    robust = deviation * t.ppf(0.975, len(sequences) - 1) / _NORMAL_95
+    return np.asarray(np.hypot(np.maximum(laplace, robust), replayed))
 
 
 def intervals(bench: Bench, model: Model) -> list[dict[str, dict[str, Any]]]:

@@ -34,7 +34,8 @@ class Parameter:
     Attributes:
         name, unit: as in effects.md, SI. low, high: bounds. scale: a step that matters, for trust regions and differences.
         choices: allowed words, for a parameter that is not a number. log: whether it is searched by its logarithm; then
-            `scale` is a step of the logarithm.
+            `scale` and `accuracy` are of the logarithm. accuracy: standard deviation that the replay's own error leaves, however
+            good the data.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Parameter:
     scale: float = 1.0
     choices: tuple[str, ...] = ()
     log: bool = False
+    accuracy: float = 0.0
 
     def coordinate(self, value: float) -> float:
         """What a search moves instead of the value."""
@@ -55,10 +57,21 @@ class Parameter:
 
 
 def parameter(
-    unit: str, *, low: float = 0.0, high: float = 0.0, scale: float = 1.0, choices: tuple[str, ...] = (), log: bool = False
+    unit: str,
+    *,
+    low: float = 0.0,
+    high: float = 0.0,
+    scale: float = 1.0,
+    choices: tuple[str, ...] = (),
+    log: bool = False,
+    accuracy: float = 0.0,
 ) -> Any:
     """A dataclass field that carries a Parameter."""
-    return dataclasses.field(metadata={"unit": unit, "low": low, "high": high, "scale": scale, "choices": choices, "log": log})
+    return dataclasses.field(
+        metadata={
+            "unit": unit, "low": low, "high": high, "scale": scale, "choices": choices, "log": log, "accuracy": accuracy,
+        }
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,8 +14,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from core.fem import corotational, neo_hooke
 from core.frames import FloatArray
 
 __all__ = ["CORNERS", "LAWS", "assemble_elastic", "elastic_energy", "gauss_gradients", "lame"]
@@ -51,82 +51,6 @@ def gauss_gradients(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.ascontiguousarray(gradients), np.ascontiguousarray(np.linalg.det(jacobian))
 
 
-@njit(cache=True)
-def _deformation(gradients: Any, positions: Any, nodes: Any, out: Any) -> None:
-    out[:] = 0.0
-    for a in range(8):
-        for i in range(3):
-            for j in range(3):
-                out[i, j] += positions[nodes[a], i] * gradients[a, j]
-
-
-@njit(cache=True)
-def _cofactor(f: Any, cof: Any) -> float:
-    for i in range(3):
-        for j in range(3):
-            i1, i2, j1, j2 = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
-            cof[i, j] = f[i1, j1] * f[i2, j2] - f[i1, j2] * f[i2, j1]
-    return f[0, 0] * cof[0, 0] + f[0, 1] * cof[0, 1] + f[0, 2] * cof[0, 2]  # type: ignore[no-any-return]
-
-
-@njit(cache=True)
-def _polar(f: Any, rotation: Any) -> None:
-    """The rotation nearest to f, by Higham's scaled Newton iteration."""
-    rotation[:] = f
-    cof = np.empty((3, 3))
-    for _ in range(30):
-        det = _cofactor(rotation, cof)
-        scale = abs(det) ** (-1.0 / 3.0)
-        change = 0.0
-        for i in range(3):
-            for j in range(3):
-                new = 0.5 * (scale * rotation[i, j] + cof[i, j] / (scale * det))
-                change += (new - rotation[i, j]) ** 2
-                rotation[i, j] = new
-        if change < 1e-26:
-            break
-
-
-@njit(cache=True)
-def _dilatation(law: int, f: Any, work: Any) -> float:
-    """The scalar whose element mean carries the volumetric energy; `work` gets its derivative by F. NaN when inverted."""
-    if law == 0:
-        det = _cofactor(f, work)
-        return det if det > 0 else np.nan
-    if _cofactor(f, work) <= 0:
-        return np.nan
-    _polar(f, work)
-    trace = -3.0
-    for i in range(3):
-        for j in range(3):
-            trace += work[i, j] * f[i, j]
-    return trace
-
-
-@njit(cache=True)
-def _volumetric(law: int, theta: float) -> tuple[float, float, float]:
-    """Energy density, its first and its second derivative by theta, for a volumetric stiffness of one."""
-    if law == 0:
-        return 0.25 * (theta * theta - 1 - 2 * np.log(theta)), 0.5 * (theta - 1 / theta), 0.5 * (1 + 1 / (theta * theta))
-    return 0.5 * theta * theta, theta, 1.0
-
-
-@njit(cache=True)
-def _density(law: int, f: Any, dilatation: float, work: Any) -> float:
-    """Energy density of the part at a point, over mu."""
-    total = 0.0
-    if law == 0:
-        for i in range(3):
-            for j in range(3):
-                total += f[i, j] * f[i, j]
-        return 0.5 * (dilatation ** (-2.0 / 3.0) * total - 3.0)  # type: ignore[no-any-return]
-    for i in range(3):
-        for j in range(3):
-            total += (f[i, j] - work[i, j]) ** 2
-    return total
-
-
-@njit(cache=True)
 def elastic_energy(law: int, gradients: Any, weights: Any, nodes: Any, mu: Any, bulk: Any, positions: Any) -> float:
     """Elastic energy over E [m^3]; infinite when an element is inverted at a quadrature point.
 
@@ -134,76 +58,11 @@ def elastic_energy(law: int, gradients: Any, weights: Any, nodes: Any, mu: Any, 
         law: see LAWS. gradients, weights: from `gauss_gradients`. nodes: (e, 8).
         mu, bulk: (e,) moduli over E. positions: (n, 3) current node positions [m].
     """
-    f, work = np.empty((3, 3)), np.empty((3, 3))
-    total = 0.0
-    for e in range(nodes.shape[0]):
-        volume, mean = 0.0, 0.0
-        for q in range(8):
-            _deformation(gradients[e, q], positions, nodes[e], f)
-            t = _dilatation(law, f, work)
-            if np.isnan(t):
-                return np.inf
-            volume += weights[e, q]
-            mean += weights[e, q] * t
-            total += weights[e, q] * mu[e] * _density(law, f, t, work)
-        total += volume * bulk[e] * _volumetric(law, mean / volume)[0]
-    return total
+    kernels = neo_hooke if law == LAWS["neo_hooke"] else corotational
+    return float(kernels.energy(gradients, weights, nodes, mu, bulk, positions))
 
 
-@njit(cache=True)
-def _neo_hooke(f: Any, det: float, cof: Any, mu: float, pressure: float, wanted: bool, stress: Any, tangent: Any) -> None:
-    """First Piola stress of the isochoric part and, if wanted, the tangent of both parts at a fixed pressure."""
-    inv = cof / det  # F^-T
-    square = 0.0
-    for i in range(3):
-        for j in range(3):
-            square += f[i, j] * f[i, j]
-    scale = mu * det ** (-2.0 / 3.0)
-    for i in range(3):
-        for j in range(3):
-            stress[i, j] = scale * (f[i, j] - square / 3 * inv[i, j])
-    if not wanted:
-        return
-    crossed = scale * square / 3 - pressure * det
-    for i in range(3):
-        for j in range(3):
-            by_volume = pressure * det * inv[i, j] - 2.0 / 3.0 * stress[i, j]
-            by_shape = -2.0 / 3.0 * scale * inv[i, j]
-            for k in range(3):
-                for m in range(3):
-                    tangent[i, j, k, m] = by_volume * inv[k, m] + by_shape * f[k, m] + crossed * inv[k, j] * inv[i, m]
-            tangent[i, j, i, j] += scale
-
-
-@njit(cache=True)
-def _corotational(f: Any, rotation: Any, mu: float, pressure: float, wanted: bool, stress: Any, tangent: Any) -> None:
-    """As `_neo_hooke`. dR = R [w]x with (tr S - S) w the axial vector of R^T dF - dF^T R, exact (not the usual dR = 0)."""
-    for i in range(3):
-        for j in range(3):
-            stress[i, j] = 2 * mu * (f[i, j] - rotation[i, j])
-    if not wanted:
-        return
-    stretch = rotation.T @ f
-    inverse = np.linalg.inv((stretch[0, 0] + stretch[1, 1] + stretch[2, 2]) * np.eye(3) - stretch)
-    axial, spin = np.empty(3), np.zeros((3, 3))
-    for k in range(3):
-        for m in range(3):
-            # R^T dF for the unit dF at (k, m) has row vector R[k, :] in column m
-            axial[:] = 0.0
-            axial[(m + 2) % 3] = rotation[k, (m + 1) % 3]
-            axial[(m + 1) % 3] = -rotation[k, (m + 2) % 3]
-            w = inverse @ axial
-            spin[0, 1], spin[0, 2], spin[1, 2] = -w[2], w[1], -w[0]
-            spin[1, 0], spin[2, 0], spin[2, 1] = w[2], -w[1], w[0]
-            turn = rotation @ spin
-            for i in range(3):
-                for j in range(3):
-                    tangent[i, j, k, m] = (pressure - 2 * mu) * turn[i, j]
-            tangent[k, m, k, m] += 2 * mu
-
-
-@njit(cache=True)
-def assemble_elastic(  # noqa: PLR0912 (one pass over the elements)
+def assemble_elastic(
     law: int, gradients: Any, weights: Any, nodes: Any, mu: Any, bulk: Any, positions: Any, slots: Any, force: Any, data: Any
 ) -> None:
     """Add the energy's gradient over E to `force` (n, 3) [m^2] and, if `data` is not empty, its tangent [m] to it.
@@ -211,74 +70,9 @@ def assemble_elastic(  # noqa: PLR0912 (one pass over the elements)
     `slots` (e, 24, 24) says where in `data` an entry of the element's matrix goes; -1 drops it (constrained, or below the
     diagonal of the symmetric matrix). Elements must not be inverted. Other arguments as in `elastic_energy`.
     """
-    f, stress, tangent = np.empty((8, 3, 3)), np.empty((3, 3)), np.empty((3, 3, 3, 3))
-    work, dilatation, mean_gradient = np.empty((8, 3, 3)), np.empty(8), np.empty((8, 3))
-    half = np.empty((3, 3, 24))
-    matrix = np.empty((24, 24))
-    wanted = data.shape[0] > 0
-    for e in range(nodes.shape[0]):
-        volume, mean = 0.0, 0.0
-        mean_gradient[:] = 0.0
-        matrix[:] = 0.0
-        for q in range(8):
-            _deformation(gradients[e, q], positions, nodes[e], f[q])
-            dilatation[q] = _dilatation(law, f[q], work[q])
-            volume += weights[e, q]
-            mean += weights[e, q] * dilatation[q]
-            for a in range(8):
-                for i in range(3):
-                    for j in range(3):
-                        mean_gradient[a, i] += weights[e, q] * work[q, i, j] * gradients[e, q, a, j]
-        _, slope, curvature = _volumetric(law, mean / volume)
-        pressure = bulk[e] * slope
-        for q in range(8):
-            w = weights[e, q]
-            if law == 0:
-                _neo_hooke(f[q], dilatation[q], work[q], mu[e], pressure, wanted, stress, tangent)
-            else:
-                _corotational(f[q], work[q], mu[e], pressure, wanted, stress, tangent)
-            for a in range(8):
-                for i in range(3):
-                    for j in range(3):
-                        force[nodes[e, a], i] += w * stress[i, j] * gradients[e, q, a, j]
-            if wanted:
-                _add_point(tangent, gradients[e, q], w, half, matrix)
-        for a in range(8):
-            for i in range(3):
-                force[nodes[e, a], i] += pressure * mean_gradient[a, i]
-        if wanted:
-            _scatter(matrix, mean_gradient, bulk[e] * curvature / volume, slots[e], data)
-
-
-@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
-def _add_point(tangent: Any, gradients: Any, weight: float, half: Any, matrix: Any) -> None:
-    """Add one quadrature point's B^T A B to the upper blocks of the element's matrix; rows are long, for vector instructions."""
-    for b in range(8):
-        g0, g1, g2 = weight * gradients[b, 0], weight * gradients[b, 1], weight * gradients[b, 2]
-        for j in range(3):
-            for i in range(3):
-                for k in range(3):
-                    half[j, i, 3 * b + k] = tangent[i, j, k, 0] * g0 + tangent[i, j, k, 1] * g1 + tangent[i, j, k, 2] * g2
-    for a in range(8):
-        g0, g1, g2 = gradients[a, 0], gradients[a, 1], gradients[a, 2]
-        for i in range(3):
-            row, h0, h1, h2 = matrix[3 * a + i], half[0, i], half[1, i], half[2, i]
-            for c in range(3 * a, 24):
-                row[c] += g0 * h0[c] + g1 * h1[c] + g2 * h2[c]
-
-
-@njit(cache=True)
-def _scatter(matrix: Any, mean_gradient: Any, factor: float, slots: Any, data: Any) -> None:
-    """Add the volumetric rank-one part and write the element's matrix where its entries belong."""
-    for a in range(8):
-        for b in range(a, 8):
-            for i in range(3):
-                for k in range(3):
-                    value = matrix[3 * a + i, 3 * b + k] + factor * mean_gradient[a, i] * mean_gradient[b, k]
-                    slot = slots[3 * a + i, 3 * b + k]
-                    if slot >= 0:
-                        data[slot] += value
-                    if a != b:
-                        slot = slots[3 * b + k, 3 * a + i]
-                        if slot >= 0:
-                            data[slot] += value
+    if law != LAWS["neo_hooke"]:
+        corotational.assemble(gradients, weights, nodes, mu, bulk, positions, slots, force, data)
+        return
+    neo_hooke.add_forces(gradients, weights, nodes, mu, bulk, positions, force)
+    if len(data):
+        neo_hooke.add_matrices(gradients, weights, nodes, mu, bulk, positions, slots, data)

@@ -123,6 +123,8 @@ class BlockModel:
         mu, bulk = lame(setup.material.law, setup.material.poisson_ratio)
         factor = np.exp(log_stiffness(setup.material.inclusions, corners))
         self.mu, self.bulk = mu * factor, bulk * factor
+        # Sums of squares near three lose their last digits when three is taken off, in proportion to this stiffness times volume.
+        self.rounding = 4e-16 * float(self.mu @ self.weights.sum(axis=1))
         self.weight_force = self._weight(setup.load.specific_weight_over_stiffness)
         self._prepare_base(setup)
 
@@ -195,6 +197,15 @@ class BlockModel:
         if self.detached:
             self._assemble_base(positions, force, data)
         return Assembly(force[top.free], data, push, penetration)
+
+    def contact_force(self, positions: FloatArray, probe: Probe) -> FloatArray:
+        """The tool's part of the residual (u,) over E [m^2]."""
+        force = np.zeros_like(positions)
+        assemble_contact(
+            self.topology.surface, self.areas, FACE_SHAPES, FACE_GRADIENTS, positions, probe.centre, probe.radius, False,
+            CONTACT_STIFFNESS, False, self.topology.surface_slots, force, _EMPTY, np.zeros(3),
+        )  # fmt: skip
+        return np.asarray(force[self.topology.free])
 
     def _assemble_base(self, positions: FloatArray, force: FloatArray, data: FloatArray) -> None:
         top = self.topology

@@ -11,10 +11,12 @@ from core.fem.linear import NotPositiveDefinite
 from core.fem.model import Assembly, BlockModel, Probe
 from core.frames import FloatArray
 
-__all__ = ["Outcome", "Solution", "solve"]
+__all__ = ["Outcome", "Solution", "followed", "solve"]
 
 RELATIVE_TOLERANCE = 1e-6
 """Converged: the residual's norm is below this share of the tool's push and of the body's internal forces."""
+CHORD_GAIN = 0.3
+"""A step that left less than this share of the residual is followed by one on the same factor, as long as that does as well."""
 MAX_ITERATIONS = 40
 MAX_SPLITS = 6
 MAX_PENETRATION = 4e-4
@@ -81,35 +83,76 @@ def _search(
     for _ in range(12):
         trial = positions + length * move
         value = model.energy(trial, probe)
-        if value <= energy + 1e-4 * length * slope + 1e-13 * abs(energy):
+        if value <= energy + 1e-4 * length * slope + model.rounding:
             return trial, value
         length /= 2
     return positions, energy
+
+
+def _chord(
+    model: BlockModel, probe: Probe | None, positions: FloatArray, state: Assembly, energy: float
+) -> tuple[FloatArray, float] | None:
+    """A step on the factor of an earlier iteration; None when the energy does not fall along the whole of it."""
+    step = -model.topology.factor.solve(state.residual)
+    trial = positions.copy()
+    trial[model.topology.free] += step
+    value = model.energy(trial, probe)
+    falls = value <= energy + 1e-4 * float(state.residual @ step) + model.rounding
+    return (trial, value) if falls else None
+
+
+def _step(model: BlockModel, probe: Probe | None, positions: FloatArray, energy: float) -> tuple[FloatArray, float, Outcome | None]:
+    """One Newton step with a line search; an outcome when there is none."""
+    state = model.assemble(positions, probe)
+    step = _direction(model, probe, positions, state)
+    if step is None:
+        return positions, energy, Outcome.INDEFINITE
+    trial, value = _search(model, probe, positions, step, float(state.residual @ step), energy)
+    return trial, value, Outcome.ITERATIONS if trial is positions else None
 
 
 def _newton(model: BlockModel, probe: Probe | None, start: FloatArray, tolerance: float) -> Solution:
     positions, energy = start, model.energy(start, probe)
     if not np.isfinite(energy):
         return Solution(start, np.zeros(3), Outcome.INVERTED, 0, np.inf, 0.0)
-    residual, state, outcome, iteration = np.inf, model.assemble(start, probe), Outcome.ITERATIONS, 0
-    for iteration in range(MAX_ITERATIONS + 1):  # noqa: B007
+    before, outcome, iteration = 0.0, Outcome.ITERATIONS, 0
+    while True:
+        state = model.assemble(positions, probe, tangent=False)
         residual = float(np.linalg.norm(state.residual)) / _scale(model, state)
         if residual <= tolerance:
             outcome = Outcome.CONVERGED
             break
-        step = _direction(model, probe, positions, state)
-        if step is None:
-            outcome = Outcome.INDEFINITE
+        if iteration == MAX_ITERATIONS:
             break
-        trial, energy = _search(model, probe, positions, step, float(state.residual @ step), energy)
-        if trial is positions:
+        iteration += 1
+        taken = _chord(model, probe, positions, state, energy) if residual < CHORD_GAIN * before else None
+        before = residual
+        if taken is not None:
+            positions, energy = taken
+            continue
+        positions, energy, stopped = _step(model, probe, positions, energy)
+        if stopped is not None:
+            outcome = stopped
             break
-        positions = trial
-        state = model.assemble(positions, probe)
     if outcome is Outcome.CONVERGED and probe is not None:
         if model.depth_inside(positions, probe) > MAX_PENETRATION or model.encloses(positions, probe):
             outcome = Outcome.INSIDE_TOOL
     return Solution(positions, state.push, outcome, iteration, residual, state.penetration)
+
+
+_FOLLOWED_STEP = 1e-7
+"""Motion of the tool [m] over which the contact force is differenced."""
+
+
+def followed(model: BlockModel, last: Probe, probe: Probe, positions: FloatArray) -> FloatArray:
+    """Where the body goes, to first order, as the tool moves on from `last`, on the factor that solving there has left."""
+    motion = probe.centre - last.centre
+    share = _FOLLOWED_STEP / max(float(np.linalg.norm(motion)), _FOLLOWED_STEP)
+    near = Probe(last.centre + share * motion, last.radius)
+    change = (model.contact_force(positions, near) - model.contact_force(positions, last)) / share
+    guess = positions.copy()
+    guess[model.topology.free] -= model.topology.factor.solve(change)
+    return guess if model.energy(guess, probe) < model.energy(positions, probe) else positions
 
 
 def solve(

@@ -25,8 +25,8 @@ HIDDEN: Mapping[str, Mapping[str, str]] = {
 """The effects that the virtual bench can hide, with the unit of each parameter; names are those of the catalogue."""
 
 
-SHORT_PROTOCOL = ("poke-top-01", "poke-top-02", "poke-top-03", "poke-side-01", "drag-01")
-"""Every kind of motion to fit on, and one poke to test on; the full protocol only adds tests."""
+SHORT_PROTOCOL = ("poke-top-01", "poke-top-02", "poke-side-01", "poke-side-02", "drag-01")
+"""Every kind of motion to fit on, and a push from another side, which shows most causes, to test on."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,49 @@
+"""From one place of the tool to the next, in steps short enough for Newton's method."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from core.fem.model import BlockModel, Probe
+from core.fem.newton import Solution, followed, solve
+from core.frames import FloatArray
+
+__all__ = ["FREE_STEP", "lead"]
+
+FREE_STEP = 1.5e-3
+"""Longest motion in contact [m] that is tried at once."""
+_STAGE_TOLERANCE = 0.2
+"""Residual at which a place on the way counts as reached: the next stage only begins from it."""
+
+
+def lead(model: BlockModel, positions: FloatArray, before: Probe, probe: Probe, tolerance: float) -> Solution:
+    """Equilibrium at `probe`, led there from an equilibrium (n, 3) [m] with the tool at `before`.
+
+    Places on the way are reached roughly at first; where that leads astray, the way is gone again with care.
+    """
+    steps = max(1, int(np.ceil(float(np.linalg.norm(probe.centre - before.centre)) / FREE_STEP)))
+    if steps == 1:
+        return solve(model, probe, positions, before, tolerance)
+    stages = [Probe(before.centre + share * (probe.centre - before.centre), probe.radius) for share in np.arange(1, steps) / steps]
+    hasty = _through(model, positions, [before, *stages, probe], tolerance, careful=False)
+    if hasty.converged:
+        return hasty
+    careful = _through(model, positions, [before, *stages, probe], tolerance, careful=True)
+    return replace(careful, iterations=hasty.iterations + careful.iterations)
+
+
+def _through(model: BlockModel, positions: FloatArray, probes: list[Probe], tolerance: float, careful: bool) -> Solution:
+    """The last of the solutions at each place after the first, or the first that is none."""
+    rough = tolerance if careful else max(tolerance, _STAGE_TOLERANCE)
+    solution = solve(model, probes[1], positions, probes[0] if careful else None, rough)
+    iterations = solution.iterations
+    for last, probe in pairwise(probes[1:]):
+        if not solution.converged:
+            break
+        start = followed(model, last, probe, solution.positions)
+        solution = solve(model, probe, start, last if careful else None, tolerance if probe is probes[-1] else rough)
+        iterations += solution.iterations
+    return replace(solution, iterations=iterations)
