@@ -23,6 +23,8 @@ TRAVEL = 7e-4
 SMOOTHING = 0.02
 """Half the time [s] over which the robot's pose is averaged: streams carry noise of some hundredths of a millimetre."""
 MOST_POINTS = 20000
+_TURN, _TURN_STEP = 5e-5, 0.02
+"""A place counts as deeper than a group's own from this difference on [m]; time between the places that are looked at [s]."""
 FAR = np.array([0.0, 0.0, 10.0])
 """Where the tool is said to be when there is none [m]."""
 
@@ -45,6 +47,13 @@ def clear_of(size: tuple[float, float, float], centres: FloatArray) -> FloatArra
     """Distance (m,) [m] of points (m, 3) to the stated block; zero inside."""
     low, high = np.array([-size[0] / 2, -size[1] / 2, 0.0]), np.array([size[0] / 2, size[1] / 2, size[2]])
     return np.asarray(np.linalg.norm(centres - np.clip(centres, low, high), axis=1))
+
+
+def _depth(size: tuple[float, float, float], centres: FloatArray) -> FloatArray:
+    """How far points (m, 3) lie below the nearest side of the stated block (m,) [m], negative outside; the base does not count."""
+    sides = np.array([size[0] / 2, size[1] / 2]) - np.abs(centres[:, :2])
+    inside = np.minimum(sides.min(axis=1), size[2] - centres[:, 2])
+    return np.where(inside > 0, inside, -clear_of(size, centres))
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +90,25 @@ class Observations:
         """Stated tool centre (g, 3) [m] of each group, phantom frame, under the setup's clock and registration."""
         poses = setup.phantom_from_robot.apply(smooth_centres(self.kinematics, self.times - setup.sensor.time_offset))
         return np.array([poses[list(g.frames)].mean(axis=0) if g.frames else FAR for g in self.groups])
+
+    def turns(self, setup: Setup) -> list[FloatArray | None]:
+        """For each group the place (3,) [m] where the tool was deepest since the group before; None where that is its own place.
+
+        A base that slides has gone as far as the deepest push took it, whether a cloud was taken there or not.
+        """
+        times = np.arange(self.times[0], self.times[-1], _TURN_STEP)
+        way = setup.phantom_from_robot.apply(smooth_centres(self.kinematics, times - setup.sensor.time_offset))
+        depths = _depth(setup.geometry.size, way)
+        found: list[FloatArray | None] = []
+        last = np.inf
+        for group, centre in zip(self.groups, self.centres(setup), strict=True):
+            now = float(self.times[list(group.frames)].mean()) if group.frames else np.inf
+            between = np.flatnonzero((times > last) & (times <= now))
+            last = now
+            deepest = between[np.argmax(depths[between])] if len(between) else None
+            deeper = deepest is not None and depths[deepest] > _depth(setup.geometry.size, centre[None])[0] + _TURN
+            found.append(way[deepest] if deeper else None)
+        return found
 
 
 def _split(centres: FloatArray, free: np.ndarray) -> list[list[int]]:

@@ -245,8 +245,12 @@ def predict(
         moves[number] = touch_correction(other, grid).apply(data.centres(other)) - centres
     columns = _Columns(block, wanted) if wanted else None
     gap, count, spread, changes, frames, chosen = [], [], [], [], [], []
+    turns = data.turns(setup) if setup.support.friction_coefficient is not None else [None] * len(centres)
     previous: Equilibrium | None = None
     for number, (group, centre) in enumerate(zip(data.groups, centres, strict=True)):
+        turn = turns[number]
+        if turn is not None:
+            block.step(true_from_stated.apply(turn[None])[0], previous)
         start = starts[number] if starts is not None and starts[number].in_contact else previous
         frame = block.step(centre, start)
         if frame.outcome is not Outcome.CONVERGED and start is not previous:

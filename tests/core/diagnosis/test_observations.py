@@ -137,3 +137,14 @@ def test_centres_follow_the_robots_registration(sequence):
     motion = small_motion(np.array([1e-3, 0.0, -2e-3, 0.0, 0.02, 0.0]), np.array([0.0, 0.0, TOP]))
     moved = item.centres(replace(SETUP, phantom_from_robot=motion @ Transform()))
     assert np.allclose(moved, motion.apply(item.centres(SETUP)))
+
+
+def test_turns_are_the_deepest_places_that_no_group_has(sequence):
+    observed = _observed(sequence, most=4)
+    turns, centres = observed.turns(SETUP), observed.centres(SETUP)
+    bottom = TOP + 5e-3 - 4e-3
+    deep = [(turn, centre) for turn, centre in zip(turns, centres, strict=True) if turn is not None]
+    assert len(deep) >= 2  # both pushes turn between groups
+    assert all(turn[2] < centre[2] for turn, centre in deep)
+    assert min(turn[2] for turn, _ in deep) == pytest.approx(bottom, abs=2e-4)
+    assert turns[0] is None
