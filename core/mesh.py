@@ -27,17 +27,25 @@ class GridSpec:
 
     Attributes:
         nodes: number of nodes along x, y, z.
-        spacing: None for an even grid, else the edge length [m] of the elements at the focus of a graded one.
+        spacing: None for an even grid, else the distance of the nodes [m] at the focus of a graded one.
+        order: of the shape functions, 1 (8 nodes an element) or 2 (27 nodes, which takes an odd number of nodes along each axis).
     """
 
     nodes: tuple[int, int, int] = (13, 5, 5)
     spacing: float | None = None
+    order: int = 1
 
     def __post_init__(self) -> None:
         if any(not 2 <= count <= 400 for count in self.nodes):
             raise MeshError(f"a grid needs 2 to 400 nodes along each axis, got {self.nodes}", nodes=list(self.nodes))
         if self.spacing is not None and not 0 < self.spacing < 1:
             raise MeshError(f"element spacing {self.spacing:g} m is not between 0 and 1 m", spacing=self.spacing)
+
+        if self.order not in (1, 2) or any((count - 1) % self.order for count in self.nodes):
+            raise MeshError(
+                f"a grid is of order 1, or of order 2 with odd numbers of nodes; got order {self.order} and {self.nodes}",
+                nodes=list(self.nodes), order=self.order,
+            )  # fmt: skip
 
     @classmethod
     def parse(cls, text: str) -> GridSpec:
@@ -81,19 +89,31 @@ def graded_axis(low: float, high: float, nodes: int, focus: float, spacing: floa
     return np.concatenate([lower, upper[1:]])
 
 
+def _quadratic(local: FloatArray) -> list[FloatArray]:
+    """The three quadratic Lagrange polynomials on [0, 1] at these places."""
+    return [(1 - local) * (1 - 2 * local), 4 * local * (1 - local), local * (2 * local - 1)]
+
+
+def _with_middles(ends: FloatArray) -> FloatArray:
+    """Coordinates with the middle of each interval between them."""
+    return np.insert(ends, np.arange(1, len(ends)), (ends[1:] + ends[:-1]) / 2)
+
+
 @dataclass(frozen=True, eq=False)
 class BoxMesh:
     """Nodes and hexahedra of a block; node (i, j, k) has number (k * ny + j) * nx + i.
 
     Attributes:
-        axes: node coordinates along x, y, z [m], phantom frame.
+        axes: node coordinates along x, y, z [m], phantom frame. order: of the shape functions, 1 or 2; with 2 every second node
+            lies midway between its neighbours.
     """
 
     axes: tuple[FloatArray, FloatArray, FloatArray]
+    order: int = 1
 
     def __getstate__(self) -> dict[str, Any]:
-        """Only the axes travel between processes; the rest is made again when asked for."""
-        return {"axes": self.axes}
+        """Only the axes and the order travel between processes; the rest is made again when asked for."""
+        return {"axes": self.axes, "order": self.order}
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:
@@ -114,30 +134,52 @@ class BoxMesh:
 
     @cached_property
     def hexahedra(self) -> IntArray:
-        """(e, 8) nodes; local node number is 4 * dz + 2 * dy + dx."""
-        n = self._numbers
-        last = [slice(None, -1), slice(1, None)]
-        corners = [n[last[dz], last[dy], last[dx]].ravel() for dz in (0, 1) for dy in (0, 1) for dx in (0, 1)]
+        """(e, 8) or (e, 27) nodes; local numbers grow along x, then y, then z."""
+        n, p = self._numbers, self.order
+
+        def every(shift: int) -> slice:
+            return slice(shift, shift - p or None, p)
+
+        steps = range(p + 1)
+        corners = [n[every(dz), every(dy), every(dx)].ravel() for dz in steps for dy in steps for dx in steps]
         return np.stack(corners, axis=1)
 
     @cached_property
-    def faces(self) -> dict[str, IntArray]:
-        """Quadrilaterals (f, 4) of each side, turning counter-clockwise seen from outside."""
+    def _sides(self) -> dict[str, tuple[IntArray, bool]]:
+        """Node numbers of each side in rows and columns, and whether rows run against the outward turn."""
         n = self._numbers
+        return {
+            "-z": (n[0], True),
+            "+z": (n[-1], False),
+            "-y": (n[:, 0], False),
+            "+y": (n[:, -1], True),
+            "-x": (n[:, :, 0], True),
+            "+x": (n[:, :, -1], False),
+        }
+
+    @cached_property
+    def element_sides(self) -> dict[str, IntArray]:
+        """Nodes of the elements' sides: (f, 4) around the corners, or (f, 9) row by row, seen from outside."""
+        if self.order == 1:
+            return self.faces
+
+        def patches(grid: IntArray, flip: bool) -> IntArray:
+            rows = grid[::-1] if flip else grid
+            steps = [slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2)]
+            return np.stack([rows[a, b].ravel() for a in steps for b in steps], axis=1)
+
+        return {side: patches(grid, flip) for side, (grid, flip) in self._sides.items()}
+
+    @cached_property
+    def faces(self) -> dict[str, IntArray]:
+        """Quadrilaterals (f, 4) of neighbouring nodes on each side, turning counter-clockwise seen from outside."""
 
         def quads(grid: IntArray, flip: bool) -> IntArray:
             corners = [grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]]
             stacked = np.stack([corner.ravel() for corner in corners], axis=1)
             return stacked[:, ::-1] if flip else stacked
 
-        return {
-            "-z": quads(n[0], True),
-            "+z": quads(n[-1], False),
-            "-y": quads(n[:, 0], False),
-            "+y": quads(n[:, -1], True),
-            "-x": quads(n[:, :, 0], True),
-            "+x": quads(n[:, :, -1], False),
-        }
+        return {side: quads(grid, flip) for side, (grid, flip) in self._sides.items()}
 
     @cached_property
     def free_surface(self) -> IntArray:
@@ -150,20 +192,21 @@ class BoxMesh:
         return np.asarray(self._numbers[0].ravel())
 
     def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Elements' nodes and trilinear weights, both (m, 8), at rest positions (m, 3) [m]; outside is moved to the block."""
-        cell, local = [], []
+        """Elements' nodes and shape functions (m, a) at rest positions (m, 3) [m]; outside is moved to the block."""
+        first, parts = [], []
         for axis, coordinates in enumerate(self.axes):
-            value = np.clip(points[:, axis], coordinates[0], coordinates[-1])
-            index = np.clip(np.searchsorted(coordinates, value, side="right") - 1, 0, len(coordinates) - 2)
-            cell.append(index)
-            local.append((value - coordinates[index]) / (coordinates[index + 1] - coordinates[index]))
-        nodes, weights = [], []
-        for dz in (0, 1):
-            for dy in (0, 1):
-                for dx in (0, 1):
-                    nodes.append(self._numbers[cell[2] + dz, cell[1] + dy, cell[0] + dx])
-                    parts = [t if d else 1 - t for t, d in zip(local, (dx, dy, dz), strict=True)]
-                    weights.append(parts[0] * parts[1] * parts[2])
+            ends = coordinates[:: self.order]
+            value = np.clip(points[:, axis], ends[0], ends[-1])
+            index = np.clip(np.searchsorted(ends, value, side="right") - 1, 0, len(ends) - 2)
+            first.append(index * self.order)
+            local = (value - ends[index]) / (ends[index + 1] - ends[index])
+            parts.append([1 - local, local] if self.order == 1 else _quadratic(local))
+        nodes, weights, steps = [], [], range(self.order + 1)
+        for dz in steps:
+            for dy in steps:
+                for dx in steps:
+                    nodes.append(self._numbers[first[2] + dz, first[1] + dy, first[0] + dx])
+                    weights.append(parts[0][dx] * parts[1][dy] * parts[2][dz])
         return np.stack(nodes, axis=1), np.stack(weights, axis=1)
 
     def interpolate(self, field: FloatArray, points: FloatArray) -> FloatArray:
@@ -181,12 +224,13 @@ def box_mesh(size: tuple[float, float, float], grid: GridSpec, focus: FloatArray
         focus: (3,) point [m] towards which a graded grid is refined; the middle of the top when left out.
     """
     lows, highs = (-size[0] / 2, -size[1] / 2, 0.0), (size[0] / 2, size[1] / 2, size[2])
+    ends = [(count - 1) // grid.order + 1 for count in grid.nodes]
     if grid.spacing is None:
-        axes = [even_axis(low, high, n) for low, high, n in zip(lows, highs, grid.nodes, strict=True)]
+        axes = [even_axis(low, high, n) for low, high, n in zip(lows, highs, ends, strict=True)]
     else:
         centre = np.array([0.0, 0.0, size[2]]) if focus is None else np.clip(focus, lows, highs)
-        axes = [
-            graded_axis(low, high, n, float(at), grid.spacing)
-            for low, high, n, at in zip(lows, highs, grid.nodes, centre, strict=True)
-        ]
-    return BoxMesh((axes[0], axes[1], axes[2]))
+        edge = grid.spacing * grid.order
+        axes = [graded_axis(low, high, n, float(at), edge) for low, high, n, at in zip(lows, highs, ends, centre, strict=True)]
+    if grid.order == 2:
+        axes = [_with_middles(axis) for axis in axes]
+    return BoxMesh((axes[0], axes[1], axes[2]), grid.order)

@@ -95,12 +95,12 @@ def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray
 
 
 def element_forces(model: BlockModel, positions: FloatArray) -> FloatArray:
-    """Internal forces over E that each element puts on its own nodes (e, 8, 3) [m^2]."""
-    count = len(model.mu)
-    apart = np.arange(8 * count).reshape(count, 8)
-    force = np.zeros((8 * count, 3))
+    """Internal forces over E that each element puts on its own nodes (e, a, 3) [m^2]."""
+    count, corners = model.topology.hexahedra.shape
+    apart = np.arange(corners * count).reshape(count, corners)
+    force = np.zeros((corners * count, 3))
     assemble_elastic(
-        model.law, model.gradients, model.weights, apart, model.mu, model.bulk,
-        positions[model.topology.hexahedra].reshape(-1, 3), np.empty((count, 24, 24), np.int32), force, np.empty(0),
+        model.law, model.rule, apart, model.mu, model.bulk, positions[model.topology.hexahedra].reshape(-1, 3),
+        np.empty((0, 0, 0), np.int32), force, np.empty(0),
     )  # fmt: skip
-    return force.reshape(count, 8, 3)
+    return force.reshape(count, corners, 3)

@@ -7,7 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from core.fem.elastic import LAWS, assemble_elastic, elastic_energy, gauss_gradients, lame
+from core.fem.elastic import LAWS, assemble_elastic, elastic_energy, lame
+from core.fem.elements import HEXAHEDRA, quadrature
 from core.fem.linear import SparseCholesky, upper_pattern
 from core.frames import FloatArray
 from core.mesh import BoxMesh, GridSpec, box_mesh
@@ -15,9 +16,9 @@ from core.mesh import BoxMesh, GridSpec, box_mesh
 __all__ = ["FreeBody", "distorted", "grid"]
 
 
-def grid(size: tuple[float, float, float], nodes: tuple[int, int, int]) -> BoxMesh:
+def grid(size: tuple[float, float, float], nodes: tuple[int, int, int], order: int = 1) -> BoxMesh:
     """An even grid; edge lengths [m]."""
-    return box_mesh(size, GridSpec(nodes=nodes))
+    return box_mesh(size, GridSpec(nodes=nodes, order=order))
 
 
 def distorted(mesh: BoxMesh, share: float, seed: int) -> FloatArray:
@@ -48,7 +49,8 @@ class FreeBody:
     def _parts(self):
         mu, bulk = lame(self.law, self.poisson_ratio)
         ones = np.ones(len(self.mesh.hexahedra))
-        return *gauss_gradients(self.nodes[self.mesh.hexahedra]), np.ascontiguousarray(self.mesh.hexahedra), mu * ones, bulk * ones
+        rule = quadrature(HEXAHEDRA[self.mesh.order], self.nodes[self.mesh.hexahedra])
+        return rule, np.ascontiguousarray(self.mesh.hexahedra), mu * ones, bulk * ones
 
     @cached_property
     def _system(self):

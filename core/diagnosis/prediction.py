@@ -143,7 +143,7 @@ class _Columns:
         arm = frame.probe.centre - wanted.pivot
         turned = [np.tensordot(np.cross(axis, arm), tool, axes=1) for axis in np.eye(3)]
         scaled = changed[3:] / np.array(wanted.steps)[:, None, None] if wanted.steps else changed[3:]
-        corners = frame.mesh.nodes[frame.mesh.hexahedra] if wanted.lumps else np.empty((0, 8, 3))
+        corners = frame.mesh.nodes[frame.mesh.hexahedra] if wanted.lumps else np.empty((0, 2, 3))
         factors = np.array([log_stiffness((replace(lump, stiffness_ratio=np.e),), corners) for lump in wanted.lumps])
         lumps = stiffness_changes(self.block, frame, factors) if wanted.lumps else changed[:0]
         return np.concatenate([tool, np.array(turned), scaled, lumps])
@@ -184,7 +184,7 @@ def _observe(frame: Equilibrium, compared: _Compared) -> sp.csr_matrix:
     share = 1.0 / np.maximum(compared.means.count, 1)[seen.patch]
     entries = (weights[:, :, None] * seen.normal[:, None, :] * share[:, None, None]).ravel()
     columns = (3 * nodes[:, :, None] + np.arange(3)).ravel()
-    rows = np.repeat(seen.patch, 24)
+    rows = np.repeat(seen.patch, 3 * nodes.shape[1])
     return sp.coo_matrix((entries, (rows, columns)), shape=(patches, 3 * len(frame.mesh.nodes))).tocsr()
 
 

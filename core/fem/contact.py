@@ -12,35 +12,14 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from core.frames import FloatArray
-
-__all__ = ["FACE_GRADIENTS", "FACE_SHAPES", "assemble_contact", "contact_energy", "face_weights", "turns_around"]
-
-_GAUSS = np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)])
-_GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 9.0
-_POINTS = np.array([[s, t] for t in _GAUSS for s in _GAUSS])
-_POINT_WEIGHTS = np.array([a * b for b in _GAUSS_WEIGHTS for a in _GAUSS_WEIGHTS])
-_QUAD = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-FACE_SHAPES = np.ascontiguousarray(((1 + _POINTS[:, None] * _QUAD[None]) / 2).prod(axis=2))
-FACE_GRADIENTS = np.ascontiguousarray(
-    np.stack(
-        [_QUAD[:, 0] / 2 * (1 + _POINTS[:, 1:] * _QUAD[:, 1]) / 2, _QUAD[:, 1] / 2 * (1 + _POINTS[:, :1] * _QUAD[:, 0]) / 2], axis=2
-    )
-)
-
-
-def face_weights(corners: FloatArray) -> FloatArray:
-    """Rest area [m^2] at the 3x3 Gauss points (f, 9) of quadrilaterals with corners (f, 4, 3) [m]."""
-    tangents = np.einsum("qac,fai->fqci", FACE_GRADIENTS, corners)
-    area = np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=2)
-    return np.asarray(area * _POINT_WEIGHTS)
+__all__ = ["assemble_contact", "contact_energy", "turns_around"]
 
 
 @njit(cache=True)
 def _gap(positions: Any, face: Any, shapes: Any, gradients: Any, centre: Any, radius: float, flat: bool, direction: Any) -> float:
     """Signed gap of a surface point [m], negative inside the obstacle; `direction` gets the unit vector that opens the gap."""
     x, s, t = np.zeros(3), np.zeros(3), np.zeros(3)
-    for a in range(4):
+    for a in range(face.shape[0]):
         for i in range(3):
             x[i] += shapes[a] * positions[face[a], i]
             s[i] += gradients[a, 0] * positions[face[a], i]
@@ -68,14 +47,14 @@ def _in_reach(positions: Any, face: Any, centre: Any, radius: float, flat: bool)
     """Cheap test that spares most faces the quadrature."""
     if flat:
         return True
-    nearest, edge = np.inf, 0.0
-    for a in range(4):
+    nearest, size = np.inf, 0.0
+    for a in range(face.shape[0]):
         distance, length = 0.0, 0.0
         for i in range(3):
             distance += (positions[face[a], i] - centre[i]) ** 2
-            length += (positions[face[a], i] - positions[face[(a + 1) % 4], i]) ** 2
-        nearest, edge = min(nearest, distance), max(edge, length)
-    return np.sqrt(nearest) < radius + np.sqrt(edge)  # type: ignore[no-any-return]
+            length += (positions[face[a], i] - positions[face[0], i]) ** 2
+        nearest, size = min(nearest, distance), max(size, length)
+    return np.sqrt(nearest) < radius + np.sqrt(size)  # type: ignore[no-any-return]
 
 
 @njit(cache=True)
@@ -87,7 +66,7 @@ def contact_energy(
     for f in range(faces.shape[0]):
         if not _in_reach(positions, faces[f], centre, radius, flat):
             continue
-        for q in range(9):
+        for q in range(shapes.shape[0]):
             gap = _gap(positions, faces[f], shapes[q], gradients[q], centre, radius, flat, direction)
             if gap < 0:
                 total += 0.5 * stiffness * areas[f, q] * gap * gap
@@ -113,14 +92,14 @@ def assemble_contact(
 ) -> float:
     """Add the penalty's gradient over E to `force` (n, 3) [m^2], its tangent to `data` [m], the push on the body to `resultant`.
 
-    `slots` (f, 12, 12) as in `assemble_elastic`; an empty `data` leaves the tangent out,
+    `slots` (f, 3 b, 3 b) as in `assemble_elastic`; an empty `data` leaves the tangent out,
     `bending` False the part from the sphere's curvature, which is not positive. Returns the deepest penetration [m].
     """
     direction, deepest = np.empty(3), 0.0
     for f in range(faces.shape[0]):
         if not _in_reach(positions, faces[f], centre, radius, flat):
             continue
-        for q in range(9):
+        for q in range(shapes.shape[0]):
             gap = _gap(positions, faces[f], shapes[q], gradients[q], centre, radius, flat, direction)
             if gap >= 0:
                 continue
@@ -128,7 +107,7 @@ def assemble_contact(
             weight = stiffness * areas[f, q]
             for i in range(3):
                 resultant[i] -= weight * gap * direction[i]
-                for a in range(4):
+                for a in range(faces.shape[1]):
                     force[faces[f, a], i] += weight * gap * direction[i] * shapes[q, a]
             if data.shape[0] == 0:
                 continue
@@ -136,8 +115,8 @@ def assemble_contact(
             for i in range(3):
                 for j in range(3):
                     value = weight * (1 - bend) * direction[i] * direction[j] + (weight * bend if i == j else 0.0)
-                    for a in range(4):
-                        for b in range(4):
+                    for a in range(faces.shape[1]):
+                        for b in range(faces.shape[1]):
                             slot = slots[f, 3 * a + i, 3 * b + j]
                             if slot >= 0:
                                 data[slot] += value * shapes[q, a] * shapes[q, b]

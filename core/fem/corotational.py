@@ -1,6 +1,7 @@
-"""Kernels of the corotational hexahedra with mean dilatation, for comparison with the engines that have only this law.
+"""Kernels of the corotational law, for comparison with the engines that have only this one.
 
-W = mu |F - R|^2 at each point, lambda/2 theta^2 per element, theta = mean of tr(R^T F) - 3, F = R S the polar decomposition.
+W = mu |F - R|^2 at each point, and lambda/2 theta^2, theta the projection of tr(R^T F) - 3 on the element's pressures,
+F = R S the polar decomposition.
 """
 
 from __future__ import annotations
@@ -10,13 +11,15 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from core.fem.hyperelastic import project, scatter
+
 __all__ = ["assemble", "energy"]
 
 
 @njit(cache=True)
 def _deformation(gradients: Any, positions: Any, nodes: Any, out: Any) -> None:
     out[:] = 0.0
-    for a in range(8):
+    for a in range(nodes.shape[0]):
         for i in range(3):
             for j in range(3):
                 out[i, j] += positions[nodes[a], i] * gradients[a, j]
@@ -73,21 +76,20 @@ def _density(f: Any, rotation: Any) -> float:
 
 
 @njit(cache=True)
-def energy(gradients: Any, weights: Any, nodes: Any, mu: Any, bulk: Any, positions: Any) -> float:
+def energy(gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: Any, positions: Any) -> float:
     """Elastic energy over E [m^3]; infinite when an element is inverted at a quadrature point."""
-    f, work = np.empty((3, 3)), np.empty((3, 3))
+    f, work, theta = np.empty((3, 3)), np.empty((3, 3)), np.empty(modes.shape[2])
     total = 0.0
     for e in range(nodes.shape[0]):
-        volume, mean = 0.0, 0.0
-        for q in range(8):
+        theta[:] = 0.0
+        for q in range(weights.shape[1]):
             _deformation(gradients[e, q], positions, nodes[e], f)
             t = _dilatation(f, work)
             if np.isnan(t):
                 return np.inf
-            volume += weights[e, q]
-            mean += weights[e, q] * t
+            theta += weights[e, q] * t * modes[e, q]
             total += weights[e, q] * mu[e] * _density(f, work)
-        total += 0.5 * bulk[e] * mean * mean / volume
+        total += 0.5 * bulk[e] * np.sum(theta * theta)
     return total
 
 
@@ -122,74 +124,59 @@ def _stress(f: Any, rotation: Any, mu: float, pressure: float, wanted: bool, str
 
 
 @njit(cache=True)
-def assemble(  # noqa: PLR0912 (one pass over the elements)
-    gradients: Any, weights: Any, nodes: Any, mu: Any, bulk: Any, positions: Any, slots: Any, force: Any, data: Any
+def _press(
+    gradients: Any, weights: Any, modes: Any, bulk: float, positions: Any, nodes: Any, f: Any, work: Any, press: Any
+) -> None:
+    """F, its rotation and the pressure at all points of an element."""
+    dilatation = np.empty(weights.shape[0])
+    for q in range(weights.shape[0]):
+        _deformation(gradients[q], positions, nodes, f[q])
+        dilatation[q] = bulk * _dilatation(f[q], work[q])
+    project(weights, modes, dilatation, press)
+
+
+@njit(cache=True)
+def assemble(
+    gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: Any, positions: Any, slots: Any, force: Any, data: Any
 ) -> None:
     """Add the energy's gradient to `force` and, if `data` is not empty, its tangent to it, as `assemble_elastic` has them."""
-    f, stress, tangent = np.empty((8, 3, 3)), np.empty((3, 3)), np.empty((3, 3, 3, 3))
-    work, dilatation, mean_gradient = np.empty((8, 3, 3)), np.empty(8), np.empty((8, 3))
-    half = np.empty((3, 3, 24))
-    matrix = np.empty((24, 24))
-    wanted = data.shape[0] > 0
+    points, size, wanted = weights.shape[1], 3 * nodes.shape[1], data.shape[0] > 0
+    f, work, press = np.empty((points, 3, 3)), np.empty((points, 3, 3)), np.empty(points)
+    stress, tangent, half = np.empty((3, 3)), np.empty((3, 3, 3, 3)), np.empty((3, 3, size))
+    moved, matrix = np.empty((modes.shape[2], size)), np.empty((size, size))
     for e in range(nodes.shape[0]):
-        volume, mean = 0.0, 0.0
-        mean_gradient[:] = 0.0
+        moved[:] = 0.0
         matrix[:] = 0.0
-        for q in range(8):
-            _deformation(gradients[e, q], positions, nodes[e], f[q])
-            dilatation[q] = _dilatation(f[q], work[q])
-            volume += weights[e, q]
-            mean += weights[e, q] * dilatation[q]
-            for a in range(8):
-                for i in range(3):
-                    for j in range(3):
-                        mean_gradient[a, i] += weights[e, q] * work[q, i, j] * gradients[e, q, a, j]
-        pressure = bulk[e] * mean / volume
-        for q in range(8):
+        _press(gradients[e], weights[e], modes[e], bulk[e], positions, nodes[e], f, work, press)
+        for q in range(points):
             w = weights[e, q]
-            _stress(f[q], work[q], mu[e], pressure, wanted, stress, tangent)
-            for a in range(8):
+            _stress(f[q], work[q], mu[e], press[q], wanted, stress, tangent)
+            for a in range(nodes.shape[1]):
                 for i in range(3):
-                    for j in range(3):
-                        force[nodes[e, a], i] += w * stress[i, j] * gradients[e, q, a, j]
+                    turned = np.sum(work[q, i] * gradients[e, q, a])
+                    force[nodes[e, a], i] += w * (np.sum(stress[i] * gradients[e, q, a]) + press[q] * turned)
+                    for m in range(modes.shape[2]):
+                        moved[m, 3 * a + i] += w * modes[e, q, m] * turned
             if wanted:
                 _add_point(tangent, gradients[e, q], w, half, matrix)
-        for a in range(8):
-            for i in range(3):
-                force[nodes[e, a], i] += pressure * mean_gradient[a, i]
         if wanted:
-            _scatter(matrix, mean_gradient, bulk[e] / volume, slots[e], data)
+            for m in range(modes.shape[2]):
+                matrix += bulk[e] * np.outer(moved[m], moved[m])
+            scatter(matrix, slots[e], data)
 
 
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
 def _add_point(tangent: Any, gradients: Any, weight: float, half: Any, matrix: Any) -> None:
     """Add one quadrature point's B^T A B to the upper blocks of the element's matrix; rows are long, for vector instructions."""
-    for b in range(8):
+    for b in range(gradients.shape[0]):
         g0, g1, g2 = weight * gradients[b, 0], weight * gradients[b, 1], weight * gradients[b, 2]
         for j in range(3):
             for i in range(3):
                 for k in range(3):
                     half[j, i, 3 * b + k] = tangent[i, j, k, 0] * g0 + tangent[i, j, k, 1] * g1 + tangent[i, j, k, 2] * g2
-    for a in range(8):
+    for a in range(gradients.shape[0]):
         g0, g1, g2 = gradients[a, 0], gradients[a, 1], gradients[a, 2]
         for i in range(3):
             row, h0, h1, h2 = matrix[3 * a + i], half[0, i], half[1, i], half[2, i]
-            for c in range(3 * a, 24):
+            for c in range(3 * a, matrix.shape[1]):
                 row[c] += g0 * h0[c] + g1 * h1[c] + g2 * h2[c]
-
-
-@njit(cache=True)
-def _scatter(matrix: Any, mean_gradient: Any, factor: float, slots: Any, data: Any) -> None:
-    """Add the volumetric rank-one part and write the element's matrix where its entries belong."""
-    for a in range(8):
-        for b in range(a, 8):
-            for i in range(3):
-                for k in range(3):
-                    value = matrix[3 * a + i, 3 * b + k] + factor * mean_gradient[a, i] * mean_gradient[b, k]
-                    slot = slots[3 * a + i, 3 * b + k]
-                    if slot >= 0:
-                        data[slot] += value
-                    if a != b:
-                        slot = slots[3 * b + k, 3 * a + i]
-                        if slot >= 0:
-                            data[slot] += value

@@ -10,8 +10,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from core.fem.contact import FACE_GRADIENTS, FACE_SHAPES, assemble_contact, contact_energy, face_weights, turns_around
-from core.fem.elastic import LAWS, assemble_elastic, elastic_energy, gauss_gradients, lame
+from core.fem.contact import assemble_contact, contact_energy, turns_around
+from core.fem.elastic import LAWS, assemble_elastic, elastic_energy, lame
+from core.fem.elements import HEXAHEDRA, Quadrature, face_weights, quadrature
 from core.fem.linear import SparseCholesky, face_slots, upper_pattern
 from core.frames import FloatArray
 from core.mesh import BoxMesh, GridSpec, IntArray, box_mesh
@@ -49,11 +50,13 @@ class Assembly:
 class Topology:
     """What grids of one shape share whatever their coordinates: numbering, matrix pattern, symbolic factorisation."""
 
-    def __init__(self, nodes: tuple[int, int, int], held: bool) -> None:
-        mesh = box_mesh((1.0, 1.0, 1.0), GridSpec(nodes=nodes))
+    def __init__(self, nodes: tuple[int, int, int], order: int, held: bool) -> None:
+        mesh = box_mesh((1.0, 1.0, 1.0), GridSpec(nodes=nodes, order=order))
+        self.element = HEXAHEDRA[order]
         self.hexahedra = np.ascontiguousarray(mesh.hexahedra)
-        self.surface = np.ascontiguousarray(mesh.free_surface)
-        self.base = np.ascontiguousarray(mesh.faces["-z"])
+        self.surface = np.concatenate([mesh.element_sides[side] for side in ("+z", "-y", "+y", "-x", "+x")])
+        self.base = np.ascontiguousarray(mesh.element_sides["-z"])
+        self.hull = np.concatenate(list(mesh.faces.values()))
         free = np.ones((len(mesh.nodes), 3), dtype=bool)
         if held:
             free[mesh.base_nodes] = False
@@ -69,9 +72,9 @@ class Topology:
 
 
 @lru_cache(maxsize=8)
-def topology(nodes: tuple[int, int, int], held: bool) -> Topology:
+def topology(nodes: tuple[int, int, int], order: int, held: bool) -> Topology:
     """The shared part of all grids with these numbers of nodes; `held` leaves the base nodes out of the unknowns."""
-    return Topology(nodes, held)
+    return Topology(nodes, order, held)
 
 
 def log_stiffness(inclusions: tuple[Inclusion, ...], corners: FloatArray) -> FloatArray:
@@ -79,7 +82,7 @@ def log_stiffness(inclusions: tuple[Inclusion, ...], corners: FloatArray) -> Flo
     log_factor = np.zeros(len(corners))
     if not inclusions:
         return log_factor
-    low, high = corners[:, 0], corners[:, 7]
+    low, high = corners[:, 0], corners[:, -1]
     steps = (np.arange(4) + 0.5) / 4
     offsets = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
     width = np.cbrt(np.prod(high - low, axis=1))[:, None] / 8
@@ -105,11 +108,11 @@ def _held_share(detached: tuple[Detachment, ...], size: tuple[float, float, floa
 
 
 @lru_cache(maxsize=32)
-def _quadrature(mesh: BoxMesh) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Corners of the elements, gradients and weights at their points, and weights on the free surface: the mesh's alone."""
-    corners = mesh.nodes[mesh.hexahedra]
-    gradients, weights = gauss_gradients(corners)
-    return corners, gradients, weights, face_weights(mesh.nodes[mesh.free_surface])
+def _quadrature(mesh: BoxMesh) -> tuple[Quadrature, FloatArray]:
+    """Quadrature of the elements, and areas on the free surface (f, p) [m^2]: the mesh's alone."""
+    shared = topology(mesh.shape, mesh.order, True)
+    areas = face_weights(shared.element.face, mesh.nodes[shared.surface])
+    return quadrature(shared.element, mesh.nodes[shared.hexahedra]), areas
 
 
 class BlockModel:
@@ -117,14 +120,14 @@ class BlockModel:
 
     def __init__(self, setup: Setup, mesh: BoxMesh) -> None:
         self.mesh, self.setup = mesh, setup
-        self.topology = topology(mesh.shape, held=not setup.support.detached)
-        self.law = LAWS[setup.material.law]
-        corners, self.gradients, self.weights, self.areas = _quadrature(mesh)
+        self.topology = topology(mesh.shape, mesh.order, held=not setup.support.detached)
+        self.law, self.face = LAWS[setup.material.law], self.topology.element.face
+        self.rule, self.areas = _quadrature(mesh)
         mu, bulk = lame(setup.material.law, setup.material.poisson_ratio)
-        factor = np.exp(log_stiffness(setup.material.inclusions, corners))
+        factor = np.exp(log_stiffness(setup.material.inclusions, mesh.nodes[self.topology.hexahedra]))
         self.mu, self.bulk = mu * factor, bulk * factor
         # Sums of squares near three lose their last digits when three is taken off, in proportion to this stiffness times volume.
-        self.rounding = 4e-16 * float(self.mu @ self.weights.sum(axis=1))
+        self.rounding = 4e-16 * float(self.mu @ self.rule.weights.sum(axis=1))
         self.weight_force = self._weight(setup.load.specific_weight_over_stiffness)
         self._prepare_base(setup)
 
@@ -133,7 +136,7 @@ class BlockModel:
         share = np.zeros(len(self.mesh.nodes))
         if not specific:
             return share
-        np.add.at(share, self.topology.hexahedra, np.repeat(self.weights.sum(axis=1)[:, None] / 8, 8, axis=1))
+        np.add.at(share, self.topology.hexahedra, self.rule.weights @ self.topology.element.shapes)
         return specific * share
 
     def _prepare_base(self, setup: Setup) -> None:
@@ -141,11 +144,11 @@ class BlockModel:
         if not self.detached:
             return
         corners = self.mesh.nodes[self.topology.base]
-        areas = face_weights(corners)
-        points = np.einsum("qa,fai->fqi", FACE_SHAPES, corners)
+        areas, shapes = face_weights(self.face, corners), self.face.shapes
+        points = np.einsum("qa,fai->fqi", shapes, corners)
         self.base_areas = areas
         held = areas * _held_share(setup.support.detached, setup.geometry.size, points)
-        self.bond = BOND_STIFFNESS * np.einsum("fq,qa,qb->fab", held, FACE_SHAPES, FACE_SHAPES)
+        self.bond = BOND_STIFFNESS * np.einsum("fq,qa,qb->fab", held, shapes, shapes)
 
     def _bond_gradient(self, positions: FloatArray) -> FloatArray:
         """Gradient of the bond's energy at the base faces' nodes (f, 4, 3) [m^2]."""
@@ -155,7 +158,7 @@ class BlockModel:
     def energy(self, positions: FloatArray, probe: Probe | None) -> float:
         """Total potential over E [m^3]; infinite when an element is inverted."""
         top = self.topology
-        total = float(elastic_energy(self.law, self.gradients, self.weights, top.hexahedra, self.mu, self.bulk, positions))
+        total = elastic_energy(self.law, self.rule, top.hexahedra, self.mu, self.bulk, positions)
         if not np.isfinite(total):
             return np.inf
         total += float(self.weight_force @ (positions[:, 2] - self.mesh.nodes[:, 2]))
@@ -163,8 +166,8 @@ class BlockModel:
             total += contact_energy(
                 top.surface,
                 self.areas,
-                FACE_SHAPES,
-                FACE_GRADIENTS,
+                self.face.shapes,
+                self.face.gradients,
                 positions,
                 probe.centre,
                 probe.radius,
@@ -175,7 +178,15 @@ class BlockModel:
             moved = (positions - self.mesh.nodes)[top.base]
             total += 0.5 * float(np.vdot(moved, self._bond_gradient(positions)))
             total += contact_energy(
-                top.base, self.base_areas, FACE_SHAPES, FACE_GRADIENTS, positions, np.zeros(3), 0.0, True, CONTACT_STIFFNESS
+                top.base,
+                self.base_areas,
+                self.face.shapes,
+                self.face.gradients,
+                positions,
+                np.zeros(3),
+                0.0,
+                True,
+                CONTACT_STIFFNESS,
             )
         return total
 
@@ -185,13 +196,11 @@ class BlockModel:
         force = np.zeros_like(positions)
         data = np.zeros(top.entries) if tangent else _EMPTY
         push, penetration = np.zeros(3), 0.0
-        assemble_elastic(
-            self.law, self.gradients, self.weights, top.hexahedra, self.mu, self.bulk, positions, top.slots, force, data
-        )
+        assemble_elastic(self.law, self.rule, top.hexahedra, self.mu, self.bulk, positions, top.slots, force, data)
         force[:, 2] += self.weight_force
         if probe is not None:
             penetration = assemble_contact(
-                top.surface, self.areas, FACE_SHAPES, FACE_GRADIENTS, positions, probe.centre, probe.radius, False,
+                top.surface, self.areas, self.face.shapes, self.face.gradients, positions, probe.centre, probe.radius, False,
                 CONTACT_STIFFNESS, bending, top.surface_slots, force, data, push,
             )  # fmt: skip
         if self.detached:
@@ -202,7 +211,7 @@ class BlockModel:
         """The tool's part of the residual (u,) over E [m^2]."""
         force = np.zeros_like(positions)
         assemble_contact(
-            self.topology.surface, self.areas, FACE_SHAPES, FACE_GRADIENTS, positions, probe.centre, probe.radius, False,
+            self.topology.surface, self.areas, self.face.shapes, self.face.gradients, positions, probe.centre, probe.radius, False,
             CONTACT_STIFFNESS, False, self.topology.surface_slots, force, _EMPTY, np.zeros(3),
         )  # fmt: skip
         return np.asarray(force[self.topology.free])
@@ -211,11 +220,12 @@ class BlockModel:
         top = self.topology
         np.add.at(force, top.base, self._bond_gradient(positions))
         if len(data):
-            blocks = np.einsum("fab,ij->faibj", self.bond, np.eye(3)).reshape(len(self.bond), 12, 12)
+            size = 3 * self.bond.shape[1]
+            blocks = np.einsum("fab,ij->faibj", self.bond, np.eye(3)).reshape(len(self.bond), size, size)
             used = top.base_slots >= 0
             np.add.at(data, top.base_slots[used], blocks[used])
         assemble_contact(
-            top.base, self.base_areas, FACE_SHAPES, FACE_GRADIENTS, positions, np.zeros(3), 0.0, True,
+            top.base, self.base_areas, self.face.shapes, self.face.gradients, positions, np.zeros(3), 0.0, True,
             CONTACT_STIFFNESS, False, top.base_slots, force, data, np.zeros(3),
         )  # fmt: skip
 
@@ -227,6 +237,4 @@ class BlockModel:
 
     def encloses(self, positions: FloatArray, probe: Probe) -> bool:
         """Whether the tool's centre lies within the deformed block, where no contact would be felt."""
-        top = self.topology
-        around = turns_around(top.surface, positions, probe.centre) + turns_around(top.base, positions, probe.centre)
-        return bool(around > 0.5)
+        return bool(turns_around(self.topology.hull, positions, probe.centre) > 0.5)

@@ -4,17 +4,21 @@ import numpy as np
 import pytest
 
 from core.errors import MeshError
-from core.fem.elastic import gauss_gradients
+from core.fem.elements import HEXAHEDRA, quadrature
 from core.mesh import GridSpec, box_mesh, even_axis, graded_axis
 
 SIZE = (0.0687, 0.0393, 0.0358)
-GRIDS = pytest.mark.parametrize("grid", [GridSpec(), GridSpec(nodes=(9, 8, 7), spacing=1e-3)], ids=["even", "graded"])
+GRIDS = pytest.mark.parametrize(
+    "grid",
+    [GridSpec(), GridSpec(nodes=(9, 8, 7), spacing=1e-3), GridSpec(nodes=(9, 7, 5), spacing=1e-3, order=2)],
+    ids=["even", "graded", "quadratic"],
+)
 
 
 @GRIDS
 def test_elements_fill_the_block_without_overlap(grid):
     mesh = box_mesh(SIZE, grid)
-    _, weights = gauss_gradients(mesh.nodes[mesh.hexahedra])
+    weights = quadrature(HEXAHEDRA[grid.order], mesh.nodes[mesh.hexahedra]).weights
     assert weights.min() > 0
     assert weights.sum() == pytest.approx(np.prod(SIZE), rel=1e-12)
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.fem.contact import FACE_GRADIENTS, FACE_SHAPES, assemble_contact, contact_energy, face_weights
+from core.fem.contact import assemble_contact, contact_energy
+from core.fem.elements import HEXAHEDRA
 from core.fem.model import CONTACT_STIFFNESS, BlockModel, Probe
 from core.mesh import GridSpec, box_mesh
 from core.replay import replay
@@ -29,9 +30,9 @@ def _dented(model: BlockModel, seed: int) -> tuple[np.ndarray, Probe]:
     return nodes + sunk, Probe(np.array([1e-3, 0.0, SIZE[2] + 3e-3]), 5e-3)
 
 
-def test_areas_of_the_quadrature_points_add_up_to_the_surface():
-    mesh = box_mesh(SIZE, GridSpec(nodes=(9, 7, 5), spacing=1e-3))
-    areas = face_weights(mesh.nodes[mesh.free_surface])
+@pytest.mark.parametrize("order", HEXAHEDRA)
+def test_areas_of_the_quadrature_points_add_up_to_the_surface(order):
+    areas = BlockModel(SETUP, box_mesh(SIZE, GridSpec(nodes=(9, 7, 5), spacing=1e-3, order=order))).areas
     x, y, z = SIZE
     assert areas.sum() == pytest.approx(x * y + 2 * x * z + 2 * y * z, rel=1e-12)
 
@@ -39,7 +40,7 @@ def test_areas_of_the_quadrature_points_add_up_to_the_surface():
 def _contact_force(model: BlockModel, positions: np.ndarray, probe: Probe) -> tuple[np.ndarray, np.ndarray]:
     force, push = np.zeros_like(positions), np.zeros(3)
     assemble_contact(
-        model.topology.surface, model.areas, FACE_SHAPES, FACE_GRADIENTS, positions, probe.centre, probe.radius, False,
+        model.topology.surface, model.areas, model.face.shapes, model.face.gradients, positions, probe.centre, probe.radius, False,
         CONTACT_STIFFNESS, True, model.topology.surface_slots, force, np.empty(0), push,
     )  # fmt: skip
     return force, push
@@ -54,8 +55,8 @@ def test_contact_force_is_the_gradient_of_its_energy_and_pushes_back_on_the_tool
         return contact_energy(
             model.topology.surface,
             model.areas,
-            FACE_SHAPES,
-            FACE_GRADIENTS,
+            model.face.shapes,
+            model.face.gradients,
             at,
             probe.centre,
             probe.radius,

@@ -1,0 +1,118 @@
+"""Reference elements: shape functions, quadrature, and the pressures that keep each of them free of volumetric locking.
+
+The volumetric energy sees the volume change J only through its projection on a few polynomials per element: a constant for
+trilinear hexahedra (mean dilatation: Nagtegaal, Parks and Rice 1974), and for quadratic elements as many as the pair stays stable
+with (Q2/P1 and P2/P0: Sussman and Bathe 1987; Boffi, Brezzi and Fortin 2013, ch. 8).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.frames import FloatArray
+
+__all__ = ["HEX8", "HEX27", "HEXAHEDRA", "Element", "Face", "Quadrature", "face_weights", "quadrature"]
+
+
+@dataclass(frozen=True, eq=False)
+class Face:
+    """A side of an element: shape functions (p, b) and their gradients (p, b, 2) at quadrature points with these weights (p,)."""
+
+    shapes: FloatArray
+    gradients: FloatArray
+    weights: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """A reference element.
+
+    Attributes:
+        nodes: (a, 3) reference coordinates, the first along the lowest corner and the last along the highest of a hexahedron.
+        shapes, gradients: (q, a) and (q, a, 3), of the shape functions at the quadrature points. weights: (q,).
+        pressures: (q, m) polynomials.
+        face: its side.
+    """
+
+    name: str
+    nodes: FloatArray
+    shapes: FloatArray
+    gradients: FloatArray
+    weights: FloatArray
+    pressures: FloatArray
+    face: Face
+
+
+@dataclass(frozen=True, eq=False)
+class Quadrature:
+    """Quadrature of a mesh at rest: gradients (e, q, a, 3) [1/m], weights (e, q) [m^3], pressures (e, q, m), orthonormal."""
+
+    gradients: FloatArray
+    weights: FloatArray
+    pressures: FloatArray
+
+
+def _lagrange(order: int, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Values and slopes (p, order + 1) of the Lagrange polynomials on [-1, 1] at these places (p,)."""
+    if order == 1:
+        return np.stack([(1 - at) / 2, (1 + at) / 2], axis=1), np.tile([-0.5, 0.5], (len(at), 1))
+    values = np.stack([at * (at - 1) / 2, 1 - at**2, at * (at + 1) / 2], axis=1)
+    return values, np.stack([at - 0.5, -2 * at, at + 0.5], axis=1)
+
+
+def _square(order: int, count: int, cyclic: bool) -> Face:
+    """Tensor-product side; `cyclic` numbers the four corners around instead of row by row."""
+    places, weights = np.polynomial.legendre.leggauss(count)
+    s, t = (part.ravel() for part in np.meshgrid(places, places, indexing="ij"))
+    (along, d_along), (across, d_across) = _lagrange(order, s), _lagrange(order, t)
+    shapes = np.einsum("pj,pi->pji", across, along).reshape(len(s), -1)
+    gradients = np.stack(
+        [
+            np.einsum("pj,pi->pji", across, d_along).reshape(len(s), -1),
+            np.einsum("pj,pi->pji", d_across, along).reshape(len(s), -1),
+        ],
+        axis=2,
+    )
+    if cyclic:
+        shapes, gradients = shapes[:, [0, 1, 3, 2]], gradients[:, [0, 1, 3, 2]]
+    return Face(np.ascontiguousarray(shapes), np.ascontiguousarray(gradients), np.outer(weights, weights).ravel())
+
+
+def _hexahedron(name: str, order: int, count: int, linear_pressure: bool, face: Face) -> Element:
+    """Tensor-product hexahedron with count^3 Gauss points; node and point numbers grow along x, then y, then z."""
+    places, weights = np.polynomial.legendre.leggauss(count)
+    z, y, x = (part.ravel() for part in np.meshgrid(places, places, places, indexing="ij"))
+    (fx, dx), (fy, dy), (fz, dz) = _lagrange(order, x), _lagrange(order, y), _lagrange(order, z)
+    parts = [(dx, fy, fz), (fx, dy, fz), (fx, fy, dz)]
+    gradients = np.stack([np.einsum("pk,pj,pi->pkji", c, b, a).reshape(len(x), -1) for a, b, c in parts], axis=2)
+    shapes = np.einsum("pk,pj,pi->pkji", fz, fy, fx).reshape(len(x), -1)
+    ends = np.linspace(-1, 1, order + 1)
+    k, j, i = (part.ravel() for part in np.meshgrid(ends, ends, ends, indexing="ij"))
+    pressures = np.stack([np.ones_like(x), x, y, z] if linear_pressure else [np.ones_like(x)], axis=1)
+    volumes = np.einsum("k,j,i->kji", weights, weights, weights).ravel()
+    return Element(name, np.stack([i, j, k], axis=1), shapes, np.ascontiguousarray(gradients), volumes, pressures, face)
+
+
+HEX8 = _hexahedron("hex8", 1, 2, False, _square(1, 3, True))
+HEX27 = _hexahedron("hex27", 2, 3, True, _square(2, 4, False))
+HEXAHEDRA = {1: HEX8, 2: HEX27}
+"""By the order of the shape functions."""
+
+
+def quadrature(element: Element, corners: FloatArray) -> Quadrature:
+    """Gradients, weights and pressures at the quadrature points of elements with these nodes (e, a, 3) [m]."""
+    jacobian = np.einsum("qai,eaj->eqij", element.gradients, corners)
+    gradients = np.einsum("eqij,qaj->eqai", np.linalg.inv(jacobian), element.gradients)
+    weights = np.linalg.det(jacobian) * element.weights
+    roots = np.sqrt(weights)[:, :, None]
+    pressures = np.linalg.qr(roots * element.pressures)[0] / roots
+    return Quadrature(np.ascontiguousarray(gradients), np.ascontiguousarray(weights), np.ascontiguousarray(pressures))
+
+
+def face_weights(face: Face, corners: FloatArray) -> FloatArray:
+    """Rest area [m^2] at the quadrature points (f, p) of sides with these nodes (f, b, 3) [m]."""
+    tangents = np.einsum("qac,fai->fqci", face.gradients, corners)
+    area = np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=2)
+    return np.asarray(area * face.weights)

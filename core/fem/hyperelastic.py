@@ -1,0 +1,214 @@
+"""Kernels of hyperelastic elements of any shape, written out in scalars: they are most of a replay's time.
+
+Neo-Hooke: W = mu/2 (J^(-2/3) tr F^T F - 3) at each point, and kappa/4 (theta^2 - 1 - 2 ln theta), theta the projection of
+J = det F on the element's pressures N_m, orthonormal over its volume at rest: theta = sum_m N_m (integral of N_m J).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+__all__ = ["add_forces", "add_matrices", "energy", "project", "scatter"]
+
+_FUSED = {"contract", "reassoc", "nsz"}
+
+
+@njit(cache=True, fastmath=_FUSED, inline="always")
+def _gather(positions: Any, nodes: Any, x: Any) -> None:
+    for a in range(nodes.shape[0]):
+        for i in range(3):
+            x[a, i] = positions[nodes[a], i]
+
+
+@njit(cache=True, fastmath=_FUSED, inline="always")
+def _deform(g: Any, x: Any, f: Any, c: Any) -> float:
+    """F and its cofactors, row by row (9,), of one point; returns det F."""
+    f00 = f01 = f02 = f10 = f11 = f12 = f20 = f21 = f22 = 0.0
+    for a in range(g.shape[0]):
+        g0, g1, g2, x0, x1, x2 = g[a, 0], g[a, 1], g[a, 2], x[a, 0], x[a, 1], x[a, 2]
+        f00, f01, f02 = f00 + x0 * g0, f01 + x0 * g1, f02 + x0 * g2
+        f10, f11, f12 = f10 + x1 * g0, f11 + x1 * g1, f12 + x1 * g2
+        f20, f21, f22 = f20 + x2 * g0, f21 + x2 * g1, f22 + x2 * g2
+    f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8] = f00, f01, f02, f10, f11, f12, f20, f21, f22
+    c00, c01, c02 = f11 * f22 - f12 * f21, f12 * f20 - f10 * f22, f10 * f21 - f11 * f20
+    c[0], c[1], c[2] = c00, c01, c02
+    c[3], c[4], c[5] = f02 * f21 - f01 * f22, f00 * f22 - f02 * f20, f01 * f20 - f00 * f21
+    c[6], c[7], c[8] = f01 * f12 - f02 * f11, f02 * f10 - f00 * f12, f00 * f11 - f01 * f10
+    return f00 * c00 + f01 * c01 + f02 * c02
+
+
+@njit(cache=True, fastmath=_FUSED, inline="always")
+def _square(f: Any) -> float:
+    total = 0.0
+    for k in range(9):
+        total += f[k] * f[k]
+    return total
+
+
+@njit(cache=True, fastmath=_FUSED, inline="always")
+def project(weights: Any, modes: Any, values: Any, projected: Any) -> None:
+    """The part of `values` (q,) that the element's pressures (q, m) can follow."""
+    projected[:] = 0.0
+    for m in range(modes.shape[1]):
+        share = 0.0
+        for q in range(modes.shape[0]):
+            share += weights[q] * modes[q, m] * values[q]
+        for q in range(modes.shape[0]):
+            projected[q] += share * modes[q, m]
+
+
+@njit(cache=True, fastmath=_FUSED)
+def energy(gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: Any, positions: Any) -> float:
+    """Elastic energy over E [m^3]; infinite when an element is inverted at a quadrature point."""
+    points = weights.shape[1]
+    x, f, c = np.empty((nodes.shape[1], 3)), np.empty(9), np.empty(9)
+    det, theta = np.empty(points), np.empty(points)
+    total = 0.0
+    for e in range(nodes.shape[0]):
+        _gather(positions, nodes[e], x)
+        shape, volume = 0.0, 0.0
+        for q in range(points):
+            det[q] = _deform(gradients[e, q], x, f, c)
+            if not det[q] > 0.0:
+                return np.inf
+            shape += weights[e, q] * (_square(f) / np.cbrt(det[q] * det[q]) - 3.0)
+        project(weights[e], modes[e], det, theta)
+        for q in range(points):
+            if not theta[q] > 0.0:
+                return np.inf
+            volume += weights[e, q] * (theta[q] * theta[q] - 1.0 - 2.0 * np.log(theta[q]))
+        total += 0.5 * mu[e] * shape + 0.25 * bulk[e] * volume
+    return total
+
+
+@njit(cache=True, fastmath=_FUSED, inline="always")
+def _press(gradients: Any, weights: Any, modes: Any, bulk: float, x: Any, f: Any, c: Any, scalars: Any) -> None:
+    """F and cofactors at all points of an element; rows of `scalars` get det F, theta, U'(theta), pressure."""
+    det, theta, slope = scalars[0], scalars[1], scalars[2]
+    for q in range(weights.shape[0]):
+        det[q] = _deform(gradients[q], x, f[q], c[q])
+    project(weights, modes, det, theta)
+    for q in range(weights.shape[0]):
+        slope[q] = 0.5 * bulk * (theta[q] - 1.0 / theta[q])
+    project(weights, modes, slope, scalars[3])
+
+
+@njit(cache=True, fastmath=_FUSED)
+def add_forces(gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: Any, positions: Any, force: Any) -> None:
+    """Add the energy's gradient over E to `force` (n, 3) [m^2]. Elements must not be inverted."""
+    points, corners = weights.shape[1], nodes.shape[1]
+    x, f, c, p = np.empty((corners, 3)), np.empty((points, 9)), np.empty((points, 9)), np.empty(9)
+    scalars, own = np.empty((4, points)), np.empty((corners, 3))
+    det, press = scalars[0], scalars[3]
+    for e in range(nodes.shape[0]):
+        _gather(positions, nodes[e], x)
+        _press(gradients[e], weights[e], modes[e], bulk[e], x, f, c, scalars)
+        own[:] = 0.0
+        for q in range(points):
+            scale = weights[e, q] * mu[e] / np.cbrt(det[q] * det[q])
+            by_volume = weights[e, q] * press[q] - scale * _square(f[q]) / (3.0 * det[q])
+            for k in range(9):
+                p[k] = scale * f[q, k] + by_volume * c[q, k]
+            for a in range(corners):
+                g0, g1, g2 = gradients[e, q, a, 0], gradients[e, q, a, 1], gradients[e, q, a, 2]
+                own[a, 0] += p[0] * g0 + p[1] * g1 + p[2] * g2
+                own[a, 1] += p[3] * g0 + p[4] * g1 + p[5] * g2
+                own[a, 2] += p[6] * g0 + p[7] * g1 + p[8] * g2
+        for a in range(corners):
+            for i in range(3):
+                force[nodes[e, a], i] += own[a, i]
+
+
+@njit(cache=True, fastmath=_FUSED, inline="always")
+def _images(g: Any, f: Any, c: Any, turned: Any, closed: Any) -> None:
+    """F g and cof(F) g of each node's gradient g, as rows (3 a,)."""
+    for a in range(g.shape[0]):
+        g0, g1, g2 = g[a, 0], g[a, 1], g[a, 2]
+        for i in range(3):
+            turned[3 * a + i] = f[3 * i] * g0 + f[3 * i + 1] * g1 + f[3 * i + 2] * g2
+            closed[3 * a + i] = c[3 * i] * g0 + c[3 * i + 1] * g1 + c[3 * i + 2] * g2
+
+
+@njit(cache=True, fastmath=_FUSED)
+def _add_point(g: Any, scale: float, press: float, square: float, det: float, turned: Any, closed: Any, matrix: Any) -> None:
+    """Add one point's part to the upper blocks of the element's matrix, its rows unrolled by axis.
+
+    With f = F g, c = cof(F) g of each node: scale [(g.g') 1 - 2/(3 J) (f c' + c f') + 5 I1/(9 J^2) c c'] plus what the
+    cofactor's own change brings, (press / J) (c c' - c' c) crosswise, press the factor of cof(F) in the stress.
+    """
+    mixed, crossed = -2.0 / 3.0 * scale / det, press / det
+    squared = 5.0 / 9.0 * scale * square / (det * det) + crossed
+    for a in range(g.shape[0]):
+        g0, g1, g2 = scale * g[a, 0], scale * g[a, 1], scale * g[a, 2]
+        for b in range(a, g.shape[0]):
+            straight = g0 * g[b, 0] + g1 * g[b, 1] + g2 * g[b, 2]
+            for i in range(3):
+                matrix[3 * a + i, 3 * b + i] += straight
+        t0, t1, t2 = crossed * closed[3 * a], crossed * closed[3 * a + 1], crossed * closed[3 * a + 2]
+        for i in range(3):
+            row = 3 * a + i
+            by_closed, by_turned = mixed * turned[row] + squared * closed[row], mixed * closed[row]
+            for b in range(a, g.shape[0]):
+                k, other = 3 * b, closed[3 * b + i]
+                matrix[row, k] += by_closed * closed[k] + by_turned * turned[k] - t0 * other
+                matrix[row, k + 1] += by_closed * closed[k + 1] + by_turned * turned[k + 1] - t1 * other
+                matrix[row, k + 2] += by_closed * closed[k + 2] + by_turned * turned[k + 2] - t2 * other
+
+
+@njit(cache=True, fastmath=_FUSED)
+def _add_volume(weights: Any, modes: Any, bulk: float, theta: Any, moved: Any, matrix: Any) -> None:
+    """Add what the pressures' own change brings: sum over m, n of D_mn b_m b_n', b_m (m, 3 a) the change of mode m's theta."""
+    for m in range(modes.shape[1]):
+        for n in range(modes.shape[1]):
+            stiffness = 0.0
+            for q in range(modes.shape[0]):
+                curvature = 0.5 * bulk * (1.0 + 1.0 / (theta[q] * theta[q]))
+                stiffness += weights[q] * curvature * modes[q, m] * modes[q, n]
+            for row in range(matrix.shape[0]):
+                share = stiffness * moved[m, row]
+                for k in range(3 * (row // 3), matrix.shape[0]):
+                    matrix[row, k] += share * moved[n, k]
+
+
+@njit(cache=True, fastmath=_FUSED)
+def add_matrices(
+    gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: Any, positions: Any, slots: Any, data: Any
+) -> None:
+    """Add the energy's tangent over E [m] to `data`; `slots` (e, 3 a, 3 a) as in `assemble_elastic`."""
+    points, size = weights.shape[1], 3 * nodes.shape[1]
+    x, f, c, scalars = np.empty((nodes.shape[1], 3)), np.empty((points, 9)), np.empty((points, 9)), np.empty((4, points))
+    turned, closed = np.empty(size), np.empty(size)
+    moved, matrix = np.empty((modes.shape[2], size)), np.empty((size, size))
+    for e in range(nodes.shape[0]):
+        _gather(positions, nodes[e], x)
+        _press(gradients[e], weights[e], modes[e], bulk[e], x, f, c, scalars)
+        matrix[:] = 0.0
+        moved[:] = 0.0
+        for q in range(points):
+            weight, det, square = weights[e, q], scalars[0, q], _square(f[q])
+            scale = weight * mu[e] / np.cbrt(det * det)
+            _images(gradients[e, q], f[q], c[q], turned, closed)
+            press = weight * scalars[3, q] - scale * square / (3.0 * det)
+            _add_point(gradients[e, q], scale, press, square, det, turned, closed, matrix)
+            for m in range(modes.shape[2]):
+                for k in range(size):
+                    moved[m, k] += weight * modes[e, q, m] * closed[k]
+        _add_volume(weights[e], modes[e], bulk[e], scalars[1], moved, matrix)
+        scatter(matrix, slots[e], data)
+
+
+@njit(cache=True)
+def scatter(matrix: Any, slots: Any, data: Any) -> None:
+    """Write the element's matrix, of which the upper blocks are given, where its entries belong."""
+    for row in range(matrix.shape[0]):
+        for column in range(3 * (row // 3), matrix.shape[0]):
+            slot = slots[row, column]
+            if slot >= 0:
+                data[slot] += matrix[row, column]
+            if column // 3 != row // 3:
+                slot = slots[column, row]
+                if slot >= 0:
+                    data[slot] += matrix[row, column]
