@@ -13,6 +13,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from core.errors import SolveError
+from core.fem.follow import Follower
 from core.fem.model import BlockModel, Probe
 from core.fem.newton import RELATIVE_TOLERANCE, Outcome, Solution, solve
 from core.fem.path import FREE_STEP, lead
@@ -103,7 +104,7 @@ class Replay:
 
     def __init__(self, setup: Setup, grid: GridSpec, tolerance: float = RELATIVE_TOLERANCE) -> None:
         self.setup, self.grid, self.tolerance = setup, grid, tolerance
-        self._offset = np.array(setup.tool.offset)
+        self._offset, self._follower = np.array(setup.tool.offset), Follower()
         self._model: BlockModel | None = None
         self._before: tuple[Equilibrium, Equilibrium] | None = None
         self.slip = np.zeros(2)
@@ -151,7 +152,7 @@ class Replay:
         positions = self._extrapolated(model, start, mesh.nodes + displacement, local)
         if not start.in_contact:  # begin where the straight way in first touches, not from afar
             before = self._first_touch(before, local)
-        solution = lead(model, positions, before, local, self.tolerance)
+        solution = lead(model, positions, before, local, self.tolerance, self._follower)
         frame = self._equilibrium(solution, mesh, probe)
         self._before = (start, frame)
         return frame

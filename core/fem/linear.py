@@ -87,18 +87,23 @@ class SparseCholesky:
 
     Args:
         pattern: upper triangle (with diagonal) in CSR form, indices sorted; its `data` is the array that is factorised.
+
+    Attributes:
+        generation: number of the factor that is held.
     """
 
     def __init__(self, pattern: sp.csr_matrix) -> None:
         self._matrix = pattern
         self._handle = _Handle(pattern)
         self._idle = np.zeros(pattern.shape[0])
+        self.generation = 0
         self._handle.run(_ANALYSE, self._idle)
         # At interpreter exit the memory goes anyway, and the library may be gone first.
         weakref.finalize(self, _release, self._handle).atexit = False
 
     def factorise(self, data: FloatArray) -> None:
         """Factorise the matrix with these entries; raises NotPositiveDefinite."""
+        self.generation += 1
         self._matrix.data[:] = data
         self._handle.run(_FACTORISE, self._idle)
 

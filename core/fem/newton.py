@@ -11,7 +11,7 @@ from core.fem.linear import NotPositiveDefinite
 from core.fem.model import Assembly, BlockModel, Probe
 from core.frames import FloatArray
 
-__all__ = ["Outcome", "Solution", "followed", "solve"]
+__all__ = ["Outcome", "Solution", "followed", "misfit", "solve", "verdict"]
 
 RELATIVE_TOLERANCE = 1e-6
 """Converged: the residual's norm is below this share of the tool's push and of the body's internal forces."""
@@ -49,10 +49,18 @@ class Solution:
         return self.outcome is Outcome.CONVERGED
 
 
-def _scale(model: BlockModel, state: Assembly) -> float:
-    """Force scale [m^2] to which residuals are compared: the push, the weight, and a tiny share of E times the base."""
+def misfit(model: BlockModel, state: Assembly) -> float:
+    """The residual's norm over the push, the weight, and a tiny share of E times the base."""
     size = model.setup.geometry.size
-    return float(np.linalg.norm(state.push) + model.weight_force.sum() + 1e-5 * size[0] * size[1])
+    scale = np.linalg.norm(state.push) + model.weight_force.sum() + 1e-5 * size[0] * size[1]
+    return float(np.linalg.norm(state.residual) / scale)
+
+
+def verdict(model: BlockModel, probe: Probe | None, positions: FloatArray) -> Outcome:
+    """What a balance of forces is worth: it must not be with the material on the wrong side of the tool."""
+    if probe is not None and (model.depth_inside(positions, probe) > MAX_PENETRATION or model.encloses(positions, probe)):
+        return Outcome.INSIDE_TOOL
+    return Outcome.CONVERGED
 
 
 def _direction(model: BlockModel, probe: Probe | None, positions: FloatArray, state: Assembly) -> FloatArray | None:
@@ -118,9 +126,9 @@ def _newton(model: BlockModel, probe: Probe | None, start: FloatArray, tolerance
     before, outcome, iteration = 0.0, Outcome.ITERATIONS, 0
     while True:
         state = model.assemble(positions, probe, tangent=False)
-        residual = float(np.linalg.norm(state.residual)) / _scale(model, state)
+        residual = misfit(model, state)
         if residual <= tolerance:
-            outcome = Outcome.CONVERGED
+            outcome = verdict(model, probe, positions)
             break
         if iteration == MAX_ITERATIONS:
             break
@@ -134,9 +142,6 @@ def _newton(model: BlockModel, probe: Probe | None, start: FloatArray, tolerance
         if stopped is not None:
             outcome = stopped
             break
-    if outcome is Outcome.CONVERGED and probe is not None:
-        if model.depth_inside(positions, probe) > MAX_PENETRATION or model.encloses(positions, probe):
-            outcome = Outcome.INSIDE_TOOL
     return Solution(positions, state.push, outcome, iteration, residual, state.penetration)
 
 

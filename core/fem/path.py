@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from core.fem.follow import Follower
 from core.fem.model import BlockModel, Probe
 from core.fem.newton import Solution, followed, solve
 from core.frames import FloatArray
@@ -19,14 +20,15 @@ _STAGE_TOLERANCE = 0.2
 """Residual at which a place on the way counts as reached: the next stage only begins from it."""
 
 
-def lead(model: BlockModel, positions: FloatArray, before: Probe, probe: Probe, tolerance: float) -> Solution:
+def lead(model: BlockModel, positions: FloatArray, before: Probe, probe: Probe, tolerance: float, follower: Follower) -> Solution:
     """Equilibrium at `probe`, led there from an equilibrium (n, 3) [m] with the tool at `before`.
 
     Places on the way are reached roughly at first; where that leads astray, the way is gone again with care.
     """
     steps = max(1, int(np.ceil(float(np.linalg.norm(probe.centre - before.centre)) / FREE_STEP)))
     if steps == 1:
-        return solve(model, probe, positions, before, tolerance)
+        near = follower.solve(model, probe, positions, tolerance)
+        return near if near is not None else solve(model, probe, positions, before, tolerance)
     stages = [Probe(before.centre + share * (probe.centre - before.centre), probe.radius) for share in np.arange(1, steps) / steps]
     hasty = _through(model, positions, [before, *stages, probe], tolerance, careful=False)
     if hasty.converged:
