@@ -45,16 +45,26 @@ class Inclusion:
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """Young's modulus [Pa], Poisson's ratio [1], the law, and lumps inside."""
+    """What the block is made of.
+
+    Attributes:
+        young_modulus: at rest [Pa]. poisson_ratio: [1]. law: of elasticity. inclusions: lumps inside.
+        stretch_limit: J_m of Gent's law [1], where the material is stretched to its limit; None for a material without.
+    """
 
     young_modulus: float = 5.0e3
     poisson_ratio: float = 0.45
     law: MaterialLaw = "neo_hooke"
     inclusions: tuple[Inclusion, ...] = ()
+    stretch_limit: float | None = None
 
     def __post_init__(self) -> None:
         _within("young_modulus", self.young_modulus, 1.0, 1e9, "Pa")
         _within("poisson_ratio", self.poisson_ratio, -0.5, 0.4999, "")
+        if self.stretch_limit is not None:
+            _within("stretch_limit", self.stretch_limit, 0.1, 1e6, "")
+            if self.law == "corotational":
+                raise SetupError("the corotational law has no stretch_limit; use neo_hooke with it", key="stretch_limit")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,6 +150,7 @@ class Setup:
                 "law": self.material.law,
                 "young_modulus": self.material.young_modulus,
                 "poisson_ratio": self.material.poisson_ratio,
+                "stretch_limit": self.material.stretch_limit,
                 "inclusions": [vars(lump) for lump in self.material.inclusions],
             },
             "load": {"specific_weight_over_stiffness": self.load.specific_weight_over_stiffness},

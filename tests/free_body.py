@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from core.fem.elastic import LAWS, assemble_elastic, elastic_energy, lame
+from core.fem.elastic import Law, assemble_elastic, elastic_energy, lame
 from core.fem.elements import HEXAHEDRA, quadrature
 from core.fem.linear import SparseCholesky, upper_pattern
 from core.frames import FloatArray
@@ -41,7 +41,7 @@ class FreeBody:
 
     mesh: BoxMesh
     nodes: FloatArray
-    law: str
+    law: Law
     poisson_ratio: float
     held: np.ndarray
 
@@ -60,13 +60,13 @@ class FreeBody:
 
     def energy(self, positions: FloatArray) -> float:
         """Over E [m^3]."""
-        return elastic_energy(LAWS[self.law], *self._parts, positions)
+        return elastic_energy(self.law, *self._parts, positions)
 
     def assemble(self, positions: FloatArray):
         """Internal forces (n, 3) over E [m^2] and the entries of the tangent of the unknowns [m]."""
         pattern, slots, _ = self._system
         force, data = np.zeros_like(positions), np.zeros(pattern.nnz)
-        assemble_elastic(LAWS[self.law], *self._parts, positions, slots, force, data)
+        assemble_elastic(self.law, *self._parts, positions, slots, force, data)
         return force, data
 
     def tangent(self, positions: FloatArray) -> np.ndarray:

@@ -1,7 +1,8 @@
 """Kernels of hyperelastic elements of any shape, written out in scalars: they are most of a replay's time.
 
-Neo-Hooke: W = mu/2 (J^(-2/3) tr F^T F - 3) at each point, and kappa/4 (theta^2 - 1 - 2 ln theta), theta the projection of
-J = det F on the element's pressures N_m, orthonormal over its volume at rest: theta = sum_m N_m (integral of N_m J).
+W = -mu/(2 k) ln(1 - k x) with x = J^(-2/3) tr F^T F - 3 at each point (Gent 1996, k = 1 / J_m; neo-Hooke, mu/2 x, for k = 0), and
+kappa/4 (theta^2 - 1 - 2 ln theta), theta the projection of J = det F on the element's pressures N_m, orthonormal over its volume at
+rest: theta = sum_m N_m (integral of N_m J).
 """
 
 from __future__ import annotations
@@ -61,8 +62,8 @@ def project(weights: Any, modes: Any, values: Any, projected: Any) -> None:
 
 
 @njit(cache=True, fastmath=_FUSED)
-def energy(gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: Any, positions: Any) -> float:
-    """Elastic energy over E [m^3]; infinite when an element is inverted at a quadrature point."""
+def energy(gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: Any, stiffening: float, positions: Any) -> float:
+    """Elastic energy over E [m^3]; infinite when an element is inverted or stretched to its limit at a quadrature point."""
     points = weights.shape[1]
     x, f, c = np.empty((nodes.shape[1], 3)), np.empty(9), np.empty(9)
     det, theta = np.empty(points), np.empty(points)
@@ -74,7 +75,13 @@ def energy(gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: 
             det[q] = _deform(gradients[e, q], x, f, c)
             if not det[q] > 0.0:
                 return np.inf
-            shape += weights[e, q] * (_square(f) / np.cbrt(det[q] * det[q]) - 3.0)
+            strain = _square(f) / np.cbrt(det[q] * det[q]) - 3.0
+            if stiffening > 0.0:
+                left = 1.0 - stiffening * strain
+                if not left > 0.0:
+                    return np.inf
+                strain = -np.log(left) / stiffening
+            shape += weights[e, q] * strain
         project(weights[e], modes[e], det, theta)
         for q in range(points):
             if not theta[q] > 0.0:
@@ -96,8 +103,16 @@ def _press(gradients: Any, weights: Any, modes: Any, bulk: float, x: Any, f: Any
     project(weights, modes, slope, scalars[3])
 
 
+@njit(cache=True, fastmath=_FUSED, inline="always")
+def _hardening(square: float, root: float, stiffening: float) -> float:
+    """How much stiffer than at rest the material is, 1 / (1 - k x); `root` is J^(2/3)."""
+    return 1.0 / (1.0 - stiffening * (square / root - 3.0))
+
+
 @njit(cache=True, fastmath=_FUSED)
-def add_forces(gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: Any, positions: Any, force: Any) -> None:
+def add_forces(
+    gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: Any, stiffening: float, positions: Any, force: Any
+) -> None:
     """Add the energy's gradient over E to `force` (n, 3) [m^2]. Elements must not be inverted."""
     points, corners = weights.shape[1], nodes.shape[1]
     x, f, c, p = np.empty((corners, 3)), np.empty((points, 9)), np.empty((points, 9)), np.empty(9)
@@ -108,8 +123,9 @@ def add_forces(gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bu
         _press(gradients[e], weights[e], modes[e], bulk[e], x, f, c, scalars)
         own[:] = 0.0
         for q in range(points):
-            scale = weights[e, q] * mu[e] / np.cbrt(det[q] * det[q])
-            by_volume = weights[e, q] * press[q] - scale * _square(f[q]) / (3.0 * det[q])
+            root, square = np.cbrt(det[q] * det[q]), _square(f[q])
+            scale = weights[e, q] * mu[e] / root * _hardening(square, root, stiffening)
+            by_volume = weights[e, q] * press[q] - scale * square / (3.0 * det[q])
             for k in range(9):
                 p[k] = scale * f[q, k] + by_volume * c[q, k]
             for a in range(corners):
@@ -133,12 +149,16 @@ def _images(g: Any, f: Any, c: Any, turned: Any, closed: Any) -> None:
 
 
 @njit(cache=True, fastmath=_FUSED)
-def _add_point(g: Any, scale: float, press: float, square: float, det: float, turned: Any, closed: Any, matrix: Any) -> None:
+def _add_point(
+    g: Any, scale: float, press: float, hardening: float, square: float, det: float, turned: Any, closed: Any, matrix: Any
+) -> None:
     """Add one point's part to the upper blocks of the element's matrix, its rows unrolled by axis.
 
     With f = F g, c = cof(F) g of each node: scale [(g.g') 1 - 2/(3 J) (f c' + c f') + 5 I1/(9 J^2) c c'] plus what the
-    cofactor's own change brings, (press / J) (c c' - c' c) crosswise, press the factor of cof(F) in the stress.
+    cofactor's own change brings, (press / J) (c c' - c' c) crosswise, press the factor of cof(F) in the stress, plus
+    hardening d d' with d = f - I1/(3 J) c.
     """
+    deviation = square / (3.0 * det)
     mixed, crossed = -2.0 / 3.0 * scale / det, press / det
     squared = 5.0 / 9.0 * scale * square / (det * det) + crossed
     for a in range(g.shape[0]):
@@ -150,7 +170,9 @@ def _add_point(g: Any, scale: float, press: float, square: float, det: float, tu
         t0, t1, t2 = crossed * closed[3 * a], crossed * closed[3 * a + 1], crossed * closed[3 * a + 2]
         for i in range(3):
             row = 3 * a + i
-            by_closed, by_turned = mixed * turned[row] + squared * closed[row], mixed * closed[row]
+            hard = hardening * (turned[row] - deviation * closed[row])
+            by_closed = mixed * turned[row] + squared * closed[row] - deviation * hard
+            by_turned = mixed * closed[row] + hard
             for b in range(a, g.shape[0]):
                 k, other = 3 * b, closed[3 * b + i]
                 matrix[row, k] += by_closed * closed[k] + by_turned * turned[k] - t0 * other
@@ -175,7 +197,16 @@ def _add_volume(weights: Any, modes: Any, bulk: float, theta: Any, moved: Any, m
 
 @njit(cache=True, fastmath=_FUSED)
 def add_matrices(
-    gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: Any, positions: Any, slots: Any, data: Any
+    gradients: Any,
+    weights: Any,
+    modes: Any,
+    nodes: Any,
+    mu: Any,
+    bulk: Any,
+    stiffening: float,
+    positions: Any,
+    slots: Any,
+    data: Any,
 ) -> None:
     """Add the energy's tangent over E [m] to `data`; `slots` (e, 3 a, 3 a) as in `assemble_elastic`."""
     points, size = weights.shape[1], 3 * nodes.shape[1]
@@ -189,10 +220,13 @@ def add_matrices(
         moved[:] = 0.0
         for q in range(points):
             weight, det, square = weights[e, q], scalars[0, q], _square(f[q])
-            scale = weight * mu[e] / np.cbrt(det * det)
+            root = np.cbrt(det * det)
+            harder = _hardening(square, root, stiffening)
+            scale = weight * mu[e] / root * harder
+            hardening = 2.0 * scale * stiffening * harder / root
             _images(gradients[e, q], f[q], c[q], turned, closed)
             press = weight * scalars[3, q] - scale * square / (3.0 * det)
-            _add_point(gradients[e, q], scale, press, square, det, turned, closed, matrix)
+            _add_point(gradients[e, q], scale, press, hardening, square, det, turned, closed, matrix)
             for m in range(modes.shape[2]):
                 for k in range(size):
                     moved[m, k] += weight * modes[e, q, m] * closed[k]

@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from core.fem.contact import assemble_contact, contact_energy, turns_around
-from core.fem.elastic import LAWS, assemble_elastic, elastic_energy, lame
+from core.fem.elastic import Law, assemble_elastic, elastic_energy, lame
 from core.fem.elements import HEXAHEDRA, Quadrature, face_weights, quadrature
 from core.fem.linear import SparseCholesky, face_slots, upper_pattern
 from core.frames import FloatArray
@@ -121,9 +121,9 @@ class BlockModel:
     def __init__(self, setup: Setup, mesh: BoxMesh) -> None:
         self.mesh, self.setup = mesh, setup
         self.topology = topology(mesh.shape, mesh.order, held=not setup.support.detached)
-        self.law, self.face = LAWS[setup.material.law], self.topology.element.face
+        self.law, self.face = Law.of(setup.material), self.topology.element.face
         self.rule, self.areas = _quadrature(mesh)
-        mu, bulk = lame(setup.material.law, setup.material.poisson_ratio)
+        mu, bulk = lame(self.law, setup.material.poisson_ratio)
         factor = np.exp(log_stiffness(setup.material.inclusions, mesh.nodes[self.topology.hexahedra]))
         self.mu, self.bulk = mu * factor, bulk * factor
         # Sums of squares near three lose their last digits when three is taken off, in proportion to this stiffness times volume.

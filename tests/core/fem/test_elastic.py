@@ -8,15 +8,19 @@ from free_body import FreeBody, distorted, grid
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from core.fem.elastic import LAWS, lame
+from core.fem.elastic import Law, lame
 from core.fem.elements import HEXAHEDRA, quadrature
 
-EACH = pytest.mark.parametrize(("law", "order"), list(product(LAWS, HEXAHEDRA)))
+NEO_HOOKE, COROTATIONAL, GENT = Law(), Law(corotational=True), Law(stiffening=0.2)
+EACH = pytest.mark.parametrize(
+    ("law", "order"), list(product([NEO_HOOKE, COROTATIONAL, GENT], HEXAHEDRA)),
+    ids=[f"{law}-{order}" for law in ("neo_hooke", "corotational", "gent") for order in HEXAHEDRA],
+)  # fmt: skip
 ORDERS = pytest.mark.parametrize("order", HEXAHEDRA)
 AFFINE = np.array([[1.20, 0.10, -0.05], [0.03, 0.85, 0.12], [-0.08, 0.02, 1.10]])
 
 
-def _loose(law: str, order: int, poisson_ratio: float = 0.45, seed: int = 0) -> FreeBody:
+def _loose(law: Law, order: int, poisson_ratio: float = 0.45, seed: int = 0) -> FreeBody:
     """A small block of distorted elements, held nowhere."""
     mesh = grid((0.05, 0.03, 0.02), (5, 5, 3), order)
     return FreeBody(mesh, distorted(mesh, 0.25, seed), law, poisson_ratio, np.zeros((len(mesh.nodes), 3), dtype=bool))
@@ -127,7 +131,7 @@ def test_small_strain_of_each_law_is_that_of_hooke(law, order):
     assert body.energy(body.nodes @ (np.eye(3) + strain).T) == pytest.approx(wanted, rel=1e-4)
 
 
-def _stretched_bar(law: str, order: int, poisson_ratio: float, stretch: float) -> tuple[float, float]:
+def _stretched_bar(law: Law, order: int, poisson_ratio: float, stretch: float) -> tuple[float, float]:
     """Pull over E and cross-section [1], and transverse stretch, of a bar on rollers."""
     mesh = grid((0.04, 0.01, 0.01), (5, 3, 3), order)
     nodes = distorted(mesh, 0.2 / order, 8) - mesh.nodes.min(axis=0)
@@ -145,26 +149,28 @@ def _stretched_bar(law: str, order: int, poisson_ratio: float, stretch: float) -
 
 
 @ORDERS
+@pytest.mark.parametrize("law", [NEO_HOOKE, GENT], ids=["neo_hooke", "gent"])
 @pytest.mark.parametrize("stretch", [0.7, 0.9, 1.3, 1.8])
 @pytest.mark.parametrize("poisson_ratio", [0.3, 0.45])
-def test_neo_hooke_bar_pulls_as_the_closed_form(stretch, poisson_ratio, order):
-    mu, kappa = lame("neo_hooke", poisson_ratio)
+def test_bar_pulls_as_the_closed_form(stretch, poisson_ratio, law, order):
+    mu, kappa = lame(law, poisson_ratio)
 
     def stress(across: float) -> tuple[float, float]:
         volume, square = stretch * across**2, stretch**2 + 2 * across**2
         pressure = kappa / 2 * (volume - 1 / volume)
-        along, aside = (mu * volume ** (-2 / 3) * (one - square / (3 * one)) + pressure * volume / one for one in (stretch, across))
+        harder = mu * volume ** (-2 / 3) / (1 - law.stiffening * (volume ** (-2 / 3) * square - 3))
+        along, aside = (harder * (one - square / (3 * one)) + pressure * volume / one for one in (stretch, across))
         return along, aside
 
-    across = brentq(lambda value: stress(value)[1], 0.3, 2.0, xtol=1e-14)
-    pull, measured = _stretched_bar("neo_hooke", order, poisson_ratio, stretch)
+    across = brentq(lambda value: stress(value)[1], 0.8 * stretch**-0.5, 1.2 * stretch**-0.3, xtol=1e-14)
+    pull, measured = _stretched_bar(law, order, poisson_ratio, stretch)
     assert measured == pytest.approx(across, rel=1e-9)
     assert pull == pytest.approx(stress(across)[0], rel=1e-9)
 
 
 @ORDERS
 def test_corotational_bar_is_linear_in_its_stretch(order):
-    pull, across = _stretched_bar("corotational", order, 0.3, 1.4)
+    pull, across = _stretched_bar(COROTATIONAL, order, 0.3, 1.4)
     assert pull == pytest.approx(0.4, rel=1e-9)
     assert across == pytest.approx(1 - 0.3 * 0.4, rel=1e-9)
 
@@ -178,7 +184,7 @@ def _line_weights(at: np.ndarray, length: float, order: int) -> np.ndarray:
     return np.where(ends, 1.0, np.where(number % 2 == 1, 4.0, 2.0))
 
 
-def _tip_ratio(law: str, poisson_ratio: float, along: int, across: int = 4, order: int = 1) -> float:
+def _tip_ratio(law: Law, poisson_ratio: float, along: int, across: int = 4, order: int = 1) -> float:
     """Deflection of a cantilever, length over height 8, over Timoshenko's."""
     length, height = 0.08, 0.01
     mesh = grid((length, height, height), (along + 1, across + 1, across + 1), order)
@@ -207,11 +213,24 @@ def test_cantilever_bends_as_timoshenko_says(law, order):
 
 
 def test_cantilever_converges_with_refinement_along_it():
-    errors = [1 - _tip_ratio("neo_hooke", 0.3, along, 6) for along in (12, 24, 48)]
+    errors = [1 - _tip_ratio(NEO_HOOKE, 0.3, along, 6) for along in (12, 24, 48)]
     assert errors[0] > 2.5 * errors[1] > 5 * errors[2] > 0
 
 
 @ORDERS
 def test_bending_does_not_lock_towards_incompressibility(order):
     along = 48 if order == 1 else 16
-    assert _tip_ratio("neo_hooke", 0.4999, along, order=order) > 0.97 * _tip_ratio("neo_hooke", 0.3, along, order=order)
+    assert _tip_ratio(NEO_HOOKE, 0.4999, along, order=order) > 0.97 * _tip_ratio(NEO_HOOKE, 0.3, along, order=order)
+
+
+def test_gent_material_cannot_be_stretched_past_its_limit():
+    body = _loose(Law(stiffening=2.0), 1)  # J_m = 0.5
+    assert np.isfinite(body.energy(body.nodes * np.array([1.3, 1.3**-0.5, 1.3**-0.5])))
+    assert body.energy(body.nodes * np.array([1.7, 1.7**-0.5, 1.7**-0.5])) == np.inf
+
+
+def test_gent_material_with_a_far_limit_is_neo_hookean():
+    bodies = [_loose(law, 2) for law in (NEO_HOOKE, Law(stiffening=1e-9))]
+    positions = _bent(bodies[0], 3)
+    (plain, _), (far, _) = (body.assemble(positions) for body in bodies)
+    assert np.allclose(far, plain, rtol=1e-7, atol=1e-9 * np.abs(plain).max())
