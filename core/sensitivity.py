@@ -18,7 +18,7 @@ from core.frames import FloatArray
 from core.replay import Equilibrium, Replay
 from core.setup import Setup
 
-__all__ = ["TOOL_STEP", "displacement_changes", "factorise_at", "stiffness_changes"]
+__all__ = ["TOOL_STEP", "displacement_changes", "factorise_at", "loss_changes", "stiffness_changes"]
 
 TOOL_STEP = 5e-7
 """Motion of the tool [m] over which residuals are differenced: so short that no further surface point comes into touch."""
@@ -40,6 +40,27 @@ def _local(frame: Equilibrium) -> Probe:
     return Probe(frame.probe.centre - np.append(frame.slip, 0.0), frame.probe.radius)
 
 
+def _holds(block: Replay, frame: Equilibrium) -> bool:
+    """Whether anything deforms the block at all."""
+    return bool(frame.in_contact or block.setup.load.specific_weight_over_stiffness)
+
+
+def _unbalanced(block: Replay, frame: Equilibrium, model: BlockModel, changes: Sequence[tuple[Setup, FloatArray]]) -> FloatArray:
+    """Minus the change of the residual (u, len(changes)) over E [m^2] at the frame's displacement."""
+    positions, here = frame.mesh.nodes + frame.displacement, _local(frame)
+    residual = model.assemble(positions, here, tangent=False).residual
+    right = np.zeros((len(residual), len(changes)))
+    for column, (setup, move) in enumerate(changes):
+        same = setup.material == block.setup.material and setup.load == block.setup.load and setup.support == block.setup.support
+        shift = np.array(setup.tool.offset) - np.array(block.setup.tool.offset) + move
+        if same and setup.tool.radius == block.setup.tool.radius and not shift.any():  # only the sensor differs
+            continue
+        other = model if same else BlockModel(setup, frame.mesh)
+        probe = Probe(here.centre + shift, here.radius + setup.tool.radius - block.setup.tool.radius)
+        right[:, column] = residual - other.assemble(positions, probe, tangent=False).residual
+    return right
+
+
 def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[tuple[Setup, FloatArray]]) -> FloatArray:
     """Displacements that small changes bring about, to first order.
 
@@ -52,24 +73,29 @@ def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[tu
         (len(changes), n, 3) changes of the nodes' displacement [m]; zero where nothing holds the tool against the block.
     """
     result = np.zeros((len(changes), *frame.displacement.shape))
-    model = factorise_at(block, frame) if frame.in_contact or block.setup.load.specific_weight_over_stiffness else None
+    model = factorise_at(block, frame) if _holds(block, frame) else None
     if model is None or not changes:
         return result
-    positions, here = frame.mesh.nodes + frame.displacement, _local(frame)
-    residual = model.assemble(positions, here, tangent=False).residual
-    right = np.empty((len(residual), len(changes)))
-    for column, (setup, move) in enumerate(changes):
-        same = setup.material == block.setup.material and setup.load == block.setup.load and setup.support == block.setup.support
-        shift = np.array(setup.tool.offset) - np.array(block.setup.tool.offset) + move
-        if same and setup.tool.radius == block.setup.tool.radius and not shift.any():  # only the sensor differs
-            right[:, column] = 0.0
-            continue
-        other = model if same else BlockModel(setup, frame.mesh)
-        probe = Probe(here.centre + shift, here.radius + setup.tool.radius - block.setup.tool.radius)
-        right[:, column] = residual - other.assemble(positions, probe, tangent=False).residual
-    solved = model.topology.factor.solve(right)
-    result[:, model.topology.free] = solved.T
+    result[:, model.topology.free] = model.topology.factor.solve(_unbalanced(block, frame, model, changes)).T
     return result
+
+
+def loss_changes(block: Replay, frame: Equilibrium, slope: FloatArray, changes: Sequence[tuple[Setup, FloatArray]]) -> FloatArray:
+    """How a function of the displacement changes, to first order, by the adjoint: one solve for any number of changes.
+
+    With K the (symmetric) tangent and K lambda = dL/du, the change is dL = -lambda . dR (e.g. Plessix 2006).
+
+    Args:
+        block, frame, changes: as for `displacement_changes`. slope: (n, 3) derivative of the function by the displacement [1/m].
+
+    Returns:
+        (len(changes),) changes of the function; zero where nothing holds the tool against the block.
+    """
+    model = factorise_at(block, frame) if _holds(block, frame) else None
+    if model is None or not changes:
+        return np.zeros(len(changes))
+    adjoint = model.topology.factor.solve(slope[model.topology.free])
+    return np.asarray(adjoint @ _unbalanced(block, frame, model, changes))
 
 
 def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray) -> FloatArray:

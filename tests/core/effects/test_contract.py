@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 
 from core.effects import CATALOGUE, Effect, Slot, effect_named, from_json
+from core.effects.load import Gravity
+from core.effects.material import PoissonRatio, StiffInclusion
 from core.effects.sensor import CameraRegistration
 from core.effects.support import BaseDetachment
-from core.effects.tool import ToolOffset
+from core.effects.tool import ToolOffset, ToolRadius
 from core.errors import EffectError
 from core.mesh import GridSpec
 from core.replay import Equilibrium, Replay, replay
-from core.sensitivity import displacement_changes
+from core.sensitivity import displacement_changes, loss_changes
 from core.setup import Box, Load, Material, Setup, Support, Tool
 
 SETUP = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3), mass=0.104)
@@ -216,3 +218,36 @@ def test_sensitivity_is_the_difference_of_two_solves(name):
         return
     assert np.linalg.norm(wanted) > 1e-7
     assert np.linalg.norm(found - wanted) < 0.02 * np.linalg.norm(wanted)
+
+
+GRADIENTS = {
+    "poisson_ratio": PoissonRatio(nu=0.43),
+    "stiff_inclusion": StiffInclusion(x=4e-3, y=1e-3, z=0.022, radius=6e-3, stiffness_ratio=3.0),
+    "tool_radius": ToolRadius(radius=5.2e-3),
+    "tool_offset": ToolOffset(dx=2e-4, dy=-2.2e-4, dz=1e-4),
+    "base_detachment": BaseDetachment(edge="+x", extent=0.02),
+    "gravity": Gravity(specific_weight_over_stiffness=1.5),
+}
+
+
+@pytest.mark.parametrize("name", GRADIENTS)
+def test_adjoint_gradient_is_that_of_full_solves(name):
+    effect = GRADIENTS[name]
+    block, frame = Replay(effect.apply(SETUP), GRID, tolerance=1e-11), None
+    for centre in POKE:
+        frame = block.step(centre, frame)
+    target = 0.8 * frame.displacement  # what was measured, as it were
+
+    def loss(found: Equilibrium) -> float:
+        return 0.5 * float(((found.displacement - target) ** 2).sum())
+
+    for item, here in zip(effect.numbers(), effect.coordinates, strict=True):
+        step, around = 1e-3 * item.scale, []
+        for sign in (1, -1):
+            changed = replace(effect, **{item.name: item.value(here + sign * step)}).apply(SETUP)
+            solved = Replay(changed, GRID, tolerance=1e-11).step(POKE[-1], frame)
+            assert solved.outcome.name == "CONVERGED"
+            slope = frame.displacement - target
+            around.append((loss(solved), loss_changes(block, frame, slope, [(changed, np.zeros(3))])[0]))
+        (above, rise), (below, fall) = around
+        assert rise - fall == pytest.approx(above - below, rel=0.01)
