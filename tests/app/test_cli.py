@@ -111,6 +111,7 @@ def test_replay_writes_one_equilibrium_per_cloud(palpate: Palpate, dataset: Path
     code, out, err = palpate("replay", dataset, "--sequence", "poke-01", "--grid", "7x5x4", "--out", tmp_path / "frames.npz")
     assert code == 0, err
     assert "5 converged" in out
+    assert "the grid's own error, by a finer one" in out
     with (tmp_path / "frames.npz").open("rb") as stream, np.load(stream) as frames:
         assert frames["vertices"].shape == (5, len(frames["rest"]), 3)
         lowest = (frames["vertices"] - frames["rest"])[..., 2].min(axis=1)
