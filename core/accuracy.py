@@ -2,8 +2,8 @@
 
 The difference to a grid 1.5 times finer is itself the estimate. Richardson's factor 1 / (1 - r^-p) would be right for errors that
 fall smoothly, but a contact zone's jump with where its edge lies among the nodes: over even and graded, linear and quadratic grids
-the true error at pokes of 4 and 8 mm was 0.7 to 1.5 times the difference. A coarser second grid would be cheaper, and overstates the
-error up to ten times.
+the true error at pokes of 4 and 8 mm was 0.7 to 1.5 times the difference. A coarser second grid would be cheaper, and overstates
+the error up to ten times.
 """
 
 from __future__ import annotations
