@@ -1,0 +1,136 @@
+"""Random situations that a replay must survive: `python -m benchmarks.situations [COUNT] [SEED]`.
+
+Materials up to nu = 0.49, neo-Hooke and Gent, two effects at a time, pokes into the top and the sides and over the rim by up to
+40 % of the height, jumps of up to 5 mm between frames. No frame may end with an exception, a NaN, an inverted element that is
+called converged, or a surface point inside the tool; frames without equilibrium are counted by what they say.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from core.effects import CATALOGUE, Effect, Slot
+from core.fem.model import Probe
+from core.frames import FloatArray
+from core.mesh import GridSpec
+from core.replay import Equilibrium, Replay, replay
+from core.setup import Box, Material, Setup, Tool
+
+__all__ = ["Situation", "draw_situation", "faults"]
+
+SIZE = (0.0687, 0.0393, 0.0358)
+GRIDS = (GridSpec(nodes=(13, 5, 5)), GridSpec(nodes=(9, 7, 6), spacing=2e-3), GridSpec(nodes=(9, 7, 5), spacing=2e-3, order=2))
+DEEPEST = 0.4 * SIZE[2]
+LONGEST_JUMP = 5e-3
+INSIDE = 5e-4
+"""Surface points deeper inside the tool than this [m] are a fault."""
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """A setup, stated tool centres (f, 3) [m] in the phantom frame, and a grid."""
+
+    setup: Setup
+    centres: FloatArray
+    grid: GridSpec
+    effects: tuple[Effect, ...]
+
+
+def _effect(random: np.random.Generator, kind: type[Effect], setup: Setup) -> Effect:
+    """One of the effect's starts, or where it has none a random step away from neutral."""
+    starts = kind.starts(setup)
+    if starts and random.random() < 0.8:
+        return starts[int(random.integers(len(starts)))]
+    neutral = kind.neutral(setup)
+    return neutral.at([here + random.normal() * item.scale for item, here in zip(kind.numbers(), neutral.coordinates, strict=True)])
+
+
+def _way(random: np.random.Generator, radius: float) -> FloatArray:
+    """Into the top or a side at a random place and slant, deeper at each frame, then away by a jump along the surface."""
+    half = np.array([SIZE[0] / 2, SIZE[1] / 2])
+    axis, sign = int(random.integers(3)), 1.0 if random.random() < 0.5 else -1.0
+    outward = np.zeros(3)
+    outward[axis] = 1.0 if axis == 2 else sign
+    place = np.array([*random.uniform(-half, half), random.uniform(0.012, SIZE[2])])
+    place[axis] = SIZE[2] if axis == 2 else sign * half[axis]
+    slant = random.normal(size=3) * 0.35
+    inward = -outward + slant - outward * (slant @ outward)
+    inward /= np.linalg.norm(inward)
+    deepest = random.uniform(0.1, 1.0) * (DEEPEST if axis == 2 else min(DEEPEST, 0.6 * half[axis]))
+    steps = [-1e-3]
+    while steps[-1] < deepest:
+        steps.append(min(steps[-1] + random.uniform(0.2, 1.0) * LONGEST_JUMP, deepest))
+    way = [place + outward * radius + inward * step for step in steps]
+    jump = random.normal(size=3)
+    jump -= outward * (jump @ outward)
+    way.append(way[-1] + jump / np.linalg.norm(jump) * random.uniform(0.2, 1.0) * LONGEST_JUMP)
+    return np.array(way)
+
+
+def draw_situation(seed: int) -> Situation:
+    """The situation of this seed."""
+    random = np.random.default_rng(seed)
+    radius = float(random.uniform(3.5e-3, 8e-3))
+    limit = float(random.uniform(3.0, 50.0)) if random.random() < 0.3 else None
+    material = Material(
+        young_modulus=float(10 ** random.uniform(1, 6)), poisson_ratio=float(random.uniform(0.0, 0.49)), stretch_limit=limit
+    )
+    setup = Setup(geometry=Box(size=SIZE), tool=Tool(radius=radius), material=material, mass=0.104)
+    kinds = [kind for kind in CATALOGUE if kind.enters is not Slot.SENSOR]
+    effects = []
+    for index in random.choice(len(kinds), size=2, replace=False):
+        effects.append(_effect(random, kinds[int(index)], setup))
+        setup = effects[-1].apply(setup)
+    return Situation(setup, _way(random, radius), GRIDS[int(random.integers(len(GRIDS)))], tuple(effects))
+
+
+def faults(situation: Situation, frames: list[Equilibrium]) -> list[str]:
+    """What no frame may show, in words; empty when all is well."""
+    found, block = [], Replay(situation.setup, situation.grid)
+    for number, frame in enumerate(frames):
+        if not (np.isfinite(frame.displacement).all() and np.isfinite(frame.force).all()):
+            found.append(f"frame {number}: not a number")
+        elif frame.outcome.name == "CONVERGED":
+            model, positions = block.model(frame.mesh), frame.mesh.nodes + frame.displacement
+            probe = Probe(frame.probe.centre - np.append(frame.slip, 0.0), frame.probe.radius)
+            if not np.isfinite(model.energy(positions, probe)):
+                found.append(f"frame {number}: converged with an inverted element")
+            points = np.einsum("qa,fai->fqi", model.face.shapes, positions[model.topology.surface]).reshape(-1, 3)
+            depth = probe.radius - np.linalg.norm(points - probe.centre, axis=1).min()
+            if depth > INSIDE or model.encloses(positions, probe):
+                found.append(f"frame {number}: converged with a surface point {1e3 * depth:.2f} mm inside the tool")
+    return found
+
+
+def main(count: int, seed: int) -> int:
+    """Try `count` situations from `seed` on; 1 when one of them shows a fault."""
+    console, outcomes, wrong, begin = Console(), Counter[str](), 0, time.process_time()
+    for number in range(seed, seed + count):
+        situation = draw_situation(number)
+        try:
+            frames = replay(situation.setup, situation.centres, situation.grid)
+            found = faults(situation, frames)
+        except Exception as error:
+            frames, found = [], [f"{type(error).__name__}: {error}"]
+        outcomes.update(frame.outcome.value for frame in frames)
+        unsolved = [f"{i} {frame.outcome.name}" for i, frame in enumerate(frames) if frame.outcome.name != "CONVERGED"]
+        if found or unsolved:
+            names = " and ".join(effect.name for effect in situation.effects)
+            console.print(f"seed {number} ({names}, {situation.grid.nodes}): {'; '.join([*found, *unsolved])}", highlight=False)
+        wrong += bool(found)
+    table = Table("outcome", "frames", title=f"{count} situations from seed {seed}, {time.process_time() - begin:.0f} CPU s")
+    for outcome, frequency in outcomes.most_common():
+        table.add_row(outcome, str(frequency))
+    console.print(table, f"{wrong} with a fault")
+    return int(wrong > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(*[int(text) for text in (sys.argv[1:] + ["100", "0"][len(sys.argv) - 1 :])]))
