@@ -135,7 +135,7 @@ class Replay:
             solution.penetration, touched,
         )  # fmt: skip
 
-    def _held(self, probe: Probe, start: Equilibrium) -> Equilibrium:
+    def held(self, probe: Probe, start: Equilibrium) -> Equilibrium:
         """Equilibrium with the base where it is; `probe` in the frame of the slid block."""
         local = Probe(probe.centre - np.append(self.slip, 0.0), probe.radius)
         if _away(self.setup, local):
@@ -188,7 +188,7 @@ class Replay:
     def step(self, stated_centre: FloatArray, start: Equilibrium | None = None) -> Equilibrium:
         """Equilibrium with the tool at a stated centre (3,) [m], phantom frame; slides the base if it cannot hold."""
         probe = Probe(stated_centre + self._offset, self.setup.tool.radius)
-        frame = self._held(probe, self._free if start is None else start)
+        frame = self.held(probe, self._free if start is None else start)
         if self.setup.support.friction_coefficient is None:
             return frame
         return self._slide(probe, frame)
@@ -205,7 +205,7 @@ class Replay:
                 break
             stiffness = self._lateral_stiffness(frame)
             self.slip = self.slip + push[:2] / pull * min(excess / stiffness, 1e-3)
-            frame = self._held(probe, frame)
+            frame = self.held(probe, frame)
         return frame
 
     def _lateral_stiffness(self, frame: Equilibrium) -> float:

@@ -13,7 +13,7 @@ from core.diagnosis.hypothesis import Model
 from core.effects.sensor import CameraRegistration
 from core.frames import FloatArray
 
-__all__ = ["intervals"]
+__all__ = ["intervals", "stands"]
 
 _NORMAL_95 = 1.96
 _INTERVAL_STEPS = 400
@@ -39,6 +39,22 @@ def _spread(bench: Bench, model: Model) -> FloatArray:
     deviation = np.sqrt((moved**2).sum(axis=0) * len(sequences) / (len(sequences) - 1))
     robust = deviation * t.ppf(0.975, len(sequences) - 1) / _NORMAL_95
     return np.asarray(np.hypot(np.maximum(laplace, robust), replayed))
+
+
+def stands(bench: Bench, model: Model) -> bool:
+    """Whether each cause has a strength whose interval leaves out none at all.
+
+    Gains trust that sequences agree; a cause that fits one of them by chance is pulled elsewhere by the others, and its interval,
+    which holds what they disagree about, tells.
+    """
+    spread, at = _spread(bench, model), 0
+    for effect in model.effects:
+        numbers = effect.numbers()
+        own = zip(numbers, effect.coordinates, effect.neutral(bench.setup).coordinates, spread[at : at + len(numbers)], strict=True)
+        if not any(abs(here - none) > _NORMAL_95 * sd for item, here, none, sd in own if not item.place):
+            return False
+        at += len(numbers)
+    return True
 
 
 def intervals(bench: Bench, model: Model) -> list[dict[str, dict[str, Any]]]:

@@ -24,6 +24,10 @@ __all__ = ["TOOL_COLUMNS", "Prediction", "Sample", "Wanted", "predict", "touch_c
 TOOL_COLUMNS = 6
 """Columns that always come first: the tool moved along x, y, z and turned about the robot registration's pivot."""
 
+_MOST_RESPONSE = 1.5
+"""Where the body follows the tool by more than this [1], its tangent is about to give way."""
+_SPAN = 4e-4
+"""Half the tool's motion [m] over which the change is taken there."""
 TOOL_REACH, CLEARLY = 1.5e-3, 5e-4
 """A point this near to a model's ball [m], and nearer to it by this much than to the model's surface, is of the tool: clouds are
 cleaned of the tool where it was stated to be, and if it is somewhere else, some of its points remain."""
@@ -140,6 +144,8 @@ class _Columns:
         steps += [(other, move) for other, move in zip(wanted.setups, moves, strict=True)]
         changed = displacement_changes(self.block, frame, steps)
         tool = changed[:3] / TOOL_STEP
+        for axis in np.flatnonzero(np.abs(tool).max(axis=(1, 2)) > _MOST_RESPONSE):
+            self._span(frame, int(axis), tool, changed[3:], moves)
         arm = frame.probe.centre - wanted.pivot
         turned = [np.tensordot(np.cross(axis, arm), tool, axes=1) for axis in np.eye(3)]
         scaled = changed[3:] / np.array(wanted.steps)[:, None, None] if wanted.steps else changed[3:]
@@ -147,6 +153,23 @@ class _Columns:
         factors = np.array([log_stiffness((replace(lump, stiffness_ratio=np.e),), corners) for lump in wanted.lumps])
         lumps = stiffness_changes(self.block, frame, factors) if wanted.lumps else changed[:0]
         return np.concatenate([tool, np.array(turned), scaled, lumps])
+
+    def _span(self, frame: Equilibrium, axis: int, tool: FloatArray, changed: FloatArray, moves: FloatArray) -> None:
+        """Put what a finite motion of the tool along an axis does in place of its derivative, in all columns it has a share in.
+
+        Under a deep push a coarse grid may be about to give way sideways. Its derivative then is many times what any motion that
+        matters brings about, and would hide an offset of the tool from the screening.
+        """
+        step = _SPAN * np.eye(3)[axis]
+        sides = [self.block.held(replace(frame.probe, centre=frame.probe.centre + sign * step), frame) for sign in (1, -1)]
+        if any(side.outcome is not Outcome.CONVERGED for side in sides):
+            return
+        ahead, behind = (side.mesh.interpolate(side.displacement, frame.mesh.nodes) for side in sides)
+        wrong, tool[axis] = tool[axis].copy(), (ahead - behind) / (2 * _SPAN)
+        stated = np.array(self.block.setup.tool.offset)
+        for column, (other, move) in enumerate(zip(self.wanted.setups, moves, strict=True)):
+            share = (np.array(other.tool.offset) - stated + move)[axis]
+            changed[column] += share * (tool[axis] - wrong)
 
     def of_ball(self, frame: Equilibrium, moves: FloatArray) -> tuple[FloatArray, FloatArray]:
         """How the ball's centre (k, 3) and radius (k,) change, in the order of `displacement`."""

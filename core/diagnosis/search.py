@@ -10,6 +10,7 @@ import numpy as np
 from core.diagnosis.bench import PRIOR_STEPS, Bench
 from core.diagnosis.evidence import fit, predictive_gain
 from core.diagnosis.hypothesis import Model
+from core.diagnosis.intervals import stands
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction
 from core.diagnosis.screening import Candidate, linear_gains, null_gains, right_sides
 from core.diagnosis.structure import NOTHING, Structure, structure_of
@@ -240,7 +241,7 @@ def _again(
 def _forward(
     bench: Bench, findings: Findings, current: Trial, screened: Model, candidates: list[Candidate], gains: np.ndarray
 ) -> Trial | None:
-    """The best further cause if it gains more than the bound, else None."""
+    """The best further cause that gains more than the bound and whose strength is not an accident of one sequence, else None."""
     trials: list[Trial] = []
     strained = [] if current.model.effects else _strained(bench, screened, candidates)
     for candidate in _shortlist(gains, candidates, PROMISING * _needed(findings, current), strained):
@@ -249,9 +250,8 @@ def _forward(
         trials.append(_trial(bench, effects, current.model.predictions, current.model, hopeless))
     trials.sort(key=lambda trial: -trial.gain)
     findings.trials.extend(trials)
-    if not trials or trials[0].gain <= _needed(findings, current):
-        return None
-    return trials[0]
+    enough = [trial for trial in trials if trial.gain > _needed(findings, current)]
+    return next((trial for trial in enough if stands(bench, trial.model)), None)
 
 
 def _needed(findings: Findings, current: Trial) -> float:

@@ -35,7 +35,7 @@ class Parameter:
         name, unit: as in effects.md, SI. low, high: bounds. scale: a step that matters, for trust regions and differences.
         choices: allowed words, for a parameter that is not a number. log: whether it is searched by its logarithm; then
             `scale` and `accuracy` are of the logarithm. accuracy: standard deviation that the replay's own error leaves, however
-            good the data.
+            good the data. place: whether it says where a cause is and not how strong, and so means nothing at a neutral strength.
     """
 
     name: str
@@ -46,6 +46,7 @@ class Parameter:
     choices: tuple[str, ...] = ()
     log: bool = False
     accuracy: float = 0.0
+    place: bool = False
 
     def coordinate(self, value: float) -> float:
         """What a search moves instead of the value."""
@@ -65,11 +66,13 @@ def parameter(
     choices: tuple[str, ...] = (),
     log: bool = False,
     accuracy: float = 0.0,
+    place: bool = False,
 ) -> Any:
     """A dataclass field that carries a Parameter."""
     return dataclasses.field(
         metadata={
             "unit": unit, "low": low, "high": high, "scale": scale, "choices": choices, "log": log, "accuracy": accuracy,
+            "place": place,
         }
     )  # fmt: skip
 

@@ -15,7 +15,7 @@ from core.diagnosis.bench import Bench
 from core.diagnosis.evidence import Block, gram
 from core.diagnosis.gain import Ladder
 from core.diagnosis.hypothesis import Model
-from core.diagnosis.intervals import intervals
+from core.diagnosis.intervals import intervals, stands
 from core.diagnosis.observations import Group, Observations
 from core.diagnosis.patterns import draw_patterns, patterns
 from core.diagnosis.prediction import TOOL_COLUMNS
@@ -152,6 +152,19 @@ def test_interval_holds_what_sequences_disagree_about(bench):
     scale = RADIUS.numbers()[0].scale
     wanted = 3.18 * scale * sizes.std(ddof=1) / np.sqrt(len(sizes))
     assert (entry["high"] - entry["low"]) / 2 == pytest.approx(wanted, rel=0.2)
+
+
+def test_cause_stands_where_sequences_agree_on_its_strength(bench):
+    assert stands(bench, _measured_by(bench, np.zeros(20)))
+
+
+def test_cause_that_sequences_pull_to_both_sides_of_none_does_not_stand(bench):
+    off = (RADIUS.radius - SETUP.tool.radius) / RADIUS.numbers()[0].scale
+    assert not stands(bench, _measured_by(bench, off * np.array([1.5, -1.5, 1.0, -1.0])))
+
+
+def test_lump_as_stiff_as_the_rest_does_not_stand_wherever_it_is(bench):
+    assert not stands(bench, _model(bench, replace(LUMP, stiffness_ratio=1.0001)))
 
 
 def test_place_of_a_detached_edge_is_stated_without_interval(bench):
