@@ -6,6 +6,7 @@ elements with 0.5 mm between nodes differ from them by 1.5 and 2.1 % of the disp
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,10 +14,10 @@ import numpy as np
 
 from core.frames import FloatArray
 from core.mesh import GridSpec
-from core.replay import replay, require_converged
+from core.replay import Equilibrium, replay, require_converged
 from core.setup import Box, Setup, Tool
 
-__all__ = ["DEPTHS", "SETUP", "Pokes", "reference", "solve_pokes"]
+__all__ = ["DEPTHS", "SETUP", "Pokes", "compared", "poke_frames", "reference"]
 
 SETUP = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3), mass=0.104)
 DEPTHS = (4e-3, 8e-3)
@@ -37,16 +38,21 @@ class Pokes:
         return miss / np.linalg.norm(self.displacement, axis=(1, 2)), other.force / self.force - 1
 
 
-def solve_pokes(grid: GridSpec) -> Pokes:
-    """Both pokes on this grid, in steps of 1 mm."""
+def poke_frames(grid: GridSpec) -> list[Equilibrium]:
+    """Equilibria at the two depths, led there in steps of 1 mm."""
+    depths = np.arange(1, 9) * 1e-3
+    top = SETUP.geometry.size[2] + SETUP.tool.radius
+    frames = replay(SETUP, np.array([[0.0, 0.0, top - depth] for depth in depths]), grid, tolerance=1e-5)
+    require_converged(frames)
+    return [frames[int(np.argmin(np.abs(depths - depth)))] for depth in DEPTHS]
+
+
+def compared(frames: Sequence[Equilibrium]) -> Pokes:
+    """What grids are compared by in the two equilibria."""
     x, y, z = SETUP.geometry.size
     across = np.meshgrid(np.linspace(-x / 2, x / 2, 49), np.linspace(-y / 2, y / 2, 29), indexing="ij")
     points = np.stack([across[0].ravel(), across[1].ravel(), np.full(across[0].size, z)], axis=1)
-    depths = np.arange(1, 9) * 1e-3
-    frames = replay(SETUP, np.array([[0.0, 0.0, z + SETUP.tool.radius - depth] for depth in depths]), grid, tolerance=1e-5)
-    require_converged(frames)
-    wanted = [frames[int(np.argmin(np.abs(depths - depth)))] for depth in DEPTHS]
-    return Pokes(np.stack([frame.move(points) - points for frame in wanted]), np.array([frame.force[2] for frame in wanted]))
+    return Pokes(np.stack([frame.move(points) - points for frame in frames]), np.array([frame.force[2] for frame in frames]))
 
 
 def reference() -> Pokes:
@@ -56,5 +62,5 @@ def reference() -> Pokes:
 
 
 if __name__ == "__main__":
-    found = solve_pokes(FINEST)
+    found = compared(poke_frames(FINEST))
     np.savez_compressed(_FILE, displacement=found.displacement.astype(np.float32), force=found.force)

@@ -7,6 +7,7 @@ called converged, or a surface point inside the tool; frames without equilibrium
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from collections import Counter
@@ -18,6 +19,7 @@ from rich.table import Table
 
 from core.effects import CATALOGUE, Effect, Slot
 from core.fem.model import Probe
+from core.fem.newton import Outcome
 from core.frames import FloatArray
 from core.mesh import GridSpec
 from core.replay import Equilibrium, Replay, replay
@@ -97,7 +99,7 @@ def faults(situation: Situation, frames: list[Equilibrium]) -> list[str]:
     for number, frame in enumerate(frames):
         if not (np.isfinite(frame.displacement).all() and np.isfinite(frame.force).all()):
             found.append(f"frame {number}: not a number")
-        elif frame.outcome.name == "CONVERGED":
+        elif frame.outcome is Outcome.CONVERGED:
             model, positions = block.model(frame.mesh), frame.mesh.nodes + frame.displacement
             probe = Probe(frame.probe.centre - np.append(frame.slip, 0.0), frame.probe.radius)
             if not np.isfinite(model.energy(positions, probe)):
@@ -120,7 +122,7 @@ def main(count: int, seed: int) -> int:
         except Exception as error:
             frames, found = [], [f"{type(error).__name__}: {error}"]
         outcomes.update(frame.outcome.value for frame in frames)
-        unsolved = [f"{i} {frame.outcome.name}" for i, frame in enumerate(frames) if frame.outcome.name != "CONVERGED"]
+        unsolved = [f"{i} {frame.outcome.name}" for i, frame in enumerate(frames) if frame.outcome is not Outcome.CONVERGED]
         if found or unsolved:
             names = " and ".join(effect.name for effect in situation.effects)
             console.print(f"seed {number} ({names}, {situation.grid.nodes}): {'; '.join([*found, *unsolved])}", highlight=False)
@@ -133,4 +135,7 @@ def main(count: int, seed: int) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(*[int(text) for text in (sys.argv[1:] + ["100", "0"][len(sys.argv) - 1 :])]))
+    parser = argparse.ArgumentParser(description="Random situations that a replay must survive.")
+    parser.add_argument("count", nargs="?", type=int, default=100, help="how many")
+    parser.add_argument("seed", nargs="?", type=int, default=0, help="of the first; the others follow")
+    sys.exit(main(**vars(parser.parse_args())))

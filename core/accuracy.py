@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from core.fem.newton import Outcome
 from core.frames import FloatArray
 from core.mesh import GridSpec, box_mesh
 from core.progress import Report, silent
@@ -52,10 +53,12 @@ def finer(grid: GridSpec) -> GridSpec:
 
 
 def hardest_frames(frames: Sequence[Equilibrium]) -> list[int]:
-    """The frame with the strongest push of each touch."""
+    """The equilibrium with the strongest push of each touch; frames that are none are passed over."""
     found: list[int] = []
     touching = False
     for number, frame in enumerate(frames):
+        if frame.outcome is not Outcome.CONVERGED:
+            continue
         if frame.in_contact and touching:
             if np.linalg.norm(frame.force) > np.linalg.norm(frames[found[-1]].force):
                 found[-1] = number
@@ -65,15 +68,13 @@ def hardest_frames(frames: Sequence[Equilibrium]) -> list[int]:
     return found
 
 
-def mesh_errors(
-    setup: Setup, centres: FloatArray, frames: Sequence[Equilibrium], grid: GridSpec, *, report: Report = silent
-) -> tuple[MeshError, ...]:
+def mesh_errors(setup: Setup, frames: Sequence[Equilibrium], grid: GridSpec, *, report: Report = silent) -> tuple[MeshError, ...]:
     """Estimate the grid's error in the hardest frame of each touch.
 
     Args:
-        setup, centres, grid: what the frames were replayed with: `centres` (f, 3) stated tool centres [m].
+        setup, grid: what the frames were replayed with.
 
-    Frames that found no equilibrium on the finer grid are left out.
+    A touch that finds no equilibrium on the finer grid is left out: `hardest_frames` tells how many there are.
     """
     block, points = Replay(setup, finer(grid)), _points(setup)
     found = []
@@ -82,8 +83,8 @@ def mesh_errors(
         report(done / len(keys), f"mesh error in touch {done + 1} of {len(keys)}")
         frame = frames[number]
         block.slip = frame.slip.copy()
-        other = block.step(centres[number], frame)
-        if other.outcome.name != "CONVERGED":
+        other = block.held(frame.probe, frame)
+        if other.outcome is not Outcome.CONVERGED:
             continue
         here, there = frame.move(points), other.move(points)
         size, error = _rms(here - points), _rms(there - here)

@@ -133,16 +133,15 @@ class BoxMesh:
         return np.arange(nx * ny * nz).reshape(nz, ny, nx)
 
     @cached_property
+    def _steps(self) -> list[slice]:
+        """Along one axis, the first, second, ... node of every element."""
+        return [slice(shift, shift - self.order or None, self.order) for shift in range(self.order + 1)]
+
+    @cached_property
     def hexahedra(self) -> IntArray:
         """(e, 8) or (e, 27) nodes; local numbers grow along x, then y, then z."""
-        n, p = self._numbers, self.order
-
-        def every(shift: int) -> slice:
-            return slice(shift, shift - p or None, p)
-
-        steps = range(p + 1)
-        corners = [n[every(dz), every(dy), every(dx)].ravel() for dz in steps for dy in steps for dx in steps]
-        return np.stack(corners, axis=1)
+        n, steps = self._numbers, self._steps
+        return np.stack([n[dz, dy, dx].ravel() for dz in steps for dy in steps for dx in steps], axis=1)
 
     @cached_property
     def _sides(self) -> dict[str, tuple[IntArray, bool]]:
@@ -159,14 +158,11 @@ class BoxMesh:
 
     @cached_property
     def element_sides(self) -> dict[str, IntArray]:
-        """Nodes of the elements' sides: (f, 4) around the corners, or (f, 9) row by row, seen from outside."""
-        if self.order == 1:
-            return self.faces
+        """Nodes (f, 4) or (f, 9) of the elements' sides, row by row; along the rows times across them points outwards."""
 
         def patches(grid: IntArray, flip: bool) -> IntArray:
             rows = grid[::-1] if flip else grid
-            steps = [slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2)]
-            return np.stack([rows[a, b].ravel() for a in steps for b in steps], axis=1)
+            return np.stack([rows[down, along].ravel() for down in self._steps for along in self._steps], axis=1)
 
         return {side: patches(grid, flip) for side, (grid, flip) in self._sides.items()}
 

@@ -75,7 +75,7 @@ def replay(
     """
     import core.registration as registration  # noqa: PLC0415, PLR0402 (heavy)
     import core.replay as simulation  # noqa: PLC0415 (heavy)
-    from core.accuracy import mesh_errors  # noqa: PLC0415 (heavy)
+    from core.accuracy import hardest_frames, mesh_errors  # noqa: PLC0415 (heavy)
     from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
     from core.fem.newton import Outcome  # noqa: PLC0415 (heavy)
     from core.mesh import GridSpec  # noqa: PLC0415 (heavy)
@@ -88,7 +88,7 @@ def replay(
         setup = registration.setup_from(opened, registration.register(opened, part(report, 0.0, 0.1)))
         centres = setup.phantom_from_robot.apply(kinematics.position_at(times))
         frames = simulation.replay(setup, centres, spec, report=part(report, 0.1, 0.8))
-        misses = mesh_errors(setup, centres, frames, spec, report=part(report, 0.8, 1.0))
+        misses = mesh_errors(setup, frames, spec, report=part(report, 0.8, 1.0))
     used, quads = np.unique(frames[0].mesh.free_surface, return_inverse=True)
     rest = frames[0].mesh.nodes[used]
     _save(
@@ -103,6 +103,8 @@ def replay(
         worst = max(misses, key=lambda miss: miss.displacement)
         size = f"{1e3 * worst.displacement:.2f} mm RMS ({worst.relative:.0%}) and {worst.force:.0%} of the force"
         out.print(f"the grid's own error, by a finer one: {size} at frame {worst.frame}, the worst of {len(misses)} touches")
+    for number in sorted(set(hardest_frames(frames)) - {miss.frame for miss in misses}):
+        out.print(f"[yellow]frame {number}[/] no equilibrium on the finer grid, so its mesh error is unknown", highlight=False)
     for number in failed:
         out.print(
             f"[yellow]frame {number}[/] {frames[number].outcome.value} (residual {frames[number].residual:.2g})", highlight=False

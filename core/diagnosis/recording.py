@@ -12,6 +12,7 @@ from core.cleaning import Cleaner, tool_poses
 from core.dataset import open_dataset
 from core.diagnosis.observations import smooth_centres
 from core.diagnosis.prediction import touch_correction
+from core.fem.newton import Outcome
 from core.frames import FloatArray
 from core.measurement import Gaps, Surface, gaps
 from core.mesh import GridSpec
@@ -69,7 +70,7 @@ def _side(setup: Setup, frames: list[Equilibrium], clouds: list[FloatArray]) -> 
         paper.append(paper_distance(points[::2], frame, surface))
     return Recorded(
         np.array(moved), np.array([frame.probe.centre for frame in frames]), np.array(errors), np.array(distance), np.array(paper),
-        np.array([0 if frame.outcome.name == "CONVERGED" else 1 for frame in frames], dtype=np.int8),
+        np.array([0 if frame.outcome is Outcome.CONVERGED else 1 for frame in frames], dtype=np.int8),
         np.array([not frame.in_contact for frame in frames]),
     )  # fmt: skip
 

@@ -30,14 +30,12 @@ class Element:
     """A reference element.
 
     Attributes:
-        nodes: (a, 3) reference coordinates, the first along the lowest corner and the last along the highest of a hexahedron.
-        shapes, gradients: (q, a) and (q, a, 3), of the shape functions at the quadrature points. weights: (q,).
+        shapes, gradients: (q, a) and (q, a, 3), of the shape functions at the quadrature points; local node numbers grow along x,
+            then y, then z. weights: (q,).
         pressures: (q, m) polynomials.
         face: its side.
     """
 
-    name: str
-    nodes: FloatArray
     shapes: FloatArray
     gradients: FloatArray
     weights: FloatArray
@@ -62,8 +60,8 @@ def _lagrange(order: int, at: FloatArray) -> tuple[FloatArray, FloatArray]:
     return values, np.stack([at - 0.5, -2 * at, at + 0.5], axis=1)
 
 
-def _square(order: int, count: int, cyclic: bool) -> Face:
-    """Tensor-product side; `cyclic` numbers the four corners around instead of row by row."""
+def _square(order: int, count: int) -> Face:
+    """Tensor-product side; node numbers grow along its rows, then across them."""
     places, weights = np.polynomial.legendre.leggauss(count)
     s, t = (part.ravel() for part in np.meshgrid(places, places, indexing="ij"))
     (along, d_along), (across, d_across) = _lagrange(order, s), _lagrange(order, t)
@@ -75,12 +73,10 @@ def _square(order: int, count: int, cyclic: bool) -> Face:
         ],
         axis=2,
     )
-    if cyclic:
-        shapes, gradients = shapes[:, [0, 1, 3, 2]], gradients[:, [0, 1, 3, 2]]
     return Face(np.ascontiguousarray(shapes), np.ascontiguousarray(gradients), np.outer(weights, weights).ravel())
 
 
-def _hexahedron(name: str, order: int, count: int, linear_pressure: bool, face: Face) -> Element:
+def _hexahedron(order: int, count: int, linear_pressure: bool, face: Face) -> Element:
     """Tensor-product hexahedron with count^3 Gauss points; node and point numbers grow along x, then y, then z."""
     places, weights = np.polynomial.legendre.leggauss(count)
     z, y, x = (part.ravel() for part in np.meshgrid(places, places, places, indexing="ij"))
@@ -88,15 +84,13 @@ def _hexahedron(name: str, order: int, count: int, linear_pressure: bool, face: 
     parts = [(dx, fy, fz), (fx, dy, fz), (fx, fy, dz)]
     gradients = np.stack([np.einsum("pk,pj,pi->pkji", c, b, a).reshape(len(x), -1) for a, b, c in parts], axis=2)
     shapes = np.einsum("pk,pj,pi->pkji", fz, fy, fx).reshape(len(x), -1)
-    ends = np.linspace(-1, 1, order + 1)
-    k, j, i = (part.ravel() for part in np.meshgrid(ends, ends, ends, indexing="ij"))
     pressures = np.stack([np.ones_like(x), x, y, z] if linear_pressure else [np.ones_like(x)], axis=1)
     volumes = np.einsum("k,j,i->kji", weights, weights, weights).ravel()
-    return Element(name, np.stack([i, j, k], axis=1), shapes, np.ascontiguousarray(gradients), volumes, pressures, face)
+    return Element(shapes, np.ascontiguousarray(gradients), volumes, pressures, face)
 
 
-HEX8 = _hexahedron("hex8", 1, 2, False, _square(1, 3, True))
-HEX27 = _hexahedron("hex27", 2, 3, True, _square(2, 4, False))
+HEX8 = _hexahedron(1, 2, False, _square(1, 3))
+HEX27 = _hexahedron(2, 3, True, _square(2, 4))
 HEXAHEDRA = {1: HEX8, 2: HEX27}
 """By the order of the shape functions."""
 

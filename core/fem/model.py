@@ -207,15 +207,6 @@ class BlockModel:
             self._assemble_base(positions, force, data)
         return Assembly(force[top.free], data, push, penetration)
 
-    def contact_force(self, positions: FloatArray, probe: Probe) -> FloatArray:
-        """The tool's part of the residual (u,) over E [m^2]."""
-        force = np.zeros_like(positions)
-        assemble_contact(
-            self.topology.surface, self.areas, self.face.shapes, self.face.gradients, positions, probe.centre, probe.radius, False,
-            CONTACT_STIFFNESS, False, self.topology.surface_slots, force, _EMPTY, np.zeros(3),
-        )  # fmt: skip
-        return np.asarray(force[self.topology.free])
-
     def _assemble_base(self, positions: FloatArray, force: FloatArray, data: FloatArray) -> None:
         top = self.topology
         np.add.at(force, top.base, self._bond_gradient(positions))

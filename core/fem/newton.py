@@ -11,12 +11,10 @@ from core.fem.linear import NotPositiveDefinite
 from core.fem.model import Assembly, BlockModel, Probe
 from core.frames import FloatArray
 
-__all__ = ["Outcome", "Solution", "followed", "misfit", "solve", "verdict"]
+__all__ = ["Outcome", "Solution", "misfit", "solve", "verdict"]
 
 RELATIVE_TOLERANCE = 1e-6
 """Converged: the residual's norm is below this share of the tool's push and of the body's internal forces."""
-CHORD_GAIN = 0.3
-"""A step that left less than this share of the residual is followed by one on the same factor, as long as that does as well."""
 MAX_ITERATIONS = 40
 MAX_SPLITS = 6
 MAX_PENETRATION = 4e-4
@@ -97,18 +95,6 @@ def _search(
     return positions, energy
 
 
-def _chord(
-    model: BlockModel, probe: Probe | None, positions: FloatArray, state: Assembly, energy: float
-) -> tuple[FloatArray, float] | None:
-    """A step on the factor of an earlier iteration; None when the energy does not fall along the whole of it."""
-    step = -model.topology.factor.solve(state.residual)
-    trial = positions.copy()
-    trial[model.topology.free] += step
-    value = model.energy(trial, probe)
-    falls = value <= energy + 1e-4 * float(state.residual @ step) + model.rounding
-    return (trial, value) if falls else None
-
-
 def _step(model: BlockModel, probe: Probe | None, positions: FloatArray, energy: float) -> tuple[FloatArray, float, Outcome | None]:
     """One Newton step with a line search; an outcome when there is none."""
     state = model.assemble(positions, probe)
@@ -123,7 +109,7 @@ def _newton(model: BlockModel, probe: Probe | None, start: FloatArray, tolerance
     positions, energy = start, model.energy(start, probe)
     if not np.isfinite(energy):
         return Solution(start, np.zeros(3), Outcome.INVERTED, 0, np.inf, 0.0)
-    before, outcome, iteration = 0.0, Outcome.ITERATIONS, 0
+    outcome, iteration = Outcome.ITERATIONS, 0
     while True:
         state = model.assemble(positions, probe, tangent=False)
         residual = misfit(model, state)
@@ -133,31 +119,11 @@ def _newton(model: BlockModel, probe: Probe | None, start: FloatArray, tolerance
         if iteration == MAX_ITERATIONS:
             break
         iteration += 1
-        taken = _chord(model, probe, positions, state, energy) if residual < CHORD_GAIN * before else None
-        before = residual
-        if taken is not None:
-            positions, energy = taken
-            continue
         positions, energy, stopped = _step(model, probe, positions, energy)
         if stopped is not None:
             outcome = stopped
             break
     return Solution(positions, state.push, outcome, iteration, residual, state.penetration)
-
-
-_FOLLOWED_STEP = 1e-7
-"""Motion of the tool [m] over which the contact force is differenced."""
-
-
-def followed(model: BlockModel, last: Probe, probe: Probe, positions: FloatArray) -> FloatArray:
-    """Where the body goes, to first order, as the tool moves on from `last`, on the factor that solving there has left."""
-    motion = probe.centre - last.centre
-    share = _FOLLOWED_STEP / max(float(np.linalg.norm(motion)), _FOLLOWED_STEP)
-    near = Probe(last.centre + share * motion, last.radius)
-    change = (model.contact_force(positions, near) - model.contact_force(positions, last)) / share
-    guess = positions.copy()
-    guess[model.topology.free] -= model.topology.factor.solve(change)
-    return guess if model.energy(guess, probe) < model.energy(positions, probe) else positions
 
 
 def solve(

@@ -9,7 +9,7 @@ import numpy as np
 
 from core.fem.follow import Follower
 from core.fem.model import BlockModel, Probe
-from core.fem.newton import Solution, followed, solve
+from core.fem.newton import Solution, solve
 from core.frames import FloatArray
 
 __all__ = ["FREE_STEP", "lead"]
@@ -45,7 +45,6 @@ def _through(model: BlockModel, positions: FloatArray, probes: list[Probe], tole
     for last, probe in pairwise(probes[1:]):
         if not solution.converged:
             break
-        start = followed(model, last, probe, solution.positions)
-        solution = solve(model, probe, start, last if careful else None, tolerance if probe is probes[-1] else rough)
+        solution = solve(model, probe, solution.positions, last if careful else None, tolerance if probe is probes[-1] else rough)
         iterations += solution.iterations
     return replace(solution, iterations=iterations)

@@ -45,6 +45,18 @@ def test_faces_of_each_side_face_outwards_and_cover_it(grid, side):
     assert sign * normals[:, axis].sum() == pytest.approx(area, rel=1e-12)
 
 
+@GRIDS
+@pytest.mark.parametrize("side", ["-x", "+x", "-y", "+y", "-z", "+z"])
+def test_sides_of_the_elements_face_outwards_and_cover_it(grid, side):
+    mesh, face = box_mesh(SIZE, grid), HEXAHEDRA[grid.order].face
+    tangents = np.einsum("qac,fai->fqci", face.gradients, mesh.nodes[mesh.element_sides[side]])
+    areas = face.weights[:, None] * np.cross(tangents[:, :, 0], tangents[:, :, 1])
+    outward = np.zeros(3)
+    outward["xyz".index(side[1])] = 1 if side[0] == "+" else -1
+    assert (areas @ outward > 0).all()
+    assert np.allclose(areas.sum(axis=(0, 1)), outward * np.prod(np.array(SIZE)[outward == 0]), rtol=1e-12)
+
+
 def test_free_surface_is_everything_but_the_base():
     mesh = box_mesh(SIZE, GridSpec())
     total = sum(len(faces) for faces in mesh.faces.values())

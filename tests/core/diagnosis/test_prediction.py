@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from pushed_block import GRID, POSE, SETUP, SIZE, TOP, dwelling, observed, poke, seen_points
 
+from core.diagnosis import prediction as prediction_module
 from core.diagnosis.noise import Noise
 from core.diagnosis.observations import Group, Observations
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted, predict, touch_correction
 from core.effects.sensor import CameraRegistration
 from core.frames import FloatArray
 from core.measurement import Surface
+from core.mesh import GridSpec
 from core.registration import small_motion
 from core.replay import rest
 from core.setup import Inclusion, Load, Setup, Tool
@@ -90,6 +92,24 @@ def test_column_is_the_difference_of_two_predictions(data, baseline, name):
     assert np.linalg.norm(found[1:] - wanted[1:]) < 0.02 * touched
     if name != "camera":
         assert not wanted[0].any() and not found[0].any()
+
+
+def test_where_a_grid_is_about_to_give_way_the_column_is_the_difference_over_a_motion_that_matters(monkeypatch):
+    grid, half = GridSpec(nodes=(15, 11, 9), spacing=1.2e-3), 4e-4
+    item = observed(SETUP, np.array([poke(7.1e-3, -0.0185, 6e-4)]), noise=0.0)
+    ahead, behind = (replace(SETUP, tool=Tool(radius=5e-3, offset=(0.0, sign * half, 0.0))) for sign in (1, -1))
+    wanted = Wanted(setups=(replace(SETUP, tool=Tool(radius=5e-3, offset=(0.0, 1e-6, 0.0))),), steps=(1e-6,), pivot=PIVOT)
+    here = predict(item, SETUP, grid, wanted, tolerance=TIGHT)
+    there = [predict(item, side, grid, None, here.equilibria, TIGHT, here.samples).gap for side in (ahead, behind)]
+    change = (there[0] - there[1]) / (2 * half)
+
+    def miss(column: FloatArray) -> float:
+        return float(np.sqrt(np.nansum((column - change) ** 2) / np.nansum(change**2)))
+
+    assert miss(here.columns[..., 1]) < 0.35
+    assert miss(here.columns[..., TOOL_COLUMNS]) < 0.35
+    monkeypatch.setattr(prediction_module, "_MOST_RESPONSE", np.inf)
+    assert miss(predict(item, SETUP, grid, wanted, tolerance=TIGHT).columns[..., 1]) > 1.0
 
 
 def test_truth_leaves_only_noise_and_the_stated_setup_more():
