@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from scipy.stats import t
 
 from core.diagnosis.bench import Bench
-from core.diagnosis.evidence import fit
+from core.diagnosis.evidence import Block, fit
 from core.diagnosis.hypothesis import Model
 from core.effects.sensor import CameraRegistration
 from core.frames import FloatArray
@@ -17,44 +18,49 @@ __all__ = ["intervals", "stands"]
 
 _NORMAL_95 = 1.96
 _INTERVAL_STEPS = 400
+_ANY_SHARE = 10.0
+"""Prior deviation of a pattern's share in the data: anything."""
 
 
-def _spread(bench: Bench, model: Model) -> FloatArray:
-    """Half widths of the 95 % intervals over 1.96, one for each search coordinate.
+def _robust(blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray, own: slice) -> tuple[FloatArray, FloatArray]:
+    """Most probable change of the columns in `own` (n,), and the half widths (n,) of its 95 % intervals over 1.96.
 
     The larger of two: Laplace's approximation, which trusts the noise model, and the robust spread of Liang and Zeger (1986): how
     far whole sequences pull in different directions, with as many degrees of freedom as there are sequences, less one.
     """
-    blocks, columns, precision = bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model)
-    own = slice(len(model.nuisance), None)
     solution = fit(blocks, columns, precision)
-    laplace = np.sqrt(np.diag(solution.covariance)[own])
-    replayed = np.array([item.accuracy for effect in model.effects for item in effect.numbers()])
+    change, laplace = solution.change[own], np.sqrt(np.diag(solution.covariance)[own])
     sequences = [block for block in blocks if block.name != "rest"]
     if len(sequences) < 2:
-        return np.asarray(np.hypot(laplace, replayed))
+        return change, laplace
     index = np.array(columns) + 1
     pulls = np.array([block.gram[index, 0] + block.gram[np.ix_(index, index)] @ solution.change for block in sequences])
     moved = (pulls @ solution.covariance)[:, own]
     deviation = np.sqrt((moved**2).sum(axis=0) * len(sequences) / (len(sequences) - 1))
-    robust = deviation * t.ppf(0.975, len(sequences) - 1) / _NORMAL_95
-    return np.asarray(np.hypot(np.maximum(laplace, robust), replayed))
+    return change, np.maximum(laplace, deviation * t.ppf(0.975, len(sequences) - 1) / _NORMAL_95)
 
 
-def stands(bench: Bench, model: Model) -> bool:
-    """Whether each cause has a strength whose interval leaves out none at all.
+def _spread(bench: Bench, model: Model) -> FloatArray:
+    """Half widths of the 95 % intervals over 1.96, one for each search coordinate, with what the replay's own error leaves."""
+    own = slice(len(model.nuisance), None)
+    robust = _robust(bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model), own)[1]
+    replayed = np.array([item.accuracy for effect in model.effects for item in effect.numbers()])
+    return np.asarray(np.hypot(robust, replayed))
 
-    Gains trust that sequences agree; a cause that fits one of them by chance is pulled elsewhere by the others, and its interval,
-    which holds what they disagree about, tells.
+
+def stands(bench: Bench, model: Model, without: Model) -> bool:
+    """Whether sequences agree that the model's last cause is there: the interval of how much of it they see leaves out none.
+
+    What the cause changes against the model `without` it is one pattern; its share in the data is one where it is right, and is
+    pulled elsewhere by sequences that know nothing of it. The cause's own numbers could not tell: a lump of 50 times the
+    stiffness is like one of 10, and its place means nothing where it is as stiff as the rest.
     """
-    spread, at = _spread(bench, model), 0
-    for effect in model.effects:
-        numbers = effect.numbers()
-        own = zip(numbers, effect.coordinates, effect.neutral(bench.setup).coordinates, spread[at : at + len(numbers)], strict=True)
-        if not any(abs(here - none) > _NORMAL_95 * sd for item, here, none, sd in own if not item.place):
-            return False
-        at += len(numbers)
-    return True
+    extended = bench.block_with(without, [(model.effects[-1], model.predictions)], without)
+    columns = [*extended.nuisance, *extended.columns, *extended.extra["signatures"]]
+    precision = np.zeros((len(columns), len(columns)))
+    precision[:-1, :-1], precision[-1, -1] = bench.precision(extended), _ANY_SHARE**-2
+    share, spread = _robust(bench.tempered(extended), columns, precision, slice(-1, None))
+    return bool(share[0] > _NORMAL_95 * spread[0])
 
 
 def intervals(bench: Bench, model: Model) -> list[dict[str, dict[str, Any]]]:

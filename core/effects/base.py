@@ -46,7 +46,6 @@ class Parameter:
     choices: tuple[str, ...] = ()
     log: bool = False
     accuracy: float = 0.0
-    place: bool = False
 
     def coordinate(self, value: float) -> float:
         """What a search moves instead of the value."""
@@ -66,13 +65,11 @@ def parameter(
     choices: tuple[str, ...] = (),
     log: bool = False,
     accuracy: float = 0.0,
-    place: bool = False,
 ) -> Any:
     """A dataclass field that carries a Parameter."""
     return dataclasses.field(
         metadata={
             "unit": unit, "low": low, "high": high, "scale": scale, "choices": choices, "log": log, "accuracy": accuracy,
-            "place": place,
         }
     )  # fmt: skip
 

@@ -38,10 +38,10 @@ class StiffInclusion(Effect):
 
     name, enters = "stiff_inclusion", Slot.MATERIAL
     summary = "a lump of other stiffness lies inside"
-    x: float = parameter("m", low=-0.5, high=0.5, scale=3e-3, place=True)
-    y: float = parameter("m", low=-0.5, high=0.5, scale=3e-3, place=True)
-    z: float = parameter("m", low=0.0, high=0.5, scale=3e-3, place=True)
-    radius: float = parameter("m", low=2e-3, high=2e-2, scale=0.25, log=True, place=True)
+    x: float = parameter("m", low=-0.5, high=0.5, scale=3e-3)
+    y: float = parameter("m", low=-0.5, high=0.5, scale=3e-3)
+    z: float = parameter("m", low=0.0, high=0.5, scale=3e-3)
+    radius: float = parameter("m", low=2e-3, high=2e-2, scale=0.25, log=True)
     stiffness_ratio: float = parameter("1", low=0.02, high=50.0, scale=0.5, log=True)
 
     @classmethod

@@ -16,6 +16,7 @@ from core.diagnosis.evidence import Block, gram
 from core.diagnosis.gain import Ladder
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.intervals import intervals, stands
+from core.diagnosis.noise import Noise
 from core.diagnosis.observations import Group, Observations
 from core.diagnosis.patterns import draw_patterns, patterns
 from core.diagnosis.prediction import TOOL_COLUMNS
@@ -154,17 +155,30 @@ def test_interval_holds_what_sequences_disagree_about(bench):
     assert (entry["high"] - entry["low"]) / 2 == pytest.approx(wanted, rel=0.2)
 
 
-def test_cause_stands_where_sequences_agree_on_its_strength(bench):
-    assert stands(bench, _measured_by(bench, np.zeros(20)))
+def _seen_by(bench: Bench, shares: FloatArray) -> tuple[Model, Model]:
+    """A model with a lump, and the one without it: as many sequences, each of which sees this share of what the lump does."""
+    random, shape = np.random.default_rng(4), (GROUPS, bench.surface.patches)
+    with_lump, without = [], []
+    for number, share in enumerate(shares):
+        does, columns = 1e-4 * random.standard_normal(shape), 1e-4 * random.standard_normal((*shape, NUISANCES - 1))
+        gap = share * does + 1e-4 * random.standard_normal(shape)
+        without.append(prediction(gap, name=f"poke-{number:02d}", columns=columns))
+        with_lump.append(prediction(gap - does, name=f"poke-{number:02d}", columns=columns))
+    bench.noises = [Noise(np.full(shape, 1e8), one.gap, np.zeros(shape), np.zeros((*shape, 0))) for one in without]
+    nuisance = tuple(range(NUISANCES))
+    return (
+        Model((LUMP,), LUMP.apply(SETUP), tuple(with_lump), (), (), {}, nuisance),
+        Model((), SETUP, tuple(without), (), (), {}, nuisance),
+    )
 
 
-def test_cause_that_sequences_pull_to_both_sides_of_none_does_not_stand(bench):
-    off = (RADIUS.radius - SETUP.tool.radius) / RADIUS.numbers()[0].scale
-    assert not stands(bench, _measured_by(bench, off * np.array([1.5, -1.5, 1.0, -1.0])))
+def test_cause_stands_where_sequences_see_as_much_of_it(bench):
+    assert stands(bench, *_seen_by(bench, np.array([1.0, 0.8, 1.1, 0.9])))
 
 
-def test_lump_as_stiff_as_the_rest_does_not_stand_wherever_it_is(bench):
-    assert not stands(bench, _model(bench, replace(LUMP, stiffness_ratio=1.0001)))
+@pytest.mark.parametrize("shares", [[1.5, -1.5, 1.0, -1.0], [2.0, 0.0, 0.0, 0.1], [0.0, 0.0, 0.0, 0.0], [-1.0, -0.9, -1.1, -1.0]])
+def test_cause_that_only_some_sequences_see_or_that_is_not_there_does_not_stand(bench, shares):
+    assert not stands(bench, *_seen_by(bench, np.array(shares)))
 
 
 def test_place_of_a_detached_edge_is_stated_without_interval(bench):
