@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from core.fem.elastic import assemble_elastic
-from core.fem.linear import NotPositiveDefinite
+from core.fem.factor import NotPositiveDefinite
 from core.fem.model import BlockModel, Probe
 from core.frames import FloatArray
 from core.replay import Equilibrium, Replay

@@ -18,7 +18,7 @@ from numpy.linalg import LinAlgError
 from scipy.linalg import cho_factor, cho_solve
 
 from core.fem.contact import assemble_contact, contact_energy
-from core.fem.linear import NotPositiveDefinite
+from core.fem.factor import NotPositiveDefinite
 from core.fem.model import CONTACT_STIFFNESS, BlockModel, Probe
 from core.frames import FloatArray
 from core.mesh import IntArray

@@ -1,115 +1,50 @@
-"""Sparse symmetric systems with one pattern: analysed once, factorised often (MKL Pardiso: Cholesky, else LDL^T)."""
+"""Sparse symmetric systems: their pattern, and the best direct solver that this machine has."""
 
 from __future__ import annotations
 
-import ctypes
-import weakref
+import logging
+from collections.abc import Callable
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from core.frames import FloatArray
+from core.fem.factor import Factor
+from core.fem.superlu import SuperLUFactor
 from core.mesh import IntArray
 
-__all__ = ["NotPositiveDefinite", "SparseCholesky"]
+__all__ = ["SOLVERS", "face_slots", "factor_of", "upper_pattern"]
 
-_POSITIVE_DEFINITE = 2
-_ANALYSE, _FACTORISE, _SOLVE, _RELEASE = 11, 22, 33, -1
-_ZERO_PIVOT = -4
-_CHOSEN, _ORDERING = 0, 1
-_NESTED_DISSECTION = 2
-_DOUBLES, _INTEGERS = ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_int32)
+log = logging.getLogger(__name__)
 
 
-class NotPositiveDefinite(Exception):
-    """The matrix has no Cholesky factor."""
+def _pardiso(pattern: sp.csr_matrix) -> Factor:
+    from core.fem.pardiso import Pardiso  # noqa: PLC0415 (MKL is not on every machine)
+
+    return Pardiso(pattern)
+
+
+SOLVERS: dict[str, Callable[[sp.csr_matrix], Factor]] = {"pardiso": _pardiso, "superlu": SuperLUFactor}
+"""By name, fastest first."""
 
 
 @lru_cache(maxsize=1)
-def _pardiso() -> Any:
-    """MKL's entry point; looking for the library takes most of a second, so it is done once."""
-    from pypardiso import PyPardisoSolver  # noqa: PLC0415 (heavy)
-
-    return PyPardisoSolver()._mkl_pardiso
-
-
-def _aligned(right: FloatArray) -> FloatArray:
-    """A copy that begins at a cache line: MKL's last digits depend on where an array lies."""
-    memory = np.empty(right.size + 8)
-    begin = -memory.ctypes.data // 8 % 8
-    copy = memory[begin : begin + right.size].reshape(right.shape, order="F")
-    copy[...] = right
-    return copy
+def _best() -> str:
+    """The first solver that works here; a slow one is told of."""
+    trial = sp.csr_matrix(sp.eye(2))
+    for name, make in SOLVERS.items():
+        try:
+            make(trial)
+        except ImportError as error:
+            log.warning("no %s on this machine (%s): solving takes several times as long", name, error)
+            continue
+        return name
+    raise RuntimeError("no sparse direct solver works on this machine")
 
 
-class _Handle:
-    """One matrix in MKL's memory, with everything its calls need that does not change between them."""
-
-    def __init__(self, pattern: sp.csr_matrix) -> None:
-        self.matrix = pattern
-        self.size = pattern.shape[0]
-        self.rows = pattern.indptr.astype(np.int32) + 1
-        self.columns = pattern.indices.astype(np.int32) + 1
-        self.memory = np.zeros(64, dtype=np.int64)
-        self.options = np.zeros(64, dtype=np.int32)
-        # MKL's own defaults refine every solution, which a Cholesky factor does not need: a solve takes three times as long.
-        self.options[_CHOSEN], self.options[_ORDERING] = 1, _NESTED_DISSECTION
-        self.order = np.zeros(self.size, dtype=np.int32)
-        self.call = _pardiso()
-
-    def run(self, phase: int, right: FloatArray) -> FloatArray:
-        """Carry out a phase; returns the solution (n,) or (n, m) in column order where the phase has one."""
-        solution, error = _aligned(right), ctypes.c_int32(0)
-        right = _aligned(right)
-        number = [ctypes.byref(ctypes.c_int32(value)) for value in (1, _POSITIVE_DEFINITE, phase, self.size)]
-        columns = ctypes.byref(ctypes.c_int32(1 if right.ndim == 1 else right.shape[1]))
-        self.call(
-            self.memory.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)), number[0], number[0], number[1], number[2], number[3],
-            self.matrix.data.ctypes.data_as(_DOUBLES), self.rows.ctypes.data_as(_INTEGERS), self.columns.ctypes.data_as(_INTEGERS),
-            self.order.ctypes.data_as(_INTEGERS), columns, self.options.ctypes.data_as(_INTEGERS), ctypes.byref(ctypes.c_int32(0)),
-            right.ctypes.data_as(_DOUBLES), solution.ctypes.data_as(_DOUBLES), ctypes.byref(error),
-        )  # fmt: skip
-        if error.value == _ZERO_PIVOT:
-            raise NotPositiveDefinite("the matrix has no Cholesky factor")
-        if error.value:
-            raise RuntimeError(f"MKL Pardiso failed in phase {phase} with error {error.value}")
-        return solution
-
-
-def _release(handle: _Handle) -> None:
-    handle.run(_RELEASE, np.zeros(handle.size))
-
-
-class SparseCholesky:
-    """Cholesky factors of matrices that share one pattern.
-
-    Args:
-        pattern: upper triangle (with diagonal) in CSR form, indices sorted; its `data` is the array that is factorised.
-
-    Attributes:
-        generation: number of the factor that is held.
-    """
-
-    def __init__(self, pattern: sp.csr_matrix) -> None:
-        self._matrix = pattern
-        self._handle = _Handle(pattern)
-        self._idle = np.zeros(pattern.shape[0])
-        self.generation = 0
-        self._handle.run(_ANALYSE, self._idle)
-        # At interpreter exit the memory goes anyway, and the library may be gone first.
-        weakref.finalize(self, _release, self._handle).atexit = False
-
-    def factorise(self, data: FloatArray) -> None:
-        """Factorise the matrix with these entries; raises NotPositiveDefinite."""
-        self.generation += 1
-        self._matrix.data[:] = data
-        self._handle.run(_FACTORISE, self._idle)
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Solve for one (n,) or several (n, m) right sides with the last factor."""
-        return np.ascontiguousarray(self._handle.run(_SOLVE, np.asfortranarray(right, dtype=float)))
+def factor_of(pattern: sp.csr_matrix, solver: str | None = None) -> Factor:
+    """A solver for matrices with this pattern (upper triangle and diagonal in CSR form, indices sorted): the best, unless named."""
+    return SOLVERS[solver or _best()](pattern)
 
 
 def upper_pattern(elements: IntArray, unknown: IntArray) -> tuple[sp.csr_matrix, IntArray]:

@@ -13,7 +13,7 @@ import numpy as np
 from core.fem.contact import assemble_contact, contact_energy, turns_around
 from core.fem.elastic import Law, assemble_elastic, elastic_energy, lame
 from core.fem.elements import HEXAHEDRA, Quadrature, face_weights, quadrature
-from core.fem.linear import SparseCholesky, face_slots, upper_pattern
+from core.fem.linear import face_slots, factor_of, upper_pattern
 from core.frames import FloatArray
 from core.mesh import BoxMesh, GridSpec, IntArray, box_mesh
 from core.setup import Detachment, Inclusion, Setup
@@ -68,7 +68,7 @@ class Topology:
         self.entries = pattern.nnz
         rows = np.repeat(np.arange(pattern.shape[0]), np.diff(pattern.indptr))
         self.diagonal = np.flatnonzero(rows == pattern.indices)
-        self.factor = SparseCholesky(pattern)
+        self.factor = factor_of(pattern)
 
 
 @lru_cache(maxsize=8)

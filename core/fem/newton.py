@@ -7,7 +7,7 @@ from enum import Enum
 
 import numpy as np
 
-from core.fem.linear import NotPositiveDefinite
+from core.fem.factor import NotPositiveDefinite
 from core.fem.model import Assembly, BlockModel, Probe
 from core.frames import FloatArray
 

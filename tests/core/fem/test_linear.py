@@ -4,8 +4,16 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from core.fem.linear import NotPositiveDefinite, SparseCholesky, face_slots, upper_pattern
+from core.fem import linear
+from core.fem.factor import NotPositiveDefinite
+from core.fem.linear import SOLVERS, face_slots, factor_of, upper_pattern
+from core.fem.model import topology
+from core.fem.newton import Outcome
 from core.mesh import GridSpec, box_mesh
+from core.replay import replay
+from core.setup import Box, Setup, Tool
+
+EACH = pytest.mark.parametrize("solver", SOLVERS)
 
 
 def _chain(count: int, diagonal: float) -> sp.csr_matrix:
@@ -18,27 +26,30 @@ def _whole(upper: sp.csr_matrix) -> np.ndarray:
     return dense + np.triu(dense, 1).T
 
 
-def test_factor_solves_one_and_several_right_sides():
+@EACH
+def test_factor_solves_one_and_several_right_sides(solver):
     upper = _chain(40, 2.1)
-    factor = SparseCholesky(upper.copy())
+    factor = factor_of(upper.copy(), solver)
     factor.factorise(upper.data)
     right = np.random.default_rng(0).normal(size=(40, 3))
     assert np.allclose(_whole(upper) @ factor.solve(right), right, atol=1e-12)
     assert np.allclose(_whole(upper) @ factor.solve(right[:, 0].copy()), right[:, 0], atol=1e-12)
 
 
-def test_second_factor_of_the_same_pattern_replaces_the_first():
+@EACH
+def test_second_factor_of_the_same_pattern_replaces_the_first(solver):
     upper = _chain(20, 2.5)
-    factor = SparseCholesky(upper.copy())
+    factor = factor_of(upper.copy(), solver)
     right = np.arange(20.0)
     for scale in (1.0, 4.0):
         factor.factorise(scale * upper.data)
         assert np.allclose(scale * _whole(upper) @ factor.solve(right), right, atol=1e-11)
 
 
-def test_indefinite_matrix_is_refused_and_the_next_good_one_taken():
+@EACH
+def test_indefinite_matrix_is_refused_and_the_next_good_one_taken(solver):
     upper = _chain(20, 0.5)
-    factor = SparseCholesky(upper.copy())
+    factor = factor_of(upper.copy(), solver)
     with pytest.raises(NotPositiveDefinite):
         factor.factorise(upper.data)
     good = _chain(20, 3.0)
@@ -46,14 +57,44 @@ def test_indefinite_matrix_is_refused_and_the_next_good_one_taken():
     assert np.allclose(_whole(good) @ factor.solve(np.ones(20)), 1.0, atol=1e-12)
 
 
-def test_two_factors_do_not_disturb_each_other():
+@EACH
+def test_two_factors_do_not_disturb_each_other(solver):
     first, second = _chain(15, 2.5), _chain(25, 3.5)
-    factors = [SparseCholesky(upper.copy()) for upper in (first, second)]
+    factors = [factor_of(upper.copy(), solver) for upper in (first, second)]
     for factor, upper in zip(factors, (first, second), strict=True):
         factor.factorise(upper.data)
     assert np.allclose(_whole(first) @ factors[0].solve(np.ones(15)), 1.0, atol=1e-12)
     del factors[0]
     assert np.allclose(_whole(second) @ factors[0].solve(np.ones(25)), 1.0, atol=1e-12)
+
+
+@EACH
+def test_singular_matrix_is_refused(solver):
+    upper = sp.csr_matrix(np.triu([[1.0, -1.0], [-1.0, 1.0]]))
+    with pytest.raises(NotPositiveDefinite):
+        factor_of(upper.copy(), solver).factorise(upper.data)
+
+
+def _without_mkl(pattern: sp.csr_matrix) -> None:
+    raise ImportError("no MKL here")
+
+
+def test_machine_without_mkl_is_told_and_finds_the_same_equilibria(monkeypatch, caplog):
+    setup = Setup(geometry=Box(size=(0.03, 0.02, 0.02)), tool=Tool(radius=4e-3), mass=0.02)
+    centres, grid = np.array([[0.0, 0.0, 0.024 - depth] for depth in (1e-3, 2e-3, 3e-3)]), GridSpec(nodes=(7, 5, 5))
+    usual = replay(setup, centres, grid)
+    monkeypatch.setitem(SOLVERS, "pardiso", _without_mkl)
+    linear._best.cache_clear()
+    topology.cache_clear()
+    try:
+        other = replay(setup, centres, grid)
+    finally:
+        linear._best.cache_clear()
+        topology.cache_clear()
+    assert "no pardiso on this machine (no MKL here)" in caplog.text
+    for one, two in zip(usual, other, strict=True):
+        assert one.outcome is two.outcome is Outcome.CONVERGED
+        assert np.abs(one.displacement - two.displacement).max() < 1e-8
 
 
 def test_pattern_holds_every_entry_of_every_element_once():
