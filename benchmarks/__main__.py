@@ -6,9 +6,15 @@ import sys
 
 from rich.console import Console
 
-from benchmarks import cleaning, dataset, measurement, replay
+from benchmarks import cleaning, dataset, effects, measurement, replay
 
-ALL = {"replay": replay.run, "measurement": measurement.run, "cleaning": cleaning.run, "dataset": dataset.run}
+ALL = {
+    "replay": replay.run,
+    "effects": effects.run,
+    "measurement": measurement.run,
+    "cleaning": cleaning.run,
+    "dataset": dataset.run,
+}
 
 
 def main(names: list[str]) -> int:

@@ -158,13 +158,14 @@ class Gaps:
     Attributes:
         index: (m,) which of the given points met the surface. gap: (m,) measured minus simulated along the outward normal [m].
         foot: (m, 3) rest positions of the material points they met. normal: (m, 3) outward, of the deformed surface.
-        patch: (m,). side: (m,).
+        facing: (m,) cosine of the angle between the normal and the way back to the camera. patch: (m,). side: (m,).
     """
 
     index: IntArray
     gap: FloatArray
     foot: FloatArray
     normal: FloatArray
+    facing: FloatArray
     patch: IntArray
     side: IntArray
 
@@ -206,7 +207,7 @@ def gaps(points: FloatArray, camera: FloatArray, frame: Equilibrium, surface: Su
     good = (facing > _GRAZING) & (surface.edge_distance(foot, side) > _EDGE) & (np.abs(gap) < _OUTLIER)
     good |= everything
     foot, side = foot[good], side[good]
-    return Gaps(hit[good], gap[good], foot, normal[good], surface.patch_of(foot, side), side)
+    return Gaps(hit[good], gap[good], foot, normal[good], facing[good], surface.patch_of(foot, side), side)
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,6 +32,8 @@ TOOL_REACH, CLEARLY = 1.5e-3, 5e-4
 """A point this near to a model's ball [m], and nearer to it by this much than to the model's surface, is of the tool: clouds are
 cleaned of the tool where it was stated to be, and if it is somewhere else, some of its points remain."""
 
+_MOST_STRETCH = 2.0
+"""A model's surface may turn away from the camera so far that a gap along the ray counts this many times the gap itself."""
 FARTHEST_CHANGE = 8e-3
 """A point's gap that changes by more than this [m] between models has met another side of the block: its old gap stands."""
 
@@ -57,15 +59,18 @@ class Sample:
     """Which of a group's points are averaged where: settled by the baseline and kept for every other model.
 
     Were each model to choose anew, points would change patches with the model, and the noise they carry would look like a
-    difference between models.
+    difference between models. Nor may a model turn its sides towards the camera or away from it, and the noise along the rays
+    with them: gaps count along the ray, times the cosine that the baseline's surface has.
 
     Attributes:
         index: (m,) of the group's points. patch: (m,). gap: (m,) of the baseline [m], which stands where a model's ray misses.
+        facing: (m,) cosine between the baseline's normal and the way back to the camera.
     """
 
     index: IntArray
     patch: IntArray
     gap: FloatArray
+    facing: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +221,8 @@ def _chosen(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) ->
     points, pose = _placed(group, setup)
     seen = gaps(points, pose.translation, frame, surface)
     kept = within_spread(seen.gap, seen.patch, surface.patches)
-    return Sample(seen.index[kept].astype(np.int32), seen.patch[kept].astype(np.int32), seen.gap[kept].astype(np.float32))
+    index, patch = seen.index[kept].astype(np.int32), seen.patch[kept].astype(np.int32)
+    return Sample(index, patch, seen.gap[kept].astype(np.float32), seen.facing[kept].astype(np.float32))
 
 
 def _placed(group: Group, setup: Setup) -> tuple[FloatArray, Transform]:
@@ -225,11 +231,17 @@ def _placed(group: Group, setup: Setup) -> tuple[FloatArray, Transform]:
     return pose.apply(group.points), pose
 
 
+def _along_rays(seen: Gaps, sample: Sample) -> Gaps:
+    """Gaps, and the normals that say how they change, as long as the baseline's surface would have made them of these rays."""
+    factor = np.minimum(sample.facing[seen.index] / np.maximum(seen.facing, 1e-6), _MOST_STRETCH)
+    return replace(seen, gap=seen.gap * factor, normal=seen.normal * factor[:, None])
+
+
 def _compare(group: Group, setup: Setup, frame: Equilibrium, surface: Surface, sample: Sample) -> _Compared:
     """The sample's points, where they meet the surface, and their averages; points of the model's tool lie off the tool."""
     points, pose = _placed(group, setup)
     points = points[sample.index]
-    seen = gaps(points, pose.translation, frame, surface, everything=True)
+    seen = _along_rays(gaps(points, pose.translation, frame, surface, everything=True), sample)
     values = sample.gap.astype(float)
     near = np.abs(seen.gap - values[seen.index]) < FARTHEST_CHANGE
     values[seen.index[near]] = seen.gap[near]
@@ -240,7 +252,9 @@ def _compare(group: Group, setup: Setup, frame: Equilibrium, surface: Surface, s
     values[on_tool] = off_tool[on_tool]
     kept, tool = ~on_tool[seen.index], np.flatnonzero(on_tool)
     index = seen.index[kept]
-    seen = Gaps(index, seen.gap[kept], seen.foot[kept], seen.normal[kept], sample.patch[index], seen.side[kept])
+    seen = Gaps(
+        index, seen.gap[kept], seen.foot[kept], seen.normal[kept], seen.facing[kept], sample.patch[index], seen.side[kept]
+    )  # fmt: skip
     means = plain_means(values, sample.patch, surface.patches)
     return _Compared(points, seen, means, tool, arm[tool] / distance[tool, None], sample.patch[tool])
 

@@ -139,6 +139,17 @@ def test_same_points_give_a_difference_without_their_noise():
     assert np.nanstd(same - wanted) < 0.7 * np.nanstd(anew - wanted)
 
 
+def test_noise_stays_what_it_is_under_a_model_that_turns_its_sides_to_the_camera():
+    item = observed(SETUP, CENTRES[:1], noise=2e-3, count=20000)
+    here = predict(item, SETUP, GRID)
+    there = _again(item, replace(SETUP, load=Load(specific_weight_over_stiffness=4.0)), here)
+    sides = Surface(SETUP.geometry).patch_normals[:, 2] < 0.5
+    kept = sides & (here.count[0] >= 8)
+    change = np.median((there.spread[0, kept] / here.spread[0, kept]) ** 2) - 1
+    assert abs(change) < 0.005
+    assert np.nanmean(np.abs(there.gap[0, kept] - here.gap[0, kept])) > 3e-4
+
+
 def test_reference_group_does_not_feel_the_cameras_later_shift(data):
     groups = (replace(data.groups[0], frames=(), reference=True), data.groups[0])
     item = replace(data, groups=groups)

@@ -1,0 +1,97 @@
+"""How much each effect moves the visible surface at one 8 mm poke into the middle of the top, beside figures measured earlier.
+
+The reference figures come from another engine on the same block (quadratic hexahedra, E 5 kPa, nu 0.44). Where they can differ:
+"the base slides" meant a base free to spread, while `base_slip` moves the block as a whole, and only when it is pushed sideways;
+"half the base detached" let the bond open anywhere in that half at once, as here; the lump's place aside is not stated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from rich.table import Table
+
+from benchmarks.reference import SETUP
+from benchmarks.stopwatch import timed
+from core.effects.base import Effect
+from core.effects.load import Gravity
+from core.effects.material import PoissonRatio, StiffInclusion
+from core.effects.support import BaseDetachment, BaseSlip
+from core.effects.tool import ToolOffset, ToolRadius
+from core.frames import FloatArray
+from core.mesh import GridSpec, box_mesh
+from core.replay import replay, require_converged
+from core.setup import Setup
+
+__all__ = ["run"]
+
+DEPTH = 8e-3
+GRID = GridSpec(nodes=(17, 13, 9), spacing=1.2e-3, order=2)
+UNDISTURBED, WITHIN = 0.76e-3, 0.1
+"""RMS displacement of the visible surface [m], and how near to it this engine must come [1]."""
+STATED = replace(SETUP, material=replace(SETUP.material, poisson_ratio=0.44))
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One effect, and the RMS and largest change [mm] that the other engine found."""
+
+    name: str
+    setup: Setup
+    reference: tuple[float, float]
+
+
+def _with(effect: Effect) -> Setup:
+    return effect.apply(STATED)
+
+
+ROWS = (
+    Row("gravity", _with(Gravity(specific_weight_over_stiffness=2.1)), (0.94, 1.06)),
+    Row("tool radius 3.5 mm", _with(ToolRadius(radius=3.5e-3)), (0.27, 1.2)),
+    Row(
+        "lump of 8 mm, 10 times, 10 mm deep and aside",
+        _with(StiffInclusion(x=8e-3, y=0.0, z=STATED.geometry.size[2] - 0.01, radius=8e-3, stiffness_ratio=10.0)),
+        (0.17, 0.91),
+    ),
+    Row("tool 2 mm aside", _with(ToolOffset(dx=2e-3, dy=0.0, dz=0.0)), (0.15, 1.1)),
+    Row("base slides, friction 0.1", _with(BaseSlip(friction_coefficient=0.1)), (0.14, 0.24)),
+    Row("half the base detached", _with(BaseDetachment(edge="+x", extent=STATED.geometry.size[0] / 2)), (0.10, 0.23)),
+    Row("nu 0.35", _with(PoissonRatio(nu=0.35)), (0.07, 0.32)),
+    Row("nu 0.49", _with(PoissonRatio(nu=0.49)), (0.05, 0.14)),
+    Row("Gent, J_m 10", replace(STATED, material=replace(STATED.material, stretch_limit=10.0)), (0.04, 0.20)),
+)
+
+
+def _surface(setup: Setup, points: FloatArray) -> FloatArray:
+    """Displacement (m, 3) [m] of surface points at the poke's end, led there in steps of 1 mm."""
+    top = setup.geometry.size[2] + SETUP.tool.radius
+    frames = replay(setup, np.array([[0.0, 0.0, top - depth] for depth in np.arange(1e-3, DEPTH + 1e-6, 1e-3)]), GRID)
+    require_converged(frames)
+    return frames[-1].move(points) - points
+
+
+def _visible() -> FloatArray:
+    """Rest positions (m, 3) [m] spread evenly over the top and the two sides that a camera above one edge sees."""
+    mesh = box_mesh(STATED.geometry.size, GridSpec(nodes=(35, 21, 19)))
+    return mesh.nodes[np.unique(np.concatenate([mesh.faces[side] for side in ("+z", "-x", "-y")]))]
+
+
+def run() -> list[Table]:
+    """Replay the poke with each effect, and tabulate what it changes."""
+    points = _visible()
+    plain, seconds = timed(lambda: _surface(STATED, points))
+    size = float(np.sqrt((plain**2).sum(axis=1).mean()))
+    if abs(size / UNDISTURBED - 1) > WITHIN:
+        raise RuntimeError(f"the undisturbed field is {1e3 * size:.3f} mm RMS, not {1e3 * UNDISTURBED:.2f} mm")
+    title = f"Change of the visible surface at an 8 mm poke; the undisturbed field: {1e3 * size:.2f} mm RMS"
+    table = Table("effect", "RMS, mm", "other engine", "largest, mm", "other engine", "CPU s", title=title)
+    table.add_row("none", "0", "0", "0", "0", f"{seconds:.1f}")
+    for row in ROWS:
+        moved, seconds = timed(lambda row=row: _surface(row.setup, points))  # type: ignore[misc]
+        change = 1e3 * np.linalg.norm(moved - plain, axis=1)
+        rms = float(np.sqrt((change**2).mean()))
+        table.add_row(
+            row.name, f"{rms:.2f}", f"{row.reference[0]:g}", f"{change.max():.2f}", f"{row.reference[1]:g}", f"{seconds:.1f}"
+        )
+    return [table]
