@@ -29,8 +29,8 @@ from core.setup import Setup
 
 __all__ = ["DIAGNOSIS_GRID", "FINE_GRID", "diagnose"]
 
-DIAGNOSIS_GRID = GridSpec(nodes=(13, 9, 9), spacing=1.5e-3, order=2)
-FINE_GRID = GridSpec(nodes=(17, 13, 13), spacing=1.0e-3, order=2)
+DIAGNOSIS_GRID = GridSpec(nodes=(15, 11, 9), spacing=1.2e-3)
+FINE_GRID = GridSpec(nodes=(21, 15, 12), spacing=0.75e-3)
 PAGE_GRID = GridSpec(nodes=(13, 9, 8), spacing=1.5e-3)
 """For a tool of 5 mm; all are scaled with the stated radius."""
 FIT_GROUPS = 14
@@ -161,5 +161,5 @@ def _model(dataset: Dataset, setup: Setup, findings: Findings, fitted: list[str]
     effects = [effect.to_json() for effect in findings.best.model.effects] if findings.best else []
     return {
         "format": 1, "version": 1, "dataset": dataset.name, "parent": None, "fitted_on": fitted, "effects": effects,
-        "setup": setup.as_dict(), "grid": vars(DIAGNOSIS_GRID) | {"nodes": list(DIAGNOSIS_GRID.nodes)},
+        "setup": setup.as_dict(), "grid": {"nodes": list(DIAGNOSIS_GRID.nodes), "spacing": DIAGNOSIS_GRID.spacing},
     }  # fmt: skip
