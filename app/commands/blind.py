@@ -26,13 +26,10 @@ def blind(
     with progress("blind suite") as report:
         results = run_suite(folder, cases, workers, report)
     out.print(_table(cases, results))
-    effects = [result for result in results if result.hidden]
-    named = [result for result in results if not result.hidden and result.verdict != "none"]
-    out.print(
-        f"{sum(result.right for result in effects)} of {len(effects)} effects right; "
-        f"{len(named)} of {len(results) - len(effects)} controls named",
-        highlight=False,
-    )
+    for kind, hidden in (("effects", True), ("controls", False)):
+        those = [result for result in results if bool(result.hidden) is hidden]
+        named = "" if hidden else f", a cause named in {sum(bool(result.named) for result in those)}"
+        out.print(f"{sum(result.right for result in those)} of {len(those)} {kind} right{named}", highlight=False)
 
 
 def _table(cases: list[Case], results: list[Result]) -> Table:

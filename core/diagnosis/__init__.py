@@ -161,5 +161,5 @@ def _model(dataset: Dataset, setup: Setup, findings: Findings, fitted: list[str]
     effects = [effect.to_json() for effect in findings.best.model.effects] if findings.best else []
     return {
         "format": 1, "version": 1, "dataset": dataset.name, "parent": None, "fitted_on": fitted, "effects": effects,
-        "setup": setup.as_dict(), "grid": {"nodes": list(DIAGNOSIS_GRID.nodes), "spacing": DIAGNOSIS_GRID.spacing},
+        "setup": setup.as_dict(), "grid": vars(DIAGNOSIS_GRID) | {"nodes": list(DIAGNOSIS_GRID.nodes)},
     }  # fmt: skip
