@@ -9,7 +9,7 @@ import numpy as np
 
 from core.fem.elastic import Law, assemble_elastic, elastic_energy, lame
 from core.fem.elements import HEXAHEDRA, quadrature
-from core.fem.linear import SparseCholesky, upper_pattern
+from core.fem.linear import factor_of, upper_pattern
 from core.frames import FloatArray
 from core.mesh import BoxMesh, GridSpec, box_mesh
 
@@ -56,7 +56,7 @@ class FreeBody:
     def _system(self):
         unknown = np.where(self.held, -1, np.cumsum(~self.held).reshape(self.held.shape) - 1)
         pattern, slots = upper_pattern(self.mesh.hexahedra, unknown)
-        return pattern, slots, SparseCholesky(pattern)
+        return pattern, slots, factor_of(pattern)
 
     def energy(self, positions: FloatArray) -> float:
         """Over E [m^3]."""
