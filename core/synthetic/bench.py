@@ -22,6 +22,7 @@ __all__ = ["neutral_displacement", "perform", "rest_surface", "true_offset", "tr
 KEY_SPACING = 1.0e-3
 SLIDING_SPACING = 1.3e-3
 GRAVITY = 9.81
+SHORTER, MOST_SHORT = 1.0e-3, 4.5e-3
 
 
 def true_radius(scenario: Scenario) -> float:
@@ -37,18 +38,31 @@ def true_offset(scenario: Scenario) -> FloatArray:
 
 
 def perform(scenario: Scenario, motion: Motion, fine: float | None = None) -> Track:
-    """Solve one motion of a scenario; every probe gets a grid that is fine where it touches."""
+    """Solve one motion of a scenario; every probe gets a grid that is fine where it touches.
+
+    Pressed against a hard lump, the block gives way at some depth: it jumps aside, and the tool leads to no equilibrium any more.
+    The operator stops such a push short of it; the track's motion is the one that was carried out.
+    """
     slip, stretches = np.zeros(3), []
     for probe in motion.probes:
-        block = mesh_block(scenario.size, _grading(scenario, probe, fine or scenario.fine))
+        stretch, slip = _as_deep_as_it_goes(scenario, probe, slip, fine or scenario.fine)
+        stretches.append(stretch)
+    return Track(replace(motion, probes=tuple(stretch.probe for stretch in stretches)), tuple(stretches))
+
+
+def _as_deep_as_it_goes(scenario: Scenario, probe: Probe, slip: FloatArray, fine: float) -> tuple[Stretch, FloatArray]:
+    """One probe from a base that has slipped by `slip` (3,) [m], and the slip after it."""
+    for short in np.arange(0.0, MOST_SHORT, SHORTER):
+        tried = probe.shallower(float(short))
+        block = mesh_block(scenario.size, _grading(scenario, tried, fine))
         bench = _Bench(scenario, block, slip)
         try:
-            settled, passages = bench.settled + slip, bench.passages(probe)
+            return Stretch(tried, block.surface_rest, block.surface_faces, bench.settled + slip, bench.passages(tried)), bench.slip
+        except SolveError as error:
+            failure = error
         finally:
             bench.close()
-        stretches.append(Stretch(probe, block.surface_rest, block.surface_faces, settled, passages))
-        slip = bench.slip
-    return Track(motion, tuple(stretches))
+    raise failure
 
 
 def neutral_displacement(scenario: Scenario, stretch: Stretch, centre: FloatArray) -> FloatArray:

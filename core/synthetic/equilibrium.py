@@ -108,6 +108,11 @@ class _System:
         self._solver.set_phase(22)
         self._solver._call_pardiso(self._matrix, right)
 
+    @property
+    def negative(self) -> int:
+        """How many eigenvalues of what was factored last are negative."""
+        return int(self._solver.get_iparm(23))
+
     def solve(self, right: FloatArray) -> FloatArray:
         """With the last factor; right is (3 free,) or (3 free, k)."""
         self._solver.set_phase(33)
@@ -138,6 +143,7 @@ class Equilibrium:
         self._tolerance = 1e-4 * self.modulus * solid.tool_radius**2
         self.iterations = 0
         self._penalty = 0.0
+        self._cautious = False
         self.rest = self._advance(np.zeros_like(block.nodes), _NOWHERE, 0)
 
     def _elastic(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -191,7 +197,7 @@ class Equilibrium:
             if iteration == limit:
                 break
             self.iterations += 1
-            self._system.factorise(self._stiffness)
+            self._factorise(u, centre)
             step = np.zeros_like(u)
             step[self._free] = self._system.solve(residual).reshape(-1, 3)
             length = self._search(u, step, centre, energy, float(step[self._free].ravel() @ residual))
@@ -203,6 +209,15 @@ class Equilibrium:
             "use a finer grid or a shallower push",
             residual=norm,
         )
+
+    def _factorise(self, u: FloatArray, centre: FloatArray) -> None:
+        """Factor the tangent of `_assemble`; or the cautious one where the energy is not convex."""
+        self._system.factorise(self._stiffness)
+        if self._system.negative:
+            self._cautious = True
+            self._assemble(u, centre)
+            self._cautious = False
+            self._system.factorise(self._stiffness)
 
     def _converged(
         self,
@@ -264,7 +279,7 @@ class Equilibrium:
     ) -> tuple[float, float]:
         block = self.block
         parts = (u, block.nodes, block.elements, sampling.owner, sampling.values, sampling.weights)
-        energy, deepest = assemble_obstacle(*parts, centre, radius, self._penalty, derivative, *out)
+        energy, deepest = assemble_obstacle(*parts, centre, radius, self._penalty, self._cautious, derivative, *out)
         return float(energy), float(deepest)
 
     def close(self) -> None:

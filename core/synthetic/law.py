@@ -20,6 +20,7 @@ __all__ = ["SECOND_INVARIANT_SHARE", "assemble_obstacle", "assemble_solid", "con
 
 SECOND_INVARIANT_SHARE = 0.1
 SOFT_GAP = 0.03e-3
+CAUTIOUS_GAP = 0.02
 _FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 
@@ -154,6 +155,7 @@ def assemble_obstacle(  # noqa: PLR0912
     centre: Any,
     radius: float,
     penalty: float,
+    cautious: bool,
     derivative: bool,
     stiffness: Any,
     force: Any,
@@ -164,6 +166,9 @@ def assemble_obstacle(  # noqa: PLR0912
     """A rigid sphere, or with radius 0 the table z = 0, pressing on surface points; frictionless penalty [Pa/m].
 
     The pressure sets in quadratically over SOFT_GAP: a kink there makes Newton jump between sets of touching points.
+
+    Where the pressure turns as the block slides along the sphere, the stiffness can be negative; a `cautious` one leaves that part
+    out where the pressure is high.
 
     Adds to element stiffness, nodal force, push (3,) the force on the block [N], coupling (n, 3, 3) = -d force / d centre,
     and total (3, 3) its sum, where `derivative`; returns energy [J] and deepest penetration [m].
@@ -207,7 +212,7 @@ def assemble_obstacle(  # noqa: PLR0912
                 slope = stiff
             if not derivative:
                 continue
-            bend = pressure / distance if radius > 0 and gap < 0.02 * radius else 0.0
+            bend = pressure / distance if radius > 0 and (gap < CAUTIOUS_GAP * radius or not cautious) else 0.0
             for i in range(3):
                 push[i] += pressure * n[i]
                 for k in range(3):

@@ -6,7 +6,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from core.errors import RunError
 from core.frames import FloatArray, Transform
-from core.progress import Report, part, silent
+from core.progress import Report, silent
 from core.synthetic.bench import neutral_displacement, perform, rest_surface, true_offset, true_radius
 from core.synthetic.camera import DepthCamera, Scene, place_camera
 from core.synthetic.motion import Motion, draw_motion
@@ -42,6 +42,15 @@ class _Job:
     seen: FloatArray
     folder: Path
     seed: int
+
+
+@dataclass(frozen=True)
+class _Record:
+    """Of one sequence: mean squares of the change by what is hidden [m^2], and how far each push stopped short [m]."""
+
+    sequence: str
+    squares: list[float]
+    shortened: list[float]
 
 
 def make_dataset(folder: Path, scenario: Scenario, seed: int, workers: int = 1, report: Report = silent) -> Truth:
@@ -84,11 +93,14 @@ def _fill(folder: Path, scenario: Scenario, seed: int, workers: int, report: Rep
         for motion in _motions(scenario, seen, seed)
     ]
     squares: list[float] = []
-    for done, part_squares in enumerate(_all(jobs, workers, part(report, 0.05, 1.0))):
-        squares += part_squares
-        report(0.05 + 0.95 * (done + 1) / len(jobs), f"recorded {done + 1} of {len(jobs)} sequences")
+    shortened: dict[str, list[float]] = {}
+    for done, record in enumerate(_all(jobs, workers)):
+        squares += record.squares
+        shortened |= {record.sequence: record.shortened} if any(record.shortened) else {}
+        stopped = "; a push there stopped short where the block gives way" if any(record.shortened) else ""
+        report(0.05 + 0.95 * (done + 1) / len(jobs), f"recorded {done + 1} of {len(jobs)} sequences{stopped}")
     visibility = float(np.sqrt(np.mean(squares))) if squares else 0.0
-    return Truth(scenario.effects, visibility, camera.phantom_from_camera, robot_from_phantom, shift)
+    return Truth(scenario.effects, visibility, camera.phantom_from_camera, robot_from_phantom, shift, shortened)
 
 
 def _motions(scenario: Scenario, seen: FloatArray, seed: int) -> list[Motion]:
@@ -99,7 +111,7 @@ def _motions(scenario: Scenario, seen: FloatArray, seed: int) -> list[Motion]:
     ]
 
 
-def _all(jobs: list[_Job], workers: int, report: Report) -> Iterator[list[float]]:
+def _all(jobs: list[_Job], workers: int) -> Iterator[_Record]:
     if workers <= 1:
         yield from (_record(job) for job in jobs)
         return
@@ -143,9 +155,14 @@ def _write_touches(
     write_touches(folder / "touches.csv", list(landmarks), robot_from_phantom.apply(touched))
 
 
-def _record(job: _Job) -> list[float]:
-    """Solve one sequence and write its files; returns the mean squares by which the hidden effects change the surface [m^2]."""
-    track = perform(job.scenario, job.motion)
+def _record(job: _Job) -> _Record:
+    """Solve one sequence and write its files."""
+    planned = job.motion
+    track = perform(job.scenario, planned)
+    job = replace(job, motion=track.motion)
+    shortened = [
+        float(before.corners[1] - after.corners[1]) for before, after in zip(planned.probes, track.motion.probes, strict=True)
+    ]
     rng = np.random.default_rng([job.seed, 2, *job.motion.name.encode()])
     (job.folder / "clouds").mkdir(parents=True)
     start = rng.uniform(5.0, 45.0)
@@ -160,7 +177,7 @@ def _record(job: _Job) -> list[float]:
     camera = _moved(job)
     for file, instant in zip(files, instants.tolist(), strict=True):
         write_ply(job.folder / file, camera.cloud(_scene(job, track, instant), rng))
-    return _visibility(job, track)
+    return _Record(planned.name, _visibility(job, track), shortened)
 
 
 def _moved(job: _Job) -> DepthCamera:

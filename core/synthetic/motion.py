@@ -44,6 +44,11 @@ class Probe:
         """Tool centre (n, 3) [m] at the arc lengths (n,)."""
         return np.stack([np.interp(arcs, self.corners, self.waypoints[:, axis]) for axis in range(3)], axis=-1)
 
+    def shallower(self, by: float) -> Probe:
+        """The same touch in the same time, its first run ending `by` [m] earlier and all that follows that much further out."""
+        waypoints = self.waypoints + by * self.outwards * (np.arange(len(self.waypoints)) > 0)[:, None]
+        return Probe(waypoints, self.times, np.where(self.arcs > 0, self.arcs - by, 0.0))
+
     def arc(self, times: FloatArray) -> FloatArray:
         """Arc length (n,) [m] at the times (n,) [s]."""
         return _eased(times, self.times, self.arcs)

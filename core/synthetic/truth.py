@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ class Truth:
         phantom_from_camera: as `rest.ply` was taken.
         robot_from_phantom: of the robot's true frame.
         camera_shift: phantom frame; `camera_shift @ phantom_from_camera` holds in the sequences.
+        shortened: by sequence, how far each of its pushes stopped short of its plan because the block gave way [m].
     """
 
     effects: tuple[HiddenEffect, ...]
@@ -30,6 +32,7 @@ class Truth:
     phantom_from_camera: Transform
     robot_from_phantom: Transform
     camera_shift: Transform = field(default_factory=Transform)
+    shortened: Mapping[str, list[float]] = field(default_factory=dict)
 
     @property
     def verdict(self) -> str:
@@ -42,6 +45,7 @@ class Truth:
             "verdict": self.verdict,
             "effects": [_described(hidden) for hidden in self.effects],
             "visibility_mm": round(self.visibility * 1e3, 4),
+            "stopped_short_mm": {name: [round(part * 1e3, 3) for part in parts] for name, parts in self.shortened.items()},
             "registration": {
                 "phantom_from_camera": self.phantom_from_camera.matrix.tolist(),
                 "robot_from_phantom_R": self.robot_from_phantom.rotation.tolist(),

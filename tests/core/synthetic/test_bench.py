@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from core.synthetic.bench import perform, rest_surface
-from core.synthetic.motion import Motion, draw_motion
+from core.synthetic.motion import Motion, Probe, draw_motion
 from core.synthetic.scenario import HiddenEffect, Scenario
 from core.synthetic.track import Track
 
@@ -80,3 +80,18 @@ def test_keys_are_dense_enough_to_interpolate(monkeypatch: pytest.MonkeyPatch) -
     for instant in np.linspace(first.begin, first.end, 9):
         error = track.stretches[0].displacement(instant) - dense.stretches[0].displacement(instant)
         assert np.sqrt(np.mean(np.sum(error**2, axis=1))) < 0.03e-3
+
+
+def test_push_onto_a_hard_lump_stops_short_of_where_the_block_gives_way() -> None:
+    lump = {"x": -0.0025, "y": 0.0009, "z": 0.0243, "radius": 0.0086, "stiffness_ratio": 9.1}
+    top = np.array([-0.00303, 0.00161, 0.0473])
+    planned = Probe(
+        np.array([top, [-0.00303, 0.00161, 0.0334]]), np.array([0.0, 2.0, 3.0, 5.0]), np.array([0.0, 13.9e-3, 13.9e-3, 0.0])
+    )
+    motion = Motion("poke-top-01", np.array([0.0, 0.0, -1.0]), (planned,), 6.0)
+    track = perform(Scenario(effects=(HiddenEffect("stiff_inclusion", lump),)), motion)
+    (done,) = track.motion.probes
+    assert 0.9e-3 < planned.corners[1] - done.corners[1] < 4.5e-3
+    assert np.allclose(track.motion.centre(np.array([0.0, 2.5, 5.0])), [top, done.waypoints[1], top])
+    assert track.moments[0].push[2] == 0.0
+    assert max(-moment.push[2] for moment in track.moments) > 0.3
