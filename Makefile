@@ -30,6 +30,8 @@ check: develop
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
+	MYPYPATH=tests:. $(VENV)/bin/mypy --explicit-package-bases --allow-untyped-defs --allow-incomplete-defs --allow-untyped-calls \
+	    --no-warn-return-any --no-warn-unused-ignores tests benchmarks
 
 clean:
 	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

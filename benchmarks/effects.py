@@ -68,7 +68,7 @@ def _surface(setup: Setup, points: FloatArray) -> FloatArray:
     top = setup.geometry.size[2] + SETUP.tool.radius
     frames = replay(setup, np.array([[0.0, 0.0, top - depth] for depth in np.arange(1e-3, DEPTH + 1e-6, 1e-3)]), GRID)
     require_converged(frames)
-    return frames[-1].move(points) - points
+    return np.asarray(frames[-1].move(points) - points)
 
 
 def _visible() -> FloatArray:

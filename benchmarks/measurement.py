@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from rich.table import Table
 
-from benchmarks.replay import SETUP
+from benchmarks.reference import SETUP
 from benchmarks.stopwatch import timed
 from core.measurement import Surface, gaps, patch_means
 from core.mesh import GridSpec

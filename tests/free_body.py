@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from core.fem.elastic import Law, assemble_elastic, elastic_energy, lame
-from core.fem.elements import HEXAHEDRA, quadrature
+from core.fem.elements import HEXAHEDRA, Quadrature, quadrature
 from core.fem.linear import factor_of, upper_pattern
 from core.frames import FloatArray
-from core.mesh import BoxMesh, GridSpec, box_mesh
+from core.mesh import BoxMesh, GridSpec, IntArray, box_mesh
 
 __all__ = ["FreeBody", "distorted", "grid"]
 
@@ -46,7 +46,7 @@ class FreeBody:
     held: np.ndarray
 
     @cached_property
-    def _parts(self):
+    def _parts(self) -> tuple[Quadrature, IntArray, FloatArray, FloatArray]:
         mu, bulk = lame(self.law, self.poisson_ratio)
         ones = np.ones(len(self.mesh.hexahedra))
         rule = quadrature(HEXAHEDRA[self.mesh.order], self.nodes[self.mesh.hexahedra])

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from core.dataset import Kinematics
+from core.diagnosis.comparison import Sample
 from core.diagnosis.observations import Group, Observations
-from core.diagnosis.prediction import Prediction, Sample
+from core.diagnosis.prediction import Prediction
 from core.fem.newton import Outcome
 from core.frames import FloatArray, Transform
 from core.mesh import GridSpec
@@ -54,7 +55,7 @@ def dwelling(centres: FloatArray) -> tuple[FloatArray, Kinematics]:
     time = np.arange(0, DWELL * len(centres), 1e-3)
     index = np.minimum((time / DWELL).astype(int), len(centres) - 1)
     stream = Kinematics(time, centres[index], np.tile([0.0, 0.0, 0.0, 1.0], (len(time), 1)))
-    return DWELL * (np.arange(len(centres)) + 0.5), stream
+    return np.asarray(DWELL * (np.arange(len(centres)) + 0.5)), stream
 
 
 def observed(truth: Setup, centres: FloatArray, *, count: int = 6000, noise: float = 3e-4, seed: int = 0) -> Observations:

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse as sp
 
-from core.diagnosis.observations import Group, Observations
+from core.diagnosis.comparison import Compared, Sample, choose, compare, observe
+from core.diagnosis.observations import Observations
 from core.fem.model import log_stiffness
 from core.fem.newton import Outcome
 from core.frames import FloatArray, Transform
-from core.measurement import Gaps, PatchMeans, Surface, gaps, plain_means, within_spread
-from core.mesh import GridSpec, IntArray
+from core.measurement import Surface
+from core.mesh import GridSpec
 from core.registration.robot import fit_robot
 from core.replay import Equilibrium, Replay, rest
 from core.sensitivity import TOOL_STEP, displacement_changes, stiffness_changes
@@ -28,14 +28,6 @@ _MOST_RESPONSE = 1.5
 """Where the body follows the tool by more than this [1], its tangent is about to give way."""
 _SPAN = 4e-4
 """Half the tool's motion [m] over which the change is taken there."""
-TOOL_REACH, CLEARLY = 1.5e-3, 5e-4
-"""A point this near to a model's ball [m], and nearer to it by this much than to the model's surface, is of the tool: clouds are
-cleaned of the tool where it was stated to be, and if it is somewhere else, some of its points remain."""
-
-_MOST_STRETCH = 2.0
-"""A model's surface may turn away from the camera so far that a gap along the ray counts this many times the gap itself."""
-FARTHEST_CHANGE = 8e-3
-"""A point's gap that changes by more than this [m] between models has met another side of the block: its old gap stands."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -52,25 +44,6 @@ class Wanted:
     steps: tuple[float, ...] = ()
     lumps: tuple[Inclusion, ...] = ()
     pivot: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Sample:
-    """Which of a group's points are averaged where: settled by the baseline and kept for every other model.
-
-    Were each model to choose anew, points would change patches with the model, and the noise they carry would look like a
-    difference between models. Nor may a model turn its sides towards the camera or away from it, and the noise along the rays
-    with them: gaps count along the ray, times the cosine that the baseline's surface has.
-
-    Attributes:
-        index: (m,) of the group's points. patch: (m,). gap: (m,) of the baseline [m], which stands where a model's ray misses.
-        facing: (m,) cosine between the baseline's normal and the way back to the camera.
-    """
-
-    index: IntArray
-    patch: IntArray
-    gap: FloatArray
-    facing: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,37 +76,6 @@ def touch_correction(setup: Setup, grid: GridSpec) -> Transform:
         return Transform()
     landmarks = np.array(setup.landmarks)
     return fit_robot(landmarks, rest(setup, grid).move(landmarks)).phantom_from_robot
-
-
-@dataclass(frozen=True, eq=False)
-class _Compared:
-    """A group's sample under one model.
-
-    Attributes:
-        points: (m, 3) phantom frame [m]. seen: those that lie on the surface. means: of the gaps, by patch.
-        tool: (t,) those that lie on the tool instead. away: (t, 3) unit vectors from its centre. patch: (t,) where they count.
-    """
-
-    points: FloatArray
-    seen: Gaps
-    means: PatchMeans
-    tool: IntArray
-    away: FloatArray
-    patch: IntArray
-
-    def average(self, values: FloatArray, patch: IntArray) -> FloatArray:
-        """Sums over the points of each patch (p, k) of (n, k) values, over all the patch's points."""
-        total = np.zeros((len(self.means.mean), values.shape[1]))
-        np.add.at(total, patch, values)
-        return np.asarray(total / np.maximum(self.means.count, 1)[:, None])
-
-    def along_sight(self, moved: Transform) -> FloatArray:
-        """Change of the averages (p,) [m] when the camera's points are moved."""
-        shift = moved.apply(self.points) - self.points
-        surface = np.einsum("mi,mi->m", shift[self.seen.index], self.seen.normal)
-        ball = np.einsum("ti,ti->t", shift[self.tool], self.away)
-        values, patch = np.concatenate([surface, ball]), np.concatenate([self.seen.patch, self.patch])
-        return self.average(values[:, None], patch)[:, 0]
 
 
 class _Columns:
@@ -188,12 +130,12 @@ class _Columns:
         radius = np.concatenate([np.zeros(6), np.array(growth) / steps[:, 0] if growth else [], np.zeros(len(lumps))])
         return centre, radius
 
-    def project(self, frame: Equilibrium, moves: FloatArray, compared: _Compared, reference: bool) -> FloatArray:
+    def project(self, frame: Equilibrium, moves: FloatArray, compared: Compared, reference: bool) -> FloatArray:
         """(p, k) changes of the patch averages; the reference was seen before the camera could move."""
         values = np.zeros((len(compared.means.mean), TOOL_COLUMNS + len(self.wanted.setups) + len(self.wanted.lumps)))
         if frame.in_contact or self.block.setup.load.specific_weight_over_stiffness:
             fields = self.displacement(frame, moves)
-            values = -(_observe(frame, compared) @ fields.reshape(len(fields), -1).T)
+            values = -(observe(frame, compared) @ fields.reshape(len(fields), -1).T)
         if len(compared.tool):
             centre, radius = self.of_ball(frame, moves)
             values -= compared.average(compared.away @ centre.T + radius, compared.patch)
@@ -203,60 +145,6 @@ class _Columns:
                 moved = other.phantom_from_camera_true @ here.inverse()
                 values[:, TOOL_COLUMNS + number] += compared.along_sight(moved) / step
         return values
-
-
-def _observe(frame: Equilibrium, compared: _Compared) -> sp.csr_matrix:
-    """Patch averages of the displacement along the normal as a linear function of the nodes' displacement (p, 3n)."""
-    seen, patches = compared.seen, len(compared.means.mean)
-    nodes, weights = frame.mesh.locate(seen.foot)
-    share = 1.0 / np.maximum(compared.means.count, 1)[seen.patch]
-    entries = (weights[:, :, None] * seen.normal[:, None, :] * share[:, None, None]).ravel()
-    columns = (3 * nodes[:, :, None] + np.arange(3)).ravel()
-    rows = np.repeat(seen.patch, 3 * nodes.shape[1])
-    return sp.coo_matrix((entries, (rows, columns)), shape=(patches, 3 * len(frame.mesh.nodes))).tocsr()
-
-
-def _chosen(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) -> Sample:
-    """The points to average, by the model at hand: those on clear parts of the surface, without stray ones."""
-    points, pose = _placed(group, setup)
-    seen = gaps(points, pose.translation, frame, surface)
-    kept = within_spread(seen.gap, seen.patch, surface.patches)
-    index, patch = seen.index[kept].astype(np.int32), seen.patch[kept].astype(np.int32)
-    return Sample(index, patch, seen.gap[kept].astype(np.float32), seen.facing[kept].astype(np.float32))
-
-
-def _placed(group: Group, setup: Setup) -> tuple[FloatArray, Transform]:
-    """The group's points in the phantom frame, and the camera's pose; the reference was seen before the camera could move."""
-    pose = setup.phantom_from_camera if group.reference else setup.phantom_from_camera_true
-    return pose.apply(group.points), pose
-
-
-def _along_rays(seen: Gaps, sample: Sample) -> Gaps:
-    """Gaps, and the normals that say how they change, as long as the baseline's surface would have made them of these rays."""
-    factor = np.minimum(sample.facing[seen.index] / np.maximum(seen.facing, 1e-6), _MOST_STRETCH)
-    return replace(seen, gap=seen.gap * factor, normal=seen.normal * factor[:, None])
-
-
-def _compare(group: Group, setup: Setup, frame: Equilibrium, surface: Surface, sample: Sample) -> _Compared:
-    """The sample's points, where they meet the surface, and their averages; points of the model's tool lie off the tool."""
-    points, pose = _placed(group, setup)
-    points = points[sample.index]
-    seen = _along_rays(gaps(points, pose.translation, frame, surface, everything=True), sample)
-    values = sample.gap.astype(float)
-    near = np.abs(seen.gap - values[seen.index]) < FARTHEST_CHANGE
-    values[seen.index[near]] = seen.gap[near]
-    arm = points - frame.probe.centre
-    distance = np.linalg.norm(arm, axis=1)
-    off_tool = distance - frame.probe.radius
-    on_tool = (np.abs(off_tool) < TOOL_REACH) & (np.abs(off_tool) < np.abs(values) - CLEARLY)
-    values[on_tool] = off_tool[on_tool]
-    kept, tool = ~on_tool[seen.index], np.flatnonzero(on_tool)
-    index = seen.index[kept]
-    seen = Gaps(
-        index, seen.gap[kept], seen.foot[kept], seen.normal[kept], seen.facing[kept], sample.patch[index], seen.side[kept]
-    )  # fmt: skip
-    means = plain_means(values, sample.patch, surface.patches)
-    return _Compared(points, seen, means, tool, arm[tool] / distance[tool, None], sample.patch[tool])
 
 
 def predict(
@@ -293,8 +181,8 @@ def predict(
         if frame.outcome is not Outcome.CONVERGED and start is not previous:
             frame = block.step(centre, previous)
         previous = frame if frame.outcome is Outcome.CONVERGED else None
-        sample = samples[number] if samples is not None else _chosen(group, setup, frame, surface)
-        compared = _compare(group, setup, frame, surface, sample)
+        sample = samples[number] if samples is not None else choose(group, setup, frame, surface)
+        compared = compare(group, setup, frame, surface, sample)
         means = compared.means
         chosen.append(sample)
         gap.append(means.mean)

@@ -11,8 +11,9 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from types import TracebackType
 from typing import ParamSpec, Self, TypeVar
 
+from core.diagnosis.comparison import Sample
 from core.diagnosis.observations import Observations
-from core.diagnosis.prediction import Prediction, Sample, Wanted, predict
+from core.diagnosis.prediction import Prediction, Wanted, predict
 from core.mesh import GridSpec
 from core.replay import Equilibrium
 from core.setup import Setup

@@ -65,7 +65,7 @@ class Topology:
         pattern, self.slots = upper_pattern(self.hexahedra, self.unknown)
         self.surface_slots = face_slots(pattern, self.surface, self.unknown)
         self.base_slots = face_slots(pattern, self.base, self.unknown)
-        self.entries = pattern.nnz
+        self.pattern, self.entries = pattern, pattern.nnz
         rows = np.repeat(np.arange(pattern.shape[0]), np.diff(pattern.indptr))
         self.diagonal = np.flatnonzero(rows == pattern.indices)
         self.factor = factor_of(pattern)

@@ -141,7 +141,7 @@ def test_layers_and_colours_are_the_same_in_page_server_and_browser(page: Page) 
     assert page.viewer.evaluate(POINTS) >= page.held["drawn"]["points"] > 50
     for layer, node in (("measured", "/cloud"), ("tool", "/tool/ball")):
         page.page.click(f"[data-layer={layer}]")
-        page.until(lambda node=node: node not in page.visible())
+        page.until(lambda node=node: node not in page.visible())  # type: ignore[misc]
         assert layer not in page.held["view"]["layers"]
     page.page.click("[data-layer=extended]")
     page.page.click("[data-colour=plain]")

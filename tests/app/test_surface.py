@@ -5,18 +5,18 @@ import pytest
 
 from app.surface import grid_edges, refine
 from core.frames import FloatArray
-from core.mesh import GridSpec, box_mesh
+from core.mesh import GridSpec, IntArray, box_mesh
 
 SIZE = (0.06, 0.04, 0.03)
 
 
-def block() -> tuple[FloatArray, FloatArray]:
+def block() -> tuple[FloatArray, IntArray]:
     mesh = box_mesh(SIZE, GridSpec(nodes=(5, 4, 3)))
     quads = mesh.free_surface
     return mesh.nodes, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
-def area(points: FloatArray, faces: FloatArray) -> float:
+def area(points: FloatArray, faces: IntArray) -> float:
     a, b, c = (points[faces[:, k]] for k in range(3))
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 

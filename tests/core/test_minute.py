@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.replay import RATE, SETUP, motion
+from benchmarks.reference import SETUP
+from benchmarks.replay import RATE, motion
 from core.mesh import GridSpec
 from core.replay import replay, require_converged
 

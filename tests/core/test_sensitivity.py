@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from functools import partial
 
 import numpy as np
 import pytest
@@ -84,10 +84,8 @@ def test_element_forces_are_gradients_of_each_elements_energy(pushed):
     for element in random.choice(len(forces), 5, replace=False):
         only = slice(element, element + 1)
         rule = Quadrature(model.rule.gradients[only], model.rule.weights[only], model.rule.pressures[only])
-        parts = (model.law, rule, model.topology.hexahedra[only], model.mu[only], model.bulk[only])
-
-        def energy(where: FloatArray, parts: tuple[Any, ...] = parts) -> float:
-            return elastic_energy(*parts, where)
+        nodes, mu, bulk = model.topology.hexahedra[only], model.mu[only], model.bulk[only]
+        energy = partial(elastic_energy, model.law, rule, nodes, mu, bulk)
 
         for corner, axis in ((0, 2), (5, 0), (7, 1)):
             step = np.zeros_like(positions)

@@ -62,7 +62,7 @@ def test_what_open3d_writes_is_read(tmp_path: Path) -> None:
     cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(POINTS))
     cloud.paint_uniform_color([0.1, 0.5, 0.9])
     for ascii_text in (False, True):
-        open3d.io.write_point_cloud(str(tmp_path / "cloud.ply"), cloud, write_ascii=ascii_text)
+        open3d.io.write_point_cloud(tmp_path / "cloud.ply", cloud, write_ascii=ascii_text)
         np.testing.assert_allclose(read_cloud(tmp_path, "cloud.ply"), POINTS, atol=1e-6)
 
 

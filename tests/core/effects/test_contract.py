@@ -210,6 +210,7 @@ def test_sensitivity_is_the_difference_of_two_solves(name):
     frame = None
     for centre in POKE:
         frame = block.step(centre, frame)
+    assert frame is not None
     solved = other.step(POKE[-1], frame)
     wanted = solved.displacement - frame.displacement
     found = displacement_changes(block, frame, [(changed, np.zeros(3))])[0]
@@ -236,6 +237,7 @@ def test_adjoint_gradient_is_that_of_full_solves(name):
     block, frame = Replay(effect.apply(SETUP), GRID, tolerance=1e-11), None
     for centre in POKE:
         frame = block.step(centre, frame)
+    assert frame is not None
     target = 0.8 * frame.displacement  # what was measured, as it were
 
     def loss(found: Equilibrium) -> float:

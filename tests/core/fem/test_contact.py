@@ -77,7 +77,7 @@ def test_tangent_with_the_ball_s_curvature_is_the_derivative_of_the_residual(det
     model = _model(replace(SETUP, support=Support(detached=detached)))
     positions, probe = _dented(model, 2)
     free = model.topology.free
-    tangent = model.topology.factor._matrix.copy()
+    tangent = model.topology.pattern.copy()
     tangent.data = model.assemble(positions, probe).data
     direction = np.random.default_rng(3).normal(size=free.sum())
     wanted = tangent @ direction + tangent.T @ direction - tangent.diagonal() * direction

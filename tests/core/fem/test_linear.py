@@ -18,7 +18,7 @@ EACH = pytest.mark.parametrize("solver", SOLVERS)
 
 def _chain(count: int, diagonal: float) -> sp.csr_matrix:
     """Upper triangle of a chain of springs."""
-    return sp.csr_matrix(sp.diags([np.full(count, diagonal), np.full(count - 1, -1.0)], [0, 1]))
+    return sp.csr_matrix(sp.diags_array([[diagonal] * count, [-1.0] * (count - 1)], offsets=(0, 1)))
 
 
 def _whole(upper: sp.csr_matrix) -> np.ndarray:

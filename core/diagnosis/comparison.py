@@ -1,0 +1,130 @@
+"""What a group's points say of one model: where they meet its surface or its tool, and their averages by patch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from core.diagnosis.observations import Group
+from core.frames import FloatArray, Transform
+from core.measurement import Gaps, PatchMeans, Surface, gaps, plain_means, within_spread
+from core.mesh import IntArray
+from core.replay import Equilibrium
+from core.setup import Setup
+
+__all__ = ["Compared", "Sample", "choose", "compare", "observe"]
+
+TOOL_REACH, CLEARLY = 1.5e-3, 5e-4
+"""A point this near to a model's ball [m], and nearer to it by this much than to the model's surface, is of the tool: clouds are
+cleaned of the tool where it was stated to be, and if it is somewhere else, some of its points remain."""
+
+_MOST_STRETCH = 2.0
+"""A model's surface may turn away from the camera so far that a gap along the ray counts this many times the gap itself."""
+FARTHEST_CHANGE = 8e-3
+"""A point's gap that changes by more than this [m] between models has met another side of the block: its old gap stands."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Which of a group's points are averaged where: settled by the baseline and kept for every other model.
+
+    Were each model to choose anew, points would change patches with the model, and the noise they carry would look like a
+    difference between models. Nor may a model turn its sides towards the camera or away from it, and the noise along the rays
+    with them: gaps count along the ray, times the cosine that the baseline's surface has.
+
+    Attributes:
+        index: (m,) of the group's points. patch: (m,). gap: (m,) of the baseline [m], which stands where a model's ray misses.
+        facing: (m,) cosine between the baseline's normal and the way back to the camera.
+    """
+
+    index: IntArray
+    patch: IntArray
+    gap: FloatArray
+    facing: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """A group's sample under one model.
+
+    Attributes:
+        points: (m, 3) phantom frame [m]. seen: those that lie on the surface. means: of the gaps, by patch.
+        tool: (t,) those that lie on the tool instead. away: (t, 3) unit vectors from its centre. patch: (t,) where they count.
+    """
+
+    points: FloatArray
+    seen: Gaps
+    means: PatchMeans
+    tool: IntArray
+    away: FloatArray
+    patch: IntArray
+
+    def average(self, values: FloatArray, patch: IntArray) -> FloatArray:
+        """Sums over the points of each patch (p, k) of (n, k) values, over all the patch's points."""
+        total = np.zeros((len(self.means.mean), values.shape[1]))
+        np.add.at(total, patch, values)
+        return np.asarray(total / np.maximum(self.means.count, 1)[:, None])
+
+    def along_sight(self, moved: Transform) -> FloatArray:
+        """Change of the averages (p,) [m] when the camera's points are moved."""
+        shift = moved.apply(self.points) - self.points
+        surface = np.einsum("mi,mi->m", shift[self.seen.index], self.seen.normal)
+        ball = np.einsum("ti,ti->t", shift[self.tool], self.away)
+        values, patch = np.concatenate([surface, ball]), np.concatenate([self.seen.patch, self.patch])
+        return self.average(values[:, None], patch)[:, 0]
+
+
+def observe(frame: Equilibrium, compared: Compared) -> sp.csr_matrix:
+    """Patch averages of the displacement along the normal as a linear function of the nodes' displacement (p, 3n)."""
+    seen, patches = compared.seen, len(compared.means.mean)
+    nodes, weights = frame.mesh.locate(seen.foot)
+    share = 1.0 / np.maximum(compared.means.count, 1)[seen.patch]
+    entries = (weights[:, :, None] * seen.normal[:, None, :] * share[:, None, None]).ravel()
+    columns = (3 * nodes[:, :, None] + np.arange(3)).ravel()
+    rows = np.repeat(seen.patch, 3 * nodes.shape[1])
+    return sp.coo_matrix((entries, (rows, columns)), shape=(patches, 3 * len(frame.mesh.nodes))).tocsr()
+
+
+def choose(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) -> Sample:
+    """The points to average, by the model at hand: those on clear parts of the surface, without stray ones."""
+    points, pose = _placed(group, setup)
+    seen = gaps(points, pose.translation, frame, surface)
+    kept = within_spread(seen.gap, seen.patch, surface.patches)
+    index, patch = seen.index[kept].astype(np.int32), seen.patch[kept].astype(np.int32)
+    return Sample(index, patch, seen.gap[kept].astype(np.float32), seen.facing[kept].astype(np.float32))
+
+
+def _placed(group: Group, setup: Setup) -> tuple[FloatArray, Transform]:
+    """The group's points in the phantom frame, and the camera's pose; the reference was seen before the camera could move."""
+    pose = setup.phantom_from_camera if group.reference else setup.phantom_from_camera_true
+    return pose.apply(group.points), pose
+
+
+def _along_rays(seen: Gaps, sample: Sample) -> Gaps:
+    """Gaps, and the normals that say how they change, as long as the baseline's surface would have made them of these rays."""
+    factor = np.minimum(sample.facing[seen.index] / np.maximum(seen.facing, 1e-6), _MOST_STRETCH)
+    return replace(seen, gap=seen.gap * factor, normal=seen.normal * factor[:, None])
+
+
+def compare(group: Group, setup: Setup, frame: Equilibrium, surface: Surface, sample: Sample) -> Compared:
+    """The sample's points, where they meet the surface, and their averages; points of the model's tool lie off the tool."""
+    points, pose = _placed(group, setup)
+    points = points[sample.index]
+    seen = _along_rays(gaps(points, pose.translation, frame, surface, everything=True), sample)
+    values = sample.gap.astype(float)
+    near = np.abs(seen.gap - values[seen.index]) < FARTHEST_CHANGE
+    values[seen.index[near]] = seen.gap[near]
+    arm = points - frame.probe.centre
+    distance = np.linalg.norm(arm, axis=1)
+    off_tool = distance - frame.probe.radius
+    on_tool = (np.abs(off_tool) < TOOL_REACH) & (np.abs(off_tool) < np.abs(values) - CLEARLY)
+    values[on_tool] = off_tool[on_tool]
+    kept, tool = ~on_tool[seen.index], np.flatnonzero(on_tool)
+    index = seen.index[kept]
+    seen = Gaps(
+        index, seen.gap[kept], seen.foot[kept], seen.normal[kept], seen.facing[kept], sample.patch[index], seen.side[kept]
+    )  # fmt: skip
+    means = plain_means(values, sample.patch, surface.patches)
+    return Compared(points, seen, means, tool, arm[tool] / distance[tool, None], sample.patch[tool])
