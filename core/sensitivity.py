@@ -99,34 +99,43 @@ def loss_changes(block: Replay, frame: Equilibrium, slope: FloatArray, changes: 
 
 
 def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray) -> FloatArray:
-    """Displacements that small changes of the elements' stiffness bring about, to first order.
+    """Displacements that small changes of the stiffness within the body bring about, to first order.
 
     Args:
-        log_factors: (m, elements) logarithm of new over old stiffness, on the frame's mesh.
+        log_factors: (m, e, q) logarithm of new over old stiffness, at the quadrature points of the frame's mesh.
 
     Returns:
-        (m, n, 3) [m]; cheap in m, since an element's share of the residual is its own internal force.
+        (m, n, 3) [m]; cheap in m, since a point's share of the residual is what it alone would resist with.
     """
     result = np.zeros((len(log_factors), *frame.displacement.shape))
     model = factorise_at(block, frame) if frame.in_contact else None
     if model is None:
         return result
-    forces = element_forces(model, frame.mesh.nodes + frame.displacement).reshape(len(model.mu), -1)
-    unknown = model.topology.unknown[model.topology.hexahedra].reshape(len(model.mu), -1)
+    forces = point_forces(model, frame.mesh.nodes + frame.displacement)
+    elements, points = model.mu.shape
+    unknown = np.repeat(model.topology.unknown[model.topology.hexahedra].reshape(elements, 1, -1), points, axis=1)
     used = unknown >= 0
-    count = int(model.topology.unknown.max()) + 1
-    gather = sp.csr_matrix((forces[used], (unknown[used], np.nonzero(used)[0])), shape=(count, len(model.mu)))
-    result[:, model.topology.free] = -model.topology.factor.solve(np.asarray(gather @ log_factors.T)).T
+    column = np.broadcast_to(np.arange(elements * points).reshape(elements, points, 1), unknown.shape)
+    shape = (int(model.topology.unknown.max()) + 1, elements * points)
+    gather = sp.csr_matrix((forces.reshape(unknown.shape)[used], (unknown[used], column[used])), shape=shape)
+    right = gather @ sp.csc_matrix(log_factors.reshape(len(log_factors), -1).T)
+    result[:, model.topology.free] = -model.topology.factor.solve(right.toarray()).T
     return result
 
 
-def element_forces(model: BlockModel, positions: FloatArray) -> FloatArray:
-    """Internal forces over E that each element puts on its own nodes (e, a, 3) [m^2]."""
-    count, corners = model.topology.hexahedra.shape
-    apart = np.arange(corners * count).reshape(count, corners)
-    force = np.zeros((corners * count, 3))
-    assemble_elastic(
-        model.law, model.rule, apart, model.mu, model.bulk, positions[model.topology.hexahedra].reshape(-1, 3),
-        np.empty((0, 0, 0), np.int32), force, np.empty(0),
-    )  # fmt: skip
-    return force.reshape(count, corners, 3)
+def point_forces(model: BlockModel, positions: FloatArray) -> FloatArray:
+    """Internal forces over E that the stiffness at each quadrature point puts on its element's nodes (e, q, a, 3) [m^2].
+
+    Forces are linear in the stiffness, so each point's are those of a body that has none elsewhere.
+    """
+    elements, points = model.mu.shape
+    corners = model.topology.hexahedra.shape[1]
+    apart = np.arange(corners * elements).reshape(elements, corners)
+    where = positions[model.topology.hexahedra].reshape(-1, 3)
+    forces = np.empty((elements, points, corners, 3))
+    for point in range(points):
+        mu, bulk, force = np.zeros_like(model.mu), np.zeros_like(model.bulk), np.zeros((corners * elements, 3))
+        mu[:, point], bulk[:, point] = model.mu[:, point], model.bulk[:, point]
+        assemble_elastic(model.law, model.rule, apart, mu, bulk, where, np.empty((0, 0, 0), np.int32), force, np.empty(0))
+        forces[:, point] = force.reshape(elements, corners, 3)
+    return forces

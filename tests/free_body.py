@@ -37,6 +37,7 @@ class FreeBody:
 
     Attributes:
         mesh: which nodes form which element. nodes: (n, 3) rest positions [m]. held: (n, 3) where the displacement is given.
+        uneven: spread of the logarithm of the stiffness from point to point.
     """
 
     mesh: BoxMesh
@@ -44,13 +45,14 @@ class FreeBody:
     law: Law
     poisson_ratio: float
     held: np.ndarray
+    uneven: float = 0.0
 
     @cached_property
     def _parts(self) -> tuple[Quadrature, IntArray, FloatArray, FloatArray]:
         mu, bulk = lame(self.law, self.poisson_ratio)
-        ones = np.ones(len(self.mesh.hexahedra))
         rule = quadrature(HEXAHEDRA[self.mesh.order], self.nodes[self.mesh.hexahedra])
-        return rule, np.ascontiguousarray(self.mesh.hexahedra), mu * ones, bulk * ones
+        factor = np.exp(self.uneven * np.random.default_rng(2).standard_normal(rule.weights.shape))
+        return rule, np.ascontiguousarray(self.mesh.hexahedra), mu * factor, bulk * factor
 
     @cached_property
     def _system(self):

@@ -9,7 +9,7 @@ import numpy as np
 
 from core.diagnosis.comparison import Compared, Sample, choose, compare, observe
 from core.diagnosis.observations import Observations
-from core.fem.model import log_stiffness
+from core.fem.model import log_stiffness, rule_of
 from core.fem.newton import Outcome
 from core.frames import FloatArray, Transform
 from core.measurement import Surface
@@ -96,8 +96,7 @@ class _Columns:
         arm = frame.probe.centre - wanted.pivot
         turned = [np.tensordot(np.cross(axis, arm), tool, axes=1) for axis in np.eye(3)]
         scaled = changed[3:] / np.array(wanted.steps)[:, None, None] if wanted.steps else changed[3:]
-        corners = frame.mesh.nodes[frame.mesh.hexahedra] if wanted.lumps else np.empty((0, 2, 3))
-        factors = np.array([log_stiffness((replace(lump, stiffness_ratio=np.e),), corners) for lump in wanted.lumps])
+        factors = np.array([log_stiffness((replace(lump, stiffness_ratio=np.e),), rule_of(frame.mesh)[0]) for lump in wanted.lumps])
         lumps = stiffness_changes(self.block, frame, factors) if wanted.lumps else changed[:0]
         return np.concatenate([tool, np.array(turned), scaled, lumps])
 

@@ -78,18 +78,19 @@ def _density(f: Any, rotation: Any) -> float:
 @njit(cache=True)
 def energy(gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: Any, positions: Any) -> float:
     """Elastic energy over E [m^3]; infinite when an element is inverted at a quadrature point."""
-    f, work, theta = np.empty((3, 3)), np.empty((3, 3)), np.empty(modes.shape[2])
+    points = weights.shape[1]
+    f, work, trace, theta = np.empty((3, 3)), np.empty((3, 3)), np.empty(points), np.empty(points)
     total = 0.0
     for e in range(nodes.shape[0]):
-        theta[:] = 0.0
-        for q in range(weights.shape[1]):
+        for q in range(points):
             _deformation(gradients[e, q], positions, nodes[e], f)
-            t = _dilatation(f, work)
-            if np.isnan(t):
+            trace[q] = _dilatation(f, work)
+            if np.isnan(trace[q]):
                 return np.inf
-            theta += weights[e, q] * t * modes[e, q]
-            total += weights[e, q] * mu[e] * _density(f, work)
-        total += 0.5 * bulk[e] * np.sum(theta * theta)
+            total += weights[e, q] * mu[e, q] * _density(f, work)
+        project(weights[e], modes[e], trace, theta)
+        for q in range(points):
+            total += 0.5 * weights[e, q] * bulk[e, q] * theta[q] * theta[q]
     return total
 
 
@@ -124,15 +125,14 @@ def _stress(f: Any, rotation: Any, mu: float, pressure: float, wanted: bool, str
 
 
 @njit(cache=True)
-def _press(
-    gradients: Any, weights: Any, modes: Any, bulk: float, positions: Any, nodes: Any, f: Any, work: Any, press: Any
-) -> None:
+def _press(gradients: Any, weights: Any, modes: Any, bulk: Any, positions: Any, nodes: Any, f: Any, work: Any, press: Any) -> None:
     """F, its rotation and the pressure at all points of an element."""
-    dilatation = np.empty(weights.shape[0])
+    dilatation, theta = np.empty(weights.shape[0]), np.empty(weights.shape[0])
     for q in range(weights.shape[0]):
         _deformation(gradients[q], positions, nodes, f[q])
-        dilatation[q] = bulk * _dilatation(f[q], work[q])
-    project(weights, modes, dilatation, press)
+        dilatation[q] = _dilatation(f[q], work[q])
+    project(weights, modes, dilatation, theta)
+    project(weights, modes, bulk * theta, press)
 
 
 @njit(cache=True)
@@ -150,7 +150,7 @@ def assemble(
         _press(gradients[e], weights[e], modes[e], bulk[e], positions, nodes[e], f, work, press)
         for q in range(points):
             w = weights[e, q]
-            _stress(f[q], work[q], mu[e], press[q], wanted, stress, tangent)
+            _stress(f[q], work[q], mu[e, q], press[q], wanted, stress, tangent)
             for a in range(nodes.shape[1]):
                 for i in range(3):
                     turned = np.sum(work[q, i] * gradients[e, q, a])
@@ -161,7 +161,8 @@ def assemble(
                 _add_point(tangent, gradients[e, q], w, half, matrix)
         if wanted:
             for m in range(modes.shape[2]):
-                matrix += bulk[e] * np.outer(moved[m], moved[m])
+                for n in range(modes.shape[2]):
+                    matrix += np.sum(weights[e] * bulk[e] * modes[e, :, m] * modes[e, :, n]) * np.outer(moved[m], moved[n])
             scatter(matrix, slots[e], data)
 
 

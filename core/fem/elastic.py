@@ -47,7 +47,7 @@ def elastic_energy(law: Law, rule: Quadrature, nodes: IntArray, mu: FloatArray, 
     """Elastic energy over E [m^3]; infinite when an element is inverted at a quadrature point.
 
     Args:
-        nodes: (e, a). mu, bulk: (e,) moduli over E. positions: (n, 3) current node positions [m].
+        nodes: (e, a). mu, bulk: (e, q) moduli over E at the quadrature points. positions: (n, 3) current node positions [m].
     """
     parts = (rule.gradients, rule.weights, rule.pressures, nodes, mu, bulk)
     if law.corotational:

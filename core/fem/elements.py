@@ -45,11 +45,13 @@ class Element:
 
 @dataclass(frozen=True, eq=False)
 class Quadrature:
-    """Quadrature of a mesh at rest: gradients (e, q, a, 3) [1/m], weights (e, q) [m^3], pressures (e, q, m), orthonormal."""
+    """Quadrature of a mesh at rest: gradients (e, q, a, 3) [1/m], weights (e, q) [m^3], pressures (e, q, m), orthonormal; places
+    (e, q, 3) [m]."""
 
     gradients: FloatArray
     weights: FloatArray
     pressures: FloatArray
+    places: FloatArray
 
 
 def _lagrange(order: int, at: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -102,7 +104,8 @@ def quadrature(element: Element, corners: FloatArray) -> Quadrature:
     weights = np.linalg.det(jacobian) * element.weights
     roots = np.sqrt(weights)[:, :, None]
     pressures = np.linalg.qr(roots * element.pressures)[0] / roots
-    return Quadrature(np.ascontiguousarray(gradients), np.ascontiguousarray(weights), np.ascontiguousarray(pressures))
+    places = np.einsum("qa,eai->eqi", element.shapes, corners)
+    return Quadrature(np.ascontiguousarray(gradients), np.ascontiguousarray(weights), np.ascontiguousarray(pressures), places)
 
 
 def face_weights(face: Face, corners: FloatArray) -> FloatArray:

@@ -70,7 +70,6 @@ def energy(gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: 
     total = 0.0
     for e in range(nodes.shape[0]):
         _gather(positions, nodes[e], x)
-        shape, volume = 0.0, 0.0
         for q in range(points):
             det[q] = _deform(gradients[e, q], x, f, c)
             if not det[q] > 0.0:
@@ -81,25 +80,24 @@ def energy(gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: 
                 if not left > 0.0:
                     return np.inf
                 strain = -np.log(left) / stiffening
-            shape += weights[e, q] * strain
+            total += 0.5 * mu[e, q] * weights[e, q] * strain
         project(weights[e], modes[e], det, theta)
         for q in range(points):
             if not theta[q] > 0.0:
                 return np.inf
-            volume += weights[e, q] * (theta[q] * theta[q] - 1.0 - 2.0 * np.log(theta[q]))
-        total += 0.5 * mu[e] * shape + 0.25 * bulk[e] * volume
+            total += 0.25 * bulk[e, q] * weights[e, q] * (theta[q] * theta[q] - 1.0 - 2.0 * np.log(theta[q]))
     return total
 
 
 @njit(cache=True, fastmath=_FUSED, inline="always")
-def _press(gradients: Any, weights: Any, modes: Any, bulk: float, x: Any, f: Any, c: Any, scalars: Any) -> None:
+def _press(gradients: Any, weights: Any, modes: Any, bulk: Any, x: Any, f: Any, c: Any, scalars: Any) -> None:
     """F and cofactors at all points of an element; rows of `scalars` get det F, theta, U'(theta), pressure."""
     det, theta, slope = scalars[0], scalars[1], scalars[2]
     for q in range(weights.shape[0]):
         det[q] = _deform(gradients[q], x, f[q], c[q])
     project(weights, modes, det, theta)
     for q in range(weights.shape[0]):
-        slope[q] = 0.5 * bulk * (theta[q] - 1.0 / theta[q])
+        slope[q] = 0.5 * bulk[q] * (theta[q] - 1.0 / theta[q])
     project(weights, modes, slope, scalars[3])
 
 
@@ -124,7 +122,7 @@ def add_forces(
         own[:] = 0.0
         for q in range(points):
             root, square = np.cbrt(det[q] * det[q]), _square(f[q])
-            scale = weights[e, q] * mu[e] / root * _hardening(square, root, stiffening)
+            scale = weights[e, q] * mu[e, q] / root * _hardening(square, root, stiffening)
             by_volume = weights[e, q] * press[q] - scale * square / (3.0 * det[q])
             for k in range(9):
                 p[k] = scale * f[q, k] + by_volume * c[q, k]
@@ -181,13 +179,13 @@ def _add_point(
 
 
 @njit(cache=True, fastmath=_FUSED)
-def _add_volume(weights: Any, modes: Any, bulk: float, theta: Any, moved: Any, matrix: Any) -> None:
+def _add_volume(weights: Any, modes: Any, bulk: Any, theta: Any, moved: Any, matrix: Any) -> None:
     """Add what the pressures' own change brings: sum over m, n of D_mn b_m b_n', b_m (m, 3 a) the change of mode m's theta."""
     for m in range(modes.shape[1]):
         for n in range(modes.shape[1]):
             stiffness = 0.0
             for q in range(modes.shape[0]):
-                curvature = 0.5 * bulk * (1.0 + 1.0 / (theta[q] * theta[q]))
+                curvature = 0.5 * bulk[q] * (1.0 + 1.0 / (theta[q] * theta[q]))
                 stiffness += weights[q] * curvature * modes[q, m] * modes[q, n]
             for row in range(matrix.shape[0]):
                 share = stiffness * moved[m, row]
@@ -222,7 +220,7 @@ def add_matrices(
             weight, det, square = weights[e, q], scalars[0, q], _square(f[q])
             root = np.cbrt(det * det)
             harder = _hardening(square, root, stiffening)
-            scale = weight * mu[e] / root * harder
+            scale = weight * mu[e, q] / root * harder
             hardening = 2.0 * scale * stiffening * harder / root
             _images(gradients[e, q], f[q], c[q], turned, closed)
             press = weight * scalars[3, q] - scale * square / (3.0 * det)

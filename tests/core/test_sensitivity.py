@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 
 import numpy as np
@@ -9,11 +9,11 @@ from pushed_block import GRID, SETUP, poke
 
 from core.fem.elastic import elastic_energy
 from core.fem.elements import Quadrature
-from core.fem.model import BlockModel, log_stiffness
+from core.fem.model import BlockModel, log_stiffness, rule_of
 from core.fem.newton import solve
 from core.frames import FloatArray
 from core.replay import Equilibrium, Replay
-from core.sensitivity import TOOL_STEP, displacement_changes, element_forces, factorise_at, stiffness_changes
+from core.sensitivity import TOOL_STEP, displacement_changes, factorise_at, point_forces, stiffness_changes
 from core.setup import Inclusion, Load, Sensor, Setup
 
 TIGHT = 1e-10
@@ -33,7 +33,7 @@ def _relative(found: FloatArray, wanted: FloatArray) -> float:
 
 
 def _stiffened(frame: Equilibrium, log_factor: FloatArray) -> FloatArray:
-    """Displacement (n, 3) [m] when the elements' stiffness is multiplied, by a full solve."""
+    """Displacement (n, 3) [m] when the points' stiffness is multiplied, by a full solve."""
     model = BlockModel(SETUP, frame.mesh)
     model.mu, model.bulk = model.mu * np.exp(log_factor), model.bulk * np.exp(log_factor)
     solution = solve(model, frame.probe, frame.mesh.nodes + frame.displacement, None, TIGHT)
@@ -43,12 +43,11 @@ def _stiffened(frame: Equilibrium, log_factor: FloatArray) -> FloatArray:
 
 def test_stiffness_changes_are_those_of_full_solves(pushed):
     block, frame = pushed
-    corners = frame.mesh.nodes[frame.mesh.hexahedra]
-    near = int(np.argmin(np.linalg.norm(corners.mean(axis=1) - poke(14e-3), axis=1)))
-    alone = np.zeros(len(corners))
-    alone[near] = 1.0
-    lump = log_stiffness((Inclusion(x=8e-3, y=0.0, z=0.022, radius=7e-3, stiffness_ratio=np.e),), corners)
-    field = np.random.default_rng(0).standard_normal(len(corners))
+    rule, _ = rule_of(frame.mesh)
+    alone = np.zeros(rule.weights.shape)
+    alone.flat[np.argmin(np.linalg.norm(rule.places - poke(14e-3), axis=2))] = 1.0
+    lump = log_stiffness((Inclusion(x=8e-3, y=0.0, z=0.022, radius=7e-3, stiffness_ratio=np.e),), rule)
+    field = np.random.default_rng(0).standard_normal(rule.weights.shape)
     found = stiffness_changes(block, frame, np.array([alone, lump, field]))
     for factor, change in zip((alone, lump, field), found, strict=True):
         wanted = (_stiffened(frame, SMALL * factor) - _stiffened(frame, -SMALL * factor)) / (2 * SMALL)
@@ -57,7 +56,7 @@ def test_stiffness_changes_are_those_of_full_solves(pushed):
 
 def test_stiffness_everywhere_the_same_moves_only_against_the_contact(pushed):
     block, frame = pushed
-    whole = stiffness_changes(block, frame, np.ones((1, len(frame.mesh.hexahedra))))[0]
+    whole = stiffness_changes(block, frame, np.ones((1, *rule_of(frame.mesh)[0].weights.shape)))[0]
     # Position-driven: a stiffer block takes the same shape, but for the softness of the contact.
     assert np.abs(whole).max() < 0.05 * np.abs(frame.displacement).max()
 
@@ -65,8 +64,7 @@ def test_stiffness_everywhere_the_same_moves_only_against_the_contact(pushed):
 def test_lump_of_the_setup_is_what_its_column_says(pushed):
     block, frame = pushed
     lump = Inclusion(x=8e-3, y=0.0, z=0.022, radius=7e-3, stiffness_ratio=np.e)
-    corners = frame.mesh.nodes[frame.mesh.hexahedra]
-    found = stiffness_changes(block, frame, log_stiffness((lump,), corners)[None])[0]
+    found = stiffness_changes(block, frame, log_stiffness((lump,), rule_of(frame.mesh)[0])[None])[0]
     setups = [
         replace(SETUP, material=replace(SETUP.material, inclusions=(replace(lump, stiffness_ratio=np.exp(step)),)))
         for step in (SMALL, -SMALL)
@@ -75,34 +73,35 @@ def test_lump_of_the_setup_is_what_its_column_says(pushed):
     assert _relative(found, (stiffer - softer) / (2 * SMALL)) < 0.01
 
 
-def test_element_forces_are_gradients_of_each_elements_energy(pushed):
+def test_point_forces_are_gradients_of_each_points_energy(pushed):
     block, frame = pushed
     model = block.model(frame.mesh)
     positions = frame.mesh.nodes + frame.displacement
-    forces = element_forces(model, positions)
+    forces = point_forces(model, positions)
     random = np.random.default_rng(1)
-    for element in random.choice(len(forces), 5, replace=False):
+    for element, point in random.integers(model.mu.shape, size=(5, 2)):
         only = slice(element, element + 1)
-        rule = Quadrature(model.rule.gradients[only], model.rule.weights[only], model.rule.pressures[only])
-        nodes, mu, bulk = model.topology.hexahedra[only], model.mu[only], model.bulk[only]
+        rule = Quadrature(*(getattr(model.rule, part.name)[only] for part in fields(Quadrature)))
+        alone = np.arange(model.mu.shape[1]) == point
+        nodes, mu, bulk = model.topology.hexahedra[only], model.mu[only] * alone, model.bulk[only] * alone
         energy = partial(elastic_energy, model.law, rule, nodes, mu, bulk)
 
         for corner, axis in ((0, 2), (5, 0), (7, 1)):
             step = np.zeros_like(positions)
             step[model.topology.hexahedra[element, corner], axis] = 1e-7
             wanted = (energy(positions + step) - energy(positions - step)) / 2e-7
-            assert forces[element, corner, axis] == pytest.approx(wanted, rel=1e-3, abs=1e-5 * np.abs(forces).max())
+            assert forces[element, point, corner, axis] == pytest.approx(wanted, rel=1e-3, abs=1e-5 * np.abs(forces).max())
 
 
-def test_element_forces_add_up_to_the_residual_and_balance(pushed):
+def test_point_forces_add_up_to_the_residual_and_balance(pushed):
     block, frame = pushed
     model = block.model(frame.mesh)
     positions = frame.mesh.nodes + frame.displacement
-    forces = element_forces(model, positions)
+    forces = point_forces(model, positions)
     total = np.zeros_like(positions)
-    np.add.at(total, model.topology.hexahedra, forces)
+    np.add.at(total, model.topology.hexahedra, forces.sum(axis=1))
     assert np.allclose(total[model.topology.free], model.assemble(positions, None).residual, atol=1e-16)
-    assert np.abs(forces.sum(axis=1)).max() < 1e-9 * np.abs(forces).max()
+    assert np.abs(forces.sum(axis=2)).max() < 1e-9 * np.abs(forces).max()
 
 
 def test_tool_motion_is_that_of_full_solves(pushed):
@@ -133,7 +132,7 @@ def test_untouched_block_answers_to_weight_only():
     block = Replay(SETUP, GRID)
     frame = block.step(poke(-9e-3))
     assert not displacement_changes(block, frame, [(SETUP, np.array([0.0, 0.0, TOOL_STEP]))]).any()
-    assert not stiffness_changes(block, frame, np.ones((2, len(frame.mesh.hexahedra)))).any()
+    assert not stiffness_changes(block, frame, np.ones((2, *rule_of(frame.mesh)[0].weights.shape))).any()
     sagging = Replay(replace(SETUP, load=Load(specific_weight_over_stiffness=1.5)), GRID)
     heavier = replace(SETUP, load=Load(specific_weight_over_stiffness=1.501))
     assert displacement_changes(sagging, sagging.step(poke(-9e-3)), [(heavier, np.zeros(3))])[0, :, 2].min() < 0

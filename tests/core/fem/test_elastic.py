@@ -21,9 +21,9 @@ AFFINE = np.array([[1.20, 0.10, -0.05], [0.03, 0.85, 0.12], [-0.08, 0.02, 1.10]]
 
 
 def _loose(law: Law, order: int, poisson_ratio: float = 0.45, seed: int = 0) -> FreeBody:
-    """A small block of distorted elements, held nowhere."""
+    """A small block of distorted elements whose stiffness varies from point to point, held nowhere."""
     mesh = grid((0.05, 0.03, 0.02), (5, 5, 3), order)
-    return FreeBody(mesh, distorted(mesh, 0.25, seed), law, poisson_ratio, np.zeros((len(mesh.nodes), 3), dtype=bool))
+    return FreeBody(mesh, distorted(mesh, 0.25, seed), law, poisson_ratio, np.zeros((len(mesh.nodes), 3), dtype=bool), uneven=0.5)
 
 
 def _bent(body: FreeBody, seed: int) -> np.ndarray:
