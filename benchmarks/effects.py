@@ -8,6 +8,7 @@ The reference figures come from another engine on the same block (quadratic hexa
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from rich.table import Table
@@ -22,7 +23,7 @@ from core.effects.tool import ToolOffset, ToolRadius
 from core.frames import FloatArray
 from core.mesh import GridSpec, box_mesh
 from core.replay import replay, require_converged
-from core.setup import Setup
+from core.setup import Layer, Setup
 
 __all__ = ["run"]
 
@@ -46,6 +47,10 @@ def _with(effect: Effect) -> Setup:
     return effect.apply(STATED)
 
 
+def _made_of(**changes: Any) -> Setup:
+    return replace(STATED, material=replace(STATED.material, **changes))
+
+
 ROWS = (
     Row("gravity", _with(Gravity(specific_weight_over_stiffness=2.1)), (0.94, 1.06)),
     Row("tool radius 3.5 mm", _with(ToolRadius(radius=3.5e-3)), (0.27, 1.2)),
@@ -59,7 +64,10 @@ ROWS = (
     Row("half the base detached", _with(BaseDetachment(edge="+x", extent=STATED.geometry.size[0] / 2)), (0.10, 0.23)),
     Row("nu 0.35", _with(PoissonRatio(nu=0.35)), (0.07, 0.32)),
     Row("nu 0.49", _with(PoissonRatio(nu=0.49)), (0.05, 0.14)),
-    Row("Gent, J_m 10", replace(STATED, material=replace(STATED.material, stretch_limit=10.0)), (0.04, 0.20)),
+    Row("Gent, J_m 10", _made_of(stretch_limit=10.0), (0.04, 0.20)),
+    Row("skin of 2 mm, 5 times stiffer", _made_of(layer=Layer(thickness=2e-3, stiffness_ratio=5.0)), (0.27, 1.0)),
+    Row("top twice as stiff as the base", _made_of(log_ratio=float(np.log(2.0))), (0.19, 0.37)),
+    Row("base twice as stiff as the top", _made_of(log_ratio=-float(np.log(2.0))), (0.19, 0.37)),
 )
 
 

@@ -9,7 +9,20 @@ from typing import Any, Literal
 from core.errors import SetupError
 from core.frames import Transform
 
-__all__ = ["Box", "Detachment", "Edge", "Inclusion", "Load", "Material", "MaterialLaw", "Sensor", "Setup", "Support", "Tool"]
+__all__ = [
+    "Box",
+    "Detachment",
+    "Edge",
+    "Inclusion",
+    "Layer",
+    "Load",
+    "Material",
+    "MaterialLaw",
+    "Sensor",
+    "Setup",
+    "Support",
+    "Tool",
+]
 
 MaterialLaw = Literal["neo_hooke", "corotational"]
 Edge = Literal["-x", "+x", "-y", "+y"]
@@ -44,11 +57,24 @@ class Inclusion:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Layer:
+    """A skin of other stiffness on the top: thickness [m], stiffness of skin over rest [1]."""
+
+    thickness: float
+    stiffness_ratio: float
+
+    def __post_init__(self) -> None:
+        _within("layer thickness", self.thickness, 1e-5, 2.0, "m")
+        _within("layer stiffness_ratio", self.stiffness_ratio, 1e-3, 1e3, "")
+
+
+@dataclass(frozen=True, kw_only=True)
 class Material:
     """What the block is made of.
 
     Attributes:
         young_modulus: at rest [Pa]. poisson_ratio: [1]. law: of elasticity. inclusions: lumps inside.
+        layer: a skin on the top. log_ratio: ln of Young's modulus at the top over that at the base, its geometric mean kept [1].
         stretch_limit: J_m of Gent's law [1], where the material is stretched to its limit; None for a material without.
     """
 
@@ -56,11 +82,14 @@ class Material:
     poisson_ratio: float = 0.45
     law: MaterialLaw = "neo_hooke"
     inclusions: tuple[Inclusion, ...] = ()
+    layer: Layer | None = None
+    log_ratio: float = 0.0
     stretch_limit: float | None = None
 
     def __post_init__(self) -> None:
         _within("young_modulus", self.young_modulus, 1.0, 1e9, "Pa")
         _within("poisson_ratio", self.poisson_ratio, -0.5, 0.4999, "")
+        _within("log_ratio", self.log_ratio, -7.0, 7.0, "")
         if self.stretch_limit is not None:
             _within("stretch_limit", self.stretch_limit, 0.1, 1e6, "")
             if self.law == "corotational":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -37,7 +38,7 @@ class FreeBody:
 
     Attributes:
         mesh: which nodes form which element. nodes: (n, 3) rest positions [m]. held: (n, 3) where the displacement is given.
-        uneven: spread of the logarithm of the stiffness from point to point.
+        log_stiffness: its logarithm over the stated one at the quadrature points (e, q).
     """
 
     mesh: BoxMesh
@@ -45,13 +46,13 @@ class FreeBody:
     law: Law
     poisson_ratio: float
     held: np.ndarray
-    uneven: float = 0.0
+    log_stiffness: Callable[[Quadrature], FloatArray] | None = None
 
     @cached_property
     def _parts(self) -> tuple[Quadrature, IntArray, FloatArray, FloatArray]:
         mu, bulk = lame(self.law, self.poisson_ratio)
         rule = quadrature(HEXAHEDRA[self.mesh.order], self.nodes[self.mesh.hexahedra])
-        factor = np.exp(self.uneven * np.random.default_rng(2).standard_normal(rule.weights.shape))
+        factor = np.exp(np.zeros(rule.weights.shape) if self.log_stiffness is None else self.log_stiffness(rule))
         return rule, np.ascontiguousarray(self.mesh.hexahedra), mu * factor, bulk * factor
 
     @cached_property

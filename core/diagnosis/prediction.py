@@ -9,8 +9,9 @@ import numpy as np
 
 from core.diagnosis.comparison import Compared, Sample, choose, compare, observe
 from core.diagnosis.observations import Observations
-from core.fem.model import log_stiffness, rule_of
+from core.fem.model import rule_of
 from core.fem.newton import Outcome
+from core.fem.stiffness import lump_share
 from core.frames import FloatArray, Transform
 from core.measurement import Surface
 from core.mesh import GridSpec
@@ -96,7 +97,7 @@ class _Columns:
         arm = frame.probe.centre - wanted.pivot
         turned = [np.tensordot(np.cross(axis, arm), tool, axes=1) for axis in np.eye(3)]
         scaled = changed[3:] / np.array(wanted.steps)[:, None, None] if wanted.steps else changed[3:]
-        factors = np.array([log_stiffness((replace(lump, stiffness_ratio=np.e),), rule_of(frame.mesh)[0]) for lump in wanted.lumps])
+        factors = np.array([lump_share(lump, rule_of(frame.mesh)[0]) for lump in wanted.lumps])
         lumps = stiffness_changes(self.block, frame, factors) if wanted.lumps else changed[:0]
         return np.concatenate([tool, np.array(turned), scaled, lumps])
 

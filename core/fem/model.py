@@ -14,11 +14,12 @@ from core.fem.contact import assemble_contact, contact_energy, turns_around
 from core.fem.elastic import Law, assemble_elastic, elastic_energy, lame
 from core.fem.elements import HEXAHEDRA, Quadrature, face_weights, quadrature
 from core.fem.linear import face_slots, factor_of, upper_pattern
+from core.fem.stiffness import log_stiffness
 from core.frames import FloatArray
 from core.mesh import BoxMesh, GridSpec, IntArray, box_mesh
-from core.setup import Detachment, Inclusion, Setup
+from core.setup import Detachment, Setup
 
-__all__ = ["CONTACT_STIFFNESS", "Assembly", "BlockModel", "Probe", "Topology", "log_stiffness", "rule_of", "topology"]
+__all__ = ["CONTACT_STIFFNESS", "Assembly", "BlockModel", "Probe", "Topology", "rule_of", "topology"]
 
 CONTACT_STIFFNESS = 5e4
 """Contact pressure over E per penetration [1/m]: 0.02 mm at a pressure equal to E."""
@@ -26,8 +27,6 @@ BOND_STIFFNESS = 2e4
 """The same for a bonded base that is not simply held [1/m]."""
 _BOND_EDGE = 1e-3
 """Width over which a bond ends at a detached strip's edge [m]: the result changes smoothly with the strip's extent."""
-_LUMP_EDGE = 2.3
-"""So many edges from its surface a lump holds less than a ten-thousandth of a point's volume."""
 _EMPTY = np.empty(0)
 
 
@@ -79,20 +78,6 @@ def topology(nodes: tuple[int, int, int], order: int, held: bool) -> Topology:
     return Topology(nodes, order, held)
 
 
-def log_stiffness(inclusions: tuple[Inclusion, ...], rule: Quadrature) -> FloatArray:
-    """Logarithm of stiffness over the matrix's at the quadrature points (e, q), smooth in the lump's place and size.
-
-    A point stands for the volume around it, which a lump's surface cuts while it passes over about an edge's length.
-    """
-    log_factor = np.zeros(rule.weights.shape)
-    edge = np.cbrt(rule.weights)
-    for lump in inclusions:
-        depth = (lump.radius - np.linalg.norm(rule.places - (lump.x, lump.y, lump.z), axis=2)) / edge
-        near = depth > -_LUMP_EDGE
-        log_factor[near] += 0.5 * (1 + np.tanh(2 * depth[near])) * np.log(lump.stiffness_ratio)
-    return log_factor
-
-
 def _held_share(detached: tuple[Detachment, ...], size: tuple[float, float, float], points: FloatArray) -> FloatArray:
     """Share of the bond (0 to 1) left at base points (..., 3) [m]."""
     held = np.ones(points.shape[:-1])
@@ -120,7 +105,7 @@ class BlockModel:
         self.law, self.face = Law.of(setup.material), self.topology.element.face
         self.rule, self.areas = rule_of(mesh)
         mu, bulk = lame(self.law, setup.material.poisson_ratio)
-        factor = np.exp(log_stiffness(setup.material.inclusions, self.rule))
+        factor = np.exp(log_stiffness(setup.material, self.rule, setup.geometry.size[2]))
         self.mu, self.bulk = mu * factor, bulk * factor
         # Sums of squares near three lose their last digits when three is taken off, in proportion to this stiffness times volume.
         self.rounding = 4e-16 * float(np.vdot(self.mu, self.rule.weights))

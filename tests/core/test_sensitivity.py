@@ -9,8 +9,9 @@ from pushed_block import GRID, SETUP, poke
 
 from core.fem.elastic import elastic_energy
 from core.fem.elements import Quadrature
-from core.fem.model import BlockModel, log_stiffness, rule_of
+from core.fem.model import BlockModel, rule_of
 from core.fem.newton import solve
+from core.fem.stiffness import lump_share
 from core.frames import FloatArray
 from core.replay import Equilibrium, Replay
 from core.sensitivity import TOOL_STEP, displacement_changes, factorise_at, point_forces, stiffness_changes
@@ -46,7 +47,7 @@ def test_stiffness_changes_are_those_of_full_solves(pushed):
     rule, _ = rule_of(frame.mesh)
     alone = np.zeros(rule.weights.shape)
     alone.flat[np.argmin(np.linalg.norm(rule.places - poke(14e-3), axis=2))] = 1.0
-    lump = log_stiffness((Inclusion(x=8e-3, y=0.0, z=0.022, radius=7e-3, stiffness_ratio=np.e),), rule)
+    lump = lump_share(Inclusion(x=8e-3, y=0.0, z=0.022, radius=7e-3, stiffness_ratio=np.e), rule)
     field = np.random.default_rng(0).standard_normal(rule.weights.shape)
     found = stiffness_changes(block, frame, np.array([alone, lump, field]))
     for factor, change in zip((alone, lump, field), found, strict=True):
@@ -64,7 +65,7 @@ def test_stiffness_everywhere_the_same_moves_only_against_the_contact(pushed):
 def test_lump_of_the_setup_is_what_its_column_says(pushed):
     block, frame = pushed
     lump = Inclusion(x=8e-3, y=0.0, z=0.022, radius=7e-3, stiffness_ratio=np.e)
-    found = stiffness_changes(block, frame, log_stiffness((lump,), rule_of(frame.mesh)[0])[None])[0]
+    found = stiffness_changes(block, frame, lump_share(lump, rule_of(frame.mesh)[0])[None])[0]
     setups = [
         replace(SETUP, material=replace(SETUP.material, inclusions=(replace(lump, stiffness_ratio=np.exp(step)),)))
         for step in (SMALL, -SMALL)
