@@ -48,7 +48,7 @@ def test_stiffness_changes_are_those_of_full_solves(pushed):
     alone = np.zeros(rule.weights.shape)
     alone.flat[np.argmin(np.linalg.norm(rule.places - poke(14e-3), axis=2))] = 1.0
     lump = lump_share(Inclusion(x=8e-3, y=0.0, z=0.022, radius=7e-3, stiffness_ratio=np.e), rule)
-    field = np.random.default_rng(0).standard_normal(rule.weights.shape)
+    field = np.asarray(np.random.default_rng(0).standard_normal(rule.weights.shape))
     found = stiffness_changes(block, frame, np.array([alone, lump, field]))
     for factor, change in zip((alone, lump, field), found, strict=True):
         wanted = (_stiffened(frame, SMALL * factor) - _stiffened(frame, -SMALL * factor)) / (2 * SMALL)

@@ -24,7 +24,7 @@ AFFINE = np.array([[1.20, 0.10, -0.05], [0.03, 0.85, 0.12], [-0.08, 0.02, 1.10]]
 
 
 def _uneven(spread: float, rule: Quadrature) -> np.ndarray:
-    return spread * np.random.default_rng(2).standard_normal(rule.weights.shape)
+    return np.asarray(spread * np.random.default_rng(2).standard_normal(rule.weights.shape))
 
 
 def _loose(law: Law, order: int, poisson_ratio: float = 0.45, seed: int = 0, spread: float = 0.5) -> FreeBody:
