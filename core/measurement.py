@@ -19,7 +19,7 @@ from core.mesh import IntArray
 from core.replay import Equilibrium
 from core.setup import Box
 
-__all__ = ["Gaps", "PatchMeans", "Surface", "gaps", "patch_means", "plain_means", "within_spread"]
+__all__ = ["Gaps", "PatchMeans", "Surface", "gaps", "gaps_beside", "patch_means", "plain_means", "within_spread"]
 
 MaskArray = np.ndarray[Any, np.dtype[np.bool_]]
 SIDES = ("+z", "-y", "+y", "-x", "+x")
@@ -28,6 +28,8 @@ _GRAZING = 0.3
 _EDGE = 1.5e-3
 """Points this near to an edge of the block [m] are left out: depth cameras round edges off."""
 _OUTLIER = 8e-3
+_BESIDE = 1e-3
+"""How far from a material point others are taken to span its plane [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,22 +44,24 @@ class Surface:
     spacing: float = 1.5e-3
     patch: float = 4e-3
 
-    def _axes(self, side: str) -> tuple[int, int, int]:
+    def axes(self, side: str) -> tuple[int, int, int]:
         """Normal axis and the two axes in the plane, right-handed about the outward normal."""
         normal = "xyz".index(side[1])
         first, second = [(1, 2), (2, 0), (0, 1)][normal]
         return (normal, first, second) if side[0] == "+" else (normal, second, first)
 
-    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest corner at rest, (3,) each [m]."""
         x, y, z = self.geometry.size
         return np.array([-x / 2, -y / 2, 0.0]), np.array([x / 2, y / 2, z])
 
     @cached_property
     def _mesh(self) -> tuple[FloatArray, IntArray, IntArray]:
-        low, high = self._bounds()
+        low, high = self.bounds
         vertices, faces, sides, count = [], [], [], 0
         for number, side in enumerate(SIDES):
-            normal, first, second = self._axes(side)
+            normal, first, second = self.axes(side)
             steps = [max(2, int(np.ceil((high[a] - low[a]) / self.spacing)) + 1) for a in (first, second)]
             lines = [np.linspace(low[a], high[a], n) for a, n in zip((first, second), steps, strict=True)]
             grid = np.meshgrid(*lines, indexing="ij")
@@ -90,10 +94,10 @@ class Surface:
 
     @cached_property
     def _layout(self) -> tuple[list[tuple[int, int]], IntArray]:
-        low, high = self._bounds()
+        low, high = self.bounds
         shapes = []
         for side in SIDES:
-            _, first, second = self._axes(side)
+            _, first, second = self.axes(side)
             nx, ny = (max(1, round((high[a] - low[a]) / self.patch)) for a in (first, second))
             shapes.append((nx, ny))
         return shapes, np.concatenate([[0], np.cumsum([a * b for a, b in shapes])])
@@ -105,12 +109,12 @@ class Surface:
 
     def patch_of(self, points: FloatArray, side: IntArray) -> IntArray:
         """Patch (m,) of rest positions (m, 3) [m] that lie on these sides (m,)."""
-        low, high = self._bounds()
+        low, high = self.bounds
         shapes, offsets = self._layout
         result = np.empty(len(points), dtype=np.int64)
         for number, name in enumerate(SIDES):
             here = side == number
-            _, *plane = self._axes(name)
+            _, *plane = self.axes(name)
             cell = [
                 np.clip(((points[here, a] - low[a]) / (high[a] - low[a]) * n).astype(int), 0, n - 1)
                 for a, n in zip(plane, shapes[number], strict=True)
@@ -121,10 +125,10 @@ class Surface:
     @cached_property
     def patch_centres(self) -> FloatArray:
         """(p, 3) rest positions of the patches' centres [m]."""
-        low, high = self._bounds()
+        low, high = self.bounds
         centres = []
         for name, (nx, ny) in zip(SIDES, self._layout[0], strict=True):
-            normal, first, second = self._axes(name)
+            normal, first, second = self.axes(name)
             points = np.empty((nx * ny, 3))
             for a, n, order in ((first, nx, np.arange(nx * ny) // ny), (second, ny, np.arange(nx * ny) % ny)):
                 points[:, a] = low[a] + (order + 0.5) / n * (high[a] - low[a])
@@ -144,7 +148,7 @@ class Surface:
 
     def edge_distance(self, points: FloatArray, side: IntArray) -> FloatArray:
         """Distance (m,) [m] of rest positions to the nearest edge of their side; the base counts as one."""
-        low, high = self._bounds()
+        low, high = self.bounds
         inside = np.minimum(points - low, high - points)
         normal_axis = np.array(["xyz".index(name[1]) for name in SIDES])[side]
         inside[np.arange(len(points)), normal_axis] = np.inf
@@ -208,6 +212,32 @@ def gaps(points: FloatArray, camera: FloatArray, frame: Equilibrium, surface: Su
     good |= everything
     foot, side = foot[good], side[good]
     return Gaps(hit[good], gap[good], foot, normal[good], facing[good], surface.patch_of(foot, side), side)
+
+
+def gaps_beside(
+    points: FloatArray, camera: FloatArray, frame: Equilibrium, surface: Surface, foot: FloatArray, side: IntArray
+) -> Gaps:
+    """Compare measured points with the planes that touch the surface at given material points: for rays that just miss the block.
+
+    Args:
+        points: (n, 3) [m], phantom frame. camera: (3,) optical centre [m]. frame: the simulated block.
+        foot: (n, 3) rest positions [m] of the material points. side: (n,) in SIDES, on which they lie.
+    """
+    low, high = surface.bounds
+    here, along = frame.move(foot), np.zeros((2, len(foot), 3))
+    for number, name in enumerate(SIDES):
+        on = side == number
+        for row, axis in enumerate(surface.axes(name)[1:]):
+            inwards = np.where(foot[on, axis] > (low[axis] + high[axis]) / 2, -1.0, 1.0)
+            beside = foot[on].copy()
+            beside[:, axis] += inwards * _BESIDE
+            along[row, on] = inwards[:, None] * (frame.move(beside) - here[on])
+    normal = np.cross(along[0], along[1])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    rays = points - camera
+    facing = -np.einsum("mi,mi->m", rays / np.linalg.norm(rays, axis=1)[:, None], normal)
+    gap = np.einsum("mi,mi->m", points - here, normal)
+    return Gaps(np.arange(len(points)), gap, foot, normal, facing, surface.patch_of(foot, side), side)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from core.diagnosis.observations import Group
 from core.frames import FloatArray, Transform
-from core.measurement import Gaps, PatchMeans, Surface, gaps, plain_means, within_spread
+from core.measurement import Gaps, PatchMeans, Surface, gaps, gaps_beside, plain_means, within_spread
 from core.mesh import IntArray
 from core.replay import Equilibrium
 from core.setup import Setup
@@ -32,10 +32,12 @@ class Sample:
 
     Were each model to choose anew, points would change patches with the model, and the noise they carry would look like a
     difference between models. Nor may a model turn its sides towards the camera or away from it, and the noise along the rays
-    with them: gaps count along the ray, times the cosine that the baseline's surface has.
+    with them: gaps count along the ray, times the cosine that the baseline's surface has. A ray that misses the model is compared
+    with the plane at the material point that the baseline showed it: were the baseline's gap to stand, the truth would pay for it.
 
     Attributes:
-        index: (m,) of the group's points. patch: (m,). gap: (m,) of the baseline [m], which stands where a model's ray misses.
+        index: (m,) of the group's points. patch: (m,). gap: (m,) of the baseline [m], which stands where nothing is near.
+        foot: (m, 3) rest positions of the material points that they met [m]. side: (m,) on which these lie.
         facing: (m,) cosine between the baseline's normal and the way back to the camera.
     """
 
@@ -43,6 +45,8 @@ class Sample:
     patch: IntArray
     gap: FloatArray
     facing: FloatArray
+    foot: FloatArray
+    side: IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +97,10 @@ def choose(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) -> 
     seen = gaps(points, pose.translation, frame, surface)
     kept = within_spread(seen.gap, seen.patch, surface.patches)
     index, patch = seen.index[kept].astype(np.int32), seen.patch[kept].astype(np.int32)
-    return Sample(index, patch, seen.gap[kept].astype(np.float32), seen.facing[kept].astype(np.float32))
+    return Sample(
+        index, patch, seen.gap[kept].astype(np.float32), seen.facing[kept].astype(np.float32), seen.foot[kept].astype(np.float32),
+        seen.side[kept].astype(np.int8),
+    )  # fmt: skip
 
 
 def _placed(group: Group, setup: Setup) -> tuple[FloatArray, Transform]:
@@ -108,11 +115,23 @@ def _along_rays(seen: Gaps, sample: Sample) -> Gaps:
     return replace(seen, gap=seen.gap * factor, normal=seen.normal * factor[:, None])
 
 
+def _met_or_beside(points: FloatArray, camera: FloatArray, frame: Equilibrium, surface: Surface, sample: Sample) -> Gaps:
+    """Gaps of the sample's points to the model: where their rays meet it, or beside it where they miss."""
+    met = gaps(points, camera, frame, surface, everything=True)
+    missed = np.setdiff1d(np.arange(len(points)), met.index)
+    if not len(missed):
+        return met
+    foot, side = sample.foot[missed].astype(float), sample.side[missed].astype(np.int64)
+    beside = gaps_beside(points[missed], camera, frame, surface, foot, side)
+    beside = replace(beside, index=missed)
+    return Gaps(*(np.concatenate([getattr(part, item.name) for part in (met, beside)]) for item in fields(Gaps)))
+
+
 def compare(group: Group, setup: Setup, frame: Equilibrium, surface: Surface, sample: Sample) -> Compared:
     """The sample's points, where they meet the surface, and their averages; points of the model's tool lie off the tool."""
     points, pose = _placed(group, setup)
     points = points[sample.index]
-    seen = _along_rays(gaps(points, pose.translation, frame, surface, everything=True), sample)
+    seen = _along_rays(_met_or_beside(points, pose.translation, frame, surface, sample), sample)
     values = sample.gap.astype(float)
     near = np.abs(seen.gap - values[seen.index]) < FARTHEST_CHANGE
     values[seen.index[near]] = seen.gap[near]

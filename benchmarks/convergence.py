@@ -1,0 +1,96 @@
+"""How the error falls and the time grows with the grid, for both elements; also drawn, to runs/convergence.png."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from rich.table import Table
+
+from benchmarks.reference import compared, poke_frames, reference
+from benchmarks.stopwatch import timed
+from core.frames import FloatArray
+from core.mesh import GridSpec
+
+__all__ = ["run"]
+
+PICTURE = Path("runs/convergence.png")
+NODES = ((9, 7, 5), (13, 9, 9), (17, 13, 9), (25, 17, 13))
+SPACING = (2.4e-3, 1.6e-3, 1.2e-3, 0.8e-3)
+"""Between nodes at the tool [m], in step with the nodes' number: each grid is the one before it, refined."""
+FRAMES = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """One grid: unknowns, spacing [m], errors of displacement and force (2,) at 4 and 8 mm [1], CPU time of a frame [s]."""
+
+    order: int
+    unknowns: int
+    spacing: float
+    displacement: FloatArray
+    force: FloatArray
+    seconds: float
+
+
+def _point(order: int, nodes: tuple[int, int, int], spacing: float) -> Point:
+    grid = GridSpec(nodes=nodes, spacing=spacing, order=order)
+    poke_frames(grid)  # warms up: compilation and symbolic factorisation
+    frames, seconds = timed(lambda: poke_frames(grid))
+    displacement, force = reference().error(compared(frames))
+    x, y, z = nodes
+    return Point(order, 3 * x * y * (z - 1), spacing, displacement, np.abs(force), seconds / FRAMES)
+
+
+def _slope(x: list[float], y: list[float]) -> float:
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
+
+
+def run() -> list[Table]:
+    """Solve the pokes of the reference on finer and finer grids; the finest must be nearer to it than the coarsest."""
+    table = Table("elements", "unknowns", "mm at tool", "top off by", "force off by", "ms a frame", title="Finer grids, 4 / 8 mm")
+    orders = Table("elements", "displacement ~ h^", "force ~ h^", "time ~ unknowns^", title="Fitted at 8 mm")
+    series = {}
+    for order, name in ((1, "trilinear"), (2, "quadratic")):
+        points = [_point(order, nodes, spacing) for nodes, spacing in zip(NODES, SPACING, strict=True)]
+        series[name] = points
+        if not points[-1].displacement[1] < 0.5 * points[0].displacement[1]:
+            raise RuntimeError(f"{name} elements do not converge: {[float(point.displacement[1]) for point in points]}")
+        for point in points:
+            (near, deep), (light, heavy) = point.displacement, point.force
+            table.add_row(
+                name, str(point.unknowns), f"{1e3 * point.spacing:.1f}", f"{near:.1%} / {deep:.1%}",
+                f"{light:.1%} / {heavy:.1%}", f"{1e3 * point.seconds:.0f}",
+            )  # fmt: skip
+        spacing, unknowns = [point.spacing for point in points], [float(point.unknowns) for point in points]
+        orders.add_row(
+            name, f"{_slope(spacing, [point.displacement[1] for point in points]):.1f}",
+            f"{_slope(spacing, [point.force[1] for point in points]):.1f}",
+            f"{_slope(unknowns, [point.seconds for point in points]):.1f}",
+        )  # fmt: skip
+    _draw(series)
+    return [table, orders]
+
+
+def _draw(series: dict[str, list[Point]]) -> None:
+    mpl.use("Agg")
+    from matplotlib import pyplot  # noqa: PLC0415 (after the choice of a backend without a window)
+
+    figure, (errors, times) = pyplot.subplots(1, 2, figsize=(9, 4), layout="constrained")
+    for (name, points), colour in zip(series.items(), ("tab:blue", "tab:orange"), strict=True):
+        spacing = [1e3 * point.spacing for point in points]
+        errors.loglog(spacing, [100 * point.displacement[1] for point in points], "o-", color=colour, label=f"{name}, top")
+        errors.loglog(spacing, [100 * point.force[1] for point in points], "s--", color=colour, label=f"{name}, force")
+        times.loglog(
+            [point.unknowns for point in points], [1e3 * point.seconds for point in points], "o-", color=colour, label=name
+        )
+    errors.set(xlabel="node spacing at the tool, mm", ylabel="error at 8 mm, %")
+    times.set(xlabel="unknowns", ylabel="CPU time of a frame, ms")
+    for axes in (errors, times):
+        axes.grid(visible=True, which="both", alpha=0.3)
+        axes.legend(frameon=False)
+    PICTURE.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(PICTURE, dpi=120)
+    pyplot.close(figure)
