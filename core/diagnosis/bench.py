@@ -214,11 +214,11 @@ class Bench:
 
     # -- scores -----------------------------------------------------------------------------------------------------------------
 
-    def precision(self, model: Model) -> FloatArray:
-        """Prior precision of nuisances and search coordinates."""
+    def precision(self, model: Model, nuisances: FloatArray | None = None) -> FloatArray:
+        """Prior precision of nuisances (as stated, unless given otherwise) and search coordinates."""
         size = len(model.nuisance) + len(model.columns)
         precision = np.zeros((size, size))
-        precision[: len(model.nuisance), : len(model.nuisance)] = self.nuisances.precision
+        precision[: len(model.nuisance), : len(model.nuisance)] = self.nuisances.precision if nuisances is None else nuisances
         own = np.arange(len(model.nuisance), size)
         precision[own, own] = (PRIOR_STEPS * model.scales) ** -2 if len(own) else 0
         return precision
@@ -240,9 +240,9 @@ class Bench:
         """Log predictive density of each block given the others [nats]."""
         return predictive_score(self.tempered(model), [*model.nuisance, *model.columns], self.precision(model), len(model.nuisance))
 
-    def objective(self, model: Model) -> float:
-        """Log evidence at these values of the search coordinates [nats]."""
-        return log_evidence(self.tempered(model), model.nuisance, self.nuisances.precision)
+    def objective(self, model: Model, nuisances: FloatArray | None = None) -> float:
+        """Log evidence at these values of the search coordinates [nats]; `nuisances` as for `precision`."""
+        return log_evidence(self.tempered(model), model.nuisance, self.nuisances.precision if nuisances is None else nuisances)
 
     def refit(self, effects: Sequence[Effect], starts: Sequence[Prediction] | None, hopeless: float = -np.inf) -> Model:
         """Gauss-Newton with a trust region from these values; returns the best model met.
@@ -250,20 +250,20 @@ class Bench:
         A model whose log evidence stays below `hopeless` after two steps is given up.
         """
         self.tell(f"fitting {' and '.join(effect.name for effect in effects)}")
-        return self._fitted(self.evaluate(effects, starts), hopeless)
+        return self._fitted(self.evaluate(effects, starts), self.nuisances.precision, hopeless)
 
-    def _fitted(self, model: Model, hopeless: float) -> Model:
-        best, radius = self.objective(model), _TRUST
+    def _fitted(self, model: Model, nuisances: FloatArray, hopeless: float = -np.inf) -> Model:
+        best, radius = self.objective(model, nuisances), _TRUST
         for iteration in range(_ITERATIONS):
             if iteration == 2 and best < hopeless:
                 break
-            solution = fit(self.tempered(model), [*model.nuisance, *model.columns], self.precision(model))
+            solution = fit(self.tempered(model), [*model.nuisance, *model.columns], self.precision(model, nuisances))
             change = solution.change[len(model.nuisance) :]
             if np.abs(change / model.scales).max() < 0.05:
                 break
             step = change * min(1.0, radius / np.abs(change / model.scales).max())
             trial = self.evaluate(self._shift(model, step), model.predictions)
-            value = self.objective(trial)
+            value = self.objective(trial, nuisances)
             if value > best:
                 gained, model, best = value - best, trial, value
                 if gained < 1.0:
@@ -277,12 +277,14 @@ class Bench:
     def refine(self, model: Model) -> Model:
         """Fit an accepted model's parameters once more, with the mesh's error measured in it and not in the stated setup.
 
+        What an effect does and a nuisance as well is now all the effect's.
         From here on models compare no longer with those scored before.
         """
         self.tell("fitting the causes once more on two meshes")
         fine = [f.result() for f in self.predict(model.effects, None, model.predictions, self.fine)]
         self.noises = [n.remeshed(m, f) for n, m, f in zip(self.noises, model.predictions, fine, strict=True)]
-        return self._fitted(self.assemble(model.effects, model.setup, model.predictions, (), 0), -np.inf)
+        found = self.assemble(model.effects, model.setup, model.predictions, (), 0)
+        return self._fitted(found, self.nuisances.beside(found.effects))
 
     def _shift(self, model: Model, step: FloatArray) -> list[Effect]:
         effects, at = [], 0

@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from core.diagnosis.evidence import Block
-from core.diagnosis.prediction import Prediction
+from core.diagnosis.prediction import TOOL_COLUMNS, Prediction
 from core.effects import Effect
+from core.effects.material import PoissonRatio
+from core.effects.sensor import CameraRegistration
+from core.effects.tool import ToolOffset, ToolRadius
 from core.frames import FloatArray
 from core.registration import Registration
 from core.setup import Setup
 
-__all__ = ["Model", "Nuisances"]
+__all__ = ["TWINS", "Model", "Nuisances"]
 
 TIP = 1e-4
 RADIUS = 5e-5
 NU = 0.01
 CAMERA = np.array([1e-4] * 3 + [2e-3] * 3)
 """Accuracies that are no finding: tool tip and radius [m], Poisson's ratio [1], camera beyond its covariance [m, rad]."""
+
+
+TWINS: Mapping[type[Effect], tuple[int, ...]] = {
+    ToolOffset: (0, 1, 2),
+    ToolRadius: (TOOL_COLUMNS,),
+    PoissonRatio: (TOOL_COLUMNS + 1,),
+    CameraRegistration: tuple(range(TOOL_COLUMNS + 2, TOOL_COLUMNS + 8)),
+}
+"""Effects that do what a nuisance does, only more of it, and the nuisance's columns, in the order of their numbers."""
+_PINNED = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +54,18 @@ class Nuisances:
         precision[8:14, 8:14] = np.linalg.inv(camera)
         precision[14, 14] = 1.0
         return cls(precision)
+
+    def beside(self, effects: Sequence[Effect]) -> FloatArray:
+        """Prior precision (n, n) where these effects take all that they and their twins among the nuisances do together.
+
+        Left free, a nuisance keeps a share of what the effect should state: a quarter of a camera's shift, for a price that the
+        least nonlinearity outweighs.
+        """
+        precision = self.precision.copy()
+        for effect in effects:
+            own = list(TWINS.get(type(effect), ()))
+            precision[own, own] += _PINNED * np.diag(self.precision)[own]
+        return precision
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,17 +10,17 @@ from scipy.stats import chi2, norm
 
 from core.diagnosis.bench import PRIOR_STEPS, Bench
 from core.diagnosis.evidence import fit, predictive_gain
-from core.diagnosis.hypothesis import Model
+from core.diagnosis.hypothesis import TWINS, Model
 from core.diagnosis.intervals import stands
-from core.diagnosis.prediction import TOOL_COLUMNS, Prediction
+from core.diagnosis.prediction import Prediction
 from core.diagnosis.screening import Candidate, linear_gains, null_gains, right_sides
 from core.diagnosis.structure import NOTHING, Structure, structure_of
 from core.effects import Effect
 from core.effects.load import Gravity
-from core.effects.material import PoissonRatio, StiffInclusion
-from core.effects.sensor import CameraRegistration, TimeOffset
+from core.effects.material import StiffInclusion
+from core.effects.sensor import TimeOffset
 from core.effects.support import BaseDetachment, BaseSlip
-from core.effects.tool import ToolOffset, ToolRadius
+from core.effects.tool import ToolOffset
 from core.setup import Inclusion
 
 __all__ = ["MOST_CAUSES", "Findings", "Trial", "lump_places", "search"]
@@ -113,14 +113,8 @@ def _signatures(bench: Bench, baseline: Model) -> list[tuple[Effect, list[Predic
 def _candidates(model: Model, bench: Bench, signatures: Sequence[tuple[Effect, list[Prediction]]]) -> list[Candidate]:
     """Every effect of the catalogue that is not in the model yet, as columns of it."""
     setup, found = model.setup, []
-    camera = tuple(range(TOOL_COLUMNS + 2, TOOL_COLUMNS + 8))
-    widened: list[tuple[Effect, tuple[int, ...]]] = [
-        (ToolOffset.neutral(setup), (0, 1, 2)),
-        (ToolRadius.neutral(setup), (TOOL_COLUMNS,)),
-        (PoissonRatio.neutral(setup), (TOOL_COLUMNS + 1,)),
-        (CameraRegistration.neutral(setup), camera),
-    ]
-    for effect, columns in widened:
+    for kind, columns in TWINS.items():
+        effect = kind.neutral(setup)
         spreads = [PRIOR_STEPS * item.scale for item in effect.numbers()]
         found.append(Candidate(start=effect, widened=dict(zip(columns, spreads, strict=True))))
     if "time_offset" in model.extra:
