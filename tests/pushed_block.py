@@ -87,8 +87,8 @@ def prediction(
     still = rest(SETUP, GridSpec())
     frames = [replace(still, outcome=Outcome.ITERATIONS if g in failed else Outcome.CONVERGED) for g in range(len(gap))]
     none = np.zeros((*gap.shape, 0)) if columns is None else columns
-    whole, real = np.zeros(0, np.int32), np.zeros(0, np.float32)
-    nothing = Sample(whole, whole, real, real, np.zeros((0, 3), np.float32), whole)
+    whole, real = np.zeros(0, np.int32), np.zeros(0)
+    nothing = Sample(whole, whole, real, real, np.zeros((0, 3)), whole)
     full = np.where(np.isfinite(gap), count, 0.0)
     return Prediction(name, gap, full, np.broadcast_to(spread, gap.shape), none, tuple(frames), (nothing,) * len(gap))
 
