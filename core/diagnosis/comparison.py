@@ -20,6 +20,9 @@ TOOL_REACH, CLEARLY = 1.5e-3, 5e-4
 """A point this near to a model's ball [m], and nearer to it by this much than to the model's surface, is of the tool: clouds are
 cleaned of the tool where it was stated to be, and if it is somewhere else, some of its points remain."""
 
+JUMP, MUCH_NEARER = 3e-3, 1e-3
+"""A ray whose foot moves by more than this between models [m] has passed over a rim; so much nearer [m] must the point lie to the
+surface beside it, or models would gain by choosing."""
 _MOST_STRETCH = 2.0
 """A model's surface may turn away from the camera so far that a gap along the ray counts this many times the gap itself."""
 FARTHEST_CHANGE = 8e-3
@@ -115,16 +118,29 @@ def _along_rays(seen: Gaps, sample: Sample) -> Gaps:
     return replace(seen, gap=seen.gap * factor, normal=seen.normal * factor[:, None])
 
 
+def _taken(part: Gaps, rows: IntArray) -> Gaps:
+    return Gaps(*(getattr(part, item.name)[rows] for item in fields(Gaps)))
+
+
 def _met_or_beside(points: FloatArray, camera: FloatArray, frame: Equilibrium, surface: Surface, sample: Sample) -> Gaps:
-    """Gaps of the sample's points to the model: where their rays meet it, or beside it where they miss."""
+    """Gaps of the sample's points to the model: where their rays meet it, or beside it where they miss.
+
+    A ray that meets the model far from where it met the baseline has passed over the rim of a dent or an edge; such a point counts
+    from the other place where that is much nearer, so that its gap does not jump by millimetres as the rim passes its ray.
+    """
     met = gaps(points, camera, frame, surface, everything=True)
-    missed = np.setdiff1d(np.arange(len(points)), met.index)
-    if not len(missed):
+    away = np.linalg.norm(met.foot - sample.foot[met.index], axis=1) > JUMP
+    elsewhere = np.concatenate([np.setdiff1d(np.arange(len(points)), met.index), met.index[away]])
+    if not len(elsewhere):
         return met
-    foot, side = sample.foot[missed].astype(float), sample.side[missed].astype(np.int64)
-    beside = gaps_beside(points[missed], camera, frame, surface, foot, side)
-    beside = replace(beside, index=missed)
-    return Gaps(*(np.concatenate([getattr(part, item.name) for part in (met, beside)]) for item in fields(Gaps)))
+    foot, side = sample.foot[elsewhere].astype(float), sample.side[elsewhere].astype(np.int64)
+    beside = replace(gaps_beside(points[elsewhere], camera, frame, surface, foot, side), index=elsewhere)
+    by_ray = np.full(len(points), np.inf)
+    by_ray[met.index] = np.abs(met.gap)
+    nearer = np.abs(beside.gap) < by_ray[elsewhere] - MUCH_NEARER
+    kept = ~np.isin(met.index, elsewhere[nearer])
+    parts = (_taken(met, np.flatnonzero(kept)), _taken(beside, np.flatnonzero(nearer)))
+    return Gaps(*(np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(Gaps)))
 
 
 def compare(group: Group, setup: Setup, frame: Equilibrium, surface: Surface, sample: Sample) -> Compared:

@@ -44,3 +44,18 @@ def test_ray_that_misses_feels_how_the_surface_moves():
     moved = side.phantom_from_camera_true @ MOVED.phantom_from_camera_true.inverse()
     change = found.along_sight(moved)[found.means.count > 0]
     assert np.allclose(change, -1e-4, atol=1e-6)
+
+
+def test_gap_does_not_jump_where_a_rim_passes_the_ray():
+    """Points just inside the far edge of the top: lower the block and their rays pass over it to nothing, or to the side."""
+    random = np.random.default_rng(1)
+    places = np.column_stack([
+        SIZE[0] / 2 - 1.6e-3 + random.uniform(-5e-5, 5e-5, 40), random.uniform(0.0, 0.004, 40), np.full(40, SIZE[2])
+    ])  # fmt: skip
+    group = Group((0,), POSE.inverse().apply(places), False)
+    sample = choose(group, SETUP, BLOCK, SURFACE)
+    for lift in (0.5e-3, 1e-3, 2e-3, 4e-3):
+        lifted = CameraRegistration(tx=0.0, ty=0.0, tz=lift, rx=0.0, ry=0.0, rz=0.0).apply(SETUP)
+        found = compare(group, lifted, BLOCK, SURFACE, sample).means
+        # The gap counts along the ray, times the cosine that the stated surface has: the height by which the points lie off it.
+        assert np.allclose(found.mean[found.count > 0], lift, atol=1e-5)
