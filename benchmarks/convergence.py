@@ -27,7 +27,6 @@ FRAMES = 8
 class Point:
     """One grid: unknowns, spacing [m], errors of displacement and force (2,) at 4 and 8 mm [1], CPU time of a frame [s]."""
 
-    order: int
     unknowns: int
     spacing: float
     displacement: FloatArray
@@ -41,7 +40,7 @@ def _point(order: int, nodes: tuple[int, int, int], spacing: float) -> Point:
     frames, seconds = timed(lambda: poke_frames(grid))
     displacement, force = reference().error(compared(frames))
     x, y, z = nodes
-    return Point(order, 3 * x * y * (z - 1), spacing, displacement, np.abs(force), seconds / FRAMES)
+    return Point(3 * x * y * (z - 1), spacing, displacement, np.abs(force), seconds / FRAMES)
 
 
 def _slope(x: list[float], y: list[float]) -> float:

@@ -11,7 +11,7 @@ from fastapi.responses import FileResponse
 
 from app.colours import nice_limit
 from app.desk import DeskOf
-from app.runs import Run
+from app.runs import Replay, Run
 from app.sentences import verdict_sentence
 from app.summaries import finite
 from core.errors import RunError
@@ -29,7 +29,7 @@ def listed(desk: DeskOf) -> list[dict[str, Any]]:
 
 @router.get("/{name}")
 def one(name: str, desk: DeskOf) -> dict[str, Any]:
-    """One run: verdict sentence, phantom and, per sequence, its split and its mean errors [m]."""
+    """One run: verdict sentence, phantom and, per sequence, its split and both models' errors where the stated one is worst [m]."""
     run = desk.runs.get(name)
     replays = [run.replay(sequence) for sequence in run.sequences]
     size = [round(float(edge), 6) for edge in replays[0].size] if replays else None
@@ -44,8 +44,7 @@ def one(name: str, desk: DeskOf) -> dict[str, Any]:
                 "frames": len(replay),
                 "seconds": round(float(replay["time"][-1] - replay["time"][0]), 3) if len(replay) else 0.0,
                 "split": run.origin.get("splits", {}).get(replay.name),
-                "distance_raw": finite(np.nanmean(replay["distance_raw"])),
-                "distance_extended": finite(np.nanmean(replay["distance_extended"])),
+                **_worst(replay),
             }
             for replay in replays
         ],
@@ -92,6 +91,16 @@ def sequence(name: str, sequence: str, desk: DeskOf) -> dict[str, Any]:
         "outcome": [int(code) for code in replay["outcome"]],
         "automatic_limit": reel.limit,
     }
+
+
+def _worst(replay: Replay) -> dict[str, Any]:
+    """Errors [m] of both models in the frame in which the stated one is furthest off."""
+    keys = ("distance_raw", "distance_extended")
+    seen = np.flatnonzero(np.isfinite(replay[keys[0]]))
+    if not len(seen):
+        return dict.fromkeys(keys)
+    frame = seen[np.argmax(replay[keys[0]][seen])]
+    return {key: finite(replay[key][frame]) for key in keys}
 
 
 def _listed(run: Run) -> dict[str, Any]:

@@ -30,7 +30,7 @@ _LEAST = 3
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """One model's side of a recording; arrays over frames (f, ...), SI, phantom frame."""
+    """One model's side of a recording; arrays over frames (f, ...), SI, phantom frame; `distance` is the RMS of `error`."""
 
     surface: FloatArray
     tool: FloatArray
@@ -58,6 +58,12 @@ def _vertex_errors(seen: Gaps, surface: Surface) -> FloatArray:
     return errors
 
 
+def _rms(errors: FloatArray) -> float:
+    """Over what was seen, of errors (v,) [m] that are averages already: single points would show little but the sensor's noise."""
+    seen = errors[np.isfinite(errors)]
+    return float(np.sqrt(np.mean(seen**2))) if len(seen) else np.nan
+
+
 def _side(setup: Setup, frames: list[Equilibrium], clouds: list[FloatArray]) -> Recorded:
     surface, pose = Surface(setup.geometry, spacing=VERTEX_SPACING), setup.phantom_from_camera_true
     moved, errors, distance, paper = [], [], [], []
@@ -66,7 +72,7 @@ def _side(setup: Setup, frames: list[Equilibrium], clouds: list[FloatArray]) -> 
         seen = gaps(points, pose.translation, frame, surface)
         moved.append(frame.move(surface.vertices))
         errors.append(_vertex_errors(seen, surface))
-        distance.append(float(np.sqrt(np.mean(seen.gap**2))) if len(seen.gap) else np.nan)
+        distance.append(_rms(errors[-1]))
         paper.append(paper_distance(points[::2], frame, surface))
     return Recorded(
         np.array(moved), np.array([frame.probe.centre for frame in frames]), np.array(errors), np.array(distance), np.array(paper),

@@ -66,7 +66,7 @@ class Topology:
         pattern, self.slots = upper_pattern(self.hexahedra, self.unknown)
         self.surface_slots = face_slots(pattern, self.surface, self.unknown)
         self.base_slots = face_slots(pattern, self.base, self.unknown)
-        self.pattern, self.entries = pattern, pattern.nnz
+        self.pattern = pattern
         rows = np.repeat(np.arange(pattern.shape[0]), np.diff(pattern.indptr))
         self.diagonal = np.flatnonzero(rows == pattern.indices)
         self.factor = factor_of(pattern)
@@ -175,7 +175,7 @@ class BlockModel:
         """Residual and, if wanted, tangent at these positions; without `bending` the contact's tangent is positive."""
         top = self.topology
         force = np.zeros_like(positions)
-        data = np.zeros(top.entries) if tangent else _EMPTY
+        data = np.zeros(top.pattern.nnz) if tangent else _EMPTY
         push, penetration = np.zeros(3), 0.0
         assemble_elastic(self.law, self.rule, top.hexahedra, self.mu, self.bulk, positions, top.slots, force, data)
         force[:, 2] += self.weight_force

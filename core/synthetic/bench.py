@@ -12,7 +12,7 @@ from scipy.spatial import Delaunay, cKDTree
 from core.errors import SolveError
 from core.frames import FloatArray
 from core.synthetic.block import Block, Grading, IntArray, mesh_block
-from core.synthetic.equilibrium import Equilibrium, Solid, State
+from core.synthetic.equilibrium import Equilibrium, GivesWay, Solid, State
 from core.synthetic.motion import Motion, Probe
 from core.synthetic.scenario import Scenario
 from core.synthetic.track import Moment, Passage, Stretch, Track
@@ -58,7 +58,7 @@ def _as_deep_as_it_goes(scenario: Scenario, probe: Probe, slip: FloatArray, fine
         bench = _Bench(scenario, block, slip)
         try:
             return Stretch(tried, block.surface_rest, block.surface_faces, bench.settled + slip, bench.passages(tried)), bench.slip
-        except SolveError as error:
+        except GivesWay as error:
             failure = error
         finally:
             bench.close()

@@ -13,12 +13,16 @@ from core.synthetic.block import Block, Sampling
 from core.synthetic.law import assemble_obstacle, assemble_solid, constants, solid_energy
 from core.synthetic.system import System
 
-__all__ = ["Equilibrium", "Solid", "State"]
+__all__ = ["Equilibrium", "GivesWay", "Solid", "State"]
 
 PENALTY_OVER_E = 4.5e4
 SOFTER = 1 / 12
 _UNUSED = (np.zeros((1, 10, 10, 3, 3)), np.zeros((1, 3)), np.zeros(3), np.zeros((1, 3, 3)), np.zeros((3, 3)))
 _NOWHERE = np.array([0.0, 0.0, 10.0])
+
+
+class GivesWay(SolveError):
+    """The block is about to jump: where Newton's method ended, its energy was not convex."""
 
 
 @dataclass(frozen=True)
@@ -120,8 +124,8 @@ class Equilibrium:
     def _newton(self, displacement: FloatArray, centre: FloatArray, limit: int = 14, softness: float = 1.0) -> State:
         self._penalty = softness * self._hardest
         u = displacement.copy()
-        energy = np.inf
-        norm = np.inf
+        energy = norm = np.inf
+        convex = True
         for iteration in range(limit + 1):
             energy, force, push, coupling, total, deepest = self._assemble(u, centre)
             if not np.isfinite(energy):
@@ -133,27 +137,29 @@ class Equilibrium:
             if iteration == limit:
                 break
             self.iterations += 1
-            self._factorise(u, centre)
+            convex = self._factorise(u, centre)
             step = np.zeros_like(u)
             step[self._free] = self._system.solve(residual).reshape(-1, 3)
             length = self._search(u, step, centre, energy, float(step[self._free].ravel() @ residual))
             if length == 0.0:
                 break
             u += length * step
-        raise SolveError(
+        raise (SolveError if convex else GivesWay)(
             f"no equilibrium of the virtual block with the tool at {np.round(centre * 1e3, 2)} mm: residual {norm:.2g} N; "
             "use a finer grid or a shallower push",
             residual=norm,
         )
 
-    def _factorise(self, u: FloatArray, centre: FloatArray) -> None:
-        """Factor the tangent of `_assemble`; or the cautious one where the energy is not convex."""
+    def _factorise(self, u: FloatArray, centre: FloatArray) -> bool:
+        """Factor the tangent of `_assemble`, or the cautious one where the energy is not convex; returns whether it is."""
         self._system.factorise(self._stiffness)
-        if self._system.negative:
-            self._cautious = True
-            self._assemble(u, centre)
-            self._cautious = False
-            self._system.factorise(self._stiffness)
+        if not self._system.negative:
+            return True
+        self._cautious = True
+        self._assemble(u, centre)
+        self._cautious = False
+        self._system.factorise(self._stiffness)
+        return False
 
     def _converged(
         self,

@@ -42,7 +42,7 @@ function drawSequences() {
   if (!heading) return;
   fill("sequences", heading.sequences.map((entry) => element("button", {
     class: "row", type: "button", "aria-current": String(entry.name === sequence), "data-sequence": entry.name,
-    title: `${entry.frames} frames, ${entry.seconds.toFixed(0)} s; mean error raw → extended`, onclick: () => set({ sequence: entry.name, frame: 0, playing: false }),
+    title: `${entry.frames} frames, ${entry.seconds.toFixed(0)} s; error in the worst frame, raw → extended`, onclick: () => set({ sequence: entry.name, frame: 0, playing: false }),
   }, element("span", { class: `tag ${entry.split ?? ""}` }, TAGS[entry.split] ?? "–"), element("span", { class: "name" }, entry.name),
     element("span", { class: "value" }, `${mm(entry.distance_raw, false)} → ${mm(entry.distance_extended, false)}`))));
 }

@@ -22,6 +22,13 @@ def test_run_says_its_verdict_in_a_sentence_and_lists_its_sequences(client: http
     assert run["has_clouds"]
 
 
+def test_sequence_states_both_errors_of_its_worst_frame(client: httpx.Client, base: str) -> None:
+    deepest = 0.003
+    for one in client.get(base).json()["sequences"]:
+        assert one["distance_raw"] == pytest.approx(0.2 * deepest)
+        assert one["distance_extended"] == pytest.approx(0.02 * deepest)
+
+
 def test_report_and_model_are_as_written(client: httpx.Client, base: str, report: dict[str, Any]) -> None:
     assert client.get(f"{base}/report").json() == report
     assert client.get(f"{base}/model").json() == {"format": 1}

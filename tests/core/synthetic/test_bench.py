@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.errors import SolveError
 from core.synthetic.bench import perform, rest_surface
+from core.synthetic.equilibrium import GivesWay
 from core.synthetic.motion import Motion, Probe, draw_motion
 from core.synthetic.scenario import HiddenEffect, Scenario
 from core.synthetic.track import Track
@@ -95,3 +97,10 @@ def test_push_onto_a_hard_lump_stops_short_of_where_the_block_gives_way() -> Non
     assert np.allclose(track.motion.centre(np.array([0.0, 2.5, 5.0])), [top, done.waypoints[1], top])
     assert track.moments[0].push[2] == 0.0
     assert max(-moment.push[2] for moment in track.moments) > 0.3
+
+
+def test_solver_that_fails_where_the_block_stands_firm_is_not_taken_for_that(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("core.synthetic.equilibrium.Equilibrium._search", lambda *_: 0.0)
+    with pytest.raises(SolveError, match="no equilibrium") as failure:
+        _track("poke-top-01")
+    assert not isinstance(failure.value, GivesWay)
