@@ -16,11 +16,13 @@ ALL = {
     "cleaning": cleaning.run,
     "dataset": dataset.run,
 }
+WIDTH = 140
+"""Characters of a line where there is no terminal to ask."""
 
 
 def main(names: list[str]) -> int:
     """Run benchmarks by name, print their tables; 1 when a result is wrong, 2 when a name is unknown."""
-    console, outcome = Console(), 0
+    console, outcome = Console(width=None if sys.stdout.isatty() else WIDTH), 0
     unknown = [name for name in names if name not in ALL]
     if unknown:
         console.print(f"no benchmark is called {', '.join(unknown)}; known are {', '.join(ALL)}")
