@@ -1,6 +1,6 @@
 # make demo    set everything up, make a phantom with a hidden fault, find it, open the page   (ARGS="--no-serve" ends after the table)
 # make test    set everything up, run the tests (fast ones and the browser's; the slow ones: make test ARGS="-m slow")
-# make bench   speed and accuracy of the engine                    make check   lint, format, types
+# make bench   speed and accuracy of the engine, and of others     make check   lint, format, types
 # make clean   remove .venv and all caches                         PYTHON=...   another Python 3.11
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
@@ -23,7 +23,7 @@ demo: install
 test: develop
 	$(VENV)/bin/python -m pytest -m "not slow" -n 2 --dist loadfile $(ARGS)
 
-bench: install
+bench: $(VENV)/.peers
 	$(VENV)/bin/python -m benchmarks $(ARGS)
 
 check: develop
@@ -59,6 +59,10 @@ $(VENV)/.torch: constraints.txt | $(VENV)/.created
 
 $(VENV)/.installed: pyproject.toml constraints.txt $(VENV)/.torch
 	$(PIP) install --quiet -e . -c constraints.txt
+	@touch $@
+
+$(VENV)/.peers: pyproject.toml constraints.txt $(VENV)/.system-demo $(VENV)/.installed
+	$(PIP) install --quiet -e ".[peers]" -c constraints.txt
 	@touch $@
 
 $(VENV)/.developed: pyproject.toml constraints.txt $(VENV)/.installed

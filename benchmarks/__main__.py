@@ -6,10 +6,11 @@ import sys
 
 from rich.console import Console
 
-from benchmarks import cleaning, convergence, dataset, effects, measurement, replay
+from benchmarks import cleaning, convergence, dataset, effects, measurement, peers, replay
 
 ALL = {
     "replay": replay.run,
+    "peers": peers.run,
     "convergence": convergence.run,
     "effects": effects.run,
     "measurement": measurement.run,

@@ -17,7 +17,7 @@ from core.mesh import GridSpec
 from core.replay import Equilibrium, replay, require_converged
 from core.setup import Box, Setup, Tool
 
-__all__ = ["DEPTHS", "SETUP", "Pokes", "compared", "poke_frames", "reference"]
+__all__ = ["DEPTHS", "SETUP", "Pokes", "compared", "poke_frames", "reference", "top_points"]
 
 SETUP = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3), mass=0.104)
 DEPTHS = (4e-3, 8e-3)
@@ -47,11 +47,16 @@ def poke_frames(grid: GridSpec) -> list[Equilibrium]:
     return [frames[int(np.argmin(np.abs(depths - depth)))] for depth in DEPTHS]
 
 
-def compared(frames: Sequence[Equilibrium]) -> Pokes:
-    """What grids are compared by in the two equilibria."""
+def top_points() -> FloatArray:
+    """Rest positions (m, 3) [m] of the points spread over the top, at which displacements are compared."""
     x, y, z = SETUP.geometry.size
     across = np.meshgrid(np.linspace(-x / 2, x / 2, 49), np.linspace(-y / 2, y / 2, 29), indexing="ij")
-    points = np.stack([across[0].ravel(), across[1].ravel(), np.full(across[0].size, z)], axis=1)
+    return np.stack([across[0].ravel(), across[1].ravel(), np.full(across[0].size, z)], axis=1)
+
+
+def compared(frames: Sequence[Equilibrium]) -> Pokes:
+    """What grids are compared by in the two equilibria."""
+    points = top_points()
     return Pokes(np.stack([frame.move(points) - points for frame in frames]), np.array([frame.force[2] for frame in frames]))
 
 

@@ -1,0 +1,207 @@
+"""Engines that one can install, on the pokes of the reference and in the same run: MuJoCo's flex and Newton's VBD.
+
+Both are dynamic, so the ball sinks by 10 mm/s and rests for a third of a second before it is looked at. Material, block, ball and
+grid are those of the reference, without friction and gravity; what else they need is as their own examples have it. They come with
+the extra `peers`: pip install -e ".[peers]" -c constraints.txt, which `make bench` does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.util import find_spec
+from typing import Any, Protocol
+
+import numpy as np
+from rich.table import Table
+from scipy.interpolate import RegularGridInterpolator
+
+from benchmarks.reference import DEPTHS, SETUP, compared, reference, top_points
+from benchmarks.stopwatch import timed
+from core.frames import FloatArray
+from core.mesh import GridSpec
+from core.replay import replay, require_converged
+
+__all__ = ["run"]
+
+Nodes = tuple[int, int, int]
+GRIDS: tuple[Nodes, ...] = ((13, 5, 5), (25, 9, 9))
+RATE = 30.0
+SPEED, REST = 10e-3, 1 / 3
+"""Of the ball [m/s], and how long it stands still at each depth [s]."""
+SIZE, RADIUS = np.array(SETUP.geometry.size), SETUP.tool.radius
+MODULUS, NU = SETUP.material.young_modulus, SETUP.material.poisson_ratio
+
+
+class Peer(Protocol):
+    """A running engine; `steps` are those that it takes in a frame of 1 / 30 s."""
+
+    steps: int
+
+    def step(self, depth: float) -> None:
+        """Move the ball to this depth [m] and go one step on."""
+
+    def positions(self) -> FloatArray:
+        """Of all nodes (n, 3) [m]."""
+
+
+class MuJoCo:
+    """Saint Venant-Kirchhoff tetrahedra, 16 steps a frame: with half as many it warns of a singular matrix."""
+
+    steps = 16
+
+    def __init__(self, nodes: Nodes) -> None:
+        import mujoco  # noqa: PLC0415 (an optional extra)
+
+        x, y, z = SIZE / (np.array(nodes) - 1)
+        self.engine = mujoco
+        self.model = mujoco.MjModel.from_xml_string(f"""
+            <mujoco>
+              <option timestep="{1 / RATE / self.steps}" gravity="0 0 0" integrator="discrete"/>
+              <worldbody>
+                <flexcomp name="block" type="grid" dim="3" count="{nodes[0]} {nodes[1]} {nodes[2]}" spacing="{x} {y} {z}"
+                          pos="0 0 {SIZE[2] / 2}" radius="1e-5" mass="{SETUP.mass}">
+                  <contact selfcollide="none" condim="1"/>
+                  <elasticity young="{MODULUS}" poisson="{NU}" damping="0.01"/>
+                  <pin gridrange="0 0 0 {nodes[0] - 1} {nodes[1] - 1} 0"/>
+                </flexcomp>
+                <body mocap="true" pos="0 0 {SIZE[2] + RADIUS}"><geom type="sphere" size="{RADIUS}" condim="1"/></body>
+              </worldbody>
+            </mujoco>""")
+        self.data = mujoco.MjData(self.model)
+        mujoco.mj_forward(self.model, self.data)
+
+    def step(self, depth: float) -> None:
+        self.data.mocap_pos[0, 2] = SIZE[2] + RADIUS - depth
+        self.engine.mj_step(self.model, self.data)
+
+    def positions(self) -> FloatArray:
+        return np.array(self.data.flexvert_xpos)
+
+
+class Newton:
+    """Neo-Hookean tetrahedra by vertex block descent, one step of 20 iterations a frame."""
+
+    steps = 1
+    skin = 1e-4
+    """By which the nodes are thick [m], and the ball thinner."""
+
+    def __init__(self, nodes: Nodes) -> None:
+        import warp  # noqa: PLC0415 (an optional extra)
+
+        warp.config.log_level = warp.LOG_WARNING
+        import newton  # noqa: PLC0415 (starts warp as it is set)
+
+        cells, (x, y, z) = np.array(nodes) - 1, SIZE / (np.array(nodes) - 1)
+        builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
+        builder.add_soft_grid(
+            pos=warp.vec3(-SIZE[0] / 2, -SIZE[1] / 2, 0.0), rot=warp.quat_identity(), vel=warp.vec3(0.0, 0.0, 0.0),
+            dim_x=int(cells[0]), dim_y=int(cells[1]), dim_z=int(cells[2]), cell_x=x, cell_y=y, cell_z=z,
+            density=SETUP.mass / SIZE.prod(), k_mu=MODULUS / (2 * (1 + NU)), k_lambda=MODULUS * NU / ((1 + NU) * (1 - 2 * NU)),
+            k_damp=1.0, particle_radius=self.skin,
+        )  # fmt: skip
+        for node in np.flatnonzero(np.array(builder.particle_q)[:, 2] < 1e-9):
+            builder.particle_mass[node] = 0.0
+            builder.particle_flags[node] &= ~int(newton.ParticleFlags.ACTIVE)
+        place = warp.transform(warp.vec3(0.0, 0.0, SIZE[2] + RADIUS), warp.quat_identity())
+        ball = newton.ModelBuilder.ShapeConfig(mu=0.0, ke=1e3)
+        builder.add_shape_sphere(builder.add_body(xform=place, is_kinematic=True), radius=RADIUS - self.skin, cfg=ball)
+        builder.color()
+        self.model: Any = builder.finalize(device="cpu")
+        self.model.soft_contact_ke, self.model.soft_contact_kd, self.model.soft_contact_mu = 1e3, 0.0, 0.0
+        self.solver = newton.solvers.SolverVBD(self.model, iterations=20)
+        self.now, self.next = self.model.state(), self.model.state()
+        self.control, self.contacts = self.model.control(), self.model.contacts()
+        self.step(0.0)  # compiles
+
+    def step(self, depth: float) -> None:
+        bodies = self.now.body_q.numpy()
+        bodies[0, 2] = SIZE[2] + RADIUS - depth
+        for state in (self.now, self.next):
+            state.body_q.assign(bodies)
+        self.now.clear_forces()
+        self.model.collide(self.now, self.contacts)
+        self.solver.step(self.now, self.next, self.control, self.contacts, 1 / RATE / self.steps)
+        self.now, self.next = self.next, self.now
+
+    def positions(self) -> FloatArray:
+        return self.now.particle_q.numpy().astype(float)
+
+
+OWN = (
+    *(("Palpate, even hexahedra", GridSpec(nodes=nodes)) for nodes in GRIDS),
+    ("Palpate, quadratic, 1.5 mm at tool", GridSpec(nodes=(13, 9, 9), spacing=1.5e-3, order=2)),
+)
+
+PEERS: tuple[tuple[str, str, Callable[[Nodes], Peer]], ...] = (
+    ("MuJoCo flex, tetrahedra", "mujoco", MuJoCo),
+    ("Newton VBD, tetrahedra", "newton", Newton),
+)
+
+
+def _over_top(rest: FloatArray, moved: FloatArray, nodes: Nodes) -> FloatArray:
+    """Displacement (m, 3) [m] of the reference's points on the top, linear between the nodes (n, 3) there."""
+    top = np.flatnonzero(rest[:, 2] > SIZE[2] - 1e-6)
+    rows = top[np.lexsort((rest[top, 1].round(7), rest[top, 0].round(7)))]
+    axes = [np.linspace(-SIZE[axis] / 2, SIZE[axis] / 2, nodes[axis]) for axis in (0, 1)]
+    change = (moved - rest)[rows].reshape(nodes[0], nodes[1], 3)
+    return np.asarray(RegularGridInterpolator(axes, change)(top_points()[:, :2]))
+
+
+def _depths(step: float) -> tuple[FloatArray, list[int]]:
+    """The ball's depth (n,) [m] every `step` seconds, and at which of them each of the two depths has been held."""
+    depths, held, before = np.zeros(0), [], 0.0
+    for depth in DEPTHS:
+        count = round((depth - before) / SPEED / step)
+        sinking = before + (depth - before) * np.arange(1, count + 1) / count
+        depths = np.concatenate([depths, sinking, np.full(round(REST / step), depth)])
+        held.append(len(depths) - 1)
+        before = depth
+    return depths, held
+
+
+def _poke(peer: Peer, nodes: Nodes) -> FloatArray:
+    """Displacement (2, m, 3) [m] of the reference's points at the two depths."""
+    rest, shown = peer.positions(), []
+    depths, held = _depths(1 / RATE / peer.steps)
+    for number, depth in enumerate(depths):
+        peer.step(float(depth))
+        if number in held:
+            shown.append(_over_top(rest, peer.positions(), nodes))
+    return np.stack(shown)
+
+
+def _own(grid: GridSpec) -> FloatArray:
+    depths, held = _depths(1 / RATE)
+    frames = replay(SETUP, np.array([[0.0, 0.0, SIZE[2] + RADIUS - depth] for depth in depths]), grid)
+    require_converged(frames)
+    return compared([frames[number] for number in held]).displacement
+
+
+def _row(table: Table, name: str, nodes: Nodes, displacement: FloatArray, seconds: float) -> None:
+    grid, ratio = "x".join(map(str, nodes)), f"{seconds * RATE / len(_depths(1 / RATE)[0]):.3f}"
+    if not np.isfinite(displacement).all():
+        table.add_row(name, grid, ratio, "not finite", "-")
+        return
+    wanted = reference().displacement
+    errors = np.linalg.norm(displacement - wanted, axis=(1, 2)) / np.linalg.norm(wanted, axis=(1, 2))
+    deepest = -1e3 * displacement[..., 2].min(axis=1)
+    table.add_row(name, grid, ratio, f"{errors[0]:.0%} / {errors[1]:.0%}", f"{deepest[0]:.1f} / {deepest[1]:.1f}")
+
+
+def run() -> list[Table]:
+    """Poke with every engine that is there, and tabulate errors and CPU seconds per simulated second."""
+    heads = ("engine", "nodes", "CPU s per s", "top off by, 4 / 8 mm", "top sunk by, mm")
+    table = Table(*heads, title="Engines that one can install, one thread, the same pokes by 4 and 8 mm")
+    for name, grid in OWN:
+        _own(grid)  # warms up
+        displacement, seconds = timed(lambda grid=grid: _own(grid))  # type: ignore[misc]
+        _row(table, name, grid.nodes, displacement, seconds)
+    for name, package, start in PEERS:
+        if find_spec(package) is None:
+            table.add_row(name, "-", "not installed", 'pip install -e ".[peers]" -c constraints.txt', "-")
+            continue
+        for nodes in GRIDS:
+            peer = start(nodes)
+            displacement, seconds = timed(lambda peer=peer, nodes=nodes: _poke(peer, nodes))  # type: ignore[misc]
+            _row(table, name, nodes, displacement, seconds)
+    return [table]
