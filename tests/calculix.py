@@ -23,7 +23,7 @@ _CELLS = 8
 _SKIN = 1.0
 _PENALTY = 50.0
 _INCREMENT = 0.05
-"""Of a step: contact takes the ball for its tangent planes within one, and a quarter of the 8 mm push at a time made it 2 % too stiff."""
+"""Of a step: contact takes the ball for its tangent planes within one, and four to a step made the 8 mm push 2 % too stiff."""
 _CORNERS = [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)]
 _EDGES = [
     *((1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2)),
@@ -128,7 +128,8 @@ def _deck(setup: Setup, depths: tuple[float, ...]) -> tuple[str, FloatArray]:
     ]  # fmt: skip
     for depth in depths:
         parts += [
-            "*STEP, NLGEOM, INC=1000", "*STATIC", f"{_INCREMENT}, 1., 1e-4, {_INCREMENT}", "*BOUNDARY", f"{centre}, 3, 3, {-1e3 * depth:.12g}",
+            "*STEP, NLGEOM, INC=1000", "*STATIC", f"{_INCREMENT}, 1., 1e-4, {_INCREMENT}",
+            "*BOUNDARY", f"{centre}, 3, 3, {-1e3 * depth:.12g}",
             "*NODE PRINT, NSET=TOP, FREQUENCY=1000", "U",
             "*NODE PRINT, NSET=BASE, TOTALS=ONLY, FREQUENCY=1000", "RF", "*END STEP",
         ]  # fmt: skip
