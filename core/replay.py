@@ -147,7 +147,7 @@ class Replay:
         displacement = start.displacement
         if start.mesh is not mesh:
             displacement = start.mesh.interpolate(start.displacement, mesh.nodes - carried)
-            displacement[mesh.base_nodes] *= 0.0 if not self.setup.support.detached else 1.0
+            displacement[mesh.base_nodes] *= 1.0 if model.sprung else 0.0
         before = Probe(start.probe.centre - np.append(start.slip, 0.0) + carried, start.probe.radius)
         positions = self._extrapolated(model, start, mesh.nodes + displacement, local)
         if not start.in_contact:  # begin where the straight way in first touches, not from afar

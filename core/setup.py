@@ -13,6 +13,7 @@ __all__ = [
     "Box",
     "Detachment",
     "Edge",
+    "Fibres",
     "Inclusion",
     "Layer",
     "Load",
@@ -69,6 +70,17 @@ class Layer:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Fibres:
+    """Stiffer along one direction in the plane: its angle from the x axis [rad], E along over E across [1]."""
+
+    direction: float
+    stiffness_ratio: float
+
+    def __post_init__(self) -> None:
+        _within("fibres stiffness_ratio", self.stiffness_ratio, 1.0, 1e3, "")
+
+
+@dataclass(frozen=True, kw_only=True)
 class Material:
     """What the block is made of.
 
@@ -76,6 +88,7 @@ class Material:
         young_modulus: at rest [Pa]. poisson_ratio: [1]. law: of elasticity. inclusions: lumps inside.
         layer: a skin on the top. log_ratio: ln of Young's modulus at the top over that at the base, its geometric mean kept [1].
         stretch_limit: J_m of Gent's law [1], where the material is stretched to its limit; None for a material without.
+        fibres: along one direction; None for a material that is the same in all.
     """
 
     young_modulus: float = 5.0e3
@@ -85,6 +98,7 @@ class Material:
     layer: Layer | None = None
     log_ratio: float = 0.0
     stretch_limit: float | None = None
+    fibres: Fibres | None = None
 
     def __post_init__(self) -> None:
         _within("young_modulus", self.young_modulus, 1.0, 1e9, "Pa")
@@ -113,10 +127,21 @@ class Detachment:
 
 @dataclass(frozen=True, kw_only=True)
 class Support:
-    """How the base is held: fixed (friction None) or sliding as a whole with Coulomb friction; strips may be detached."""
+    """How the base is held.
+
+    Attributes:
+        friction_coefficient: of a base that slides as a whole, Coulomb's [1]; None for one that does not.
+        detached: strips that are not held. stiffness_over_E: springs per area under the base, in all directions, over Young's
+            modulus [1/m]; None for a rigid support.
+    """
 
     friction_coefficient: float | None = None
     detached: tuple[Detachment, ...] = ()
+    stiffness_over_E: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.stiffness_over_E is not None:
+            _within("support stiffness_over_E", self.stiffness_over_E, 1e-2, 1e6, "1/m")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,11 +206,15 @@ class Setup:
                 "poisson_ratio": self.material.poisson_ratio,
                 "stretch_limit": self.material.stretch_limit,
                 "inclusions": [vars(lump) for lump in self.material.inclusions],
+                "layer": None if self.material.layer is None else vars(self.material.layer),
+                "log_ratio": self.material.log_ratio,
+                "fibres": None if self.material.fibres is None else vars(self.material.fibres),
             },
             "load": {"specific_weight_over_stiffness": self.load.specific_weight_over_stiffness},
             "support": {
                 "friction_coefficient": self.support.friction_coefficient,
                 "detached": [vars(strip) for strip in self.support.detached],
+                "stiffness_over_E": self.support.stiffness_over_E,
             },
             "tool": {"radius": self.tool.radius, "offset": list(self.tool.offset)},
             "sensor": {

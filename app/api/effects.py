@@ -7,7 +7,7 @@ from typing import Any
 
 from fastapi import APIRouter
 
-from core.effects import CATALOGUE, Effect, Parameter
+from core.effects import CATALOGUE, DIAGNOSED, Effect, Parameter
 
 __all__ = ["router"]
 
@@ -16,7 +16,7 @@ router = APIRouter(prefix="/effects", tags=["effects"])
 
 @router.get("")
 def listed() -> list[dict[str, Any]]:
-    """The catalogue; bounds are SI, null where there is none."""
+    """The catalogue; bounds are SI, null where there is none. What is not `diagnosed` only a replay knows."""
     return [_described(effect) for effect in CATALOGUE]
 
 
@@ -25,6 +25,7 @@ def _described(effect: type[Effect]) -> dict[str, Any]:
         "name": effect.name,
         "enters": effect.enters.value,
         "summary": effect.summary,
+        "diagnosed": effect in DIAGNOSED,
         "parameters": [_parameter(item) for item in effect.parameters()],
     }
 

@@ -12,7 +12,7 @@ from core.diagnosis.gain import Ladder
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.intervals import intervals
 from core.diagnosis.search import Findings, Trial
-from core.effects import CATALOGUE
+from core.effects import DIAGNOSED
 
 __all__ = ["UNEXPLAINED_MISFIT", "report_of", "verdict_of"]
 
@@ -62,7 +62,7 @@ def _causes(bench: Bench, findings: Findings, trials: list[Trial]) -> list[dict[
 def _ranking(findings: Findings, named: set[str]) -> list[dict[str, Any]]:
     chances = _probabilities(findings)
     rows = []
-    for kind in CATALOGUE:
+    for kind in DIAGNOSED:
         if kind.name in named:
             continue
         alone = [t for t in findings.trials if t.model.names == (kind.name,)]

@@ -1,4 +1,7 @@
-"""The catalogue of causes. A new one is one class in a file of this folder and one entry here."""
+"""The catalogue of causes. A new one is one class in a file of this folder and one entry here.
+
+The engine replays all of them. A diagnosis weighs those in `DIAGNOSED`, for which its false alarms were counted.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +11,14 @@ from core.effects.base import Effect, Parameter, Slot
 from core.effects.load import Gravity
 from core.effects.material import PoissonRatio, StiffInclusion
 from core.effects.sensor import CameraRegistration, TimeOffset
-from core.effects.support import BaseDetachment, BaseSlip
+from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
+from core.effects.support import BaseCompliance, BaseDetachment, BaseSlip
 from core.effects.tool import ToolOffset, ToolRadius
 from core.errors import EffectError
 
-__all__ = ["CATALOGUE", "Effect", "Parameter", "Slot", "effect_named", "from_json"]
+__all__ = ["CATALOGUE", "DIAGNOSED", "Effect", "Parameter", "Slot", "effect_named", "from_json"]
 
-CATALOGUE: tuple[type[Effect], ...] = (
+DIAGNOSED: tuple[type[Effect], ...] = (
     PoissonRatio,
     StiffInclusion,
     ToolRadius,
@@ -24,6 +28,14 @@ CATALOGUE: tuple[type[Effect], ...] = (
     Gravity,
     TimeOffset,
     CameraRegistration,
+)
+CATALOGUE: tuple[type[Effect], ...] = (
+    *DIAGNOSED,
+    SurfaceLayer,
+    StiffnessGradient,
+    StrainStiffening,
+    Anisotropy,
+    BaseCompliance,
 )
 
 

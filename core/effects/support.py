@@ -9,9 +9,11 @@ from typing import Self, cast
 from core.effects.base import Effect, Slot, parameter
 from core.setup import Detachment, Edge, Setup
 
-__all__ = ["BaseDetachment", "BaseSlip"]
+__all__ = ["BaseCompliance", "BaseDetachment", "BaseSlip"]
 
 _EDGES = ("-x", "+x", "-y", "+y")
+_RIGID = 1e5
+"""Springs under the base from which on it counts as rigid [1/m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,3 +60,25 @@ class BaseDetachment(Effect):
             return setup
         strip = Detachment(edge=cast(Edge, self.edge), extent=self.extent)
         return replace(setup, support=replace(setup.support, detached=(*setup.support.detached, strip)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class BaseCompliance(Effect):
+    """An elastic support instead of a rigid one: springs per area in all directions, over Young's modulus."""
+
+    name, enters = "base_compliance", Slot.SUPPORT
+    summary = "the support under the base gives way"
+    stiffness_over_E: float = parameter("1/m", low=5.0, high=_RIGID, scale=0.3, log=True)
+
+    @classmethod
+    def neutral(cls, setup: Setup) -> Self:
+        stiffness = setup.support.stiffness_over_E
+        return cls(stiffness_over_E=_RIGID if stiffness is None else min(max(stiffness, 5.0), _RIGID))
+
+    @classmethod
+    def starts(cls, setup: Setup) -> Sequence[Self]:
+        return [cls(stiffness_over_E=stiffness) for stiffness in (40.0, 200.0)]
+
+    def apply(self, setup: Setup) -> Setup:
+        stiffness = None if self.stiffness_over_E >= _RIGID else self.stiffness_over_E
+        return replace(setup, support=replace(setup.support, stiffness_over_E=stiffness))

@@ -6,6 +6,7 @@ pressures can follow it (see `core.fem.elements`), which keeps the elements free
 neo_hooke     W = mu/2 x + kappa/4 (theta^2 - 1 - 2 ln theta), x = J^(-2/3) tr F^T F - 3, theta from J = det F
 gent          as neo_hooke, with -mu J_m/2 ln(1 - x / J_m) instead of mu/2 x: no stretch takes x to J_m
 corotational  W = mu |F - R|^2 + lambda/2 theta^2, theta from tr(R^T F) - 3, F = R S the polar decomposition
+fibres        to any of them: mu gamma/2 (|F a|^2 - 1)^2, a along the fibres
 """
 
 from __future__ import annotations
@@ -13,27 +14,55 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Self
 
-from core.fem import corotational, hyperelastic
+import numpy as np
+
+from core.fem import corotational, fibres, hyperelastic
 from core.fem.elements import Quadrature
 from core.frames import FloatArray
 from core.mesh import IntArray
 from core.setup import Material
 
-__all__ = ["Law", "assemble_elastic", "elastic_energy", "lame"]
+__all__ = ["Law", "assemble_elastic", "elastic_energy", "lame", "reinforcement"]
 
 
 @dataclass(frozen=True)
 class Law:
-    """Which energy: `corotational` or not, and the strain stiffening 1 / J_m of Gent's law [1], zero without."""
+    """Which energy.
+
+    Attributes:
+        corotational: or hyperelastic. stiffening: 1 / J_m of Gent's law [1], zero without.
+        gamma: stiffness of the fibres over the shear modulus [1], zero without. angle: of the fibres from the x axis [rad].
+    """
 
     corotational: bool = False
     stiffening: float = 0.0
+    gamma: float = 0.0
+    angle: float = 0.0
 
     @classmethod
     def of(cls, material: Material) -> Self:
         """The law of a material."""
-        limit = material.stretch_limit
-        return cls(material.law == "corotational", 0.0 if limit is None else 1.0 / limit)
+        limit, along = material.stretch_limit, material.fibres
+        return cls(
+            material.law == "corotational",
+            0.0 if limit is None else 1.0 / limit,
+            0.0 if along is None else reinforcement(along.stiffness_ratio, material.poisson_ratio),
+            0.0 if along is None else along.direction,
+        )
+
+    @property
+    def direction(self) -> FloatArray:
+        """Unit vector (3,) along the fibres."""
+        return np.array([np.cos(self.angle), np.sin(self.angle), 0.0])
+
+
+def reinforcement(stiffness_ratio: float, poisson_ratio: float) -> float:
+    """The fibres' gamma [1] that makes Young's modulus along them so many times that across, at small strain.
+
+    Along: E_a = E + 4 gamma mu. Across, where the fibres hinder the contraction: E / E_c = 1 - nu^2 (1 - E / E_a).
+    """
+    along = 1 + (stiffness_ratio - 1) / (1 - poisson_ratio**2)
+    return (along - 1) * (1 + poisson_ratio) / 2
 
 
 def lame(law: Law, poisson_ratio: float) -> tuple[float, float]:
@@ -51,8 +80,12 @@ def elastic_energy(law: Law, rule: Quadrature, nodes: IntArray, mu: FloatArray, 
     """
     parts = (rule.gradients, rule.weights, rule.pressures, nodes, mu, bulk)
     if law.corotational:
-        return float(corotational.energy(*parts, positions))
-    return float(hyperelastic.energy(*parts, law.stiffening, positions))
+        total = float(corotational.energy(*parts, positions))
+    else:
+        total = float(hyperelastic.energy(*parts, law.stiffening, positions))
+    if law.gamma:
+        total += float(fibres.energy(rule.gradients, rule.weights, nodes, law.gamma * mu, law.direction, positions))
+    return total
 
 
 def assemble_elastic(
@@ -72,6 +105,11 @@ def assemble_elastic(
     diagonal of the symmetric matrix). Elements must not be inverted. Other arguments as in `elastic_energy`.
     """
     parts = (rule.gradients, rule.weights, rule.pressures, nodes, mu, bulk)
+    if law.gamma:
+        along = (rule.gradients, rule.weights, nodes, law.gamma * mu, law.direction, positions)
+        fibres.add_forces(*along, force)
+        if len(data):
+            fibres.add_matrices(*along, slots, data)
     if law.corotational:
         corotational.assemble(*parts, positions, slots, force, data)
         return

@@ -17,7 +17,7 @@ from core.fem.linear import face_slots, factor_of, upper_pattern
 from core.fem.stiffness import log_stiffness
 from core.frames import FloatArray
 from core.mesh import BoxMesh, GridSpec, IntArray, box_mesh
-from core.setup import Detachment, Setup
+from core.setup import Detachment, Setup, Support
 
 __all__ = ["CONTACT_STIFFNESS", "Assembly", "BlockModel", "Probe", "Topology", "rule_of", "topology"]
 
@@ -88,6 +88,11 @@ def _held_share(detached: tuple[Detachment, ...], size: tuple[float, float, floa
     return held
 
 
+def _sprung(support: Support) -> bool:
+    """Whether the base can move against what it stands on."""
+    return bool(support.detached) or support.stiffness_over_E is not None
+
+
 @lru_cache(maxsize=32)
 def rule_of(mesh: BoxMesh) -> tuple[Quadrature, FloatArray]:
     """Quadrature of the elements, and areas on the free surface (f, p) [m^2]: the mesh's alone."""
@@ -101,7 +106,7 @@ class BlockModel:
 
     def __init__(self, setup: Setup, mesh: BoxMesh) -> None:
         self.mesh, self.setup = mesh, setup
-        self.topology = topology(mesh.shape, mesh.order, held=not setup.support.detached)
+        self.topology = topology(mesh.shape, mesh.order, held=not _sprung(setup.support))
         self.law, self.face = Law.of(setup.material), self.topology.element.face
         self.rule, self.areas = rule_of(mesh)
         mu, bulk = lame(self.law, setup.material.poisson_ratio)
@@ -121,15 +126,16 @@ class BlockModel:
         return specific * share
 
     def _prepare_base(self, setup: Setup) -> None:
-        self.detached = bool(setup.support.detached)
-        if not self.detached:
+        self.detached, self.sprung = bool(setup.support.detached), _sprung(setup.support)
+        if not self.sprung:
             return
         corners = self.mesh.nodes[self.topology.base]
         areas, shapes = face_weights(self.face, corners), self.face.shapes
         points = np.einsum("qa,fai->fqi", shapes, corners)
         self.base_areas = areas
         held = areas * _held_share(setup.support.detached, setup.geometry.size, points)
-        self.bond = BOND_STIFFNESS * np.einsum("fq,qa,qb->fab", held, shapes, shapes)
+        softness = 1 / BOND_STIFFNESS + (1 / setup.support.stiffness_over_E if setup.support.stiffness_over_E else 0.0)
+        self.bond = 1 / softness * np.einsum("fq,qa,qb->fab", held, shapes, shapes)
 
     def _bond_gradient(self, positions: FloatArray) -> FloatArray:
         """Gradient of the bond's energy at the base faces' nodes (f, 4, 3) [m^2]."""
@@ -155,9 +161,10 @@ class BlockModel:
                 False,
                 CONTACT_STIFFNESS,
             )
-        if self.detached:
+        if self.sprung:
             moved = (positions - self.mesh.nodes)[top.base]
             total += 0.5 * float(np.vdot(moved, self._bond_gradient(positions)))
+        if self.detached:
             total += contact_energy(
                 top.base,
                 self.base_areas,
@@ -184,7 +191,7 @@ class BlockModel:
                 top.surface, self.areas, self.face.shapes, self.face.gradients, positions, probe.centre, probe.radius, False,
                 CONTACT_STIFFNESS, bending, top.surface_slots, force, data, push,
             )  # fmt: skip
-        if self.detached:
+        if self.sprung:
             self._assemble_base(positions, force, data)
         return Assembly(force[top.free], data, push, penetration)
 
@@ -196,6 +203,8 @@ class BlockModel:
             blocks = np.einsum("fab,ij->faibj", self.bond, np.eye(3)).reshape(len(self.bond), size, size)
             used = top.base_slots >= 0
             np.add.at(data, top.base_slots[used], blocks[used])
+        if not self.detached:
+            return
         assemble_contact(
             top.base, self.base_areas, self.face.shapes, self.face.gradients, positions, np.zeros(3), 0.0, True,
             CONTACT_STIFFNESS, False, top.base_slots, force, data, np.zeros(3),

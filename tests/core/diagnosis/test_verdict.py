@@ -24,7 +24,7 @@ from core.diagnosis.search import RIVAL, Findings, Trial
 from core.diagnosis.structure import Structure
 from core.diagnosis.verdict import UNEXPLAINED_MISFIT, report_of, verdict_of
 from core.diagnosis.workers import Workers
-from core.effects import CATALOGUE, Effect
+from core.effects import DIAGNOSED, Effect
 from core.effects.load import Gravity
 from core.effects.material import PoissonRatio, StiffInclusion
 from core.effects.sensor import CameraRegistration
@@ -83,7 +83,7 @@ Tried = tuple[tuple[Effect, ...], float, float]
 def _findings(bench: Bench, *trials: Tried, accepted: bool = True, misfit: float = 2.0) -> Findings:
     """Trials as (effects, gain, misfit left), best first; the first is accepted or not."""
     made = [Trial(_model(bench, *effects), gain, left) for effects, gain, left in trials]
-    screened = {kind.name: 0.5 * number for number, kind in enumerate(CATALOGUE)}
+    screened = {kind.name: 0.5 * number for number, kind in enumerate(DIAGNOSED)}
     return Findings(_model(bench), made[0] if accepted and made else None, made, 12.0, misfit, screened)
 
 
@@ -214,7 +214,7 @@ def test_report_keeps_the_contract(bench, dataset):
     assert cause["effect"] == "stiff_inclusion" and cause["probability"] > 0.99
     assert set(cause["parameters"]) == {"x", "y", "z", "radius", "stiffness_ratio"}
     assert all({"value", "unit", "low", "high"} == set(entry) for entry in cause["parameters"].values())
-    assert {row["effect"] for row in report["ranking"]} == {kind.name for kind in CATALOGUE} - {"stiff_inclusion"}
+    assert {row["effect"] for row in report["ranking"]} == {kind.name for kind in DIAGNOSED} - {"stiff_inclusion"}
     assert all({"effect", "probability", "error_removed"} <= set(row) for row in report["ranking"])
     assert report["ranking"][0]["effect"] == "tool_radius" and report["ranking"][0]["error_removed"] == pytest.approx(0.5)
     assert {"fraction", "where", "when"} <= set(report["unexplained"])
@@ -235,7 +235,7 @@ def test_stiffness_is_not_identifiable_without_forces(bench, dataset):
 def test_report_without_a_cause_names_none(bench, dataset):
     report = report_of(dataset, bench, _findings(bench, ((LUMP,), 2.0, 1.0), accepted=False, misfit=1.0), None, "test")
     assert report["verdict"] == "none" and report["causes"] == [] and report["gain"] is None
-    assert len(report["ranking"]) == len(CATALOGUE)
+    assert len(report["ranking"]) == len(DIAGNOSED)
 
 
 def test_ambiguous_report_names_every_rival(bench, dataset):

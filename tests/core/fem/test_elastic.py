@@ -14,10 +14,14 @@ from core.fem.elements import HEXAHEDRA, Quadrature, quadrature
 from core.fem.stiffness import log_stiffness
 from core.setup import Layer, Material
 
-NEO_HOOKE, COROTATIONAL, GENT = Law(), Law(corotational=True), Law(stiffening=0.2)
+NEO_HOOKE, COROTATIONAL, GENT, FIBRED = Law(), Law(corotational=True), Law(stiffening=0.2), Law(gamma=1.5, angle=0.6)
 EACH = pytest.mark.parametrize(
     ("law", "order"), list(product([NEO_HOOKE, COROTATIONAL, GENT], HEXAHEDRA)),
     ids=[f"{law}-{order}" for law in ("neo_hooke", "corotational", "gent") for order in HEXAHEDRA],
+)  # fmt: skip
+EVERY = pytest.mark.parametrize(
+    ("law", "order"), list(product([NEO_HOOKE, COROTATIONAL, GENT, FIBRED], HEXAHEDRA)),
+    ids=[f"{law}-{order}" for law in ("neo_hooke", "corotational", "gent", "fibres") for order in HEXAHEDRA],
 )  # fmt: skip
 ORDERS = pytest.mark.parametrize("order", HEXAHEDRA)
 AFFINE = np.array([[1.20, 0.10, -0.05], [0.03, 0.85, 0.12], [-0.08, 0.02, 1.10]])
@@ -67,7 +71,7 @@ def test_patch_test_leaves_no_force_inside_distorted_elements(law, order):
     assert np.abs(force[inside]).max() < 1e-13 * np.abs(force).max()
 
 
-@EACH
+@EVERY
 def test_patch_test_finds_the_affine_field_from_its_boundary(law, order):
     mesh = grid((0.05, 0.03, 0.02), (5, 5, 5), order)
     low, high = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)
@@ -79,7 +83,7 @@ def test_patch_test_finds_the_affine_field_from_its_boundary(law, order):
     assert np.abs(found - wanted).max() < 1e-12
 
 
-@EACH
+@EVERY
 def test_force_is_the_gradient_of_the_energy(law, order):
     body = _loose(law, order)
     positions = _bent(body, 2)
@@ -90,7 +94,7 @@ def test_force_is_the_gradient_of_the_energy(law, order):
     assert slope == pytest.approx(np.vdot(force, direction), rel=1e-7)
 
 
-@EACH
+@EVERY
 @pytest.mark.parametrize("poisson_ratio", [0.0, 0.45, 0.49])
 def test_tangent_is_the_derivative_of_the_force(law, order, poisson_ratio):
     body = _loose(law, order, poisson_ratio)
@@ -104,7 +108,7 @@ def test_tangent_is_the_derivative_of_the_force(law, order, poisson_ratio):
     assert np.array_equal(tangent, tangent.T)
 
 
-@EACH
+@EVERY
 def test_rigid_motion_leaves_no_stress_and_no_energy(law, order):
     body = _loose(law, order)
     turn = Rotation.from_rotvec([0.9, -1.7, 0.6]).as_matrix()
@@ -115,7 +119,7 @@ def test_rigid_motion_leaves_no_stress_and_no_energy(law, order):
     assert abs(body.energy(moved)) < 1e-14 * body.energy(_bent(body, 1))
 
 
-@EACH
+@EVERY
 def test_energy_does_not_see_a_rotation_of_the_strained_body(law, order):
     body = _loose(law, order)
     positions = _bent(body, 7)
@@ -123,7 +127,7 @@ def test_energy_does_not_see_a_rotation_of_the_strained_body(law, order):
     assert body.energy(positions @ turn.T) / body.energy(positions) == pytest.approx(1.0, abs=1e-12)
 
 
-@EACH
+@EVERY
 def test_inverted_element_has_infinite_energy(law, order):
     body = _loose(law, order)
     assert body.energy(body.nodes * np.array([1.0, 1.0, -1.0])) == np.inf

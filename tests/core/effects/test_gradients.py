@@ -1,0 +1,122 @@
+"""First-order changes of a replay by every effect, against solves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.effects import from_json
+from core.effects.load import Gravity
+from core.effects.material import PoissonRatio, StiffInclusion
+from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
+from core.effects.support import BaseCompliance, BaseDetachment
+from core.effects.tool import ToolOffset, ToolRadius
+from core.mesh import GridSpec
+from core.replay import Equilibrium, Replay
+from core.sensitivity import displacement_changes, loss_changes
+from core.setup import Box, Load, Material, Setup, Support, Tool
+
+SETUP = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3), mass=0.104)
+GRID = GridSpec(nodes=(9, 7, 6), spacing=2e-3)
+POKE = np.array([[5e-3, 2e-3, 0.0358 + 5e-3 - depth] for depth in (1e-3, 3e-3, 5e-3)])
+
+
+def _with(effect: str, **parameters: float | str) -> Setup:
+    return from_json({"effect": effect, "parameters": parameters}).apply(SETUP)
+
+
+def _with_detachment(extent: float) -> Setup:
+    return _with("base_detachment", edge="+x", extent=extent)
+
+
+def _with_lump(ratio: float = 4.0, x: float = 6e-3, radius: float = 6e-3) -> Setup:
+    return _with("stiff_inclusion", x=x, y=1e-3, z=0.024, radius=radius, stiffness_ratio=ratio)
+
+
+CHANGES = {
+    "poisson_ratio": (SETUP, replace(SETUP, material=Material(poisson_ratio=0.4501))),
+    "stiff_inclusion ratio": (_with_lump(), _with_lump(ratio=4.004)),
+    "stiff_inclusion x": (_with_lump(), _with_lump(x=6.005e-3)),
+    "stiff_inclusion radius": (_with_lump(), _with_lump(radius=6.003e-3)),
+    "gravity": (
+        replace(SETUP, load=Load(specific_weight_over_stiffness=1.5)),
+        replace(SETUP, load=Load(specific_weight_over_stiffness=1.501)),
+    ),
+    "gravity from none": (SETUP, replace(SETUP, load=Load(specific_weight_over_stiffness=1e-3))),
+    "base_detachment": (_with_detachment(0.02), _with_detachment(0.02001)),
+    "tool_radius": (SETUP, replace(SETUP, tool=Tool(radius=5.0005e-3))),
+    "tool_offset dx": (SETUP, replace(SETUP, tool=Tool(radius=5e-3, offset=(5e-7, 0.0, 0.0)))),
+    "tool_offset dz": (SETUP, replace(SETUP, tool=Tool(radius=5e-3, offset=(0.0, 0.0, 5e-7)))),
+    "base_slip": (SETUP, replace(SETUP, support=Support(friction_coefficient=2.0))),
+    "surface_layer thickness": (
+        _with("surface_layer", thickness=3e-3, stiffness_ratio=4.0),
+        _with("surface_layer", thickness=3.003e-3, stiffness_ratio=4.0),
+    ),
+    "stiffness_gradient from none": (SETUP, _with("stiffness_gradient", log_ratio=1e-3)),
+    "strain_stiffening": (_with("strain_stiffening", J_m=4.0), _with("strain_stiffening", J_m=4.004)),
+    "anisotropy direction": (
+        _with("anisotropy", direction=0.4, stiffness_ratio=3.0),
+        _with("anisotropy", direction=0.401, stiffness_ratio=3.0),
+    ),
+    "anisotropy from none": (SETUP, _with("anisotropy", direction=0.4, stiffness_ratio=1.001)),
+    "base_compliance": (_with("base_compliance", stiffness_over_E=60.0), _with("base_compliance", stiffness_over_E=60.06)),
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_sensitivity_is_the_difference_of_two_solves(name):
+    setup, changed = CHANGES[name]
+    block, other = Replay(setup, GRID, tolerance=1e-10), Replay(changed, GRID, tolerance=1e-10)
+    frame = None
+    for centre in POKE:
+        frame = block.step(centre, frame)
+    assert frame is not None
+    solved = other.step(POKE[-1], frame)
+    wanted = solved.displacement - frame.displacement
+    found = displacement_changes(block, frame, [(changed, np.zeros(3))])[0]
+    if name == "base_slip":
+        assert np.abs(found).max() < 1e-9 and np.abs(wanted).max() < 1e-9
+        return
+    assert np.linalg.norm(wanted) > 1e-7
+    assert np.linalg.norm(found - wanted) < 0.02 * np.linalg.norm(wanted)
+
+
+GRADIENTS = {
+    "poisson_ratio": PoissonRatio(nu=0.43),
+    "stiff_inclusion": StiffInclusion(x=4e-3, y=1e-3, z=0.022, radius=6e-3, stiffness_ratio=3.0),
+    "tool_radius": ToolRadius(radius=5.2e-3),
+    "tool_offset": ToolOffset(dx=2e-4, dy=-2.2e-4, dz=1e-4),
+    "base_detachment": BaseDetachment(edge="+x", extent=0.02),
+    "gravity": Gravity(specific_weight_over_stiffness=1.5),
+    "surface_layer": SurfaceLayer(thickness=3e-3, stiffness_ratio=4.0),
+    "stiffness_gradient": StiffnessGradient(log_ratio=0.5),
+    "strain_stiffening": StrainStiffening(J_m=4.0),
+    "anisotropy": Anisotropy(direction=0.4, stiffness_ratio=3.0),
+    "base_compliance": BaseCompliance(stiffness_over_E=60.0),
+}
+
+
+@pytest.mark.parametrize("name", GRADIENTS)
+def test_adjoint_gradient_is_that_of_full_solves(name):
+    effect = GRADIENTS[name]
+    block, frame = Replay(effect.apply(SETUP), GRID, tolerance=1e-11), None
+    for centre in POKE:
+        frame = block.step(centre, frame)
+    assert frame is not None
+    target = 0.8 * frame.displacement  # what was measured, as it were
+
+    def loss(found: Equilibrium) -> float:
+        return 0.5 * float(((found.displacement - target) ** 2).sum())
+
+    for item, here in zip(effect.numbers(), effect.coordinates, strict=True):
+        step, around = 1e-3 * item.scale, []
+        for sign in (1, -1):
+            changed = replace(effect, **{item.name: item.value(here + sign * step)}).apply(SETUP)
+            solved = Replay(changed, GRID, tolerance=1e-11).step(POKE[-1], frame)
+            assert solved.outcome.name == "CONVERGED"
+            slope = frame.displacement - target
+            around.append((loss(solved), loss_changes(block, frame, slope, [(changed, np.zeros(3))])[0]))
+        (above, rise), (below, fall) = around
+        assert rise - fall == pytest.approx(above - below, rel=0.01)
