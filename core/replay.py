@@ -116,7 +116,7 @@ class Replay:
         return self._model
 
     @cached_property
-    def _free(self) -> Equilibrium:
+    def free(self) -> Equilibrium:
         """The block without the tool: sagging under gravity, otherwise as stated."""
         size = self.setup.geometry.size
         mesh = _focused_mesh(self.setup, self.grid, np.array([0.0, 0.0, size[2]]))
@@ -139,7 +139,7 @@ class Replay:
         """Equilibrium with the base where it is; `probe` in the frame of the slid block."""
         local = Probe(probe.centre - np.append(self.slip, 0.0), probe.radius)
         if _away(self.setup, local):
-            return replace(self._free, slip=self.slip.copy(), probe=probe)
+            return replace(self.free, slip=self.slip.copy(), probe=probe)
         mesh = _focused_mesh(self.setup, self.grid, local.centre)
         model = self.model(mesh)
         # The dent travels with the tool, so the field is carried along with the grid's focus before it is read.
@@ -188,7 +188,7 @@ class Replay:
     def step(self, stated_centre: FloatArray, start: Equilibrium | None = None) -> Equilibrium:
         """Equilibrium with the tool at a stated centre (3,) [m], phantom frame; slides the base if it cannot hold."""
         probe = Probe(stated_centre + self._offset, self.setup.tool.radius)
-        frame = self.held(probe, self._free if start is None else start)
+        frame = self.held(probe, self.free if start is None else start)
         if self.setup.support.friction_coefficient is None:
             return frame
         return self._slide(probe, frame)
@@ -222,7 +222,7 @@ class Replay:
 
 def rest(setup: Setup, grid: GridSpec) -> Equilibrium:
     """The block without the tool."""
-    return Replay(setup, grid)._free
+    return Replay(setup, grid).free
 
 
 def replay(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 
@@ -36,6 +37,20 @@ class Probe:
 
     centre: FloatArray
     radius: float
+
+
+class Carried(Protocol):
+    """A quadratic potential of the unknowns' displacements that one step in time adds (`core.fem.inertia`)."""
+
+    @property
+    def data(self) -> FloatArray:
+        """Its tangent's entries over E, in the pattern of the model's [m]."""
+
+    def energy(self, displacement: FloatArray) -> float:
+        """Over E [m^3]."""
+
+    def force(self, displacement: FloatArray) -> FloatArray:
+        """Its gradient over E (u,) [m^2]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +129,7 @@ class BlockModel:
         self.mu, self.bulk = mu * factor, bulk * factor
         # Sums of squares near three lose their last digits when three is taken off, in proportion to this stiffness times volume.
         self.rounding = 4e-16 * float(np.vdot(self.mu, self.rule.weights))
+        self.carried: Carried | None = None
         self.weight_force = self._weight(setup.load.specific_weight_over_stiffness)
         self._prepare_base(setup)
 
@@ -149,6 +165,8 @@ class BlockModel:
         if not np.isfinite(total):
             return np.inf
         total += float(self.weight_force @ (positions[:, 2] - self.mesh.nodes[:, 2]))
+        if self.carried is not None:
+            total += self.carried.energy((positions - self.mesh.nodes)[top.free])
         if probe is not None:
             total += contact_energy(
                 top.surface,
@@ -193,7 +211,11 @@ class BlockModel:
             )  # fmt: skip
         if self.sprung:
             self._assemble_base(positions, force, data)
-        return Assembly(force[top.free], data, push, penetration)
+        residual = force[top.free]
+        if self.carried is not None:
+            residual += self.carried.force((positions - self.mesh.nodes)[top.free])
+            data = data + self.carried.data if tangent else data
+        return Assembly(residual, data, push, penetration)
 
     def _assemble_base(self, positions: FloatArray, force: FloatArray, data: FloatArray) -> None:
         top = self.topology
