@@ -71,7 +71,7 @@ def test_mode_let_go_falls_in_each_step_as_implicit_euler_says(grid, damping):
 def test_slow_motion_is_that_without_inertia(grid):
     setup = replace(SETUP, load=Load(specific_weight_over_stiffness=0.5))
     wanted = replay(setup, POKE, grid)
-    found = replay_in_time(setup, POKE, 1e3 * np.arange(4), grid, damping=Damping(mass=0.1, stiffness=0.1))
+    found = replay_in_time(setup, POKE, [0.0, 1e3, 2e3, 3e3], grid, damping=Damping(mass=0.1, stiffness=0.1))
     require_converged(found)
     for frame, still in zip(found, wanted, strict=True):
         assert np.abs(frame.displacement - still.displacement).max() < 2e-6
