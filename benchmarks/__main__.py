@@ -6,13 +6,14 @@ import sys
 
 from rich.console import Console
 
-from benchmarks import cleaning, convergence, dataset, effects, measurement, peers, replay
+from benchmarks import cleaning, convergence, dataset, effects, measurement, modulus, peers, replay
 
 ALL = {
     "replay": replay.run,
     "peers": peers.run,
     "convergence": convergence.run,
     "effects": effects.run,
+    "modulus": modulus.run,
     "measurement": measurement.run,
     "cleaning": cleaning.run,
     "dataset": dataset.run,
