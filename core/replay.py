@@ -27,6 +27,8 @@ __all__ = ["GRAVITY", "Equilibrium", "Replay", "replay", "require_converged", "r
 GRAVITY = 9.81
 """Acceleration of free fall [m/s^2]."""
 _FOCUS_STEP = 2e-4
+_PLACED, _MOST_PLACES = 1e-2, 30
+"""How well a tool that gives way is placed [m], over the tolerance, and how often that is tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,12 +188,37 @@ class Replay:
         return Probe(before.centre + low * (probe.centre - before.centre), probe.radius)
 
     def step(self, stated_centre: FloatArray, start: Equilibrium | None = None) -> Equilibrium:
-        """Equilibrium with the tool at a stated centre (3,) [m], phantom frame; slides the base if it cannot hold."""
-        probe = Probe(stated_centre + self._offset, self.setup.tool.radius)
-        frame = self.held(probe, self.free if start is None else start)
+        """Equilibrium with the tool at a stated centre (3,) [m], phantom frame; tool and base give way if they can."""
+        centre, start = stated_centre + self._offset, self.free if start is None else start
+        if not self.setup.tool.compliance_times_stiffness:
+            return self._placed(centre, start)
+        return self._give_way(centre, start)
+
+    def _placed(self, centre: FloatArray, start: Equilibrium) -> Equilibrium:
+        """Equilibrium with the tool's centre held here (3,) [m]; slides the base if it cannot hold."""
+        probe = Probe(centre, self.setup.tool.radius)
+        frame = self.held(probe, start)
         if self.setup.support.friction_coefficient is None:
             return frame
         return self._slide(probe, frame)
+
+    def _give_way(self, centre: FloatArray, start: Equilibrium) -> Equilibrium:
+        """Equilibrium with the tool on a spring whose other end is here (3,) [m], by Broyden's method on its true centre."""
+        giving, modulus = self.setup.tool.compliance_times_stiffness, self.setup.material.young_modulus
+        softness, place = giving / modulus, centre + giving / modulus * start.force
+        inverse = np.eye(3) / (1 + giving * 2 * self.setup.tool.radius)  # a punch of the ball's size resists the most
+        frame = self._placed(place, start)
+        for _ in range(_MOST_PLACES):
+            miss = centre + softness * frame.force - place
+            if frame.outcome is not Outcome.CONVERGED or np.linalg.norm(miss) < _PLACED * self.tolerance:
+                return frame
+            step = inverse @ miss
+            place = place + step
+            frame = self._placed(place, frame)
+            change = miss - (centre + softness * frame.force - place)
+            turned = inverse @ change
+            inverse += np.outer(step - turned, step @ inverse) / (step @ turned)
+        return replace(frame, outcome=Outcome.TOOL_SWINGS)
 
     def _slide(self, probe: Probe, frame: Equilibrium) -> Equilibrium:
         """Move the base until friction holds: Coulomb, with the weight and the push as its load."""

@@ -46,19 +46,84 @@ def _holds(block: Replay, frame: Equilibrium) -> bool:
 
 
 def _unbalanced(block: Replay, frame: Equilibrium, model: BlockModel, changes: Sequence[tuple[Setup, FloatArray]]) -> FloatArray:
-    """Minus the change of the residual (u, len(changes)) over E [m^2] at the frame's displacement."""
+    """Minus the change of the residual (u, len(changes)) over E [m^2] at the frame's displacement.
+
+    A tool that gives way stays where it is here; `GivingTool` moves it.
+    """
     positions, here = frame.mesh.nodes + frame.displacement, _local(frame)
     residual = model.assemble(positions, here, tangent=False).residual
     right = np.zeros((len(residual), len(changes)))
     for column, (setup, move) in enumerate(changes):
-        same = setup.material == block.setup.material and setup.load == block.setup.load and setup.support == block.setup.support
-        shift = np.array(setup.tool.offset) - np.array(block.setup.tool.offset) + move
+        same = _same_body(block, setup)
+        shift = np.zeros(3) if _gives(block.setup, setup) else _shift(block, setup, move)
         if same and setup.tool.radius == block.setup.tool.radius and not shift.any():  # only the sensor differs
             continue
         other = model if same else BlockModel(setup, frame.mesh)
         probe = Probe(here.centre + shift, here.radius + setup.tool.radius - block.setup.tool.radius)
         right[:, column] = residual - other.assemble(positions, probe, tangent=False).residual
     return right
+
+
+def _same_body(block: Replay, setup: Setup) -> bool:
+    here = block.setup
+    return setup.material == here.material and setup.load == here.load and setup.support == here.support
+
+
+def _shift(block: Replay, setup: Setup, move: FloatArray) -> FloatArray:
+    """How the tool's centre moves before it gives way (3,) [m]."""
+    return np.asarray(np.array(setup.tool.offset) - np.array(block.setup.tool.offset) + move)
+
+
+def _gives(*setups: Setup) -> bool:
+    return any(setup.tool.compliance_times_stiffness for setup in setups)
+
+
+class GivingTool:
+    """How a tool on a spring takes part in a change, at a frame whose tangent is factorised.
+
+    With y its centre, s its stated one, c its compliance times E and f the force on it over E, y = s + c f. So, with B the change
+    of the residual and -H that of f as y moves, A = K^-1 B and `free` the change of the displacement at a fixed tool,
+
+        (1 + c (H - B' A)) dy = ds + dc f + c (df - B' free),    du = free - A dy.
+    """
+
+    def __init__(self, block: Replay, frame: Equilibrium, model: BlockModel) -> None:
+        self._block, self._model, self._here = block, model, _local(frame)
+        self._positions = frame.mesh.nodes + frame.displacement
+        self._compliance = block.setup.tool.compliance_times_stiffness
+        state = model.assemble(self._positions, self._here, tangent=False)
+        self._force = -state.push
+        slopes = [self._slope(axis) for axis in np.eye(3)]
+        self._coupling = np.stack([residual for residual, _ in slopes], axis=1)
+        harder = -np.stack([force for _, force in slopes], axis=1)
+        self.answer = model.topology.factor.solve(self._coupling)
+        self._inverse = np.linalg.inv(np.eye(3) + self._compliance * (harder - self._coupling.T @ self.answer))
+
+    def _slope(self, axis: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Of the residual (u,) and of the force on the tool (3,), over E, by the tool's motion along an axis [m]."""
+        ways = [Probe(self._here.centre + sign * TOOL_STEP * axis, self._here.radius) for sign in (1, -1)]
+        ahead, behind = (self._model.assemble(self._positions, probe, tangent=False) for probe in ways)
+        return (ahead.residual - behind.residual) / (2 * TOOL_STEP), (behind.push - ahead.push) / (2 * TOOL_STEP)
+
+    def coupled(self, free: FloatArray) -> FloatArray:
+        """B' free (3, m) [m^2]."""
+        return np.asarray(self._coupling.T @ free)
+
+    def moves(self, changes: Sequence[tuple[Setup, FloatArray]], coupled: FloatArray) -> FloatArray:
+        """Of the centre (3, len(changes)) [m], with B' free of each change as `coupled` (3, len(changes)) [m^2]."""
+        right = -self._compliance * coupled
+        for column, (setup, move) in enumerate(changes):
+            softer = setup.tool.compliance_times_stiffness - self._compliance
+            right[:, column] += _shift(self._block, setup, move) + softer * self._force + self._compliance * self._pushed(setup)
+        return np.asarray(self._inverse @ right)
+
+    def _pushed(self, setup: Setup) -> FloatArray:
+        """Change of the force on the tool (3,) over E with another radius, all else staying where it is."""
+        wider = setup.tool.radius - self._block.setup.tool.radius
+        if not wider:
+            return np.zeros(3)
+        state = self._model.assemble(self._positions, Probe(self._here.centre, self._here.radius + wider), tangent=False)
+        return np.asarray(-state.push - self._force)
 
 
 def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[tuple[Setup, FloatArray]]) -> FloatArray:
@@ -76,7 +141,12 @@ def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[tu
     model = factorise_at(block, frame) if _holds(block, frame) else None
     if model is None or not changes:
         return result
-    result[:, model.topology.free] = model.topology.factor.solve(_unbalanced(block, frame, model, changes)).T
+    free = model.topology.factor.solve(_unbalanced(block, frame, model, changes))
+    if _gives(block.setup, *(setup for setup, _ in changes)):
+        tool = GivingTool(block, frame, model)
+        here = np.array([_gives(block.setup, setup) for setup, _ in changes])
+        free -= here * (tool.answer @ tool.moves(changes, tool.coupled(free)))
+    result[:, model.topology.free] = free.T
     return result
 
 
@@ -94,8 +164,14 @@ def loss_changes(block: Replay, frame: Equilibrium, slope: FloatArray, changes: 
     model = factorise_at(block, frame) if _holds(block, frame) else None
     if model is None or not changes:
         return np.zeros(len(changes))
+    right = _unbalanced(block, frame, model, changes)
     adjoint = model.topology.factor.solve(slope[model.topology.free])
-    return np.asarray(adjoint @ _unbalanced(block, frame, model, changes))
+    found = np.asarray(adjoint @ right)
+    if _gives(block.setup, *(setup for setup, _ in changes)):
+        tool = GivingTool(block, frame, model)
+        here = np.array([_gives(block.setup, setup) for setup, _ in changes])
+        found -= here * (slope[model.topology.free] @ tool.answer @ tool.moves(changes, tool.answer.T @ right))
+    return found
 
 
 def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray) -> FloatArray:
@@ -119,7 +195,11 @@ def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray
     shape = (int(model.topology.unknown.max()) + 1, elements * points)
     gather = sp.csr_matrix((forces.reshape(unknown.shape)[used], (unknown[used], column[used])), shape=shape)
     right = gather @ sp.csc_matrix(log_factors.reshape(len(log_factors), -1).T)
-    result[:, model.topology.free] = -model.topology.factor.solve(right.toarray()).T
+    free = -model.topology.factor.solve(right.toarray())
+    if _gives(block.setup):
+        tool = GivingTool(block, frame, model)
+        free -= tool.answer @ tool.moves([(block.setup, np.zeros(3))] * len(log_factors), tool.coupled(free))
+    result[:, model.topology.free] = free.T
     return result
 
 

@@ -146,13 +146,20 @@ class Support:
 
 @dataclass(frozen=True, kw_only=True)
 class Tool:
-    """A rigid sphere: radius [m]; its true centre is the stated one plus `offset` (phantom frame) [m]."""
+    """A rigid sphere.
+
+    Attributes:
+        radius: [m]. offset: where its centre is against the stated one before anything is touched, phantom frame [m].
+        compliance_times_stiffness: how far the force F on it moves its centre, C F: C times Young's modulus [1/m].
+    """
 
     radius: float
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    compliance_times_stiffness: float = 0.0
 
     def __post_init__(self) -> None:
         _within("tool radius", self.radius, 1e-4, 0.2, "m")
+        _within("tool compliance_times_stiffness", self.compliance_times_stiffness, 0.0, 1e3, "1/m")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -216,7 +223,11 @@ class Setup:
                 "detached": [vars(strip) for strip in self.support.detached],
                 "stiffness_over_E": self.support.stiffness_over_E,
             },
-            "tool": {"radius": self.tool.radius, "offset": list(self.tool.offset)},
+            "tool": {
+                "radius": self.tool.radius,
+                "offset": list(self.tool.offset),
+                "compliance_times_stiffness": self.tool.compliance_times_stiffness,
+            },
             "sensor": {
                 "depth_sigma": self.sensor.depth_sigma,
                 "time_offset": self.sensor.time_offset,

@@ -9,7 +9,7 @@ from typing import Self
 from core.effects.base import Effect, Slot, parameter
 from core.setup import Setup
 
-__all__ = ["ToolOffset", "ToolRadius"]
+__all__ = ["ToolCompliance", "ToolOffset", "ToolRadius"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,3 +54,23 @@ class ToolOffset(Effect):
     def apply(self, setup: Setup) -> Setup:
         offset = setup.tool.offset
         return replace(setup, tool=replace(setup.tool, offset=(offset[0] + self.dx, offset[1] + self.dy, offset[2] + self.dz)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToolCompliance(Effect):
+    """The shaft or the cables give way under load: the true centre is the stated one plus C F."""
+
+    name, enters = "tool_compliance", Slot.TOOL
+    summary = "the tool gives way under load"
+    compliance_times_stiffness: float = parameter("1/m", low=0.0, high=500.0, scale=3.0)
+
+    @classmethod
+    def neutral(cls, setup: Setup) -> Self:
+        return cls(compliance_times_stiffness=setup.tool.compliance_times_stiffness)
+
+    @classmethod
+    def starts(cls, setup: Setup) -> Sequence[Self]:
+        return [cls(compliance_times_stiffness=20.0)]
+
+    def apply(self, setup: Setup) -> Setup:
+        return replace(setup, tool=replace(setup.tool, compliance_times_stiffness=self.compliance_times_stiffness))

@@ -27,6 +27,7 @@ class Outcome(Enum):
     ITERATIONS = "no equilibrium within the allowed iterations; the motion between frames is too large or the load too high"
     INDEFINITE = "the stiffness stayed indefinite: the block buckles or an element is almost inverted"
     INVERTED = "an element is inverted at the start of the solve"
+    TOOL_SWINGS = "the tool gives way so much that no place was found where its spring balances the block"
     INSIDE_TOOL = "the material came to rest inside the tool, or the tool inside the material"
 
 

@@ -36,6 +36,7 @@ VOCABULARY = {
     "strain_stiffening": {"J_m": "1"},
     "anisotropy": {"direction": "rad", "stiffness_ratio": "1"},
     "base_compliance": {"stiffness_over_E": "1/m"},
+    "tool_compliance": {"compliance_times_stiffness": "1/m"},
 }
 
 # One finite size of each, for the tests that need a change.
@@ -54,6 +55,7 @@ EXAMPLES: dict[str, dict[str, float | str]] = {
     "strain_stiffening": {"J_m": 4.0},
     "anisotropy": {"direction": 0.4, "stiffness_ratio": 3.0},
     "base_compliance": {"stiffness_over_E": 60.0},
+    "tool_compliance": {"compliance_times_stiffness": 20.0},
 }
 EACH = pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
 

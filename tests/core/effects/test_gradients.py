@@ -12,7 +12,7 @@ from core.effects.load import Gravity
 from core.effects.material import PoissonRatio, StiffInclusion
 from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
 from core.effects.support import BaseCompliance, BaseDetachment
-from core.effects.tool import ToolOffset, ToolRadius
+from core.effects.tool import ToolCompliance, ToolOffset, ToolRadius
 from core.mesh import GridSpec
 from core.replay import Equilibrium, Replay
 from core.sensitivity import displacement_changes, loss_changes
@@ -61,6 +61,19 @@ CHANGES = {
         _with("anisotropy", direction=0.401, stiffness_ratio=3.0),
     ),
     "anisotropy from none": (SETUP, _with("anisotropy", direction=0.4, stiffness_ratio=1.001)),
+    "tool_compliance": (
+        _with("tool_compliance", compliance_times_stiffness=20.0),
+        _with("tool_compliance", compliance_times_stiffness=20.02),
+    ),
+    "tool_compliance from none": (SETUP, _with("tool_compliance", compliance_times_stiffness=0.02)),
+    "offset of a tool that gives way": (
+        _with("tool_compliance", compliance_times_stiffness=20.0),
+        replace(SETUP, tool=Tool(radius=5e-3, offset=(0.0, 0.0, 5e-7), compliance_times_stiffness=20.0)),
+    ),
+    "stiffness under a tool that gives way": (
+        _with("tool_compliance", compliance_times_stiffness=20.0),
+        replace(_with("tool_compliance", compliance_times_stiffness=20.0), material=Material(poisson_ratio=0.4501)),
+    ),
     "base_compliance": (_with("base_compliance", stiffness_over_E=60.0), _with("base_compliance", stiffness_over_E=60.06)),
 }
 
@@ -95,6 +108,7 @@ GRADIENTS = {
     "strain_stiffening": StrainStiffening(J_m=4.0),
     "anisotropy": Anisotropy(direction=0.4, stiffness_ratio=3.0),
     "base_compliance": BaseCompliance(stiffness_over_E=60.0),
+    "tool_compliance": ToolCompliance(compliance_times_stiffness=20.0),
 }
 
 
