@@ -53,6 +53,11 @@ class Quadrature:
     pressures: FloatArray
     places: FloatArray
 
+    @property
+    def edges(self) -> FloatArray:
+        """Of the volume that each point stands for (e, q) [m]."""
+        return np.asarray(np.cbrt(self.weights))
+
 
 def _lagrange(order: int, at: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Values and slopes (p, order + 1) of the Lagrange polynomials on [-1, 1] at these places (p,)."""

@@ -15,7 +15,7 @@ from core.fem.contact import assemble_contact, contact_energy, turns_around
 from core.fem.elastic import Law, assemble_elastic, elastic_energy, lame
 from core.fem.elements import HEXAHEDRA, Quadrature, face_weights, quadrature
 from core.fem.linear import face_slots, factor_of, upper_pattern
-from core.fem.stiffness import log_stiffness
+from core.fem.stiffness import SurfaceSpots, log_stiffness, surface_stiffness
 from core.frames import FloatArray
 from core.mesh import BoxMesh, GridSpec, IntArray, box_mesh
 from core.setup import Detachment, Setup, Support
@@ -116,16 +116,31 @@ def rule_of(mesh: BoxMesh) -> tuple[Quadrature, FloatArray]:
     return quadrature(shared.element, mesh.nodes[shared.hexahedra]), areas
 
 
+@lru_cache(maxsize=32)
+def _surface_places(mesh: BoxMesh) -> FloatArray:
+    """Of the free surface's quadrature points (f, p, 3) [m]."""
+    shared = topology(mesh.shape, mesh.order, True)
+    return np.einsum("qa,fai->fqi", shared.element.face.shapes, mesh.nodes[shared.surface])
+
+
 class BlockModel:
-    """One block on one mesh: energy, residual and tangent as functions of the node positions (n, 3) [m] and the probe."""
+    """One block on one mesh: energy, residual and tangent as functions of the node positions (n, 3) [m] and the probe.
+
+    Attributes:
+        mu, bulk: (e, q) over E at the quadrature points [1].
+        areas: (f, p) of the free surface's quadrature points, times the stiffness there over E [m^2], with which contact goes.
+    """
 
     def __init__(self, setup: Setup, mesh: BoxMesh) -> None:
         self.mesh, self.setup = mesh, setup
         self.topology = topology(mesh.shape, mesh.order, held=not _sprung(setup.support))
         self.law, self.face = Law.of(setup.material), self.topology.element.face
-        self.rule, self.areas = rule_of(mesh)
+        self.rule, areas = rule_of(mesh)
+        height = setup.geometry.size[2]
+        spots = SurfaceSpots(_surface_places(mesh), np.sqrt(areas))
+        self.areas = areas * surface_stiffness(setup.material, spots, height)
         mu, bulk = lame(self.law, setup.material.poisson_ratio)
-        factor = np.exp(log_stiffness(setup.material, self.rule, setup.geometry.size[2]))
+        factor = np.exp(log_stiffness(setup.material, self.rule, height))
         self.mu, self.bulk = mu * factor, bulk * factor
         # Sums of squares near three lose their last digits when three is taken off, in proportion to this stiffness times volume.
         self.rounding = 4e-16 * float(np.vdot(self.mu, self.rule.weights))

@@ -2,46 +2,78 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Protocol
+
 import numpy as np
 
-from core.fem.elements import Quadrature
 from core.frames import FloatArray
 from core.setup import Inclusion, Layer, Material
 
-__all__ = ["layer_share", "log_stiffness", "lump_share"]
+__all__ = ["Spots", "SurfaceSpots", "layer_share", "log_stiffness", "lump_share", "surface_stiffness"]
+
+
+class Spots(Protocol):
+    """Points of the body at rest, and how large the part is that each stands for."""
+
+    @property
+    def places(self) -> FloatArray:
+        """(..., 3) [m]."""
+
+    @property
+    def edges(self) -> FloatArray:
+        """(...) [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceSpots:
+    """Points of the surface at rest (f, p, 3) [m], and the edge of the part of it that each stands for (f, p) [m]."""
+
+    places: FloatArray
+    edges: FloatArray
+
 
 _EDGE = 2.3
 """So many edges from its surface a lump or skin holds less than a ten-thousandth of a point's volume."""
 
 
-def _inside(depth: FloatArray, rule: Quadrature) -> FloatArray:
-    """Share (e, q) of each point's volume on the inner side of a surface that lies `depth` (e, q) [m] outwards of the point.
+def _inside(depth: FloatArray, spots: Spots) -> FloatArray:
+    """Share (...) of each point's volume on the inner side of a surface that lies `depth` (...) [m] outwards of the point.
 
     A point stands for the volume around it, which the surface cuts while it passes over about an edge's length; the share is
     smooth, and so is all that follows from it.
     """
     share = np.zeros(depth.shape)
-    edges = depth / np.cbrt(rule.weights)
+    edges = depth / spots.edges
     near = edges > -_EDGE
     share[near] = 0.5 * (1 + np.tanh(2 * edges[near]))
     return share
 
 
-def lump_share(lump: Inclusion, rule: Quadrature) -> FloatArray:
-    """Share (e, q) of the volume of each quadrature point that the lump holds [1]."""
-    return _inside(lump.radius - np.linalg.norm(rule.places - (lump.x, lump.y, lump.z), axis=2), rule)
+def lump_share(lump: Inclusion, spots: Spots) -> FloatArray:
+    """Share (...) of the volume of each point that the lump holds [1]."""
+    return _inside(lump.radius - np.linalg.norm(spots.places - (lump.x, lump.y, lump.z), axis=-1), spots)
 
 
-def layer_share(layer: Layer, rule: Quadrature, height: float) -> FloatArray:
-    """Share (e, q) of the volume of each quadrature point that the skin on top of a body of this height [m] holds [1]."""
-    return _inside(rule.places[:, :, 2] - (height - layer.thickness), rule)
+def layer_share(layer: Layer, spots: Spots, height: float) -> FloatArray:
+    """Share (...) of the volume of each point that the skin on top of a body of this height [m] holds [1]."""
+    return _inside(spots.places[..., 2] - (height - layer.thickness), spots)
 
 
-def log_stiffness(material: Material, rule: Quadrature, height: float) -> FloatArray:
-    """Logarithm (e, q) of the stiffness at the quadrature points over the stated one [1]."""
-    log_factor = material.log_ratio * (rule.places[:, :, 2] / height - 0.5)
+def log_stiffness(material: Material, spots: Spots, height: float) -> FloatArray:
+    """Logarithm (...) of the stiffness at these points over the stated one [1]."""
+    log_factor = material.log_ratio * (spots.places[..., 2] / height - 0.5)
     for lump in material.inclusions:
-        log_factor += lump_share(lump, rule) * np.log(lump.stiffness_ratio)
+        log_factor += lump_share(lump, spots) * np.log(lump.stiffness_ratio)
     if material.layer is not None:
-        log_factor += layer_share(material.layer, rule, height) * np.log(material.layer.stiffness_ratio)
+        log_factor += layer_share(material.layer, spots, height) * np.log(material.layer.stiffness_ratio)
     return np.asarray(log_factor)
+
+
+def surface_stiffness(material: Material, spots: Spots, height: float) -> FloatArray:
+    """How hard the surface resists a push (...), over E [1]: what a contact's penalty must go with, or a hard skin is pushed into.
+
+    Never below one, since under a soft skin lies what is not. Fibres in the plane share a push with the matrix around them.
+    """
+    fibres = 1.0 if material.fibres is None else np.sqrt(material.fibres.stiffness_ratio)
+    return np.asarray(fibres * np.exp(np.maximum(log_stiffness(material, spots, height), 0.0)))

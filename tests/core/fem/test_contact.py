@@ -10,7 +10,7 @@ from core.fem.elements import HEXAHEDRA
 from core.fem.model import CONTACT_STIFFNESS, BlockModel, Probe
 from core.mesh import GridSpec, box_mesh
 from core.replay import replay
-from core.setup import Box, Detachment, Material, Setup, Support, Tool
+from core.setup import Box, Detachment, Layer, Material, Setup, Support, Tool
 
 SIZE = (0.0687, 0.0393, 0.0358)
 SETUP = Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3))
@@ -116,3 +116,13 @@ def test_ball_on_a_large_block_presses_as_hertz_says():
     theory = 4 / 3 * 5e3 / (1 - 0.45**2) * np.sqrt(5e-3) * depths**1.5
     ratio = np.array([frame.force[2] for frame in frames]) / theory
     assert (ratio[1:] > 0.95).all() and (ratio[1:] < 1.10).all(), ratio
+
+
+@pytest.mark.parametrize("skin", [0.1, 30.0])
+def test_hard_or_soft_skin_lets_the_ball_in_as_little_as_the_plain_block(skin):
+    way = np.array([[0.0, 0.0, SIZE[2] + 5e-3 - depth] for depth in (1e-3, 2e-3, 3e-3)])
+    coated = replace(SETUP, material=Material(layer=Layer(thickness=4e-3, stiffness_ratio=skin)))
+    grid = GridSpec(nodes=(9, 7, 6), spacing=1.5e-3)
+    plain, inside = (replay(setup, way, grid)[-1] for setup in (SETUP, coated))
+    assert abs(inside.force[2] / plain.force[2] - 1) > 0.5
+    assert inside.penetration < 1.5 * plain.penetration
