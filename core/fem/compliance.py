@@ -25,8 +25,9 @@ from core.mesh import IntArray
 
 __all__ = ["Compliance"]
 
-_MARGIN = 1.5e-3
-"""Surface nodes this far from the ball [m] may come to touch it in the steps to come."""
+_MARGIN, _EDGES = 5e-4, 0.3
+"""Surface nodes this far from the ball [m], or this share of their side's length, may come to touch it in the steps to come. Where
+one further off does, the residual says so, and the next linearisation has it."""
 _INNER_STEPS = 25
 _INNER_TOLERANCE = 1e-8
 
@@ -58,7 +59,7 @@ class Compliance:
         top = model.topology
         distance = np.linalg.norm(positions[top.surface] - probe.centre, axis=2)
         edges = np.linalg.norm(positions[top.surface] - positions[top.surface[:, :1]], axis=2).max(axis=1)
-        near = np.flatnonzero(distance.min(axis=1) < probe.radius + np.maximum(_MARGIN, 0.7 * edges))
+        near = np.flatnonzero(distance.min(axis=1) < probe.radius + np.maximum(_MARGIN, _EDGES * edges))
         nodes = np.unique(top.surface[near])
         nodes = nodes[top.free[nodes].all(axis=1)]
         near = near[np.isin(top.surface[near], nodes).all(axis=1)]

@@ -120,7 +120,7 @@ def rule_of(mesh: BoxMesh) -> tuple[Quadrature, FloatArray]:
 def _surface_places(mesh: BoxMesh) -> FloatArray:
     """Of the free surface's quadrature points (f, p, 3) [m]."""
     shared = topology(mesh.shape, mesh.order, True)
-    return np.einsum("qa,fai->fqi", shared.element.face.shapes, mesh.nodes[shared.surface])
+    return np.asarray(np.einsum("qa,fai->fqi", shared.element.face.shapes, mesh.nodes[shared.surface]))
 
 
 class BlockModel:
