@@ -62,12 +62,15 @@ def test_stiffness_everywhere_the_same_moves_only_against_the_contact(pushed):
     assert np.abs(whole).max() < 0.05 * np.abs(frame.displacement).max()
 
 
-def test_lump_of_the_setup_is_what_its_column_says(pushed):
-    block, frame = pushed
+@pytest.mark.parametrize("compliance", [0.0, 30.0], ids=["stiff tool", "tool that gives way"])
+def test_lump_of_the_setup_is_what_its_column_says(compliance):
+    stated = replace(SETUP, tool=replace(SETUP.tool, compliance_times_stiffness=compliance))
+    block = Replay(stated, GRID, TIGHT)
+    frame = block.step(poke(4e-3), block.step(poke(2e-3)))
     lump = Inclusion(x=8e-3, y=0.0, z=0.022, radius=7e-3, stiffness_ratio=np.e)
     found = stiffness_changes(block, frame, lump_share(lump, rule_of(frame.mesh)[0])[None])[0]
     setups = [
-        replace(SETUP, material=replace(SETUP.material, inclusions=(replace(lump, stiffness_ratio=np.exp(step)),)))
+        replace(stated, material=replace(SETUP.material, inclusions=(replace(lump, stiffness_ratio=np.exp(step)),)))
         for step in (SMALL, -SMALL)
     ]
     stiffer, softer = (Replay(setup, GRID, TIGHT).step(poke(4e-3), frame).displacement for setup in setups)
