@@ -6,12 +6,13 @@ import sys
 
 from rich.console import Console
 
-from benchmarks import cleaning, convergence, dataset, effects, measurement, modulus, peers, replay
+from benchmarks import cleaning, convergence, dataset, effects, measurement, modulus, peers, replay, sweep
 
 ALL = {
     "replay": replay.run,
     "peers": peers.run,
     "convergence": convergence.run,
+    "sweep": sweep.run,
     "effects": effects.run,
     "modulus": modulus.run,
     "measurement": measurement.run,
