@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 from rich.table import Table
 
+from benchmarks.picture import picture
 from benchmarks.reference import compared, poke_frames, reference
 from benchmarks.stopwatch import timed
 from core.frames import FloatArray
@@ -74,22 +74,11 @@ def run() -> list[Table]:
 
 
 def _draw(series: dict[str, list[Point]]) -> None:
-    mpl.use("Agg")
-    from matplotlib import pyplot  # noqa: PLC0415 (after the choice of a backend without a window)
-
-    figure, (errors, times) = pyplot.subplots(1, 2, figsize=(9, 4), layout="constrained")
-    for (name, points), colour in zip(series.items(), ("tab:blue", "tab:orange"), strict=True):
-        spacing = [1e3 * point.spacing for point in points]
-        errors.loglog(spacing, [100 * point.displacement[1] for point in points], "o-", color=colour, label=f"{name}, top")
-        errors.loglog(spacing, [100 * point.force[1] for point in points], "s--", color=colour, label=f"{name}, force")
-        times.loglog(
-            [point.unknowns for point in points], [1e3 * point.seconds for point in points], "o-", color=colour, label=name
-        )
-    errors.set(xlabel="node spacing at the tool, mm", ylabel="error at 8 mm, %")
-    times.set(xlabel="unknowns", ylabel="CPU time of a frame, ms")
-    for axes in (errors, times):
-        axes.grid(visible=True, which="both", alpha=0.3)
-        axes.legend(frameon=False)
-    PICTURE.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(PICTURE, dpi=120)
-    pyplot.close(figure)
+    with picture(PICTURE, 2, (9, 4)) as (errors, times):
+        for (name, points), colour in zip(series.items(), ("tab:blue", "tab:orange"), strict=True):
+            spacing, unknowns = [1e3 * point.spacing for point in points], [point.unknowns for point in points]
+            errors.loglog(spacing, [100 * point.displacement[1] for point in points], "o-", color=colour, label=f"{name}, top")
+            errors.loglog(spacing, [100 * point.force[1] for point in points], "s--", color=colour, label=f"{name}, force")
+            times.loglog(unknowns, [1e3 * point.seconds for point in points], "o-", color=colour, label=name)
+        errors.set(xlabel="node spacing at the tool, mm", ylabel="error at 8 mm, %")
+        times.set(xlabel="unknowns", ylabel="CPU time of a frame, ms")

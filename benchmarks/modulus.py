@@ -18,10 +18,10 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 from rich.table import Table
 
+from benchmarks.picture import picture
 from benchmarks.reference import SETUP, top_points
 from benchmarks.replay import RATE, motion
 from benchmarks.stopwatch import timed
@@ -126,15 +126,7 @@ def run() -> list[Table]:
 
 
 def _draw(errors: dict[str, list[float]]) -> None:
-    mpl.use("Agg")
-    from matplotlib import pyplot  # noqa: PLC0415 (after the choice of a backend without a window)
-
-    figure, axes = pyplot.subplots(figsize=(6, 4), layout="constrained")
-    for (name, values), style in zip(errors.items(), ("o-", "s--", "^:"), strict=True):
-        axes.semilogx(MODULI, 1e3 * np.array(values), style, label=name)
-    axes.set(xlabel="Young's modulus, Pa", ylabel="mean distance, mm")
-    axes.grid(visible=True, which="both", alpha=0.3)
-    axes.legend(frameon=False)
-    PICTURE.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(PICTURE, dpi=120)
-    pyplot.close(figure)
+    with picture(PICTURE, 1, (6, 4)) as (axes,):
+        for (name, values), style in zip(errors.items(), ("o-", "s--", "^:"), strict=True):
+            axes.semilogx(MODULI, 1e3 * np.array(values), style, label=name)
+        axes.set(xlabel="Young's modulus, Pa", ylabel="mean distance, mm")

@@ -36,6 +36,8 @@ class MovingBlock:
             raise SetupError("with inertia the grid must be even: a graded one moves through the material", key="spacing")
         if setup.support.friction_coefficient is not None:
             raise SetupError("a sliding base has no inertia here; hold it", key="friction_coefficient")
+        if setup.tool.compliance_times_stiffness:
+            raise SetupError("a tool that gives way has no inertia here; make it stiff", key="compliance_times_stiffness")
         self._static = Replay(setup, grid, tolerance)
         self.model: BlockModel = self._static.model(self._static.free.mesh)
         self.positions = self.model.mesh.nodes + self._static.free.displacement
@@ -99,6 +101,8 @@ def replay_in_time(
     times = np.asarray(times, dtype=float)
     if len(times) != len(centres) or (np.diff(times) <= 0).any():
         raise SetupError("a replay in time needs one time per frame, each later than the one before", key="times")
+    if steps < 1:
+        raise SetupError(f"a replay in time takes at least one step from frame to frame, not {steps}", key="steps")
     block = MovingBlock(setup, grid, damping, tolerance)
     frames: list[Equilibrium] = []
     for number, centre in enumerate(np.asarray(centres, dtype=float)):

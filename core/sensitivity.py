@@ -48,7 +48,7 @@ def _holds(block: Replay, frame: Equilibrium) -> bool:
 def _unbalanced(block: Replay, frame: Equilibrium, model: BlockModel, changes: Sequence[tuple[Setup, FloatArray]]) -> FloatArray:
     """Minus the change of the residual (u, len(changes)) over E [m^2] at the frame's displacement.
 
-    A tool that gives way stays where it is here; `GivingTool` moves it.
+    A tool that gives way stays where it is here; `_GivingTool` moves it.
     """
     positions, here = frame.mesh.nodes + frame.displacement, _local(frame)
     residual = model.assemble(positions, here, tangent=False).residual
@@ -78,8 +78,8 @@ def _gives(*setups: Setup) -> bool:
     return any(setup.tool.compliance_times_stiffness for setup in setups)
 
 
-class GivingTool:
-    """How a tool on a spring takes part in a change, at a frame whose tangent is factorised.
+class _GivingTool:
+    """How a tool on a spring takes part in a change, at a frame whose tangent is factorised; changes without one move nothing here.
 
     With y its centre, s its stated one, c its compliance times E and f the force on it over E, y = s + c f. So, with B the change
     of the residual and -H that of f as y moves, A = K^-1 B and `free` the change of the displacement at a fixed tool,
@@ -111,10 +111,12 @@ class GivingTool:
 
     def moves(self, changes: Sequence[tuple[Setup, FloatArray]], coupled: FloatArray) -> FloatArray:
         """Of the centre (3, len(changes)) [m], with B' free of each change as `coupled` (3, len(changes)) [m^2]."""
-        right = -self._compliance * coupled
+        right = np.zeros_like(coupled)
         for column, (setup, move) in enumerate(changes):
-            softer = setup.tool.compliance_times_stiffness - self._compliance
-            right[:, column] += _shift(self._block, setup, move) + softer * self._force + self._compliance * self._pushed(setup)
+            if not _gives(self._block.setup, setup):
+                continue
+            softer, pushed = setup.tool.compliance_times_stiffness - self._compliance, self._pushed(setup) - coupled[:, column]
+            right[:, column] = _shift(self._block, setup, move) + softer * self._force + self._compliance * pushed
         return np.asarray(self._inverse @ right)
 
     def _pushed(self, setup: Setup) -> FloatArray:
@@ -132,7 +134,7 @@ def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[tu
     Args:
         block: what made the frame. frame: an equilibrium in contact, or under its own weight.
         changes: (setup, move) pairs: a Setup that differs a little from the block's, and how the tool's stated centre
-            moves with it (3,) [m]. The base may not change between held and partly detached.
+            moves with it (3,) [m]. The base may not change between held and free to move.
 
     Returns:
         (len(changes), n, 3) changes of the nodes' displacement [m]; zero where nothing holds the tool against the block.
@@ -143,9 +145,8 @@ def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[tu
         return result
     free = model.topology.factor.solve(_unbalanced(block, frame, model, changes))
     if _gives(block.setup, *(setup for setup, _ in changes)):
-        tool = GivingTool(block, frame, model)
-        here = np.array([_gives(block.setup, setup) for setup, _ in changes])
-        free -= here * (tool.answer @ tool.moves(changes, tool.coupled(free)))
+        tool = _GivingTool(block, frame, model)
+        free -= tool.answer @ tool.moves(changes, tool.coupled(free))
     result[:, model.topology.free] = free.T
     return result
 
@@ -168,9 +169,8 @@ def loss_changes(block: Replay, frame: Equilibrium, slope: FloatArray, changes: 
     adjoint = model.topology.factor.solve(slope[model.topology.free])
     found = np.asarray(adjoint @ right)
     if _gives(block.setup, *(setup for setup, _ in changes)):
-        tool = GivingTool(block, frame, model)
-        here = np.array([_gives(block.setup, setup) for setup, _ in changes])
-        found -= here * (slope[model.topology.free] @ tool.answer @ tool.moves(changes, tool.answer.T @ right))
+        tool = _GivingTool(block, frame, model)
+        found -= slope[model.topology.free] @ tool.answer @ tool.moves(changes, tool.answer.T @ right)
     return found
 
 
@@ -197,7 +197,7 @@ def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray
     right = gather @ sp.csc_matrix(log_factors.reshape(len(log_factors), -1).T)
     free = -model.topology.factor.solve(right.toarray())
     if _gives(block.setup):
-        tool = GivingTool(block, frame, model)
+        tool = _GivingTool(block, frame, model)
         free -= tool.answer @ tool.moves([(block.setup, np.zeros(3))] * len(log_factors), tool.coupled(free))
     result[:, model.topology.free] = free.T
     return result

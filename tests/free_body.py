@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from core.fem.linear import factor_of, upper_pattern
 from core.frames import FloatArray
 from core.mesh import BoxMesh, GridSpec, IntArray, box_mesh
 
-__all__ = ["FreeBody", "distorted", "grid"]
+__all__ = ["FreeBody", "distorted", "grid", "stretched_bar"]
 
 
 def grid(size: tuple[float, float, float], nodes: tuple[int, int, int], order: int = 1) -> BoxMesh:
@@ -94,3 +95,20 @@ class FreeBody:
             factor.factorise(data)
             positions[free] -= factor.solve(residual)
         raise AssertionError(f"no equilibrium: residual {np.linalg.norm(residual):.2g}")
+
+
+def stretched_bar(law: Law, order: int, poisson_ratio: float, stretch: float) -> tuple[float, FloatArray]:
+    """Pull over E and cross-section [1] of a bar along x on rollers, and its transverse stretches (2,) [1], the same all along."""
+    mesh = grid((0.04, 0.01, 0.01), (5, 3, 3), order)
+    nodes = distorted(mesh, 0.2 / order, 8) - mesh.nodes.min(axis=0)
+    ends = nodes[:, 0] > 0.04 - 1e-9
+    held = np.abs(nodes) < 1e-9
+    held[ends, 0] = True
+    body = FreeBody(mesh, nodes, law, poisson_ratio, held)
+    positions = nodes
+    for last, now in pairwise(np.linspace(1, stretch, 9)):
+        thinner = (now / last) ** -poisson_ratio
+        positions, force = body.equilibrium(positions * np.array([now / last, thinner, thinner]))
+    across = [positions[np.abs(nodes[:, axis] - 0.01) < 1e-9, axis] / 0.01 for axis in (1, 2)]
+    assert max(map(np.ptp, across)) < 1e-9
+    return force[ends, 0].sum() / 1e-4, np.array([side.mean() for side in across])

@@ -117,10 +117,11 @@ def rule_of(mesh: BoxMesh) -> tuple[Quadrature, FloatArray]:
 
 
 @lru_cache(maxsize=32)
-def _surface_places(mesh: BoxMesh) -> FloatArray:
-    """Of the free surface's quadrature points (f, p, 3) [m]."""
+def _surface_spots(mesh: BoxMesh) -> SurfaceSpots:
+    """The free surface's quadrature points."""
     shared = topology(mesh.shape, mesh.order, True)
-    return np.asarray(np.einsum("qa,fai->fqi", shared.element.face.shapes, mesh.nodes[shared.surface]))
+    places = np.einsum("qa,fai->fqi", shared.element.face.shapes, mesh.nodes[shared.surface])
+    return SurfaceSpots(places, np.sqrt(rule_of(mesh)[1]))
 
 
 class BlockModel:
@@ -137,8 +138,7 @@ class BlockModel:
         self.law, self.face = Law.of(setup.material), self.topology.element.face
         self.rule, areas = rule_of(mesh)
         height = setup.geometry.size[2]
-        spots = SurfaceSpots(_surface_places(mesh), np.sqrt(areas))
-        self.areas = areas * surface_stiffness(setup.material, spots, height)
+        self.areas = areas * surface_stiffness(setup.material, _surface_spots(mesh), height)
         mu, bulk = lame(self.law, setup.material.poisson_ratio)
         factor = np.exp(log_stiffness(setup.material, self.rule, height))
         self.mu, self.bulk = mu * factor, bulk * factor

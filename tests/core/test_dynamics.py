@@ -98,10 +98,14 @@ def test_damping_delays_the_recovery_of_a_dent():
     assert left[1] > 10 * left[0]
 
 
-def test_graded_grid_sliding_base_and_times_out_of_order_are_turned_down():
+def test_what_has_no_inertia_and_times_out_of_order_are_turned_down():
     with pytest.raises(SetupError, match="even"):
         MovingBlock(SETUP, GridSpec(nodes=(9, 7, 5), spacing=2e-3), Damping())
     with pytest.raises(SetupError, match="sliding"):
         MovingBlock(replace(SETUP, support=Support(friction_coefficient=0.2)), GridSpec(), Damping())
+    with pytest.raises(SetupError, match="gives way"):
+        MovingBlock(replace(SETUP, tool=Tool(radius=5e-3, compliance_times_stiffness=10.0)), GridSpec(), Damping())
+    with pytest.raises(SetupError, match="at least one step"):
+        replay_in_time(SETUP, POKE, [0.0, 0.1, 0.2, 0.3], GridSpec(), damping=Damping(), steps=0)
     with pytest.raises(SetupError, match="later"):
         replay_in_time(SETUP, POKE, [0.0, 0.1, 0.1, 0.2], GridSpec(), damping=Damping())

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.errors import SolveError
 from core.fem.newton import Outcome
 from core.mesh import GridSpec
 from core.replay import replay, require_converged
@@ -47,6 +48,14 @@ def test_tool_on_a_very_soft_spring_barely_dents_the_block():
     frame = replay(_giving(1e3), POKE, GRID)[-1]
     assert frame.outcome is Outcome.CONVERGED
     assert 0 < -frame.displacement[:, 2].min() < 1.2e-3
+
+
+def test_place_that_is_not_found_is_said(monkeypatch):
+    monkeypatch.setattr("core.replay._MOST_PLACES", 1)
+    frame = replay(_giving(60.0), POKE[:2], GRID)[-1]
+    assert frame.outcome is Outcome.TOOL_SWINGS and "spring" in frame.outcome.value
+    with pytest.raises(SolveError, match="frame 0: the tool gives way"):
+        require_converged([frame])
 
 
 def test_gives_way_together_with_gravity_and_a_sliding_base():

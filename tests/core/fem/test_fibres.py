@@ -4,28 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from free_body import FreeBody, distorted, grid
+from free_body import stretched_bar
 from scipy.optimize import brentq
 
 from core.fem.elastic import Law, lame, reinforcement
 from core.fem.elements import HEXAHEDRA
-from core.frames import FloatArray
 
 ORDERS = pytest.mark.parametrize("order", HEXAHEDRA)
-
-
-def _bar(law: Law, order: int, poisson_ratio: float, stretch: float) -> tuple[float, FloatArray]:
-    """Pull over E and cross-section [1] of a bar along x on rollers, and its transverse stretches (2,)."""
-    mesh = grid((0.04, 0.01, 0.01), (5, 3, 3), order)
-    nodes = distorted(mesh, 0.2 / order, 8) - mesh.nodes.min(axis=0)
-    ends = nodes[:, 0] > 0.04 - 1e-9
-    held = np.abs(nodes) < 1e-9
-    held[ends, 0] = True
-    body = FreeBody(mesh, nodes, law, poisson_ratio, held)
-    positions = nodes * np.array([stretch, stretch**-poisson_ratio, stretch**-poisson_ratio])
-    positions, force = body.equilibrium(positions)
-    across = [positions[np.abs(nodes[:, axis] - 0.01) < 1e-9, axis].mean() / 0.01 for axis in (1, 2)]
-    return force[ends, 0].sum() / 1e-4, np.array(across)
 
 
 @ORDERS
@@ -35,7 +20,7 @@ def test_small_stretch_along_is_so_many_times_stiffer_than_across(order, ratio, 
     gamma, step = reinforcement(ratio, poisson_ratio), 2e-3
 
     def modulus(angle: float) -> float:
-        pulls = [_bar(Law(gamma=gamma, angle=angle), order, poisson_ratio, 1 + sign * step)[0] for sign in (1, -1)]
+        pulls = [stretched_bar(Law(gamma=gamma, angle=angle), order, poisson_ratio, 1 + sign * step)[0] for sign in (1, -1)]
         return (pulls[0] - pulls[1]) / (2 * step)
 
     assert modulus(0.0) / modulus(np.pi / 2) == pytest.approx(ratio, rel=1e-4)
@@ -55,13 +40,13 @@ def test_stretched_along_the_fibres_as_the_closed_form(order, stretch):
         return along, aside
 
     across = brentq(lambda value: matrix(value)[1], 0.8 * stretch**-0.5, 1.2 * stretch**-0.3, xtol=1e-14)
-    pull, measured = _bar(Law(gamma=gamma), order, poisson_ratio, stretch)
+    pull, measured = stretched_bar(Law(gamma=gamma), order, poisson_ratio, stretch)
     assert measured == pytest.approx(across, rel=1e-9)
     assert pull == pytest.approx(matrix(across)[0] + 2 * gamma * mu * (stretch**2 - 1) * stretch, rel=1e-9)
 
 
 @ORDERS
 def test_contracts_less_along_the_fibres_when_pulled_across(order):
-    _, (along, across) = _bar(Law(gamma=1.2, angle=np.pi / 2), order, 0.45, 1.1)
-    _, (free, _) = _bar(Law(), order, 0.45, 1.1)
+    _, (along, across) = stretched_bar(Law(gamma=1.2, angle=np.pi / 2), order, 0.45, 1.1)
+    _, (free, _) = stretched_bar(Law(), order, 0.45, 1.1)
     assert across < free < along < 1
