@@ -48,7 +48,7 @@ class Peer(Protocol):
 
 
 class MuJoCo:
-    """Saint Venant-Kirchhoff tetrahedra, 16 steps a frame: with half as many it warns of a singular matrix on the coarse grid, too."""
+    """Saint Venant-Kirchhoff tetrahedra; 16 steps a frame, half as many bring warnings of a singular matrix on the coarse grid."""
 
     steps = 16
 
