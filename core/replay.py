@@ -7,11 +7,12 @@ each frame has its own node coordinates, and starts from the frame before, inter
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 
+from core.equilibrium import Equilibrium
 from core.errors import SolveError
 from core.fem.follow import Follower
 from core.fem.model import BlockModel, Probe
@@ -21,45 +22,14 @@ from core.frames import FloatArray
 from core.mesh import BoxMesh, GridSpec, box_mesh
 from core.progress import Report, silent
 from core.setup import Setup
+from core.yielding import give_way, slide
 
 __all__ = ["GRAVITY", "Equilibrium", "Replay", "replay", "require_converged", "rest"]
 
 GRAVITY = 9.81
 """Acceleration of free fall [m/s^2]."""
 _FOCUS_STEP = 2e-4
-_PLACED, _MOST_PLACES = 1e-2, 30
-"""How well a tool that gives way is placed [m], over the tolerance, and how often that is tried."""
-
-
-@dataclass(frozen=True, eq=False)
-class Equilibrium:
-    """The block in one frame.
-
-    Attributes:
-        mesh: its grid. displacement: (n, 3) of the nodes against the stated shape [m], without `slip`.
-        slip: (2,) how far the base has slid along x and y [m].
-        probe: the tool (true centre and radius), phantom frame.
-        force: (3,) of the block on the tool [N]. outcome, iterations, residual, penetration: how it was reached.
-    """
-
-    mesh: BoxMesh
-    displacement: FloatArray
-    slip: FloatArray
-    probe: Probe
-    force: FloatArray
-    outcome: Outcome
-    iterations: int
-    residual: float
-    penetration: float
-    in_contact: bool
-
-    @cached_property
-    def _moved(self) -> FloatArray:
-        return np.asarray(self.displacement + np.append(self.slip, 0.0))
-
-    def move(self, points: FloatArray) -> FloatArray:
-        """Current positions of material points given by their rest positions (m, 3) [m]."""
-        return points + self.mesh.interpolate(self._moved, points)
+_MOST_SLIDES = 12
 
 
 @lru_cache(maxsize=64)
@@ -192,7 +162,7 @@ class Replay:
         centre, start = stated_centre + self._offset, self.free if start is None else start
         if not self.setup.tool.compliance_times_stiffness:
             return self._placed(centre, start)
-        return self._give_way(centre, start)
+        return give_way(centre, start, self.setup, self.tolerance, self._placed)
 
     def _placed(self, centre: FloatArray, start: Equilibrium) -> Equilibrium:
         """Equilibrium with the tool's centre held here (3,) [m]; slides the base if it cannot hold."""
@@ -200,51 +170,18 @@ class Replay:
         frame = self.held(probe, start)
         if self.setup.support.friction_coefficient is None:
             return frame
-        return self._slide(probe, frame)
+        return self._slide(probe, frame, self.setup.support.friction_coefficient)
 
-    def _give_way(self, centre: FloatArray, start: Equilibrium) -> Equilibrium:
-        """Equilibrium with the tool on a spring whose other end is here (3,) [m], by Broyden's method on its true centre."""
-        giving, modulus = self.setup.tool.compliance_times_stiffness, self.setup.material.young_modulus
-        softness, place = giving / modulus, centre + giving / modulus * start.force
-        inverse = np.eye(3) / (1 + giving * 2 * self.setup.tool.radius)  # a punch of the ball's size resists the most
-        frame = self._placed(place, start)
-        for _ in range(_MOST_PLACES):
-            miss = centre + softness * frame.force - place
-            if frame.outcome is not Outcome.CONVERGED or np.linalg.norm(miss) < _PLACED * self.tolerance:
-                return frame
-            step = inverse @ miss
-            place = place + step
-            frame = self._placed(place, frame)
-            change = miss - (centre + softness * frame.force - place)
-            turned = inverse @ change
-            inverse += np.outer(step - turned, step @ inverse) / (step @ turned)
-        return replace(frame, outcome=Outcome.TOOL_SWINGS)
-
-    def _slide(self, probe: Probe, frame: Equilibrium) -> Equilibrium:
+    def _slide(self, probe: Probe, frame: Equilibrium, friction: float) -> Equilibrium:
         """Move the base until friction holds: Coulomb, with the weight and the push as its load."""
-        friction = self.setup.support.friction_coefficient or 0.0
         weight = self.setup.mass * GRAVITY
-        for _ in range(12):
-            push = -frame.force
-            pull, load = float(np.linalg.norm(push[:2])), max(weight - push[2], 0.0)
-            excess = pull - friction * load
-            if excess <= 1e-3 * friction * weight or frame.outcome is not Outcome.CONVERGED:
+        for _ in range(_MOST_SLIDES):
+            step = slide(frame, friction, weight)
+            if step is None or frame.outcome is not Outcome.CONVERGED:
                 break
-            stiffness = self._lateral_stiffness(frame)
-            self.slip = self.slip + push[:2] / pull * min(excess / stiffness, 1e-3)
+            self.slip = self.slip + step
             frame = self.held(probe, frame)
         return frame
-
-    def _lateral_stiffness(self, frame: Equilibrium) -> float:
-        """How fast the sideways push falls as the base gives way [N/m], from the last factor."""
-        push = -frame.force[:2]
-        return float(np.linalg.norm(push)) / max(self._reach(frame), 2e-4)
-
-    def _reach(self, frame: Equilibrium) -> float:
-        """Sideways indentation [m] that the push stands for: the tool's displacement of the material it touches."""
-        surface = frame.mesh.nodes + frame.displacement
-        nearest = int(np.argmin(np.linalg.norm(surface - (frame.probe.centre - np.append(self.slip, 0.0)), axis=1)))
-        return float(np.linalg.norm(frame.displacement[nearest, :2]))
 
 
 def rest(setup: Setup, grid: GridSpec) -> Equilibrium:

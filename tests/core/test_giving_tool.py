@@ -51,7 +51,7 @@ def test_tool_on_a_very_soft_spring_barely_dents_the_block():
 
 
 def test_place_that_is_not_found_is_said(monkeypatch):
-    monkeypatch.setattr("core.replay._MOST_PLACES", 1)
+    monkeypatch.setattr("core.yielding._MOST_PLACES", 1)
     frame = replay(_giving(60.0), POKE[:2], GRID)[-1]
     assert frame.outcome is Outcome.TOOL_SWINGS and "spring" in frame.outcome.value
     with pytest.raises(SolveError, match="frame 0: the tool gives way"):

@@ -1,0 +1,46 @@
+"""The block in one frame of a replay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from core.fem.model import Probe
+from core.fem.newton import Outcome
+from core.frames import FloatArray
+from core.mesh import BoxMesh
+
+__all__ = ["Equilibrium"]
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """The block in one frame.
+
+    Attributes:
+        mesh: its grid. displacement: (n, 3) of the nodes against the stated shape [m], without `slip`.
+        slip: (2,) how far the base has slid along x and y [m].
+        probe: the tool (true centre and radius), phantom frame.
+        force: (3,) of the block on the tool [N]. outcome, iterations, residual, penetration: how it was reached.
+    """
+
+    mesh: BoxMesh
+    displacement: FloatArray
+    slip: FloatArray
+    probe: Probe
+    force: FloatArray
+    outcome: Outcome
+    iterations: int
+    residual: float
+    penetration: float
+    in_contact: bool
+
+    @cached_property
+    def _moved(self) -> FloatArray:
+        return np.asarray(self.displacement + np.append(self.slip, 0.0))
+
+    def move(self, points: FloatArray) -> FloatArray:
+        """Current positions of material points given by their rest positions (m, 3) [m]."""
+        return points + self.mesh.interpolate(self._moved, points)

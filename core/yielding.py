@@ -1,0 +1,67 @@
+"""What gives way when it is pushed: a tool on a spring, and a base that slides on the table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from core.equilibrium import Equilibrium
+from core.fem.newton import Outcome
+from core.frames import FloatArray
+from core.setup import Setup
+
+__all__ = ["give_way", "slide"]
+
+_PLACED, _MOST_PLACES = 1e-2, 30
+"""How well a tool that gives way is placed [m], over the tolerance, and how often that is tried."""
+_LONGEST_SLIDE = 1e-3
+_SHALLOWEST = 2e-4
+
+
+def give_way(
+    centre: FloatArray, start: Equilibrium, setup: Setup, tolerance: float, placed: Callable[[FloatArray, Equilibrium], Equilibrium]
+) -> Equilibrium:
+    """Equilibrium with the tool on a spring whose other end is at `centre` (3,) [m], by Broyden's method on its true centre.
+
+    Args:
+        start: to begin from. tolerance: of the replay. placed: the equilibrium with the tool held at a place, begun from another.
+    """
+    giving, modulus = setup.tool.compliance_times_stiffness, setup.material.young_modulus
+    softness, place = giving / modulus, centre + giving / modulus * start.force
+    inverse = np.eye(3) / (1 + giving * 2 * setup.tool.radius)  # a punch of the ball's size resists the most
+    frame = placed(place, start)
+    for _ in range(_MOST_PLACES):
+        miss = centre + softness * frame.force - place
+        if frame.outcome is not Outcome.CONVERGED or np.linalg.norm(miss) < _PLACED * tolerance:
+            return frame
+        step = inverse @ miss
+        place = place + step
+        frame = placed(place, frame)
+        change = miss - (centre + softness * frame.force - place)
+        turned = inverse @ change
+        inverse += np.outer(step - turned, step @ inverse) / (step @ turned)
+    return replace(frame, outcome=Outcome.TOOL_SWINGS)
+
+
+def slide(frame: Equilibrium, friction: float, weight: float) -> FloatArray | None:
+    """How far the base moves on (2,) [m] where Coulomb's friction does not hold it; None where it does.
+
+    Args:
+        friction: coefficient [1]. weight: of the block [N]; with the tool's push it loads the base.
+    """
+    push = -frame.force
+    pull, load = float(np.linalg.norm(push[:2])), max(weight - push[2], 0.0)
+    excess = pull - friction * load
+    if excess <= 1e-3 * friction * weight:
+        return None
+    stiffness = pull / max(_reach(frame), _SHALLOWEST)
+    return np.asarray(push[:2] / pull * min(excess / stiffness, _LONGEST_SLIDE))
+
+
+def _reach(frame: Equilibrium) -> float:
+    """Sideways indentation [m] that the push stands for: the tool's displacement of the material it touches."""
+    surface = frame.mesh.nodes + frame.displacement
+    nearest = int(np.argmin(np.linalg.norm(surface - (frame.probe.centre - np.append(frame.slip, 0.0)), axis=1)))
+    return float(np.linalg.norm(frame.displacement[nearest, :2]))
