@@ -23,7 +23,7 @@ from core.effects.base import Effect
 from core.effects.load import Gravity
 from core.effects.material import PoissonRatio, StiffInclusion
 from core.effects.support import BaseDetachment, BaseSlip
-from core.effects.tool import ToolOffset, ToolRadius
+from core.effects.tool import ToolFriction, ToolOffset, ToolRadius
 from core.frames import FloatArray
 from core.mesh import GridSpec
 from core.replay import replay, require_converged
@@ -71,6 +71,7 @@ ROWS = (
     Row("nu 0.35", _with(PoissonRatio(nu=0.35)), (0.07, 0.32)),
     Row("nu 0.49", _with(PoissonRatio(nu=0.49)), (0.05, 0.14)),
     Row("Gent, J_m 10", _made_of(stretch_limit=10.0), (0.04, 0.20)),
+    Row("friction 0.5 under the tool", _with(ToolFriction(friction_coefficient=0.5)), (0.04, 0.28)),
     Row("skin of 2 mm, 5 times stiffer", _made_of(layer=Layer(thickness=2e-3, stiffness_ratio=5.0)), (0.27, 1.0)),
     Row("top twice as stiff as the base", _made_of(log_ratio=float(np.log(2.0))), (0.19, 0.37)),
     Row("base twice as stiff as the top", _made_of(log_ratio=-float(np.log(2.0))), (0.19, 0.37)),

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from core.fem.friction import Hold
 from core.fem.model import Probe
 from core.fem.newton import Outcome
 from core.frames import FloatArray
@@ -24,6 +25,7 @@ class Equilibrium:
         slip: (2,) how far the base has slid along x and y [m].
         probe: the tool (true centre and radius), phantom frame.
         force: (3,) of the block on the tool [N]. outcome, iterations, residual, penetration: how it was reached.
+        hold: what friction leaves to the next frame; None without.
     """
 
     mesh: BoxMesh
@@ -36,6 +38,7 @@ class Equilibrium:
     residual: float
     penetration: float
     in_contact: bool
+    hold: Hold | None = None
 
     @cached_property
     def _moved(self) -> FloatArray:

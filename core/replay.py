@@ -14,8 +14,10 @@ import numpy as np
 
 from core.equilibrium import Equilibrium
 from core.errors import SolveError
+from core.fem.drag import Past, drag
 from core.fem.follow import Follower
-from core.fem.model import BlockModel, Probe
+from core.fem.friction import Hold
+from core.fem.model import BlockModel, Probe, surface_spots
 from core.fem.newton import RELATIVE_TOLERANCE, Outcome, Solution, solve
 from core.fem.path import FREE_STEP, lead
 from core.frames import FloatArray
@@ -30,6 +32,8 @@ GRAVITY = 9.81
 """Acceleration of free fall [m/s^2]."""
 _FOCUS_STEP = 2e-4
 _MOST_SLIDES = 12
+_DRAG_STEP = 1e-3
+"""Longest motion of a tool with friction [m] that is taken as straight."""
 
 
 @lru_cache(maxsize=64)
@@ -57,6 +61,15 @@ def _focused_mesh(setup: Setup, grid: GridSpec, centre: FloatArray) -> BoxMesh:
 def _focus(mesh: BoxMesh) -> FloatArray:
     """Where the grid is finest (3,) [m]; the same place for all even grids of one block."""
     return np.array([axis[int(np.argmin(np.gradient(axis)))] for axis in mesh.axes])
+
+
+def _past(model: BlockModel, start: Equilibrium, before: Probe) -> Past:
+    """The surface's quadrature points in the frame before, in which the tool was at `before`."""
+    places = surface_spots(model.mesh).places
+    flat = places.reshape(-1, 3)
+    seen = (flat + start.mesh.interpolate(start.displacement, flat)).reshape(places.shape) - before.centre
+    ways, touched = (start.hold or Hold.nothing()).at(places)
+    return Past(seen, ways, touched)
 
 
 def _away(setup: Setup, probe: Probe) -> bool:
@@ -124,9 +137,38 @@ class Replay:
         positions = self._extrapolated(model, start, mesh.nodes + displacement, local)
         if not start.in_contact:  # begin where the straight way in first touches, not from afar
             before = self._first_touch(before, local)
-        solution = lead(model, positions, before, local, self.tolerance, self._follower)
-        frame = self._equilibrium(solution, mesh, probe)
+        if self.setup.tool.friction_coefficient:
+            past = _past(model, start, Probe(before.centre - carried, before.radius))
+            frame = self._dragged(model, positions, (before, local), past, probe)
+        else:
+            solution = lead(model, positions, before, local, self.tolerance, self._follower)
+            frame = self._equilibrium(solution, mesh, probe)
         self._before = (start, frame)
+        return frame
+
+    def _dragged(
+        self, model: BlockModel, positions: FloatArray, probes: tuple[Probe, Probe], past: Past, probe: Probe
+    ) -> Equilibrium:
+        """Equilibrium with friction under the tool, whose `probes` before and now are in the frame of the slid block."""
+        friction = self.setup.tool.friction_coefficient
+        solution, hold = drag(model, positions, probes, past, friction, self.tolerance, self._follower)
+        return replace(self._equilibrium(solution, model.mesh, probe), hold=hold)
+
+    def _led(self, probe: Probe, start: Equilibrium) -> Equilibrium:
+        """Equilibrium at `probe`; with friction by way of places so near that each point's way between two is known."""
+        if not self.setup.tool.friction_coefficient:
+            return self.held(probe, start)
+        slip = np.append(self.slip, 0.0)
+        begin = start.probe
+        if not start.in_contact:
+            touch = self._first_touch(Probe(begin.centre - slip, begin.radius), Probe(probe.centre - slip, probe.radius))
+            begin = Probe(touch.centre + slip, touch.radius)
+        steps = max(1, int(np.ceil(float(np.linalg.norm(probe.centre - begin.centre)) / _DRAG_STEP)))
+        frame = start
+        for share in np.arange(1, steps + 1) / steps:
+            frame = self.held(Probe(begin.centre + share * (probe.centre - begin.centre), probe.radius), frame)
+            if frame.outcome is not Outcome.CONVERGED:
+                break
         return frame
 
     def _extrapolated(self, model: BlockModel, start: Equilibrium, positions: FloatArray, probe: Probe) -> FloatArray:
@@ -167,7 +209,7 @@ class Replay:
     def _placed(self, centre: FloatArray, start: Equilibrium) -> Equilibrium:
         """Equilibrium with the tool's centre held here (3,) [m]; slides the base if it cannot hold."""
         probe = Probe(centre, self.setup.tool.radius)
-        frame = self.held(probe, start)
+        frame = self._led(probe, start)
         if self.setup.support.friction_coefficient is None:
             return frame
         return self._slide(probe, frame, self.setup.support.friction_coefficient)
@@ -207,17 +249,20 @@ def replay(
 
     A frame without equilibrium is returned with its outcome, never raised: look at `outcome`, or call `require_converged`.
     """
+    if starts is not None and setup.remembers:
+        raise SolveError("a setup whose frames depend on those before them is replayed in order of time, without starts")
     block, frames = Replay(setup, grid, tolerance), []
     previous: Equilibrium | None = None
     for number, centre in enumerate(centres):
         report(number / len(centres), f"frame {number + 1} of {len(centres)}")
         start = starts[number] if starts is not None and starts[number].in_contact else previous
         frame = block.step(np.asarray(centre, dtype=float), start)
-        for other in (previous, None):  # a long jump may lead through the block; from rest the tool comes in from outside
+        # A long jump may lead through the block; from rest the tool comes in from outside, and all that was before is forgotten.
+        for other in () if setup.remembers else (previous, None):
             if frame.outcome is not Outcome.CONVERGED and other is not start:
                 start, frame = other, block.step(np.asarray(centre, dtype=float), other)
         frames.append(frame)
-        previous = frame if frame.outcome is Outcome.CONVERGED else None
+        previous = frame if frame.outcome is Outcome.CONVERGED else previous if setup.remembers else None
     return frames
 
 

@@ -2,6 +2,7 @@
 
 At equilibrium the residual R(u, p) vanishes, so du/dp = -K^-1 dR/dp (implicit function theorem). dR/dp is taken by asking the
 changed Setup for its residual at the same displacement; thus any effect has its sensitivity without knowing the solver.
+A setup that remembers has none here: its frame hangs on all those before it, which a change would have changed, too.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
+from core.errors import SetupError
 from core.fem.elastic import assemble_elastic
 from core.fem.factor import NotPositiveDefinite
 from core.fem.model import BlockModel, Probe
@@ -41,8 +43,17 @@ def _local(frame: Equilibrium) -> Probe:
 
 
 def _holds(block: Replay, frame: Equilibrium) -> bool:
-    """Whether anything deforms the block at all."""
+    """Whether anything deforms the block at all; SetupError where the frame hangs on those before it."""
+    _memoryless(block.setup)
     return bool(frame.in_contact or block.setup.load.specific_weight_over_stiffness)
+
+
+def _memoryless(setup: Setup) -> None:
+    if setup.remembers:
+        raise SetupError(
+            "a frame that hangs on those before it has no first-order changes of its own; take differences of whole replays",
+            key="friction_coefficient",
+        )
 
 
 def _unbalanced(block: Replay, frame: Equilibrium, model: BlockModel, changes: Sequence[tuple[Setup, FloatArray]]) -> FloatArray:
@@ -54,6 +65,7 @@ def _unbalanced(block: Replay, frame: Equilibrium, model: BlockModel, changes: S
     residual = model.assemble(positions, here, tangent=False).residual
     right = np.zeros((len(residual), len(changes)))
     for column, (setup, move) in enumerate(changes):
+        _memoryless(setup)
         same = _same_body(block, setup)
         shift = np.zeros(3) if _gives(block.setup, setup) else _shift(block, setup, move)
         if same and setup.tool.radius == block.setup.tool.radius and not shift.any():  # only the sensor differs

@@ -151,15 +151,18 @@ class Tool:
     Attributes:
         radius: [m]. offset: where its centre is against the stated one before anything is touched, phantom frame [m].
         compliance_times_stiffness: how far the force F on it moves its centre, C F: C times Young's modulus [1/m].
+        friction_coefficient: Coulomb's, of the tool on the surface [1].
     """
 
     radius: float
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     compliance_times_stiffness: float = 0.0
+    friction_coefficient: float = 0.0
 
     def __post_init__(self) -> None:
         _within("tool radius", self.radius, 1e-4, 0.2, "m")
         _within("tool compliance_times_stiffness", self.compliance_times_stiffness, 0.0, 1e3, "1/m")
+        _within("tool friction_coefficient", self.friction_coefficient, 0.0, 10.0, "")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -199,6 +202,11 @@ class Setup:
     phantom_from_camera: Transform = field(default_factory=Transform)
 
     @property
+    def remembers(self) -> bool:
+        """Whether a frame depends on all those before it, so that none may be left out."""
+        return bool(self.tool.friction_coefficient)
+
+    @property
     def phantom_from_camera_true(self) -> Transform:
         """The camera registration including the sensor's believed shift."""
         return self.sensor.camera_shift @ self.phantom_from_camera
@@ -227,6 +235,7 @@ class Setup:
                 "radius": self.tool.radius,
                 "offset": list(self.tool.offset),
                 "compliance_times_stiffness": self.tool.compliance_times_stiffness,
+                "friction_coefficient": self.tool.friction_coefficient,
             },
             "sensor": {
                 "depth_sigma": self.sensor.depth_sigma,

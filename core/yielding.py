@@ -38,7 +38,7 @@ def give_way(
             return frame
         step = inverse @ miss
         place = place + step
-        frame = placed(place, frame)
+        frame = placed(place, start if setup.remembers else frame)
         change = miss - (centre + softness * frame.force - place)
         turned = inverse @ change
         inverse += np.outer(step - turned, step @ inverse) / (step @ turned)

@@ -96,6 +96,11 @@ def _set(name: str, numbers: IntArray, kind: str = "NSET") -> str:
     return f"*{kind}, {kind}={name}\n" + ",\n".join(map(str, numbers))
 
 
+def _friction(coefficient: float) -> list[str]:
+    """Coulomb's, with a stick as stiff as the contact."""
+    return ["*FRICTION", f"{coefficient:g}, {_PENALTY}"] if coefficient else []
+
+
 def _deck(setup: Setup, depths: tuple[float, ...]) -> tuple[str, FloatArray]:
     """The input file, and the rest positions (n, 3) [mm] of the nodes it prints."""
     size, radius, nu = np.array(setup.geometry.size), 1e3 * setup.tool.radius, setup.material.poisson_ratio
@@ -124,6 +129,7 @@ def _deck(setup: Setup, depths: tuple[float, ...]) -> tuple[str, FloatArray]:
         f"*RIGID BODY, ELSET=BALL, REF NODE={centre}, ROT NODE={centre + 1}",
         "*SURFACE, NAME=SOFT", "UPPER, S2", "*SURFACE, NAME=HARD", "BALL, S2",
         "*SURFACE INTERACTION, NAME=TOUCH", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{_PENALTY}",
+        *_friction(setup.tool.friction_coefficient),
         "*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE", "SOFT, HARD",
         "*BOUNDARY", "BASE, 1, 3", "MIDDLEX, 1, 1", "MIDDLEY, 2, 2", f"{centre}, 1, 2", f"{centre + 1}, 1, 3",
     ]  # fmt: skip

@@ -13,7 +13,7 @@ from core.effects.material import PoissonRatio, StiffInclusion
 from core.effects.sensor import CameraRegistration, TimeOffset
 from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
 from core.effects.support import BaseCompliance, BaseDetachment, BaseSlip
-from core.effects.tool import ToolCompliance, ToolOffset, ToolRadius
+from core.effects.tool import ToolCompliance, ToolFriction, ToolOffset, ToolRadius
 from core.errors import EffectError
 
 __all__ = ["CATALOGUE", "DIAGNOSED", "Effect", "Parameter", "Slot", "effect_named", "from_json"]
@@ -37,6 +37,7 @@ CATALOGUE: tuple[type[Effect], ...] = (
     Anisotropy,
     BaseCompliance,
     ToolCompliance,
+    ToolFriction,
 )
 
 

@@ -9,7 +9,7 @@ from typing import Self
 from core.effects.base import Effect, Slot, parameter
 from core.setup import Setup
 
-__all__ = ["ToolCompliance", "ToolOffset", "ToolRadius"]
+__all__ = ["ToolCompliance", "ToolFriction", "ToolOffset", "ToolRadius"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,3 +74,23 @@ class ToolCompliance(Effect):
 
     def apply(self, setup: Setup) -> Setup:
         return replace(setup, tool=replace(setup.tool, compliance_times_stiffness=self.compliance_times_stiffness))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToolFriction(Effect):
+    """The tool drags the surface along: Coulomb's friction with stick and slip."""
+
+    name, enters = "tool_friction", Slot.TOOL
+    summary = "the tool drags the surface along"
+    friction_coefficient: float = parameter("1", low=0.0, high=3.0, scale=0.1)
+
+    @classmethod
+    def neutral(cls, setup: Setup) -> Self:
+        return cls(friction_coefficient=setup.tool.friction_coefficient)
+
+    @classmethod
+    def starts(cls, setup: Setup) -> Sequence[Self]:
+        return [cls(friction_coefficient=friction) for friction in (0.2, 0.6)]
+
+    def apply(self, setup: Setup) -> Setup:
+        return replace(setup, tool=replace(setup.tool, friction_coefficient=self.friction_coefficient))

@@ -84,6 +84,9 @@ class Compliance:
             self._local, model.areas[self._faces], model.face.shapes, model.face.gradients, positions, probe.centre,
             probe.radius, False, CONTACT_STIFFNESS, bending, self._slots, force, data, np.zeros(3),
         )  # fmt: skip
+        if model.grip is not None:
+            grip = model.grip.of(self._faces)
+            grip.assemble(self._local, model.face, positions, probe.centre, self._slots, force, data, np.zeros(3))
         return force.ravel(), data.reshape(positions.size, positions.size)
 
     def step(self, model: BlockModel, positions: FloatArray, residual: FloatArray, probe: Probe) -> FloatArray | None:
@@ -135,6 +138,8 @@ class Compliance:
             self._local, model.areas[self._faces], model.face.shapes, model.face.gradients, here + change.reshape(-1, 3),
             probe.centre, probe.radius, False, CONTACT_STIFFNESS,
         )  # fmt: skip
+        if model.grip is not None:
+            touched += model.grip.of(self._faces).energy(self._local, model.face, here + change.reshape(-1, 3), probe.centre)
         return float(0.5 * change @ self._stiffness @ change + load @ change + touched)
 
 

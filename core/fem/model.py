@@ -14,13 +14,14 @@ import numpy as np
 from core.fem.contact import assemble_contact, contact_energy, turns_around
 from core.fem.elastic import Law, assemble_elastic, elastic_energy, lame
 from core.fem.elements import HEXAHEDRA, Quadrature, face_weights, quadrature
+from core.fem.friction import Grip
 from core.fem.linear import face_slots, factor_of, upper_pattern
 from core.fem.stiffness import SurfaceSpots, log_stiffness, surface_stiffness
 from core.frames import FloatArray
 from core.mesh import BoxMesh, GridSpec, IntArray, box_mesh
 from core.setup import Detachment, Setup, Support
 
-__all__ = ["CONTACT_STIFFNESS", "Assembly", "BlockModel", "Probe", "Topology", "rule_of", "topology"]
+__all__ = ["CONTACT_STIFFNESS", "Assembly", "BlockModel", "Probe", "Topology", "rule_of", "surface_spots", "topology"]
 
 CONTACT_STIFFNESS = 5e4
 """Contact pressure over E per penetration [1/m]: 0.02 mm at a pressure equal to E."""
@@ -117,7 +118,7 @@ def rule_of(mesh: BoxMesh) -> tuple[Quadrature, FloatArray]:
 
 
 @lru_cache(maxsize=32)
-def _surface_spots(mesh: BoxMesh) -> SurfaceSpots:
+def surface_spots(mesh: BoxMesh) -> SurfaceSpots:
     """The free surface's quadrature points."""
     shared = topology(mesh.shape, mesh.order, True)
     places = np.einsum("qa,fai->fqi", shared.element.face.shapes, mesh.nodes[shared.surface])
@@ -138,13 +139,14 @@ class BlockModel:
         self.law, self.face = Law.of(setup.material), self.topology.element.face
         self.rule, areas = rule_of(mesh)
         height = setup.geometry.size[2]
-        self.areas = areas * surface_stiffness(setup.material, _surface_spots(mesh), height)
+        self.areas = areas * surface_stiffness(setup.material, surface_spots(mesh), height)
         mu, bulk = lame(self.law, setup.material.poisson_ratio)
         factor = np.exp(log_stiffness(setup.material, self.rule, height))
         self.mu, self.bulk = mu * factor, bulk * factor
         # Sums of squares near three lose their last digits when three is taken off, in proportion to this stiffness times volume.
         self.rounding = 4e-16 * float(np.vdot(self.mu, self.rule.weights))
         self.carried: Carried | None = None
+        self.grip: Grip | None = None
         self.weight_force = self._weight(setup.load.specific_weight_over_stiffness)
         self._prepare_base(setup)
 
@@ -194,6 +196,8 @@ class BlockModel:
                 False,
                 CONTACT_STIFFNESS,
             )
+            if self.grip is not None:
+                total += self.grip.energy(top.surface, self.face, positions, probe.centre)
         if self.sprung:
             moved = (positions - self.mesh.nodes)[top.base]
             total += 0.5 * float(np.vdot(moved, self._bond_gradient(positions)))
@@ -224,6 +228,8 @@ class BlockModel:
                 top.surface, self.areas, self.face.shapes, self.face.gradients, positions, probe.centre, probe.radius, False,
                 CONTACT_STIFFNESS, bending, top.surface_slots, force, data, push,
             )  # fmt: skip
+            if self.grip is not None:
+                self.grip.assemble(top.surface, self.face, positions, probe.centre, top.surface_slots, force, data, push)
         if self.sprung:
             self._assemble_base(positions, force, data)
         residual = force[top.free]

@@ -28,6 +28,7 @@ class Outcome(Enum):
     INDEFINITE = "the stiffness stayed indefinite: the block buckles or an element is almost inverted"
     INVERTED = "an element is inverted at the start of the solve"
     TOOL_SWINGS = "the tool gives way so much that no place was found where its spring balances the block"
+    GRIP_SWINGS = "pressure and friction under the tool do not come to agree; the motion between frames is too large"
     INSIDE_TOOL = "the material came to rest inside the tool, or the tool inside the material"
 
 

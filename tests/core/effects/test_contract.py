@@ -37,6 +37,7 @@ VOCABULARY = {
     "anisotropy": {"direction": "rad", "stiffness_ratio": "1"},
     "base_compliance": {"stiffness_over_E": "1/m"},
     "tool_compliance": {"compliance_times_stiffness": "1/m"},
+    "tool_friction": {"friction_coefficient": "1"},
 }
 
 # One finite size of each, for the tests that need a change.
@@ -56,6 +57,7 @@ EXAMPLES: dict[str, dict[str, float | str]] = {
     "anisotropy": {"direction": 0.4, "stiffness_ratio": 3.0},
     "base_compliance": {"stiffness_over_E": 60.0},
     "tool_compliance": {"compliance_times_stiffness": 20.0},
+    "tool_friction": {"friction_coefficient": 0.5},
 }
 EACH = pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
 

@@ -1,0 +1,127 @@
+"""One step of a tool that drags the surface along: equilibria and renewed grips in turn, until they agree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from core.fem.follow import Follower
+from core.fem.friction import STICK_STIFFNESS, Grip, Hold
+from core.fem.model import CONTACT_STIFFNESS, BlockModel, Probe, surface_spots
+from core.fem.newton import Outcome, Solution, misfit
+from core.fem.path import lead
+from core.frames import FloatArray
+
+__all__ = ["Past", "drag"]
+
+_AGREED = 1e-4
+"""Residual with the renewed grip, over the push, at which pressure and friction agree."""
+_MOST_TURNS = 30
+
+
+@dataclass(frozen=True, eq=False)
+class Past:
+    """The step's beginning, at the quadrature points (f, p) of the model's surface: where they were seen from the tool's centre
+    (f, p, 3) [m], their tangential ways from the anchors (f, p, 3) [m], and which were touched (f, p)."""
+
+    seen: FloatArray
+    ways: FloatArray
+    touched: np.ndarray[Any, np.dtype[np.bool_]]
+
+
+def _seen(model: BlockModel, positions: FloatArray, probe: Probe) -> FloatArray:
+    """The surface's quadrature points (f, p, 3) from the tool's centre [m]."""
+    return np.asarray(np.einsum("qa,fai->fqi", model.face.shapes, positions[model.topology.surface]) - probe.centre)
+
+
+def _pressed(model: BlockModel, positions: FloatArray, probe: Probe, seen: FloatArray) -> FloatArray:
+    """How deep each point is pressed (f, p) [m]; zero where it is not touched or faces away."""
+    tangents = np.einsum("qac,fai->fqci", model.face.gradients, positions[model.topology.surface])
+    facing = np.einsum("fqi,fqi->fq", np.cross(tangents[:, :, 0], tangents[:, :, 1]), seen)
+    return np.where(facing < 0, np.maximum(probe.radius - np.linalg.norm(seen, axis=2), 0.0), 0.0)
+
+
+def _renewed(model: BlockModel, positions: FloatArray, probe: Probe, past: Past, friction: float) -> Grip:
+    """The grip that goes with the pressure at these positions.
+
+    A point that was not touched before sticks from where the tool met it: for the share of its way that came after. As that place
+    moves while the equilibrium is sought, its stick is given that share of the stiffness instead, and the whole way.
+    """
+    seen = _seen(model, positions, probe)
+    depth = _pressed(model, positions, probe, seen)
+    faces = np.flatnonzero((depth > 0).any(axis=1))
+    here, before, depth = seen[faces], past.seen[faces], depth[faces]
+    gap = np.maximum(np.linalg.norm(before, axis=2) - probe.radius, 0.0)
+    held = past.touched[faces]
+    late = np.where(held, 1.0, depth / np.maximum(depth + gap, 1e-12))
+    anchors = np.where(held[..., None], before - past.ways[faces], before)
+    normals = here / np.linalg.norm(here, axis=2, keepdims=True)
+    areas = model.areas[faces]
+    return Grip(faces, anchors, normals, friction * CONTACT_STIFFNESS * areas * depth, late * STICK_STIFFNESS * areas)
+
+
+def _hold(model: BlockModel, positions: FloatArray, probe: Probe, grip: Grip) -> Hold:
+    """What is left to the next step: anchors dragged along as far as their points slip."""
+    seen = _seen(model, positions, probe)
+    ways = seen[grip.faces] - grip.anchors
+    ways -= grip.normals * np.einsum("gpi,gpi->gp", ways, grip.normals)[..., None]
+    drag = grip.stiffness * np.linalg.norm(ways, axis=2)
+    share = np.minimum(1.0, grip.limits / np.maximum(drag, 1e-300)) * grip.stiffness / (STICK_STIFFNESS * model.areas[grip.faces])
+    ways *= share[..., None]
+    whole, touched = np.zeros_like(seen), np.zeros(seen.shape[:2], dtype=bool)
+    whole[grip.faces], touched[grip.faces] = ways, grip.limits > 0
+    return Hold(surface_spots(model.mesh).places.reshape(-1, 3), whole.reshape(-1, 3), touched.ravel())
+
+
+def drag(
+    model: BlockModel,
+    positions: FloatArray,
+    probes: tuple[Probe, Probe],
+    past: Past,
+    friction: float,
+    tolerance: float,
+    follower: Follower,
+) -> tuple[Solution, Hold]:
+    """Equilibrium with friction.
+
+    Args:
+        positions: (n, 3) to begin from [m]. probes: the tool before and now. past: the step's beginning.
+        friction: coefficient [1]. tolerance: residual of each equilibrium; the last one's, with pressure and friction in
+            agreement, is at most the larger of it and 1e-4.
+
+    Returns:
+        the solution, whose push has the drag in it, and what the step leaves to the next.
+    """
+    before, probe = probes
+    iterations, share, last = 0, 1.0, np.inf
+    model.grip = None
+    try:
+        solution = lead(model, positions, before, probe, tolerance, follower)
+        for _ in range(_MOST_TURNS):
+            iterations += solution.iterations
+            if not solution.converged:
+                return replace(solution, iterations=iterations), Hold.nothing()
+            grip = _renewed(model, solution.positions, probe, past, friction)
+            old: Grip | None = model.grip
+            model.grip = grip
+            residual = misfit(model, model.assemble(solution.positions, probe, tangent=False))
+            if residual <= max(tolerance, _AGREED):
+                return replace(solution, iterations=iterations, residual=residual), _hold(model, solution.positions, probe, grip)
+            share = max(share / 2, 0.1) if residual > last else min(1.5 * share, 1.0)  # halves, where they go to and fro
+            last = residual
+            model.grip = _mixed(old, grip, share)
+            solution = lead(model, solution.positions, probe, probe, tolerance, follower)
+        return replace(solution, outcome=Outcome.GRIP_SWINGS, iterations=iterations, residual=residual), Hold.nothing()
+    finally:
+        model.grip = None
+
+
+def _mixed(old: Grip | None, new: Grip, share: float) -> Grip:
+    """The new grip with limits only part of the way from the old ones'."""
+    if old is None or share == 1.0:
+        return new
+    before = np.zeros((max(int(old.faces.max(initial=0)), int(new.faces.max(initial=0))) + 1, new.limits.shape[1]))
+    before[old.faces] = old.limits
+    return replace(new, limits=share * new.limits + (1 - share) * before[new.faces])

@@ -1,0 +1,174 @@
+"""Coulomb's friction between the tool and the surface, with stick and slip: a return mapping at the contact's quadrature points.
+
+A touched point sticks to an anchor that travels with the tool. Its tangential traction is k_t d, d the tangential way from the
+anchor, for as long as that is below mu p, with p the contact's pressure; beyond, the anchor is dragged along (Simo and Laursen
+1992; Wriggers 2006, ch. 5). Pressure and normals are kept while an equilibrium is sought, and renewed after it, until nothing
+changes: so each search is for the minimum of an energy (Tresca's friction as a fixed point: Haslinger 1983), as it is without.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numba import njit
+from scipy.spatial import cKDTree
+
+from core.fem.elements import Face
+from core.frames import FloatArray
+from core.mesh import IntArray
+
+__all__ = ["STICK_STIFFNESS", "Grip", "Hold"]
+
+STICK_STIFFNESS = 5e4
+"""Tangential traction over E per way from the anchor [1/m], times the surface's stiffness over E."""
+_NEIGHBOURS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Grip:
+    """What holds the surface while one equilibrium is sought, at the quadrature points (g, p) of those faces that touch.
+
+    Attributes:
+        faces: (g,) numbers of the faces. anchors: (g, p, 3) seen from the tool's centre [m]. normals: (g, p, 3) from it.
+        limits: (g, p) largest tangential force over E [m^2]. stiffness: (g, p) of the stick over E [m].
+    """
+
+    faces: IntArray
+    anchors: FloatArray
+    normals: FloatArray
+    limits: FloatArray
+    stiffness: FloatArray
+
+    def of(self, faces: IntArray) -> Self:
+        """The part of it on these faces (h,), by their places among them."""
+        number = np.full(int(max(faces.max(initial=0), self.faces.max(initial=0))) + 1, -1)
+        number[faces] = np.arange(len(faces))
+        own = number[self.faces] >= 0
+        points = (self.anchors[own], self.normals[own], self.limits[own], self.stiffness[own])
+        return type(self)(number[self.faces[own]], *points)
+
+    def energy(self, surface: IntArray, face: Face, positions: FloatArray, centre: FloatArray) -> float:
+        """Over E [m^3], with the tool's centre here (3,) [m]; `surface` (f, b) are all faces' nodes."""
+        points = (self.anchors, self.normals, self.limits, self.stiffness)
+        return float(_energy(surface[self.faces], face.shapes, *points, positions, centre))
+
+    def assemble(
+        self,
+        surface: IntArray,
+        face: Face,
+        positions: FloatArray,
+        centre: FloatArray,
+        slots: IntArray,
+        force: FloatArray,
+        data: FloatArray,
+        push: FloatArray,
+    ) -> None:
+        """Add the energy's gradient over E to `force` (n, 3) [m^2], its tangent to `data` [m], the drag on the body to `push`.
+
+        `slots` (f, 3 b, 3 b) of all faces as in `assemble_elastic`; an empty `data` leaves the tangent out.
+        """
+        points = (self.anchors, self.normals, self.limits, self.stiffness)
+        _assemble(surface[self.faces], face.shapes, *points, positions, centre, slots[self.faces], force, data, push)
+
+
+@dataclass(frozen=True, eq=False)
+class Hold:
+    """What one frame leaves to the next: points of the surface at rest (m, 3) [m], tangential ways from their anchors (m, 3) [m],
+    and which of them (m,) are touched; none touched is a fresh start."""
+
+    places: FloatArray
+    ways: FloatArray
+    touched: np.ndarray[Any, np.dtype[np.bool_]]
+
+    @classmethod
+    def nothing(cls) -> Self:
+        """Before the first touch."""
+        return cls(np.empty((0, 3)), np.empty((0, 3)), np.empty(0, dtype=bool))
+
+    def at(self, places: FloatArray) -> tuple[FloatArray, np.ndarray[Any, np.dtype[np.bool_]]]:
+        """Ways (..., 3) [m] and whether touched (...) at other points of the surface (..., 3), as a grid that moved has them."""
+        flat = places.reshape(-1, 3)
+        if not self.touched.any():
+            return np.zeros_like(places), np.zeros(places.shape[:-1], dtype=bool)
+        distance, near = (np.asarray(part) for part in cKDTree(self.places).query(flat, k=_NEIGHBOURS))
+        weights = 1 / (distance + 1e-9) ** 2
+        weights /= weights.sum(axis=1, keepdims=True)
+        ways = np.einsum("mk,mki->mi", weights, self.ways[near])
+        touched = self.touched[near[:, 0]]
+        return (ways * touched[:, None]).reshape(places.shape), touched.reshape(places.shape[:-1])
+
+
+@njit(cache=True)
+def _way(positions: Any, face: Any, shapes: Any, centre: Any, anchor: Any, normal: Any, way: Any) -> float:
+    """Fill the tangential way from the anchor (3,) [m] and return its length."""
+    along = 0.0
+    for i in range(3):
+        way[i] = -centre[i] - anchor[i]
+        for a in range(face.shape[0]):
+            way[i] += shapes[a] * positions[face[a], i]
+        along += way[i] * normal[i]
+    length = 0.0
+    for i in range(3):
+        way[i] -= along * normal[i]
+        length += way[i] ** 2
+    return np.sqrt(length)  # type: ignore[no-any-return]
+
+
+@njit(cache=True)
+def _energy(faces: Any, shapes: Any, anchors: Any, normals: Any, limits: Any, stiffness: Any, positions: Any, centre: Any) -> float:
+    """Of sticking points k/2 d^2, of slipping ones limit (d - limit / 2 k), over E [m^3]; faces (g, b)."""
+    way, total = np.empty(3), 0.0
+    for f in range(faces.shape[0]):
+        for q in range(shapes.shape[0]):
+            limit, stick = limits[f, q], stiffness[f, q]
+            if limit <= 0.0:
+                continue
+            length = _way(positions, faces[f], shapes[q], centre, anchors[f, q], normals[f, q], way)
+            total += 0.5 * stick * length * length if stick * length <= limit else limit * (length - 0.5 * limit / stick)
+    return total
+
+
+@njit(cache=True)
+def _assemble(
+    faces: Any,
+    shapes: Any,
+    anchors: Any,
+    normals: Any,
+    limits: Any,
+    stiffness: Any,
+    positions: Any,
+    centre: Any,
+    slots: Any,
+    force: Any,
+    data: Any,
+    resultant: Any,
+) -> None:
+    """As `Grip.assemble`, for the faces (g, b) and slots (g, 3 b, 3 b) of the grip; the tangent is never negative."""
+    way = np.empty(3)
+    for f in range(faces.shape[0]):
+        for q in range(shapes.shape[0]):
+            limit, stick = limits[f, q], stiffness[f, q]
+            if limit <= 0.0:
+                continue
+            length = _way(positions, faces[f], shapes[q], centre, anchors[f, q], normals[f, q], way)
+            slips = stick * length > limit
+            straight = limit / length if slips else stick
+            for i in range(3):
+                resultant[i] -= straight * way[i]
+                for a in range(faces.shape[1]):
+                    force[faces[f, a], i] += straight * way[i] * shapes[q, a]
+            if data.shape[0] == 0:
+                continue
+            along = straight / length**2 if slips else 0.0
+            for i in range(3):
+                for j in range(3):
+                    value = -straight * normals[f, q, i] * normals[f, q, j] - along * way[i] * way[j]
+                    if i == j:
+                        value += straight
+                    for a in range(faces.shape[1]):
+                        for b in range(faces.shape[1]):
+                            slot = slots[f, 3 * a + i, 3 * b + j]
+                            if slot >= 0:
+                                data[slot] += value * shapes[q, a] * shapes[q, b]
