@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +22,12 @@ CCX = shutil.which("ccx")
 
 @pytest.mark.slow
 @pytest.mark.skipif(CCX is None, reason="no CalculiX on this machine: install the package calculix-ccx")
-def test_two_pokes_are_those_of_calculix(tmp_path: Path) -> None:
-    referee = poke(str(CCX), SETUP, DEPTHS, tmp_path)
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_two_pokes_are_those_of_calculix(friction: float, tmp_path: Path) -> None:
+    setup = replace(SETUP, tool=replace(SETUP.tool, friction_coefficient=friction))
+    referee = poke(str(CCX), setup, DEPTHS, tmp_path)
     top = SETUP.geometry.size[2] + SETUP.tool.radius
-    frames = replay(SETUP, np.array([[0.0, 0.0, top - depth] for depth in np.arange(1, 9) * 1e-3]), GRID)
+    frames = replay(setup, np.array([[0.0, 0.0, top - depth] for depth in np.arange(1, 9) * 1e-3]), GRID)
     require_converged(frames)
     for number, frame in enumerate((frames[3], frames[7])):
         force = SETUP.material.young_modulus * referee.force[number]
