@@ -9,7 +9,7 @@ the error up to ten times.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,9 +20,8 @@ from core.progress import Report, silent
 from core.replay import Equilibrium, Replay
 from core.setup import Setup
 
-__all__ = ["MeshError", "finer", "hardest_frames", "mesh_errors"]
+__all__ = ["MeshError", "hardest_frames", "mesh_errors"]
 
-RATIO = 1.5
 _SAMPLING = GridSpec(nodes=(35, 21, 19))
 
 
@@ -39,17 +38,6 @@ class MeshError:
     displacement: float
     relative: float
     force: float
-
-
-def finer(grid: GridSpec) -> GridSpec:
-    """The grid with its nodes RATIO times closer, or as nearly so as whole elements allow."""
-
-    def more(count: int) -> int:
-        return round((count - 1) / grid.order * RATIO) * grid.order + 1
-
-    nx, ny, nz = grid.nodes
-    spacing = None if grid.spacing is None else grid.spacing / RATIO
-    return replace(grid, nodes=(more(nx), more(ny), more(nz)), spacing=spacing)
 
 
 def hardest_frames(frames: Sequence[Equilibrium]) -> list[int]:
@@ -76,7 +64,7 @@ def mesh_errors(setup: Setup, frames: Sequence[Equilibrium], grid: GridSpec, *, 
 
     A touch that finds no equilibrium on the finer grid is left out: `hardest_frames` tells how many there are.
     """
-    block, points = Replay(setup, finer(grid)), _points(setup)
+    block, points = Replay(setup, grid.finer()), _points(setup)
     found = []
     keys = hardest_frames(frames)
     for done, number in enumerate(keys):

@@ -25,6 +25,7 @@ class Equilibrium:
         slip: (2,) how far the base has slid along x and y [m].
         probe: the tool (true centre and radius), phantom frame.
         force: (3,) of the block on the tool [N]. outcome, iterations, residual, penetration: how it was reached.
+        hardness: of the contact, see `core.fem.model.BlockModel.harden`.
         hold: what friction leaves to the next frame; None without.
     """
 
@@ -39,6 +40,7 @@ class Equilibrium:
     penetration: float
     in_contact: bool
     hold: Hold | None = None
+    hardness: float = 1.0
 
     @cached_property
     def _moved(self) -> FloatArray:

@@ -6,7 +6,7 @@ Grading matters more than the number of nodes: the contact zone of a 5 mm ball i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,6 +17,8 @@ from core.errors import MeshError
 from core.frames import FloatArray
 
 __all__ = ["BoxMesh", "GridSpec", "IntArray", "box_mesh", "even_axis", "graded_axis"]
+
+_FINER = 1.5
 
 IntArray = np.ndarray[Any, np.dtype[np.integer[Any]]]
 
@@ -46,6 +48,16 @@ class GridSpec:
                 f"a grid is of order 1, or of order 2 with odd numbers of nodes; got order {self.order} and {self.nodes}",
                 nodes=list(self.nodes), order=self.order,
             )  # fmt: skip
+
+    def finer(self) -> GridSpec:
+        """The grid with its nodes 1.5 times closer, or as nearly so as whole elements allow."""
+
+        def more(count: int) -> int:
+            return round((count - 1) / self.order * _FINER) * self.order + 1
+
+        nx, ny, nz = self.nodes
+        spacing = None if self.spacing is None else self.spacing / _FINER
+        return replace(self, nodes=(more(nx), more(ny), more(nz)), spacing=spacing)
 
     @classmethod
     def parse(cls, text: str) -> GridSpec:

@@ -117,7 +117,7 @@ class Replay:
         displacement = solution.positions - mesh.nodes
         return Equilibrium(
             mesh, displacement, self.slip.copy(), probe, force, solution.outcome, solution.iterations, solution.residual,
-            solution.penetration, touched,
+            solution.penetration, touched, hardness=self.model(mesh).hardness,
         )  # fmt: skip
 
     def held(self, probe: Probe, start: Equilibrium) -> Equilibrium:
@@ -206,6 +206,20 @@ class Replay:
             return self._placed(centre, start)
         return give_way(centre, start, self.setup, self.tolerance, self._placed)
 
+    def on_finer_grid(self, stated_centre: FloatArray, start: Equilibrium | None, failed: Equilibrium) -> Equilibrium:
+        """The frame once more, on a grid 1.5 times finer; as it was, where that finds no equilibrium, either.
+
+        A ball pressed in by more than its radius can slip behind the chords of a coarse grid's surface, and not of a fine one's.
+        """
+        other = Replay(self.setup, self.grid.finer(), self.tolerance)
+        for begin in (start,) if self.setup.remembers else (start, None):
+            other.slip = self.slip.copy() if begin is None else begin.slip.copy()
+            frame = other.step(stated_centre, begin)
+            if frame.outcome is Outcome.CONVERGED:
+                self.slip = other.slip
+                return frame
+        return failed
+
     def _placed(self, centre: FloatArray, start: Equilibrium) -> Equilibrium:
         """Equilibrium with the tool's centre held here (3,) [m]; slides the base if it cannot hold."""
         probe = Probe(centre, self.setup.tool.radius)
@@ -247,7 +261,8 @@ def replay(
         grid: the mesh. starts: equilibria of a similar setup at the same frames to begin from; else from the frame before.
         tolerance: residual at which a frame counts as converged, over the push. report: progress.
 
-    A frame without equilibrium is returned with its outcome, never raised: look at `outcome`, or call `require_converged`.
+    A frame that finds no equilibrium is tried on a finer grid. One that finds none there, either, is returned with its outcome,
+    never raised: look at `outcome`, or call `require_converged`.
     """
     if starts is not None and setup.remembers:
         raise SolveError("a setup whose frames depend on those before them is replayed in order of time, without starts")
@@ -261,6 +276,8 @@ def replay(
         for other in () if setup.remembers else (previous, None):
             if frame.outcome is not Outcome.CONVERGED and other is not start:
                 start, frame = other, block.step(np.asarray(centre, dtype=float), other)
+        if frame.outcome is not Outcome.CONVERGED:
+            frame = block.on_finer_grid(np.asarray(centre, dtype=float), previous, frame)
         frames.append(frame)
         previous = frame if frame.outcome is Outcome.CONVERGED else previous if setup.remembers else None
     return frames

@@ -29,6 +29,7 @@ TOOL_STEP = 5e-7
 def factorise_at(block: Replay, frame: Equilibrium) -> BlockModel | None:
     """Factorise the tangent at a frame's equilibrium; None when it has no Cholesky factor."""
     model = block.model(frame.mesh)
+    model.harden(frame.hardness)
     state = model.assemble(frame.mesh.nodes + frame.displacement, _local(frame))
     try:
         model.topology.factor.factorise(state.data)
@@ -71,6 +72,7 @@ def _unbalanced(block: Replay, frame: Equilibrium, model: BlockModel, changes: S
         if same and setup.tool.radius == block.setup.tool.radius and not shift.any():  # only the sensor differs
             continue
         other = model if same else BlockModel(setup, frame.mesh)
+        other.harden(frame.hardness)
         probe = Probe(here.centre + shift, here.radius + setup.tool.radius - block.setup.tool.radius)
         right[:, column] = residual - other.assemble(positions, probe, tangent=False).residual
     return right

@@ -130,7 +130,8 @@ class BlockModel:
 
     Attributes:
         mu, bulk: (e, q) over E at the quadrature points [1].
-        areas: (f, p) of the free surface's quadrature points, times the stiffness there over E [m^2], with which contact goes.
+        areas: (f, p) of the free surface's quadrature points, times the stiffness there over E and the hardness [m^2], with which
+            contact goes. hardness: of the contact, one unless `harden` was called [1].
     """
 
     def __init__(self, setup: Setup, mesh: BoxMesh) -> None:
@@ -139,7 +140,7 @@ class BlockModel:
         self.law, self.face = Law.of(setup.material), self.topology.element.face
         self.rule, areas = rule_of(mesh)
         height = setup.geometry.size[2]
-        self.areas = areas * surface_stiffness(setup.material, surface_spots(mesh), height)
+        self.areas, self.hardness = areas * surface_stiffness(setup.material, surface_spots(mesh), height), 1.0
         mu, bulk = lame(self.law, setup.material.poisson_ratio)
         factor = np.exp(log_stiffness(setup.material, self.rule, height))
         self.mu, self.bulk = mu * factor, bulk * factor
@@ -149,6 +150,11 @@ class BlockModel:
         self.grip: Grip | None = None
         self.weight_force = self._weight(setup.load.specific_weight_over_stiffness)
         self._prepare_base(setup)
+
+    def harden(self, hardness: float) -> None:
+        """Make the contact so many times as stiff as it is at first [1]."""
+        if hardness != self.hardness:
+            self.areas, self.hardness = self.areas * (hardness / self.hardness), hardness
 
     def _weight(self, specific: float) -> FloatArray:
         """Weight at the nodes over E (n,) [m^2]."""

@@ -18,6 +18,7 @@ RELATIVE_TOLERANCE = 1e-6
 MAX_ITERATIONS = 40
 MAX_SPLITS = 6
 MAX_PENETRATION = 4e-4
+_LONGEST = 0.5
 
 
 class Outcome(Enum):
@@ -87,7 +88,8 @@ def _search(
     """Halve the step until the energy falls as it should (Armijo), rounding allowed for; the same positions when it never does."""
     move = np.zeros_like(positions)
     move[model.topology.free] = step
-    length = 1.0
+    # Nothing moves by more than half the tool's radius at once: beyond its centre no contact would be felt.
+    length = 1.0 if probe is None else min(1.0, _LONGEST * probe.radius / max(float(np.abs(step).max()), 1e-300))
     for _ in range(12):
         trial = positions + length * move
         value = model.energy(trial, probe)

@@ -19,12 +19,27 @@ FREE_STEP = 1.5e-3
 _STAGE_TOLERANCE = 0.2
 """Residual at which a place on the way counts as reached: the next stage only begins from it."""
 
+_DEEPEST = 2e-4
+"""Penetration [m] from which on the contact is hardened, by _HARDER at a time, to _HARDEST times what it is at first."""
+_HARDER, _HARDEST = 4.0, 64.0
+
 
 def lead(model: BlockModel, positions: FloatArray, before: Probe, probe: Probe, tolerance: float, follower: Follower) -> Solution:
     """Equilibrium at `probe`, led there from an equilibrium (n, 3) [m] with the tool at `before`.
 
-    Places on the way are reached roughly at first; where that leads astray, the way is gone again with care.
+    Where the tool is pressed in so hard that the contact's penalty gives way, the contact is hardened step by step.
     """
+    model.harden(1.0)
+    solution = _led(model, positions, before, probe, tolerance, follower)
+    while solution.converged and solution.penetration > _DEEPEST and model.hardness < _HARDEST:
+        model.harden(_HARDER * model.hardness)
+        harder = solve(model, probe, solution.positions, probe, tolerance)
+        solution = replace(harder, iterations=solution.iterations + harder.iterations)
+    return solution
+
+
+def _led(model: BlockModel, positions: FloatArray, before: Probe, probe: Probe, tolerance: float, follower: Follower) -> Solution:
+    """Places on the way are reached roughly at first; where that leads astray, the way is gone again with care."""
     steps = max(1, int(np.ceil(float(np.linalg.norm(probe.centre - before.centre)) / FREE_STEP)))
     if steps == 1:
         near = follower.solve(model, probe, positions, tolerance)

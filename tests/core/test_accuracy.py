@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.accuracy import finer, hardest_frames, mesh_errors
+from core.accuracy import hardest_frames, mesh_errors
 from core.fem.newton import Outcome
 from core.mesh import GridSpec
 from core.replay import replay
@@ -53,8 +53,8 @@ def test_mesh_error_is_that_of_the_slid_block():
 
 
 def test_finer_grid_keeps_its_kind():
-    assert finer(GridSpec(nodes=(13, 5, 5))) == GridSpec(nodes=(19, 7, 7))
-    assert finer(GridSpec(nodes=(13, 9, 9), spacing=1.5e-3, order=2)) == GridSpec(nodes=(19, 13, 13), spacing=1e-3, order=2)
+    assert GridSpec(nodes=(13, 5, 5)).finer() == GridSpec(nodes=(19, 7, 7))
+    assert GridSpec(nodes=(13, 9, 9), spacing=1.5e-3, order=2).finer() == GridSpec(nodes=(19, 13, 13), spacing=1e-3, order=2)
 
 
 def test_replay_that_never_touches_has_no_mesh_error():
