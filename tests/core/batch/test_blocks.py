@@ -102,3 +102,20 @@ def test_matrix_that_is_not_positive_definite_is_told_and_spoils_no_other():
     factor = factorise(blocks.frame.layout, data)
     assert factor.sound.tolist() == [True, True, False, True]
     assert bool(torch.isfinite(factor.solve(torch.ones_like(rest))[[0, 1, 3]]).all())
+
+
+@BOTH_ORDERS
+@pytest.mark.parametrize("dtype", [torch.float64, torch.float32], ids=str)
+def test_nothing_on_the_way_leaves_the_device(grid, dtype):
+    """On torch's device without memory: tensors of two devices cannot be combined."""
+    models, places, probes = _deformed(grid)
+    device = torch.device("meta")
+    blocks, balls = blocks_of(models, device).pick(torch.tensor([0, 2], device=device)), balls_of(probes[:2], device)
+    positions = torch.as_tensor(np.stack(places[:2]), device=device)
+    state = blocks.state(positions, balls)
+    data = blocks.tangent(positions, balls, torch.ones(2, dtype=dtype, device=device), dtype)
+    factor = factorise(blocks.frame.layout, data)
+    step = factor.solve(state.residual)
+    found = (blocks.energy(positions, balls), state.misfit, data, factor.sound, step)
+    assert {tensor.device.type for tensor in found} == {"meta"}
+    assert (data.dtype, step.dtype) == (dtype, torch.float64)

@@ -127,6 +127,7 @@ class _SpinningTool(Tool):
         ({"support": Support(detached=(Detachment(edge="+x", extent=0.01),))}, "support.detached"),
         ({"support": Support(stiffness_over_E=200.0)}, "support.stiffness_over_E"),
         ({"tool": Tool(radius=5e-3, compliance_times_stiffness=2.0)}, "tool.compliance_times_stiffness"),
+        ({"tool": Tool(radius=5e-3, friction_coefficient=0.3)}, "tool.friction_coefficient"),
         ({"tool": _SpinningTool(radius=5e-3, spin=1.0)}, "tool.spin"),
         ({"tool": _SpinningTool(radius=5e-3)}, None),
     ],
