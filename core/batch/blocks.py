@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import torch
@@ -15,7 +14,7 @@ from core.batch.contact import Balls, Skin
 from core.batch.elastic import Bodies
 from core.batch.slabs import Layout
 from core.batch.stack import Stack
-from core.fem.model import BlockModel, Probe, Topology
+from core.fem.model import BlockModel, Probe
 from core.frames import FloatArray
 
 __all__ = ["Blocks", "Frame", "State", "balls_of", "blocks_of", "frame_of"]
@@ -94,19 +93,19 @@ class Blocks:
         return self.frame.layout.collect(elastic.matrices(self.bodies.to(dtype), deformed.to(dtype)), pressed.to(dtype))
 
 
-@lru_cache(maxsize=8)
-def frame_of(top: Topology, nodes: tuple[int, int, int], device: torch.device) -> Frame:
-    """Of all grids with these numbers of nodes."""
+def frame_of(model: BlockModel, device: torch.device) -> Frame:
+    """What this model shares with all others on grids of its shape."""
+    top = model.topology
     face, free = top.element.face, top.free.all(axis=1, keepdims=True).astype(float)
     elements, surface, shapes, gradients, loose = (
         torch.as_tensor(array, device=device) for array in (top.hexahedra, top.surface, face.shapes, face.gradients, free)
     )
-    return Frame(elements, loose, Skin(surface, shapes, gradients), Layout(top, nodes, device))
+    return Frame(elements, loose, Skin(surface, shapes, gradients), Layout(top, model.mesh.nodes, device))
 
 
-def blocks_of(models: Sequence[BlockModel], device: torch.device) -> Blocks:
-    """The models as tensors; what several of them share goes to the device once."""
-    first = models[0]
+def blocks_of(models: Sequence[BlockModel], frame: Frame) -> Blocks:
+    """The models as tensors on the frame's device; what several of them share goes there once."""
+    device = frame.free.device
     rules = list({id(model.rule): model.rule for model in models}.values())
     which = torch.tensor([next(i for i, rule in enumerate(rules) if rule is model.rule) for model in models], device=device)
 
@@ -134,7 +133,7 @@ def blocks_of(models: Sequence[BlockModel], device: torch.device) -> Blocks:
         rounding=own([model.rounding for model in models]),
         least=own([1e-5 * x * y for x, y, _ in size]),
     )
-    return Blocks(frame_of(first.topology, first.mesh.shape, device), bodies, loads)
+    return Blocks(frame, bodies, loads)
 
 
 def balls_of(probes: Sequence[Probe], device: torch.device) -> Balls:

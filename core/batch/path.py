@@ -8,12 +8,9 @@ from torch import Tensor
 from core.batch.blocks import Blocks
 from core.batch.contact import Balls
 from core.batch.newton import Balance, solve
-from core.fem.path import FREE_STEP
+from core.fem.path import FREE_STEP, STAGE_TOLERANCE
 
 __all__ = ["lead"]
-
-_STAGE_TOLERANCE = 0.2
-"""Misfit at which a place on the way counts as reached: the next stage only begins from it."""
 
 
 def lead(blocks: Blocks, positions: Tensor, before: Tensor, balls: Balls, tolerance: float, dtype: torch.dtype) -> Balance:
@@ -28,7 +25,7 @@ def lead(blocks: Blocks, positions: Tensor, before: Tensor, balls: Balls, tolera
     for left in range(int(stages.max()) - 1, -1, -1):
         now = (going & (stages > left)).nonzero().squeeze(1)
         centres = balls.centres[now] - (left / stages * way.T).T[now]
-        rough = max(tolerance, _STAGE_TOLERANCE) if left else tolerance
+        rough = max(tolerance, STAGE_TOLERANCE) if left else tolerance
         stage = solve(blocks.pick(now), Balls(centres, balls.radii[now]), found.positions[now], rough, dtype)
         found.put(now, stage)
         iterations[now] += stage.iterations

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 
-from core.batch.blocks import Blocks, balls_of, blocks_of, frame_of
+from core.batch.blocks import Blocks, Frame, balls_of, blocks_of, frame_of
 from core.batch.member import Begin, Member
 from core.batch.membership import obstacle
 from core.batch.newton import Balance
 from core.batch.path import lead
 from core.equilibrium import Equilibrium
 from core.errors import SetupError
-from core.fem.model import BlockModel, topology
+from core.fem.model import BlockModel
 from core.fem.newton import RELATIVE_TOLERANCE, Outcome, Solution, verdict
 from core.frames import FloatArray
 from core.mesh import GridSpec
@@ -51,26 +51,22 @@ def replay_batch(
     """
     place = _device(device)
     ways = np.broadcast_to(np.asarray(centres, dtype=float), (len(setups), *np.shape(centres)[-2:]))
+    together = [number for number, setup in enumerate(setups) if obstacle(setup) is None]
+    groups = [[number] for number in range(len(setups)) if number not in together]
+    if together:
+        frame = frame_of(Member(setups[together[0]], grid, tolerance).sag().model, place)
+        room = _free_memory(place) / 2 if memory is None else memory
+        most = max(1, int(room / frame.layout.size(dtype)))
+        groups = [together[first : first + most] for first in range(0, len(together), most)] + groups
     found: dict[int, list[Equilibrium]] = {}
-    for numbers in _parts(setups, grid, place, dtype, memory):
+    for numbers in groups:
         told = part(report, len(found) / len(setups), (len(found) + len(numbers)) / len(setups))
-        if obstacle(setups[numbers[0]]) is not None:
+        if numbers[0] in together:
+            batch = _Batch([Member(setups[number], grid, tolerance) for number in numbers], frame, tolerance, dtype)
+            found.update(zip(numbers, batch.replay(ways[numbers], told), strict=True))
+        else:
             found[numbers[0]] = replay(setups[numbers[0]], ways[numbers[0]], grid, tolerance=tolerance, report=told)
-            continue
-        batch = _Batch([Member(setups[number], grid, tolerance) for number in numbers], tolerance, place, dtype)
-        found.update(zip(numbers, batch.replay(ways[numbers], told), strict=True))
     return [found[number] for number in range(len(setups))]
-
-
-def _parts(
-    setups: Sequence[Setup], grid: GridSpec, place: torch.device, dtype: torch.dtype, memory: float | None
-) -> list[list[int]]:
-    """The setups' numbers in groups: as many as the device can hold together, and alone those that no batch can hold."""
-    alone = [number for number, setup in enumerate(setups) if obstacle(setup) is not None]
-    together = [number for number in range(len(setups)) if number not in alone]
-    layout = frame_of(topology(grid.nodes, grid.order, held=True), grid.nodes, place).layout
-    most = max(1, int((_free_memory(place) / 2 if memory is None else memory) / layout.size(dtype)))
-    return [together[first : first + most] for first in range(0, len(together), most)] + [[number] for number in alone]
 
 
 def _device(name: str) -> torch.device:
@@ -88,10 +84,11 @@ def _free_memory(place: torch.device) -> float:
 
 
 class _Batch:
-    """Some members on a device."""
+    """Some members on a frame's device."""
 
-    def __init__(self, members: list[Member], tolerance: float, place: torch.device, dtype: torch.dtype) -> None:
-        self._members, self._tolerance, self._place, self._dtype = members, tolerance, place, dtype
+    def __init__(self, members: list[Member], frame: Frame, tolerance: float, dtype: torch.dtype) -> None:
+        self._members, self._frame, self._tolerance, self._dtype = members, frame, tolerance, dtype
+        self._place = frame.free.device
         self._models: list[BlockModel] = []
         self._blocks: Blocks | None = None
 
@@ -139,7 +136,7 @@ class _Batch:
         """The models as tensors; the last ones are kept."""
         same = len(models) == len(self._models) and all(new is old for new, old in zip(models, self._models, strict=True))
         if self._blocks is None or not same:
-            self._models, self._blocks = models, blocks_of(models, self._place)
+            self._models, self._blocks = models, blocks_of(models, self._frame)
         return self._blocks
 
 

@@ -1,4 +1,4 @@
-"""Symmetric systems of many bodies on one grid, cut across its longest side into slabs that only touch their neighbours.
+"""Symmetric systems of many bodies on one mesh, cut across its longest side into slabs that only touch their neighbours.
 
 So the matrices are block tridiagonal, and a Cholesky factor is one dense factor, one triangular solve and one product a slab, each
 of them for all bodies at once: with 3960 unknowns in 15 slabs, a twentieth of a dense factor's work and an eighth of its memory.
@@ -13,22 +13,26 @@ import torch
 from torch import Tensor
 
 from core.fem.model import Topology
+from core.frames import FloatArray
 from core.mesh import IntArray
 
 __all__ = ["Factor", "Layout", "factorise"]
 
 
-def _slabs(nodes: tuple[int, int, int], order: int, top: Topology) -> IntArray:
-    """Each node's slab (n,), -1 where it is held: across the axis that makes the largest slab smallest."""
-    ways, free = [], top.free.all(axis=1)
-    for index in np.meshgrid(*(np.arange(count) for count in nodes[::-1]), indexing="ij"):
-        layer = -(-index.ravel() // order)
+def _slabs(elements: IntArray, held: IntArray, places: FloatArray) -> IntArray:
+    """Each node's slab (n,), -1 where it is held: layers of elements (e, a), counted from the end that makes them thinnest."""
+    ways, free = [], ~np.isin(np.arange(len(places)), held)
+    for along in places.T:
+        layer = np.where(along < along.min() + 1e-9, 0, -1)
+        while (layer < 0).any():
+            reached = elements[(layer[elements] >= 0).any(axis=1)]
+            layer[reached] = np.where(layer[reached] < 0, layer.max() + 1, layer[reached])
         ways.append(np.where(free, layer - layer[free].min(), -1))
     return min(ways, key=lambda slab: int(np.bincount(slab[free]).max()))
 
 
 class Layout:
-    """Where unknowns and entries of element matrices go.
+    """Where unknowns and entries of element matrices go, for nodes that lie about at `places` (n, 3) [m].
 
     Attributes:
         slabs, width: how many, and the unknowns of the largest; smaller ones are filled up with ones on the diagonal.
@@ -36,8 +40,8 @@ class Layout:
         fillers: entries. elements, faces: (e, 3 a, 3 a) and (f, 3 k, 3 k) entries of their matrices, `entries` where there is none.
     """
 
-    def __init__(self, top: Topology, nodes: tuple[int, int, int], device: torch.device) -> None:
-        slab = _slabs(nodes, round(top.hexahedra.shape[1] ** (1 / 3)) - 1, top)
+    def __init__(self, top: Topology, places: FloatArray, device: torch.device) -> None:
+        slab = _slabs(top.hexahedra, np.flatnonzero(~top.free.all(axis=1)), places)
         counts = np.bincount(slab[slab >= 0])
         self.slabs, self.width = len(counts), 3 * int(counts.max())
         self.entries = (2 * self.slabs - 1) * self.width**2
@@ -46,14 +50,14 @@ class Layout:
             rank[slab == number] = np.arange(count)
         self._slab, self._rank = np.repeat(slab, 3), (3 * rank[:, None] + np.arange(3)).ravel()
         unknown = np.flatnonzero(self._slab >= 0)
-        places = np.full(self.slabs * self.width, len(self._slab))
-        places[self._slab[unknown] * self.width + self._rank[unknown]] = unknown
-        filler = np.flatnonzero(places == len(self._slab))
+        where = np.full(self.slabs * self.width, len(self._slab))
+        where[self._slab[unknown] * self.width + self._rank[unknown]] = unknown
+        filler = np.flatnonzero(where == len(self._slab))
         fillers = filler // self.width * self.width**2 + filler % self.width * (self.width + 1)
         diagonal = self._slab[unknown] * self.width**2 + self._rank[unknown] * (self.width + 1)
         elements, faces = self._entries(top.hexahedra), self._entries(top.surface)
         self.places, self.fillers, self.diagonal, self.elements, self.faces = (
-            torch.as_tensor(array, device=device) for array in (places, fillers, diagonal, elements, faces)
+            torch.as_tensor(array, device=device) for array in (where, fillers, diagonal, elements, faces)
         )
 
     def _entries(self, parts: IntArray) -> IntArray:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from core.batch.blocks import Blocks, balls_of, blocks_of
+from core.batch.blocks import Blocks, balls_of, blocks_of, frame_of
 from core.batch.contact import Balls
 from core.batch.slabs import factorise
 from core.fem.model import BlockModel, Probe
@@ -43,7 +43,14 @@ def _deformed(grid: GridSpec, amplitude: float = 2e-4) -> tuple[list[BlockModel]
 
 def _batch(grid: GridSpec) -> tuple[list[BlockModel], list[np.ndarray], list[Probe], Blocks, Balls, torch.Tensor]:
     models, places, probes = _deformed(grid)
-    return models, places, probes, blocks_of(models, CPU), balls_of(probes, CPU), torch.as_tensor(np.stack(places))
+    return (
+        models,
+        places,
+        probes,
+        blocks_of(models, frame_of(models[0], CPU)),
+        balls_of(probes, CPU),
+        torch.as_tensor(np.stack(places)),
+    )
 
 
 @BOTH_ORDERS
@@ -58,7 +65,7 @@ def test_energy_of_an_inverted_or_overstretched_block_is_infinite_and_of_no_othe
     middle = len(places[0]) // 2
     places[0][middle] += (0.0, 0.0, 0.05)
     places[1] = models[1].mesh.nodes * (1.0, 1.0, 3.0)  # past J_m = 2, but not inside out
-    found = blocks_of(models, CPU).energy(torch.as_tensor(np.stack(places)), balls_of(probes, CPU))
+    found = blocks_of(models, frame_of(models[0], CPU)).energy(torch.as_tensor(np.stack(places)), balls_of(probes, CPU))
     assert torch.isinf(found).tolist() == [True, True, False, False]
 
 
@@ -95,7 +102,7 @@ def test_factor_in_slabs_solves_the_tangent_of_each_block_alone(grid, bending):
 
 def test_matrix_that_is_not_positive_definite_is_told_and_spoils_no_other():
     models, _, probes = _deformed(GRIDS[0])
-    blocks, balls = blocks_of(models, CPU), balls_of(probes, CPU)
+    blocks, balls = blocks_of(models, frame_of(models[0], CPU)), balls_of(probes, CPU)
     rest = blocks.loads.rest
     data = blocks.tangent(rest, balls, torch.zeros(len(models), dtype=torch.float64), torch.float64)
     data[2, blocks.frame.layout.diagonal[7]] = -1.0
@@ -110,7 +117,10 @@ def test_nothing_on_the_way_leaves_the_device(grid, dtype):
     """On torch's device without memory: tensors of two devices cannot be combined."""
     models, places, probes = _deformed(grid)
     device = torch.device("meta")
-    blocks, balls = blocks_of(models, device).pick(torch.tensor([0, 2], device=device)), balls_of(probes[:2], device)
+    blocks, balls = (
+        blocks_of(models, frame_of(models[0], device)).pick(torch.tensor([0, 2], device=device)),
+        balls_of(probes[:2], device),
+    )
     positions = torch.as_tensor(np.stack(places[:2]), device=device)
     state = blocks.state(positions, balls)
     data = blocks.tangent(positions, balls, torch.ones(2, dtype=dtype, device=device), dtype)
