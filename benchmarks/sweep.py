@@ -1,17 +1,20 @@
-"""Many parameter sets of one motion: each from nothing, each from the one before, and in two processes at once."""
+"""Many parameter sets of one motion: each from nothing, each from the one before, in two processes at once, and as one batch."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
 
 import numpy as np
+import torch
 from rich.table import Table
 
 from benchmarks.reference import SETUP
 from benchmarks.stopwatch import timed
+from core.batch import replay_batch
 from core.frames import FloatArray
 from core.mesh import GridSpec
 from core.replay import Equilibrium, replay, require_converged
@@ -23,6 +26,8 @@ SETS = (1, 4, 16)
 GRID = GridSpec(nodes=(15, 11, 9), spacing=1.2e-3)
 SAME = 2e-6
 """How well [m] the ways must agree in every node."""
+CARD_SETS = (16, 64, 256)
+"""More than a card can hold are done in parts."""
 
 
 def _way() -> FloatArray:
@@ -61,6 +66,36 @@ def _worker(setups: list[Setup]) -> FloatArray:
     return _shapes(_chained(setups))
 
 
+def _clocked(work: Callable[[], FloatArray]) -> tuple[FloatArray, float]:
+    """What the work returns, and the seconds on the wall; work on a card has ended when its shapes are here."""
+    begin = time.perf_counter()
+    result = work()
+    return result, time.perf_counter() - begin
+
+
+def _check(count: int, *ways: FloatArray) -> None:
+    """All ways of replaying so many sets must find the same."""
+    apart = max(float(np.abs(way - ways[0]).max()) for way in ways)
+    if apart > SAME:
+        raise RuntimeError(f"{count} sets differ with the way they are replayed by {1e6 * apart:.1f} um")
+
+
+def _on_card() -> list[Table]:
+    """A batch on CUDA against single replays, every eighth of which is checked; nothing where there is no card."""
+    if not torch.cuda.is_available():
+        return []
+    name = torch.cuda.get_device_name()
+    table = Table("sets", "alone, CPU s a set", "batch on CUDA, s a set", title=f"The same on {name}")
+    _shapes(replay_batch(_setups(2), _way(), GRID, device="cuda"))  # warms up
+    for count in CARD_SETS:
+        setups, frames = _setups(count), len(_way())
+        alone, apart = timed(lambda setups=setups: _shapes(_alone(setups[::8])))  # type: ignore[misc]
+        batch, together = _clocked(lambda setups=setups: _shapes(replay_batch(setups, _way(), GRID, device="cuda")))  # type: ignore[misc]
+        _check(count, alone, batch.reshape(count, frames, *batch.shape[1:])[::8].reshape(alone.shape))
+        table.add_row(str(count), f"{apart / len(setups[::8]):.3f}", f"{together / count:.3f}")
+    return [table]
+
+
 def run() -> list[Table]:
     """Replay more and more sets in each way; all must find the same."""
     table = Table(
@@ -68,21 +103,20 @@ def run() -> list[Table]:
         "alone, CPU s a set",
         "chained, CPU s a set",
         "two processes, s a set",
+        "batch, CPU s a set",
         title="A poke of 12 frames, many parameter sets",
     )
     _alone(_setups(1))  # warms up
+    replay_batch(_setups(1), _way(), GRID)
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         list(pool.map(_worker, [_setups(1)] * 2))
         for count in SETS:
             setups = _setups(count)
             alone, apart = timed(lambda setups=setups: _shapes(_alone(setups)))  # type: ignore[misc]
             chained, together = timed(lambda setups=setups: _shapes(_chained(setups)))  # type: ignore[misc]
-            begin = time.perf_counter()
+            batch, at_once = timed(lambda setups=setups: _shapes(replay_batch(setups, _way(), GRID)))  # type: ignore[misc]
             halves = [part for part in (setups[: (count + 1) // 2], setups[(count + 1) // 2 :]) if part]
-            split = np.concatenate(list(pool.map(_worker, halves)))
-            both = time.perf_counter() - begin
-            apart_by = float(max(np.abs(chained - alone).max(), np.abs(split - alone).max()))
-            if apart_by > SAME:
-                raise RuntimeError(f"{count} sets differ with the way they are replayed by {1e6 * apart_by:.1f} um")
-            table.add_row(str(count), f"{apart / count:.2f}", f"{together / count:.2f}", f"{both / count:.2f}")
-    return [table]
+            split, both = _clocked(lambda halves=halves: np.concatenate(list(pool.map(_worker, halves))))  # type: ignore[misc]
+            _check(count, alone, chained, split, batch)
+            table.add_row(str(count), *(f"{seconds / count:.2f}" for seconds in (apart, together, both, at_once)))
+    return [table, *_on_card()]

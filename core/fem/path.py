@@ -12,14 +12,14 @@ from core.fem.model import BlockModel, Probe
 from core.fem.newton import Solution, solve
 from core.frames import FloatArray
 
-__all__ = ["FREE_STEP", "lead"]
+__all__ = ["DEEPEST", "FREE_STEP", "STAGE_TOLERANCE", "lead"]
 
 FREE_STEP = 1.5e-3
 """Longest motion in contact [m] that is tried at once."""
-_STAGE_TOLERANCE = 0.2
+STAGE_TOLERANCE = 0.2
 """Residual at which a place on the way counts as reached: the next stage only begins from it."""
 
-_DEEPEST = 2e-4
+DEEPEST = 2e-4
 """Penetration [m] from which on the contact is hardened, by _HARDER at a time, to _HARDEST times what it is at first."""
 _HARDER, _HARDEST = 4.0, 64.0
 
@@ -31,7 +31,7 @@ def lead(model: BlockModel, positions: FloatArray, before: Probe, probe: Probe, 
     """
     model.harden(1.0)
     solution = _led(model, positions, before, probe, tolerance, follower)
-    while solution.converged and solution.penetration > _DEEPEST and model.hardness < _HARDEST:
+    while solution.converged and solution.penetration > DEEPEST and model.hardness < _HARDEST:
         model.harden(_HARDER * model.hardness)
         harder = solve(model, probe, solution.positions, probe, tolerance)
         solution = replace(harder, iterations=solution.iterations + harder.iterations)
@@ -54,7 +54,7 @@ def _led(model: BlockModel, positions: FloatArray, before: Probe, probe: Probe, 
 
 def _through(model: BlockModel, positions: FloatArray, probes: list[Probe], tolerance: float, careful: bool) -> Solution:
     """The last of the solutions at each place after the first, or the first that is none."""
-    rough = tolerance if careful else max(tolerance, _STAGE_TOLERANCE)
+    rough = tolerance if careful else max(tolerance, STAGE_TOLERANCE)
     solution = solve(model, probes[1], positions, probes[0] if careful else None, rough)
     iterations = solution.iterations
     for last, probe in pairwise(probes[1:]):
