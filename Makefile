@@ -66,5 +66,5 @@ $(VENV)/.peers: pyproject.toml constraints.txt $(VENV)/.system-demo $(VENV)/.ins
 	@touch $@
 
 $(VENV)/.developed: pyproject.toml constraints.txt $(VENV)/.installed
-	$(PIP) install --quiet -e ".[test,check]" -c constraints.txt
+	$(PIP) install --quiet -e ".[test,check,shapes]" -c constraints.txt
 	@touch $@

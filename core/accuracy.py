@@ -15,14 +15,12 @@ import numpy as np
 
 from core.fem.newton import Outcome
 from core.frames import FloatArray
-from core.mesh import GridSpec, box_mesh
+from core.meshing import Meshing
 from core.progress import Report, silent
 from core.replay import Equilibrium, Replay
 from core.setup import Setup
 
 __all__ = ["MeshError", "hardest_frames", "mesh_errors"]
-
-_SAMPLING = GridSpec(nodes=(35, 21, 19))
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ def hardest_frames(frames: Sequence[Equilibrium]) -> list[int]:
     return found
 
 
-def mesh_errors(setup: Setup, frames: Sequence[Equilibrium], grid: GridSpec, *, report: Report = silent) -> tuple[MeshError, ...]:
+def mesh_errors(setup: Setup, frames: Sequence[Equilibrium], grid: Meshing, *, report: Report = silent) -> tuple[MeshError, ...]:
     """Estimate the grid's error in the hardest frame of each touch.
 
     Args:
@@ -64,7 +62,7 @@ def mesh_errors(setup: Setup, frames: Sequence[Equilibrium], grid: GridSpec, *, 
 
     A touch that finds no equilibrium on the finer grid is left out: `hardest_frames` tells how many there are.
     """
-    block, points = Replay(setup, grid.finer()), _points(setup)
+    block, points = Replay(setup, grid.finer()), setup.geometry.surface_points()
     found = []
     keys = hardest_frames(frames)
     for done, number in enumerate(keys):
@@ -83,9 +81,3 @@ def mesh_errors(setup: Setup, frames: Sequence[Equilibrium], grid: GridSpec, *, 
 
 def _rms(field: FloatArray) -> float:
     return float(np.sqrt((field**2).sum(axis=1).mean()))
-
-
-def _points(setup: Setup) -> FloatArray:
-    """Rest positions (m, 3) [m] spread evenly over the free surface."""
-    mesh = box_mesh(setup.geometry.size, _SAMPLING)
-    return mesh.nodes[np.unique(mesh.free_surface)]

@@ -42,7 +42,7 @@ class MovingBlock:
         self.model: BlockModel = self._static.model(self._static.free.mesh)
         self.positions = self.model.mesh.nodes + self._static.free.displacement
         self.velocity = np.zeros_like(self.positions)
-        self._inertia = Inertia(self.model, setup.mass / float(np.prod(setup.geometry.size)), damping)
+        self._inertia = Inertia(self.model, setup.mass / float(np.prod(setup.box.size)), damping)
         self._offset, self._radius = np.array(setup.tool.offset), setup.tool.radius
         self._follower, self._tolerance = Follower(), tolerance
         self._probe: Probe | None = None

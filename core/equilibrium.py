@@ -11,7 +11,7 @@ from core.fem.friction import Hold
 from core.fem.model import Probe
 from core.fem.newton import Outcome
 from core.frames import FloatArray
-from core.mesh import BoxMesh
+from core.meshing import Mesh
 
 __all__ = ["Equilibrium"]
 
@@ -21,7 +21,7 @@ class Equilibrium:
     """The block in one frame.
 
     Attributes:
-        mesh: its grid. displacement: (n, 3) of the nodes against the stated shape [m], without `slip`.
+        mesh: its elements. displacement: (n, 3) of the nodes against the stated shape [m], without `slip`.
         slip: (2,) how far the base has slid along x and y [m].
         probe: the tool (true centre and radius), phantom frame.
         force: (3,) of the block on the tool [N]. outcome, iterations, residual, penetration: how it was reached.
@@ -29,7 +29,7 @@ class Equilibrium:
         hold: what friction leaves to the next frame; None without.
     """
 
-    mesh: BoxMesh
+    mesh: Mesh
     displacement: FloatArray
     slip: FloatArray
     probe: Probe

@@ -4,7 +4,7 @@ PalpateError                 a problem a user can act on; the message says what 
 ├── DatasetError             a file of a dataset is missing or off: names file, row and key
 ├── RegistrationError        frames could not be related, or only doubtfully
 ├── SetupError               a belief about the experiment is impossible: names key, value and bounds
-├── MeshError                a shape or grid that cannot be filled with elements
+├── MeshError                a surface, shape or grid that cannot be filled with elements: names file, numbers and place
 ├── SolveError               a frame without equilibrium: names frame, residual and cause
 ├── EffectError              an unknown effect, or a parameter out of bounds: names parameter, value and bounds
 ├── DiagnosisError           data that cannot carry a diagnosis
@@ -52,7 +52,7 @@ class SetupError(PalpateError):
 
 
 class MeshError(PalpateError):
-    """A shape or grid that cannot be filled with elements."""
+    """A surface, shape or grid that cannot be filled with elements; `where` has file and what was counted."""
 
 
 class SolveError(PalpateError):

@@ -7,20 +7,23 @@ Grading matters more than the number of nodes: the contact zone of a 5 mm ball i
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import brentq
 
 from core.errors import MeshError
+from core.fem.elements import HEXAHEDRA
 from core.frames import FloatArray
+from core.meshing import FINER, Connectivity, IntArray
+
+if TYPE_CHECKING:
+    from core.setup import Setup
 
 __all__ = ["BoxMesh", "GridSpec", "IntArray", "box_mesh", "even_axis", "graded_axis"]
 
-_FINER = 1.5
-
-IntArray = np.ndarray[Any, np.dtype[np.integer[Any]]]
+_FOCUS_STEP = 2e-4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,10 +56,10 @@ class GridSpec:
         """The grid with its nodes 1.5 times closer, or as nearly so as whole elements allow."""
 
         def more(count: int) -> int:
-            return round((count - 1) / self.order * _FINER) * self.order + 1
+            return round((count - 1) / self.order * FINER) * self.order + 1
 
         nx, ny, nz = self.nodes
-        spacing = None if self.spacing is None else self.spacing / _FINER
+        spacing = None if self.spacing is None else self.spacing / FINER
         return replace(self, nodes=(more(nx), more(ny), more(nz)), spacing=spacing)
 
     @classmethod
@@ -67,6 +70,22 @@ class GridSpec:
         except ValueError:
             raise MeshError(f"a grid reads like 13x5x5 (nodes along x, y, z), got {text!r}", grid=text) from None
         return cls(nodes=(nx, ny, nz))
+
+    def mesh(self, setup: Setup, centre: FloatArray) -> BoxMesh:
+        """The grid refined towards the surface point next to the tool, in small steps so that neighbouring frames share it."""
+        size = setup.box.size
+        if self.spacing is None:
+            return _mesh(size, self, (0.0, 0.0, size[2]))
+        half = np.array([size[0] / 2, size[1] / 2])
+        low, high = np.append(-half, 0.0), np.append(half, size[2])
+        focus = np.clip(np.round(centre / _FOCUS_STEP) * _FOCUS_STEP, low, high)
+        inside = np.all((focus > low) & (focus < high))
+        if inside:  # a centre pushed below the surface: refine the nearest side, from above if in doubt
+            gaps = np.concatenate([focus - low, high - focus])
+            gaps[2] = np.inf
+            side = int(np.argmin(gaps))
+            focus[side % 3] = high[side % 3] if side >= 3 else low[side % 3]
+        return _mesh(size, self, (float(focus[0]), float(focus[1]), float(focus[2])))
 
 
 def even_axis(low: float, high: float, nodes: int) -> FloatArray:
@@ -199,6 +218,16 @@ class BoxMesh:
         """Nodes at z = 0."""
         return np.asarray(self._numbers[0].ravel())
 
+    @property
+    def connectivity(self) -> Connectivity:
+        """Shared by all grids of this shape and order."""
+        return _connectivity(self.shape, self.order)
+
+    @property
+    def focus(self) -> FloatArray:
+        """Where the grid is finest (3,) [m]; the same place for all even grids of one block."""
+        return np.array([axis[int(np.argmin(np.gradient(axis)))] for axis in self.axes])
+
     def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """Elements' nodes and shape functions (m, a) at rest positions (m, 3) [m]; outside is moved to the block."""
         first, parts = [], []
@@ -242,3 +271,22 @@ def box_mesh(size: tuple[float, float, float], grid: GridSpec, focus: FloatArray
     if grid.order == 2:
         axes = [_with_middles(axis) for axis in axes]
     return BoxMesh((axes[0], axes[1], axes[2]), grid.order)
+
+
+@lru_cache(maxsize=64)
+def _mesh(size: tuple[float, float, float], grid: GridSpec, focus: tuple[float, float, float]) -> BoxMesh:
+    return box_mesh(size, grid, np.array(focus))
+
+
+@lru_cache(maxsize=32)
+def _connectivity(nodes: tuple[int, int, int], order: int) -> Connectivity:
+    mesh = box_mesh((1.0, 1.0, 1.0), GridSpec(nodes=nodes, order=order))
+    return Connectivity(
+        element=HEXAHEDRA[order],
+        count=len(mesh.nodes),
+        elements=np.ascontiguousarray(mesh.hexahedra),
+        surface=np.concatenate([mesh.element_sides[side] for side in ("+z", "-y", "+y", "-x", "+x")]),
+        base=np.ascontiguousarray(mesh.element_sides["-z"]),
+        hull=np.concatenate(list(mesh.faces.values())),
+        base_nodes=mesh.base_nodes,
+    )

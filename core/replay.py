@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from core.fem.model import BlockModel, Probe, surface_spots
 from core.fem.newton import RELATIVE_TOLERANCE, Outcome, Solution, solve
 from core.fem.path import FREE_STEP, lead
 from core.frames import FloatArray
-from core.mesh import BoxMesh, GridSpec, box_mesh
+from core.meshing import Mesh, Meshing
 from core.progress import Report, silent
 from core.setup import Setup
 from core.yielding import give_way, slide
@@ -30,37 +30,9 @@ __all__ = ["GRAVITY", "Equilibrium", "Replay", "replay", "require_converged", "r
 
 GRAVITY = 9.81
 """Acceleration of free fall [m/s^2]."""
-_FOCUS_STEP = 2e-4
 _MOST_SLIDES = 12
 _DRAG_STEP = 1e-3
 """Longest motion of a tool with friction [m] that is taken as straight."""
-
-
-@lru_cache(maxsize=64)
-def _mesh(size: tuple[float, float, float], grid: GridSpec, focus: tuple[float, float, float]) -> BoxMesh:
-    return box_mesh(size, grid, np.array(focus))
-
-
-def _focused_mesh(setup: Setup, grid: GridSpec, centre: FloatArray) -> BoxMesh:
-    """The grid refined towards the surface point next to the tool, in small steps so that neighbouring frames share it."""
-    size = setup.geometry.size
-    if grid.spacing is None:
-        return _mesh(size, grid, (0.0, 0.0, size[2]))
-    half = np.array([size[0] / 2, size[1] / 2])
-    low, high = np.append(-half, 0.0), np.append(half, size[2])
-    focus = np.clip(np.round(centre / _FOCUS_STEP) * _FOCUS_STEP, low, high)
-    inside = np.all((focus > low) & (focus < high))
-    if inside:  # a centre pushed below the surface: refine the nearest side, from above if in doubt
-        gaps = np.concatenate([focus - low, high - focus])
-        gaps[2] = np.inf
-        side = int(np.argmin(gaps))
-        focus[side % 3] = high[side % 3] if side >= 3 else low[side % 3]
-    return _mesh(size, grid, (float(focus[0]), float(focus[1]), float(focus[2])))
-
-
-def _focus(mesh: BoxMesh) -> FloatArray:
-    """Where the grid is finest (3,) [m]; the same place for all even grids of one block."""
-    return np.array([axis[int(np.argmin(np.gradient(axis)))] for axis in mesh.axes])
 
 
 def _past(model: BlockModel, start: Equilibrium, before: Probe) -> Past:
@@ -74,9 +46,8 @@ def _past(model: BlockModel, start: Equilibrium, before: Probe) -> Past:
 
 def _away(setup: Setup, probe: Probe) -> bool:
     """Whether the tool cannot touch the block, sagging and bulging allowed for."""
-    size = np.array(setup.geometry.size)
     slack = 5e-4 if setup.load.specific_weight_over_stiffness else 0.0
-    nearest = np.clip(probe.centre, [-size[0] / 2, -size[1] / 2, 0], [size[0] / 2, size[1] / 2, size[2]])
+    nearest = setup.geometry.nearest(probe.centre[None])[0]
     return bool(np.linalg.norm(probe.centre - nearest) > probe.radius + slack)
 
 
@@ -87,14 +58,14 @@ class Replay:
         setup: what is believed. grid: the mesh. tolerance: residual at which a frame counts as converged, over the push.
     """
 
-    def __init__(self, setup: Setup, grid: GridSpec, tolerance: float = RELATIVE_TOLERANCE) -> None:
+    def __init__(self, setup: Setup, grid: Meshing, tolerance: float = RELATIVE_TOLERANCE) -> None:
         self.setup, self.grid, self.tolerance = setup, grid, tolerance
         self._offset, self._follower = np.array(setup.tool.offset), Follower()
         self._model: BlockModel | None = None
         self._before: tuple[Equilibrium, Equilibrium] | None = None
         self.slip = np.zeros(2)
 
-    def model(self, mesh: BoxMesh) -> BlockModel:
+    def model(self, mesh: Mesh) -> BlockModel:
         """The block's potential on this mesh; the last one is kept."""
         if self._model is None or self._model.mesh is not mesh:
             self._model = BlockModel(self.setup, mesh)
@@ -103,15 +74,14 @@ class Replay:
     @cached_property
     def free(self) -> Equilibrium:
         """The block without the tool: sagging under gravity, otherwise as stated."""
-        size = self.setup.geometry.size
-        mesh = _focused_mesh(self.setup, self.grid, np.array([0.0, 0.0, size[2]]))
+        mesh = self.grid.mesh(self.setup, np.array([0.0, 0.0, self.setup.geometry.height]))
         away = Probe(np.array([0.0, 0.0, 10.0]), self.setup.tool.radius)
         if not self.setup.load.specific_weight_over_stiffness:
             still = np.zeros_like(mesh.nodes)
             return Equilibrium(mesh, still, np.zeros(2), away, np.zeros(3), Outcome.CONVERGED, 0, 0.0, 0.0, False)
         return self._equilibrium(solve(self.model(mesh), None, mesh.nodes, None, self.tolerance), mesh, away)
 
-    def _equilibrium(self, solution: Solution, mesh: BoxMesh, probe: Probe) -> Equilibrium:
+    def _equilibrium(self, solution: Solution, mesh: Mesh, probe: Probe) -> Equilibrium:
         force = -solution.push * self.setup.material.young_modulus
         touched = bool(np.linalg.norm(solution.push) > 0)
         displacement = solution.positions - mesh.nodes
@@ -125,14 +95,14 @@ class Replay:
         local = Probe(probe.centre - np.append(self.slip, 0.0), probe.radius)
         if _away(self.setup, local):
             return replace(self.free, slip=self.slip.copy(), probe=probe)
-        mesh = _focused_mesh(self.setup, self.grid, local.centre)
+        mesh = self.grid.mesh(self.setup, local.centre)
         model = self.model(mesh)
         # The dent travels with the tool, so the field is carried along with the grid's focus before it is read.
-        carried = _focus(mesh) - _focus(start.mesh) if start.in_contact else np.zeros(3)
+        carried = mesh.focus - start.mesh.focus if start.in_contact else np.zeros(3)
         displacement = start.displacement
         if start.mesh is not mesh:
             displacement = start.mesh.interpolate(start.displacement, mesh.nodes - carried)
-            displacement[mesh.base_nodes] *= 1.0 if model.sprung else 0.0
+            displacement[mesh.connectivity.base_nodes] *= 1.0 if model.sprung else 0.0
         before = Probe(start.probe.centre - np.append(start.slip, 0.0) + carried, start.probe.radius)
         positions = self._extrapolated(model, start, mesh.nodes + displacement, local)
         if not start.in_contact:  # begin where the straight way in first touches, not from afar
@@ -190,8 +160,7 @@ class Replay:
         """The last place on the way to `probe` that is clear of the block."""
         low, high = 0.0, 1.0
         if np.linalg.norm(before.centre - probe.centre) > 1.0 or not _away(self.setup, before):
-            size = np.array(self.setup.geometry.size)
-            middle = np.array([0.0, 0.0, size[2] / 2])
+            middle = (self.setup.geometry.low + self.setup.geometry.high) / 2
             before = Probe(probe.centre + (probe.centre - middle) / np.linalg.norm(probe.centre - middle) * 0.05, probe.radius)
         for _ in range(12):
             share = (low + high) / 2
@@ -240,7 +209,7 @@ class Replay:
         return frame
 
 
-def rest(setup: Setup, grid: GridSpec) -> Equilibrium:
+def rest(setup: Setup, grid: Meshing) -> Equilibrium:
     """The block without the tool."""
     return Replay(setup, grid).free
 
@@ -248,7 +217,7 @@ def rest(setup: Setup, grid: GridSpec) -> Equilibrium:
 def replay(
     setup: Setup,
     centres: FloatArray,
-    grid: GridSpec,
+    grid: Meshing,
     *,
     starts: Sequence[Equilibrium] | None = None,
     tolerance: float = RELATIVE_TOLERANCE,

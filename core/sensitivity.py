@@ -203,7 +203,7 @@ def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray
         return result
     forces = point_forces(model, frame.mesh.nodes + frame.displacement)
     elements, points = model.mu.shape
-    unknown = np.repeat(model.topology.unknown[model.topology.hexahedra].reshape(elements, 1, -1), points, axis=1)
+    unknown = np.repeat(model.topology.unknown[model.topology.elements].reshape(elements, 1, -1), points, axis=1)
     used = unknown >= 0
     column = np.broadcast_to(np.arange(elements * points).reshape(elements, points, 1), unknown.shape)
     shape = (int(model.topology.unknown.max()) + 1, elements * points)
@@ -223,9 +223,9 @@ def point_forces(model: BlockModel, positions: FloatArray) -> FloatArray:
     Forces are linear in the stiffness, so each point's are those of a body that has none elsewhere.
     """
     elements, points = model.mu.shape
-    corners = model.topology.hexahedra.shape[1]
+    corners = model.topology.elements.shape[1]
     apart = np.arange(corners * elements).reshape(elements, corners)
-    where = positions[model.topology.hexahedra].reshape(-1, 3)
+    where = positions[model.topology.elements].reshape(-1, 3)
     forces = np.empty((elements, points, corners, 3))
     for point in range(points):
         mu, bulk, force = np.zeros_like(model.mu), np.zeros_like(model.bulk), np.zeros((corners * elements, 3))

@@ -6,8 +6,12 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import numpy as np
+
 from core.errors import SetupError
-from core.frames import Transform
+from core.frames import FloatArray, Transform
+from core.mesh import GridSpec, box_mesh
+from core.shape.body import Shape
 
 __all__ = [
     "Box",
@@ -21,10 +25,12 @@ __all__ = [
     "MaterialLaw",
     "Sensor",
     "Setup",
+    "Shape",
     "Support",
     "Tool",
 ]
 
+_SAMPLING = GridSpec(nodes=(35, 21, 19))
 MaterialLaw = Literal["neo_hooke", "corotational"]
 Edge = Literal["-x", "+x", "-y", "+y"]
 
@@ -44,6 +50,34 @@ class Box:
     def __post_init__(self) -> None:
         for axis, length in zip("xyz", self.size, strict=True):
             _within(f"size {axis}", length, 1e-3, 2.0, "m")
+
+    @property
+    def low(self) -> FloatArray:
+        """Lowest corner (3,) [m], phantom frame."""
+        return np.array([-self.size[0] / 2, -self.size[1] / 2, 0.0])
+
+    @property
+    def high(self) -> FloatArray:
+        """Highest corner (3,) [m]."""
+        return np.array([self.size[0] / 2, self.size[1] / 2, self.size[2]])
+
+    @property
+    def height(self) -> float:
+        """[m]."""
+        return self.size[2]
+
+    def nearest(self, points: FloatArray) -> FloatArray:
+        """Places of the block (m, 3) [m] nearest to points (m, 3) [m]: the points themselves within it."""
+        return np.clip(points, self.low, self.high)
+
+    def surface_points(self) -> FloatArray:
+        """Rest positions (m, 3) [m] spread evenly over the free surface."""
+        mesh = box_mesh(self.size, _SAMPLING)
+        return mesh.nodes[np.unique(mesh.free_surface)]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {"size": list(self.size)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,7 +224,7 @@ class Setup:
         phantom_from_robot, phantom_from_camera: the stated registrations.
     """
 
-    geometry: Box
+    geometry: Box | Shape
     tool: Tool
     material: Material = field(default_factory=Material)
     load: Load = field(default_factory=Load)
@@ -200,6 +234,34 @@ class Setup:
     landmarks: tuple[tuple[float, float, float], ...] = ()
     phantom_from_robot: Transform = field(default_factory=Transform)
     phantom_from_camera: Transform = field(default_factory=Transform)
+
+    def __post_init__(self) -> None:
+        if isinstance(self.geometry, Shape):
+            self._check_shape(self.geometry)
+
+    def _check_shape(self, shape: Shape) -> None:
+        """What is said of a block's flat sides makes no sense of every shape."""
+        if self.material.layer is not None:
+            raise SetupError(f"{shape.name}: a layer lies on the flat top of a block; leave it out for other shapes", key="layer")
+        if self.support.detached and not shape.flat_base:
+            raise SetupError(
+                f"{shape.name}: only a base that lies in z = 0 can be detached; what is held here reaches from "
+                f"{shape.corners[shape.held][..., 2].min():.4g} to {shape.corners[shape.held][..., 2].max():.4g} m", key="detached",
+            )  # fmt: skip
+
+    @property
+    def box(self) -> Box:
+        """The geometry of a block; SetupError for other shapes."""
+        if isinstance(self.geometry, Shape):
+            raise SetupError(f"{self.geometry.name}: this works for a block only, not for other shapes yet", key="geometry")
+        return self.geometry
+
+    @property
+    def shape(self) -> Shape:
+        """The geometry of a body that is no block; SetupError for a block."""
+        if isinstance(self.geometry, Box):
+            raise SetupError("tetrahedra fill closed surfaces; mesh a block with a grid of hexahedra", key="geometry")
+        return self.geometry
 
     @property
     def remembers(self) -> bool:
@@ -214,7 +276,7 @@ class Setup:
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON, SI units."""
         return {
-            "geometry": {"size": list(self.geometry.size)},
+            "geometry": self.geometry.as_dict(),
             "material": {
                 "law": self.material.law,
                 "young_modulus": self.material.young_modulus,

@@ -89,8 +89,9 @@ def replay(
         centres = setup.phantom_from_robot.apply(kinematics.position_at(times))
         frames = simulation.replay(setup, centres, spec, report=part(report, 0.1, 0.8))
         misses = mesh_errors(setup, frames, spec, report=part(report, 0.8, 1.0))
-    used, quads = np.unique(frames[0].mesh.free_surface, return_inverse=True)
-    rest = frames[0].mesh.nodes[used]
+    mesh = spec.mesh(setup, centres[0])
+    used, quads = np.unique(mesh.free_surface, return_inverse=True)
+    rest = mesh.nodes[used]
     _save(
         file, time=times, tool=centres, rest=rest, faces=quads.reshape(-1, 4),
         vertices=np.stack([frame.move(rest) for frame in frames]), force=np.stack([frame.force for frame in frames]),

@@ -98,7 +98,7 @@ def frame_of(model: BlockModel, device: torch.device) -> Frame:
     top = model.topology
     face, free = top.element.face, top.free.all(axis=1, keepdims=True).astype(float)
     elements, surface, shapes, gradients, loose = (
-        torch.as_tensor(array, device=device) for array in (top.hexahedra, top.surface, face.shapes, face.gradients, free)
+        torch.as_tensor(array, device=device) for array in (top.elements, top.surface, face.shapes, face.gradients, free)
     )
     return Frame(elements, loose, Skin(surface, shapes, gradients), Layout(top, model.mesh.nodes, device))
 

@@ -11,8 +11,9 @@ from core.fem.model import BlockModel, Probe
 from core.fem.newton import Outcome, Solution
 from core.fem.path import DEEPEST, FREE_STEP
 from core.frames import FloatArray
-from core.mesh import BoxMesh, GridSpec
-from core.replay import Replay, _away, _focus, _focused_mesh
+from core.mesh import GridSpec
+from core.meshing import Mesh
+from core.replay import Replay, _away
 from core.setup import Setup
 
 __all__ = ["Begin", "Member"]
@@ -44,8 +45,8 @@ class Member(Replay):
 
     def sag(self) -> Begin:
         """The solve without the tool."""
-        size = self.setup.geometry.size
-        model = self.model(_focused_mesh(self.setup, self.grid, np.array([0.0, 0.0, size[2]])))
+        size = self.setup.box.size
+        model = self.model(self.grid.mesh(self.setup, np.array([0.0, 0.0, size[2]])))
         away = Probe(np.array([0.0, 0.0, 10.0]), self.setup.tool.radius)
         return Begin(model, model.mesh.nodes, model.mesh.nodes, away, away)
 
@@ -59,14 +60,14 @@ class Member(Replay):
         probe = Probe(centre + self._offset, self.setup.tool.radius)
         if _away(self.setup, probe):
             return None
-        mesh, start = _focused_mesh(self.setup, self.grid, probe.centre), self._previous or self.free
+        mesh, start = self.grid.mesh(self.setup, probe.centre), self._previous or self.free
         model = self.model(mesh)
         model.harden(1.0)
-        carried = _focus(mesh) - _focus(start.mesh) if start.in_contact else np.zeros(3)
+        carried = mesh.focus - start.mesh.focus if start.in_contact else np.zeros(3)
         displacement = start.displacement
         if start.mesh is not mesh:
             displacement = start.mesh.interpolate(start.displacement, mesh.nodes - carried)
-            displacement[mesh.base_nodes] = 0.0
+            displacement[mesh.connectivity.base_nodes] = 0.0
         before = Probe(start.probe.centre + carried, start.probe.radius)
         if not start.in_contact:
             before = self._first_touch(before, probe)
@@ -79,7 +80,7 @@ class Member(Replay):
         found = self.frames[-1:]
         return found[0] if found and found[0].outcome is Outcome.CONVERGED else None
 
-    def _further(self, start: Equilibrium, mesh: BoxMesh, probe: Probe) -> FloatArray:
+    def _further(self, start: Equilibrium, mesh: Mesh, probe: Probe) -> FloatArray:
         """How far (n, 3) [m] the block goes on if it keeps moving with the tool as between the last two frames."""
         if len(self.frames) < 2 or start is not self.frames[-1]:
             return np.zeros_like(start.displacement)

@@ -41,7 +41,7 @@ class Layout:
     """
 
     def __init__(self, top: Topology, places: FloatArray, device: torch.device) -> None:
-        slab = _slabs(top.hexahedra, np.flatnonzero(~top.free.all(axis=1)), places)
+        slab = _slabs(top.elements, np.flatnonzero(~top.free.all(axis=1)), places)
         counts = np.bincount(slab[slab >= 0])
         self.slabs, self.width = len(counts), 3 * int(counts.max())
         self.entries = (2 * self.slabs - 1) * self.width**2
@@ -55,7 +55,7 @@ class Layout:
         filler = np.flatnonzero(where == len(self._slab))
         fillers = filler // self.width * self.width**2 + filler % self.width * (self.width + 1)
         diagonal = self._slab[unknown] * self.width**2 + self._rank[unknown] * (self.width + 1)
-        elements, faces = self._entries(top.hexahedra), self._entries(top.surface)
+        elements, faces = self._entries(top.elements), self._entries(top.surface)
         self.places, self.fillers, self.diagonal, self.elements, self.faces = (
             torch.as_tensor(array, device=device) for array in (where, fillers, diagonal, elements, faces)
         )

@@ -54,7 +54,7 @@ class Bench:
         self.names, self._report, self._done = tuple(names), report, 0.0
         self.grid, self.fine = grid, fine
         self.nuisances = Nuisances.of(registration)
-        self.surface = Surface(setup.geometry)
+        self.surface = Surface(setup.box)
         self.temperature = 1.0
         self.noises: list[Noise] = []
         self.evaluations = 0

@@ -118,7 +118,7 @@ def _rms(sums: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _paper(data: Sequence[Observations], predictions: Sequence[Prediction], setup: Setup) -> float:
     """The paper's metric [m], mean over touched groups."""
-    surface, pose, found = Surface(setup.geometry), setup.phantom_from_camera_true, []
+    surface, pose, found = Surface(setup.box), setup.phantom_from_camera_true, []
     for item, prediction in zip(data, predictions, strict=True):
         for number, group in enumerate(item.groups):
             if not group.free and number not in prediction.failed:

@@ -98,7 +98,7 @@ class Observations:
         """
         times = np.arange(self.times[0], self.times[-1], _TURN_STEP)
         way = setup.phantom_from_robot.apply(smooth_centres(self.kinematics, times - setup.sensor.time_offset))
-        depths = _depth(setup.geometry.size, way)
+        depths = _depth(setup.box.size, way)
         found: list[FloatArray | None] = []
         last = np.inf
         for group, centre in zip(self.groups, self.centres(setup), strict=True):
@@ -106,7 +106,7 @@ class Observations:
             between = np.flatnonzero((times > last) & (times <= now))
             last = now
             deepest = between[np.argmax(depths[between])] if len(between) else None
-            deeper = deepest is not None and depths[deepest] > _depth(setup.geometry.size, centre[None])[0] + _TURN
+            deeper = deepest is not None and depths[deepest] > _depth(setup.box.size, centre[None])[0] + _TURN
             found.append(way[deepest] if deeper else None)
         return found
 
@@ -143,7 +143,7 @@ def observe(
     """
     kinematics, times = sequence.kinematics, np.asarray(sequence.cloud_times)
     centres = setup.phantom_from_robot.apply(smooth_centres(kinematics, times))
-    free = clear_of(setup.geometry.size, centres) > setup.tool.radius + CLEARANCE
+    free = clear_of(setup.box.size, centres) > setup.tool.radius + CLEARANCE
     poses = tool_poses(kinematics, times, setup.phantom_from_robot, shaft)
     groups = [Group((), rest[cleaner.clean(rest).indices], True, True)] if rest is not None else []
     probes = np.cumsum(np.diff(free.astype(int), prepend=1) < 0)

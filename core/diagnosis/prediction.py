@@ -162,7 +162,7 @@ def predict(
         starts: equilibria of a similar setup, one per group, to begin from.
         wanted: changes to state; none without it. samples: which points to average; chosen anew without them.
     """
-    surface, block = Surface(setup.geometry), Replay(setup, grid, tolerance)
+    surface, block = Surface(setup.box), Replay(setup, grid, tolerance)
     true_from_stated = touch_correction(setup, grid)
     centres = true_from_stated.apply(data.centres(setup))
     moves = np.zeros((len(wanted.setups) if wanted else 0, len(data.groups), 3))

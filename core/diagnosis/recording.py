@@ -65,7 +65,7 @@ def _rms(errors: FloatArray) -> float:
 
 
 def _side(setup: Setup, frames: list[Equilibrium], clouds: list[FloatArray]) -> Recorded:
-    surface, pose = Surface(setup.geometry, spacing=VERTEX_SPACING), setup.phantom_from_camera_true
+    surface, pose = Surface(setup.box, spacing=VERTEX_SPACING), setup.phantom_from_camera_true
     moved, errors, distance, paper = [], [], [], []
     for frame, cloud in zip(frames, clouds, strict=True):
         points = pose.apply(cloud)
@@ -103,7 +103,7 @@ def record(
         frames = replay(setup, centres, grid, starts=frames or None, tolerance=1e-3)
         sides.append(_side(setup, frames, clouds))
     before, after = sides
-    surface = Surface(stated.geometry, spacing=VERTEX_SPACING)
+    surface = Surface(stated.box, spacing=VERTEX_SPACING)
     floor = after.distance[after.free] if after.free.any() else after.distance
     np.savez_compressed(
         target, time=times, cloud_index=index, faces=surface.faces, rest=surface.vertices.astype(np.float32),

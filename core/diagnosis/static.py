@@ -56,7 +56,7 @@ class StaticChannel:
         """From the raw rest cloud (n, 3) [m], camera frame, under the stated setup."""
         clean = cleaner.clean(cloud)
         places, height, scatter = _table_cells(clean.table_points)
-        surface, pose = Surface(setup.geometry), setup.phantom_from_camera
+        surface, pose = Surface(setup.box), setup.phantom_from_camera
         seen = gaps(pose.apply(cloud[clean.indices]), pose.translation, rest(setup, grid), surface)
         means = patch_means(seen.gap, seen.patch, surface.patches, least=_LEAST_POINTS)
         used = np.flatnonzero(np.isfinite(means.mean) & (means.count >= _LEAST_POINTS))
@@ -65,7 +65,7 @@ class StaticChannel:
         residual = np.concatenate([means.mean[used], height])
         places = np.concatenate([centres, places])
         directions = np.concatenate([normals, np.tile([0.0, 0.0, 1.0], (len(height), 1))])
-        pivot = np.array([0.0, 0.0, setup.geometry.size[2]])
+        pivot = np.array([0.0, 0.0, setup.box.size[2]])
         moved = np.einsum("ni,nij->nj", directions, motion_jacobian(places, pivot))
         free = np.column_stack([moved, _bulges(places[: len(used)], normals, len(residual))])
         covariance, bias, reach = _camera_errors(places, white, residual, free)

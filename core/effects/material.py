@@ -51,7 +51,7 @@ class StiffInclusion(Effect):
     @classmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:
         """Places all over the block; which of them deserve a solve is decided from element sensitivities."""
-        x, y, z = setup.geometry.size
+        x, y, z = setup.box.size
         return [
             cls(x=(i - 0.5 * 6) / 7 * x, y=(j - 1) / 3 * y, z=height * z, radius=7e-3, stiffness_ratio=ratio)
             for i in range(7)

@@ -125,13 +125,13 @@ def assemble_contact(
 
 @njit(cache=True)
 def turns_around(faces: Any, positions: Any, point: Any) -> float:
-    """How often quadrilaterals (f, 4) wind around a point (3,): over a closed surface 1 inside and 0 outside.
+    """How often flat polygons (f, 3) or (f, 4) wind around a point (3,): over a closed surface 1 inside and 0 outside.
 
     Sum of the triangles' solid angles (van Oosterom and Strackee 1983) over that of the sphere.
     """
     total, arms, lengths = 0.0, np.empty((3, 3)), np.empty(3)
     for f in range(faces.shape[0]):
-        for second in (1, 2):
+        for second in range(1, faces.shape[1] - 1):
             for corner, a in enumerate((0, second, second + 1)):
                 for i in range(3):
                     arms[corner, i] = positions[faces[f, a], i] - point[i]

@@ -8,12 +8,18 @@ with (Q2/P1 and P2/P0: Sussman and Bathe 1987; Boffi, Brezzi and Fortin 2013, ch
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 
 from core.frames import FloatArray
 
-__all__ = ["HEX8", "HEX27", "HEXAHEDRA", "Element", "Face", "Quadrature", "face_weights", "quadrature"]
+__all__ = [
+    "EDGES", "HEX8", "HEX27", "HEXAHEDRA", "TET10", "Element", "Face", "Quadrature", "face_weights", "quadrature", "shapes_of",
+]  # fmt: skip
+
+EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
+"""Corners of a tetrahedron between which its nodes 4 to 9 lie; the first three are those of a triangle, for its nodes 3 to 5."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +36,8 @@ class Element:
     """A reference element.
 
     Attributes:
-        shapes, gradients: (q, a) and (q, a, 3), of the shape functions at the quadrature points; local node numbers grow along x,
-            then y, then z. weights: (q,).
+        shapes, gradients: (q, a) and (q, a, 3), of the shape functions at the quadrature points; a hexahedron's local node
+            numbers grow along x, then y, then z, a tetrahedron's corners come before the middles of its EDGES. weights: (q,).
         pressures: (q, m) polynomials.
         face: its side.
     """
@@ -100,6 +106,44 @@ HEX8 = _hexahedron(1, 2, False, _square(1, 3))
 HEX27 = _hexahedron(2, 3, True, _square(2, 4))
 HEXAHEDRA = {1: HEX8, 2: HEX27}
 """By the order of the shape functions."""
+
+
+def shapes_of(shares: FloatArray) -> FloatArray:
+    """Shape functions (p, 6) of a triangle or (p, 10) of a tetrahedron at barycentric coordinates (p, 3) or (p, 4)."""
+    edges = EDGES[: 3 if shares.shape[1] == 3 else 6]
+    return np.concatenate([shares * (2 * shares - 1), *(4 * shares[:, [a]] * shares[:, [b]] for a, b in edges)], axis=1)
+
+
+def _quadratic_gradients(shares: FloatArray) -> FloatArray:
+    """Their gradients (p, a, d) by the barycentric coordinates after the first, on which the reference element is drawn."""
+    count = shares.shape[1]
+    slopes = np.concatenate([-np.ones((1, count - 1)), np.eye(count - 1)])
+    corners = (4 * shares - 1)[:, :, None] * slopes
+    edges = EDGES[: 3 if count == 3 else 6]
+    middles = [4 * (shares[:, a, None] * slopes[b] + shares[:, b, None] * slopes[a]) for a, b in edges]
+    return np.ascontiguousarray(np.concatenate([corners, np.stack(middles, axis=1)], axis=1))
+
+
+def _triangle() -> Face:
+    """Side of a quadratic tetrahedron: Dunavant's (1985) twelve points, exact to degree six."""
+    orbits = {
+        (0.501426509658179, 0.249286745170910, 0.249286745170910): 0.116786275726379,
+        (0.873821971016996, 0.063089014491502, 0.063089014491502): 0.050844906370207,
+        (0.053145049844817, 0.310352451033784, 0.636502499121399): 0.082851075618374,
+    }
+    points = [(point, weight) for orbit, weight in orbits.items() for point in sorted(set(permutations(orbit)))]
+    shares, weights = np.array([point for point, _ in points]), np.array([weight for _, weight in points])
+    return Face(shapes_of(shares), _quadratic_gradients(shares), weights / 2)
+
+
+def _tetrahedron(face: Face) -> Element:
+    """Four points, exact to degree two: all that elements with straight edges need at small strain."""
+    far = (5 + 3 * np.sqrt(5)) / 20
+    shares = np.full((4, 4), (1 - far) / 3) + (far - (1 - far) / 3) * np.eye(4)
+    return Element(shapes_of(shares), _quadratic_gradients(shares), np.full(4, 1 / 24), np.ones((4, 1)), face)
+
+
+TET10 = _tetrahedron(_triangle())
 
 
 def quadrature(element: Element, corners: FloatArray) -> Quadrature:

@@ -13,13 +13,13 @@ import numpy as np
 
 from core.fem.contact import assemble_contact, contact_energy, turns_around
 from core.fem.elastic import Law, assemble_elastic, elastic_energy, lame
-from core.fem.elements import HEXAHEDRA, Quadrature, face_weights, quadrature
+from core.fem.elements import Quadrature, face_weights, quadrature
 from core.fem.friction import Grip
 from core.fem.linear import face_slots, factor_of, upper_pattern
 from core.fem.stiffness import SurfaceSpots, log_stiffness, surface_stiffness
 from core.frames import FloatArray
-from core.mesh import BoxMesh, GridSpec, IntArray, box_mesh
-from core.setup import Detachment, Setup, Support
+from core.meshing import Connectivity, IntArray, Mesh
+from core.setup import Box, Detachment, Setup, Shape, Support
 
 __all__ = ["CONTACT_STIFFNESS", "Assembly", "BlockModel", "Probe", "Topology", "rule_of", "surface_spots", "topology"]
 
@@ -65,21 +65,18 @@ class Assembly:
 
 
 class Topology:
-    """What grids of one shape share whatever their coordinates: numbering, matrix pattern, symbolic factorisation."""
+    """What meshes of one connectivity share wherever their nodes lie: numbering, matrix pattern, symbolic factorisation."""
 
-    def __init__(self, nodes: tuple[int, int, int], order: int, held: bool) -> None:
-        mesh = box_mesh((1.0, 1.0, 1.0), GridSpec(nodes=nodes, order=order))
-        self.element = HEXAHEDRA[order]
-        self.hexahedra = np.ascontiguousarray(mesh.hexahedra)
-        self.surface = np.concatenate([mesh.element_sides[side] for side in ("+z", "-y", "+y", "-x", "+x")])
-        self.base = np.ascontiguousarray(mesh.element_sides["-z"])
-        self.hull = np.concatenate(list(mesh.faces.values()))
-        free = np.ones((len(mesh.nodes), 3), dtype=bool)
+    def __init__(self, connectivity: Connectivity, held: bool) -> None:
+        self.element = connectivity.element
+        self.elements = connectivity.elements
+        self.surface, self.base, self.hull = connectivity.surface, connectivity.base, connectivity.hull
+        free = np.ones((connectivity.count, 3), dtype=bool)
         if held:
-            free[mesh.base_nodes] = False
+            free[connectivity.base_nodes] = False
         self.free = free
         self.unknown = np.where(free, np.cumsum(free).reshape(free.shape) - 1, -1)
-        pattern, self.slots = upper_pattern(self.hexahedra, self.unknown)
+        pattern, self.slots = upper_pattern(self.elements, self.unknown)
         self.surface_slots = face_slots(pattern, self.surface, self.unknown)
         self.base_slots = face_slots(pattern, self.base, self.unknown)
         self.pattern = pattern
@@ -89,17 +86,17 @@ class Topology:
 
 
 @lru_cache(maxsize=8)
-def topology(nodes: tuple[int, int, int], order: int, held: bool) -> Topology:
-    """The shared part of all grids with these numbers of nodes; `held` leaves the base nodes out of the unknowns."""
-    return Topology(nodes, order, held)
+def topology(connectivity: Connectivity, held: bool) -> Topology:
+    """The shared part of all meshes with this connectivity; `held` leaves the base nodes out of the unknowns."""
+    return Topology(connectivity, held)
 
 
-def _held_share(detached: tuple[Detachment, ...], size: tuple[float, float, float], points: FloatArray) -> FloatArray:
+def _held_share(detached: tuple[Detachment, ...], body: Box | Shape, points: FloatArray) -> FloatArray:
     """Share of the bond (0 to 1) left at base points (..., 3) [m]."""
     held = np.ones(points.shape[:-1])
     for strip in detached:
         axis, sign = "xy".index(strip.edge[1]), -1 if strip.edge[0] == "-" else 1
-        inwards = size[axis] / 2 - sign * points[..., axis]
+        inwards = sign * ((body.low if sign < 0 else body.high)[axis] - points[..., axis])
         held *= 0.5 * (1 + np.tanh((inwards - strip.extent) / _BOND_EDGE))
     return held
 
@@ -110,17 +107,17 @@ def _sprung(support: Support) -> bool:
 
 
 @lru_cache(maxsize=32)
-def rule_of(mesh: BoxMesh) -> tuple[Quadrature, FloatArray]:
+def rule_of(mesh: Mesh) -> tuple[Quadrature, FloatArray]:
     """Quadrature of the elements, and areas on the free surface (f, p) [m^2]: the mesh's alone."""
-    shared = topology(mesh.shape, mesh.order, True)
+    shared = mesh.connectivity
     areas = face_weights(shared.element.face, mesh.nodes[shared.surface])
-    return quadrature(shared.element, mesh.nodes[shared.hexahedra]), areas
+    return quadrature(shared.element, mesh.nodes[shared.elements]), areas
 
 
 @lru_cache(maxsize=32)
-def surface_spots(mesh: BoxMesh) -> SurfaceSpots:
+def surface_spots(mesh: Mesh) -> SurfaceSpots:
     """The free surface's quadrature points."""
-    shared = topology(mesh.shape, mesh.order, True)
+    shared = mesh.connectivity
     places = np.einsum("qa,fai->fqi", shared.element.face.shapes, mesh.nodes[shared.surface])
     return SurfaceSpots(places, np.sqrt(rule_of(mesh)[1]))
 
@@ -134,12 +131,12 @@ class BlockModel:
             contact goes. hardness: of the contact, one unless `harden` was called [1].
     """
 
-    def __init__(self, setup: Setup, mesh: BoxMesh) -> None:
+    def __init__(self, setup: Setup, mesh: Mesh) -> None:
         self.mesh, self.setup = mesh, setup
-        self.topology = topology(mesh.shape, mesh.order, held=not _sprung(setup.support))
+        self.topology = topology(mesh.connectivity, held=not _sprung(setup.support))
         self.law, self.face = Law.of(setup.material), self.topology.element.face
         self.rule, areas = rule_of(mesh)
-        height = setup.geometry.size[2]
+        height = setup.geometry.height
         self.areas, self.hardness = areas * surface_stiffness(setup.material, surface_spots(mesh), height), 1.0
         mu, bulk = lame(self.law, setup.material.poisson_ratio)
         factor = np.exp(log_stiffness(setup.material, self.rule, height))
@@ -161,7 +158,7 @@ class BlockModel:
         share = np.zeros(len(self.mesh.nodes))
         if not specific:
             return share
-        np.add.at(share, self.topology.hexahedra, self.rule.weights @ self.topology.element.shapes)
+        np.add.at(share, self.topology.elements, self.rule.weights @ self.topology.element.shapes)
         return specific * share
 
     def _prepare_base(self, setup: Setup) -> None:
@@ -172,19 +169,19 @@ class BlockModel:
         areas, shapes = face_weights(self.face, corners), self.face.shapes
         points = np.einsum("qa,fai->fqi", shapes, corners)
         self.base_areas = areas
-        held = areas * _held_share(setup.support.detached, setup.geometry.size, points)
+        held = areas * _held_share(setup.support.detached, setup.geometry, points)
         softness = 1 / BOND_STIFFNESS + (1 / setup.support.stiffness_over_E if setup.support.stiffness_over_E else 0.0)
         self.bond = 1 / softness * np.einsum("fq,qa,qb->fab", held, shapes, shapes)
 
     def _bond_gradient(self, positions: FloatArray) -> FloatArray:
-        """Gradient of the bond's energy at the base faces' nodes (f, 4, 3) [m^2]."""
+        """Gradient of the bond's energy at the base faces' nodes (f, b, 3) [m^2]."""
         moved = (positions - self.mesh.nodes)[self.topology.base]
         return np.asarray(np.einsum("fab,fbi->fai", self.bond, moved))
 
     def energy(self, positions: FloatArray, probe: Probe | None) -> float:
         """Total potential over E [m^3]; infinite when an element is inverted."""
         top = self.topology
-        total = elastic_energy(self.law, self.rule, top.hexahedra, self.mu, self.bulk, positions)
+        total = elastic_energy(self.law, self.rule, top.elements, self.mu, self.bulk, positions)
         if not np.isfinite(total):
             return np.inf
         total += float(self.weight_force @ (positions[:, 2] - self.mesh.nodes[:, 2]))
@@ -227,7 +224,7 @@ class BlockModel:
         force = np.zeros_like(positions)
         data = np.zeros(top.pattern.nnz) if tangent else _EMPTY
         push, penetration = np.zeros(3), 0.0
-        assemble_elastic(self.law, self.rule, top.hexahedra, self.mu, self.bulk, positions, top.slots, force, data)
+        assemble_elastic(self.law, self.rule, top.elements, self.mu, self.bulk, positions, top.slots, force, data)
         force[:, 2] += self.weight_force
         if probe is not None:
             penetration = assemble_contact(

@@ -87,12 +87,12 @@ def test_point_forces_are_gradients_of_each_points_energy(pushed):
         only = slice(element, element + 1)
         rule = Quadrature(*(getattr(model.rule, part.name)[only] for part in fields(Quadrature)))
         alone = np.arange(model.mu.shape[1]) == point
-        nodes, mu, bulk = model.topology.hexahedra[only], model.mu[only] * alone, model.bulk[only] * alone
+        nodes, mu, bulk = model.topology.elements[only], model.mu[only] * alone, model.bulk[only] * alone
         energy = partial(elastic_energy, model.law, rule, nodes, mu, bulk)
 
         for corner, axis in ((0, 2), (5, 0), (7, 1)):
             step = np.zeros_like(positions)
-            step[model.topology.hexahedra[element, corner], axis] = 1e-7
+            step[model.topology.elements[element, corner], axis] = 1e-7
             wanted = (energy(positions + step) - energy(positions - step)) / 2e-7
             assert forces[element, point, corner, axis] == pytest.approx(wanted, rel=1e-3, abs=1e-5 * np.abs(forces).max())
 
@@ -103,7 +103,7 @@ def test_point_forces_add_up_to_the_residual_and_balance(pushed):
     positions = frame.mesh.nodes + frame.displacement
     forces = point_forces(model, positions)
     total = np.zeros_like(positions)
-    np.add.at(total, model.topology.hexahedra, forces.sum(axis=1))
+    np.add.at(total, model.topology.elements, forces.sum(axis=1))
     assert np.allclose(total[model.topology.free], model.assemble(positions, None).residual, atol=1e-16)
     assert np.abs(forces.sum(axis=2)).max() < 1e-9 * np.abs(forces).max()
 

@@ -1,0 +1,1 @@
+"""Bodies that are no block: closed surfaces, checked, filled with tetrahedra."""
