@@ -22,7 +22,7 @@ def run() -> list[Table]:
     x, y, z = SETUP.geometry.size
     centres = np.array([[0.0, 0.0, z + 5e-3 - depth] for depth in (2e-3, 4e-3)])
     frame = replay(SETUP, centres, GridSpec(nodes=(11, 9, 7), spacing=1.5e-3))[-1]
-    surface, camera, rng = Surface(SETUP.geometry), np.array([0.02, -0.05, 0.35]), np.random.default_rng(0)
+    surface, camera, rng = Surface(SETUP.box), np.array([0.02, -0.05, 0.35]), np.random.default_rng(0)
     rest = rng.uniform([-x / 2, -y / 2, z], [x / 2, y / 2, z], (POINTS, 3))
     points = frame.move(rest) + np.array([0.0, 0.0, OFFSET])
     rays = points - camera

@@ -91,7 +91,7 @@ KINDS: dict[str, Callable[[float, list[FloatArray]], Pieces]] = {
 
 def _error(pieces: Pieces, clouds: list[list[FloatArray]]) -> float:
     """Mean distance [m] over the frames that have an equilibrium."""
-    surface = Surface(SETUP.geometry)
+    surface = Surface(SETUP.box)
     pairs = [pair for frames, seen in zip(pieces, clouds, strict=True) for pair in zip(frames, seen, strict=True)]
     return float(np.mean([paper_distance(cloud, frame, surface) for frame, cloud in pairs if frame.outcome is Outcome.CONVERGED]))
 

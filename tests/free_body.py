@@ -1,4 +1,4 @@
-"""A body of hexahedra whose supports the test chooses, built from the same assembly as the replay's blocks."""
+"""A body whose supports the test chooses, built from the same assembly as the replay's blocks."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from itertools import pairwise
 import numpy as np
 
 from core.fem.elastic import Law, assemble_elastic, elastic_energy, lame
-from core.fem.elements import HEXAHEDRA, Quadrature, quadrature
+from core.fem.elements import Quadrature, quadrature
 from core.fem.linear import factor_of, upper_pattern
 from core.frames import FloatArray
-from core.mesh import BoxMesh, GridSpec, IntArray, box_mesh
+from core.mesh import BoxMesh, GridSpec, box_mesh
+from core.meshing import IntArray, Mesh
 
 __all__ = ["FreeBody", "distorted", "grid", "stretched_bar"]
 
@@ -42,7 +43,7 @@ class FreeBody:
         log_stiffness: its logarithm over the stated one at the quadrature points (e, q).
     """
 
-    mesh: BoxMesh
+    mesh: Mesh
     nodes: FloatArray
     law: Law
     poisson_ratio: float
@@ -52,14 +53,14 @@ class FreeBody:
     @cached_property
     def _parts(self) -> tuple[Quadrature, IntArray, FloatArray, FloatArray]:
         mu, bulk = lame(self.law, self.poisson_ratio)
-        rule = quadrature(HEXAHEDRA[self.mesh.order], self.nodes[self.mesh.hexahedra])
+        rule = quadrature(self.mesh.connectivity.element, self.nodes[self.mesh.connectivity.elements])
         factor = np.exp(np.zeros(rule.weights.shape) if self.log_stiffness is None else self.log_stiffness(rule))
-        return rule, np.ascontiguousarray(self.mesh.hexahedra), mu * factor, bulk * factor
+        return rule, self.mesh.connectivity.elements, mu * factor, bulk * factor
 
     @cached_property
     def _system(self):
         unknown = np.where(self.held, -1, np.cumsum(~self.held).reshape(self.held.shape) - 1)
-        pattern, slots = upper_pattern(self.mesh.hexahedra, unknown)
+        pattern, slots = upper_pattern(self.mesh.connectivity.elements, unknown)
         return pattern, slots, factor_of(pattern)
 
     def energy(self, positions: FloatArray) -> float:

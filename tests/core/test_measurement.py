@@ -12,7 +12,7 @@ from core.setup import Box, Setup, Tool
 SIZE = (0.0687, 0.0393, 0.0358)
 TOP = SIZE[2]
 SETUP = Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3))
-SURFACE = Surface(SETUP.geometry)
+SURFACE = Surface(SETUP.box)
 CAMERA = np.array([-0.19, -0.16, 0.28])
 
 

@@ -9,7 +9,7 @@ from core.mesh import GridSpec, box_mesh
 from core.metrics import PAPER_GRID, paper_distance, supersampled
 from core.replay import Equilibrium, replay, rest
 
-SURFACE = Surface(SETUP.geometry)
+SURFACE = Surface(SETUP.box)
 
 
 @pytest.fixture(scope="module")

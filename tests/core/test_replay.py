@@ -234,7 +234,7 @@ def test_lifted_base_never_goes_below_the_table_and_lifts_more_the_wider_the_str
     lifts, shapes = [], []
     for extent in (0.0, 0.01, 0.02, 0.03):
         frame = _detached(extent, centres)
-        base = frame.displacement[frame.mesh.base_nodes]
+        base = frame.displacement[frame.mesh.connectivity.base_nodes]
         assert base[:, 2].min() > -2e-5
         lifts.append(base[:, 2].max())
         shapes.append(_top(frame))

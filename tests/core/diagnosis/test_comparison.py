@@ -10,7 +10,7 @@ from core.measurement import Surface
 from core.replay import rest
 from core.setup import Setup
 
-SURFACE, BLOCK = Surface(SETUP.geometry), rest(SETUP, GRID)
+SURFACE, BLOCK = Surface(SETUP.box), rest(SETUP, GRID)
 SHIFT = np.array([5e-3, 1e-3, 0.0])
 MOVED = CameraRegistration(tx=5e-3, ty=1e-3, tz=0.0, rx=0.0, ry=0.0, rz=0.0).apply(SETUP)
 

@@ -174,5 +174,5 @@ def test_sequences_without_any_touch_are_refused():
 
 def test_papers_metric_is_the_mean_over_touched_groups():
     found = _ladder([0, 1, 2], [FLOOR, 2e-3, 3e-3], [FLOOR, 2e-3, 3e-3])
-    wanted = paper_distance(POSE.apply(CLOUD), rest(SETUP, GridSpec()), Surface(SETUP.geometry))
+    wanted = paper_distance(POSE.apply(CLOUD), rest(SETUP, GridSpec()), Surface(SETUP.box))
     assert found.paper == pytest.approx((wanted, wanted))

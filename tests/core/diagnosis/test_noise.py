@@ -102,7 +102,7 @@ def test_model_without_any_equilibrium_neither_gains_nor_loses():
 
 
 def test_noise_states_the_engines_accuracy_at_every_touched_patch():
-    surface = Surface(SETUP.geometry)
+    surface = Surface(SETUP.box)
     centres = np.array([poke(-6e-3), poke(3e-3)])
     frames = tuple(replay(SETUP, centres, GRID))
     random = np.random.default_rng(3)
@@ -122,7 +122,7 @@ def test_noise_states_the_engines_accuracy_at_every_touched_patch():
 
 
 def test_group_without_equilibrium_in_the_baseline_has_no_weight():
-    surface = Surface(SETUP.geometry)
+    surface = Surface(SETUP.box)
     gap, columns = np.full((3, surface.patches), 1e-4), np.zeros((3, surface.patches, 1))
     whole = prediction(gap, columns=columns)
     fine = prediction(gap, failed=(2,))
