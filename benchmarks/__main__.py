@@ -6,12 +6,13 @@ import sys
 
 from rich.console import Console
 
-from benchmarks import cleaning, convergence, dataset, effects, measurement, modulus, peers, replay, sweep
+from benchmarks import cleaning, convergence, dataset, effects, measurement, modulus, peers, replay, shapes, sweep
 
 ALL = {
     "replay": replay.run,
     "peers": peers.run,
     "convergence": convergence.run,
+    "shapes": shapes.run,
     "sweep": sweep.run,
     "effects": effects.run,
     "modulus": modulus.run,

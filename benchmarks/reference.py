@@ -14,13 +14,15 @@ import numpy as np
 
 from core.frames import FloatArray
 from core.mesh import GridSpec
+from core.meshing import Meshing
 from core.replay import Equilibrium, replay, require_converged
 from core.setup import Box, Setup, Tool
 
-__all__ = ["DEPTHS", "SETUP", "Pokes", "compared", "poke_frames", "reference", "top_points"]
+__all__ = ["DEPTHS", "SETUP", "Pokes", "compared", "poke_centres", "poke_frames", "reference", "top_points"]
 
 SETUP = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3), mass=0.104)
 DEPTHS = (4e-3, 8e-3)
+_WAY = np.arange(1, 9) * 1e-3
 FINEST = GridSpec(nodes=(33, 25, 17), spacing=0.6e-3, order=2)
 _FILE = Path(__file__).with_name("reference.npz")
 
@@ -38,18 +40,21 @@ class Pokes:
         return miss / np.linalg.norm(self.displacement, axis=(1, 2)), other.force / self.force - 1
 
 
-def poke_frames(grid: GridSpec) -> list[Equilibrium]:
+def poke_centres() -> FloatArray:
+    """Tool centres (8, 3) [m] from 1 to 8 mm deep."""
+    return np.array([[0.0, 0.0, SETUP.box.size[2] + SETUP.tool.radius - depth] for depth in _WAY])
+
+
+def poke_frames(grid: Meshing, setup: Setup = SETUP) -> list[Equilibrium]:
     """Equilibria at the two depths, led there in steps of 1 mm."""
-    depths = np.arange(1, 9) * 1e-3
-    top = SETUP.geometry.size[2] + SETUP.tool.radius
-    frames = replay(SETUP, np.array([[0.0, 0.0, top - depth] for depth in depths]), grid, tolerance=1e-5)
+    frames = replay(setup, poke_centres(), grid, tolerance=1e-5)
     require_converged(frames)
-    return [frames[int(np.argmin(np.abs(depths - depth)))] for depth in DEPTHS]
+    return [frames[int(np.argmin(np.abs(_WAY - depth)))] for depth in DEPTHS]
 
 
 def top_points() -> FloatArray:
     """Rest positions (m, 3) [m] of the points spread over the top, at which displacements are compared."""
-    x, y, z = SETUP.geometry.size
+    x, y, z = SETUP.box.size
     across = np.meshgrid(np.linspace(-x / 2, x / 2, 49), np.linspace(-y / 2, y / 2, 29), indexing="ij")
     return np.stack([across[0].ravel(), across[1].ravel(), np.full(across[0].size, z)], axis=1)
 

@@ -98,7 +98,7 @@ def test_force_is_the_gradient_of_the_energy(mesh, law):
 @pytest.mark.parametrize("poisson_ratio", [0.0, 0.49])
 def test_tangent_is_the_derivative_of_the_force(mesh, law, poisson_ratio):
     body, positions = _free(mesh, law, poisson_ratio), _bent(mesh, 5)
-    direction, step = np.random.default_rng(6).normal(0, 1, positions.shape), 3e-8
+    direction, step = np.asarray(np.random.default_rng(6).normal(0, 1, positions.shape)), 3e-8
     ahead, behind = (body.assemble(positions + sign * step * direction)[0] for sign in (1, -1))
     numeric = ((ahead - behind) / (2 * step)).ravel()
     assert np.abs(body.tangent(positions) @ direction.ravel() - numeric).max() < 2e-8 * np.abs(numeric).max()

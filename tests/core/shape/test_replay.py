@@ -98,7 +98,7 @@ def test_residual_is_the_gradient_of_the_whole_energy():
     model, probe = BlockModel(soft, mesh), Probe(centres[0], 5e-3)
     random = np.random.default_rng(0)
     positions = mesh.nodes + 1e-5 * random.normal(size=mesh.nodes.shape)
-    state, way = model.assemble(positions, probe), random.normal(size=mesh.nodes.shape)
+    state, way = model.assemble(positions, probe), np.asarray(random.normal(size=mesh.nodes.shape))
     slope = (model.energy(positions + 1e-9 * way, probe) - model.energy(positions - 1e-9 * way, probe)) / 2e-9
     assert state.penetration > 1e-4
     assert slope == pytest.approx(float(state.residual @ way[model.topology.free]), rel=1e-5)
@@ -113,7 +113,7 @@ def test_gradients_on_an_organ_are_those_of_finite_differences():
     wanted = moved.displacement - frame.displacement
     found = displacement_changes(block, frame, [(near, np.zeros(3))])[0]
     assert np.linalg.norm(found - wanted) < 0.01 * np.linalg.norm(wanted)
-    slope = np.random.default_rng(1).normal(size=frame.displacement.shape)
+    slope = np.asarray(np.random.default_rng(1).normal(size=frame.displacement.shape))
     (adjoint,) = loss_changes(block, frame, slope, [(near, np.zeros(3))])
     assert adjoint == pytest.approx(float(np.vdot(slope, found)), rel=1e-6)
 
