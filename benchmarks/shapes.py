@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from rich.table import Table
@@ -68,7 +69,7 @@ def run() -> list[Table]:
         if (displacement > case.top).any() or (np.abs(force) > case.force).any():
             found = ", ".join(f"{value:.1%}" for value in (*displacement, *force))
             raise RuntimeError(f"{case.name}: displacement at 4 and 8 mm and force are off by {found}")
-        followed, seconds = timed(lambda case=case: replay(case.setup, centres, case.mesh))
+        followed, seconds = timed(partial(replay, case.setup, centres, case.mesh))
         require_converged(followed)
         shared = frames[0].mesh.connectivity
         table.add_row(

@@ -1,7 +1,8 @@
 """Gmsh fills a closed surface with tetrahedra, small where the tool goes.
 
-Gmsh (Geuzaine and Remacle 2009) is under the GPL and stays optional: `pip install "palpate[shapes]"`. The surface's own triangles
-are only its geometry: they are joined to patches along sharp edges, and each patch is triangulated anew (Remacle et al. 2010).
+Gmsh (Geuzaine and Remacle 2009) is under the GPL and stays optional: `pip install "palpate[shapes]"`. The surface's triangles
+are only its geometry: they are joined to patches, between sharp edges and the border of what is held, and each patch is
+triangulated anew (Remacle et al. 2010).
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ __all__ = ["TetSpec", "fill"]
 
 _SHARP = np.radians(40.0)
 """Triangles that meet at a sharper angle than this keep an edge between them."""
-_TETRAHEDRA, _TRIANGLES = 4, 2
+_TETRAHEDRA, _TRIANGLES, _LINES = 4, 2, 1
 """Gmsh's numbers of element types."""
 _FRONTAL, _DELAUNAY = 6, 1
 """Gmsh's numbers of algorithms in the plane and in space."""
@@ -132,11 +133,20 @@ def _build(gmsh: Any, shape: Shape) -> None:
     gmsh.model.addDiscreteEntity(2, 1)
     gmsh.model.mesh.addNodes(2, 1, np.arange(1, len(shape.vertices) + 1), shape.vertices.ravel())
     gmsh.model.mesh.addElementsByType(1, _TRIANGLES, [], (shape.triangles + 1).ravel())
+    gmsh.model.addDiscreteEntity(1, 1)
+    gmsh.model.mesh.addElementsByType(1, _LINES, [], (_border(shape) + 1).ravel())
     gmsh.model.mesh.classifySurfaces(_SHARP, True, True, np.pi)
     gmsh.model.mesh.createGeometry()
     patches = [tag for _, tag in gmsh.model.getEntities(2)]
     gmsh.model.geo.addVolume([gmsh.model.geo.addSurfaceLoop(patches)])
     gmsh.model.geo.synchronize()
+
+
+def _border(shape: Shape) -> IntArray:
+    """Edges (k, 2) between what is held and what is not; Gmsh keeps lines that are there before it makes patches."""
+    edges = np.sort(np.concatenate([shape.triangles[:, [0, 1]], shape.triangles[:, [1, 2]], shape.triangles[:, [2, 0]]]), axis=1)
+    unique, number = np.unique(edges, axis=0, return_inverse=True)
+    return np.asarray(unique[np.bincount(number.ravel(), weights=np.tile(shape.held, 3)) == 1])
 
 
 def _size(gmsh: Any, places: FloatArray, spec: TetSpec) -> None:
@@ -173,7 +183,7 @@ def _checked(shape: Shape, spec: TetSpec, corners: FloatArray, tetrahedra: IntAr
     """The mesh, if it fills the surface; a side is held where the surface next to it is."""
     edges = corners[tetrahedra[:, 1:]] - corners[tetrahedra[:, :1]]
     volumes = np.linalg.det(edges) / 6
-    if not len(volumes) or volumes.min() <= 0 or abs(volumes.sum() / shape.volume - 1) > 0.1:
+    if not len(volumes) or volumes.min() <= 0 or abs(volumes.sum() / shape.volume - 1) > 0.05:
         raise MeshError(
             f"{shape.name}: the {len(volumes)} tetrahedra hold {1e6 * volumes.sum():.4g} cm3 of the surface's "
             f"{1e6 * shape.volume:.4g} cm3; use a smaller coarsest spacing than {spec.coarsest:g} m",

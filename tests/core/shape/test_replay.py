@@ -29,7 +29,7 @@ def _down(x: float, top: float, *depths: float) -> FloatArray:
 
 
 def _coarse(centres: FloatArray) -> TetSpec:
-    return TetSpec.along(centres, 5e-3, spacing=2.5e-3, coarsest=6e-3)
+    return TetSpec.along(centres, 5e-3, spacing=2.5e-3, coarsest=4e-3)
 
 
 def test_block_from_a_surface_moves_and_pushes_like_the_reference():
@@ -46,7 +46,7 @@ def test_block_from_a_surface_moves_and_pushes_like_the_reference():
 def test_nearly_incompressible_body_does_not_lock(poisson_ratio):
     """Halving the spacing must not soften a body by much: locked elements soften several times."""
     setup, centres = replace(DOME, material=Material(poisson_ratio=poisson_ratio)), _down(0.0, RADII[2], 1e-3, 2e-3)
-    specs = [TetSpec.along(centres, 5e-3, spacing=spacing, coarsest=6e-3) for spacing in (2.5e-3, 1.5e-3)]
+    specs = [TetSpec.along(centres, 5e-3, spacing=spacing, coarsest=4e-3) for spacing in (2.5e-3, 1.5e-3)]
     coarse, fine = (replay(setup, centres, spec)[-1] for spec in specs)
     assert coarse.force[2] == pytest.approx(fine.force[2], rel=0.06)
 
@@ -58,7 +58,7 @@ def test_organ_is_palpated_from_above_and_from_the_side():
     require_converged(frames)
     assert not frames[0].in_contact and not frames[0].displacement.any()
     assert frames[1].force[2] < frames[2].force[2] < frames[3].force[2]
-    assert np.linalg.norm(frames[3].force[:2]) < 0.02 * frames[3].force[2]  # pressed on an axis of symmetry
+    assert np.linalg.norm(frames[3].force[:2]) < 0.05 * frames[3].force[2]  # pressed on an axis of symmetry
     assert frames[-1].force[0] > 5 * abs(frames[-1].force[1])
     assert max(frame.penetration for frame in frames) < 4e-4
     tip = frames[3].move(np.array([[0.0, 0.0, RADII[2]]]))[0]
@@ -130,7 +130,7 @@ def test_organ_held_at_a_painted_side_sags_towards_the_other():
     held = replace(
         DOME, geometry=dome(RADII, Painted.of(whole.vertices[:, 0] < -0.015)), load=Load(specific_weight_over_stiffness=2.0)
     )
-    frame = Replay(held, TetSpec(path=(), radius=5e-3, spacing=5e-3, coarsest=5e-3)).free
+    frame = Replay(held, TetSpec(path=(), radius=5e-3, spacing=4e-3, coarsest=4e-3)).free
     assert not frame.displacement[frame.mesh.connectivity.base_nodes].any()
     ends = frame.move(np.array([[0.028, 0.0, 2e-3], [-0.028, 0.0, 2e-3]]))[:, 2] - 2e-3
     assert ends[0] < -1e-3 and abs(ends[1]) < 1e-4

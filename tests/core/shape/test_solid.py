@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 from shapes import box_surface, dome, filled_box
 
 from core.errors import MeshError, SetupError
@@ -18,6 +19,12 @@ from core.shape.fixed import Faces
 SIZE = (0.06, 0.04, 0.03)
 TOUCH = np.array([[0.01, 0.0, SIZE[2] + 4e-3]])
 SETUP = Setup(geometry=Shape(*box_surface(SIZE)), tool=Tool(radius=5e-3))
+
+
+def _halved(surface):
+    """The same surface of smaller triangles."""
+    fine = trimesh.Trimesh(*surface).subdivide().subdivide()
+    return np.array(fine.vertices), np.array(fine.faces)
 
 
 def test_quadratic_field_is_interpolated_exactly():
@@ -76,6 +83,15 @@ def test_sides_are_held_where_the_named_triangles_are():
     left = np.flatnonzero((vertices[triangles, 0] < -0.029).all(axis=1))
     mesh = fill(Shape(vertices, triangles, Faces.of(left)), TetSpec(path=(), radius=1e-3, spacing=5e-3, coarsest=5e-3))
     assert np.allclose(mesh.nodes[mesh.connectivity.base_nodes, 0], -0.03)
+
+
+def test_held_region_within_a_flat_side_keeps_its_border():
+    shape = Shape(*_halved(box_surface(SIZE)))
+    held = np.flatnonzero(((shape.corners[..., 2] > SIZE[2] - 1e-9) & (shape.corners[..., 0] < 0.0151)).all(axis=1))
+    mesh = fill(replace(shape, fixed=Faces.of(held)), TetSpec(path=(), radius=1e-3, spacing=4e-3, coarsest=4e-3))
+    sides = mesh.nodes[mesh.connectivity.base[:, :3]]
+    areas = np.linalg.norm(np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0]), axis=1) / 2
+    assert areas.sum() == pytest.approx(0.045 * SIZE[1], rel=1e-9)
 
 
 def test_gmsh_leaves_signal_handlers_alone_and_no_model_behind():
