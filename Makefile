@@ -61,8 +61,8 @@ $(VENV)/.installed: pyproject.toml constraints.txt $(VENV)/.torch
 	$(PIP) install --quiet -e . -c constraints.txt
 	@touch $@
 
-$(VENV)/.peers: pyproject.toml constraints.txt $(VENV)/.system-demo $(VENV)/.installed
-	$(PIP) install --quiet -e ".[peers]" -c constraints.txt
+$(VENV)/.peers: pyproject.toml constraints.txt $(VENV)/.system-bench $(VENV)/.installed
+	$(PIP) install --quiet -e ".[peers,shapes]" -c constraints.txt
 	@touch $@
 
 $(VENV)/.developed: pyproject.toml constraints.txt $(VENV)/.installed

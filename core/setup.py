@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-import numpy as np
-
+from core.bounds import within as _within
+from core.box import Box
 from core.errors import SetupError
-from core.frames import FloatArray, Transform
-from core.mesh import GridSpec, box_mesh
+from core.frames import Transform
 from core.shape.body import Shape
 
 __all__ = [
@@ -30,54 +28,8 @@ __all__ = [
     "Tool",
 ]
 
-_SAMPLING = GridSpec(nodes=(35, 21, 19))
 MaterialLaw = Literal["neo_hooke", "corotational"]
 Edge = Literal["-x", "+x", "-y", "+y"]
-
-
-def _within(key: str, value: float, low: float, high: float, unit: str) -> None:
-    if not (math.isfinite(value) and low <= value <= high):
-        message = f"{key} = {value:g} {unit} is outside {low:g} to {high:g} {unit}"
-        raise SetupError(message, key=key, value=value, low=low, high=high)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Box:
-    """A block on its base, edge lengths (x, y, z) [m]."""
-
-    size: tuple[float, float, float]
-
-    def __post_init__(self) -> None:
-        for axis, length in zip("xyz", self.size, strict=True):
-            _within(f"size {axis}", length, 1e-3, 2.0, "m")
-
-    @property
-    def low(self) -> FloatArray:
-        """Lowest corner (3,) [m], phantom frame."""
-        return np.array([-self.size[0] / 2, -self.size[1] / 2, 0.0])
-
-    @property
-    def high(self) -> FloatArray:
-        """Highest corner (3,) [m]."""
-        return np.array([self.size[0] / 2, self.size[1] / 2, self.size[2]])
-
-    @property
-    def height(self) -> float:
-        """[m]."""
-        return self.size[2]
-
-    def nearest(self, points: FloatArray) -> FloatArray:
-        """Places of the block (m, 3) [m] nearest to points (m, 3) [m]: the points themselves within it."""
-        return np.clip(points, self.low, self.high)
-
-    def surface_points(self) -> FloatArray:
-        """Rest positions (m, 3) [m] spread evenly over the free surface."""
-        mesh = box_mesh(self.size, _SAMPLING)
-        return mesh.nodes[np.unique(mesh.free_surface)]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values for JSON."""
-        return {"size": list(self.size)}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,11 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from core.errors import MeshError
-from core.fem.contact import turns_around
 from core.frames import FloatArray
 from core.meshing import IntArray
 from core.shape.fixed import BoolArray, FixedRegion, Plane
-from core.shape.nearest import nearest
 from core.shape.surface import check_surface, read_surface
 
 __all__ = ["Shape", "load_shape"]
@@ -98,6 +96,9 @@ class Shape:
 
     def nearest(self, points: FloatArray) -> FloatArray:
         """Places of the body (m, 3) [m] nearest to points (m, 3) [m]: the points themselves within it."""
+        from core.fem.contact import turns_around  # noqa: PLC0415 (heavy)
+        from core.shape.nearest import nearest  # noqa: PLC0415 (heavy)
+
         _, places = nearest(np.ascontiguousarray(points, float), self.corners)
         inside = np.array([turns_around(self.triangles, self.vertices, point) > 0.5 for point in points], dtype=bool)
         return np.where(inside[:, None], points, places)

@@ -1,0 +1,57 @@
+"""A block, the phantom that needs no file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from core.bounds import within
+from core.frames import FloatArray
+
+__all__ = ["Box"]
+
+_SAMPLING = (35, 21, 19)
+"""Points along the edges where the surface is sampled."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box:
+    """A block on its base, edge lengths (x, y, z) [m]."""
+
+    size: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        for axis, length in zip("xyz", self.size, strict=True):
+            within(f"size {axis}", length, 1e-3, 2.0, "m")
+
+    @property
+    def low(self) -> FloatArray:
+        """Lowest corner (3,) [m], phantom frame."""
+        return np.array([-self.size[0] / 2, -self.size[1] / 2, 0.0])
+
+    @property
+    def high(self) -> FloatArray:
+        """Highest corner (3,) [m]."""
+        return np.array([self.size[0] / 2, self.size[1] / 2, self.size[2]])
+
+    @property
+    def height(self) -> float:
+        """[m]."""
+        return self.size[2]
+
+    def nearest(self, points: FloatArray) -> FloatArray:
+        """Places of the block (m, 3) [m] nearest to points (m, 3) [m]: the points themselves within it."""
+        return np.clip(points, self.low, self.high)
+
+    def surface_points(self) -> FloatArray:
+        """Rest positions (m, 3) [m] spread evenly over the free surface."""
+        from core.mesh import GridSpec, box_mesh  # noqa: PLC0415 (heavy)
+
+        mesh = box_mesh(self.size, GridSpec(nodes=_SAMPLING))
+        return mesh.nodes[np.unique(mesh.free_surface)]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {"size": list(self.size)}
