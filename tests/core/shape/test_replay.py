@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from core.fem.model import BlockModel, Probe
 from core.frames import FloatArray
 from core.replay import Replay, replay, require_converged
 from core.sensitivity import displacement_changes, loss_changes
-from core.setup import Load, Material, Setup, Shape, Support, Tool
+from core.setup import Detachment, Load, Material, Setup, Shape, Support, Tool
 from core.shape.filling import TetSpec
 from core.shape.fixed import Painted
 
@@ -64,6 +65,34 @@ def test_organ_is_palpated_from_above_and_from_the_side():
     tip = frames[3].move(np.array([[0.0, 0.0, RADII[2]]]))[0]
     assert tip[2] == pytest.approx(RADII[2] - 4e-3, abs=3e-4)
     assert all(frame.mesh is frames[0].mesh for frame in frames)
+
+
+@pytest.mark.parametrize("poisson_ratio", [0.45, 0.49])
+def test_push_to_two_fifths_of_the_height_is_followed(poisson_ratio):
+    centres = _down(0.0, RADII[2], *np.arange(1, 9) * 1e-3)
+    frames = replay(replace(DOME, material=Material(poisson_ratio=poisson_ratio)), centres, _coarse(centres))
+    require_converged(frames)
+    assert all(later.force[2] > earlier.force[2] for earlier, later in pairwise(frames))
+
+
+@pytest.mark.parametrize(
+    "softer",
+    [
+        replace(DOME, support=Support(detached=(Detachment(edge="-x", extent=0.035),))),
+        replace(DOME, support=Support(stiffness_over_E=100.0)),
+        replace(DOME, support=Support(friction_coefficient=0.05)),
+        replace(DOME, tool=Tool(radius=5e-3, compliance_times_stiffness=20.0)),
+    ],
+    ids=["detached", "springs", "slides", "tool gives way"],
+)
+def test_organ_that_is_held_less_resists_less(softer):
+    inwards = np.array([0.6, 0.0, -0.8])  # from the left and above
+    start = np.array([-0.021, 0.0, 0.0143]) - 5e-3 * inwards
+    centres = start + np.outer([1e-3, 2e-3, 3e-3], inwards)
+    frames = [replay(setup, centres, _coarse(centres)) for setup in (DOME, softer)]
+    for each in frames:
+        require_converged(each)
+    assert np.linalg.norm(frames[1][-1].force) < 0.98 * np.linalg.norm(frames[0][-1].force)
 
 
 def test_shape_does_not_depend_on_the_modulus_but_the_force_does():
