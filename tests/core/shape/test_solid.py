@@ -123,7 +123,7 @@ def test_spacings_out_of_order_are_told(spacing, coarsest):
 
 
 def test_finer_mesh_has_its_nodes_closer():
-    spec = TetSpec.along(TOUCH, 5e-3, spacing=3e-3, coarsest=6e-3).finer(1.5)
+    spec = TetSpec.along(TOUCH, 5e-3, spacing=3e-3, coarsest=6e-3).finer()
     assert (spec.spacing, spec.coarsest) == pytest.approx((2e-3, 4e-3))
 
 
