@@ -246,6 +246,16 @@ class BoxMesh:
                     weights.append(parts[0][dx] * parts[1][dy] * parts[2][dz])
         return np.stack(nodes, axis=1), np.stack(weights, axis=1)
 
+    def shapes_along(self, axis: int, at: FloatArray) -> FloatArray:
+        """Shape functions (p, n) of the nodes along one axis at coordinates (p,) [m] within the block."""
+        ends = self.axes[axis][:: self.order]
+        index = np.clip(np.searchsorted(ends, at, side="right") - 1, 0, len(ends) - 2)
+        local = (at - ends[index]) / (ends[index + 1] - ends[index])
+        found = np.zeros((len(at), len(self.axes[axis])))
+        for step, values in enumerate([1 - local, local] if self.order == 1 else _quadratic(local)):
+            found[np.arange(len(at)), index * self.order + step] = values
+        return found
+
     def interpolate(self, field: FloatArray, points: FloatArray) -> FloatArray:
         """A nodal field (n, c) at rest positions (m, 3) [m]."""
         nodes, weights = self.locate(points)

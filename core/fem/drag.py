@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -83,6 +84,7 @@ def drag(
     friction: float,
     tolerance: float,
     follower: Follower,
+    recall: Callable[[BlockModel, FloatArray], None] | None = None,
 ) -> tuple[Solution, Hold]:
     """Equilibrium with friction.
 
@@ -90,6 +92,7 @@ def drag(
         positions: (n, 3) to begin from [m]. probes: the tool before and now. past: the step's beginning.
         friction: coefficient [1]. tolerance: residual of each equilibrium; the last one's, with pressure and friction in
             agreement, is at most the larger of it and 1e-4.
+        recall: puts what a material keeps of positions (n, 3) into the model.
 
     Returns:
         the solution, whose push has the drag in it, and what the step leaves to the next.
@@ -104,6 +107,8 @@ def drag(
             if not solution.converged:
                 return replace(solution, iterations=iterations), Hold.nothing()
             grip = _renewed(model, solution.positions, probe, past, friction)
+            if recall is not None:
+                recall(model, solution.positions)
             old: Grip | None = model.grip
             model.grip = grip
             residual = misfit(model, model.assemble(solution.positions, probe, tangent=False))
