@@ -34,14 +34,15 @@ from core.fem.memory import ConstantStress, cauchy_green, from_log_strain, log_s
 from core.fem.model import BlockModel, Probe
 from core.fem.newton import Outcome, Solution, misfit, solve
 from core.fem.path import lead
-from core.fem.points import MaterialPoints, material_points, quadrature_tangents
+from core.fem.points import MaterialPoints, material_points
 from core.frames import FloatArray
 from core.meshing import Mesh, Meshing
 from core.setup import Material, Setup
 
 __all__ = ["History", "Memory", "State", "refuse_memory"]
 
-_MOST_ROUNDS = 30
+_MOST_ROUNDS = 100
+"""Equilibria in one frame until one brings its own set: each leaves about the retained share of what the last one missed by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,23 +132,14 @@ class Memory:
         self._step, self._time = _Step(np.exp(-spans), taken, factor), float(time)
 
     def recall(self, model: BlockModel, positions: FloatArray | None = None) -> None:
-        """Put the step into a model; with positions (n, 3) [m], with the set that they bring.
-
-        Where the set grows, T follows S by the retained share of its change at most. Half of that share is taken from the modulus,
-        and given back at these positions, so that equilibria found one after another run into the one that brings its own set.
-        """
+        """Put the step into a model; with positions (n, 3) [m], with the set that they bring."""
         past, step, mesh = self.history, self._step, model.mesh
         fixed = np.einsum("k,kmc->mc", step.left, past.delayed) - step.taken.sum() * past.driving
-        if positions is None or not self._fraction:
-            stress, stiff = self._points.read(mesh, fixed - step.factor * past.free), np.array(step.factor)
-        else:
-            brought = self._set(cauchy_green(self._points.tangents(mesh, positions)))
-            growing = (brought.largest > past.largest).astype(float)
-            softer = step.factor * self._fraction / 2 * self._points.read(mesh, growing[:, None])
-            here = shear_stress(self._law, cauchy_green(quadrature_tangents(mesh, positions).reshape(-1, 3, 3)))
-            stress = self._points.read(mesh, fixed - step.factor * brought.free)
-            stress, stiff = stress + softer * here.reshape(stress.shape), step.factor - softer[..., 0]
-        model.mu = stiff * model.unrelaxed
+        kept = past
+        if positions is not None and self._fraction:
+            kept = self._set(cauchy_green(self._points.tangents(mesh, positions)))
+        stress = self._points.read(mesh, fixed - step.factor * kept.free)
+        model.mu = step.factor * model.unrelaxed
         model.carried = ConstantStress.of(model, stress * model.unrelaxed[..., None])
 
     def _set(self, strained: FloatArray) -> History:
