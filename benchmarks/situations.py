@@ -37,10 +37,11 @@ INSIDE = 5e-4
 
 @dataclass(frozen=True, eq=False)
 class Situation:
-    """A setup, stated tool centres (f, 3) [m] in the phantom frame, and a grid."""
+    """A setup, stated tool centres (f, 3) [m] in the phantom frame and their times (f,) [s], and a grid."""
 
     setup: Setup
     centres: FloatArray
+    times: FloatArray
     grid: GridSpec
     effects: tuple[Effect, ...]
 
@@ -90,7 +91,9 @@ def draw_situation(seed: int) -> Situation:
     for index in random.choice(len(kinds), size=2, replace=False):
         effects.append(_effect(random, kinds[int(index)], setup))
         setup = effects[-1].apply(setup)
-    return Situation(setup, _way(random, radius), GRIDS[int(random.integers(len(GRIDS)))], tuple(effects))
+    way, grid = _way(random, radius), GRIDS[int(random.integers(len(GRIDS)))]
+    times = np.cumsum(10 ** random.uniform(-2, 1, len(way)))
+    return Situation(setup, way, times, grid, tuple(effects))
 
 
 def faults(situation: Situation, frames: list[Equilibrium]) -> list[str]:
@@ -117,7 +120,7 @@ def main(count: int, seed: int) -> int:
     for number in range(seed, seed + count):
         situation = draw_situation(number)
         try:
-            frames = replay(situation.setup, situation.centres, situation.grid)
+            frames = replay(situation.setup, situation.centres, situation.grid, times=situation.times)
             found = faults(situation, frames)
         except Exception as error:
             frames, found = [], [f"{type(error).__name__}: {error}"]

@@ -15,6 +15,7 @@ import numpy as np
 
 from core.fem.newton import Outcome
 from core.frames import FloatArray
+from core.memory import refuse_memory
 from core.meshing import Meshing
 from core.progress import Report, silent
 from core.replay import Equilibrium, Replay
@@ -62,6 +63,7 @@ def mesh_errors(setup: Setup, frames: Sequence[Equilibrium], grid: Meshing, *, r
 
     A touch that finds no equilibrium on the finer grid is left out: `hardest_frames` tells how many there are.
     """
+    refuse_memory(setup.material, "the mesh's error is estimated in single frames, which do not know those before;")
     block, points = Replay(setup, grid.finer()), setup.geometry.surface_points()
     found = []
     keys = hardest_frames(frames)

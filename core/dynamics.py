@@ -16,6 +16,7 @@ from core.fem.model import BlockModel, Probe
 from core.fem.newton import RELATIVE_TOLERANCE, Outcome, Solution
 from core.fem.path import lead
 from core.frames import FloatArray
+from core.memory import refuse_memory
 from core.mesh import GridSpec
 from core.progress import Report, silent
 from core.replay import Equilibrium, Replay
@@ -38,6 +39,7 @@ class MovingBlock:
             raise SetupError("a sliding base has no inertia here; hold it", key="friction_coefficient")
         if setup.tool.compliance_times_stiffness:
             raise SetupError("a tool that gives way has no inertia here; make it stiff", key="compliance_times_stiffness")
+        refuse_memory(setup.material, "a block with inertia has no memory here;")
         self._static = Replay(setup, grid, tolerance)
         self.model: BlockModel = self._static.model(self._static.free.mesh)
         self.positions = self.model.mesh.nodes + self._static.free.displacement

@@ -11,8 +11,8 @@ from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.optimize import brentq
 
+from core.axes import even_axis, graded_axis
 from core.errors import MeshError
 from core.fem.elements import HEXAHEDRA
 from core.frames import FloatArray
@@ -21,7 +21,7 @@ from core.meshing import FINER, Connectivity, IntArray
 if TYPE_CHECKING:
     from core.setup import Setup
 
-__all__ = ["BoxMesh", "GridSpec", "IntArray", "box_mesh", "even_axis", "graded_axis"]
+__all__ = ["BoxMesh", "GridSpec", "IntArray", "box_mesh"]
 
 _FOCUS_STEP = 2e-4
 
@@ -86,38 +86,6 @@ class GridSpec:
             side = int(np.argmin(gaps))
             focus[side % 3] = high[side % 3] if side >= 3 else low[side % 3]
         return _mesh(size, self, (float(focus[0]), float(focus[1]), float(focus[2])))
-
-
-def even_axis(low: float, high: float, nodes: int) -> FloatArray:
-    """Evenly spaced node coordinates [m]."""
-    return np.linspace(low, high, nodes)
-
-
-def graded_axis(low: float, high: float, nodes: int, focus: float, spacing: float) -> FloatArray:
-    """Node coordinates [m] whose spacing is `spacing` at the focus and grows away from it at one constant rate.
-
-    The spacing at s is spacing + g |s - focus|, so node numbers are the logarithm of the distance; g is chosen such that the
-    given number of nodes fills the axis, and the whole is stretched a little so that the count on each side is whole.
-    """
-    left, right = max(focus - low, 0.0), max(high - focus, 0.0)
-    elements = nodes - 1
-    if (left + right) / elements <= spacing:
-        return even_axis(low, high, nodes)
-
-    def count(growth: float) -> float:
-        return float((np.log1p(growth * left / spacing) + np.log1p(growth * right / spacing)) / growth) - elements
-
-    growth = brentq(count, 1e-9, 1e3)
-    on_left = round(float(np.log1p(growth * left / spacing) / growth))
-    on_left = min(max(on_left, 1 if left > 0 else 0), elements - (1 if right > 0 else 0))
-
-    def side(length: float, number: int) -> FloatArray:
-        steps = np.expm1(growth * np.arange(number + 1))
-        return np.asarray(length * steps / max(steps[-1], 1e-300))
-
-    lower = focus - side(left, on_left)[::-1] if on_left else np.array([low])
-    upper = focus + side(right, elements - on_left) if on_left < elements else np.array([high])
-    return np.concatenate([lower, upper[1:]])
 
 
 def _quadratic(local: FloatArray) -> list[FloatArray]:
@@ -245,6 +213,16 @@ class BoxMesh:
                     nodes.append(self._numbers[first[2] + dz, first[1] + dy, first[0] + dx])
                     weights.append(parts[0][dx] * parts[1][dy] * parts[2][dz])
         return np.stack(nodes, axis=1), np.stack(weights, axis=1)
+
+    def shapes_along(self, axis: int, at: FloatArray) -> FloatArray:
+        """Shape functions (p, n) of the nodes along one axis at coordinates (p,) [m] within the block."""
+        ends = self.axes[axis][:: self.order]
+        index = np.clip(np.searchsorted(ends, at, side="right") - 1, 0, len(ends) - 2)
+        local = (at - ends[index]) / (ends[index + 1] - ends[index])
+        found = np.zeros((len(at), len(self.axes[axis])))
+        for step, values in enumerate([1 - local, local] if self.order == 1 else _quadratic(local)):
+            found[np.arange(len(at)), index * self.order + step] = values
+        return found
 
     def interpolate(self, field: FloatArray, points: FloatArray) -> FloatArray:
         """A nodal field (n, c) at rest positions (m, 3) [m]."""

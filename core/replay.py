@@ -1,7 +1,7 @@
 """Replay a tool's motion: one converged equilibrium per frame, or a sentence saying why not.
 
-The block keeps no memory, except for a sliding base, whose place depends on the pushes before. A graded mesh follows the tool:
-each frame has its own node coordinates, and starts from the frame before, interpolated.
+The block keeps no memory, except in a material that does (`core.memory`), and for a sliding base, whose place depends on the pushes
+before. A graded mesh follows the tool: each frame has its own node coordinates, and starts from the frame before, interpolated.
 """
 
 from __future__ import annotations
@@ -11,16 +11,17 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from core.equilibrium import Equilibrium
-from core.errors import SolveError
+from core.errors import SetupError, SolveError
 from core.fem.drag import Past, drag
 from core.fem.follow import Follower
-from core.fem.friction import Hold
-from core.fem.model import BlockModel, Probe, surface_spots
+from core.fem.model import BlockModel, Probe
 from core.fem.newton import RELATIVE_TOLERANCE, Outcome, Solution, solve
 from core.fem.path import FREE_STEP, lead
 from core.frames import FloatArray
+from core.memory import Memory, State
 from core.meshing import Mesh, Meshing
 from core.progress import Report, silent
 from core.setup import Setup
@@ -30,23 +31,13 @@ __all__ = ["GRAVITY", "Equilibrium", "Replay", "replay", "require_converged", "r
 
 GRAVITY = 9.81
 """Acceleration of free fall [m/s^2]."""
-_MOST_SLIDES = 12
-_DRAG_STEP = 1e-3
-"""Longest motion of a tool with friction [m] that is taken as straight."""
-
-
-def _past(model: BlockModel, start: Equilibrium, before: Probe) -> Past:
-    """The surface's quadrature points in the frame before, in which the tool was at `before`."""
-    places = surface_spots(model.mesh).places
-    flat = places.reshape(-1, 3)
-    seen = (flat + start.mesh.interpolate(start.displacement, flat)).reshape(places.shape) - before.centre
-    ways, touched = (start.hold or Hold.nothing()).at(places)
-    return Past(seen, ways, touched)
+_MOST_SLIDES, _DRAG_STEP = 12, 1e-3
+"""Of a base in one frame, and the longest motion of a tool with friction [m] that is taken as straight."""
 
 
 def _away(setup: Setup, probe: Probe) -> bool:
     """Whether the tool cannot touch the block, sagging and bulging allowed for."""
-    slack = 5e-4 if setup.load.specific_weight_over_stiffness else 0.0
+    slack = 5e-4 if setup.load.specific_weight_over_stiffness or setup.material.remembers else 0.0
     nearest = setup.geometry.nearest(probe.centre[None])[0]
     return bool(np.linalg.norm(probe.centre - nearest) > probe.radius + slack)
 
@@ -64,22 +55,45 @@ class Replay:
         self._model: BlockModel | None = None
         self._before: tuple[Equilibrium, Equilibrium] | None = None
         self.slip = np.zeros(2)
+        self._rest_mesh = grid.mesh(setup, np.array([0.0, 0.0, setup.geometry.height]))
+        self.memory = Memory.of(setup, grid, self._rest_mesh)
+        if self.memory is not None:
+            self.memory.start(self.free)
+
+    def state(self, frame: Equilibrium) -> State:
+        """What another replay of the same setup and grid can go on from: `frame` is the last one."""
+        return State(frame, None if self.memory is None else self.memory.history)
+
+    def resume(self, state: State) -> None:
+        """Go on from there: `step` from the state's frame."""
+        self.slip = state.frame.slip.copy()
+        if self.memory is not None and state.history is not None:
+            self.memory.history = state.history
 
     def model(self, mesh: Mesh) -> BlockModel:
-        """The block's potential on this mesh; the last one is kept."""
+        """The block's potential on this mesh, in the step in time that is under way; the last one is kept."""
         if self._model is None or self._model.mesh is not mesh:
             self._model = BlockModel(self.setup, mesh)
+        if self.memory is not None:
+            self.memory.recall(self._model)
         return self._model
 
     @cached_property
     def free(self) -> Equilibrium:
         """The block without the tool: sagging under gravity, otherwise as stated."""
-        mesh = self.grid.mesh(self.setup, np.array([0.0, 0.0, self.setup.geometry.height]))
-        away = Probe(np.array([0.0, 0.0, 10.0]), self.setup.tool.radius)
+        mesh, away = self._rest_mesh, Probe(np.array([0.0, 0.0, 10.0]), self.setup.tool.radius)
         if not self.setup.load.specific_weight_over_stiffness:
             still = np.zeros_like(mesh.nodes)
             return Equilibrium(mesh, still, np.zeros(2), away, np.zeros(3), Outcome.CONVERGED, 0, 0.0, 0.0, False)
-        return self._equilibrium(solve(self.model(mesh), None, mesh.nodes, None, self.tolerance), mesh, away)
+        return self._equilibrium(self._untouched(self.model(mesh), mesh.nodes), mesh, away)
+
+    def _untouched(self, model: BlockModel, positions: FloatArray) -> Solution:
+        """Equilibrium without the tool, from positions (n, 3) [m]."""
+        return self._settled(model, None, solve(model, None, positions, None, self.tolerance))
+
+    def _settled(self, model: BlockModel, probe: Probe | None, solution: Solution) -> Solution:
+        """The solution with the set that it leaves in a material that keeps one."""
+        return solution if self.memory is None else self.memory.settled(model, probe, solution, self.tolerance, self._follower)
 
     def _equilibrium(self, solution: Solution, mesh: Mesh, probe: Probe) -> Equilibrium:
         force = -solution.push * self.setup.material.young_modulus
@@ -94,7 +108,11 @@ class Replay:
         """Equilibrium with the base where it is; `probe` in the frame of the slid block."""
         local = Probe(probe.centre - np.append(self.slip, 0.0), probe.radius)
         if _away(self.setup, local):
-            return replace(self.free, slip=self.slip.copy(), probe=probe)
+            if self.memory is None or self.memory.fresh:
+                return replace(self.free, slip=self.slip.copy(), probe=probe)
+            # The grid stays where the dent is.
+            solution = self._untouched(self.model(start.mesh), start.mesh.nodes + start.displacement)
+            return self._equilibrium(solution, start.mesh, probe)
         mesh = self.grid.mesh(self.setup, local.centre)
         model = self.model(mesh)
         # The dent travels with the tool, so the field is carried along with the grid's focus before it is read.
@@ -108,11 +126,11 @@ class Replay:
         if not start.in_contact:  # begin where the straight way in first touches, not from afar
             before = self._first_touch(before, local)
         if self.setup.tool.friction_coefficient:
-            past = _past(model, start, Probe(before.centre - carried, before.radius))
+            past = Past.of(model, start, Probe(before.centre - carried, before.radius))
             frame = self._dragged(model, positions, (before, local), past, probe)
         else:
             solution = lead(model, positions, before, local, self.tolerance, self._follower)
-            frame = self._equilibrium(solution, mesh, probe)
+            frame = self._equilibrium(self._settled(model, local, solution), mesh, probe)
         self._before = (start, frame)
         return frame
 
@@ -121,7 +139,8 @@ class Replay:
     ) -> Equilibrium:
         """Equilibrium with friction under the tool, whose `probes` before and now are in the frame of the slid block."""
         friction = self.setup.tool.friction_coefficient
-        solution, hold = drag(model, positions, probes, past, friction, self.tolerance, self._follower)
+        recall = None if self.memory is None else self.memory.recall
+        solution, hold = drag(model, positions, probes, past, friction, self.tolerance, self._follower, recall)
         return replace(self._equilibrium(solution, model.mesh, probe), hold=hold)
 
     def _led(self, probe: Probe, start: Equilibrium) -> Equilibrium:
@@ -168,12 +187,21 @@ class Replay:
             low, high = (share, high) if clear else (low, share)
         return Probe(before.centre + low * (probe.centre - before.centre), probe.radius)
 
-    def step(self, stated_centre: FloatArray, start: Equilibrium | None = None) -> Equilibrium:
-        """Equilibrium with the tool at a stated centre (3,) [m], phantom frame; tool and base give way if they can."""
+    def step(self, stated_centre: FloatArray, start: Equilibrium | None = None, time: float | None = None) -> Equilibrium:
+        """Equilibrium with the tool at a stated centre (3,) [m], phantom frame; tool and base give way if they can.
+
+        A material with memory must be told the time [s], and goes on from its last equilibrium, whatever the start.
+        """
         centre, start = stated_centre + self._offset, self.free if start is None else start
-        if not self.setup.tool.compliance_times_stiffness:
-            return self._placed(centre, start)
-        return give_way(centre, start, self.setup, self.tolerance, self._placed)
+        if self.memory is not None:
+            self.memory.begin(time)
+        if self.setup.tool.compliance_times_stiffness:
+            frame = give_way(centre, start, self.setup, self.tolerance, self._placed)
+        else:
+            frame = self._placed(centre, start)
+        if self.memory is not None:
+            self.memory.end(frame)
+        return frame
 
     def on_finer_grid(self, stated_centre: FloatArray, start: Equilibrium | None, failed: Equilibrium) -> Equilibrium:
         """The frame once more, on a grid 1.5 times finer; as it was, where that finds no equilibrium, either.
@@ -219,6 +247,8 @@ def replay(
     centres: FloatArray,
     grid: Meshing,
     *,
+    times: ArrayLike | None = None,
+    since: State | None = None,
     starts: Sequence[Equilibrium] | None = None,
     tolerance: float = RELATIVE_TOLERANCE,
     report: Report = silent,
@@ -227,8 +257,9 @@ def replay(
 
     Args:
         setup: what is believed. centres: (f, 3) stated tool centres [m], phantom frame, in the order of time.
-        grid: the mesh. starts: equilibria of a similar setup at the same frames to begin from; else from the frame before.
-        tolerance: residual at which a frame counts as converged, over the push. report: progress.
+        grid: the mesh. times: (f,) of the frames [s], which a material with memory asks for. since: where an earlier replay ended
+            (`Replay.state`), to go on from; else from rest. starts: equilibria of a similar setup at the same frames to begin from;
+            else from the frame before. tolerance: residual at which a frame counts as converged, over the push. report: progress.
 
     A frame that finds no equilibrium is tried on a finer grid. One that finds none there, either, is returned with its outcome,
     never raised: look at `outcome`, or call `require_converged`.
@@ -237,16 +268,22 @@ def replay(
         raise SolveError("a setup whose frames depend on those before them is replayed in order of time, without starts")
     block, frames = Replay(setup, grid, tolerance), []
     previous: Equilibrium | None = None
-    for number, centre in enumerate(centres):
+    if since is not None:
+        block.resume(since)
+        previous = since.frame
+    instants = [None] * len(centres) if times is None else np.asarray(times, dtype=float).tolist()
+    if len(instants) != len(centres):
+        raise SetupError(f"{len(instants)} times for {len(centres)} frames; give one for each", key="times")
+    for number, (centre, time) in enumerate(zip(np.asarray(centres, dtype=float), instants, strict=True)):
         report(number / len(centres), f"frame {number + 1} of {len(centres)}")
         start = starts[number] if starts is not None and starts[number].in_contact else previous
-        frame = block.step(np.asarray(centre, dtype=float), start)
-        # A long jump may lead through the block; from rest the tool comes in from outside, and all that was before is forgotten.
-        for other in () if setup.remembers else (previous, None):
+        frame = block.step(centre, start, time)
+        # A long jump may lead through the block; from rest the tool comes in from outside, and what friction held is forgotten.
+        for other in () if setup.tool.friction_coefficient else (previous, None):
             if frame.outcome is not Outcome.CONVERGED and other is not start:
-                start, frame = other, block.step(np.asarray(centre, dtype=float), other)
-        if frame.outcome is not Outcome.CONVERGED:
-            frame = block.on_finer_grid(np.asarray(centre, dtype=float), previous, frame)
+                start, frame = other, block.step(centre, other, time)
+        if frame.outcome is not Outcome.CONVERGED and not setup.material.remembers:  # what it remembers is not on that grid
+            frame = block.on_finer_grid(centre, previous, frame)
         frames.append(frame)
         previous = frame if frame.outcome is Outcome.CONVERGED else previous if setup.remembers else None
     return frames
@@ -257,7 +294,6 @@ def require_converged(frames: Sequence[Equilibrium]) -> None:
     for number, frame in enumerate(frames):
         if frame.outcome is not Outcome.CONVERGED:
             raise SolveError(
-                f"frame {number}: {frame.outcome.value} "
-                f"(relative residual {frame.residual:.2g} after {frame.iterations} iterations)",
+                f"frame {number}: {frame.outcome.value} (residual {frame.residual:.2g} after {frame.iterations} iterations)",
                 frame=number, residual=frame.residual, outcome=frame.outcome.name,
             )  # fmt: skip

@@ -17,6 +17,7 @@ from core.fem.elastic import assemble_elastic
 from core.fem.factor import NotPositiveDefinite
 from core.fem.model import BlockModel, Probe
 from core.frames import FloatArray
+from core.memory import refuse_memory
 from core.replay import Equilibrium, Replay
 from core.setup import Setup
 
@@ -44,17 +45,17 @@ def _local(frame: Equilibrium) -> Probe:
 
 
 def _holds(block: Replay, frame: Equilibrium) -> bool:
-    """Whether anything deforms the block at all; SetupError where the frame hangs on those before it."""
-    _memoryless(block.setup)
+    """Whether anything deforms the block at all."""
     return bool(frame.in_contact or block.setup.load.specific_weight_over_stiffness)
 
 
-def _memoryless(setup: Setup) -> None:
-    if setup.remembers:
-        raise SetupError(
-            "a frame that hangs on those before it has no first-order changes of its own; take differences of whole replays",
-            key="friction_coefficient",
-        )
+def _memoryless(*setups: Setup) -> None:
+    """Raise SetupError where a frame hangs on those before it."""
+    told = "a frame that hangs on those before it has no first-order changes of its own; take differences of whole replays"
+    for setup in setups:
+        refuse_memory(setup.material, f"{told}, or")
+        if setup.remembers:
+            raise SetupError(told, key="friction_coefficient")
 
 
 def _unbalanced(block: Replay, frame: Equilibrium, model: BlockModel, changes: Sequence[tuple[Setup, FloatArray]]) -> FloatArray:
@@ -66,7 +67,6 @@ def _unbalanced(block: Replay, frame: Equilibrium, model: BlockModel, changes: S
     residual = model.assemble(positions, here, tangent=False).residual
     right = np.zeros((len(residual), len(changes)))
     for column, (setup, move) in enumerate(changes):
-        _memoryless(setup)
         same = _same_body(block, setup)
         shift = np.zeros(3) if _gives(block.setup, setup) else _shift(block, setup, move)
         if same and setup.tool.radius == block.setup.tool.radius and not shift.any():  # only the sensor differs
@@ -153,6 +153,7 @@ def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[tu
     Returns:
         (len(changes), n, 3) changes of the nodes' displacement [m]; zero where nothing holds the tool against the block.
     """
+    _memoryless(block.setup, *(setup for setup, _ in changes))
     result = np.zeros((len(changes), *frame.displacement.shape))
     model = factorise_at(block, frame) if _holds(block, frame) else None
     if model is None or not changes:
@@ -176,6 +177,7 @@ def loss_changes(block: Replay, frame: Equilibrium, slope: FloatArray, changes: 
     Returns:
         (len(changes),) changes of the function; zero where nothing holds the tool against the block.
     """
+    _memoryless(block.setup, *(setup for setup, _ in changes))
     model = factorise_at(block, frame) if _holds(block, frame) else None
     if model is None or not changes:
         return np.zeros(len(changes))
@@ -197,6 +199,7 @@ def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray
     Returns:
         (m, n, 3) [m]; cheap in m, since a point's share of the residual is what it alone would resist with.
     """
+    _memoryless(block.setup)
     result = np.zeros((len(log_factors), *frame.displacement.shape))
     model = factorise_at(block, frame) if frame.in_contact else None
     if model is None:

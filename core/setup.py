@@ -21,6 +21,7 @@ __all__ = [
     "Load",
     "Material",
     "MaterialLaw",
+    "Relaxation",
     "Sensor",
     "Setup",
     "Shape",
@@ -67,14 +68,29 @@ class Fibres:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Relaxation:
+    """One term of a Prony series: the share of the shear modulus that relaxes [1], and its time constant [s]."""
+
+    fraction: float
+    time_constant: float
+
+    def __post_init__(self) -> None:
+        _within("relaxation fraction", self.fraction, 0.0, 1.0, "")
+        _within("relaxation time_constant", self.time_constant, 1e-6, 1e9, "s")
+
+
+@dataclass(frozen=True, kw_only=True)
 class Material:
     """What the block is made of.
 
     Attributes:
-        young_modulus: at rest [Pa]. poisson_ratio: [1]. law: of elasticity. inclusions: lumps inside.
-        layer: a skin on the top. log_ratio: ln of Young's modulus at the top over that at the base, its geometric mean kept [1].
+        young_modulus: at rest [Pa]; of a material that relaxes, that of a motion faster than it does. poisson_ratio: likewise [1].
+        law: of elasticity. inclusions: lumps inside. layer: a skin on the top.
+        log_ratio: ln of Young's modulus at the top over that at the base, its geometric mean kept [1].
         stretch_limit: J_m of Gent's law [1], where the material is stretched to its limit; None for a material without.
         fibres: along one direction; None for a material that is the same in all.
+        relaxation: terms of a Prony series, whose fractions add up to less than one. retained_fraction: of the largest strain
+            that stays when the load is gone [1]. Both as `core.memory` has them.
     """
 
     young_modulus: float = 5.0e3
@@ -85,6 +101,8 @@ class Material:
     log_ratio: float = 0.0
     stretch_limit: float | None = None
     fibres: Fibres | None = None
+    relaxation: tuple[Relaxation, ...] = ()
+    retained_fraction: float = 0.0
 
     def __post_init__(self) -> None:
         _within("young_modulus", self.young_modulus, 1.0, 1e9, "Pa")
@@ -94,6 +112,16 @@ class Material:
             _within("stretch_limit", self.stretch_limit, 0.1, 1e6, "")
             if self.law == "corotational":
                 raise SetupError("the corotational law has no stretch_limit; use neo_hooke with it", key="stretch_limit")
+        _within("relaxed fractions in all", sum(term.fraction for term in self.relaxation), 0.0, 0.99, "")
+        _within("retained_fraction", self.retained_fraction, 0.0, 0.9, "")
+        if self.remembers and self.law == "corotational":
+            key = "relaxation" if self.relaxation else "retained_fraction"
+            raise SetupError(f"the corotational law has no {key}; use neo_hooke with it", key=key)
+
+    @property
+    def remembers(self) -> bool:
+        """Whether its stress depends on what was done to it before."""
+        return bool(self.relaxation or self.retained_fraction)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -218,7 +246,7 @@ class Setup:
     @property
     def remembers(self) -> bool:
         """Whether a frame depends on all those before it, so that none may be left out."""
-        return bool(self.tool.friction_coefficient)
+        return bool(self.tool.friction_coefficient) or self.material.remembers
 
     @property
     def phantom_from_camera_true(self) -> Transform:
@@ -238,6 +266,8 @@ class Setup:
                 "layer": None if self.material.layer is None else vars(self.material.layer),
                 "log_ratio": self.material.log_ratio,
                 "fibres": None if self.material.fibres is None else vars(self.material.fibres),
+                "relaxation": [vars(term) for term in self.material.relaxation],
+                "retained_fraction": self.material.retained_fraction,
             },
             "load": {"specific_weight_over_stiffness": self.load.specific_weight_over_stiffness},
             "support": {

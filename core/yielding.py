@@ -38,7 +38,7 @@ def give_way(
             return frame
         step = inverse @ miss
         place = place + step
-        frame = placed(place, start if setup.remembers else frame)
+        frame = placed(place, start if setup.tool.friction_coefficient else frame)
         change = miss - (centre + softness * frame.force - place)
         turned = inverse @ change
         inverse += np.outer(step - turned, step @ inverse) / (step @ turned)

@@ -87,7 +87,7 @@ def replay(
     with progress(f"replay {sequence}") as report:
         setup = registration.setup_from(opened, registration.register(opened, part(report, 0.0, 0.1)))
         centres = setup.phantom_from_robot.apply(kinematics.position_at(times))
-        frames = simulation.replay(setup, centres, spec, report=part(report, 0.1, 0.8))
+        frames = simulation.replay(setup, centres, spec, times=times, report=part(report, 0.1, 0.8))
         misses = mesh_errors(setup, frames, spec, report=part(report, 0.8, 1.0))
     mesh = spec.mesh(setup, centres[0])
     used, quads = np.unique(mesh.free_surface, return_inverse=True)

@@ -10,6 +10,7 @@ from typing import Any
 from core.effects.base import Effect, Parameter, Slot
 from core.effects.load import Gravity
 from core.effects.material import PoissonRatio, StiffInclusion
+from core.effects.memory import PermanentSet, Viscoelasticity
 from core.effects.sensor import CameraRegistration, TimeOffset
 from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
 from core.effects.support import BaseCompliance, BaseDetachment, BaseSlip
@@ -35,6 +36,8 @@ CATALOGUE: tuple[type[Effect], ...] = (
     StiffnessGradient,
     StrainStiffening,
     Anisotropy,
+    Viscoelasticity,
+    PermanentSet,
     BaseCompliance,
     ToolCompliance,
     ToolFriction,

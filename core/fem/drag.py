@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
+from core.equilibrium import Equilibrium
 from core.fem.follow import Follower
 from core.fem.friction import STICK_STIFFNESS, Grip, Hold
 from core.fem.model import CONTACT_STIFFNESS, BlockModel, Probe, surface_spots
@@ -29,6 +31,15 @@ class Past:
     seen: FloatArray
     ways: FloatArray
     touched: np.ndarray[Any, np.dtype[np.bool_]]
+
+    @classmethod
+    def of(cls, model: BlockModel, start: Equilibrium, before: Probe) -> Self:
+        """As the frame before left it, in which the tool was at `before`."""
+        places = surface_spots(model.mesh).places
+        flat = places.reshape(-1, 3)
+        seen = (flat + start.mesh.interpolate(start.displacement, flat)).reshape(places.shape) - before.centre
+        ways, touched = (start.hold or Hold.nothing()).at(places)
+        return cls(seen, ways, touched)
 
 
 def _seen(model: BlockModel, positions: FloatArray, probe: Probe) -> FloatArray:
@@ -83,6 +94,7 @@ def drag(
     friction: float,
     tolerance: float,
     follower: Follower,
+    recall: Callable[[BlockModel, FloatArray], None] | None = None,
 ) -> tuple[Solution, Hold]:
     """Equilibrium with friction.
 
@@ -90,6 +102,7 @@ def drag(
         positions: (n, 3) to begin from [m]. probes: the tool before and now. past: the step's beginning.
         friction: coefficient [1]. tolerance: residual of each equilibrium; the last one's, with pressure and friction in
             agreement, is at most the larger of it and 1e-4.
+        recall: puts what a material keeps of positions (n, 3) into the model.
 
     Returns:
         the solution, whose push has the drag in it, and what the step leaves to the next.
@@ -104,6 +117,8 @@ def drag(
             if not solution.converged:
                 return replace(solution, iterations=iterations), Hold.nothing()
             grip = _renewed(model, solution.positions, probe, past, friction)
+            if recall is not None:
+                recall(model, solution.positions)
             old: Grip | None = model.grip
             model.grip = grip
             residual = misfit(model, model.assemble(solution.positions, probe, tangent=False))

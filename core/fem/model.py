@@ -41,7 +41,7 @@ class Probe:
 
 
 class Carried(Protocol):
-    """A quadratic potential of the unknowns' displacements that one step in time adds (`core.fem.inertia`)."""
+    """A quadratic potential of the unknowns' displacements that one step in time adds (`core.fem.inertia`, `core.fem.memory`)."""
 
     @property
     def data(self) -> FloatArray:
@@ -126,7 +126,7 @@ class BlockModel:
     """One block on one mesh: energy, residual and tangent as functions of the node positions (n, 3) [m] and the probe.
 
     Attributes:
-        mu, bulk: (e, q) over E at the quadrature points [1].
+        mu, bulk: (e, q) over E at the quadrature points [1]. unrelaxed: mu before a step in time changes it (`core.memory`).
         areas: (f, p) of the free surface's quadrature points, times the stiffness there over E and the hardness [m^2], with which
             contact goes. hardness: of the contact, one unless `harden` was called [1].
     """
@@ -141,6 +141,7 @@ class BlockModel:
         mu, bulk = lame(self.law, setup.material.poisson_ratio)
         factor = np.exp(log_stiffness(setup.material, self.rule, height))
         self.mu, self.bulk = mu * factor, bulk * factor
+        self.unrelaxed = self.mu
         # Sums of squares near three lose their last digits when three is taken off, in proportion to this stiffness times volume.
         self.rounding = 4e-16 * float(np.vdot(self.mu, self.rule.weights))
         self.carried: Carried | None = None

@@ -3,9 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from core.axes import even_axis, graded_axis
 from core.errors import MeshError
 from core.fem.elements import HEXAHEDRA, quadrature
-from core.mesh import GridSpec, box_mesh, even_axis, graded_axis
+from core.mesh import GridSpec, box_mesh
 
 SIZE = (0.0687, 0.0393, 0.0358)
 GRIDS = pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from core.replay import replay
 @pytest.mark.parametrize("seed", range(16))
 def test_no_situation_ends_in_nonsense(seed):
     situation = draw_situation(seed)
-    frames = replay(situation.setup, situation.centres, situation.grid)
+    frames = replay(situation.setup, situation.centres, situation.grid, times=situation.times)
     assert len(frames) == len(situation.centres)
     assert faults(situation, frames) == []
     assert any(frame.in_contact for frame in frames)

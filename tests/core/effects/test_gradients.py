@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.effects import from_json
+from core.effects import CATALOGUE, Slot, from_json
 from core.effects.load import Gravity
 from core.effects.material import PoissonRatio, StiffInclusion
+from core.effects.memory import PermanentSet, Viscoelasticity
 from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
 from core.effects.support import BaseCompliance, BaseDetachment
-from core.effects.tool import ToolCompliance, ToolOffset, ToolRadius
+from core.effects.tool import ToolCompliance, ToolFriction, ToolOffset, ToolRadius
+from core.errors import SetupError
 from core.mesh import GridSpec
 from core.replay import Equilibrium, Replay
 from core.sensitivity import displacement_changes, loss_changes
@@ -134,3 +136,25 @@ def test_adjoint_gradient_is_that_of_full_solves(name):
             around.append((loss(solved), loss_changes(block, frame, slope, [(changed, np.zeros(3))])[0]))
         (above, rise), (below, fall) = around
         assert rise - fall == pytest.approx(above - below, rel=0.01)
+
+
+REMEMBERING = (
+    Viscoelasticity(relaxed_fraction=0.3, time_constant=1.0),
+    PermanentSet(retained_fraction=0.2),
+    ToolFriction(friction_coefficient=0.3),
+)
+
+
+@pytest.mark.parametrize("effect", REMEMBERING, ids=lambda effect: effect.name)
+def test_effect_that_remembers_has_no_change_to_first_order(effect):
+    """What it remembers changes in every frame before: whole replays must be compared, and asking for less is an error."""
+    block = Replay(SETUP, GRID)
+    frame, setup = block.step(POKE[0]), effect.apply(SETUP)
+    for ask in (displacement_changes, lambda *given: loss_changes(block, frame, frame.displacement, given[-1])):
+        with pytest.raises(SetupError, match="differences of whole replays"):
+            ask(block, frame, [(setup, np.zeros(3))])
+
+
+def test_every_effect_that_deforms_the_block_has_its_gradient_checked_or_turned_down():
+    checked = {*GRADIENTS, "base_slip", *(effect.name for effect in REMEMBERING)}
+    assert {effect.name for effect in CATALOGUE if effect.enters is not Slot.SENSOR} == checked

@@ -1,0 +1,42 @@
+"""Node coordinates along one axis of a structured grid."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import brentq
+
+from core.frames import FloatArray
+
+__all__ = ["even_axis", "graded_axis"]
+
+
+def even_axis(low: float, high: float, nodes: int) -> FloatArray:
+    """Evenly spaced node coordinates [m]."""
+    return np.linspace(low, high, nodes)
+
+
+def graded_axis(low: float, high: float, nodes: int, focus: float, spacing: float) -> FloatArray:
+    """Node coordinates [m] whose spacing is `spacing` at the focus and grows away from it at one constant rate.
+
+    The spacing at s is spacing + g |s - focus|, so node numbers are the logarithm of the distance; g is chosen such that the
+    given number of nodes fills the axis, and the whole is stretched a little so that the count on each side is whole.
+    """
+    left, right = max(focus - low, 0.0), max(high - focus, 0.0)
+    elements = nodes - 1
+    if (left + right) / elements <= spacing:
+        return even_axis(low, high, nodes)
+
+    def count(growth: float) -> float:
+        return float((np.log1p(growth * left / spacing) + np.log1p(growth * right / spacing)) / growth) - elements
+
+    growth = brentq(count, 1e-9, 1e3)
+    on_left = round(float(np.log1p(growth * left / spacing) / growth))
+    on_left = min(max(on_left, 1 if left > 0 else 0), elements - (1 if right > 0 else 0))
+
+    def side(length: float, number: int) -> FloatArray:
+        steps = np.expm1(growth * np.arange(number + 1))
+        return np.asarray(length * steps / max(steps[-1], 1e-300))
+
+    lower = focus - side(left, on_left)[::-1] if on_left else np.array([low])
+    upper = focus + side(right, elements - on_left) if on_left < elements else np.array([high])
+    return np.concatenate([lower, upper[1:]])
