@@ -121,7 +121,8 @@ _CLEAR: Mapping[str, _Draw] = {
     "stiff_inclusion": _inclusion,
     "tool_radius": lambda rng: {"radius": _either(rng, (3.5e-3, 4.2e-3), (5.8e-3, 6.5e-3))},
     "tool_offset": _offset,
-    "base_slip": lambda rng: {"friction_coefficient": _between(rng, 0.08, 0.2, 3)},
+    # Of thirty motions the side push that is fitted slides at less than 0.164 to 0.234; what holds in it is not hidden, but absent.
+    "base_slip": lambda rng: {"friction_coefficient": _between(rng, 0.08, 0.15, 3)},
     "base_detachment": lambda rng: {"edge": str(rng.choice(["-x", "+x", "-y", "+y"])), "extent": _between(rng, 10e-3, 20e-3)},
     # A gel of 5 kPa has 2 per metre; below 1.5 the sag drowns in the camera's smooth bias of 0.3 mm.
     "gravity": lambda rng: {"specific_weight_over_stiffness": _between(rng, 1.7, 2.6, 2)},
