@@ -7,10 +7,12 @@ import pytest
 import torch
 
 from core.batch import replay_batch
+from core.batch.member import Member
 from core.batch.membership import obstacle
 from core.batch.path import lead
 from core.errors import Cancelled, SetupError
 from core.fem.newton import Outcome
+from core.frames import FloatArray
 from core.mesh import GridSpec
 from core.replay import Equilibrium, replay
 from core.setup import Box, Detachment, Fibres, Inclusion, Layer, Load, Material, Setup, Support, Tool
@@ -79,10 +81,10 @@ def test_all_frames_are_solved_together_in_either_precision(dtype):
 
 
 def test_single_precision_tangents_change_no_answer():
-    for single, double in zip(
-        replay_batch(SETUPS, POKE, SMALL, dtype=torch.float32), replay_batch(SETUPS, POKE, SMALL), strict=True
-    ):
+    singles, doubles = replay_batch(SETUPS, POKE, SMALL, dtype=torch.float32), replay_batch(SETUPS, POKE, SMALL)
+    for single, double in zip(singles, doubles, strict=True):
         _agree(single, double)
+    assert not np.array_equal(singles[0][3].displacement, doubles[0][3].displacement)  # the tangents were others
 
 
 def test_each_set_may_have_its_own_way():
@@ -108,9 +110,17 @@ def test_frame_that_fails_in_the_batch_is_solved_by_itself(monkeypatch):
         balance.balanced[1] = False
         return balance
 
+    own, alone = Member.alone, []
+
+    def counted(member: Member, centre: FloatArray) -> None:
+        alone.append(member.setup)
+        own(member, centre)
+
     monkeypatch.setattr("core.batch.replay.lead", never)
+    monkeypatch.setattr(Member, "alone", counted)
     for frames, setup in zip(replay_batch(SETUPS[:3], POKE, SMALL), SETUPS, strict=False):
         _agree(frames, replay(setup, POKE, SMALL))
+    assert alone.count(SETUPS[1]) == len(POKE) > alone.count(STATED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,8 +150,10 @@ def test_sets_that_no_batch_can_hold_are_replayed_by_themselves_in_their_place()
     detached = replace(STATED, support=Support(detached=(Detachment(edge="+x", extent=0.01),)))
     giving = replace(STATED, tool=Tool(radius=5e-3, compliance_times_stiffness=20.0))
     setups = [detached, SETUPS[1], giving, STATED]
-    for frames, setup in zip(replay_batch(setups, POKE[:4], SMALL), setups, strict=True):
+    found = replay_batch(setups, POKE[:4], SMALL)
+    for frames, setup in zip(found, setups, strict=True):
         _agree(frames, replay(setup, POKE[:4], SMALL))
+    assert all(np.abs(found[place][3].displacement - found[3][3].displacement).max() > 1e-5 for place in range(3))
 
 
 def test_batch_larger_than_the_memory_is_done_in_parts(monkeypatch):
@@ -198,5 +210,7 @@ def test_sweep_takes_single_replays_on_a_processor_and_a_batch_elsewhere(monkeyp
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA here")
 @pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS)
 def test_graphics_card_finds_what_a_processor_finds(grid):
-    for frames, setup in zip(replay_batch(SETUPS, POKE, grid, device="cuda"), SETUPS, strict=True):
+    found = replay_batch(SETUPS, POKE, grid, device="cuda")
+    assert any(frame.in_contact for frame in found[0])
+    for frames, setup in zip(found, SETUPS, strict=True):
         _agree(frames, replay(setup, POKE, grid))
