@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from core.errors import SolveError
 from core.fem.friction import Hold
 from core.fem.model import Probe
 from core.fem.newton import Outcome
 from core.frames import FloatArray
 from core.meshing import Mesh
 
-__all__ = ["Equilibrium"]
+__all__ = ["Equilibrium", "require_converged"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,3 +51,13 @@ class Equilibrium:
     def move(self, points: FloatArray) -> FloatArray:
         """Current positions of material points given by their rest positions (m, 3) [m]."""
         return points + self.mesh.interpolate(self._moved, points)
+
+
+def require_converged(frames: Sequence[Equilibrium]) -> None:
+    """Raise SolveError that names the first frame without equilibrium, its residual and the cause."""
+    for number, frame in enumerate(frames):
+        if frame.outcome is not Outcome.CONVERGED:
+            raise SolveError(
+                f"frame {number}: {frame.outcome.value} (residual {frame.residual:.2g} after {frame.iterations} iterations)",
+                frame=number, residual=frame.residual, outcome=frame.outcome.name,
+            )  # fmt: skip

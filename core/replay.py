@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from core.equilibrium import Equilibrium
+from core.equilibrium import Equilibrium, require_converged
 from core.errors import SetupError, SolveError
 from core.fem.drag import Past, drag
 from core.fem.follow import Follower
@@ -33,13 +33,6 @@ GRAVITY = 9.81
 """Acceleration of free fall [m/s^2]."""
 _MOST_SLIDES, _DRAG_STEP = 12, 1e-3
 """Of a base in one frame, and the longest motion of a tool with friction [m] that is taken as straight."""
-
-
-def _away(setup: Setup, probe: Probe) -> bool:
-    """Whether the tool cannot touch the block, sagging and bulging allowed for."""
-    slack = 5e-4 if setup.load.specific_weight_over_stiffness or setup.material.remembers else 0.0
-    nearest = setup.geometry.nearest(probe.centre[None])[0]
-    return bool(np.linalg.norm(probe.centre - nearest) > probe.radius + slack)
 
 
 class Replay:
@@ -104,35 +97,46 @@ class Replay:
             solution.penetration, touched, hardness=self.model(mesh).hardness,
         )  # fmt: skip
 
+    def away(self, probe: Probe) -> bool:
+        """Whether the tool cannot touch the block, sagging and bulging allowed for."""
+        slack = 5e-4 if self.setup.load.specific_weight_over_stiffness or self.setup.material.remembers else 0.0
+        nearest = self.setup.geometry.nearest(probe.centre[None])[0]
+        return bool(np.linalg.norm(probe.centre - nearest) > probe.radius + slack)
+
     def held(self, probe: Probe, start: Equilibrium) -> Equilibrium:
         """Equilibrium with the base where it is; `probe` in the frame of the slid block."""
         local = Probe(probe.centre - np.append(self.slip, 0.0), probe.radius)
-        if _away(self.setup, local):
+        if self.away(local):
             if self.memory is None or self.memory.fresh:
                 return replace(self.free, slip=self.slip.copy(), probe=probe)
             # The grid stays where the dent is.
             solution = self._untouched(self.model(start.mesh), start.mesh.nodes + start.displacement)
             return self._equilibrium(solution, start.mesh, probe)
-        mesh = self.grid.mesh(self.setup, local.centre)
-        model = self.model(mesh)
-        # The dent travels with the tool, so the field is carried along with the grid's focus before it is read.
-        carried = mesh.focus - start.mesh.focus if start.in_contact else np.zeros(3)
-        displacement = start.displacement
-        if start.mesh is not mesh:
-            displacement = start.mesh.interpolate(start.displacement, mesh.nodes - carried)
-            displacement[mesh.connectivity.base_nodes] *= 1.0 if model.sprung else 0.0
-        before = Probe(start.probe.centre - np.append(start.slip, 0.0) + carried, start.probe.radius)
-        positions = self._extrapolated(model, start, mesh.nodes + displacement, local)
-        if not start.in_contact:  # begin where the straight way in first touches, not from afar
-            before = self._first_touch(before, local)
+        model, positions, before, carried = self.set_out(local, start)
+        positions = self._extrapolated(model, start, positions, local)
         if self.setup.tool.friction_coefficient:
             past = Past.of(model, start, Probe(before.centre - carried, before.radius))
             frame = self._dragged(model, positions, (before, local), past, probe)
         else:
             solution = lead(model, positions, before, local, self.tolerance, self._follower)
-            frame = self._equilibrium(self._settled(model, local, solution), mesh, probe)
+            frame = self._equilibrium(self._settled(model, local, solution), model.mesh, probe)
         self._before = (start, frame)
         return frame
+
+    def set_out(self, probe: Probe, start: Equilibrium) -> tuple[BlockModel, FloatArray, Probe, FloatArray]:
+        """Where a solve begins, seen from the slid block: the model, positions (n, 3) [m], the tool before `probe`, and how far the
+        grid's focus has moved since `start` (3,) [m], which carries the dent along with the tool.
+        """
+        mesh = self.grid.mesh(self.setup, probe.centre)
+        model, displacement = self.model(mesh), start.displacement
+        carried = mesh.focus - start.mesh.focus if start.in_contact else np.zeros(3)
+        if start.mesh is not mesh:
+            displacement = start.mesh.interpolate(start.displacement, mesh.nodes - carried)
+            displacement[mesh.connectivity.base_nodes] *= 1.0 if model.sprung else 0.0
+        before = Probe(start.probe.centre - np.append(start.slip, 0.0) + carried, start.probe.radius)
+        if not start.in_contact:  # begin where the straight way in first touches, not from afar
+            before = self._first_touch(before, probe)
+        return model, mesh.nodes + displacement, before, carried
 
     def _dragged(
         self, model: BlockModel, positions: FloatArray, probes: tuple[Probe, Probe], past: Past, probe: Probe
@@ -178,12 +182,12 @@ class Replay:
     def _first_touch(self, before: Probe, probe: Probe) -> Probe:
         """The last place on the way to `probe` that is clear of the block."""
         low, high = 0.0, 1.0
-        if np.linalg.norm(before.centre - probe.centre) > 1.0 or not _away(self.setup, before):
+        if np.linalg.norm(before.centre - probe.centre) > 1.0 or not self.away(before):
             middle = (self.setup.geometry.low + self.setup.geometry.high) / 2
             before = Probe(probe.centre + (probe.centre - middle) / np.linalg.norm(probe.centre - middle) * 0.05, probe.radius)
         for _ in range(12):
             share = (low + high) / 2
-            clear = _away(self.setup, Probe(before.centre + share * (probe.centre - before.centre), probe.radius))
+            clear = self.away(Probe(before.centre + share * (probe.centre - before.centre), probe.radius))
             low, high = (share, high) if clear else (low, share)
         return Probe(before.centre + low * (probe.centre - before.centre), probe.radius)
 
@@ -287,13 +291,3 @@ def replay(
         frames.append(frame)
         previous = frame if frame.outcome is Outcome.CONVERGED else previous if setup.remembers else None
     return frames
-
-
-def require_converged(frames: Sequence[Equilibrium]) -> None:
-    """Raise SolveError that names the first frame without equilibrium, its residual and the cause."""
-    for number, frame in enumerate(frames):
-        if frame.outcome is not Outcome.CONVERGED:
-            raise SolveError(
-                f"frame {number}: {frame.outcome.value} (residual {frame.residual:.2g} after {frame.iterations} iterations)",
-                frame=number, residual=frame.residual, outcome=frame.outcome.name,
-            )  # fmt: skip

@@ -13,7 +13,7 @@ from core.fem.path import DEEPEST, FREE_STEP
 from core.frames import FloatArray
 from core.mesh import GridSpec
 from core.meshing import Mesh
-from core.replay import Replay, _away
+from core.replay import Replay
 from core.setup import Setup
 
 __all__ = ["Begin", "Member"]
@@ -58,21 +58,12 @@ class Member(Replay):
     def begin(self, centre: FloatArray) -> Begin | None:
         """The solve for the next frame, with the tool stated at `centre` (3,) [m]; None when it does not touch."""
         probe = Probe(centre + self._offset, self.setup.tool.radius)
-        if _away(self.setup, probe):
+        if self.away(probe):
             return None
-        mesh, start = self.grid.mesh(self.setup, probe.centre), self._previous or self.free
-        model = self.model(mesh)
+        start = self._previous or self.free
+        model, positions, before, _ = self.set_out(probe, start)
         model.harden(1.0)
-        carried = mesh.focus - start.mesh.focus if start.in_contact else np.zeros(3)
-        displacement = start.displacement
-        if start.mesh is not mesh:
-            displacement = start.mesh.interpolate(start.displacement, mesh.nodes - carried)
-            displacement[mesh.connectivity.base_nodes] = 0.0
-        before = Probe(start.probe.centre + carried, start.probe.radius)
-        if not start.in_contact:
-            before = self._first_touch(before, probe)
-        positions = mesh.nodes + displacement
-        return Begin(model, positions, positions + self._further(start, mesh, probe), before, probe)
+        return Begin(model, positions, positions + self._further(start, model.mesh, probe), before, probe)
 
     @property
     def _previous(self) -> Equilibrium | None:
