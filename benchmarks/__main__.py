@@ -6,11 +6,12 @@ import sys
 
 from rich.console import Console
 
-from benchmarks import cleaning, convergence, dataset, effects, measurement, modulus, peers, replay, shapes, sweep
+from benchmarks import cleaning, convergence, dataset, effects, gradings, measurement, modulus, peers, replay, shapes, sweep
 
 ALL = {
     "replay": replay.run,
     "peers": peers.run,
+    "gradings": gradings.run,
     "convergence": convergence.run,
     "shapes": shapes.run,
     "sweep": sweep.run,

@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 
 from core.frames import FloatArray
 
-__all__ = ["even_axis", "graded_axis"]
+__all__ = ["even_axis", "graded_axis", "sized_axis"]
 
 
 def even_axis(low: float, high: float, nodes: int) -> FloatArray:
@@ -40,3 +40,24 @@ def graded_axis(low: float, high: float, nodes: int, focus: float, spacing: floa
     lower = focus - side(left, on_left)[::-1] if on_left else np.array([low])
     upper = focus + side(right, elements - on_left) if on_left < elements else np.array([high])
     return np.concatenate([lower, upper[1:]])
+
+
+def sized_axis(low: float, high: float, focus: float, edge: float, growth: float) -> FloatArray:
+    """Element ends [m] for edges that are `edge` long at the focus and grow by `growth` [1] over the distance from it.
+
+    On each side the growth is changed a little, so that a whole number of elements fills it.
+    """
+    below, above = _side(focus - low, edge, growth), _side(high - focus, edge, growth)
+    return np.concatenate([focus - below[::-1], focus + above[1:]])
+
+
+def _side(length: float, edge: float, growth: float) -> FloatArray:
+    """Distances of the element ends from the focus [m], from 0 to the length."""
+    if length <= 0:
+        return np.zeros(1)
+    number = max(1, round(float(np.log1p(growth * length / edge) / growth)))
+    if number * edge >= length:
+        return np.linspace(0, length, number + 1)
+    whole = brentq(lambda rate: float(np.log1p(rate * length / edge) / rate) - number, 1e-9, 1e3)
+    steps = np.expm1(whole * np.arange(number + 1))
+    return np.asarray(length * steps / steps[-1])

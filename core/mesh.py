@@ -6,7 +6,7 @@ Grading matters more than the number of nodes: the contact zone of a 5 mm ball i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,7 @@ from core.meshing import FINER, Connectivity, IntArray
 if TYPE_CHECKING:
     from core.setup import Setup
 
-__all__ = ["BoxMesh", "GridSpec", "IntArray", "box_mesh"]
+__all__ = ["BoxMesh", "GridSpec", "IntArray", "box_mesh", "focus_of", "with_middles"]
 
 _FOCUS_STEP = 2e-4
 
@@ -72,20 +72,25 @@ class GridSpec:
         return cls(nodes=(nx, ny, nz))
 
     def mesh(self, setup: Setup, centre: FloatArray) -> BoxMesh:
-        """The grid refined towards the surface point next to the tool, in small steps so that neighbouring frames share it."""
+        """The grid refined towards the surface point next to the tool."""
         size = setup.box.size
         if self.spacing is None:
             return _mesh(size, self, (0.0, 0.0, size[2]))
-        half = np.array([size[0] / 2, size[1] / 2])
-        low, high = np.append(-half, 0.0), np.append(half, size[2])
-        focus = np.clip(np.round(centre / _FOCUS_STEP) * _FOCUS_STEP, low, high)
-        inside = np.all((focus > low) & (focus < high))
-        if inside:  # a centre pushed below the surface: refine the nearest side, from above if in doubt
-            gaps = np.concatenate([focus - low, high - focus])
-            gaps[2] = np.inf
-            side = int(np.argmin(gaps))
-            focus[side % 3] = high[side % 3] if side >= 3 else low[side % 3]
+        focus = focus_of(size, centre)
         return _mesh(size, self, (float(focus[0]), float(focus[1]), float(focus[2])))
+
+
+def focus_of(size: tuple[float, float, float], centre: FloatArray) -> FloatArray:
+    """The surface point (3,) [m] next to a tool's centre, in small steps so that neighbouring frames share it."""
+    half = np.array([size[0] / 2, size[1] / 2])
+    low, high = np.append(-half, 0.0), np.append(half, size[2])
+    focus = np.clip(np.round(centre / _FOCUS_STEP) * _FOCUS_STEP, low, high)
+    if np.all((focus > low) & (focus < high)):  # a centre pushed below the surface: the nearest side, the top if in doubt
+        gaps = np.concatenate([focus - low, high - focus])
+        gaps[2] = np.inf
+        side = int(np.argmin(gaps))
+        focus[side % 3] = high[side % 3] if side >= 3 else low[side % 3]
+    return np.asarray(focus)
 
 
 def _quadratic(local: FloatArray) -> list[FloatArray]:
@@ -93,7 +98,7 @@ def _quadratic(local: FloatArray) -> list[FloatArray]:
     return [(1 - local) * (1 - 2 * local), 4 * local * (1 - local), local * (2 * local - 1)]
 
 
-def _with_middles(ends: FloatArray) -> FloatArray:
+def with_middles(ends: FloatArray) -> FloatArray:
     """Coordinates with the middle of each interval between them."""
     return np.insert(ends, np.arange(1, len(ends)), (ends[1:] + ends[:-1]) / 2)
 
@@ -104,15 +109,17 @@ class BoxMesh:
 
     Attributes:
         axes: node coordinates along x, y, z [m], phantom frame. order: of the shape functions, 1 or 2; with 2 every second node
-            lies midway between its neighbours.
+            lies midway between its neighbours. focus: where a mesh that follows the tool is finest (3,) [m]; the same place for
+            all that do not.
     """
 
     axes: tuple[FloatArray, FloatArray, FloatArray]
     order: int = 1
+    focus: FloatArray = field(default_factory=lambda: np.zeros(3))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Only the axes and the order travel between processes; the rest is made again when asked for."""
-        return {"axes": self.axes, "order": self.order}
+        """Only what it was made from travels between processes; the rest is made again when asked for."""
+        return {"axes": self.axes, "order": self.order, "focus": self.focus}
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:
@@ -191,11 +198,6 @@ class BoxMesh:
         """Shared by all grids of this shape and order."""
         return _connectivity(self.shape, self.order)
 
-    @property
-    def focus(self) -> FloatArray:
-        """Where the grid is finest (3,) [m]; the same place for all even grids of one block."""
-        return np.array([axis[int(np.argmin(np.gradient(axis)))] for axis in self.axes])
-
     def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """Elements' nodes and shape functions (m, a) at rest positions (m, 3) [m]; outside is moved to the block."""
         first, parts = [], []
@@ -241,14 +243,15 @@ def box_mesh(size: tuple[float, float, float], grid: GridSpec, focus: FloatArray
     lows, highs = (-size[0] / 2, -size[1] / 2, 0.0), (size[0] / 2, size[1] / 2, size[2])
     ends = [(count - 1) // grid.order + 1 for count in grid.nodes]
     if grid.spacing is None:
+        centre = np.zeros(3)
         axes = [even_axis(low, high, n) for low, high, n in zip(lows, highs, ends, strict=True)]
     else:
         centre = np.array([0.0, 0.0, size[2]]) if focus is None else np.clip(focus, lows, highs)
         edge = grid.spacing * grid.order
         axes = [graded_axis(low, high, n, float(at), edge) for low, high, n, at in zip(lows, highs, ends, centre, strict=True)]
     if grid.order == 2:
-        axes = [_with_middles(axis) for axis in axes]
-    return BoxMesh((axes[0], axes[1], axes[2]), grid.order)
+        axes = [with_middles(axis) for axis in axes]
+    return BoxMesh((axes[0], axes[1], axes[2]), grid.order, centre)
 
 
 @lru_cache(maxsize=64)

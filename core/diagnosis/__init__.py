@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 import tempfile
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,24 +22,21 @@ from core.diagnosis.static import StaticChannel
 from core.diagnosis.verdict import report_of
 from core.diagnosis.workers import Workers
 from core.errors import DiagnosisError, RunError
-from core.mesh import GridSpec
+from core.grading import Grading
+from core.meshing import Meshing
 from core.progress import Report, part, silent
 from core.registration import Registration, register, setup_from
 from core.setup import Setup
 
 __all__ = ["DIAGNOSIS_GRID", "FINE_GRID", "diagnose"]
 
-DIAGNOSIS_GRID = GridSpec(nodes=(15, 11, 9), spacing=1.2e-3)
-FINE_GRID = GridSpec(nodes=(21, 15, 12), spacing=0.75e-3)
-PAGE_GRID = GridSpec(nodes=(13, 9, 8), spacing=1.5e-3)
+DIAGNOSIS_GRID = Grading(spacing=1.3e-3, along=0.5, inward=0.9)
+FINE_GRID = Grading(spacing=1e-3, along=0.45, inward=0.7)
+PAGE_GRID = Grading(spacing=1.5e-3, along=0.7, inward=1.2)
 """For a tool of 5 mm; all are scaled with the stated radius."""
 FIT_GROUPS = 14
 TEST_GROUPS = 24
 _USUAL_RADIUS = 5e-3
-
-
-def _scaled(grid: GridSpec, radius: float) -> GridSpec:
-    return replace(grid, spacing=(grid.spacing or 1e-3) * radius / _USUAL_RADIUS)
 
 
 def diagnose(
@@ -112,7 +109,8 @@ def _run(
     replays: bool,
 ) -> dict[str, Any]:
     fitted, unseen = data
-    grid, fine = _scaled(DIAGNOSIS_GRID, setup.tool.radius), _scaled(FINE_GRID, setup.tool.radius)
+    size = setup.tool.radius / _USUAL_RADIUS
+    grid, fine = DIAGNOSIS_GRID.scaled(size), FINE_GRID.scaled(size)
     static = StaticChannel.of(dataset.rest_cloud(), cleaner_for(dataset, registration), setup, grid)
     names = [item.name for item in fitted]
     bench = Bench(setup, registration, pool, names, static, grid, fine, part(report, 0.05, 0.75))
@@ -139,7 +137,7 @@ def _record(
     """Every sequence under the stated and the extended setup, for the page."""
     stated, found = setups
     cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration)
-    page = _scaled(PAGE_GRID, stated.tool.radius)
+    page = PAGE_GRID.scaled(stated.tool.radius / _USUAL_RADIUS)
     tasks = [
         pool.run(record, dataset.path, name, stated, found, cleaner, shaft, page, folder / f"{name}.npz")
         for name in dataset.sequences
@@ -149,7 +147,7 @@ def _record(
         task.result()
 
 
-def _gain(unseen: list[Observations], pool: Workers, stated: Setup, found: Setup, grid: GridSpec, seed: int) -> Ladder:
+def _gain(unseen: list[Observations], pool: Workers, stated: Setup, found: Setup, grid: Meshing, seed: int) -> Ladder:
     names = [item.name for item in unseen]
     baseline = [future.result() for future in pool.submit(names, stated, grid)]
     extended = baseline if found is stated else [future.result() for future in pool.submit(names, found, grid, None, baseline)]
@@ -161,5 +159,5 @@ def _model(dataset: Dataset, setup: Setup, findings: Findings, fitted: list[str]
     effects = [effect.to_json() for effect in findings.best.model.effects] if findings.best else []
     return {
         "format": 1, "version": 1, "dataset": dataset.name, "parent": None, "fitted_on": fitted, "effects": effects,
-        "setup": setup.as_dict(), "grid": vars(DIAGNOSIS_GRID) | {"nodes": list(DIAGNOSIS_GRID.nodes)},
+        "setup": setup.as_dict(), "grid": asdict(DIAGNOSIS_GRID.scaled(setup.tool.radius / _USUAL_RADIUS)),
     }  # fmt: skip

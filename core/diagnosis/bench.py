@@ -21,7 +21,7 @@ from core.effects.support import BaseSlip
 from core.effects.tool import ToolRadius
 from core.frames import FloatArray
 from core.measurement import Surface
-from core.mesh import GridSpec
+from core.meshing import Meshing
 from core.progress import Report, silent
 from core.registration import Registration
 from core.setup import Inclusion, Setup
@@ -46,8 +46,8 @@ class Bench:
         workers: Workers,
         names: Sequence[str],
         static: StaticChannel | None,
-        grid: GridSpec,
-        fine: GridSpec,
+        grid: Meshing,
+        fine: Meshing,
         report: Report = silent,
     ) -> None:
         self.setup, self.registration, self.workers, self.static = setup, registration, workers, static
@@ -113,7 +113,7 @@ class Bench:
         )  # fmt: skip
 
     def predict(
-        self, effects: Sequence[Effect], wanted: Wanted | None, starts: Sequence[Prediction] | None, grid: GridSpec | None = None
+        self, effects: Sequence[Effect], wanted: Wanted | None, starts: Sequence[Prediction] | None, grid: Meshing | None = None
     ) -> list[Future[Prediction]]:
         """Begin the replays of all sequences with these effects."""
         self.evaluations += 1

@@ -14,7 +14,7 @@ from core.fem.newton import Outcome
 from core.fem.stiffness import lump_share
 from core.frames import FloatArray, Transform
 from core.measurement import Surface
-from core.mesh import GridSpec
+from core.meshing import Meshing
 from core.registration.robot import fit_robot
 from core.replay import Equilibrium, Replay, rest
 from core.sensitivity import TOOL_STEP, displacement_changes, stiffness_changes
@@ -71,7 +71,7 @@ class Prediction:
         return tuple(i for i, frame in enumerate(self.equilibria) if frame.outcome is not Outcome.CONVERGED)
 
 
-def touch_correction(setup: Setup, grid: GridSpec) -> Transform:
+def touch_correction(setup: Setup, grid: Meshing) -> Transform:
     """Stated to true phantom_from_robot: the touched landmarks had sagged, while the registration took them for unloaded."""
     if not setup.load.specific_weight_over_stiffness or len(setup.landmarks) < 3:
         return Transform()
@@ -150,7 +150,7 @@ class _Columns:
 def predict(
     data: Observations,
     setup: Setup,
-    grid: GridSpec,
+    grid: Meshing,
     wanted: Wanted | None = None,
     starts: Sequence[Equilibrium] | None = None,
     tolerance: float = 3e-4,

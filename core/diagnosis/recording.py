@@ -15,7 +15,7 @@ from core.diagnosis.prediction import touch_correction
 from core.fem.newton import Outcome
 from core.frames import FloatArray
 from core.measurement import Gaps, Surface, gaps
-from core.mesh import GridSpec
+from core.meshing import Meshing
 from core.metrics import paper_distance
 from core.replay import Equilibrium, replay
 from core.setup import Setup
@@ -82,7 +82,7 @@ def _side(setup: Setup, frames: list[Equilibrium], clouds: list[FloatArray]) -> 
 
 
 def record(
-    folder: Path, name: str, stated: Setup, found: Setup, cleaner: Cleaner, shaft: FloatArray | None, grid: GridSpec, target: Path
+    folder: Path, name: str, stated: Setup, found: Setup, cleaner: Cleaner, shaft: FloatArray | None, grid: Meshing, target: Path
 ) -> str:
     """Replay one sequence under both models and write `target`; returns the sequence's name."""
     sequence = open_dataset(folder).sequence(name)

@@ -16,7 +16,7 @@ from core.cleaning import Cleaner
 from core.diagnosis.evidence import Block
 from core.frames import FloatArray
 from core.measurement import Surface, gaps, patch_means
-from core.mesh import GridSpec
+from core.meshing import Meshing
 from core.registration import motion_jacobian
 from core.replay import rest
 from core.setup import Setup
@@ -52,7 +52,7 @@ class StaticChannel:
     reach: float
 
     @classmethod
-    def of(cls, cloud: FloatArray, cleaner: Cleaner, setup: Setup, grid: GridSpec) -> StaticChannel:
+    def of(cls, cloud: FloatArray, cleaner: Cleaner, setup: Setup, grid: Meshing) -> StaticChannel:
         """From the raw rest cloud (n, 3) [m], camera frame, under the stated setup."""
         clean = cleaner.clean(cloud)
         places, height, scatter = _table_cells(clean.table_points)
@@ -72,7 +72,7 @@ class StaticChannel:
         covariance += _POSE_FREEDOM**2 * moved @ np.diag([1, 1, 1, 100, 100, 100]) @ moved.T
         return cls(centres, normals, residual, cho_factor(covariance)[0], bias, reach)
 
-    def block(self, stated: Setup, setup: Setup, grid: GridSpec, columns: int, varied: dict[int, tuple[Setup, float]]) -> Block:
+    def block(self, stated: Setup, setup: Setup, grid: Meshing, columns: int, varied: dict[int, tuple[Setup, float]]) -> Block:
         """Quadratic form with the pose and the bias integrated out.
 
         Args:

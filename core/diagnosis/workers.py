@@ -14,7 +14,7 @@ from typing import ParamSpec, Self, TypeVar
 from core.diagnosis.comparison import Sample
 from core.diagnosis.observations import Observations
 from core.diagnosis.prediction import Prediction, Wanted, predict
-from core.mesh import GridSpec
+from core.meshing import Meshing
 from core.replay import Equilibrium
 from core.setup import Setup
 
@@ -38,7 +38,7 @@ def _begin(data: Sequence[Observations]) -> None:
 def _task(
     name: str,
     setup: Setup,
-    grid: GridSpec,
+    grid: Meshing,
     wanted: Wanted | None,
     starts: Sequence[Equilibrium] | None,
     samples: Sequence[Sample] | None,
@@ -74,7 +74,7 @@ class Workers:
         self,
         names: Sequence[str],
         setup: Setup,
-        grid: GridSpec,
+        grid: Meshing,
         wanted: Wanted | None = None,
         starts: Sequence[Prediction] | None = None,
         tolerance: float = 3e-4,

@@ -16,6 +16,7 @@ from core.axes import even_axis
 from core.errors import MeshError
 from core.fem.model import rule_of
 from core.frames import FloatArray
+from core.grading import Grading
 from core.mesh import BoxMesh, GridSpec
 from core.meshing import Mesh, Meshing
 from core.setup import Setup
@@ -137,8 +138,9 @@ def _reading(cells: CellPoints, mesh: BoxMesh, axis: int) -> FloatArray:
 
 def material_points(setup: Setup, grid: Meshing, mesh: Mesh) -> MaterialPoints:
     """The points for a body that is meshed like this, of which this mesh is one."""
-    if not isinstance(grid, GridSpec) or grid.spacing is None:
+    spacing = grid.spacing if isinstance(grid, Grading | GridSpec) else None
+    if spacing is None:
         return QuadraturePoints(mesh)
-    size, spacing = setup.box.size, grid.spacing
+    size = setup.box.size
     nx, ny, nz = (int(np.clip(np.ceil(_CELLS_PER_EDGE * edge / spacing), 2, _MOST_CELLS)) for edge in size)
     return CellPoints(size, (nx, ny, nz))

@@ -1,0 +1,100 @@
+"""What a mesh's grading is worth where the tool may be, not only amid the top: seven pushes, each on every way to spend the nodes.
+
+`python -m benchmarks.gradings` solves them once more on a grid of 10 353 nodes, far finer than those compared, and stores that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from rich.table import Table
+
+from benchmarks.reference import SETUP
+from benchmarks.stopwatch import timed
+from core.diagnosis import DIAGNOSIS_GRID, FINE_GRID, PAGE_GRID
+from core.frames import FloatArray
+from core.mesh import GridSpec
+from core.meshing import Meshing
+from core.replay import replay, require_converged
+
+__all__ = ["run"]
+
+FINEST = GridSpec(nodes=(29, 21, 17), spacing=0.7e-3, order=2)
+TARGET = (0.07, 0.08)
+"""That the mesh of the diagnosis may be off at half the way and at its end, the worst place counted [1]."""
+_FILE = Path(__file__).with_name("gradings.npz")
+GRIDS: dict[str, Meshing] = {
+    "graded by size, diagnosis": DIAGNOSIS_GRID,
+    "graded by size, second mesh": FINE_GRID,
+    "graded by size, page": PAGE_GRID,
+    "trilinear 15x11x9, 1.2 mm": GridSpec(nodes=(15, 11, 9), spacing=1.2e-3),
+    "trilinear 21x15x12, 0.75 mm": GridSpec(nodes=(21, 15, 12), spacing=0.75e-3),
+    "quadratic 13x9x9, 1.2 mm": GridSpec(nodes=(13, 9, 9), spacing=1.2e-3, order=2),
+    "quadratic 17x13x9, 1.2 mm": GridSpec(nodes=(17, 13, 9), spacing=1.2e-3, order=2),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Pushes:
+    """Displacement (7, 2, m, 3) [m] over the free surface half way and at the end of each push, and force (7, 2, 3) [N]."""
+
+    displacement: FloatArray
+    force: FloatArray
+
+    def off(self, truth: Pushes) -> tuple[FloatArray, FloatArray]:
+        """Relative errors (7, 2) of displacement and of force."""
+        miss = np.linalg.norm(self.displacement - truth.displacement, axis=(2, 3))
+        force = np.linalg.norm(self.force - truth.force, axis=2)
+        return miss / np.linalg.norm(truth.displacement, axis=(2, 3)), force / np.linalg.norm(truth.force, axis=2)
+
+
+def _ways() -> list[FloatArray]:
+    """Tool centres (f, 3) [m]: four places on the top to 8 mm, two on the sides to 6 mm, and a slanted push to 6 mm."""
+    x, y, z = SETUP.box.size
+    radius, deep, aside = SETUP.tool.radius, np.arange(1, 9)[:, None] * 1e-3, np.arange(1, 7)[:, None] * 1e-3
+    starts = [(0.0, 0.0), (0.012, 0.005), (-0.02, -0.008), (0.0071, -0.0113)]
+    ways = [np.array([*place, z + radius]) - deep * [0, 0, 1] for place in starts]
+    ways.append(np.array([x / 2 + radius, 0, 0.02]) - aside * [1, 0, 0])
+    ways.append(np.array([0.008, -y / 2 - radius, 0.014]) + aside * [0, 1, 0])
+    return [*ways, np.array([0.02, 0.01, z + radius]) + aside * [0.5, 0.2, -0.84]]
+
+
+def _pushed(grid: Meshing) -> Pushes:
+    points, displacement, force = SETUP.geometry.surface_points(), [], []
+    for way in _ways():
+        frames = replay(SETUP, way, grid, tolerance=1e-4)
+        require_converged(frames)
+        keys = [frames[len(frames) // 2 - 1], frames[-1]]
+        displacement.append([frame.move(points) - points for frame in keys])
+        force.append([frame.force for frame in keys])
+    return Pushes(np.array(displacement), np.array(force))
+
+
+def _truth() -> Pushes:
+    with np.load(_FILE) as stored:
+        return Pushes(stored["displacement"].astype(float), stored["force"])
+
+
+def run() -> list[Table]:
+    """Errors and time of each way; the mesh of the diagnosis must keep what is promised of it at every place."""
+    title = "Seven pushes (top, sides, slanted), error over the free surface half way / at the end"
+    table = Table("mesh", "nodes", "worst place", "typical", "worst force", "typical", "ms a frame", title=title)
+    truth, count = _truth(), sum(len(way) for way in _ways())
+    for name, grid in GRIDS.items():
+        _pushed(grid)  # warms up
+        found, seconds = timed(partial(_pushed, grid))
+        displacement, force = found.off(truth)
+        nodes = len(grid.mesh(SETUP, _ways()[0][-1]).nodes)
+        both = [f"{a:.1%} / {b:.1%}" for error in (displacement, force) for a, b in (error.max(axis=0), np.median(error, axis=0))]
+        table.add_row(name, str(nodes), *both, f"{1e3 * seconds / count:.0f}")
+        if grid is DIAGNOSIS_GRID and (displacement.max(axis=0) > TARGET).any():
+            raise RuntimeError(f"the mesh of the diagnosis is off by {both[0]}")
+    return [table]
+
+
+if __name__ == "__main__":
+    solved = _pushed(FINEST)
+    np.savez_compressed(_FILE, displacement=solved.displacement.astype(np.float32), force=solved.force)

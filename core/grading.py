@@ -1,0 +1,76 @@
+"""Hexahedra as large as the place asks for: a block's mesh by sizes and not by numbers.
+
+A fixed number of nodes along an axis is spread thinly where the tool stands amid a long face, and wasted where it stands near an
+edge; and along the axis that points into the body, where the field is smooth, it wants fewer than across. Pokes by 8 mm into four
+places on the top are 3 to 6 % off with 1547 nodes graded so; quadratic elements of 13x9x9 nodes are 7 to 17 % off, although the one
+in the very middle, alone, is 8 % off (`python -m benchmarks gradings`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from core.axes import sized_axis
+from core.errors import MeshError
+from core.frames import FloatArray
+from core.mesh import BoxMesh, focus_of, with_middles
+from core.meshing import FINER
+
+if TYPE_CHECKING:
+    from core.setup import Setup
+
+__all__ = ["Grading"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Grading:
+    """How large a block's hexahedra are: the edge's length grows with the distance from the focus, on the surface below the tool.
+
+    Attributes:
+        spacing: distance of the nodes [m] at the focus.
+        along, inward: growth of the edge's length over the distance [1], across the face that is pushed and into the body.
+        order: of the shape functions, 1 (8 nodes an element) or 2 (27 nodes).
+    """
+
+    spacing: float
+    along: float = 0.5
+    inward: float = 0.9
+    order: int = 2
+
+    def __post_init__(self) -> None:
+        if not 0 < self.spacing < 1:
+            raise MeshError(f"element spacing {self.spacing:g} m is not between 0 and 1 m", spacing=self.spacing)
+        for name, growth in (("along", self.along), ("inward", self.inward)):
+            if not 0 < growth <= 10:
+                raise MeshError(f"a mesh's growth {name} is between 0 and 10, got {growth:g}", growth=growth)
+        if self.order not in (1, 2):
+            raise MeshError(f"elements are of order 1 or 2, got {self.order}", order=self.order)
+
+    def mesh(self, setup: Setup, centre: FloatArray) -> BoxMesh:
+        """The mesh for a tool's centre (3,) [m]; the same object for places next to each other."""
+        size = setup.box.size
+        x, y, z = focus_of(size, centre).tolist()
+        return _mesh(size, self, (x, y, z))
+
+    def finer(self) -> Grading:
+        """With nodes FINER times closer everywhere."""
+        return replace(self, spacing=self.spacing / FINER, along=self.along / FINER, inward=self.inward / FINER)
+
+    def scaled(self, factor: float) -> Grading:
+        """For a tool this many times as large."""
+        return replace(self, spacing=self.spacing * factor)
+
+
+@lru_cache(maxsize=64)
+def _mesh(size: tuple[float, float, float], grading: Grading, focus: tuple[float, float, float]) -> BoxMesh:
+    lows, highs = (-size[0] / 2, -size[1] / 2, 0.0), (size[0] / 2, size[1] / 2, size[2])
+    axes: list[FloatArray] = []
+    for low, high, at in zip(lows, highs, focus, strict=True):
+        growth = grading.inward if at in (low, high) else grading.along
+        axis = sized_axis(low, high, at, grading.spacing * grading.order, growth)
+        axes.append(with_middles(axis) if grading.order == 2 else axis)
+    return BoxMesh((axes[0], axes[1], axes[2]), grading.order, np.array(focus))
