@@ -39,7 +39,7 @@ from core.frames import FloatArray
 from core.meshing import Mesh, Meshing
 from core.setup import Material, Setup
 
-__all__ = ["History", "Memory", "State", "refuse_memory"]
+__all__ = ["History", "Memory", "State", "Step", "refuse_memory"]
 
 _MOST_ROUNDS = 100
 """Equilibria in one frame until one brings its own set: each leaves about the retained share of what the last one missed by."""
@@ -73,7 +73,7 @@ class State:
 
 
 @dataclass(frozen=True, eq=False)
-class _Step:
+class Step:
     """One step in time: what is left of each h (k,), what it takes from the change of S - T (k,), and S's factor in the stress."""
 
     left: FloatArray
@@ -93,17 +93,18 @@ class Memory:
 
     Attributes:
         history: as of the last frame that was an equilibrium; before the first, that of a block which has long been at rest.
+        step: the one that is under way. law, points, fraction: what S is by, where it is remembered, and what of M is retained.
     """
 
     def __init__(self, setup: Setup, points: MaterialPoints, mesh: Mesh) -> None:
         material = setup.material
-        self._law, self._points, self._fraction = Law.of(material), points, material.retained_fraction
+        self.law, self.points, self.fraction = Law.of(material), points, material.retained_fraction
         self._shares = np.array([term.fraction for term in material.relaxation])
         self._times = np.array([term.time_constant for term in material.relaxation])
         count, terms = len(points.tangents(mesh, mesh.nodes)), len(self._times)
         none = np.zeros((count, 6))
         self.history = History(None, False, np.zeros((terms, count, 6)), none, np.zeros(count), none, none)
-        self._step, self._time = _Step(np.zeros(terms), np.zeros(terms), 1 - float(self._shares.sum())), 0.0
+        self.rest()
 
     @classmethod
     def of(cls, setup: Setup, grid: Meshing, mesh: Mesh) -> Self | None:
@@ -115,9 +116,14 @@ class Memory:
         """Whether the tool was never there."""
         return not self.history.touched
 
+    def rest(self) -> None:
+        """Set out for the long rest before the first frame, in which all relaxes that can."""
+        none = np.zeros(len(self._times))
+        self.step, self._time = Step(none, none, 1 - float(self._shares.sum())), 0.0
+
     def start(self, rest: Equilibrium) -> None:
         """Begin with a block that has long been at rest like this."""
-        self.history = replace(self._after(rest), time=None, delayed=self.history.delayed)
+        self.history = replace(self.after(rest), time=None, delayed=self.history.delayed)
 
     def begin(self, time: float | None) -> None:
         """Set out for an instant [s]; the first one is reached at once from rest."""
@@ -129,45 +135,45 @@ class Memory:
         spans = (0.0 if last is None else time - last) / self._times
         taken = self._shares * np.where(spans > 0, -np.expm1(-spans) / np.where(spans > 0, spans, 1.0), 1.0)
         factor = float(1 - self._shares.sum() + taken.sum())
-        self._step, self._time = _Step(np.exp(-spans), taken, factor), float(time)
+        self.step, self._time = Step(np.exp(-spans), taken, factor), float(time)
 
     def recall(self, model: BlockModel, positions: FloatArray | None = None) -> None:
         """Put the step into a model; with positions (n, 3) [m], with the set that they bring."""
-        past, step, mesh = self.history, self._step, model.mesh
+        past, step, mesh = self.history, self.step, model.mesh
         fixed = np.einsum("k,kmc->mc", step.left, past.delayed) - step.taken.sum() * past.driving
         kept = past
-        if positions is not None and self._fraction:
-            kept = self._set(cauchy_green(self._points.tangents(mesh, positions)))
-        stress = self._points.read(mesh, fixed - step.factor * kept.free)
+        if positions is not None and self.fraction:
+            kept = self._set(cauchy_green(self.points.tangents(mesh, positions)))
+        stress = self.points.read(mesh, fixed - step.factor * kept.free)
         model.mu = step.factor * model.unrelaxed
         model.carried = ConstantStress.of(model, stress * model.unrelaxed[..., None])
 
     def _set(self, strained: FloatArray) -> History:
         """The history with the set that these C (m, 6) bring."""
         past = self.history
-        if not self._fraction:
+        if not self.fraction:
             return past
         strain = log_strain(strained)
         size = np.sqrt(np.einsum("mc,mc,c->m", strain, strain, [1, 1, 1, 2, 2, 2]))
         growing = size > past.largest
         longer, kept, free = size[growing], past.kept.copy(), past.free.copy()
         kept[growing] += ((longer - past.largest[growing]) / longer)[:, None] * strain[growing]
-        free[growing] = shear_stress(self._law, from_log_strain(self._fraction * kept[growing]))
+        free[growing] = shear_stress(self.law, from_log_strain(self.fraction * kept[growing]))
         return replace(past, largest=np.maximum(size, past.largest), kept=kept, free=free)
 
-    def _after(self, frame: Equilibrium) -> History:
-        """The history with a frame in it."""
-        past, step = self.history, self._step
-        strained = cauchy_green(self._points.tangents(frame.mesh, frame.mesh.nodes + frame.displacement))
+    def after(self, frame: Equilibrium) -> History:
+        """The history with a frame in it, at the end of the step that is under way."""
+        past, step = self.history, self.step
+        strained = cauchy_green(self.points.tangents(frame.mesh, frame.mesh.nodes + frame.displacement))
         found = self._set(strained)
-        driving = shear_stress(self._law, strained) - found.free
+        driving = shear_stress(self.law, strained) - found.free
         delayed = step.left[:, None, None] * past.delayed + step.taken[:, None, None] * (driving - past.driving)
         touched = past.touched or frame.in_contact
         return replace(found, time=self._time, touched=touched, delayed=delayed, driving=driving)
 
     def settled(self, model: BlockModel, probe: Probe | None, solution: Solution, tolerance: float, follower: Follower) -> Solution:
         """The equilibrium that brings its own set, from one under the set that was, with the tool where it is."""
-        if not self._fraction:
+        if not self.fraction:
             return solution
         iterations = solution.iterations
         for _ in range(_MOST_ROUNDS):
@@ -188,4 +194,4 @@ class Memory:
     def end(self, frame: Equilibrium) -> None:
         """Remember a frame; one that is no equilibrium leaves everything as it was, and the next step begins where this one did."""
         if frame.outcome is Outcome.CONVERGED:
-            self.history = self._after(frame)
+            self.history = self.after(frame)

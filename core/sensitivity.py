@@ -2,12 +2,13 @@
 
 At equilibrium the residual R(u, p) vanishes, so du/dp = -K^-1 dR/dp (implicit function theorem). dR/dp is taken by asking the
 changed Setup for its residual at the same displacement; thus any effect has its sensitivity without knowing the solver.
-A setup that remembers has none here: its frame hangs on all those before it, which a change would have changed, too.
+A setup that remembers has none here: its frame hangs on all those before it, which a change would have changed, too; `core.adjoint`
+goes back through them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,7 +22,13 @@ from core.memory import refuse_memory
 from core.replay import Equilibrium, Replay
 from core.setup import Setup
 
-__all__ = ["TOOL_STEP", "displacement_changes", "factorise_at", "loss_changes", "stiffness_changes"]
+__all__ = [
+    "TOOL_STEP", "Change", "GivingTool", "displacement_changes", "factorise_at", "gives", "local_probe", "loss_changes",
+    "same_body", "stiffness_changes", "unbalanced",
+]  # fmt: skip
+
+Change = tuple[Setup, FloatArray]
+"""A Setup that differs a little from the block's, and how the tool's stated centre moves with it (3,) [m]."""
 
 TOOL_STEP = 5e-7
 """Motion of the tool [m] over which residuals are differenced: so short that no further surface point comes into touch."""
@@ -31,7 +38,7 @@ def factorise_at(block: Replay, frame: Equilibrium) -> BlockModel | None:
     """Factorise the tangent at a frame's equilibrium; None when it has no Cholesky factor."""
     model = block.model(frame.mesh)
     model.harden(frame.hardness)
-    state = model.assemble(frame.mesh.nodes + frame.displacement, _local(frame))
+    state = model.assemble(frame.mesh.nodes + frame.displacement, local_probe(frame))
     try:
         model.topology.factor.factorise(state.data)
     except NotPositiveDefinite:
@@ -39,7 +46,7 @@ def factorise_at(block: Replay, frame: Equilibrium) -> BlockModel | None:
     return model
 
 
-def _local(frame: Equilibrium) -> Probe:
+def local_probe(frame: Equilibrium) -> Probe:
     """The tool as the slid block sees it."""
     return Probe(frame.probe.centre - np.append(frame.slip, 0.0), frame.probe.radius)
 
@@ -51,34 +58,41 @@ def _holds(block: Replay, frame: Equilibrium) -> bool:
 
 def _memoryless(*setups: Setup) -> None:
     """Raise SetupError where a frame hangs on those before it."""
-    told = "a frame that hangs on those before it has no first-order changes of its own; take differences of whole replays"
+    told = "a frame that hangs on those before it has no first-order changes of its own; ask for those of the whole replay"
     for setup in setups:
         refuse_memory(setup.material, f"{told}, or")
         if setup.remembers:
             raise SetupError(told, key="friction_coefficient")
 
 
-def _unbalanced(block: Replay, frame: Equilibrium, model: BlockModel, changes: Sequence[tuple[Setup, FloatArray]]) -> FloatArray:
+def unbalanced(
+    block: Replay,
+    frame: Equilibrium,
+    model: BlockModel,
+    changes: Sequence[Change],
+    made: Callable[[int], BlockModel] | None = None,
+) -> FloatArray:
     """Minus the change of the residual (u, len(changes)) over E [m^2] at the frame's displacement.
 
-    A tool that gives way stays where it is here; `_GivingTool` moves it.
+    A tool that gives way stays where it is here; `GivingTool` moves it. `made` makes the model of the change of that number.
     """
-    positions, here = frame.mesh.nodes + frame.displacement, _local(frame)
+    positions, here = frame.mesh.nodes + frame.displacement, local_probe(frame)
     residual = model.assemble(positions, here, tangent=False).residual
     right = np.zeros((len(residual), len(changes)))
     for column, (setup, move) in enumerate(changes):
-        same = _same_body(block, setup)
-        shift = np.zeros(3) if _gives(block.setup, setup) else _shift(block, setup, move)
+        same = same_body(block, setup)
+        shift = np.zeros(3) if gives(block.setup, setup) else _shift(block, setup, move)
         if same and setup.tool.radius == block.setup.tool.radius and not shift.any():  # only the sensor differs
             continue
-        other = model if same else BlockModel(setup, frame.mesh)
+        other = model if same else BlockModel(setup, frame.mesh) if made is None else made(column)
         other.harden(frame.hardness)
         probe = Probe(here.centre + shift, here.radius + setup.tool.radius - block.setup.tool.radius)
         right[:, column] = residual - other.assemble(positions, probe, tangent=False).residual
     return right
 
 
-def _same_body(block: Replay, setup: Setup) -> bool:
+def same_body(block: Replay, setup: Setup) -> bool:
+    """Whether the setup differs from the block's in the tool and the sensor at most."""
     here = block.setup
     return setup.material == here.material and setup.load == here.load and setup.support == here.support
 
@@ -88,30 +102,37 @@ def _shift(block: Replay, setup: Setup, move: FloatArray) -> FloatArray:
     return np.asarray(np.array(setup.tool.offset) - np.array(block.setup.tool.offset) + move)
 
 
-def _gives(*setups: Setup) -> bool:
+def gives(*setups: Setup) -> bool:
+    """Whether the tool gives way in any of them."""
     return any(setup.tool.compliance_times_stiffness for setup in setups)
 
 
-class _GivingTool:
+class GivingTool:
     """How a tool on a spring takes part in a change, at a frame whose tangent is factorised; changes without one move nothing here.
 
     With y its centre, s its stated one, c its compliance times E and f the force on it over E, y = s + c f. So, with B the change
     of the residual and -H that of f as y moves, A = K^-1 B and `free` the change of the displacement at a fixed tool,
 
         (1 + c (H - B' A)) dy = ds + dc f + c (df - B' free),    du = free - A dy.
+
+    Attributes:
+        coupling: B (u, 3) [m]. answer: K^-T B, which is A where the tangent is symmetric.
     """
 
-    def __init__(self, block: Replay, frame: Equilibrium, model: BlockModel) -> None:
-        self._block, self._model, self._here = block, model, _local(frame)
+    def __init__(
+        self, block: Replay, frame: Equilibrium, model: BlockModel, solve: Callable[[FloatArray], FloatArray] | None = None
+    ) -> None:
+        """`solve` is for the transposed tangent, where it is not the symmetric one that the model's factor is of."""
+        self._block, self._model, self._here = block, model, local_probe(frame)
         self._positions = frame.mesh.nodes + frame.displacement
         self._compliance = block.setup.tool.compliance_times_stiffness
         state = model.assemble(self._positions, self._here, tangent=False)
         self._force = -state.push
         slopes = [self._slope(axis) for axis in np.eye(3)]
-        self._coupling = np.stack([residual for residual, _ in slopes], axis=1)
+        self.coupling = np.stack([residual for residual, _ in slopes], axis=1)
         harder = -np.stack([force for _, force in slopes], axis=1)
-        self.answer = model.topology.factor.solve(self._coupling)
-        self._inverse = np.linalg.inv(np.eye(3) + self._compliance * (harder - self._coupling.T @ self.answer))
+        self.answer = (solve or model.topology.factor.solve)(self.coupling)
+        self._inverse = np.linalg.inv(np.eye(3) + self._compliance * (harder - self.answer.T @ self.coupling))
 
     def _slope(self, axis: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Of the residual (u,) and of the force on the tool (3,), over E, by the tool's motion along an axis [m]."""
@@ -119,19 +140,25 @@ class _GivingTool:
         ahead, behind = (self._model.assemble(self._positions, probe, tangent=False) for probe in ways)
         return (ahead.residual - behind.residual) / (2 * TOOL_STEP), (behind.push - ahead.push) / (2 * TOOL_STEP)
 
-    def coupled(self, free: FloatArray) -> FloatArray:
-        """B' free (3, m) [m^2]."""
-        return np.asarray(self._coupling.T @ free)
+    def moved(self, changes: Sequence[Change], free: FloatArray) -> FloatArray:
+        """The change of the displacement (u, len(changes)) [m], by that at a fixed tool; for a symmetric tangent."""
+        driven = self.driven(changes) - self._compliance * (self.coupling.T @ free)
+        return np.asarray(free - self.answer @ (self._inverse @ driven))
 
-    def moves(self, changes: Sequence[tuple[Setup, FloatArray]], coupled: FloatArray) -> FloatArray:
-        """Of the centre (3, len(changes)) [m], with B' free of each change as `coupled` (3, len(changes)) [m^2]."""
-        right = np.zeros_like(coupled)
+    def adjoint(self, free: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Of the displacement (u,) and, per `driven`, of the tool's place (3,), by the adjoint displacement at a fixed tool."""
+        place = -self._inverse.T @ (self.coupling.T @ free)
+        return free - self._compliance * (self.answer @ place), place
+
+    def driven(self, changes: Sequence[Change]) -> FloatArray:
+        """ds + dc f + c df (3, len(changes)) [m]."""
+        found = np.zeros((3, len(changes)))
         for column, (setup, move) in enumerate(changes):
-            if not _gives(self._block.setup, setup):
+            if not gives(self._block.setup, setup):
                 continue
-            softer, pushed = setup.tool.compliance_times_stiffness - self._compliance, self._pushed(setup) - coupled[:, column]
-            right[:, column] = _shift(self._block, setup, move) + softer * self._force + self._compliance * pushed
-        return np.asarray(self._inverse @ right)
+            softer = setup.tool.compliance_times_stiffness - self._compliance
+            found[:, column] = _shift(self._block, setup, move) + softer * self._force + self._compliance * self._pushed(setup)
+        return found
 
     def _pushed(self, setup: Setup) -> FloatArray:
         """Change of the force on the tool (3,) over E with another radius, all else staying where it is."""
@@ -142,13 +169,13 @@ class _GivingTool:
         return np.asarray(-state.push - self._force)
 
 
-def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[tuple[Setup, FloatArray]]) -> FloatArray:
+def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[Change]) -> FloatArray:
     """Displacements that small changes bring about, to first order.
 
     Args:
         block: what made the frame. frame: an equilibrium in contact, or under its own weight.
         changes: (setup, move) pairs: a Setup that differs a little from the block's, and how the tool's stated centre
-            moves with it (3,) [m]. The base may not change between held and free to move.
+            moves with it (3,) [m]. The base may not change between held and free to move; where it has slid, it stays.
 
     Returns:
         (len(changes), n, 3) changes of the nodes' displacement [m]; zero where nothing holds the tool against the block.
@@ -158,15 +185,14 @@ def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[tu
     model = factorise_at(block, frame) if _holds(block, frame) else None
     if model is None or not changes:
         return result
-    free = model.topology.factor.solve(_unbalanced(block, frame, model, changes))
-    if _gives(block.setup, *(setup for setup, _ in changes)):
-        tool = _GivingTool(block, frame, model)
-        free -= tool.answer @ tool.moves(changes, tool.coupled(free))
+    free = model.topology.factor.solve(unbalanced(block, frame, model, changes))
+    if gives(block.setup, *(setup for setup, _ in changes)):
+        free = GivingTool(block, frame, model).moved(changes, free)
     result[:, model.topology.free] = free.T
     return result
 
 
-def loss_changes(block: Replay, frame: Equilibrium, slope: FloatArray, changes: Sequence[tuple[Setup, FloatArray]]) -> FloatArray:
+def loss_changes(block: Replay, frame: Equilibrium, slope: FloatArray, changes: Sequence[Change]) -> FloatArray:
     """How a function of the displacement changes, to first order, by the adjoint: one solve for any number of changes.
 
     With K the (symmetric) tangent and K lambda = dL/du, the change is dL = -lambda . dR (e.g. Plessix 2006).
@@ -181,13 +207,13 @@ def loss_changes(block: Replay, frame: Equilibrium, slope: FloatArray, changes: 
     model = factorise_at(block, frame) if _holds(block, frame) else None
     if model is None or not changes:
         return np.zeros(len(changes))
-    right = _unbalanced(block, frame, model, changes)
+    right = unbalanced(block, frame, model, changes)
     adjoint = model.topology.factor.solve(slope[model.topology.free])
-    found = np.asarray(adjoint @ right)
-    if _gives(block.setup, *(setup for setup, _ in changes)):
-        tool = _GivingTool(block, frame, model)
-        found -= slope[model.topology.free] @ tool.answer @ tool.moves(changes, tool.answer.T @ right)
-    return found
+    if not gives(block.setup, *(setup for setup, _ in changes)):
+        return np.asarray(adjoint @ right)
+    tool = GivingTool(block, frame, model)
+    adjoint, place = tool.adjoint(adjoint)
+    return np.asarray(adjoint @ right + place @ tool.driven(changes))
 
 
 def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray) -> FloatArray:
@@ -213,9 +239,8 @@ def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray
     gather = sp.csr_matrix((forces.reshape(unknown.shape)[used], (unknown[used], column[used])), shape=shape)
     right = gather @ sp.csc_matrix(log_factors.reshape(len(log_factors), -1).T)
     free = -model.topology.factor.solve(right.toarray())
-    if _gives(block.setup):
-        tool = _GivingTool(block, frame, model)
-        free -= tool.answer @ tool.moves([(block.setup, np.zeros(3))] * len(log_factors), tool.coupled(free))
+    if gives(block.setup):
+        free = GivingTool(block, frame, model).moved([(block.setup, np.zeros(3))] * len(log_factors), free)
     result[:, model.topology.free] = free.T
     return result
 

@@ -146,12 +146,12 @@ REMEMBERING = (
 
 
 @pytest.mark.parametrize("effect", REMEMBERING, ids=lambda effect: effect.name)
-def test_effect_that_remembers_has_no_change_to_first_order(effect):
-    """What it remembers changes in every frame before: whole replays must be compared, and asking for less is an error."""
+def test_effect_that_remembers_has_no_change_of_one_frame_to_first_order(effect):
+    """What it remembers changes in every frame before, so that asking for one alone is an error (see `core.adjoint`)."""
     block = Replay(SETUP, GRID)
     frame, setup = block.step(POKE[0]), effect.apply(SETUP)
     for ask in (displacement_changes, lambda *given: loss_changes(block, frame, frame.displacement, given[-1])):
-        with pytest.raises(SetupError, match="differences of whole replays"):
+        with pytest.raises(SetupError, match="of the whole replay"):
             ask(block, frame, [(setup, np.zeros(3))])
 
 
