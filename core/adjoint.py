@@ -7,7 +7,8 @@ all displacements has (discrete adjoint, e.g. Michaleris, Tortorelli and Vidal 1
     dL = sum over n of eta_n . dH - lambda_n . dR
 
 with dR and dH what a changed Setup makes of R and H at the same displacement and history, as in `core.sensitivity`. The first of
-the frames is the block at rest.
+the frames is the block at rest. With friction h has the ways from the anchors, too, and where the surface was seen from the tool,
+and the equilibria on the way to each frame count as frames.
 """
 
 from __future__ import annotations
@@ -19,16 +20,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from core.drag_adjoint import Begun, DragStep
 from core.errors import SetupError, SolveError
+from core.fem.drag import Past, hold_of, renewed
 from core.fem.factor import NotPositiveDefinite
-from core.fem.model import BlockModel
-from core.fem.newton import Outcome
+from core.fem.model import BlockModel, Probe
 from core.frames import FloatArray
+from core.instants import Instant, instants_of, tool_shifts
 from core.memory import History, Memory
-from core.memory_adjoint import MemoryStep, agreement, nothing
-from core.meshing import Mesh
+from core.memory_adjoint import MemoryStep, added, nothing
 from core.replay import Equilibrium, Replay
-from core.sensitivity import GivingTool, gives, local_probe, same_body, unbalanced
+from core.sensitivity import GivingTool, gives, local_probe, same_body
 from core.setup import Setup
 
 __all__ = ["replay_loss_changes"]
@@ -36,59 +38,58 @@ __all__ = ["replay_loss_changes"]
 _TOLERANCE, _MOST_TURNS = 1e-11, 200
 
 
-@dataclass(frozen=True, eq=False)
-class _Instant:
-    """A frame on the way, the rest's first: its time [s], None for the rest, what was remembered before it, and its number."""
+def _positions(frame: Equilibrium) -> FloatArray:
+    return frame.mesh.nodes + frame.displacement
 
-    frame: Equilibrium
-    time: float | None
-    past: History | None
-    number: int | None
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What a setup makes of an instant's displacements: residual (u,) over E [m^2], what is remembered then, and the ways that
+    friction leaves (m, 3) [m]; None without memory or friction."""
+
+    residual: FloatArray
+    history: History | None
+    ways: FloatArray | None
 
 
 class _Body:
-    """What a setup's block remembers, put back to any frame."""
+    """A setup's block, put back to any instant."""
 
     def __init__(self, block: Replay, setup: Setup) -> None:
-        mesh = block.free.mesh
-        self.setup, self.memory = setup, Memory.of(setup, block.grid, mesh)
+        self.setup, self.memory = setup, Memory.of(setup, block.grid, block.free.mesh)
 
-    def begin(self, instant: _Instant, mesh: Mesh) -> BlockModel:
-        """The model in the step that leads to a frame."""
-        model, memory = BlockModel(self.setup, mesh), self.memory
+    def begin(self, instant: Instant) -> BlockModel:
+        """The model in the step that leads there."""
+        model, memory = BlockModel(self.setup, instant.frame.mesh), self.memory
+        model.harden(instant.frame.hardness)
         if memory is not None and instant.past is not None:
             memory.history = instant.past
             if instant.time is None:
                 memory.rest()
             else:
                 memory.begin(instant.time)
-            memory.recall(model, instant.frame.mesh.nodes + instant.frame.displacement)
+            memory.recall(model, _positions(instant.frame))
         return model
 
-
-def _instants(block: Replay, body: _Body, frames: Sequence[Equilibrium], times: Sequence[float] | None) -> list[_Instant]:
-    """The rest and all frames that are equilibria; those that are none are not remembered."""
-    memory = body.memory
-    found = [_Instant(block.free, None, None if memory is None else memory.history, None)]
-    if memory is not None:
-        memory.start(block.free)
-    for number, frame in enumerate(frames):
-        if frame.outcome is Outcome.CONVERGED:
-            time = None if times is None else times[number]
-            found.append(_Instant(frame, time, None if memory is None else memory.history, number))
-            if memory is not None:
-                memory.begin(time)
-                memory.end(frame)
-    return found
+    def find(self, instant: Instant, probe: Probe, past: Past | None) -> _Found:
+        """With the tool here, and with friction with this beginning of the step."""
+        model, positions = self.begin(instant), _positions(instant.frame)
+        if past is not None:
+            model.grip = renewed(model, positions, probe, past, self.setup.tool.friction_coefficient)
+        ways = None if model.grip is None else hold_of(model, positions, probe, model.grip).ways
+        history = self.memory.after(instant.frame) if self.memory is not None and instant.last else None
+        return _Found(model.assemble(positions, probe, tangent=False).residual, history, ways)
 
 
 def _check(block: Replay, frames: Sequence[Equilibrium], setups: Sequence[Setup]) -> None:
     """Raise SetupError for what this does not go through."""
-    material = block.setup.material
+    material, tool = block.setup.material, block.setup.tool
     for setup in (block.setup, *setups):
-        if setup.tool.friction_coefficient:
-            told = "friction at the tool has no gradients by the adjoint; take differences of whole replays"
-            raise SetupError(told, key="friction_coefficient")
+        if setup.tool.friction_coefficient and not tool.friction_coefficient:
+            raise SetupError("a change adds friction that the block does not have; give it a little", key="friction_coefficient")
+        if setup.tool.friction_coefficient and setup.tool.compliance_times_stiffness:
+            told = "a tool that gives way and drags the surface has no gradients by the adjoint; take differences of whole replays"
+            raise SetupError(told, key="compliance_times_stiffness")
         if len(setup.material.relaxation) != len(material.relaxation):
             raise SetupError("a change adds a term of relaxation; give the block one, of fraction 0", key="relaxation")
         if setup.material.retained_fraction and not material.retained_fraction:
@@ -98,97 +99,137 @@ def _check(block: Replay, frames: Sequence[Equilibrium], setups: Sequence[Setup]
         raise SetupError(told, key="friction_coefficient")
 
 
-def _factorise(model: BlockModel, instant: _Instant) -> None:
-    frame = instant.frame
-    model.harden(frame.hardness)
-    state = model.assemble(frame.mesh.nodes + frame.displacement, local_probe(frame))
-    try:
-        model.topology.factor.factorise(state.data)
-    except NotPositiveDefinite:
-        raise SolveError(
-            f"frame {instant.number}: the tangent has no factor there, so the gradient is without bounds", frame=instant.number
-        ) from None
+def _shifts(block: Replay, instants: Sequence[Instant], setup: Setup, moves: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """As `tool_shifts` has them, by a change of the setup and of the stated centres (f, 3) [m]."""
+    here, other = block.setup.tool, setup.tool
+    moved = moves + np.array(other.offset) - np.array(here.offset)
+    return tool_shifts(block, instants, moved, other.radius - here.radius)
 
 
 class _Tangent:
-    """The transposed tangent of a frame: the model's factor, and what the growth of a set adds to it."""
+    """The transposed tangent of an instant: the model's factor, and what makes it unsymmetric beside (set and friction)."""
 
-    def __init__(self, model: BlockModel, step: MemoryStep | None) -> None:
-        self._model, self._step = model, step
+    def __init__(self, model: BlockModel, instant: Instant, beside: Sequence[MemoryStep | DragStep]) -> None:
+        self._top, self._beside = model.topology, beside
+        state = model.assemble(_positions(instant.frame), local_probe(instant.frame))
+        try:
+            self._top.factor.factorise(state.data)
+        except NotPositiveDefinite:
+            told = f"frame {instant.number}: the tangent has no factor there, so the gradient is without bounds"
+            raise SolveError(told, frame=instant.number) from None
 
     def field(self, free: FloatArray) -> FloatArray:
         """Unknowns (u,) at the nodes (n, 3)."""
-        found = np.zeros(self._model.topology.free.shape)
-        found[self._model.topology.free] = free
+        found = np.zeros(self._top.free.shape)
+        found[self._top.free] = free
         return found
 
     def _turned(self, free: FloatArray) -> FloatArray:
         """Times the tangent, divided by its symmetric part."""
-        assert self._step is not None
-        top = self._model.topology
-        return free + top.factor.solve(self._step.tangent(self.field(free))[top.free])
+        field = self.field(free)
+        more = sum((part.tangent(field) for part in self._beside), np.zeros_like(field))
+        return free + self._top.factor.solve(more[self._top.free])
 
     def solve(self, right: FloatArray) -> FloatArray:
         """For one (u,) or several (u, m) right sides."""
-        near = self._model.topology.factor.solve(right)
-        if self._step is None or not self._step.grows:
+        near = self._top.factor.solve(right)
+        if not self._beside or not right.any():
             return near
         if right.ndim == 2:
             return np.stack([self.solve(column) for column in right.T], axis=1)
         operator = LinearOperator((len(right), len(right)), matvec=self._turned, dtype=float)
         found, missed = gmres(operator, near, x0=near, rtol=_TOLERANCE, atol=0.0, restart=50, maxiter=_MOST_TURNS)
         if missed:
-            raise SolveError("the adjoint of a frame in which a set grows was not found")
+            raise SolveError("the adjoint of a frame with friction, or in which a set grows, was not found")
         return np.asarray(found)
 
 
 class _Backwards:
     """The pass from the last frame to the rest; `total` (c,) is what each change does to the function so far."""
 
-    def __init__(self, block: Replay, body: _Body, changes: Sequence[tuple[Setup, FloatArray]]) -> None:
-        self._block, self._body, self._changes = block, body, changes
+    def __init__(self, block: Replay, instants: Sequence[Instant], changes: Sequence[tuple[Setup, FloatArray]]) -> None:
+        self._block, self._changes, self._body = block, changes, _Body(block, block.setup)
         self._others = [_Body(block, setup) for setup, _ in changes]
-        self._gives = gives(block.setup, *(setup for setup, _ in changes))
-        self._costate = None if body.memory is None else nothing(body.memory.history)
+        self._shifts = [_shifts(block, instants, setup, moves) for setup, moves in changes]
+        memory = self._body.memory
+        self._costate = None if memory is None else nothing(memory.history)
+        self._begun: Begun | None = None
         self.total = np.zeros(len(changes))
 
-    def step(self, instant: _Instant, slope: FloatArray) -> None:
-        """Through one frame, of which the function has this slope (n, 3) [1/m]."""
-        frame, memory, costate = instant.frame, self._body.memory, self._costate
-        model = self._body.begin(instant, frame.mesh)
-        linear = None if memory is None else MemoryStep(memory, model, frame)
-        if linear is not None and costate is not None:
-            if instant.time is None:  # nothing is delayed after a long rest
-                costate = replace(costate, delayed=np.zeros_like(costate.delayed))
-            slope = slope + linear.slope(costate)
-        _factorise(model, instant)
-        tangent = _Tangent(model, linear)
-        adjoint = self._balance(instant, model, tangent, slope)
-        if memory is not None and linear is not None and costate is not None:
-            self._remember(instant, costate, memory.after(frame))
-            self._costate = linear.before(costate, adjoint)
+    def step(self, index: int, instant: Instant, start: Equilibrium, slope: FloatArray) -> None:
+        """Through one instant, reached from `start`, of whose displacement the function has this slope (n, 3) [1/m]."""
+        begun, model = self._begun, self._body.begin(instant)
+        past, drag = self._drag(instant, model, start)
+        memory = self._memory(instant, model)
+        slope = slope if begun is None else slope + begun.displacement
+        slope = slope + sum((part.slope() for part in (drag, memory) if part is not None), np.zeros_like(slope))
+        beside = [part for part in (drag, memory) if part is not None and not part.symmetric]
+        tangent = _Tangent(model, instant, beside)
+        adjoint = tangent.field(self._balance(index, instant, model, tangent, slope))
+        self._change(index, instant, past, adjoint[model.topology.free], memory, drag)
+        if memory is not None and self._costate is not None:
+            past_costate = memory.before(adjoint)
+            self._costate = past_costate if instant.last else added(self._costate, past_costate)
+        self._begun = None if drag is None else drag.before(start, adjoint)
+        if self._begun is not None:
+            self.total += np.array([before[index] for _, before in self._shifts]) @ self._begun.centre
 
-    def _balance(self, instant: _Instant, model: BlockModel, tangent: _Tangent, slope: FloatArray) -> FloatArray:
-        """Add what the changes of the equilibrium bring about; returns the adjoint displacement (n, 3)."""
-        frame = instant.frame
-        still = instant.number is None
-        changes = [(setup, np.zeros(3) if still else moves[instant.number]) for setup, moves in self._changes]
+    def _drag(self, instant: Instant, model: BlockModel, start: Equilibrium) -> tuple[Past | None, DragStep | None]:
+        """The step's beginning and the step itself, where friction left anything; the model is given its grip."""
+        frame, here = instant.frame, local_probe(instant.frame)
+        if frame.hold is None:
+            return None, None
+        past = Past.of(model, start, self._block.from_where(start, here))
+        costate = np.zeros_like(frame.hold.ways) if self._begun is None else self._begun.ways
+        drag = DragStep(model, _positions(frame), here, past, self._block.setup.tool.friction_coefficient, costate)
+        model.grip = drag.grip
+        return past, drag
+
+    def _memory(self, instant: Instant, model: BlockModel) -> MemoryStep | None:
+        """The step of the memory; on the way to a frame nothing is remembered yet."""
+        memory, costate = self._body.memory, self._costate
+        if memory is None or costate is None:
+            return None
+        if not instant.last:
+            costate = nothing(costate)
+        elif instant.number is None:  # nothing is delayed after a long rest
+            costate = replace(costate, delayed=np.zeros_like(costate.delayed))
+        return MemoryStep(memory, model, instant.frame, costate)
+
+    def _balance(self, index: int, instant: Instant, model: BlockModel, tangent: _Tangent, slope: FloatArray) -> FloatArray:
+        """The adjoint displacement (u,); adds what a tool that gives way brings about by its spring."""
         adjoint = tangent.solve(slope[model.topology.free])
-        if self._gives and frame.in_contact:
-            tool = GivingTool(self._block, frame, model, tangent.solve)
-            adjoint, place = tool.adjoint(adjoint)
-            self.total += place @ tool.driven(changes)
-        right = unbalanced(self._block, frame, model, changes, lambda number: self._others[number].begin(instant, frame.mesh))
-        self.total += adjoint @ right
-        return tangent.field(adjoint)
+        if not instant.frame.in_contact or not gives(self._block.setup, *(setup for setup, _ in self._changes)):
+            return adjoint
+        tool = GivingTool(self._block, instant.frame, model, tangent.solve)
+        adjoint, place = tool.adjoint(adjoint)
+        moves = [(setup, moves[instant.number or 0]) for setup, moves in self._changes]
+        self.total += place @ tool.driven(moves)
+        return adjoint
 
-    def _remember(self, instant: _Instant, costate: History, after: History) -> None:
-        """Add what the changes of the memory bring about."""
-        for number, other in enumerate(self._others):
-            if same_body(self._block, other.setup) or other.memory is None:
-                continue
-            other.begin(instant, instant.frame.mesh)
-            self.total[number] += agreement(costate, other.memory.after(instant.frame), after)
+    def _change(
+        self,
+        index: int,
+        instant: Instant,
+        past: Past | None,
+        adjoint: FloatArray,
+        memory: MemoryStep | None,
+        drag: DragStep | None,
+    ) -> None:
+        """Add what the changed setups make of the equilibrium and of what is remembered."""
+        setup, here = self._block.setup, local_probe(instant.frame)
+        base = self._body.find(instant, here, past)
+        for number, (other, (shifts, _)) in enumerate(zip(self._others, self._shifts, strict=True)):
+            shift = np.zeros(3) if gives(setup, other.setup) else shifts[index]
+            if same_body(self._block, other.setup) and other.setup.tool == setup.tool and not shift.any():
+                continue  # only the sensor differs
+            probe = Probe(here.centre + shift, here.radius + other.setup.tool.radius - setup.tool.radius)
+            found = other.find(instant, probe, past)
+            self.total[number] -= float(adjoint @ (found.residual - base.residual))
+            if memory is not None and found.history is not None:
+                self.total[number] += memory.agreement(found.history)
+            if drag is not None and found.ways is not None:
+                self.total[number] += drag.agreement(found.ways)
 
 
 def replay_loss_changes(
@@ -212,9 +253,12 @@ def replay_loss_changes(
     """
     _check(block, frames, [setup for setup, _ in changes])
     spread = [(setup, np.broadcast_to(moves, (len(frames), 3))) for setup, moves in changes]
-    body = _Body(block, block.setup)
-    instants = _instants(block, body, frames, None if times is None else np.asarray(times, dtype=float).tolist())
-    way = _Backwards(block, body, spread)
-    for instant in reversed(instants):
-        way.step(instant, np.zeros_like(instant.frame.displacement) if instant.number is None else slopes[instant.number])
+    when = None if times is None else np.asarray(times, dtype=float).tolist()
+    instants = instants_of(block, Memory.of(block.setup, block.grid, block.free.mesh), frames, when)
+    way = _Backwards(block, instants, spread)
+    for index in reversed(range(len(instants))):
+        instant = instants[index]
+        known = instant.number is not None and instant.last
+        slope = slopes[instant.number or 0] if known else np.zeros_like(instant.frame.displacement)
+        way.step(index, instant, instants[max(index - 1, 0)].frame, slope)
     return way.total

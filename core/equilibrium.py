@@ -28,7 +28,7 @@ class Equilibrium:
         probe: the tool (true centre and radius), phantom frame.
         force: (3,) of the block on the tool [N]. outcome, iterations, residual, penetration: how it was reached.
         hardness: of the contact, see `core.fem.model.BlockModel.harden`.
-        hold: what friction leaves to the next frame; None without.
+        hold: what friction leaves to the next frame; None without. way: with friction, equilibria on the way from the frame before.
     """
 
     mesh: Mesh
@@ -43,6 +43,7 @@ class Equilibrium:
     in_contact: bool
     hold: Hold | None = None
     hardness: float = 1.0
+    way: tuple[Equilibrium, ...] = ()
 
     @cached_property
     def _moved(self) -> FloatArray:

@@ -20,7 +20,7 @@ from core.fem.points import quadrature_tangents
 from core.frames import FloatArray
 from core.memory import History, Memory
 
-__all__ = ["MemoryStep", "agreement", "nothing"]
+__all__ = ["MemoryStep", "added", "nothing"]
 
 _STEP = 1e-5
 """Of C [1] in central differences: their error is its square, and rounding over it."""
@@ -35,9 +35,9 @@ def nothing(history: History) -> History:
     return replace(history, **{name: np.zeros_like(getattr(history, name)) for name in _REMEMBERED})
 
 
-def agreement(costate: History, change: History, base: History) -> float:
-    """The costate times what changes from one history to another [1]."""
-    return sum(float(np.vdot(getattr(costate, name), getattr(change, name) - getattr(base, name))) for name in _REMEMBERED)
+def added(one: History, other: History) -> History:
+    """The sum of two costates."""
+    return replace(one, **{name: getattr(one, name) + getattr(other, name) for name in _REMEMBERED})
 
 
 def _slopes(function: Callable[[FloatArray], FloatArray], at: FloatArray) -> FloatArray:
@@ -68,21 +68,21 @@ def _stretched_transposed(tangents: FloatArray, costate: FloatArray) -> FloatArr
 class MemoryStep:
     """The step that a memory is in, linearised at a frame of it; `memory` still has the history from before.
 
-    Costates are in the shape of a History; its time and touch are no part of them.
+    Costates are in the shape of a History; its time and touch are no part of them. `costate` is that after the step.
     """
 
-    def __init__(self, memory: Memory, model: BlockModel, frame: Equilibrium) -> None:
+    def __init__(self, memory: Memory, model: BlockModel, frame: Equilibrium, costate: History) -> None:
         self._memory, self._model, self._mesh, self._past = memory, model, frame.mesh, memory.history
         positions = frame.mesh.nodes + frame.displacement
         self._at_points, self._at_rule = memory.points.tangents(frame.mesh, positions), quadrature_tangents(frame.mesh, positions)
-        strained = cauchy_green(self._at_points)
+        strained, self._after, self._costate = cauchy_green(self._at_points), memory.after(frame), costate
         self._by_strain = _slopes(lambda c: shear_stress(memory.law, c), strained)
-        self._linearise_set(strained, memory.after(frame))
+        self._linearise_set(strained, self._after)
 
     @property
-    def grows(self) -> bool:
-        """Whether the set grows anywhere, and makes the tangent unsymmetric."""
-        return bool(len(self._growing))
+    def symmetric(self) -> bool:
+        """Whether the tangent is: no set grows."""
+        return not len(self._growing)
 
     def _linearise_set(self, strained: FloatArray, after: History) -> None:
         """Slopes at the points whose set grows: L by C, and T by M."""
@@ -124,20 +124,24 @@ class MemoryStep:
         by_c, _ = self._through_set(replace(none, free=-self._memory.step.factor * self.recalled(adjoint)))
         return self._on_strain(by_c)
 
-    def slope(self, costate: History) -> FloatArray:
-        """What the costate after the step is by the displacements of its frame (n, 3)."""
-        driven = self._driven(costate)
-        by_c, _ = self._through_set(replace(costate, free=costate.free - driven))
+    def slope(self) -> FloatArray:
+        """What the costate is by the displacements of its frame (n, 3)."""
+        driven = self._driven()
+        by_c, _ = self._through_set(replace(self._costate, free=self._costate.free - driven))
         return self._on_strain(by_c + _pulled(self._by_strain, driven))
 
-    def _driven(self, costate: History) -> FloatArray:
-        """Costate (m, 6) of S - T after the step, by what is driven by it."""
-        return np.asarray(costate.driving + np.einsum("k,kmc->mc", self._memory.step.taken, costate.delayed))
+    def agreement(self, history: History) -> float:
+        """The costate times what another setup remembers beyond what is remembered here."""
+        parts = ((getattr(each, name) for each in (self._costate, history, self._after)) for name in _REMEMBERED)
+        return sum(float(np.vdot(costate, other - after)) for costate, other, after in parts)
 
-    def before(self, costate: History, adjoint: FloatArray) -> History:
-        """The costate before the step, by the one after it and the adjoint displacement (n, 3) of its frame."""
-        step, recalled = self._memory.step, self.recalled(adjoint)
-        free = costate.free - self._driven(costate) + step.factor * recalled
-        _, past = self._through_set(replace(costate, free=free))
+    def _driven(self) -> FloatArray:
+        """Costate (m, 6) of S - T after the step, by what is driven by it."""
+        return np.asarray(self._costate.driving + np.einsum("k,kmc->mc", self._memory.step.taken, self._costate.delayed))
+
+    def before(self, adjoint: FloatArray) -> History:
+        """The costate before the step, with the adjoint displacement (n, 3) of its frame."""
+        step, costate, recalled = self._memory.step, self._costate, self.recalled(adjoint)
+        _, past = self._through_set(replace(costate, free=costate.free - self._driven() + step.factor * recalled))
         driving = step.taken.sum() * recalled - np.einsum("k,kmc->mc", step.taken, costate.delayed)
         return replace(past, delayed=step.left[:, None, None] * (costate.delayed - recalled), driving=driving)

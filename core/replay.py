@@ -31,8 +31,9 @@ __all__ = ["GRAVITY", "Equilibrium", "Replay", "replay", "require_converged", "r
 
 GRAVITY = 9.81
 """Acceleration of free fall [m/s^2]."""
-_MOST_SLIDES, _DRAG_STEP = 12, 1e-3
-"""Of a base in one frame, and the longest motion of a tool with friction [m] that is taken as straight."""
+_MOST_SLIDES, _DRAG_STEP, _HALVINGS = 12, 1e-3, 40
+"""Of a base in one frame; the longest motion of a tool with friction [m] that is taken as straight; of the way on which the first
+touch is sought, down to rounding, since a rough one would jump as the tool's place or radius changes."""
 
 
 class Replay:
@@ -133,10 +134,13 @@ class Replay:
         if start.mesh is not mesh:
             displacement = start.mesh.interpolate(start.displacement, mesh.nodes - carried)
             displacement[mesh.connectivity.base_nodes] *= 1.0 if model.sprung else 0.0
-        before = Probe(start.probe.centre - np.append(start.slip, 0.0) + carried, start.probe.radius)
-        if not start.in_contact:  # begin where the straight way in first touches, not from afar
-            before = self._first_touch(before, probe)
-        return model, mesh.nodes + displacement, before, carried
+        before = self.from_where(start, probe)
+        return model, mesh.nodes + displacement, Probe(before.centre + carried, before.radius), carried
+
+    def from_where(self, start: Equilibrium, probe: Probe) -> Probe:
+        """Where the way from a frame to `probe` (seen from the slid block) begins: from afar, where it is about to touch."""
+        before = Probe(start.probe.centre - np.append(start.slip, 0.0), start.probe.radius)
+        return before if start.in_contact else self._first_touch(before, probe)
 
     def _dragged(
         self, model: BlockModel, positions: FloatArray, probes: tuple[Probe, Probe], past: Past, probe: Probe
@@ -152,16 +156,16 @@ class Replay:
         if not self.setup.tool.friction_coefficient:
             return self.held(probe, start)
         slip = np.append(self.slip, 0.0)
-        begin = start.probe
-        if not start.in_contact:
-            touch = self._first_touch(Probe(begin.centre - slip, begin.radius), Probe(probe.centre - slip, probe.radius))
-            begin = Probe(touch.centre + slip, touch.radius)
-        steps = max(1, int(np.ceil(float(np.linalg.norm(probe.centre - begin.centre)) / _DRAG_STEP)))
-        frame = start
+        begin = self.from_where(start, Probe(probe.centre - slip, probe.radius)).centre + slip
+        steps = max(1, int(np.ceil(float(np.linalg.norm(probe.centre - begin)) / _DRAG_STEP)))
+        way = [start]
         for share in np.arange(1, steps + 1) / steps:
-            frame = self.held(Probe(begin.centre + share * (probe.centre - begin.centre), probe.radius), frame)
-            if frame.outcome is not Outcome.CONVERGED:
+            way.append(self.held(Probe(begin + share * (probe.centre - begin), probe.radius), way[-1]))
+            if way[-1].outcome is not Outcome.CONVERGED:
                 break
+        frame = replace(way[-1], way=tuple(way[1:-1]))
+        if self._before is not None and self._before[1] is way[-1]:
+            self._before = (self._before[0], frame)
         return frame
 
     def _extrapolated(self, model: BlockModel, start: Equilibrium, positions: FloatArray, probe: Probe) -> FloatArray:
@@ -185,7 +189,7 @@ class Replay:
         if np.linalg.norm(before.centre - probe.centre) > 1.0 or not self.away(before):
             middle = (self.setup.geometry.low + self.setup.geometry.high) / 2
             before = Probe(probe.centre + (probe.centre - middle) / np.linalg.norm(probe.centre - middle) * 0.05, probe.radius)
-        for _ in range(12):
+        for _ in range(_HALVINGS):
             share = (low + high) / 2
             clear = self.away(Probe(before.centre + share * (probe.centre - before.centre), probe.radius))
             low, high = (share, high) if clear else (low, share)

@@ -89,15 +89,26 @@ class Hold:
 
     def at(self, places: FloatArray) -> tuple[FloatArray, np.ndarray[Any, np.dtype[np.bool_]]]:
         """Ways (..., 3) [m] and whether touched (...) at other points of the surface (..., 3), as a grid that moved has them."""
-        flat = places.reshape(-1, 3)
         if not self.touched.any():
             return np.zeros_like(places), np.zeros(places.shape[:-1], dtype=bool)
-        distance, near = (np.asarray(part) for part in cKDTree(self.places).query(flat, k=_NEIGHBOURS))
-        weights = 1 / (distance + 1e-9) ** 2
-        weights /= weights.sum(axis=1, keepdims=True)
+        near, weights, touched = self._near(places.reshape(-1, 3))
         ways = np.einsum("mk,mki->mi", weights, self.ways[near])
+        return ways.reshape(places.shape), touched.reshape(places.shape[:-1])
+
+    def at_transposed(self, places: FloatArray, costate: FloatArray) -> FloatArray:
+        """The transpose of how `at` takes ways to other points: from costates there (..., 3) to those of the own ways (m, 3)."""
+        found = np.zeros_like(self.ways)
+        if self.touched.any():
+            near, weights, _ = self._near(places.reshape(-1, 3))
+            np.add.at(found, near, weights[..., None] * costate.reshape(-1, 1, 3))
+        return found
+
+    def _near(self, places: FloatArray) -> tuple[IntArray, FloatArray, np.ndarray[Any, np.dtype[np.bool_]]]:
+        """Own points next to each place (m, k), their weights, none where the nearest was not touched, and whether it was (m,)."""
+        distance, near = (np.asarray(part) for part in cKDTree(self.places).query(places, k=_NEIGHBOURS))
+        weights = 1 / (distance + 1e-9) ** 2
         touched = self.touched[near[:, 0]]
-        return (ways * touched[:, None]).reshape(places.shape), touched.reshape(places.shape[:-1])
+        return near, weights / weights.sum(axis=1, keepdims=True) * touched[:, None], touched
 
 
 @njit(cache=True)

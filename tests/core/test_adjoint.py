@@ -14,8 +14,10 @@ from core.effects.material import PoissonRatio, StiffInclusion
 from core.effects.memory import PermanentSet, Viscoelasticity
 from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
 from core.effects.support import BaseCompliance, BaseDetachment, BaseSlip
-from core.effects.tool import ToolCompliance, ToolOffset, ToolRadius
+from core.effects.tool import ToolCompliance, ToolFriction, ToolOffset, ToolRadius
 from core.errors import SetupError
+from core.fem import drag
+from core.fem.friction import Hold
 from core.fem.newton import Outcome
 from core.fem.points import MaterialPoints, material_points
 from core.frames import FloatArray
@@ -29,7 +31,8 @@ SETUP = Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3), mass=0.104)
 EVEN, GRADED = GridSpec(nodes=(7, 5, 5)), GridSpec(nodes=(7, 6, 5), spacing=3e-3)
 TIGHT, STEP = 1e-9, 1e-3
 RELAXES, KEEPS = Viscoelasticity(relaxed_fraction=0.5, time_constant=1.3), PermanentSet(retained_fraction=0.3)
-NOWHERE = np.zeros(3)
+RUBS = ToolFriction(friction_coefficient=0.3)
+NOWHERE, COMPLIANCE = np.zeros(3), "compliance_times_stiffness"
 
 
 def _way(*places: tuple[float, float]) -> FloatArray:
@@ -66,19 +69,19 @@ class _Loss:
         return found
 
 
-def _agree(base: Setup, effect: Effect, grid: GridSpec, way: FloatArray = WAY) -> None:
-    """The adjoint's gradient by each of the effect's numbers is that of whole replays."""
+def _agree(base: Setup, effect: Effect, grid: GridSpec, way: FloatArray = WAY, step: float = STEP) -> None:
+    """The adjoint's gradient by each of the effect's numbers is that of whole replays, so many scales of it apart."""
     block = Replay(effect.apply(base), grid, TIGHT)
     frames = replay(block.setup, way, grid, times=TIMES, tolerance=TIGHT)
     loss = _Loss(frames)
     for item, here in zip(effect.numbers(), effect.coordinates, strict=True):
 
-        def changed(step: float, item=item, here=here) -> Setup:
-            return replace(effect, **{item.name: item.value(here + step * item.scale)}).apply(base)
+        def changed(scales: float, item=item, here=here) -> Setup:
+            return replace(effect, **{item.name: item.value(here + scales * item.scale)}).apply(base)
 
-        near = [(changed(sign * 0.1 * STEP), NOWHERE) for sign in (1, -1)]
+        near = [(changed(sign * 0.1 * step), NOWHERE) for sign in (1, -1)]
         rise, fall = replay_loss_changes(block, frames, loss.slopes(frames), near, TIMES) / 0.1
-        above, below = (loss.of(replay(changed(sign * STEP), way, grid, times=TIMES, tolerance=TIGHT)) for sign in (1, -1))
+        above, below = (loss.of(replay(changed(sign * step), way, grid, times=TIMES, tolerance=TIGHT)) for sign in (1, -1))
         assert above != below
         assert rise - fall == pytest.approx(above - below, rel=1e-3), item.name
 
@@ -144,6 +147,68 @@ def test_ways_back_from_a_material_s_points_are_the_transposes_of_the_ways_there
     assert np.vdot(back, read) == pytest.approx(np.vdot(points.read_transposed(mesh, back), field), rel=1e-10)
 
 
+@pytest.fixture
+def agreed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pressure and friction agree to the last digits, so that differences of whole replays are worth something."""
+    monkeypatch.setattr(drag, "_AGREED", TIGHT)
+    monkeypatch.setattr(drag, "_MOST_TURNS", 300)
+
+
+RUBBED = _way((4e-3, 1e-3), (4e-3, 2.5e-3), (4.33e-3, 3e-3), (5.13e-3, 3e-3), (5.13e-3, -6e-3), (6.07e-3, 2e-3), (7.11e-3, 2.2e-3))
+"""In, aside in stick and in slip, out, and in again beside."""
+
+
+@pytest.mark.usefixtures("agreed")
+@pytest.mark.parametrize("name", [name for name in EFFECTS if name != "tool_compliance"])
+def test_tool_that_drags_the_surface_has_the_gradient_of_whole_replays_by_every_effect(name):
+    """Between changes of stick and slip: one within the step of a difference is no part of a gradient."""
+    _agree(RUBS.apply(SETUP), EFFECTS[name], EVEN, RUBBED, 1e-4)
+
+
+@pytest.mark.usefixtures("agreed")
+@pytest.mark.parametrize("grid", [EVEN, GRADED], ids=["even", "graded"])
+def test_friction_itself_has_the_gradient_of_whole_replays_also_in_a_block_that_remembers(grid):
+    _agree(SETUP, RUBS, grid, RUBBED, 1e-4)
+    _agree(RELAXES.apply(SETUP), RUBS, grid, RUBBED, 1e-4)
+    _agree(RUBS.apply(SETUP), RELAXES, grid, RUBBED, 1e-4)
+
+
+@pytest.mark.usefixtures("agreed")
+def test_friction_on_a_block_that_relaxes_and_keeps_a_set():
+    rubbed = RUBS.apply(RELAXES.apply(SETUP))
+    _agree(rubbed, KEEPS, EVEN, RUBBED, 1e-4)
+    _agree(KEEPS.apply(rubbed), ToolOffset(dx=2e-4, dy=0.0, dz=1e-4), EVEN, RUBBED, 1e-4)
+
+
+def test_gradient_with_friction_at_the_tolerances_of_a_replay_is_nearly_that_of_exact_ones(monkeypatch):
+    setup = RUBS.apply(SETUP)
+    changes = [
+        (ToolFriction(friction_coefficient=0.301).apply(SETUP), NOWHERE),
+        (replace(setup, material=Material(poisson_ratio=0.451)), NOWHERE),
+    ]
+
+    def gradient(tolerance: float) -> FloatArray:
+        frames = replay(setup, RUBBED, EVEN, tolerance=tolerance)
+        slopes = [1e-4 * frame.displacement for frame in frames]
+        return replay_loss_changes(Replay(setup, EVEN, tolerance), frames, slopes, changes)
+
+    found = gradient(1e-6)
+    monkeypatch.setattr(drag, "_AGREED", TIGHT)
+    monkeypatch.setattr(drag, "_MOST_TURNS", 300)
+    assert found == pytest.approx(gradient(TIGHT), rel=0.01)
+
+
+def test_way_back_from_what_friction_holds_is_the_transpose_of_the_way_there():
+    random = np.random.default_rng(0)
+    touched = np.arange(50) % 3 > 0
+    hold = Hold(random.uniform(size=(50, 3)), random.standard_normal((50, 3)) * touched[:, None], touched)
+    places = random.uniform(size=(4, 7, 3))
+    costate = np.asarray(random.standard_normal((4, 7, 3)))
+    there, _ = hold.at(places)
+    assert there.any()
+    assert np.vdot(costate, there) == pytest.approx(np.vdot(hold.at_transposed(places, costate), hold.ways), rel=1e-12)
+
+
 def test_frame_without_equilibrium_counts_as_passed_over():
     setup, inside = RELAXES.apply(SETUP), np.array([0.0, 0.0, 0.4 * SIZE[2]])
     longer, when = np.insert(WAY, 3, inside, axis=0), np.insert(TIMES, 3, 1.7)
@@ -177,7 +242,8 @@ def test_what_the_way_through_the_frames_does_not_tell_is_refused():
         (SETUP, RELAXES.apply(SETUP), frames, "relaxation"),
         (SETUP, KEEPS.apply(SETUP), frames, "retained_fraction"),
         (held, SETUP, slid, "friction_coefficient"),
-        (SETUP, replace(SETUP, tool=Tool(radius=5e-3, friction_coefficient=0.1)), frames, "friction_coefficient"),
+        (SETUP, RUBS.apply(SETUP), frames, "friction_coefficient"),
+        (RUBS.apply(SETUP), ToolCompliance(compliance_times_stiffness=1.0).apply(RUBS.apply(SETUP)), frames, COMPLIANCE),
     ):
         with pytest.raises(SetupError) as caught:
             replay_loss_changes(Replay(setup, EVEN), way, slopes, [(changed, NOWHERE)])
