@@ -7,8 +7,8 @@ all displacements has (discrete adjoint, e.g. Michaleris, Tortorelli and Vidal 1
     dL = sum over n of eta_n . dH - lambda_n . dR
 
 with dR and dH what a changed Setup makes of R and H at the same displacement and history, as in `core.sensitivity`. The first of
-the frames is the block at rest. With friction h has the ways from the anchors, too, and where the surface was seen from the tool,
-and the equilibria on the way to each frame count as frames.
+the frames is the block at rest. With friction at the tool h has the ways from the anchors, too, and where the surface was seen from
+the tool; with a base that slides, how far it has; and all equilibria on the way to a frame count as frames.
 """
 
 from __future__ import annotations
@@ -18,24 +18,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from core.drag_adjoint import Begun, DragStep
 from core.errors import SetupError, SolveError
 from core.fem.drag import Past, hold_of, renewed
 from core.fem.factor import NotPositiveDefinite
 from core.fem.model import BlockModel, Probe
+from core.fem.transposed import TransposedTangent
 from core.frames import FloatArray
 from core.instants import Instant, instants_of, tool_shifts
 from core.memory import History, Memory
 from core.memory_adjoint import MemoryStep, added, nothing
 from core.replay import Equilibrium, Replay
-from core.sensitivity import GivingTool, gives, local_probe, same_body
+from core.sensitivity import GivingTool, gives, local_probe, same_body, tool_slopes
 from core.setup import Setup
+from core.slide_adjoint import SlideStep
 
 __all__ = ["replay_loss_changes"]
-
-_TOLERANCE, _MOST_TURNS = 1e-11, 200
 
 
 def _positions(frame: Equilibrium) -> FloatArray:
@@ -44,10 +43,11 @@ def _positions(frame: Equilibrium) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """What a setup makes of an instant's displacements: residual (u,) over E [m^2], what is remembered then, and the ways that
-    friction leaves (m, 3) [m]; None without memory or friction."""
+    """What a setup makes of an instant's displacements: residual (u,) over E [m^2], the force on the tool (3,) [N], what is
+    remembered then, and the ways that friction leaves (m, 3) [m]; None without memory or friction."""
 
     residual: FloatArray
+    force: FloatArray
     history: History | None
     ways: FloatArray | None
 
@@ -78,7 +78,8 @@ class _Body:
             model.grip = renewed(model, positions, probe, past, self.setup.tool.friction_coefficient)
         ways = None if model.grip is None else hold_of(model, positions, probe, model.grip).ways
         history = self.memory.after(instant.frame) if self.memory is not None and instant.last else None
-        return _Found(model.assemble(positions, probe, tangent=False).residual, history, ways)
+        state = model.assemble(positions, probe, tangent=False)
+        return _Found(state.residual, -state.push * self.setup.material.young_modulus, history, ways)
 
 
 def _check(block: Replay, frames: Sequence[Equilibrium], setups: Sequence[Setup]) -> None:
@@ -95,8 +96,17 @@ def _check(block: Replay, frames: Sequence[Equilibrium], setups: Sequence[Setup]
         if setup.material.retained_fraction and not material.retained_fraction:
             raise SetupError("a change adds a set that the block has not kept; give it a small one", key="retained_fraction")
     if any(frame.slip.any() for frame in frames):
-        told = "a base that slid has no gradients by the adjoint; take differences of whole replays"
-        raise SetupError(told, key="friction_coefficient")
+        _check_slid([block.setup, *setups])
+
+
+def _check_slid(setups: Sequence[Setup]) -> None:
+    """The same, where the base slid."""
+    if any(setup.support.friction_coefficient is None for setup in setups):
+        raise SetupError("a change holds a base that slid; change its friction only a little", key="friction_coefficient")
+    for key in ("friction_coefficient", "compliance_times_stiffness"):
+        if any(getattr(setup.tool, key) for setup in setups):
+            told = f"a base that slid under a tool with a {key} has no gradients by the adjoint; take differences of whole replays"
+            raise SetupError(told, key=key)
 
 
 def _shifts(block: Replay, instants: Sequence[Instant], setup: Setup, moves: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -106,42 +116,32 @@ def _shifts(block: Replay, instants: Sequence[Instant], setup: Setup, moves: Flo
     return tool_shifts(block, instants, moved, other.radius - here.radius)
 
 
-class _Tangent:
-    """The transposed tangent of an instant: the model's factor, and what makes it unsymmetric beside (set and friction)."""
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """What an instant leaves to the next, linearised, as far as there is any; `past` is where its step with friction began."""
 
-    def __init__(self, model: BlockModel, instant: Instant, beside: Sequence[MemoryStep | DragStep]) -> None:
-        self._top, self._beside = model.topology, beside
-        state = model.assemble(_positions(instant.frame), local_probe(instant.frame))
-        try:
-            self._top.factor.factorise(state.data)
-        except NotPositiveDefinite:
-            told = f"frame {instant.number}: the tangent has no factor there, so the gradient is without bounds"
-            raise SolveError(told, frame=instant.number) from None
+    instant: Instant
+    past: Past | None
+    drag: DragStep | None
+    memory: MemoryStep | None
+    slide: SlideStep | None
 
-    def field(self, free: FloatArray) -> FloatArray:
-        """Unknowns (u,) at the nodes (n, 3)."""
-        found = np.zeros(self._top.free.shape)
-        found[self._top.free] = free
-        return found
+    @property
+    def slope(self) -> FloatArray:
+        """Of all that by the displacements (n, 3)."""
+        parts = [part for part in (self.drag, self.memory, self.slide) if part is not None]
+        return sum((part.slope for part in parts), np.zeros_like(self.instant.frame.displacement))
 
-    def _turned(self, free: FloatArray) -> FloatArray:
-        """Times the tangent, divided by its symmetric part."""
-        field = self.field(free)
-        more = sum((part.tangent(field) for part in self._beside), np.zeros_like(field))
-        return free + self._top.factor.solve(more[self._top.free])
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """For one (u,) or several (u, m) right sides."""
-        near = self._top.factor.solve(right)
-        if not self._beside or not right.any():
-            return near
-        if right.ndim == 2:
-            return np.stack([self.solve(column) for column in right.T], axis=1)
-        operator = LinearOperator((len(right), len(right)), matvec=self._turned, dtype=float)
-        found, missed = gmres(operator, near, x0=near, rtol=_TOLERANCE, atol=0.0, restart=50, maxiter=_MOST_TURNS)
-        if missed:
-            raise SolveError("the adjoint of a frame with friction, or in which a set grows, was not found")
-        return np.asarray(found)
+    def agreement(self, found: _Found, setup: Setup) -> float:
+        """The costates times what another setup leaves beyond this one."""
+        total = 0.0
+        if self.memory is not None and found.history is not None:
+            total += self.memory.agreement(found.history)
+        if self.drag is not None and found.ways is not None:
+            total += self.drag.agreement(found.ways)
+        if self.slide is not None:
+            total += self.slide.agreement(found.force, setup)
+        return total
 
 
 class _Backwards:
@@ -154,25 +154,53 @@ class _Backwards:
         memory = self._body.memory
         self._costate = None if memory is None else nothing(memory.history)
         self._begun: Begun | None = None
+        self._slides = any(instant.frame.slip.any() for instant in instants)
+        self._slip, self._instants = np.zeros(2), instants
         self.total = np.zeros(len(changes))
 
-    def step(self, index: int, instant: Instant, start: Equilibrium, slope: FloatArray) -> None:
-        """Through one instant, reached from `start`, of whose displacement the function has this slope (n, 3) [1/m]."""
-        begun, model = self._begun, self._body.begin(instant)
+    def step(self, index: int, slope: FloatArray) -> None:
+        """Through one instant, of whose positions the function has this slope (n, 3) [1/m]."""
+        instant, begun = self._instants[index], self._begun
+        start, model = self._instants[max(index - 1, 0)].frame, self._body.begin(instant)
         past, drag = self._drag(instant, model, start)
-        memory = self._memory(instant, model)
-        slope = slope if begun is None else slope + begun.displacement
-        slope = slope + sum((part.slope() for part in (drag, memory) if part is not None), np.zeros_like(slope))
-        beside = [part for part in (drag, memory) if part is not None and not part.symmetric]
-        tangent = _Tangent(model, instant, beside)
-        adjoint = tangent.field(self._balance(index, instant, model, tangent, slope))
-        self._change(index, instant, past, adjoint[model.topology.free], memory, drag)
-        if memory is not None and self._costate is not None:
-            past_costate = memory.before(adjoint)
-            self._costate = past_costate if instant.last else added(self._costate, past_costate)
-        self._begun = None if drag is None else drag.before(start, adjoint)
+        sides = tool_slopes(model, _positions(instant.frame), local_probe(instant.frame)) if self._slides else None
+        parts = _Parts(instant, past, drag, self._memory(instant, model), self._slide(index, model, sides))
+        whole = slope + parts.slope + (0.0 if begun is None else begun.displacement)
+        tangent = self._tangent(parts, model)
+        free = self._balance(instant, model, tangent, whole)
+        self._change(index, parts, free)
+        if sides is not None:
+            self._slip = self._slip + slope.sum(axis=0)[:2] + (free @ sides[0])[:2]
+            self._slip -= 0.0 if parts.slide is None else parts.slide.centre[:2]
+        self._go_back(index, parts, start, tangent.field(free))
+
+    def _tangent(self, parts: _Parts, model: BlockModel) -> TransposedTangent:
+        """Of an instant's equilibrium."""
+        frame, beside = (
+            parts.instant.frame,
+            [part for part in (parts.drag, parts.memory) if part is not None and not part.symmetric],
+        )
+        try:
+            return TransposedTangent(model, _positions(frame), local_probe(frame), beside)
+        except NotPositiveDefinite:
+            told = f"frame {parts.instant.number}: the tangent has no factor there, so the gradient is without bounds"
+            raise SolveError(told, frame=parts.instant.number) from None
+
+    def _go_back(self, index: int, parts: _Parts, start: Equilibrium, adjoint: FloatArray) -> None:
+        """From the costates after an instant to those before it, by its adjoint displacement (n, 3)."""
+        if parts.memory is not None and self._costate is not None:
+            past = parts.memory.before(adjoint)
+            self._costate = past if parts.instant.last else added(self._costate, past)
+        self._begun = None if parts.drag is None else parts.drag.before(start, adjoint)
         if self._begun is not None:
             self.total += np.array([before[index] for _, before in self._shifts]) @ self._begun.centre
+
+    def _slide(self, index: int, model: BlockModel, sides: tuple[FloatArray, FloatArray] | None) -> SlideStep | None:
+        """How the base slides on from an instant to the next."""
+        instant = self._instants[index]
+        if sides is None or instant.last or (self._instants[index + 1].frame.slip == instant.frame.slip).all():
+            return None
+        return SlideStep(instant.frame, self._block.setup, self._slip, sides, model.topology.free)
 
     def _drag(self, instant: Instant, model: BlockModel, start: Equilibrium) -> tuple[Past | None, DragStep | None]:
         """The step's beginning and the step itself, where friction left anything; the model is given its grip."""
@@ -196,7 +224,7 @@ class _Backwards:
             costate = replace(costate, delayed=np.zeros_like(costate.delayed))
         return MemoryStep(memory, model, instant.frame, costate)
 
-    def _balance(self, index: int, instant: Instant, model: BlockModel, tangent: _Tangent, slope: FloatArray) -> FloatArray:
+    def _balance(self, instant: Instant, model: BlockModel, tangent: TransposedTangent, slope: FloatArray) -> FloatArray:
         """The adjoint displacement (u,); adds what a tool that gives way brings about by its spring."""
         adjoint = tangent.solve(slope[model.topology.free])
         if not instant.frame.in_contact or not gives(self._block.setup, *(setup for setup, _ in self._changes)):
@@ -207,29 +235,18 @@ class _Backwards:
         self.total += place @ tool.driven(moves)
         return adjoint
 
-    def _change(
-        self,
-        index: int,
-        instant: Instant,
-        past: Past | None,
-        adjoint: FloatArray,
-        memory: MemoryStep | None,
-        drag: DragStep | None,
-    ) -> None:
-        """Add what the changed setups make of the equilibrium and of what is remembered."""
-        setup, here = self._block.setup, local_probe(instant.frame)
-        base = self._body.find(instant, here, past)
+    def _change(self, index: int, parts: _Parts, adjoint: FloatArray) -> None:
+        """Add what the changed setups make of the equilibrium and of what it leaves to the next."""
+        setup, instant = self._block.setup, parts.instant
+        here = local_probe(instant.frame)
+        base = self._body.find(instant, here, parts.past)
         for number, (other, (shifts, _)) in enumerate(zip(self._others, self._shifts, strict=True)):
             shift = np.zeros(3) if gives(setup, other.setup) else shifts[index]
             if same_body(self._block, other.setup) and other.setup.tool == setup.tool and not shift.any():
                 continue  # only the sensor differs
             probe = Probe(here.centre + shift, here.radius + other.setup.tool.radius - setup.tool.radius)
-            found = other.find(instant, probe, past)
-            self.total[number] -= float(adjoint @ (found.residual - base.residual))
-            if memory is not None and found.history is not None:
-                self.total[number] += memory.agreement(found.history)
-            if drag is not None and found.ways is not None:
-                self.total[number] += drag.agreement(found.ways)
+            found = other.find(instant, probe, parts.past)
+            self.total[number] += parts.agreement(found, other.setup) - float(adjoint @ (found.residual - base.residual))
 
 
 def replay_loss_changes(
@@ -243,8 +260,8 @@ def replay_loss_changes(
 
     Args:
         block: a Replay of the setup and grid of the frames. frames: all of a replay from rest; those without equilibrium count as
-            passed over. slopes: (n, 3) derivatives of the function by each frame's displacement [1/m]. times: (f,) of the frames
-            [s], which a material with memory asks for.
+            passed over. slopes: (n, 3) derivatives of the function by where each frame's nodes are, slid or not [1/m]. times: (f,)
+            of the frames [s], which a material with memory asks for.
         changes: (setup, moves) pairs: a Setup that differs a little from the block's, and how the tool's stated centres move with
             it, (3,) or (f, 3) [m]. What only another path through the frames would tell is refused: SetupError.
 
@@ -260,5 +277,5 @@ def replay_loss_changes(
         instant = instants[index]
         known = instant.number is not None and instant.last
         slope = slopes[instant.number or 0] if known else np.zeros_like(instant.frame.displacement)
-        way.step(index, instant, instants[max(index - 1, 0)].frame, slope)
+        way.step(index, slope)
     return way.total

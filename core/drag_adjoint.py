@@ -97,6 +97,7 @@ class DragStep:
         """What the transposed tangent has beside the one of the kept grip, times an adjoint displacement (n, 3)."""
         return self._on_nodes(_pulled(self._by_seen - self._frozen, self._pull(adjoint)))
 
+    @property
     def slope(self) -> FloatArray:
         """What the costate is by the displacements (n, 3)."""
         return self._on_nodes(_pulled(self._by_seen, self._own))

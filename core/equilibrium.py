@@ -28,7 +28,8 @@ class Equilibrium:
         probe: the tool (true centre and radius), phantom frame.
         force: (3,) of the block on the tool [N]. outcome, iterations, residual, penetration: how it was reached.
         hardness: of the contact, see `core.fem.model.BlockModel.harden`.
-        hold: what friction leaves to the next frame; None without. way: with friction, equilibria on the way from the frame before.
+        hold: what friction leaves to the next frame; None without.
+        way: with friction at the tool or under the base, equilibria on the way from the frame before.
     """
 
     mesh: Mesh

@@ -89,7 +89,7 @@ def tool_shifts(block: Replay, instants: Sequence[Instant], moves: FloatArray, g
         first, end = index - instant.place, index + instant.places - instant.place
         start, share = instants[first].frame, instant.place / instant.places
         shift = moves[instant.number]
-        if instant.places > 1:
+        if instant.places > 1 and block.setup.tool.friction_coefficient:
             begin = _begins(block, start, local_probe(instants[end].frame), (here[first], shift), growth)
             shift = (1 - share) * begin + share * shift
         here[index] = shift

@@ -124,6 +124,7 @@ class MemoryStep:
         by_c, _ = self._through_set(replace(none, free=-self._memory.step.factor * self.recalled(adjoint)))
         return self._on_strain(by_c)
 
+    @property
     def slope(self) -> FloatArray:
         """What the costate is by the displacements of its frame (n, 3)."""
         driven = self._driven()

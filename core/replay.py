@@ -25,15 +25,12 @@ from core.memory import Memory, State
 from core.meshing import Mesh, Meshing
 from core.progress import Report, silent
 from core.setup import Setup
-from core.yielding import give_way, slide
+from core.yielding import GRAVITY, give_way, slide, weight_of
 
 __all__ = ["GRAVITY", "Equilibrium", "Replay", "replay", "require_converged", "rest"]
 
-GRAVITY = 9.81
-"""Acceleration of free fall [m/s^2]."""
 _MOST_SLIDES, _DRAG_STEP, _HALVINGS = 12, 1e-3, 40
-"""Of a base in one frame; the longest motion of a tool with friction [m] that is taken as straight; of the way on which the first
-touch is sought, down to rounding, since a rough one would jump as the tool's place or radius changes."""
+"""Of a base in one frame; longest straight motion of a tool with friction [m]; of the way to the first touch, down to rounding."""
 
 
 class Replay:
@@ -163,10 +160,14 @@ class Replay:
             way.append(self.held(Probe(begin + share * (probe.centre - begin), probe.radius), way[-1]))
             if way[-1].outcome is not Outcome.CONVERGED:
                 break
-        frame = replace(way[-1], way=tuple(way[1:-1]))
-        if self._before is not None and self._before[1] is way[-1]:
-            self._before = (self._before[0], frame)
-        return frame
+        return self._after(way[1:-1], way[-1])
+
+    def _after(self, way: Sequence[Equilibrium], frame: Equilibrium) -> Equilibrium:
+        """A frame with what was on the way to it."""
+        found = replace(frame, way=tuple(way))
+        if self._before is not None and self._before[1] is frame:
+            self._before = (self._before[0], found)
+        return found
 
     def _extrapolated(self, model: BlockModel, start: Equilibrium, positions: FloatArray, probe: Probe) -> FloatArray:
         """Where the last two frames point to, if that lies lower in energy than the last frame itself."""
@@ -235,14 +236,15 @@ class Replay:
 
     def _slide(self, probe: Probe, frame: Equilibrium, friction: float) -> Equilibrium:
         """Move the base until friction holds: Coulomb, with the weight and the push as its load."""
-        weight = self.setup.mass * GRAVITY
+        weight, way = weight_of(self.setup), [frame]
         for _ in range(_MOST_SLIDES):
-            step = slide(frame, friction, weight)
-            if step is None or frame.outcome is not Outcome.CONVERGED:
+            step = slide(way[-1], friction, weight)
+            if step is None or way[-1].outcome is not Outcome.CONVERGED:
                 break
             self.slip = self.slip + step
-            frame = self.held(probe, frame)
-        return frame
+            way.append(self.held(probe, way[-1]))
+        before = [*frame.way, replace(frame, way=()), *way[1:]]
+        return self._after(before[:-1], way[-1])
 
 
 def rest(setup: Setup, grid: Meshing) -> Equilibrium:

@@ -24,7 +24,7 @@ from core.setup import Setup
 
 __all__ = [
     "TOOL_STEP", "Change", "GivingTool", "displacement_changes", "factorise_at", "gives", "local_probe", "loss_changes",
-    "same_body", "stiffness_changes", "unbalanced",
+    "same_body", "stiffness_changes", "tool_slopes",
 ]  # fmt: skip
 
 Change = tuple[Setup, FloatArray]
@@ -32,6 +32,9 @@ Change = tuple[Setup, FloatArray]
 
 TOOL_STEP = 5e-7
 """Motion of the tool [m] over which residuals are differenced: so short that no further surface point comes into touch."""
+
+_SLOPE_STEP = 1e-9
+"""The same where it is played off against the tangent [m]: half a point that comes into touch was a tenth of a gradient."""
 
 
 def factorise_at(block: Replay, frame: Equilibrium) -> BlockModel | None:
@@ -65,16 +68,10 @@ def _memoryless(*setups: Setup) -> None:
             raise SetupError(told, key="friction_coefficient")
 
 
-def unbalanced(
-    block: Replay,
-    frame: Equilibrium,
-    model: BlockModel,
-    changes: Sequence[Change],
-    made: Callable[[int], BlockModel] | None = None,
-) -> FloatArray:
+def _unbalanced(block: Replay, frame: Equilibrium, model: BlockModel, changes: Sequence[Change]) -> FloatArray:
     """Minus the change of the residual (u, len(changes)) over E [m^2] at the frame's displacement.
 
-    A tool that gives way stays where it is here; `GivingTool` moves it. `made` makes the model of the change of that number.
+    A tool that gives way stays where it is here; `GivingTool` moves it.
     """
     positions, here = frame.mesh.nodes + frame.displacement, local_probe(frame)
     residual = model.assemble(positions, here, tangent=False).residual
@@ -84,7 +81,7 @@ def unbalanced(
         shift = np.zeros(3) if gives(block.setup, setup) else _shift(block, setup, move)
         if same and setup.tool.radius == block.setup.tool.radius and not shift.any():  # only the sensor differs
             continue
-        other = model if same else BlockModel(setup, frame.mesh) if made is None else made(column)
+        other = model if same else BlockModel(setup, frame.mesh)
         other.harden(frame.hardness)
         probe = Probe(here.centre + shift, here.radius + setup.tool.radius - block.setup.tool.radius)
         right[:, column] = residual - other.assemble(positions, probe, tangent=False).residual
@@ -105,6 +102,17 @@ def _shift(block: Replay, setup: Setup, move: FloatArray) -> FloatArray:
 def gives(*setups: Setup) -> bool:
     """Whether the tool gives way in any of them."""
     return any(setup.tool.compliance_times_stiffness for setup in setups)
+
+
+def tool_slopes(model: BlockModel, positions: FloatArray, probe: Probe) -> tuple[FloatArray, FloatArray]:
+    """Of the residual (u, 3) and of minus the force on the tool (3, 3), both over E, by the tool's motion [m]."""
+    residuals, forces = np.empty((int(model.topology.free.sum()), 3)), np.empty((3, 3))
+    for column, axis in enumerate(np.eye(3)):
+        ways = [Probe(probe.centre + sign * _SLOPE_STEP * axis, probe.radius) for sign in (1, -1)]
+        ahead, behind = (model.assemble(positions, way, tangent=False) for way in ways)
+        residuals[:, column] = (ahead.residual - behind.residual) / (2 * _SLOPE_STEP)
+        forces[:, column] = (ahead.push - behind.push) / (2 * _SLOPE_STEP)
+    return residuals, forces
 
 
 class GivingTool:
@@ -128,17 +136,9 @@ class GivingTool:
         self._compliance = block.setup.tool.compliance_times_stiffness
         state = model.assemble(self._positions, self._here, tangent=False)
         self._force = -state.push
-        slopes = [self._slope(axis) for axis in np.eye(3)]
-        self.coupling = np.stack([residual for residual, _ in slopes], axis=1)
-        harder = -np.stack([force for _, force in slopes], axis=1)
+        self.coupling, harder = tool_slopes(model, self._positions, self._here)
         self.answer = (solve or model.topology.factor.solve)(self.coupling)
         self._inverse = np.linalg.inv(np.eye(3) + self._compliance * (harder - self.answer.T @ self.coupling))
-
-    def _slope(self, axis: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Of the residual (u,) and of the force on the tool (3,), over E, by the tool's motion along an axis [m]."""
-        ways = [Probe(self._here.centre + sign * TOOL_STEP * axis, self._here.radius) for sign in (1, -1)]
-        ahead, behind = (self._model.assemble(self._positions, probe, tangent=False) for probe in ways)
-        return (ahead.residual - behind.residual) / (2 * TOOL_STEP), (behind.push - ahead.push) / (2 * TOOL_STEP)
 
     def moved(self, changes: Sequence[Change], free: FloatArray) -> FloatArray:
         """The change of the displacement (u, len(changes)) [m], by that at a fixed tool; for a symmetric tangent."""
@@ -185,7 +185,7 @@ def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[Ch
     model = factorise_at(block, frame) if _holds(block, frame) else None
     if model is None or not changes:
         return result
-    free = model.topology.factor.solve(unbalanced(block, frame, model, changes))
+    free = model.topology.factor.solve(_unbalanced(block, frame, model, changes))
     if gives(block.setup, *(setup for setup, _ in changes)):
         free = GivingTool(block, frame, model).moved(changes, free)
     result[:, model.topology.free] = free.T
@@ -207,7 +207,7 @@ def loss_changes(block: Replay, frame: Equilibrium, slope: FloatArray, changes: 
     model = factorise_at(block, frame) if _holds(block, frame) else None
     if model is None or not changes:
         return np.zeros(len(changes))
-    right = unbalanced(block, frame, model, changes)
+    right = _unbalanced(block, frame, model, changes)
     adjoint = model.topology.factor.solve(slope[model.topology.free])
     if not gives(block.setup, *(setup for setup, _ in changes)):
         return np.asarray(adjoint @ right)

@@ -12,7 +12,10 @@ from core.fem.newton import Outcome
 from core.frames import FloatArray
 from core.setup import Setup
 
-__all__ = ["give_way", "slide"]
+__all__ = ["GRAVITY", "give_way", "nearest_node", "reach_of", "slide", "slide_by", "weight_of"]
+
+GRAVITY = 9.81
+"""Acceleration of free fall [m/s^2]."""
 
 _PLACED, _MOST_PLACES = 1e-2, 30
 """How well a tool that gives way is placed [m], over the tolerance, and how often that is tried."""
@@ -51,17 +54,31 @@ def slide(frame: Equilibrium, friction: float, weight: float) -> FloatArray | No
     Args:
         friction: coefficient [1]. weight: of the block [N]; with the tool's push it loads the base.
     """
-    push = -frame.force
+    return slide_by(frame.force, reach_of(frame), friction, weight)
+
+
+def slide_by(force: FloatArray, reach: float, friction: float, weight: float) -> FloatArray | None:
+    """The same, by the force on the tool (3,) [N] and the sideways indentation [m] that it stands for."""
+    push = -force
     pull, load = float(np.linalg.norm(push[:2])), max(weight - push[2], 0.0)
     excess = pull - friction * load
     if excess <= 1e-3 * friction * weight:
         return None
-    stiffness = pull / max(_reach(frame), _SHALLOWEST)
+    stiffness = pull / max(reach, _SHALLOWEST)
     return np.asarray(push[:2] / pull * min(excess / stiffness, _LONGEST_SLIDE))
 
 
-def _reach(frame: Equilibrium) -> float:
-    """Sideways indentation [m] that the push stands for: the tool's displacement of the material it touches."""
+def weight_of(setup: Setup) -> float:
+    """Of the block [N]."""
+    return setup.mass * GRAVITY
+
+
+def nearest_node(frame: Equilibrium) -> int:
+    """The node next to the tool's centre."""
     surface = frame.mesh.nodes + frame.displacement
-    nearest = int(np.argmin(np.linalg.norm(surface - (frame.probe.centre - np.append(frame.slip, 0.0)), axis=1)))
-    return float(np.linalg.norm(frame.displacement[nearest, :2]))
+    return int(np.argmin(np.linalg.norm(surface - (frame.probe.centre - np.append(frame.slip, 0.0)), axis=1)))
+
+
+def reach_of(frame: Equilibrium) -> float:
+    """Sideways indentation [m] that the push stands for: the tool's displacement of the material it touches."""
+    return float(np.linalg.norm(frame.displacement[nearest_node(frame), :2]))

@@ -209,6 +209,23 @@ def test_way_back_from_what_friction_holds_is_the_transpose_of_the_way_there():
     assert np.vdot(costate, there) == pytest.approx(np.vdot(hold.at_transposed(places, costate), hold.ways), rel=1e-12)
 
 
+ASIDE = np.array([[-SIZE[0] / 2 - 5e-3 + depth, 1.03e-3, 0.02007] for depth in (1e-3, 2e-3, 3e-3, 4e-3, 3.5e-3, 4.7e-3, 5.2e-3)])
+"""Against a side, so that the base slides, back a little, and on."""
+
+
+@pytest.mark.parametrize("grid", [EVEN, GRADED], ids=["even", "graded"])
+@pytest.mark.parametrize("memory", [False, True], ids=["without memory", "with memory"])
+def test_base_that_slid_has_the_gradient_of_whole_replays(grid, memory):
+    setup = RELAXES.apply(SETUP) if memory else SETUP
+    slides = BaseSlip(friction_coefficient=0.1)
+    frames = replay(slides.apply(setup), ASIDE, grid, times=TIMES)
+    assert frames[3].slip[0] > 3e-4 and frames[-1].slip[0] > frames[3].slip[0] + 3e-4
+    lump = StiffInclusion(x=-0.024, y=1e-3, z=0.022, radius=8e-3, stiffness_ratio=2.0)
+    _agree(setup, slides, grid, ASIDE, 1e-5)
+    for effect in (PoissonRatio(nu=0.43), lump, ToolRadius(radius=5.2e-3), ToolOffset(dx=2e-4, dy=-2.2e-4, dz=1e-5)):
+        _agree(slides.apply(setup), effect, grid, ASIDE, 1e-5)
+
+
 def test_frame_without_equilibrium_counts_as_passed_over():
     setup, inside = RELAXES.apply(SETUP), np.array([0.0, 0.0, 0.4 * SIZE[2]])
     longer, when = np.insert(WAY, 3, inside, axis=0), np.insert(TIMES, 3, 1.7)
@@ -242,6 +259,7 @@ def test_what_the_way_through_the_frames_does_not_tell_is_refused():
         (SETUP, RELAXES.apply(SETUP), frames, "relaxation"),
         (SETUP, KEEPS.apply(SETUP), frames, "retained_fraction"),
         (held, SETUP, slid, "friction_coefficient"),
+        (RUBS.apply(held), RUBS.apply(held), slid, "friction_coefficient"),
         (SETUP, RUBS.apply(SETUP), frames, "friction_coefficient"),
         (RUBS.apply(SETUP), ToolCompliance(compliance_times_stiffness=1.0).apply(RUBS.apply(SETUP)), frames, COMPLIANCE),
     ):

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from pushed_block import GRID, SETUP, poke
+from pushed_block import GRID, SETUP, SIZE, poke
 
 from core.fem.elastic import elastic_energy
 from core.fem.elements import Quadrature
@@ -15,7 +15,7 @@ from core.fem.stiffness import lump_share
 from core.frames import FloatArray
 from core.replay import Equilibrium, Replay
 from core.sensitivity import TOOL_STEP, displacement_changes, factorise_at, point_forces, stiffness_changes
-from core.setup import Inclusion, Load, Sensor, Setup
+from core.setup import Inclusion, Load, Sensor, Setup, Support
 
 TIGHT = 1e-10
 SMALL = 1e-3
@@ -146,3 +146,19 @@ def test_no_changes_ask_for_no_solve(pushed):
     block, frame = pushed
     assert displacement_changes(block, frame, []).shape == (0, *frame.displacement.shape)
     assert factorise_at(block, frame) is not None
+
+
+def test_base_that_slid_stays_where_it_is_in_the_changes_of_one_frame():
+    """Where it would have slid to instead hangs on the frames before: that is for `core.adjoint` to tell."""
+    loose = replace(SETUP, support=Support(friction_coefficient=0.1))
+    softer = replace(loose, material=replace(loose.material, poisson_ratio=0.451))
+    block, frame = Replay(loose, GRID, TIGHT), None
+    for depth in (1e-3, 2e-3, 3e-3, 4e-3):
+        frame = block.step(np.array([-SIZE[0] / 2 - 5e-3 + depth, 1e-3, 0.02]), frame)
+    assert frame is not None and frame.slip[0] > 5e-4
+    other = Replay(softer, GRID, TIGHT)
+    other.slip = frame.slip.copy()
+    wanted = other.held(frame.probe, frame).displacement - frame.displacement
+    assert _relative(displacement_changes(block, frame, [(softer, np.zeros(3))])[0], wanted) < 0.02
+    slippery = replace(loose, support=Support(friction_coefficient=0.099))
+    assert not displacement_changes(block, frame, [(slippery, np.zeros(3))]).any()
