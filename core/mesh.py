@@ -103,16 +103,18 @@ class BoxMesh:
     """Nodes and hexahedra of a block; node (i, j, k) has number (k * ny + j) * nx + i.
 
     Attributes:
-        axes: node coordinates along x, y, z [m], phantom frame. order: of the shape functions, 1 or 2; with 2 every second node
-            lies midway between its neighbours.
+        axes: node coordinates along x, y, z [m], phantom frame. focus: where they are closest (3,) [m], on a node or, where an axis
+            has too few, between two; the same place for all even grids of one block. order: of the shape functions, 1 or 2; with 2
+            every second node lies midway between its neighbours.
     """
 
     axes: tuple[FloatArray, FloatArray, FloatArray]
+    focus: FloatArray
     order: int = 1
 
     def __getstate__(self) -> dict[str, Any]:
-        """Only the axes and the order travel between processes; the rest is made again when asked for."""
-        return {"axes": self.axes, "order": self.order}
+        """Only what it was made of travels between processes; the rest is made again when asked for."""
+        return {"axes": self.axes, "focus": self.focus, "order": self.order}
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:
@@ -191,11 +193,6 @@ class BoxMesh:
         """Shared by all grids of this shape and order."""
         return _connectivity(self.shape, self.order)
 
-    @property
-    def focus(self) -> FloatArray:
-        """Where the grid is finest (3,) [m]; the same place for all even grids of one block."""
-        return np.array([axis[int(np.argmin(np.gradient(axis)))] for axis in self.axes])
-
     def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """Elements' nodes and shape functions (m, a) at rest positions (m, 3) [m]; outside is moved to the block."""
         first, parts = [], []
@@ -240,15 +237,16 @@ def box_mesh(size: tuple[float, float, float], grid: GridSpec, focus: FloatArray
     """
     lows, highs = (-size[0] / 2, -size[1] / 2, 0.0), (size[0] / 2, size[1] / 2, size[2])
     ends = [(count - 1) // grid.order + 1 for count in grid.nodes]
+    centre = np.array([0.0, 0.0, size[2]])
     if grid.spacing is None:
         axes = [even_axis(low, high, n) for low, high, n in zip(lows, highs, ends, strict=True)]
     else:
-        centre = np.array([0.0, 0.0, size[2]]) if focus is None else np.clip(focus, lows, highs)
+        centre = centre if focus is None else np.clip(focus, lows, highs)
         edge = grid.spacing * grid.order
         axes = [graded_axis(low, high, n, float(at), edge) for low, high, n, at in zip(lows, highs, ends, centre, strict=True)]
     if grid.order == 2:
         axes = [_with_middles(axis) for axis in axes]
-    return BoxMesh((axes[0], axes[1], axes[2]), grid.order)
+    return BoxMesh((axes[0], axes[1], axes[2]), centre, grid.order)
 
 
 @lru_cache(maxsize=64)
