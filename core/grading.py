@@ -73,4 +73,4 @@ def _mesh(size: tuple[float, float, float], grading: Grading, focus: tuple[float
         growth = grading.inward if at in (low, high) else grading.along
         axis = sized_axis(low, high, at, grading.spacing * grading.order, growth)
         axes.append(with_middles(axis) if grading.order == 2 else axis)
-    return BoxMesh((axes[0], axes[1], axes[2]), grading.order, np.array(focus))
+    return BoxMesh((axes[0], axes[1], axes[2]), np.array(focus), grading.order)

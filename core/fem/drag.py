@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -26,20 +26,18 @@ _MOST_TURNS = 30
 @dataclass(frozen=True, eq=False)
 class Past:
     """The step's beginning, at the quadrature points (f, p) of the model's surface: where they were seen from the tool's centre
-    (f, p, 3) [m], their tangential ways from the anchors (f, p, 3) [m], and which were touched (f, p)."""
+    (f, p, 3) [m], and what held them, seen there, too."""
 
     seen: FloatArray
-    ways: FloatArray
-    touched: np.ndarray[Any, np.dtype[np.bool_]]
+    hold: Hold
 
     @classmethod
     def of(cls, model: BlockModel, start: Equilibrium, before: Probe) -> Self:
         """As the frame before left it, in which the tool was at `before`."""
-        places = surface_spots(model.mesh).places
+        places = surface_spots(model.mesh, model.face).places
         flat = places.reshape(-1, 3)
         seen = (flat + start.mesh.interpolate(start.displacement, flat)).reshape(places.shape) - before.centre
-        ways, touched = (start.hold or Hold.nothing()).at(places)
-        return cls(seen, ways, touched)
+        return cls(seen, (start.hold or Hold.nothing()).at(places))
 
 
 def _seen(model: BlockModel, positions: FloatArray, probe: Probe) -> FloatArray:
@@ -47,11 +45,10 @@ def _seen(model: BlockModel, positions: FloatArray, probe: Probe) -> FloatArray:
     return np.asarray(np.einsum("qa,fai->fqi", model.face.shapes, positions[model.topology.surface]) - probe.centre)
 
 
-def _pressed(model: BlockModel, positions: FloatArray, probe: Probe, seen: FloatArray) -> FloatArray:
-    """How deep each point is pressed (f, p) [m]; zero where it is not touched or faces away."""
-    tangents = np.einsum("qac,fai->fqci", model.face.gradients, positions[model.topology.surface])
-    facing = np.einsum("fqi,fqi->fq", np.cross(tangents[:, :, 0], tangents[:, :, 1]), seen)
-    return np.where(facing < 0, np.maximum(probe.radius - np.linalg.norm(seen, axis=2), 0.0), 0.0)
+def _pressed(model: BlockModel, positions: FloatArray, probe: Probe) -> FloatArray:
+    """How deep each point is pressed (f, p) [m]; zero where it is not touched or not felt."""
+    facing, depth = model.facing(positions, probe)
+    return np.where(model.areas > 0 if model.dense else facing, np.maximum(depth, 0.0), 0.0)
 
 
 def _renewed(model: BlockModel, positions: FloatArray, probe: Probe, past: Past, friction: float) -> Grip:
@@ -61,16 +58,27 @@ def _renewed(model: BlockModel, positions: FloatArray, probe: Probe, past: Past,
     moves while the equilibrium is sought, its stick is given that share of the stiffness instead, and the whole way.
     """
     seen = _seen(model, positions, probe)
-    depth = _pressed(model, positions, probe, seen)
+    depth = _pressed(model, positions, probe)
     faces = np.flatnonzero((depth > 0).any(axis=1))
     here, before, depth = seen[faces], past.seen[faces], depth[faces]
     gap = np.maximum(np.linalg.norm(before, axis=2) - probe.radius, 0.0)
-    held = past.touched[faces]
+    held = past.hold.touched[faces]
     late = np.where(held, 1.0, depth / np.maximum(depth + gap, 1e-12))
-    anchors = np.where(held[..., None], before - past.ways[faces], before)
+    anchors = np.where(held[..., None], before - past.hold.ways[faces], before)
     normals = here / np.linalg.norm(here, axis=2, keepdims=True)
     areas = model.areas[faces]
     return Grip(faces, anchors, normals, friction * CONTACT_STIFFNESS * areas * depth, late * STICK_STIFFNESS * areas)
+
+
+def _kept(model: BlockModel, past: Past) -> Grip | None:
+    """The grip that the step begins with: of those points that were held, as they were; None of none."""
+    held = past.hold
+    faces = np.flatnonzero(held.touched.any(axis=1))
+    if not len(faces):
+        return None
+    here, areas = past.seen[faces], surface_spots(model.mesh, model.face).edges[faces] ** 2
+    normals = here / np.linalg.norm(here, axis=2, keepdims=True)
+    return Grip(faces, here - held.ways[faces], normals, held.limits[faces] * areas, STICK_STIFFNESS * model.areas[faces])
 
 
 def _hold(model: BlockModel, positions: FloatArray, probe: Probe, grip: Grip) -> Hold:
@@ -79,11 +87,12 @@ def _hold(model: BlockModel, positions: FloatArray, probe: Probe, grip: Grip) ->
     ways = seen[grip.faces] - grip.anchors
     ways -= grip.normals * np.einsum("gpi,gpi->gp", ways, grip.normals)[..., None]
     drag = grip.stiffness * np.linalg.norm(ways, axis=2)
-    share = np.minimum(1.0, grip.limits / np.maximum(drag, 1e-300)) * grip.stiffness / (STICK_STIFFNESS * model.areas[grip.faces])
+    share = np.minimum(1.0, grip.limits / np.maximum(drag, 1e-300)) * grip.stiffness
+    share /= np.maximum(STICK_STIFFNESS * model.areas[grip.faces], 1e-300)  # what is not felt has no area, and does not stick
     ways *= share[..., None]
-    whole, touched = np.zeros_like(seen), np.zeros(seen.shape[:2], dtype=bool)
-    whole[grip.faces], touched[grip.faces] = ways, grip.limits > 0
-    return Hold(surface_spots(model.mesh).places.reshape(-1, 3), whole.reshape(-1, 3), touched.ravel())
+    whole, limits, spots = np.zeros_like(seen), np.zeros(seen.shape[:2]), surface_spots(model.mesh, model.face)
+    whole[grip.faces], limits[grip.faces] = ways, grip.limits / spots.edges[grip.faces] ** 2
+    return Hold(spots.places.reshape(-1, 3), whole.reshape(-1, 3), limits.ravel() > 0, limits.ravel())
 
 
 def drag(
@@ -109,9 +118,9 @@ def drag(
     """
     before, probe = probes
     iterations, share, last = 0, 1.0, np.inf
-    model.grip = None
+    model.grip = _kept(model, past)
     try:
-        solution = lead(model, positions, before, probe, tolerance, follower)
+        solution = lead(model, positions, before, probe, tolerance, follower, haste=not model.dense)
         for _ in range(_MOST_TURNS):
             iterations += solution.iterations
             if not solution.converged:

@@ -76,28 +76,32 @@ class Grip:
 @dataclass(frozen=True, eq=False)
 class Hold:
     """What one frame leaves to the next: points of the surface at rest (m, 3) [m], tangential ways from their anchors (m, 3) [m],
-    and which of them (m,) are touched; none touched is a fresh start."""
+    which of them (m,) are touched, and what friction holds at most, over E and area (m,) [1]; none touched is a fresh start."""
 
     places: FloatArray
     ways: FloatArray
     touched: np.ndarray[Any, np.dtype[np.bool_]]
+    limits: FloatArray
 
     @classmethod
     def nothing(cls) -> Self:
         """Before the first touch."""
-        return cls(np.empty((0, 3)), np.empty((0, 3)), np.empty(0, dtype=bool))
+        return cls(np.empty((0, 3)), np.empty((0, 3)), np.empty(0, dtype=bool), np.empty(0))
 
-    def at(self, places: FloatArray) -> tuple[FloatArray, np.ndarray[Any, np.dtype[np.bool_]]]:
-        """Ways (..., 3) [m] and whether touched (...) at other points of the surface (..., 3), as a grid that moved has them."""
+    def at(self, places: FloatArray) -> Self:
+        """The same at other points of the surface (..., 3) [m], as a grid that moved has them."""
         flat = places.reshape(-1, 3)
         if not self.touched.any():
-            return np.zeros_like(places), np.zeros(places.shape[:-1], dtype=bool)
+            none = np.zeros(places.shape[:-1])
+            return type(self)(places, np.zeros_like(places), none.astype(bool), none)
         distance, near = (np.asarray(part) for part in cKDTree(self.places).query(flat, k=_NEIGHBOURS))
         weights = 1 / (distance + 1e-9) ** 2
         weights /= weights.sum(axis=1, keepdims=True)
         ways = np.einsum("mk,mki->mi", weights, self.ways[near])
         touched = self.touched[near[:, 0]]
-        return (ways * touched[:, None]).reshape(places.shape), touched.reshape(places.shape[:-1])
+        limits = np.einsum("mk,mk->m", weights, self.limits[near]) * touched
+        shape = places.shape[:-1]
+        return type(self)(places, (ways * touched[:, None]).reshape(places.shape), touched.reshape(shape), limits.reshape(shape))
 
 
 @njit(cache=True)
