@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Grading"]
 
+_USUAL_RADIUS = 5e-3
+
 
 @dataclass(frozen=True, kw_only=True)
 class Grading:
@@ -60,9 +62,9 @@ class Grading:
         """With nodes FINER times closer everywhere."""
         return replace(self, spacing=self.spacing / FINER, along=self.along / FINER, inward=self.inward / FINER)
 
-    def scaled(self, factor: float) -> Grading:
-        """For a tool this many times as large."""
-        return replace(self, spacing=self.spacing * factor)
+    def for_tool(self, radius: float) -> Grading:
+        """What this grading is for a ball of 5 mm, for one of another radius [m]."""
+        return replace(self, spacing=self.spacing * radius / _USUAL_RADIUS)
 
 
 @lru_cache(maxsize=64)
