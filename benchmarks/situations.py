@@ -1,4 +1,4 @@
-"""Random situations that a replay must survive: `python -m benchmarks.situations [COUNT] [SEED]`.
+"""Random situations that a replay must survive: `python -m benchmarks.situations [COUNT] [SEED] [--workers N]`.
 
 Materials up to nu = 0.49, neo-Hooke and Gent, two effects at a time, pokes into the top and the sides and over the rim by up to
 40 % of the height, jumps of up to 5 mm between frames. No frame may end with an exception, a NaN, an inverted element that is
@@ -8,9 +8,12 @@ called converged, or a surface point inside the tool; frames without equilibrium
 from __future__ import annotations
 
 import argparse
+import multiprocessing
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +28,7 @@ from core.mesh import GridSpec
 from core.replay import Equilibrium, Replay, replay
 from core.setup import Box, Material, Setup, Tool
 
-__all__ = ["Situation", "draw_situation", "faults"]
+__all__ = ["Situation", "Trial", "attempt", "draw_situation", "faults"]
 
 SIZE = (0.0687, 0.0393, 0.0358)
 GRIDS = (GridSpec(nodes=(13, 5, 5)), GridSpec(nodes=(9, 7, 6), spacing=2e-3), GridSpec(nodes=(9, 7, 5), spacing=2e-3, order=2))
@@ -114,26 +117,61 @@ def faults(situation: Situation, frames: list[Equilibrium]) -> list[str]:
     return found
 
 
-def main(count: int, seed: int) -> int:
-    """Try `count` situations from `seed` on; 1 when one of them shows a fault."""
-    console, outcomes, wrong, begin = Console(), Counter[str](), 0, time.process_time()
-    for number in range(seed, seed + count):
-        situation = draw_situation(number)
-        try:
-            frames = replay(situation.setup, situation.centres, situation.grid, times=situation.times)
-            found = faults(situation, frames)
-        except Exception as error:
-            frames, found = [], [f"{type(error).__name__}: {error}"]
-        outcomes.update(frame.outcome.value for frame in frames)
-        unsolved = [f"{i} {frame.outcome.name}" for i, frame in enumerate(frames) if frame.outcome is not Outcome.CONVERGED]
-        if found or unsolved:
-            names = " and ".join(effect.name for effect in situation.effects)
-            console.print(f"seed {number} ({names}, {situation.grid.nodes}): {'; '.join([*found, *unsolved])}", highlight=False)
-        wrong += bool(found)
-    table = Table("outcome", "frames", title=f"{count} situations from seed {seed}, {time.process_time() - begin:.0f} CPU s")
+@dataclass(frozen=True)
+class Trial:
+    """How one situation ended.
+
+    Attributes:
+        seed: of the situation. label: its effects and grid. outcomes: of its frames. found: faults, in words. cpu: seconds.
+    """
+
+    seed: int
+    label: str
+    outcomes: tuple[Outcome, ...]
+    found: tuple[str, ...]
+    cpu: float
+
+    def __str__(self) -> str:
+        unsolved = [f"{i} {outcome.name}" for i, outcome in enumerate(self.outcomes) if outcome is not Outcome.CONVERGED]
+        return f"seed {self.seed} ({self.label}, {self.cpu:.1f} CPU s): {'; '.join([*self.found, *unsolved]) or 'fine'}"
+
+
+def attempt(seed: int) -> Trial:
+    """Replay the situation of this seed, whatever happens."""
+    begin, situation = time.process_time(), draw_situation(seed)
+    label = f"{' and '.join(effect.name for effect in situation.effects)}, {situation.grid.nodes}"
+    try:
+        frames = replay(situation.setup, situation.centres, situation.grid, times=situation.times)
+        found = faults(situation, frames)
+    except Exception as error:
+        frames, found = [], [f"{type(error).__name__}: {error}"]
+    return Trial(seed, label, tuple(frame.outcome for frame in frames), tuple(found), time.process_time() - begin)
+
+
+def _attempts(seeds: range, workers: int) -> Iterator[Trial]:
+    """The trials in the order of their seeds, each as soon as it and those before it are done."""
+    if workers == 1:
+        yield from map(attempt, seeds)
+        return
+    with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+        yield from pool.map(attempt, seeds)
+
+
+def main(count: int, seed: int, workers: int = 1) -> int:
+    """Try `count` situations from `seed` on in so many processes; 1 when one of them shows a fault."""
+    console, outcomes, wrong, cpu = Console(), Counter[Outcome](), 0, 0.0
+    for trial in _attempts(range(seed, seed + count), workers):
+        if trial.found or set(trial.outcomes) - {Outcome.CONVERGED}:
+            console.print(str(trial), highlight=False, soft_wrap=True)
+        outcomes.update(trial.outcomes)
+        wrong, cpu = wrong + bool(trial.found), cpu + trial.cpu
+    table = Table("outcome", "frames", title=f"{count} situations from seed {seed}, {cpu / count:.2f} CPU s each")
     for outcome, frequency in outcomes.most_common():
-        table.add_row(outcome, str(frequency))
-    console.print(table, f"{wrong} with a fault")
+        table.add_row(outcome.value, str(frequency))
+    unsolved = outcomes.total() - outcomes[Outcome.CONVERGED]
+    console.print(
+        table, f"{wrong} with a fault; {1000 * unsolved / max(outcomes.total(), 1):.2f} of 1000 frames without equilibrium"
+    )
     return int(wrong > 0)
 
 
@@ -141,4 +179,5 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description="Random situations that a replay must survive.")
     parser.add_argument("count", nargs="?", type=int, default=100, help="how many")
     parser.add_argument("seed", nargs="?", type=int, default=0, help="of the first; the others follow")
+    parser.add_argument("--workers", type=int, default=1, help="processes that share them")
     sys.exit(main(**vars(parser.parse_args())))

@@ -60,8 +60,10 @@ class _Body:
 
     def begin(self, instant: Instant) -> BlockModel:
         """The model in the step that leads there."""
-        model, memory = BlockModel(self.setup, instant.frame.mesh), self.memory
-        model.harden(instant.frame.hardness)
+        frame, memory = instant.frame, self.memory
+        model = BlockModel(self.setup, frame.mesh, dense=frame.dense)
+        model.harden(frame.hardness)
+        model.expect(_positions(frame), (local_probe(frame),))
         if memory is not None and instant.past is not None:
             memory.history = instant.past
             if instant.time is None:

@@ -62,11 +62,12 @@ class DragStep:
         self.grip = renewed(model, positions, probe, past, friction)
         faces, radius = self.grip.faces, probe.radius
         seen = seen_from(model, positions, probe)
-        depth = pressed(model, positions, probe, seen)[faces]
+        depth = pressed(model, positions, probe)[faces]
         self._areas, past, here = model.areas[faces], past.on(faces), seen[faces]
 
         def left(x: FloatArray, b: FloatArray, w: FloatArray) -> FloatArray:
-            now, began = here + x, replace(past, seen=past.seen + b, ways=past.ways + w)
+            now, hold = here + x, replace(past.hold, ways=past.hold.ways + w)
+            began = replace(past, seen=past.seen + b, hold=hold)
             deep = np.where(depth > 0, radius - np.linalg.norm(now, axis=2), 0.0)
             return ways_left(now, gripped(faces, now, deep, began, self._areas, radius, friction), self._areas)
 
@@ -108,7 +109,7 @@ class DragStep:
 
     def before(self, start: Equilibrium, adjoint: FloatArray) -> Begun:
         """Costates of the step's beginning, with the adjoint displacement (n, 3) of its end."""
-        places = surface_spots(self._model.mesh).places[self.grip.faces].reshape(-1, 3)
+        places = surface_spots(self._model.mesh, self._model.face).places[self.grip.faces].reshape(-1, 3)
         total = self._own - self._pull(adjoint)
         seen, held = (_pulled(slopes, total).reshape(-1, 3) for slopes in (self._by_before, self._by_ways))
         displacement = np.zeros_like(start.displacement)

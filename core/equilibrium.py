@@ -28,6 +28,7 @@ class Equilibrium:
         probe: the tool (true centre and radius), phantom frame.
         force: (3,) of the block on the tool [N]. outcome, iterations, residual, penetration: how it was reached.
         hardness: of the contact, see `core.fem.model.BlockModel.harden`.
+        dense: whether the surface felt the tool at many points, see `core.fem.model.BlockModel`.
         hold: what friction leaves to the next frame; None without.
         way: with friction at the tool or under the base, equilibria on the way from the frame before.
     """
@@ -44,6 +45,7 @@ class Equilibrium:
     in_contact: bool
     hold: Hold | None = None
     hardness: float = 1.0
+    dense: bool = False
     way: tuple[Equilibrium, ...] = ()
 
     @cached_property

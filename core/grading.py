@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Grading"]
 
+_USUAL_RADIUS = 5e-3
+
 
 @dataclass(frozen=True, kw_only=True)
 class Grading:
@@ -60,9 +62,9 @@ class Grading:
         """With nodes FINER times closer everywhere."""
         return replace(self, spacing=self.spacing / FINER, along=self.along / FINER, inward=self.inward / FINER)
 
-    def scaled(self, factor: float) -> Grading:
-        """For a tool this many times as large."""
-        return replace(self, spacing=self.spacing * factor)
+    def for_tool(self, radius: float) -> Grading:
+        """What this grading is for a ball of 5 mm, for one of another radius [m]."""
+        return replace(self, spacing=self.spacing * radius / _USUAL_RADIUS)
 
 
 @lru_cache(maxsize=64)
@@ -73,4 +75,4 @@ def _mesh(size: tuple[float, float, float], grading: Grading, focus: tuple[float
         growth = grading.inward if at in (low, high) else grading.along
         axis = sized_axis(low, high, at, grading.spacing * grading.order, growth)
         axes.append(with_middles(axis) if grading.order == 2 else axis)
-    return BoxMesh((axes[0], axes[1], axes[2]), grading.order, np.array(focus))
+    return BoxMesh((axes[0], axes[1], axes[2]), np.array(focus), grading.order)

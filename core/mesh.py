@@ -6,7 +6,7 @@ Grading matters more than the number of nodes: the contact zone of a 5 mm ball i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -108,18 +108,18 @@ class BoxMesh:
     """Nodes and hexahedra of a block; node (i, j, k) has number (k * ny + j) * nx + i.
 
     Attributes:
-        axes: node coordinates along x, y, z [m], phantom frame. order: of the shape functions, 1 or 2; with 2 every second node
-            lies midway between its neighbours. focus: where a mesh that follows the tool is finest (3,) [m]; the same place for
-            all that do not.
+        axes: node coordinates along x, y, z [m], phantom frame. focus: where they are closest (3,) [m], on a node or, where an axis
+            has too few, between two; the same place for all even grids of one block. order: of the shape functions, 1 or 2; with 2
+            every second node lies midway between its neighbours.
     """
 
     axes: tuple[FloatArray, FloatArray, FloatArray]
+    focus: FloatArray
     order: int = 1
-    focus: FloatArray = field(default_factory=lambda: np.zeros(3))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Only what it was made from travels between processes; the rest is made again when asked for."""
-        return {"axes": self.axes, "order": self.order, "focus": self.focus}
+        """Only what it was made of travels between processes; the rest is made again when asked for."""
+        return {"axes": self.axes, "focus": self.focus, "order": self.order}
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:
@@ -242,16 +242,16 @@ def box_mesh(size: tuple[float, float, float], grid: GridSpec, focus: FloatArray
     """
     lows, highs = (-size[0] / 2, -size[1] / 2, 0.0), (size[0] / 2, size[1] / 2, size[2])
     ends = [(count - 1) // grid.order + 1 for count in grid.nodes]
+    centre = np.array([0.0, 0.0, size[2]])
     if grid.spacing is None:
-        centre = np.zeros(3)
         axes = [even_axis(low, high, n) for low, high, n in zip(lows, highs, ends, strict=True)]
     else:
-        centre = np.array([0.0, 0.0, size[2]]) if focus is None else np.clip(focus, lows, highs)
+        centre = centre if focus is None else np.clip(focus, lows, highs)
         edge = grid.spacing * grid.order
         axes = [graded_axis(low, high, n, float(at), edge) for low, high, n, at in zip(lows, highs, ends, centre, strict=True)]
     if grid.order == 2:
         axes = [with_middles(axis) for axis in axes]
-    return BoxMesh((axes[0], axes[1], axes[2]), grid.order, centre)
+    return BoxMesh((axes[0], axes[1], axes[2]), centre, grid.order)
 
 
 @lru_cache(maxsize=64)

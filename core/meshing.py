@@ -18,7 +18,7 @@ __all__ = ["FINER", "Connectivity", "IntArray", "Mesh", "Meshing"]
 IntArray = np.ndarray[Any, np.dtype[np.integer[Any]]]
 
 FINER = 1.5
-"""How many times closer the nodes of the finer mesh are, by which errors are estimated and hard frames tried again."""
+"""How many times closer the nodes of the finer mesh are, by which errors are estimated."""
 
 
 @dataclass(frozen=True, eq=False)

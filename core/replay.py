@@ -6,7 +6,7 @@ before. A graded mesh follows the tool: each frame has its own node coordinates,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -19,7 +19,7 @@ from core.fem.drag import Past, drag
 from core.fem.follow import Follower
 from core.fem.model import BlockModel, Probe
 from core.fem.newton import RELATIVE_TOLERANCE, Outcome, Solution, solve
-from core.fem.path import FREE_STEP, lead
+from core.fem.path import FREE_STEP, first_touch, lead
 from core.frames import FloatArray
 from core.memory import Memory, State
 from core.meshing import Mesh, Meshing
@@ -29,8 +29,8 @@ from core.yielding import GRAVITY, give_way, slide, weight_of
 
 __all__ = ["GRAVITY", "Equilibrium", "Replay", "replay", "require_converged", "rest"]
 
-_MOST_SLIDES, _DRAG_STEP, _HALVINGS = 12, 1e-3, 40
-"""Of a base in one frame; longest straight motion of a tool with friction [m]; of the way to the first touch, down to rounding."""
+_MOST_SLIDES, _DRAG_STEP = 12, 1e-3
+"""Of a base in one frame; longest motion of a tool with friction [m] that is taken as straight."""
 
 
 class Replay:
@@ -44,8 +44,9 @@ class Replay:
         self.setup, self.grid, self.tolerance = setup, grid, tolerance
         self._offset, self._follower = np.array(setup.tool.offset), Follower()
         self._model: BlockModel | None = None
+        self._mesh: Mesh | None = None
         self._before: tuple[Equilibrium, Equilibrium] | None = None
-        self.slip = np.zeros(2)
+        self.slip, self.dense = np.zeros(2), False
         self._rest_mesh = grid.mesh(setup, np.array([0.0, 0.0, setup.geometry.height]))
         self.memory = Memory.of(setup, grid, self._rest_mesh)
         if self.memory is not None:
@@ -63,8 +64,8 @@ class Replay:
 
     def model(self, mesh: Mesh) -> BlockModel:
         """The block's potential on this mesh, in the step in time that is under way; the last one is kept."""
-        if self._model is None or self._model.mesh is not mesh:
-            self._model = BlockModel(self.setup, mesh)
+        if self._model is None or self._model.mesh is not mesh or self._model.dense != self.dense:
+            self._model = BlockModel(self.setup, mesh, dense=self.dense)
         if self.memory is not None:
             self.memory.recall(self._model)
         return self._model
@@ -92,7 +93,7 @@ class Replay:
         displacement = solution.positions - mesh.nodes
         return Equilibrium(
             mesh, displacement, self.slip.copy(), probe, force, solution.outcome, solution.iterations, solution.residual,
-            solution.penetration, touched, hardness=self.model(mesh).hardness,
+            solution.penetration, touched, hardness=self.model(mesh).hardness, dense=self.dense,
         )  # fmt: skip
 
     def away(self, probe: Probe) -> bool:
@@ -110,22 +111,30 @@ class Replay:
             # The grid stays where the dent is.
             solution = self._untouched(self.model(start.mesh), start.mesh.nodes + start.displacement)
             return self._equilibrium(solution, start.mesh, probe)
+        frame = self._touched(probe, local, start)
+        if frame.outcome is not Outcome.CONVERGED and not self.dense:
+            # Most likely the tool slipped in between the points at which the surface feels it, from which no care would keep it.
+            self.dense = True
+            frame = self._touched(probe, local, start)
+        self._before = (start, frame)
+        return frame
+
+    def _touched(self, probe: Probe, local: Probe, start: Equilibrium) -> Equilibrium:
+        """Equilibrium under the tool, which is at `local` in the frame of the slid block."""
         model, positions, before, carried = self.set_out(local, start)
+        model.expect(positions, (before, local))
         positions = self._extrapolated(model, start, positions, local)
         if self.setup.tool.friction_coefficient:
             past = Past.of(model, start, Probe(before.centre - carried, before.radius))
-            frame = self._dragged(model, positions, (before, local), past, probe)
-        else:
-            solution = lead(model, positions, before, local, self.tolerance, self._follower)
-            frame = self._equilibrium(self._settled(model, local, solution), model.mesh, probe)
-        self._before = (start, frame)
-        return frame
+            return self._dragged(model, positions, (before, local), past, probe)
+        solution = lead(model, positions, before, local, self.tolerance, self._follower, haste=not self.dense)
+        return self._equilibrium(self._settled(model, local, solution), model.mesh, probe)
 
     def set_out(self, probe: Probe, start: Equilibrium) -> tuple[BlockModel, FloatArray, Probe, FloatArray]:
         """Where a solve begins, seen from the slid block: the model, positions (n, 3) [m], the tool before `probe`, and how far the
         grid's focus has moved since `start` (3,) [m], which carries the dent along with the tool.
         """
-        mesh = self.grid.mesh(self.setup, probe.centre)
+        mesh = self._mesh or self.grid.mesh(self.setup, probe.centre)
         model, displacement = self.model(mesh), start.displacement
         carried = mesh.focus - start.mesh.focus if start.in_contact else np.zeros(3)
         if start.mesh is not mesh:
@@ -137,7 +146,7 @@ class Replay:
     def from_where(self, start: Equilibrium, probe: Probe) -> Probe:
         """Where the way from a frame to `probe` (seen from the slid block) begins: from afar, where it is about to touch."""
         before = Probe(start.probe.centre - np.append(start.slip, 0.0), start.probe.radius)
-        return before if start.in_contact else self._first_touch(before, probe)
+        return before if start.in_contact else first_touch(before, probe, self.setup.geometry, self.away)
 
     def _dragged(
         self, model: BlockModel, positions: FloatArray, probes: tuple[Probe, Probe], past: Past, probe: Probe
@@ -184,55 +193,52 @@ class Replay:
         guess = positions + min(max(share, -1.0), 1.5) * (start.displacement - earlier.displacement)
         return guess if model.energy(guess, probe) < model.energy(positions, probe) else positions
 
-    def _first_touch(self, before: Probe, probe: Probe) -> Probe:
-        """The last place on the way to `probe` that is clear of the block."""
-        low, high = 0.0, 1.0
-        if np.linalg.norm(before.centre - probe.centre) > 1.0 or not self.away(before):
-            middle = (self.setup.geometry.low + self.setup.geometry.high) / 2
-            before = Probe(probe.centre + (probe.centre - middle) / np.linalg.norm(probe.centre - middle) * 0.05, probe.radius)
-        for _ in range(_HALVINGS):
-            share = (low + high) / 2
-            clear = self.away(Probe(before.centre + share * (probe.centre - before.centre), probe.radius))
-            low, high = (share, high) if clear else (low, share)
-        return Probe(before.centre + low * (probe.centre - before.centre), probe.radius)
-
     def step(self, stated_centre: FloatArray, start: Equilibrium | None = None, time: float | None = None) -> Equilibrium:
         """Equilibrium with the tool at a stated centre (3,) [m], phantom frame; tool and base give way if they can.
 
         A material with memory must be told the time [s], and goes on from its last equilibrium, whatever the start.
         """
         centre, start = stated_centre + self._offset, self.free if start is None else start
+        self.dense = start.dense and start.in_contact
         if self.memory is not None:
             self.memory.begin(time)
-        if self.setup.tool.compliance_times_stiffness:
-            frame = give_way(centre, start, self.setup, self.tolerance, self._placed)
-        else:
-            frame = self._placed(centre, start)
+        slip, frame = self.slip, self._balanced(centre, start)
+        if frame.outcome is not Outcome.CONVERGED and self.setup.tool.compliance_times_stiffness:
+            # Of several solves some may have let the tool slip in between the points that feel it; and where one grid gives way to
+            # another, which resists otherwise, a tool on a spring may find its balance on neither.
+            self.slip, self.dense = slip, True
+            self._mesh = frame.mesh if frame.outcome is Outcome.TOOL_SWINGS else None
+            frame = self._balanced(centre, start)
+            self._mesh = None
+        if frame.outcome is not Outcome.CONVERGED:
+            self.slip = slip
         if self.memory is not None:
             self.memory.end(frame)
         return frame
 
-    def on_finer_grid(self, stated_centre: FloatArray, start: Equilibrium | None, failed: Equilibrium) -> Equilibrium:
-        """The frame once more, on a grid 1.5 times finer; as it was, where that finds no equilibrium, either.
+    def sought(self, centre: FloatArray, starts: Iterable[Equilibrium | None], time: float | None = None) -> Equilibrium:
+        """As `step`, from the first of these frames from which it finds an equilibrium, or from rest; else as the last one left it.
 
-        A ball pressed in by more than its radius can slip behind the chords of a coarse grid's surface, and not of a fine one's.
+        A long jump may lead through the block; from rest the tool comes in from outside, and what friction held would be forgotten.
         """
-        other = Replay(self.setup, self.grid.finer(), self.tolerance)
-        for begin in (start,) if self.setup.remembers else (start, None):
-            other.slip = self.slip.copy() if begin is None else begin.slip.copy()
-            frame = other.step(stated_centre, begin)
+        rest = () if self.setup.tool.friction_coefficient else (None,)
+        for start in dict.fromkeys((*starts, *rest)):
+            frame = self.step(centre, start, time)
             if frame.outcome is Outcome.CONVERGED:
-                self.slip = other.slip
-                return frame
-        return failed
+                break
+        return frame
+
+    def _balanced(self, centre: FloatArray, start: Equilibrium) -> Equilibrium:
+        """Equilibrium with the tool, or the other end of the spring on which it gives way, at `centre` (3,) [m]."""
+        if self.setup.tool.compliance_times_stiffness:
+            return give_way(centre, start, self.setup, self.tolerance, self._placed)
+        return self._placed(centre, start)
 
     def _placed(self, centre: FloatArray, start: Equilibrium) -> Equilibrium:
         """Equilibrium with the tool's centre held here (3,) [m]; slides the base if it cannot hold."""
         probe = Probe(centre, self.setup.tool.radius)
-        frame = self._led(probe, start)
-        if self.setup.support.friction_coefficient is None:
-            return frame
-        return self._slide(probe, frame, self.setup.support.friction_coefficient)
+        frame, friction = self._led(probe, start), self.setup.support.friction_coefficient
+        return frame if friction is None else self._slide(probe, frame, friction)
 
     def _slide(self, probe: Probe, frame: Equilibrium, friction: float) -> Equilibrium:
         """Move the base until friction holds: Coulomb, with the weight and the push as its load."""
@@ -271,8 +277,7 @@ def replay(
             (`Replay.state`), to go on from; else from rest. starts: equilibria of a similar setup at the same frames to begin from;
             else from the frame before. tolerance: residual at which a frame counts as converged, over the push. report: progress.
 
-    A frame that finds no equilibrium is tried on a finer grid. One that finds none there, either, is returned with its outcome,
-    never raised: look at `outcome`, or call `require_converged`.
+    A frame that finds no equilibrium is returned with its outcome, never raised: look at `outcome`, or call `require_converged`.
     """
     if starts is not None and setup.remembers:
         raise SolveError("a setup whose frames depend on those before them is replayed in order of time, without starts")
@@ -287,13 +292,7 @@ def replay(
     for number, (centre, time) in enumerate(zip(np.asarray(centres, dtype=float), instants, strict=True)):
         report(number / len(centres), f"frame {number + 1} of {len(centres)}")
         start = starts[number] if starts is not None and starts[number].in_contact else previous
-        frame = block.step(centre, start, time)
-        # A long jump may lead through the block; from rest the tool comes in from outside, and what friction held is forgotten.
-        for other in () if setup.tool.friction_coefficient else (previous, None):
-            if frame.outcome is not Outcome.CONVERGED and other is not start:
-                start, frame = other, block.step(centre, other, time)
-        if frame.outcome is not Outcome.CONVERGED and not setup.material.remembers:  # what it remembers is not on that grid
-            frame = block.on_finer_grid(centre, previous, frame)
+        frame = block.sought(centre, (start, previous), time)
         frames.append(frame)
         previous = frame if frame.outcome is Outcome.CONVERGED else previous if setup.remembers else None
     return frames

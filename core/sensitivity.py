@@ -39,8 +39,10 @@ _SLOPE_STEP = 1e-9
 
 def factorise_at(block: Replay, frame: Equilibrium) -> BlockModel | None:
     """Factorise the tangent at a frame's equilibrium; None when it has no Cholesky factor."""
+    block.dense = frame.dense
     model = block.model(frame.mesh)
     model.harden(frame.hardness)
+    model.expect(frame.mesh.nodes + frame.displacement, (local_probe(frame),))
     state = model.assemble(frame.mesh.nodes + frame.displacement, local_probe(frame))
     try:
         model.topology.factor.factorise(state.data)
@@ -81,8 +83,9 @@ def _unbalanced(block: Replay, frame: Equilibrium, model: BlockModel, changes: S
         shift = np.zeros(3) if gives(block.setup, setup) else _shift(block, setup, move)
         if same and setup.tool.radius == block.setup.tool.radius and not shift.any():  # only the sensor differs
             continue
-        other = model if same else BlockModel(setup, frame.mesh)
+        other = model if same else BlockModel(setup, frame.mesh, dense=frame.dense)
         other.harden(frame.hardness)
+        other.expect(positions, (here,))
         probe = Probe(here.centre + shift, here.radius + setup.tool.radius - block.setup.tool.radius)
         right[:, column] = residual - other.assemble(positions, probe, tangent=False).residual
     return right

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["check", "register", "replay"]
 
 Folder = Annotated[Path, typer.Argument(help="A dataset folder.", show_default=False)]
+_SHOWN = (25, 9, 9)
+"""Nodes whose way is written where the mesh itself follows the tool."""
 
 
 def check(
@@ -67,7 +69,7 @@ def replay(
     dataset: Folder,
     sequence: Annotated[str, typer.Option(help="Which sequence.", show_default=False)],
     file: Annotated[Path, typer.Option("--out", help="Where the frames go (.npz).", show_default=False)],
-    grid: Annotated[str, typer.Option(help="Nodes along x, y, z.")] = "13x5x5",
+    grid: Annotated[str, typer.Option(help="Even nodes along x, y, z, as in 13x5x5; or finest at the tool.")] = "graded",
 ) -> None:
     """Simulate one sequence as the setup states it: one equilibrium per cloud, written to an .npz file.
 
@@ -77,19 +79,23 @@ def replay(
     import core.replay as simulation  # noqa: PLC0415 (heavy)
     from core.accuracy import hardest_frames, mesh_errors  # noqa: PLC0415 (heavy)
     from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
+    from core.diagnosis import DIAGNOSIS_GRID  # noqa: PLC0415 (heavy)
     from core.fem.newton import Outcome  # noqa: PLC0415 (heavy)
-    from core.mesh import GridSpec  # noqa: PLC0415 (heavy)
+    from core.mesh import GridSpec, box_mesh  # noqa: PLC0415 (heavy)
+    from core.meshing import Meshing  # noqa: PLC0415 (heavy)
 
-    spec, opened = GridSpec.parse(grid), open_dataset(dataset)
+    even = None if grid == "graded" else GridSpec.parse(grid)
+    opened = open_dataset(dataset)
     kinematics = opened.sequence(sequence).kinematics
     times = opened.sequence(sequence).cloud_times
     times = times if len(times) else kinematics.time
     with progress(f"replay {sequence}") as report:
         setup = registration.setup_from(opened, registration.register(opened, part(report, 0.0, 0.1)))
+        spec: Meshing = even or DIAGNOSIS_GRID.for_tool(setup.tool.radius)
         centres = setup.phantom_from_robot.apply(kinematics.position_at(times))
         frames = simulation.replay(setup, centres, spec, times=times, report=part(report, 0.1, 0.8))
         misses = mesh_errors(setup, frames, spec, report=part(report, 0.8, 1.0))
-    mesh = spec.mesh(setup, centres[0])
+    mesh = box_mesh(setup.box.size, even or GridSpec(nodes=_SHOWN))
     used, quads = np.unique(mesh.free_surface, return_inverse=True)
     rest = mesh.nodes[used]
     _save(
@@ -99,7 +105,8 @@ def replay(
         mesh_error=np.array([(miss.frame, miss.displacement, miss.relative, miss.force) for miss in misses]).reshape(-1, 4),
     )  # fmt: skip
     failed = [number for number, frame in enumerate(frames) if frame.outcome is not Outcome.CONVERGED]
-    out.print(f"{len(frames)} frames on {grid} nodes, {len(frames) - len(failed)} converged: {file}", highlight=False)
+    where = f"{grid} nodes" if even else "a mesh that follows the tool"
+    out.print(f"{len(frames)} frames on {where}, {len(frames) - len(failed)} converged: {file}", highlight=False)
     if misses:
         worst = max(misses, key=lambda miss: miss.displacement)
         size = f"{1e3 * worst.displacement:.2f} mm RMS ({worst.relative:.0%}) and {worst.force:.0%} of the force"

@@ -56,11 +56,14 @@ class Member(Replay):
             self.free = self._equilibrium(solution, begin.model.mesh, begin.probe)
 
     def begin(self, centre: FloatArray) -> Begin | None:
-        """The solve for the next frame, with the tool stated at `centre` (3,) [m]; None when it does not touch."""
+        """The solve for the next frame, with the tool stated at `centre` (3,) [m]; None when it does not touch, or is felt at more
+        points than the others' tools are.
+        """
         probe = Probe(centre + self._offset, self.setup.tool.radius)
-        if self.away(probe):
-            return None
         start = self._previous or self.free
+        if self.away(probe) or start.dense:
+            return None
+        self.dense = False
         model, positions, before, _ = self.set_out(probe, start)
         model.harden(1.0)
         return Begin(model, positions, positions + self._further(start, model.mesh, probe), before, probe)
@@ -92,10 +95,4 @@ class Member(Replay):
 
     def alone(self, centre: FloatArray) -> None:
         """Do the next frame without the others, as `core.replay.replay` does it."""
-        for start in dict.fromkeys((self._previous, None)):
-            frame = self.step(centre, start)
-            if frame.outcome is Outcome.CONVERGED:
-                break
-        if frame.outcome is not Outcome.CONVERGED:
-            frame = self.on_finer_grid(centre, self._previous, frame)
-        self.frames.append(frame)
+        self.frames.append(self.sought(centre, (self._previous,)))

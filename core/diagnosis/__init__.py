@@ -28,15 +28,14 @@ from core.progress import Report, part, silent
 from core.registration import Registration, register, setup_from
 from core.setup import Setup
 
-__all__ = ["DIAGNOSIS_GRID", "FINE_GRID", "diagnose"]
+__all__ = ["DIAGNOSIS_GRID", "FINE_GRID", "PAGE_GRID", "diagnose"]
 
 DIAGNOSIS_GRID = Grading(spacing=1.3e-3, along=0.5, inward=0.9)
 FINE_GRID = Grading(spacing=1e-3, along=0.45, inward=0.7)
 PAGE_GRID = Grading(spacing=1.5e-3, along=0.7, inward=1.2)
-"""For a tool of 5 mm; all are scaled with the stated radius."""
+"""For a tool of 5 mm; others have theirs."""
 FIT_GROUPS = 14
 TEST_GROUPS = 24
-_USUAL_RADIUS = 5e-3
 
 
 def diagnose(
@@ -109,8 +108,7 @@ def _run(
     replays: bool,
 ) -> dict[str, Any]:
     fitted, unseen = data
-    size = setup.tool.radius / _USUAL_RADIUS
-    grid, fine = DIAGNOSIS_GRID.scaled(size), FINE_GRID.scaled(size)
+    grid, fine = DIAGNOSIS_GRID.for_tool(setup.tool.radius), FINE_GRID.for_tool(setup.tool.radius)
     static = StaticChannel.of(dataset.rest_cloud(), cleaner_for(dataset, registration), setup, grid)
     names = [item.name for item in fitted]
     bench = Bench(setup, registration, pool, names, static, grid, fine, part(report, 0.05, 0.75))
@@ -137,7 +135,7 @@ def _record(
     """Every sequence under the stated and the extended setup, for the page."""
     stated, found = setups
     cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration)
-    page = PAGE_GRID.scaled(stated.tool.radius / _USUAL_RADIUS)
+    page = PAGE_GRID.for_tool(stated.tool.radius)
     tasks = [
         pool.run(record, dataset.path, name, stated, found, cleaner, shaft, page, folder / f"{name}.npz")
         for name in dataset.sequences
@@ -159,5 +157,5 @@ def _model(dataset: Dataset, setup: Setup, findings: Findings, fitted: list[str]
     effects = [effect.to_json() for effect in findings.best.model.effects] if findings.best else []
     return {
         "format": 1, "version": 1, "dataset": dataset.name, "parent": None, "fitted_on": fitted, "effects": effects,
-        "setup": setup.as_dict(), "grid": asdict(DIAGNOSIS_GRID.scaled(setup.tool.radius / _USUAL_RADIUS)),
+        "setup": setup.as_dict(), "grid": asdict(DIAGNOSIS_GRID.for_tool(setup.tool.radius)),
     }  # fmt: skip

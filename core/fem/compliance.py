@@ -82,7 +82,7 @@ class Compliance:
         force, data = np.zeros_like(positions), np.zeros(positions.size**2)
         assemble_contact(
             self._local, model.areas[self._faces], model.face.shapes, model.face.gradients, positions, probe.centre,
-            probe.radius, False, CONTACT_STIFFNESS, bending, self._slots, force, data, np.zeros(3),
+            probe.radius, False, not model.dense, CONTACT_STIFFNESS, bending, self._slots, force, data, np.zeros(3),
         )  # fmt: skip
         if model.grip is not None:
             grip = model.grip.of(self._faces)
@@ -136,7 +136,7 @@ class Compliance:
         """Energy over E [m^3] of the condensed body and the contact."""
         touched = contact_energy(
             self._local, model.areas[self._faces], model.face.shapes, model.face.gradients, here + change.reshape(-1, 3),
-            probe.centre, probe.radius, False, CONTACT_STIFFNESS,
+            probe.centre, probe.radius, False, not model.dense, CONTACT_STIFFNESS,
         )  # fmt: skip
         if model.grip is not None:
             touched += model.grip.of(self._faces).energy(self._local, model.face, here + change.reshape(-1, 3), probe.centre)

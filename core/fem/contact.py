@@ -2,7 +2,8 @@
 
 Both are penalties at the surface's quadrature points, not at nodes: a ball pushed deep would slip between nodes. Stiffness is
 given over E, so that the shape does not depend on the modulus. A point is only pushed when its outward normal faces the
-sphere's centre; without that test the far side of the block can come to rest inside the ball.
+sphere's centre; without that test the far side of the block can come to rest inside the ball. The test may be made at every
+evaluation, or once before: then the energy does not jump where a point turns away while an equilibrium is sought.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ __all__ = ["assemble_contact", "contact_energy", "turns_around"]
 
 
 @njit(cache=True)
-def _gap(positions: Any, face: Any, shapes: Any, gradients: Any, centre: Any, radius: float, flat: bool, direction: Any) -> float:
+def _gap(
+    positions: Any, face: Any, shapes: Any, gradients: Any, centre: Any, radius: float, flat: bool, facing: bool, direction: Any
+) -> float:
     """Signed gap of a surface point [m], negative inside the obstacle; `direction` gets the unit vector that opens the gap."""
     x, s, t = np.zeros(3), np.zeros(3), np.zeros(3)
     for a in range(face.shape[0]):
@@ -35,8 +38,8 @@ def _gap(positions: Any, face: Any, shapes: Any, gradients: Any, centre: Any, ra
     if distance >= radius:
         return 1.0
     normal = np.cross(s, t)
-    facing = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2]
-    if facing >= 0 or distance < 1e-9:
+    away = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2]
+    if (facing and away >= 0) or distance < 1e-9:
         return 1.0
     direction /= distance
     return distance - radius  # type: ignore[no-any-return]
@@ -59,15 +62,29 @@ def _in_reach(positions: Any, face: Any, centre: Any, radius: float, flat: bool)
 
 @njit(cache=True)
 def contact_energy(
-    faces: Any, areas: Any, shapes: Any, gradients: Any, positions: Any, centre: Any, radius: float, flat: bool, stiffness: float
+    faces: Any,
+    areas: Any,
+    shapes: Any,
+    gradients: Any,
+    positions: Any,
+    centre: Any,
+    radius: float,
+    flat: bool,
+    facing: bool,
+    stiffness: float,
 ) -> float:
-    """Penalty energy over E [m^3]: stiffness/2 gap^2 over the touched area; stiffness over E [1/m]. `flat` is the plane z = 0."""
+    """Penalty energy over E [m^3]: stiffness/2 gap^2 over the touched area; stiffness over E [1/m]. `flat` is the plane z = 0.
+
+    With `facing` only points that face the sphere's centre are pushed, otherwise all that have an area.
+    """
     direction, total = np.empty(3), 0.0
     for f in range(faces.shape[0]):
         if not _in_reach(positions, faces[f], centre, radius, flat):
             continue
         for q in range(shapes.shape[0]):
-            gap = _gap(positions, faces[f], shapes[q], gradients[q], centre, radius, flat, direction)
+            if areas[f, q] == 0.0:
+                continue
+            gap = _gap(positions, faces[f], shapes[q], gradients[q], centre, radius, flat, facing, direction)
             if gap < 0:
                 total += 0.5 * stiffness * areas[f, q] * gap * gap
     return total
@@ -83,6 +100,7 @@ def assemble_contact(
     centre: Any,
     radius: float,
     flat: bool,
+    facing: bool,
     stiffness: float,
     bending: bool,
     slots: Any,
@@ -92,7 +110,7 @@ def assemble_contact(
 ) -> float:
     """Add the penalty's gradient over E to `force` (n, 3) [m^2], its tangent to `data` [m], the push on the body to `resultant`.
 
-    `slots` (f, 3 b, 3 b) as in `assemble_elastic`; an empty `data` leaves the tangent out,
+    `facing` as in `contact_energy`, `slots` (f, 3 b, 3 b) as in `assemble_elastic`; an empty `data` leaves the tangent out,
     `bending` False the part from the sphere's curvature, which is not positive. Returns the deepest penetration [m].
     """
     direction, deepest = np.empty(3), 0.0
@@ -100,8 +118,8 @@ def assemble_contact(
         if not _in_reach(positions, faces[f], centre, radius, flat):
             continue
         for q in range(shapes.shape[0]):
-            gap = _gap(positions, faces[f], shapes[q], gradients[q], centre, radius, flat, direction)
-            if gap >= 0:
+            gap = _gap(positions, faces[f], shapes[q], gradients[q], centre, radius, flat, facing, direction)
+            if gap >= 0 or areas[f, q] == 0.0:
                 continue
             deepest = max(deepest, -gap)
             weight = stiffness * areas[f, q]

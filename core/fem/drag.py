@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -27,24 +27,22 @@ _MOST_TURNS = 30
 @dataclass(frozen=True, eq=False)
 class Past:
     """The step's beginning, at the quadrature points (f, p) of the model's surface: where they were seen from the tool's centre
-    (f, p, 3) [m], their tangential ways from the anchors (f, p, 3) [m], and which were touched (f, p)."""
+    (f, p, 3) [m], and what held them, seen there, too."""
 
     seen: FloatArray
-    ways: FloatArray
-    touched: np.ndarray[Any, np.dtype[np.bool_]]
+    hold: Hold
 
     @classmethod
     def of(cls, model: BlockModel, start: Equilibrium, before: Probe) -> Self:
         """As the frame before left it, in which the tool was at `before`."""
-        places = surface_spots(model.mesh).places
+        places = surface_spots(model.mesh, model.face).places
         flat = places.reshape(-1, 3)
         seen = (flat + start.mesh.interpolate(start.displacement, flat)).reshape(places.shape) - before.centre
-        ways, touched = (start.hold or Hold.nothing()).at(places)
-        return cls(seen, ways, touched)
+        return cls(seen, (start.hold or Hold.nothing()).at(places))
 
     def on(self, faces: IntArray) -> Self:
         """The part of it on these faces (g,)."""
-        return type(self)(self.seen[faces], self.ways[faces], self.touched[faces])
+        return type(self)(self.seen[faces], self.hold.on(faces))
 
 
 def seen_from(model: BlockModel, positions: FloatArray, probe: Probe) -> FloatArray:
@@ -52,17 +50,16 @@ def seen_from(model: BlockModel, positions: FloatArray, probe: Probe) -> FloatAr
     return np.asarray(np.einsum("qa,fai->fqi", model.face.shapes, positions[model.topology.surface]) - probe.centre)
 
 
-def pressed(model: BlockModel, positions: FloatArray, probe: Probe, seen: FloatArray) -> FloatArray:
-    """How deep each point is pressed (f, p) [m]; zero where it is not touched or faces away."""
-    tangents = np.einsum("qac,fai->fqci", model.face.gradients, positions[model.topology.surface])
-    facing = np.einsum("fqi,fqi->fq", np.cross(tangents[:, :, 0], tangents[:, :, 1]), seen)
-    return np.where(facing < 0, np.maximum(probe.radius - np.linalg.norm(seen, axis=2), 0.0), 0.0)
+def pressed(model: BlockModel, positions: FloatArray, probe: Probe) -> FloatArray:
+    """How deep each point is pressed (f, p) [m]; zero where it is not touched or not felt."""
+    facing, depth = model.facing(positions, probe)
+    return np.where(model.areas > 0 if model.dense else facing, np.maximum(depth, 0.0), 0.0)
 
 
 def renewed(model: BlockModel, positions: FloatArray, probe: Probe, past: Past, friction: float) -> Grip:
     """The grip that goes with the pressure at these positions."""
     seen = seen_from(model, positions, probe)
-    depth = pressed(model, positions, probe, seen)
+    depth = pressed(model, positions, probe)
     faces = np.flatnonzero((depth > 0).any(axis=1))
     return gripped(faces, seen[faces], depth[faces], past.on(faces), model.areas[faces], probe.radius, friction)
 
@@ -75,11 +72,22 @@ def gripped(
     A point that was not touched before sticks from where the tool met it: for the share of its way that came after. As that place
     moves while the equilibrium is sought, its stick is given that share of the stiffness instead, and the whole way.
     """
-    gap = np.maximum(np.linalg.norm(past.seen, axis=2) - radius, 0.0)
-    late = np.where(past.touched, 1.0, depth / np.maximum(depth + gap, 1e-12))
-    anchors = np.where(past.touched[..., None], past.seen - past.ways, past.seen)
+    gap, held = np.maximum(np.linalg.norm(past.seen, axis=2) - radius, 0.0), past.hold.touched
+    late = np.where(held, 1.0, depth / np.maximum(depth + gap, 1e-12))
+    anchors = np.where(held[..., None], past.seen - past.hold.ways, past.seen)
     normals = seen / np.linalg.norm(seen, axis=2, keepdims=True)
     return Grip(faces, anchors, normals, friction * CONTACT_STIFFNESS * areas * depth, late * STICK_STIFFNESS * areas)
+
+
+def _kept(model: BlockModel, past: Past) -> Grip | None:
+    """The grip that the step begins with: of those points that were held, as they were; None of none."""
+    held = past.hold
+    faces = np.flatnonzero(held.touched.any(axis=1))
+    if not len(faces):
+        return None
+    here, areas = past.seen[faces], surface_spots(model.mesh, model.face).edges[faces] ** 2
+    normals = here / np.linalg.norm(here, axis=2, keepdims=True)
+    return Grip(faces, here - held.ways[faces], normals, held.limits[faces] * areas, STICK_STIFFNESS * model.areas[faces])
 
 
 def ways_left(seen: FloatArray, grip: Grip, areas: FloatArray) -> FloatArray:
@@ -88,17 +96,18 @@ def ways_left(seen: FloatArray, grip: Grip, areas: FloatArray) -> FloatArray:
     ways = seen - grip.anchors
     ways -= grip.normals * np.einsum("gpi,gpi->gp", ways, grip.normals)[..., None]
     drag = grip.stiffness * np.linalg.norm(ways, axis=2)
-    share = np.minimum(1.0, grip.limits / np.maximum(drag, 1e-300)) * grip.stiffness / (STICK_STIFFNESS * areas)
+    share = np.minimum(1.0, grip.limits / np.maximum(drag, 1e-300)) * grip.stiffness
+    share /= np.maximum(STICK_STIFFNESS * areas, 1e-300)  # what is not felt has no area, and does not stick
     return np.asarray(ways * share[..., None])
 
 
 def hold_of(model: BlockModel, positions: FloatArray, probe: Probe, grip: Grip) -> Hold:
     """What is left to the next step."""
-    seen = seen_from(model, positions, probe)
-    whole, touched = np.zeros_like(seen), np.zeros(seen.shape[:2], dtype=bool)
+    seen, spots = seen_from(model, positions, probe), surface_spots(model.mesh, model.face)
+    whole, limits = np.zeros_like(seen), np.zeros(seen.shape[:2])
     whole[grip.faces] = ways_left(seen[grip.faces], grip, model.areas[grip.faces])
-    touched[grip.faces] = grip.limits > 0
-    return Hold(surface_spots(model.mesh).places.reshape(-1, 3), whole.reshape(-1, 3), touched.ravel())
+    limits[grip.faces] = grip.limits / spots.edges[grip.faces] ** 2
+    return Hold(spots.places.reshape(-1, 3), whole.reshape(-1, 3), limits.ravel() > 0, limits.ravel())
 
 
 def drag(
@@ -124,9 +133,9 @@ def drag(
     """
     before, probe = probes
     iterations, share, last = 0, 1.0, np.inf
-    model.grip = None
+    model.grip = _kept(model, past)
     try:
-        solution = lead(model, positions, before, probe, tolerance, follower)
+        solution = lead(model, positions, before, probe, tolerance, follower, haste=not model.dense)
         for _ in range(_MOST_TURNS):
             iterations += solution.iterations
             if not solution.converged:

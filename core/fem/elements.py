@@ -17,6 +17,9 @@ import numpy as np
 
 from core.frames import FloatArray
 
+_DENSE = 8
+"""Points along each edge of a hexahedron's dense side: none further apart than a fifth of it."""
+
 __all__ = [
     "EDGES", "HEX8", "HEX27", "HEXAHEDRA", "TET10", "Element", "Face", "Quadrature", "face_weights", "quadrature", "shapes_of",
 ]  # fmt: skip
@@ -42,7 +45,7 @@ class Element:
         shapes, gradients: (q, a) and (q, a, 3), of the shape functions at the quadrature points; a hexahedron's local node
             numbers grow along x, then y, then z, a tetrahedron's corners come before the middles of its EDGES. weights: (q,).
         pressures: (q, m) polynomials.
-        face: its side.
+        face: its side. dense_face: the same with points so close that no tool worth the name fits between them.
     """
 
     shapes: FloatArray
@@ -50,6 +53,7 @@ class Element:
     weights: FloatArray
     pressures: FloatArray
     face: Face
+    dense_face: Face
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +96,7 @@ def _square(order: int, count: int) -> Face:
     return Face(np.ascontiguousarray(shapes), np.ascontiguousarray(gradients), np.outer(weights, weights).ravel())
 
 
-def _hexahedron(order: int, count: int, linear_pressure: bool, face: Face) -> Element:
+def _hexahedron(order: int, count: int, linear_pressure: bool, faces: tuple[Face, Face]) -> Element:
     """Tensor-product hexahedron with count^3 Gauss points; node and point numbers grow along x, then y, then z."""
     places, weights = np.polynomial.legendre.leggauss(count)
     z, y, x = (part.ravel() for part in np.meshgrid(places, places, places, indexing="ij"))
@@ -102,11 +106,11 @@ def _hexahedron(order: int, count: int, linear_pressure: bool, face: Face) -> El
     shapes = np.einsum("pk,pj,pi->pkji", fz, fy, fx).reshape(len(x), -1)
     pressures = np.stack([np.ones_like(x), x, y, z] if linear_pressure else [np.ones_like(x)], axis=1)
     volumes = np.einsum("k,j,i->kji", weights, weights, weights).ravel()
-    return Element(shapes, np.ascontiguousarray(gradients), volumes, pressures, face)
+    return Element(shapes, np.ascontiguousarray(gradients), volumes, pressures, *faces)
 
 
-HEX8 = _hexahedron(1, 2, False, _square(1, 3))
-HEX27 = _hexahedron(2, 3, True, _square(2, 4))
+HEX8 = _hexahedron(1, 2, False, (_square(1, 3), _square(1, _DENSE)))
+HEX27 = _hexahedron(2, 3, True, (_square(2, 4), _square(2, _DENSE)))
 HEXAHEDRA = {1: HEX8, 2: HEX27}
 """By the order of the shape functions."""
 
@@ -127,8 +131,8 @@ def _quadratic_gradients(shares: FloatArray) -> FloatArray:
     return np.ascontiguousarray(np.concatenate([corners, np.stack(middles, axis=1)], axis=1))
 
 
-def _triangle() -> Face:
-    """Side of a quadratic tetrahedron: Dunavant's (1985) twelve points, exact to degree six."""
+def _triangle(parts: int = 1) -> Face:
+    """Side of a quadratic tetrahedron: Dunavant's (1985) twelve points, exact to degree six, in each of parts^2 triangles."""
     orbits = {
         (0.501426509658179, 0.249286745170910, 0.249286745170910): 0.116786275726379,
         (0.873821971016996, 0.063089014491502, 0.063089014491502): 0.050844906370207,
@@ -136,17 +140,29 @@ def _triangle() -> Face:
     }
     points = [(point, weight) for orbit, weight in orbits.items() for point in sorted(set(permutations(orbit)))]
     shares, weights = np.array([point for point, _ in points]), np.array([weight for _, weight in points])
-    return Face(shapes_of(shares), _quadratic_gradients(shares), weights / 2)
+    shares = np.concatenate([shares @ corners for corners in _split(parts)])
+    return Face(shapes_of(shares), _quadratic_gradients(shares), np.tile(weights, parts**2) / (2 * parts**2))
 
 
-def _tetrahedron(face: Face) -> Element:
+def _split(parts: int) -> list[FloatArray]:
+    """Barycentric coordinates (3, 3) of the corners of the equal triangles that parts per edge make of one."""
+    found = []
+    for i in range(parts):
+        for j in range(parts - i):
+            found.append([(i, j), (i + 1, j), (i, j + 1)])
+            if i + j < parts - 1:
+                found.append([(i + 1, j + 1), (i, j + 1), (i + 1, j)])
+    return [np.array([(parts - i - j, i, j) for i, j in corners]) / parts for corners in found]
+
+
+def _tetrahedron(face: Face, dense_face: Face) -> Element:
     """Four points, exact to degree two: all that elements with straight edges need at small strain."""
     far = (5 + 3 * np.sqrt(5)) / 20
     shares = np.full((4, 4), (1 - far) / 3) + (far - (1 - far) / 3) * np.eye(4)
-    return Element(shapes_of(shares), _quadratic_gradients(shares), np.full(4, 1 / 24), np.ones((4, 1)), face)
+    return Element(shapes_of(shares), _quadratic_gradients(shares), np.full(4, 1 / 24), np.ones((4, 1)), face, dense_face)
 
 
-TET10 = _tetrahedron(_triangle())
+TET10 = _tetrahedron(_triangle(), _triangle(3))
 
 
 def quadrature(element: Element, corners: FloatArray) -> Quadrature:

@@ -76,24 +76,31 @@ class Grip:
 @dataclass(frozen=True, eq=False)
 class Hold:
     """What one frame leaves to the next: points of the surface at rest (m, 3) [m], tangential ways from their anchors (m, 3) [m],
-    and which of them (m,) are touched; none touched is a fresh start."""
+    which of them (m,) are touched, and what friction holds at most, over E and area (m,) [1]; none touched is a fresh start."""
 
     places: FloatArray
     ways: FloatArray
     touched: np.ndarray[Any, np.dtype[np.bool_]]
+    limits: FloatArray
 
     @classmethod
     def nothing(cls) -> Self:
         """Before the first touch."""
-        return cls(np.empty((0, 3)), np.empty((0, 3)), np.empty(0, dtype=bool))
+        return cls(np.empty((0, 3)), np.empty((0, 3)), np.empty(0, dtype=bool), np.empty(0))
 
-    def at(self, places: FloatArray) -> tuple[FloatArray, np.ndarray[Any, np.dtype[np.bool_]]]:
-        """Ways (..., 3) [m] and whether touched (...) at other points of the surface (..., 3), as a grid that moved has them."""
+    def at(self, places: FloatArray) -> Self:
+        """The same at other points of the surface (..., 3) [m], as a grid that moved has them."""
+        shape = places.shape[:-1]
         if not self.touched.any():
-            return np.zeros_like(places), np.zeros(places.shape[:-1], dtype=bool)
+            return type(self)(places, np.zeros_like(places), np.zeros(shape, dtype=bool), np.zeros(shape))
         near, weights, touched = self._near(places.reshape(-1, 3))
         ways = np.einsum("mk,mki->mi", weights, self.ways[near])
-        return ways.reshape(places.shape), touched.reshape(places.shape[:-1])
+        limits = np.einsum("mk,mk->m", weights, self.limits[near])
+        return type(self)(places, ways.reshape(places.shape), touched.reshape(shape), limits.reshape(shape))
+
+    def on(self, faces: IntArray) -> Self:
+        """The part of it on these faces (g,), where the points lie face by face."""
+        return type(self)(self.places[faces], self.ways[faces], self.touched[faces], self.limits[faces])
 
     def at_transposed(self, places: FloatArray, costate: FloatArray) -> FloatArray:
         """The transpose of how `at` takes ways to other points: from costates there (..., 3) to those of the own ways (m, 3)."""

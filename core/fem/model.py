@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from core.fem.contact import assemble_contact, contact_energy, turns_around
 from core.fem.elastic import Law, assemble_elastic, elastic_energy, lame
-from core.fem.elements import Quadrature, face_weights, quadrature
+from core.fem.elements import Face, Quadrature, face_weights, quadrature
 from core.fem.friction import Grip
 from core.fem.linear import face_slots, factor_of, upper_pattern
 from core.fem.stiffness import SurfaceSpots, log_stiffness, surface_stiffness
@@ -30,6 +30,8 @@ BOND_STIFFNESS = 2e4
 _BOND_EDGE = 1e-3
 """Width over which a bond ends at a detached strip's edge [m]: the result changes smoothly with the strip's extent."""
 _EMPTY = np.empty(0)
+
+BoolArray = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +117,10 @@ def rule_of(mesh: Mesh) -> tuple[Quadrature, FloatArray]:
 
 
 @lru_cache(maxsize=32)
-def surface_spots(mesh: Mesh) -> SurfaceSpots:
-    """The free surface's quadrature points."""
-    shared = mesh.connectivity
-    places = np.einsum("qa,fai->fqi", shared.element.face.shapes, mesh.nodes[shared.surface])
-    return SurfaceSpots(places, np.sqrt(rule_of(mesh)[1]))
+def surface_spots(mesh: Mesh, face: Face) -> SurfaceSpots:
+    """The free surface's points in this quadrature of the elements' sides."""
+    corners = mesh.nodes[mesh.connectivity.surface]
+    return SurfaceSpots(np.einsum("qa,fai->fqi", face.shapes, corners), np.sqrt(face_weights(face, corners)))
 
 
 class BlockModel:
@@ -129,15 +130,19 @@ class BlockModel:
         mu, bulk: (e, q) over E at the quadrature points [1]. unrelaxed: mu before a step in time changes it (`core.memory`).
         areas: (f, p) of the free surface's quadrature points, times the stiffness there over E and the hardness [m^2], with which
             contact goes. hardness: of the contact, one unless `harden` was called [1].
+        face: where the free surface feels the tool.
     """
 
-    def __init__(self, setup: Setup, mesh: Mesh) -> None:
+    def __init__(self, setup: Setup, mesh: Mesh, *, dense: bool = False) -> None:
+        """`dense` feels the tool at so many points that none fits between them (see `core.fem.elements.Element`)."""
         self.mesh, self.setup = mesh, setup
         self.topology = topology(mesh.connectivity, held=not _sprung(setup.support))
-        self.law, self.face = Law.of(setup.material), self.topology.element.face
-        self.rule, areas = rule_of(mesh)
-        height = setup.geometry.height
-        self.areas, self.hardness = areas * surface_stiffness(setup.material, surface_spots(mesh), height), 1.0
+        element, height = self.topology.element, setup.geometry.height
+        self.law, self.dense = Law.of(setup.material), dense
+        self.face, self._base_face = element.dense_face if dense else element.face, element.face
+        self.rule, spots = rule_of(mesh)[0], surface_spots(mesh, self.face)
+        self.areas, self.hardness = spots.edges**2 * surface_stiffness(setup.material, spots, height), 1.0
+        self._all_areas = self.areas
         mu, bulk = lame(self.law, setup.material.poisson_ratio)
         factor = np.exp(log_stiffness(setup.material, self.rule, height))
         self.mu, self.bulk = mu * factor, bulk * factor
@@ -154,6 +159,29 @@ class BlockModel:
         if hardness != self.hardness:
             self.areas, self.hardness = self.areas * (hardness / self.hardness), hardness
 
+    def expect(self, positions: FloatArray, probes: tuple[Probe, ...]) -> None:
+        """Feel these tools at all points that face one of them from positions (n, 3) [m], however they turn; only if dense."""
+        if self.dense:
+            facing = np.any([self.facing(positions, probe)[0] for probe in probes], axis=0)
+            self.areas = np.where(facing, self._all_areas * self.hardness, 0.0)
+
+    def notice(self, positions: FloatArray, probe: Probe) -> bool:
+        """Feel the tool also at points that have come to face it from within; whether there are any."""
+        if not self.dense:
+            return False
+        facing, depth = self.facing(positions, probe)
+        new = facing & (depth > 0) & (self.areas == 0)
+        self.areas = np.where(new, self._all_areas * self.hardness, self.areas)
+        return bool(new.any())
+
+    def facing(self, positions: FloatArray, probe: Probe) -> tuple[BoolArray, FloatArray]:
+        """Which points (f, p) of the surface face a tool, and how deep they lie in it [m]."""
+        corners = positions[self.topology.surface]
+        seen = np.einsum("qa,fai->fqi", self.face.shapes, corners) - probe.centre
+        tangents = np.einsum("qac,fai->fqci", self.face.gradients, corners)
+        facing = np.einsum("fqi,fqi->fq", np.cross(tangents[:, :, 0], tangents[:, :, 1]), seen) < 0
+        return facing, probe.radius - np.linalg.norm(seen, axis=2)
+
     def _weight(self, specific: float) -> FloatArray:
         """Weight at the nodes over E (n,) [m^2]."""
         share = np.zeros(len(self.mesh.nodes))
@@ -167,7 +195,7 @@ class BlockModel:
         if not self.sprung:
             return
         corners = self.mesh.nodes[self.topology.base]
-        areas, shapes = face_weights(self.face, corners), self.face.shapes
+        areas, shapes = face_weights(self._base_face, corners), self._base_face.shapes
         points = np.einsum("qa,fai->fqi", shapes, corners)
         self.base_areas = areas
         held = areas * _held_share(setup.support.detached, setup.geometry, points)
@@ -198,6 +226,7 @@ class BlockModel:
                 probe.centre,
                 probe.radius,
                 False,
+                not self.dense,
                 CONTACT_STIFFNESS,
             )
             if self.grip is not None:
@@ -209,11 +238,12 @@ class BlockModel:
             total += contact_energy(
                 top.base,
                 self.base_areas,
-                self.face.shapes,
-                self.face.gradients,
+                self._base_face.shapes,
+                self._base_face.gradients,
                 positions,
                 np.zeros(3),
                 0.0,
+                True,
                 True,
                 CONTACT_STIFFNESS,
             )
@@ -230,7 +260,7 @@ class BlockModel:
         if probe is not None:
             penetration = assemble_contact(
                 top.surface, self.areas, self.face.shapes, self.face.gradients, positions, probe.centre, probe.radius, False,
-                CONTACT_STIFFNESS, bending, top.surface_slots, force, data, push,
+                not self.dense, CONTACT_STIFFNESS, bending, top.surface_slots, force, data, push,
             )  # fmt: skip
             if self.grip is not None:
                 self.grip.assemble(top.surface, self.face, positions, probe.centre, top.surface_slots, force, data, push)
@@ -253,8 +283,8 @@ class BlockModel:
         if not self.detached:
             return
         assemble_contact(
-            top.base, self.base_areas, self.face.shapes, self.face.gradients, positions, np.zeros(3), 0.0, True,
-            CONTACT_STIFFNESS, False, top.base_slots, force, data, np.zeros(3),
+            top.base, self.base_areas, self._base_face.shapes, self._base_face.gradients, positions, np.zeros(3), 0.0, True,
+            True, CONTACT_STIFFNESS, False, top.base_slots, force, data, np.zeros(3),
         )  # fmt: skip
 
     def depth_inside(self, positions: FloatArray, probe: Probe) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -16,7 +16,8 @@ __all__ = ["Outcome", "Solution", "misfit", "solve", "verdict"]
 RELATIVE_TOLERANCE = 1e-6
 """Converged: the residual's norm is below this share of the tool's push and of the body's internal forces."""
 MAX_ITERATIONS = 40
-MAX_SPLITS = 6
+MAX_SPLITS, _MOST_ITERATIONS = 6, 400
+"""Of a motion that is split: how often it is halved, and Newton steps in all its parts."""
 MAX_PENETRATION = 4e-4
 _LONGEST = 0.5
 
@@ -64,8 +65,10 @@ def verdict(model: BlockModel, probe: Probe | None, positions: FloatArray) -> Ou
     return Outcome.CONVERGED
 
 
-def _direction(model: BlockModel, probe: Probe | None, positions: FloatArray, state: Assembly) -> FloatArray | None:
-    """Newton step of the unknowns; an indefinite tangent loses the contact's curvature, then is shifted until it has a factor."""
+def _direction(model: BlockModel, probe: Probe | None, positions: FloatArray, state: Assembly) -> tuple[FloatArray, bool] | None:
+    """Newton step of the unknowns, and whether it is exact: an indefinite tangent loses the contact's curvature, then is shifted
+    until it has a factor.
+    """
     top = model.topology
     data = state.data
     for shift in (None, 0.0, 1e-2, 1e-1, 1.0, 10.0):
@@ -78,34 +81,52 @@ def _direction(model: BlockModel, probe: Probe | None, positions: FloatArray, st
             top.factor.factorise(data)
         except NotPositiveDefinite:
             continue
-        return -top.factor.solve(state.residual)
+        return -top.factor.solve(state.residual), shift is None
     return None
 
 
 def _search(
-    model: BlockModel, probe: Probe | None, positions: FloatArray, step: FloatArray, slope: float, energy: float
+    model: BlockModel, probe: Probe | None, positions: FloatArray, step: FloatArray, slope: float, energy: float, exact: bool
 ) -> tuple[FloatArray, float]:
-    """Halve the step until the energy falls as it should (Armijo), rounding allowed for; the same positions when it never does."""
+    """Halve the step until the energy falls as it should (Armijo), rounding allowed for; the same positions when it never does.
+
+    A step that is not exact is too short where the block gives way, and is doubled for as long as that pays.
+    """
     move = np.zeros_like(positions)
     move[model.topology.free] = step
     # Nothing moves by more than half the tool's radius at once: beyond its centre no contact would be felt.
-    length = 1.0 if probe is None else min(1.0, _LONGEST * probe.radius / max(float(np.abs(step).max()), 1e-300))
-    for _ in range(12):
+    longest = np.inf if probe is None else _LONGEST * probe.radius / max(float(np.abs(step).max()), 1e-300)
+    length = min(1.0, longest)
+    for halvings in range(12):
         trial = positions + length * move
         value = model.energy(trial, probe)
         if value <= energy + 1e-4 * length * slope + model.rounding:
-            return trial, value
+            return (trial, value) if exact or halvings else _stretched(model, probe, positions, move, (length, longest), value)
         length /= 2
     return positions, energy
+
+
+def _stretched(
+    model: BlockModel, probe: Probe | None, positions: FloatArray, move: FloatArray, lengths: tuple[float, float], energy: float
+) -> tuple[FloatArray, float]:
+    """Double a step of the first of these lengths, which leads to this energy, while that pays and it is below the second."""
+    length, longest = lengths
+    while 2 * length < longest:
+        value = model.energy(positions + 2 * length * move, probe)
+        if not value < energy:
+            break
+        length, energy = 2 * length, value
+    return positions + length * move, energy
 
 
 def _step(model: BlockModel, probe: Probe | None, positions: FloatArray, energy: float) -> tuple[FloatArray, float, Outcome | None]:
     """One Newton step with a line search; an outcome when there is none."""
     state = model.assemble(positions, probe)
-    step = _direction(model, probe, positions, state)
-    if step is None:
+    found = _direction(model, probe, positions, state)
+    if found is None:
         return positions, energy, Outcome.INDEFINITE
-    trial, value = _search(model, probe, positions, step, float(state.residual @ step), energy)
+    step, exact = found
+    trial, value = _search(model, probe, positions, step, float(state.residual @ step), energy, exact)
     return trial, value, Outcome.ITERATIONS if trial is positions else None
 
 
@@ -115,6 +136,8 @@ def _newton(model: BlockModel, probe: Probe | None, start: FloatArray, tolerance
         return Solution(start, np.zeros(3), Outcome.INVERTED, 0, np.inf, 0.0)
     outcome, iteration = Outcome.ITERATIONS, 0
     while True:
+        if probe is not None and model.notice(positions, probe):
+            energy = model.energy(positions, probe)
         state = model.assemble(positions, probe, tangent=False)
         residual = misfit(model, state)
         if residual <= tolerance:
@@ -149,18 +172,24 @@ def solve(
         the solution; look at `outcome`. With a failure the positions are the last ones reached.
     """
     solution = _newton(model, probe, start, tolerance)
-    if solution.converged or before is None or probe is None:
+    if solution.converged or before is None or probe is None or before is probe:
         return solution
-    for splits in range(1, MAX_SPLITS + 1):
-        positions, iterations = start, solution.iterations
-        for share in np.linspace(0, 1, 2**splits + 1)[1:]:
-            centre = before.centre + share * (probe.centre - before.centre)
-            solution = _newton(model, Probe(centre, before.radius + share * (probe.radius - before.radius)), positions, tolerance)
-            iterations += solution.iterations
-            positions = solution.positions
-            if not solution.converged:
-                break
-        solution = Solution(positions, solution.push, solution.outcome, iterations, solution.residual, solution.penetration)
+    return _split(model, (before, probe), start, tolerance, solution)
+
+
+def _split(model: BlockModel, probes: tuple[Probe, Probe], start: FloatArray, tolerance: float, solution: Solution) -> Solution:
+    """The motion between two places of the tool in parts, halved where one fails and doubled after two that do not."""
+    before, probe = probes
+    done, part, eased, iterations = 0.0, 0.5, False, solution.iterations
+    while done < 1.0 and part >= 0.5**MAX_SPLITS and iterations < _MOST_ITERATIONS:
+        share = min(done + part, 1.0)
+        centre = before.centre + share * (probe.centre - before.centre)
+        solution = _newton(model, Probe(centre, before.radius + share * (probe.radius - before.radius)), start, tolerance)
+        iterations += solution.iterations
         if solution.converged:
-            return solution
-    return solution
+            start, done, part, eased = solution.positions, share, 2 * part if eased else part, not eased
+        else:
+            part, eased = part / 2, False
+    if solution.converged and done < 1.0:
+        solution = replace(solution, outcome=Outcome.ITERATIONS)
+    return replace(solution, iterations=iterations)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -11,8 +12,9 @@ from core.fem.follow import Follower
 from core.fem.model import BlockModel, Probe
 from core.fem.newton import Solution, solve
 from core.frames import FloatArray
+from core.setup import Box, Shape
 
-__all__ = ["DEEPEST", "FREE_STEP", "STAGE_TOLERANCE", "lead"]
+__all__ = ["DEEPEST", "FREE_STEP", "STAGE_TOLERANCE", "first_touch", "lead"]
 
 FREE_STEP = 1.5e-3
 """Longest motion in contact [m] that is tried at once."""
@@ -22,15 +24,29 @@ STAGE_TOLERANCE = 0.2
 DEEPEST = 2e-4
 """Penetration [m] from which on the contact is hardened, by _HARDER at a time, to _HARDEST times what it is at first."""
 _HARDER, _HARDEST = 4.0, 64.0
+_HALVINGS = 40
+"""Of the way to the first touch, down to rounding: a rough one jumps as the tool's place or radius changes."""
 
 
-def lead(model: BlockModel, positions: FloatArray, before: Probe, probe: Probe, tolerance: float, follower: Follower) -> Solution:
-    """Equilibrium at `probe`, led there from an equilibrium (n, 3) [m] with the tool at `before`.
+def lead(
+    model: BlockModel,
+    positions: FloatArray,
+    before: Probe,
+    probe: Probe,
+    tolerance: float,
+    follower: Follower,
+    *,
+    haste: bool = False,
+) -> Solution:
+    """Equilibrium at `probe`, led there from an equilibrium (n, 3) [m] with the tool at `before`; in haste only if that is easy.
 
     Where the tool is pressed in so hard that the contact's penalty gives way, the contact is hardened step by step.
     """
     model.harden(1.0)
-    solution = _led(model, positions, before, probe, tolerance, follower)
+    solution = _led(model, positions, (before, probe), tolerance, follower, haste)
+    while solution.converged and model.notice(solution.positions, probe):
+        wary = solve(model, probe, solution.positions, probe, tolerance)
+        solution = replace(wary, iterations=solution.iterations + wary.iterations)
     while solution.converged and solution.penetration > DEEPEST and model.hardness < _HARDEST:
         model.harden(_HARDER * model.hardness)
         harder = solve(model, probe, solution.positions, probe, tolerance)
@@ -38,15 +54,18 @@ def lead(model: BlockModel, positions: FloatArray, before: Probe, probe: Probe, 
     return solution
 
 
-def _led(model: BlockModel, positions: FloatArray, before: Probe, probe: Probe, tolerance: float, follower: Follower) -> Solution:
+def _led(
+    model: BlockModel, positions: FloatArray, probes: tuple[Probe, Probe], tolerance: float, follower: Follower, haste: bool
+) -> Solution:
     """Places on the way are reached roughly at first; where that leads astray, the way is gone again with care."""
+    before, probe = probes
     steps = max(1, int(np.ceil(float(np.linalg.norm(probe.centre - before.centre)) / FREE_STEP)))
     if steps == 1:
         near = follower.solve(model, probe, positions, tolerance)
-        return near if near is not None else solve(model, probe, positions, before, tolerance)
+        return near if near is not None else solve(model, probe, positions, None if haste else before, tolerance)
     stages = [Probe(before.centre + share * (probe.centre - before.centre), probe.radius) for share in np.arange(1, steps) / steps]
     hasty = _through(model, positions, [before, *stages, probe], tolerance, careful=False)
-    if hasty.converged:
+    if hasty.converged or haste:
         return hasty
     careful = _through(model, positions, [before, *stages, probe], tolerance, careful=True)
     return replace(careful, iterations=hasty.iterations + careful.iterations)
@@ -63,3 +82,16 @@ def _through(model: BlockModel, positions: FloatArray, probes: list[Probe], tole
         solution = solve(model, probe, solution.positions, last if careful else None, tolerance if probe is probes[-1] else rough)
         iterations += solution.iterations
     return replace(solution, iterations=iterations)
+
+
+def first_touch(before: Probe, probe: Probe, body: Box | Shape, away: Callable[[Probe], bool]) -> Probe:
+    """The last place on the way to `probe` that is clear of the body at rest, as `away` tells."""
+    low, high = 0.0, 1.0
+    if np.linalg.norm(before.centre - probe.centre) > 1.0 or not away(before):
+        middle = (body.low + body.high) / 2
+        before = Probe(probe.centre + (probe.centre - middle) / np.linalg.norm(probe.centre - middle) * 0.05, probe.radius)
+    for _ in range(_HALVINGS):
+        share = (low + high) / 2
+        clear = away(Probe(before.centre + share * (probe.centre - before.centre), probe.radius))
+        low, high = (share, high) if clear else (low, share)
+    return Probe(before.centre + low * (probe.centre - before.centre), probe.radius)

@@ -107,9 +107,13 @@ def test_serving_to_other_machines_is_refused(palpate: Palpate) -> None:
     assert "no login yet" in err
 
 
-def test_replay_writes_one_equilibrium_per_cloud(palpate: Palpate, dataset: Path, tmp_path: Path) -> None:
-    code, out, err = palpate("replay", dataset, "--sequence", "poke-01", "--grid", "7x5x4", "--out", tmp_path / "frames.npz")
+@pytest.mark.parametrize(("grid", "told"), [(["--grid", "7x5x4"], "7x5x4 nodes"), ([], "follows the tool")], ids=["even", "graded"])
+def test_replay_writes_one_equilibrium_per_cloud(
+    palpate: Palpate, dataset: Path, tmp_path: Path, grid: list[str], told: str
+) -> None:
+    code, out, err = palpate("replay", dataset, "--sequence", "poke-01", *grid, "--out", tmp_path / "frames.npz")
     assert code == 0, err
+    assert told in out
     assert "5 converged" in out
     assert "the grid's own error, by a finer one" in out
     with (tmp_path / "frames.npz").open("rb") as stream, np.load(stream) as frames:

@@ -201,10 +201,10 @@ def test_gradient_with_friction_at_the_tolerances_of_a_replay_is_nearly_that_of_
 def test_way_back_from_what_friction_holds_is_the_transpose_of_the_way_there():
     random = np.random.default_rng(0)
     touched = np.arange(50) % 3 > 0
-    hold = Hold(random.uniform(size=(50, 3)), random.standard_normal((50, 3)) * touched[:, None], touched)
+    hold = Hold(random.uniform(size=(50, 3)), random.standard_normal((50, 3)) * touched[:, None], touched, 1.0 * touched)
     places = random.uniform(size=(4, 7, 3))
     costate = np.asarray(random.standard_normal((4, 7, 3)))
-    there, _ = hold.at(places)
+    there = hold.at(places).ways
     assert there.any()
     assert np.vdot(costate, there) == pytest.approx(np.vdot(hold.at_transposed(places, costate), hold.ways), rel=1e-12)
 

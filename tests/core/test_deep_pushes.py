@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.fem.newton import Outcome
+from core.fem.model import BlockModel
+from core.fem.newton import misfit
 from core.mesh import GridSpec
 from core.replay import Equilibrium, Replay, replay, require_converged
 from core.sensitivity import displacement_changes
@@ -39,18 +40,34 @@ def test_hardened_frame_has_the_sensitivity_of_solves(pressed):
     assert np.linalg.norm(found - wanted) < 0.02 * np.linalg.norm(wanted)
 
 
-def test_ball_that_slips_behind_a_coarse_surface_is_held_by_a_finer_one():
+@pytest.fixture(scope="module")
+def beside() -> list[Equilibrium]:
+    """A small ball pressed into the side of a coarse block by more than its radius."""
     material = Material(poisson_ratio=0.322, stretch_limit=26.7, log_ratio=0.7)
     setup = Setup(geometry=Box(size=SIZE), tool=Tool(radius=4.27e-3), material=material)
     way = 1e-3 * np.array(
         [[-7.06, 21.09, 20.75], [-6.88, 17.66, 20.85], [-6.8, 16.1, 20.9], [-6.72, 14.57, 20.95], [-6.66, 13.42, 20.98]]
     )
-    grid = GridSpec(nodes=(9, 7, 5), spacing=2e-3, order=2)
-    block, frame = Replay(setup, grid), None
-    for centre in way:
-        frame = block.step(centre, frame)
-    assert frame is not None and frame.outcome is not Outcome.CONVERGED
-    frames = replay(setup, way, grid)
-    require_converged(frames)
-    assert len(frames[0].mesh.nodes) == np.prod(grid.nodes) and len(frames[-1].mesh.nodes) == np.prod(grid.finer().nodes)
-    assert frames[-1].force[1] > frames[-2].force[1] > 0
+    return replay(setup, way, GridSpec(nodes=(9, 7, 5), spacing=2e-3, order=2))
+
+
+def test_ball_that_would_slip_between_the_points_of_a_surface_is_felt_at_more(beside):
+    require_converged(beside)
+    assert not beside[0].dense and beside[-1].dense
+    assert beside[-1].force[1] > beside[-2].force[1] > 0
+
+
+def test_frame_felt_at_many_points_is_in_balance_in_their_model(beside):
+    frame = beside[-1]
+    setup = Setup(
+        geometry=Box(size=SIZE),
+        tool=Tool(radius=4.27e-3),
+        material=Material(poisson_ratio=0.322, stretch_limit=26.7, log_ratio=0.7),
+    )
+    residuals = []
+    for dense in (True, False):
+        model, positions = BlockModel(setup, frame.mesh, dense=dense), frame.mesh.nodes + frame.displacement
+        model.harden(frame.hardness)
+        model.expect(positions, (frame.probe,))
+        residuals.append(misfit(model, model.assemble(positions, frame.probe, tangent=False)))
+    assert residuals[0] < 1e-5 < residuals[1]

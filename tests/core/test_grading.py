@@ -53,7 +53,7 @@ def test_a_finer_grading_has_more_nodes_everywhere():
 
 
 def test_a_larger_tool_wants_larger_elements():
-    assert GRADING.scaled(2.0) == replace(GRADING, spacing=3e-3)
+    assert GRADING.for_tool(1e-2) == replace(GRADING, spacing=3e-3)
 
 
 @pytest.mark.parametrize("wrong", [{"spacing": 0.0}, {"along": 0.0}, {"inward": 11.0}, {"order": 3}], ids=str)

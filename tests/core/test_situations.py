@@ -2,7 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.situations import LONGEST_JUMP, draw_situation, faults
+from benchmarks.situations import LONGEST_JUMP, attempt, draw_situation, faults
+from core.fem.newton import Outcome
 from core.replay import replay
 
 
@@ -13,6 +14,20 @@ def test_no_situation_ends_in_nonsense(seed):
     assert len(frames) == len(situation.centres)
     assert faults(situation, frames) == []
     assert any(frame.in_contact for frame in frames)
+
+
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(700053, id="the ball slips between the points that feel it"),
+        pytest.param(700012, id="the same in a material that remembers"),
+        pytest.param(720057, id="pressure and friction begin from none"),
+        pytest.param(720248, id="a tool on a spring balances on neither of two grids"),
+    ],
+)
+def test_situation_that_once_had_no_equilibrium_has_one(seed):
+    trial = attempt(seed)
+    assert trial.found == () and set(trial.outcomes) == {Outcome.CONVERGED}
 
 
 def test_situations_are_told_apart_by_their_seed_and_jump():

@@ -41,7 +41,7 @@ def _contact_force(model: BlockModel, positions: np.ndarray, probe: Probe) -> tu
     force, push = np.zeros_like(positions), np.zeros(3)
     assemble_contact(
         model.topology.surface, model.areas, model.face.shapes, model.face.gradients, positions, probe.centre, probe.radius, False,
-        CONTACT_STIFFNESS, True, model.topology.surface_slots, force, np.empty(0), push,
+        True, CONTACT_STIFFNESS, True, model.topology.surface_slots, force, np.empty(0), push,
     )  # fmt: skip
     return force, push
 
@@ -61,6 +61,7 @@ def test_contact_force_is_the_gradient_of_its_energy_and_pushes_back_on_the_tool
             probe.centre,
             probe.radius,
             False,
+            True,
             CONTACT_STIFFNESS,
         )
 
