@@ -17,8 +17,11 @@ from scipy.interpolate import RegularGridInterpolator
 
 from benchmarks.reference import DEPTHS, SETUP, compared, reference, top_points
 from benchmarks.stopwatch import timed
+from core.diagnosis import DIAGNOSIS_GRID
 from core.frames import FloatArray
+from core.grading import Grading
 from core.mesh import GridSpec
+from core.meshing import Meshing
 from core.replay import replay, require_converged
 
 __all__ = ["run"]
@@ -137,9 +140,9 @@ class Newton:
         return "-"
 
 
-OWN = (
+OWN: tuple[tuple[str, GridSpec | Grading], ...] = (
     *(("Palpate, even hexahedra", GridSpec(nodes=nodes)) for nodes in GRIDS),
-    ("Palpate, quadratic, 1.5 mm at tool", GridSpec(nodes=(13, 9, 9), spacing=1.5e-3, order=2)),
+    ("Palpate, diagnosis' mesh", DIAGNOSIS_GRID),
 )
 
 PEERS: tuple[tuple[str, str, Callable[[Nodes], Peer]], ...] = (
@@ -180,7 +183,7 @@ def _poke(peer: Peer, nodes: Nodes) -> FloatArray:
     return np.stack(shown)
 
 
-def _own(grid: GridSpec) -> FloatArray:
+def _own(grid: Meshing) -> FloatArray:
     depths, held = _depths(1 / RATE)
     frames = replay(SETUP, np.array([[0.0, 0.0, SIZE[2] + RADIUS - depth] for depth in depths]), grid)
     require_converged(frames)
@@ -205,7 +208,7 @@ def run() -> list[Table]:
     for name, grid in OWN:
         _own(grid)  # warms up
         displacement, seconds = timed(lambda grid=grid: _own(grid))  # type: ignore[misc]
-        _row(table, name, grid.nodes, displacement, seconds, "0")
+        _row(table, name, grid.mesh(SETUP, np.array([0.0, 0.0, SIZE[2]])).shape, displacement, seconds, "0")
     for name, package, start in PEERS:
         if find_spec(package) is None:
             table.add_row(name, "-", "not installed", 'pip install -e ".[peers]" -c constraints.txt', "-", "-")

@@ -18,7 +18,7 @@ from core.errors import SetupError, SolveError
 from core.fem.drag import Past, drag
 from core.fem.follow import Follower
 from core.fem.model import BlockModel, Probe
-from core.fem.newton import RELATIVE_TOLERANCE, Outcome, Solution, solve
+from core.fem.newton import RELATIVE_TOLERANCE, Outcome, Solution, blocked, solve
 from core.fem.path import FREE_STEP, first_touch, lead
 from core.frames import FloatArray
 from core.memory import Memory, State
@@ -112,7 +112,7 @@ class Replay:
             solution = self._untouched(self.model(start.mesh), start.mesh.nodes + start.displacement)
             return self._equilibrium(solution, start.mesh, probe)
         frame = self._touched(probe, local, start)
-        if frame.outcome is not Outcome.CONVERGED and not self.dense:
+        if frame.outcome not in (Outcome.CONVERGED, Outcome.BASE_IN_TOOL) and not self.dense:
             # Most likely the tool slipped in between the points at which the surface feels it, from which no care would keep it.
             self.dense = True
             frame = self._touched(probe, local, start)
@@ -123,6 +123,8 @@ class Replay:
         """Equilibrium under the tool, which is at `local` in the frame of the slid block."""
         model, positions, before, carried = self.set_out(local, start)
         model.expect(positions, (before, local))
+        if (failed := blocked(model, positions, local)) is not None:
+            return self._equilibrium(failed, model.mesh, probe)
         positions = self._extrapolated(model, start, positions, local)
         if self.setup.tool.friction_coefficient:
             past = Past.of(model, start, Probe(before.centre - carried, before.radius))
@@ -282,10 +284,9 @@ def replay(
     if starts is not None and setup.remembers:
         raise SolveError("a setup whose frames depend on those before them is replayed in order of time, without starts")
     block, frames = Replay(setup, grid, tolerance), []
-    previous: Equilibrium | None = None
+    previous = None if since is None else since.frame
     if since is not None:
         block.resume(since)
-        previous = since.frame
     instants = [None] * len(centres) if times is None else np.asarray(times, dtype=float).tolist()
     if len(instants) != len(centres):
         raise SetupError(f"{len(instants)} times for {len(centres)} frames; give one for each", key="times")

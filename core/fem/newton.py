@@ -11,7 +11,7 @@ from core.fem.factor import NotPositiveDefinite
 from core.fem.model import Assembly, BlockModel, Probe
 from core.frames import FloatArray
 
-__all__ = ["Outcome", "Solution", "misfit", "solve", "verdict"]
+__all__ = ["MAX_PENETRATION", "Outcome", "Solution", "blocked", "misfit", "solve", "verdict"]
 
 RELATIVE_TOLERANCE = 1e-6
 """Converged: the residual's norm is below this share of the tool's push and of the body's internal forces."""
@@ -19,6 +19,7 @@ MAX_ITERATIONS = 40
 MAX_SPLITS, _MOST_ITERATIONS = 6, 400
 """Of a motion that is split: how often it is halved, and Newton steps in all its parts."""
 MAX_PENETRATION = 4e-4
+"""Of the surface into the tool [m]; more is no contact."""
 _LONGEST = 0.5
 
 
@@ -31,6 +32,7 @@ class Outcome(Enum):
     INVERTED = "an element is inverted at the start of the solve"
     TOOL_SWINGS = "the tool gives way so much that no place was found where its spring balances the block"
     GRIP_SWINGS = "pressure and friction under the tool do not come to agree; the motion between frames is too large"
+    BASE_IN_TOOL = "the tool reaches into the base, which is held: nothing can make way for it"
     INSIDE_TOOL = "the material came to rest inside the tool, or the tool inside the material"
 
 
@@ -63,6 +65,13 @@ def verdict(model: BlockModel, probe: Probe | None, positions: FloatArray) -> Ou
     if probe is not None and (model.depth_inside(positions, probe) > MAX_PENETRATION or model.encloses(positions, probe)):
         return Outcome.INSIDE_TOOL
     return Outcome.CONVERGED
+
+
+def blocked(model: BlockModel, positions: FloatArray, probe: Probe) -> Solution | None:
+    """What there is to say where the tool reaches into nodes that are held: no equilibrium, at these positions (n, 3) [m]."""
+    held = model.mesh.nodes[~model.topology.free.any(axis=1)]
+    depth = probe.radius - float(np.linalg.norm(held - probe.centre, axis=1).min(initial=np.inf))
+    return Solution(positions, np.zeros(3), Outcome.BASE_IN_TOOL, 0, np.inf, depth) if depth > MAX_PENETRATION else None
 
 
 def _direction(model: BlockModel, probe: Probe | None, positions: FloatArray, state: Assembly) -> tuple[FloatArray, bool] | None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from core.fem.follow import Follower
 from core.fem.model import BlockModel, Probe
-from core.fem.newton import Solution, solve
+from core.fem.newton import MAX_PENETRATION, Outcome, Solution, solve
 from core.frames import FloatArray
 from core.setup import Box, Shape
 
@@ -51,6 +51,8 @@ def lead(
         model.harden(_HARDER * model.hardness)
         harder = solve(model, probe, solution.positions, probe, tolerance)
         solution = replace(harder, iterations=solution.iterations + harder.iterations)
+    if solution.converged and solution.penetration > MAX_PENETRATION:  # what is held cannot make way, however hard the contact
+        return replace(solution, outcome=Outcome.INSIDE_TOOL)
     return solution
 
 

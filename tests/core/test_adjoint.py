@@ -201,7 +201,9 @@ def test_gradient_with_friction_at_the_tolerances_of_a_replay_is_nearly_that_of_
 def test_way_back_from_what_friction_holds_is_the_transpose_of_the_way_there():
     random = np.random.default_rng(0)
     touched = np.arange(50) % 3 > 0
-    hold = Hold(random.uniform(size=(50, 3)), random.standard_normal((50, 3)) * touched[:, None], touched, 1.0 * touched)
+    hold = Hold(
+        random.uniform(size=(50, 3)), random.standard_normal((50, 3)) * touched[:, None], touched, np.where(touched, 1.0, 0.0)
+    )
     places = random.uniform(size=(4, 7, 3))
     costate = np.asarray(random.standard_normal((4, 7, 3)))
     there = hold.at(places).ways

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from core.fem.model import BlockModel
-from core.fem.newton import misfit
+from core.fem.newton import Outcome, misfit
 from core.mesh import GridSpec
 from core.replay import Equilibrium, Replay, replay, require_converged
 from core.sensitivity import displacement_changes
-from core.setup import Box, Material, Setup, Tool
+from core.setup import Box, Material, Setup, Support, Tool
 
 SIZE = (0.0687, 0.0393, 0.0358)
 HARD_PRESS = Setup(geometry=Box(size=SIZE), tool=Tool(radius=6e-3), material=Material(poisson_ratio=0.48, stretch_limit=1.5))
@@ -71,3 +73,19 @@ def test_frame_felt_at_many_points_is_in_balance_in_their_model(beside):
         model.expect(positions, (frame.probe,))
         residuals.append(misfit(model, model.assemble(positions, frame.probe, tangent=False)))
     assert residuals[0] < 1e-5 < residuals[1]
+
+
+def test_a_tool_that_reaches_into_the_held_base_is_told_and_the_next_frame_is_solved():
+    """Against a side so low down that the ball would have to move the bottom's edge."""
+    aside = SIZE[0] / 2 + HARD_PRESS.tool.radius
+    way = np.array([[aside - 1e-3, 0.0, 8e-3], [aside - 4e-3, 0.0, 2e-3], [aside - 1e-3, 0.0, 8e-3]])
+    frames = replay(HARD_PRESS, way, GRID)
+    assert [frame.outcome for frame in frames] == [Outcome.CONVERGED, Outcome.BASE_IN_TOOL, Outcome.CONVERGED]
+    assert frames[1].penetration == pytest.approx(6e-3 - np.hypot(2e-3, 2e-3), abs=1e-6)
+    assert np.abs(frames[2].displacement - frames[0].displacement).max() < 1e-5
+
+
+def test_a_base_that_can_give_way_has_no_held_edge():
+    giving = replace(HARD_PRESS, support=Support(stiffness_over_E=1e2))
+    frame = Replay(giving, GRID).step(np.array([SIZE[0] / 2 + 5.8e-3, 0.0, 1e-3]))
+    assert frame.outcome is Outcome.CONVERGED
