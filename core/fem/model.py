@@ -18,7 +18,7 @@ from core.fem.friction import Grip
 from core.fem.linear import face_slots, factor_of, upper_pattern
 from core.fem.stiffness import SurfaceSpots, log_stiffness, surface_stiffness
 from core.frames import FloatArray
-from core.meshing import Connectivity, IntArray, Mesh
+from core.meshing import Connectivity, Mesh
 from core.setup import Box, Detachment, Setup, Shape, Support
 
 __all__ = ["CONTACT_STIFFNESS", "Assembly", "BlockModel", "Probe", "Topology", "rule_of", "surface_spots", "topology"]
@@ -289,8 +289,7 @@ class BlockModel:
 
     def depth_inside(self, positions: FloatArray, probe: Probe) -> float:
         """How deep the deepest node of the free surface lies inside the tool [m], whichever way it faces."""
-        surface: IntArray = self.topology.surface
-        distance = np.linalg.norm(positions[surface.ravel()] - probe.centre, axis=1)
+        distance = np.linalg.norm(positions[self.topology.surface.ravel()] - probe.centre, axis=1)
         return max(0.0, probe.radius - float(distance.min()))
 
     def encloses(self, positions: FloatArray, probe: Probe) -> bool:

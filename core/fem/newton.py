@@ -62,9 +62,19 @@ def misfit(model: BlockModel, state: Assembly) -> float:
 
 def verdict(model: BlockModel, probe: Probe | None, positions: FloatArray) -> Outcome:
     """What a balance of forces is worth: it must not be with the material on the wrong side of the tool."""
-    if probe is not None and (model.depth_inside(positions, probe) > MAX_PENETRATION or model.encloses(positions, probe)):
-        return Outcome.INSIDE_TOOL
-    return Outcome.CONVERGED
+    if probe is None:
+        return Outcome.CONVERGED
+    inside = model.depth_inside(positions, probe) > MAX_PENETRATION or _unfelt_depth(model, positions, probe) > MAX_PENETRATION
+    return Outcome.INSIDE_TOOL if inside or model.encloses(positions, probe) else Outcome.CONVERGED
+
+
+def _unfelt_depth(model: BlockModel, positions: FloatArray, probe: Probe) -> float:
+    """How deep the deepest point of the surface lies inside the tool [m] that does not feel it, such as one in a fold."""
+    apart = model.face.shapes @ positions[model.topology.surface] - probe.centre
+    if np.einsum("fqi,fqi->fq", apart, apart).min() > max(0.0, probe.radius - MAX_PENETRATION) ** 2:  # the usual, and cheap
+        return 0.0
+    facing, depth = model.facing(positions, probe)
+    return float(depth[~(model.areas > 0 if model.dense else facing)].max(initial=0.0))
 
 
 def blocked(model: BlockModel, positions: FloatArray, probe: Probe) -> Solution | None:

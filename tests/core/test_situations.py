@@ -7,7 +7,7 @@ from core.fem.newton import Outcome
 from core.replay import replay
 
 
-@pytest.mark.parametrize("seed", range(16))
+@pytest.mark.parametrize("seed", [*range(16), 5758, 6100, 8884])  # the last three once showed a fault
 def test_no_situation_ends_in_nonsense(seed):
     situation = draw_situation(seed)
     frames = replay(situation.setup, situation.centres, situation.grid, times=situation.times)
