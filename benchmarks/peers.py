@@ -17,9 +17,8 @@ from scipy.interpolate import RegularGridInterpolator
 
 from benchmarks.reference import DEPTHS, SETUP, compared, reference, top_points
 from benchmarks.stopwatch import timed
-from core.diagnosis import DIAGNOSIS_GRID
 from core.frames import FloatArray
-from core.grading import Grading
+from core.grading import REPLAY_GRID, Grading
 from core.mesh import GridSpec
 from core.meshing import Meshing
 from core.replay import replay, require_converged
@@ -142,7 +141,7 @@ class Newton:
 
 OWN: tuple[tuple[str, GridSpec | Grading], ...] = (
     *(("Palpate, even hexahedra", GridSpec(nodes=nodes)) for nodes in GRIDS),
-    ("Palpate, diagnosis' mesh", DIAGNOSIS_GRID),
+    ("Palpate, graded by size", REPLAY_GRID),
 )
 
 PEERS: tuple[tuple[str, str, Callable[[Nodes], Peer]], ...] = (

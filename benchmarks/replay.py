@@ -14,8 +14,8 @@ from rich.table import Table
 from benchmarks.reference import SETUP, compared, poke_frames, reference
 from benchmarks.stopwatch import timed
 from core.accuracy import mesh_errors
-from core.diagnosis import DIAGNOSIS_GRID, PAGE_GRID
 from core.frames import FloatArray
+from core.grading import PAGE_GRID, REPLAY_GRID
 from core.mesh import GridSpec
 from core.meshing import Meshing
 from core.replay import Equilibrium, replay, require_converged
@@ -57,7 +57,7 @@ CASES = (
     Case("13x5x5", GridSpec(nodes=(13, 5, 5)), 0.0, 60.0, (0.33, 0.43)),
     Case("25x9x9", GridSpec(nodes=(25, 9, 9)), 2.0, 6.0, (0.29, 0.33)),
     Case("15x11x9, 1.2 mm at tool", GridSpec(nodes=(15, 11, 9), spacing=1.2e-3), 2.0, 6.0, (0.11, 0.12)),
-    Case("graded by size, diagnosis", DIAGNOSIS_GRID, 2.0, 6.0, (0.05, 0.08)),
+    Case("graded by size", REPLAY_GRID, 2.0, 6.0, (0.05, 0.08)),
     Case("graded by size, page", PAGE_GRID, 2.0, 6.0, (0.12, 0.1)),
     Case("17x13x9, 1.2 mm at tool, quadratic", GridSpec(nodes=(17, 13, 9), spacing=1.2e-3, order=2), 2.0, 6.0, (0.05, 0.08)),
 )

@@ -79,8 +79,8 @@ def replay(
     import core.replay as simulation  # noqa: PLC0415 (heavy)
     from core.accuracy import hardest_frames, mesh_errors  # noqa: PLC0415 (heavy)
     from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
-    from core.diagnosis import DIAGNOSIS_GRID  # noqa: PLC0415 (heavy)
     from core.fem.newton import Outcome  # noqa: PLC0415 (heavy)
+    from core.grading import REPLAY_GRID  # noqa: PLC0415 (heavy)
     from core.mesh import GridSpec, box_mesh  # noqa: PLC0415 (heavy)
     from core.meshing import Meshing  # noqa: PLC0415 (heavy)
 
@@ -91,7 +91,7 @@ def replay(
     times = times if len(times) else kinematics.time
     with progress(f"replay {sequence}") as report:
         setup = registration.setup_from(opened, registration.register(opened, part(report, 0.0, 0.1)))
-        spec: Meshing = even or DIAGNOSIS_GRID.for_tool(setup.tool.radius)
+        spec: Meshing = even or REPLAY_GRID.for_tool(setup.tool.radius)
         centres = setup.phantom_from_robot.apply(kinematics.position_at(times))
         frames = simulation.replay(setup, centres, spec, times=times, report=part(report, 0.1, 0.8))
         misses = mesh_errors(setup, frames, spec, report=part(report, 0.8, 1.0))
