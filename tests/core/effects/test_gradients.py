@@ -6,14 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from deforming import DEFORMING
 
 from core.effects import CATALOGUE, Slot, from_json
-from core.effects.load import Gravity
-from core.effects.material import PoissonRatio, StiffInclusion
 from core.effects.memory import PermanentSet, Viscoelasticity
-from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
-from core.effects.support import BaseCompliance, BaseDetachment
-from core.effects.tool import ToolCompliance, ToolFriction, ToolOffset, ToolRadius
+from core.effects.tool import ToolFriction
 from core.errors import SetupError
 from core.mesh import GridSpec
 from core.replay import Equilibrium, Replay
@@ -98,25 +95,9 @@ def test_sensitivity_is_the_difference_of_two_solves(name):
     assert np.linalg.norm(found - wanted) < 0.02 * np.linalg.norm(wanted)
 
 
-GRADIENTS = {
-    "poisson_ratio": PoissonRatio(nu=0.43),
-    "stiff_inclusion": StiffInclusion(x=4e-3, y=1e-3, z=0.022, radius=6e-3, stiffness_ratio=3.0),
-    "tool_radius": ToolRadius(radius=5.2e-3),
-    "tool_offset": ToolOffset(dx=2e-4, dy=-2.2e-4, dz=1e-4),
-    "base_detachment": BaseDetachment(edge="+x", extent=0.02),
-    "gravity": Gravity(specific_weight_over_stiffness=1.5),
-    "surface_layer": SurfaceLayer(thickness=3e-3, stiffness_ratio=4.0),
-    "stiffness_gradient": StiffnessGradient(log_ratio=0.5),
-    "strain_stiffening": StrainStiffening(J_m=4.0),
-    "anisotropy": Anisotropy(direction=0.4, stiffness_ratio=3.0),
-    "base_compliance": BaseCompliance(stiffness_over_E=60.0),
-    "tool_compliance": ToolCompliance(compliance_times_stiffness=20.0),
-}
-
-
-@pytest.mark.parametrize("name", GRADIENTS)
+@pytest.mark.parametrize("name", DEFORMING)
 def test_adjoint_gradient_is_that_of_full_solves(name):
-    effect = GRADIENTS[name]
+    effect = DEFORMING[name]
     block, frame = Replay(effect.apply(SETUP), GRID, tolerance=1e-11), None
     for centre in POKE:
         frame = block.step(centre, frame)
@@ -156,5 +137,5 @@ def test_effect_that_remembers_has_no_change_of_one_frame_to_first_order(effect)
 
 
 def test_every_effect_that_deforms_the_block_has_its_gradient_checked_or_turned_down():
-    checked = {*GRADIENTS, "base_slip", *(effect.name for effect in REMEMBERING)}
+    checked = {*DEFORMING, "base_slip", *(effect.name for effect in REMEMBERING)}
     assert {effect.name for effect in CATALOGUE if effect.enters is not Slot.SENSOR} == checked
