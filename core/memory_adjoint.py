@@ -115,7 +115,7 @@ class MemoryStep:
     def recalled(self, adjoint: FloatArray) -> FloatArray:
         """Costate (m, 6) of the recalled stress X by an adjoint displacement (n, 3): of the residual's part H(X) : dC / 2."""
         change = _stretched(self._at_rule, quadrature_tangents(self._mesh, adjoint))
-        scale = rule_of(self._mesh)[0].weights * self._model.unrelaxed
+        scale = rule_of(self._mesh).weights * self._model.unrelaxed
         return self._memory.points.read_transposed(self._mesh, scale[..., None] * (0.5 * _TWICE) * change)
 
     def tangent(self, adjoint: FloatArray) -> FloatArray:

@@ -97,7 +97,7 @@ class _Columns:
         arm = frame.probe.centre - wanted.pivot
         turned = [np.tensordot(np.cross(axis, arm), tool, axes=1) for axis in np.eye(3)]
         scaled = changed[3:] / np.array(wanted.steps)[:, None, None] if wanted.steps else changed[3:]
-        factors = np.array([lump_share(lump, rule_of(frame.mesh)[0]) for lump in wanted.lumps])
+        factors = np.array([lump_share(lump, rule_of(frame.mesh)) for lump in wanted.lumps])
         lumps = stiffness_changes(self.block, frame, factors) if wanted.lumps else changed[:0]
         return np.concatenate([tool, np.array(turned), scaled, lumps])
 

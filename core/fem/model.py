@@ -109,11 +109,10 @@ def _sprung(support: Support) -> bool:
 
 
 @lru_cache(maxsize=32)
-def rule_of(mesh: Mesh) -> tuple[Quadrature, FloatArray]:
-    """Quadrature of the elements, and areas on the free surface (f, p) [m^2]: the mesh's alone."""
+def rule_of(mesh: Mesh) -> Quadrature:
+    """Quadrature of the elements: the mesh's alone."""
     shared = mesh.connectivity
-    areas = face_weights(shared.element.face, mesh.nodes[shared.surface])
-    return quadrature(shared.element, mesh.nodes[shared.elements]), areas
+    return quadrature(shared.element, mesh.nodes[shared.elements])
 
 
 @lru_cache(maxsize=32)
@@ -140,7 +139,7 @@ class BlockModel:
         element, height = self.topology.element, setup.geometry.height
         self.law, self.dense = Law.of(setup.material), dense
         self.face, self._base_face = element.dense_face if dense else element.face, element.face
-        self.rule, spots = rule_of(mesh)[0], surface_spots(mesh, self.face)
+        self.rule, spots = rule_of(mesh), surface_spots(mesh, self.face)
         self.areas, self.hardness = spots.edges**2 * surface_stiffness(setup.material, spots, height), 1.0
         self._all_areas = self.areas
         mu, bulk = lame(self.law, setup.material.poisson_ratio)

@@ -49,14 +49,14 @@ class MaterialPoints(Protocol):
 
 def quadrature_tangents(mesh: Mesh, positions: FloatArray) -> FloatArray:
     """Derivatives (e, q, 3, 3) of the positions (n, 3) along x, y, z, one row each, at the quadrature points [1]."""
-    gradients = rule_of(mesh)[0].gradients
+    gradients = rule_of(mesh).gradients
     return np.asarray(np.swapaxes(gradients, 2, 3) @ positions[mesh.connectivity.elements][:, None])
 
 
 def quadrature_tangents_transposed(mesh: Mesh, rows: FloatArray) -> FloatArray:
     """The transpose of `quadrature_tangents`, from (e, q, 3, 3) to the nodes (n, 3)."""
     found = np.zeros_like(mesh.nodes)
-    np.add.at(found, mesh.connectivity.elements, (rule_of(mesh)[0].gradients @ rows).sum(axis=1))
+    np.add.at(found, mesh.connectivity.elements, (rule_of(mesh).gradients @ rows).sum(axis=1))
     return found
 
 
@@ -78,11 +78,11 @@ class QuadraturePoints:
     def read(self, mesh: Mesh, field: FloatArray) -> FloatArray:
         """As `MaterialPoints` has it."""
         self._same(mesh)
-        return field.reshape(*rule_of(mesh)[0].weights.shape, -1)
+        return field.reshape(*rule_of(mesh).weights.shape, -1)
 
     def tangents_transposed(self, mesh: Mesh, rows: FloatArray) -> FloatArray:
         """As `MaterialPoints` has it."""
-        return quadrature_tangents_transposed(mesh, rows.reshape(*rule_of(mesh)[0].weights.shape, 3, 3))
+        return quadrature_tangents_transposed(mesh, rows.reshape(*rule_of(mesh).weights.shape, 3, 3))
 
     def read_transposed(self, mesh: Mesh, field: FloatArray) -> FloatArray:
         """As `MaterialPoints` has it."""
@@ -156,7 +156,7 @@ def _elements(mesh: BoxMesh) -> tuple[int, int, int]:
 
 def _points_along(mesh: BoxMesh) -> int:
     """Of the quadrature of an element, along one edge."""
-    return round(float(np.cbrt(rule_of(mesh)[0].weights.shape[1])))
+    return round(float(np.cbrt(rule_of(mesh).weights.shape[1])))
 
 
 @lru_cache(maxsize=96)
@@ -172,7 +172,7 @@ def _reading(cells: CellPoints, mesh: BoxMesh, axis: int) -> FloatArray:
     """The value (p, c) at the grid's quadrature points along an axis, on straight lines through the values in the cells."""
     corners, points = cells._corners[axis], _points_along(mesh)
     middles = (corners[1:] + corners[:-1]) / 2
-    apart = rule_of(mesh)[0].places.reshape(*_elements(mesh)[::-1], *([points] * 3), 3)
+    apart = rule_of(mesh).places.reshape(*_elements(mesh)[::-1], *([points] * 3), 3)
     places = np.moveaxis(apart[..., axis], (2 - axis, 5 - axis), (0, 1))[:, :, 0, 0, 0, 0].ravel()
     found = np.zeros((len(places), len(middles)))
     index = np.clip(np.searchsorted(middles, places) - 1, 0, len(middles) - 2)
