@@ -24,16 +24,20 @@ from core.effects import CATALOGUE, Effect, Slot
 from core.fem.model import Probe
 from core.fem.newton import Outcome
 from core.frames import FloatArray
+from core.grading import REPLAY_GRID
 from core.mesh import GridSpec
+from core.meshing import Meshing
 from core.replay import Equilibrium, Replay, replay
 from core.setup import Box, Material, Setup, Tool
 
-__all__ = ["Situation", "Trial", "attempt", "draw_situation", "faults"]
+__all__ = ["GRIDS", "Situation", "Trial", "attempt", "draw_situation", "faults"]
 
 SIZE = (0.0687, 0.0393, 0.0358)
 GRIDS = (GridSpec(nodes=(13, 5, 5)), GridSpec(nodes=(9, 7, 6), spacing=2e-3), GridSpec(nodes=(9, 7, 5), spacing=2e-3, order=2))
 DEEPEST = 0.4 * SIZE[2]
 LONGEST_JUMP = 5e-3
+BY_SIZE = 0.25
+"""Share of the situations that take the mesh of `palpate replay` [1], whose edges go by size."""
 INSIDE = 5e-4
 """Surface points deeper inside the tool than this [m] are a fault."""
 
@@ -45,7 +49,7 @@ class Situation:
     setup: Setup
     centres: FloatArray
     times: FloatArray
-    grid: GridSpec
+    grid: Meshing
     effects: tuple[Effect, ...]
 
 
@@ -96,7 +100,8 @@ def draw_situation(seed: int) -> Situation:
         setup = effects[-1].apply(setup)
     way, grid = _way(random, radius), GRIDS[int(random.integers(len(GRIDS)))]
     times = np.cumsum(10 ** random.uniform(-2, 1, len(way)))
-    return Situation(setup, way, times, grid, tuple(effects))
+    by_size = random.random() < BY_SIZE
+    return Situation(setup, way, times, REPLAY_GRID.for_tool(radius) if by_size else grid, tuple(effects))
 
 
 def faults(situation: Situation, frames: list[Equilibrium]) -> list[str]:
@@ -136,10 +141,14 @@ class Trial:
         return f"seed {self.seed} ({self.label}, {self.cpu:.1f} CPU s): {'; '.join([*self.found, *unsolved]) or 'fine'}"
 
 
+def _name(grid: Meshing) -> str:
+    return str(grid.nodes) if isinstance(grid, GridSpec) else "by size"
+
+
 def attempt(seed: int) -> Trial:
     """Replay the situation of this seed, whatever happens."""
     begin, situation = time.process_time(), draw_situation(seed)
-    label = f"{' and '.join(effect.name for effect in situation.effects)}, {situation.grid.nodes}"
+    label = f"{' and '.join(effect.name for effect in situation.effects)}, {_name(situation.grid)}"
     try:
         frames = replay(situation.setup, situation.centres, situation.grid, times=situation.times)
         found = faults(situation, frames)
