@@ -15,7 +15,7 @@ from rich.table import Table
 from benchmarks.reference import SETUP
 from benchmarks.stopwatch import timed
 from core.frames import FloatArray
-from core.grading import PAGE_GRID, REPLAY_GRID, Grading
+from core.grading import FINE_GRID, PAGE_GRID, REPLAY_GRID
 from core.mesh import GridSpec
 from core.meshing import Meshing
 from core.replay import replay, require_converged
@@ -28,9 +28,9 @@ TARGET = (0.07, 0.08)
 _FILE = Path(__file__).with_name("gradings.npz")
 GRIDS: dict[str, Meshing] = {
     "graded by size": REPLAY_GRID,
-    "graded by size, finer": Grading(spacing=1e-3, along=0.45, inward=0.7),
+    "graded by size, fine": FINE_GRID,
     "graded by size, page": PAGE_GRID,
-    "trilinear 15x11x9, diagnosis": GridSpec(nodes=(15, 11, 9), spacing=1.2e-3),
+    "trilinear 15x11x9, 1.2 mm": GridSpec(nodes=(15, 11, 9), spacing=1.2e-3),
     "trilinear 21x15x12, 0.75 mm": GridSpec(nodes=(21, 15, 12), spacing=0.75e-3),
     "quadratic 13x9x9, 1.2 mm": GridSpec(nodes=(13, 9, 9), spacing=1.2e-3, order=2),
     "quadratic 17x13x9, 1.2 mm": GridSpec(nodes=(17, 13, 9), spacing=1.2e-3, order=2),

@@ -36,7 +36,7 @@ SIZE = (0.0687, 0.0393, 0.0358)
 GRIDS = (GridSpec(nodes=(13, 5, 5)), GridSpec(nodes=(9, 7, 6), spacing=2e-3), GridSpec(nodes=(9, 7, 5), spacing=2e-3, order=2))
 DEEPEST = 0.4 * SIZE[2]
 LONGEST_JUMP = 5e-3
-BY_SIZE = 0.25
+BY_SIZE = 0.1
 """Share of the situations that take the mesh of `palpate replay` [1], whose edges go by size."""
 INSIDE = 5e-4
 """Surface points deeper inside the tool than this [m] are a fault."""

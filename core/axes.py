@@ -42,22 +42,35 @@ def graded_axis(low: float, high: float, nodes: int, focus: float, spacing: floa
     return np.concatenate([lower, upper[1:]])
 
 
-def sized_axis(low: float, high: float, focus: float, edge: float, growth: float) -> FloatArray:
-    """Element ends [m] for edges that are `edge` long at the focus and grow by `growth` [1] over the distance from it.
+def sized_axis(low: float, high: float, focus: float, edge: float, growth: float, longest: float = np.inf) -> FloatArray:
+    """Element ends [m] for edges that are `edge` long at the focus and grow by `growth` [1] over the distance, up to `longest` [m].
 
-    On each side the growth is changed a little, so that a whole number of elements fills it.
+    On each side growth and longest edge are changed by one factor, so that a whole number of elements fills it.
     """
-    below, above = _side(focus - low, edge, growth), _side(high - focus, edge, growth)
+    below, above = _side(focus - low, edge, growth, longest), _side(high - focus, edge, growth, longest)
     return np.concatenate([focus - below[::-1], focus + above[1:]])
 
 
-def _side(length: float, edge: float, growth: float) -> FloatArray:
+def _side(length: float, edge: float, growth: float, longest: float) -> FloatArray:
     """Distances of the element ends from the focus [m], from 0 to the length."""
     if length <= 0:
         return np.zeros(1)
-    number = max(1, round(float(np.log1p(growth * length / edge) / growth)))
+
+    def reach(factor: float) -> float:
+        """Where the edges stop to grow [m]."""
+        return min(max((longest - edge / factor) / growth, 0.0), length)
+
+    def count(factor: float) -> float:
+        rate, grown = factor * growth, reach(factor)
+        return float(np.log1p(rate * grown / edge) / rate) + (length - grown) / (factor * longest)
+
+    number = max(1, round(count(1.0)))
     if number * edge >= length:
         return np.linspace(0, length, number + 1)
-    whole = brentq(lambda rate: float(np.log1p(rate * length / edge) / rate) - number, 1e-9, 1e3)
-    steps = np.expm1(whole * np.arange(number + 1))
-    return np.asarray(length * steps / steps[-1])
+    factor = brentq(lambda value: count(value) - number, 1e-9 / growth, 1e3 / growth)
+    rate, grown = factor * growth, reach(factor)
+    steps, growing = np.arange(number + 1), float(np.log1p(rate * grown / edge) / rate)
+    ends = np.where(
+        steps < growing, np.expm1(rate * steps) * edge / rate, grown + (steps - growing) * min(factor * longest, length)
+    )
+    return np.append(ends[:-1], length)

@@ -22,26 +22,16 @@ from core.diagnosis.static import StaticChannel
 from core.diagnosis.verdict import report_of
 from core.diagnosis.workers import Workers
 from core.errors import DiagnosisError, RunError
-from core.grading import PAGE_GRID
-from core.mesh import GridSpec
+from core.grading import FINE_GRID, PAGE_GRID, REPLAY_GRID
 from core.meshing import Meshing
 from core.progress import Report, part, silent
 from core.registration import Registration, register, setup_from
 from core.setup import Setup
 
-__all__ = ["DIAGNOSIS_GRID", "FINE_GRID", "diagnose"]
+__all__ = ["diagnose"]
 
-DIAGNOSIS_GRID = GridSpec(nodes=(15, 11, 9), spacing=1.2e-3)
-FINE_GRID = GridSpec(nodes=(21, 15, 12), spacing=0.75e-3)
-"""For a tool of 5 mm; others have theirs. Meshes by sizes (`core.grading`) are twice as accurate under the tool, but so coarse at
-the base that the sag under gravity changes by 16 um with where the tool is: a side push turned a true gravity down by 27 nats."""
-_USUAL_RADIUS = 5e-3
 FIT_GROUPS = 14
 TEST_GROUPS = 24
-
-
-def _for_tool(grid: GridSpec, radius: float) -> GridSpec:
-    return replace(grid, spacing=(grid.spacing or 1e-3) * radius / _USUAL_RADIUS)
 
 
 def diagnose(
@@ -114,7 +104,7 @@ def _run(
     replays: bool,
 ) -> dict[str, Any]:
     fitted, unseen = data
-    grid, fine = _for_tool(DIAGNOSIS_GRID, setup.tool.radius), _for_tool(FINE_GRID, setup.tool.radius)
+    grid, fine = REPLAY_GRID.for_tool(setup.tool.radius), FINE_GRID.for_tool(setup.tool.radius)
     static = StaticChannel.of(dataset.rest_cloud(), cleaner_for(dataset, registration), setup, grid)
     names = [item.name for item in fitted]
     bench = Bench(setup, registration, pool, names, static, grid, fine, part(report, 0.05, 0.75))
@@ -163,5 +153,5 @@ def _model(dataset: Dataset, setup: Setup, findings: Findings, fitted: list[str]
     effects = [effect.to_json() for effect in findings.best.model.effects] if findings.best else []
     return {
         "format": 1, "version": 1, "dataset": dataset.name, "parent": None, "fitted_on": fitted, "effects": effects,
-        "setup": setup.as_dict(), "grid": asdict(_for_tool(DIAGNOSIS_GRID, setup.tool.radius)),
+        "setup": setup.as_dict(), "grid": asdict(REPLAY_GRID.for_tool(setup.tool.radius)),
     }  # fmt: skip
