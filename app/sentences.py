@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-__all__ = ["cause_phrase", "quantity", "verdict_sentence"]
+__all__ = ["cause_phrase", "limit_phrase", "quantity", "verdict_sentence"]
 
 NARROW = "\N{NO-BREAK SPACE}"
 Values = dict[str, float]
@@ -46,6 +46,27 @@ def cause_phrase(cause: dict[str, Any], size: Sequence[float] | None = None) -> 
         return phrase(values, size) if phrase else f"an effect called {cause['effect'].replace('_', ' ')}"
     except (KeyError, TypeError):
         return f"an effect called {cause['effect'].replace('_', ' ')}"
+
+
+def limit_phrase(row: dict[str, Any]) -> str:
+    """The smallest size of an effect that this data would show, from a row of the report's ambiguity map."""
+    factors = [limit["factor"] for limit in row["limits"] if "factor" in limit]
+    shares = [limit["share"] for limit in row["limits"] if "share" in limit]
+    if None in (*factors, *shares, *(limit.get("change", 0.0) for limit in row["limits"])):
+        return "not at any size"
+    if factors:
+        typical = row["typical"]["factor"]
+        spread = (
+            "at half of the places not at any size" if typical is None else f"{quantity(typical, '1')} times at half of the places"
+        )
+        return f"{quantity(factors[0], '1')} times where it shows best, {spread}"
+    if shares:
+        at = ", ".join(f"{name.replace('_', ' ')} {quantity(one['value'], one['unit'])}" for name, one in row["at"].items())
+        return f"{quantity(100 * shares[0], '1')}{NARROW}% of what {at} does"
+    worst: dict[str, float] = {}
+    for limit in row["limits"]:
+        worst[limit["unit"]] = max(limit["change"], worst.get(limit["unit"], 0.0))
+    return ", ".join(quantity(change, unit) for unit, change in worst.items())
 
 
 def _gain(report: dict[str, Any]) -> str:

@@ -18,7 +18,7 @@ from rich.table import Table
 from rich.text import Text
 
 from app.console import out, progress, verdict_cells, verdict_table, write_json
-from app.sentences import verdict_sentence
+from app.sentences import limit_phrase, verdict_sentence
 from core.errors import DatasetError, RunError
 
 __all__ = ["diagnose", "print_report", "run_diagnosis", "truth_beside"]
@@ -90,6 +90,8 @@ def print_report(report: dict[str, Any]) -> None:
     out.print(Panel(Group(*lines), expand=False))
     if report.get("ranking"):
         out.print(_ranking(report["ranking"]))
+    if report.get("ambiguity_map"):
+        out.print(_told(report["ambiguity_map"]))
 
 
 def _ranking(entries: list[dict[str, Any]]) -> Table:
@@ -100,6 +102,17 @@ def _ranking(entries: list[dict[str, Any]]) -> Table:
     for entry in entries[:8]:
         removed, probability = entry.get("error_removed"), entry.get("probability")
         table.add_row(entry["effect"], *("–" if value is None else f"{100 * value:.1f} %" for value in (removed, probability)))
+    return table
+
+
+def _told(rows: list[dict[str, Any]]) -> Table:
+    table = Table(header_style="bold", title="What this data can tell", title_justify="left")
+    table.add_column("effect")
+    table.add_column("would be named from")
+    table.add_column("looks most like")
+    for row in rows:
+        alike = row["alike"][0] if row["alike"] else None
+        table.add_row(row["effect"], limit_phrase(row), f"{alike['effect']} ({100 * alike['share']:.0f} %)" if alike else "–")
     return table
 
 

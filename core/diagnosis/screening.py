@@ -21,9 +21,13 @@ __all__ = ["Candidate", "linear_gains", "null_gains", "right_sides"]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Candidate:
-    """An effect as columns: `columns` with prior deviations `spread`; `widened` are nuisances with a wider prior instead."""
+    """An effect as columns: `columns` with prior deviations `spread`; `widened` are nuisances with a wider prior instead.
+
+    `of` names the parameter whose search coordinate each column changes by one; without it a column is all that `start` does.
+    """
 
     start: Effect
+    of: tuple[str, ...] = ()
     columns: tuple[int, ...] = ()
     spread: tuple[float, ...] = ()
     widened: dict[int, float] = field(default_factory=dict)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.stats import chi2, norm
 
+from core.diagnosis.ambiguity import Told, ambiguity_map
 from core.diagnosis.bench import PRIOR_STEPS, Bench
 from core.diagnosis.evidence import fit, predictive_gain
 from core.diagnosis.hypothesis import TWINS, Model
@@ -65,6 +66,7 @@ class Findings:
         baseline: the stated setup. best: the model accepted, or None. trials: every refitted model, best first.
         bound: least gain of a cause [nats]. misfit: of the baseline, per value. screened: linear gain by effect name.
         structure: error of the baseline that is smooth and grows with the push. left: the same of the best model.
+        told: what this experiment tells of each effect, whatever the data say.
     """
 
     baseline: Model
@@ -75,6 +77,7 @@ class Findings:
     screened: dict[str, float] = field(default_factory=dict)
     structure: Structure = NOTHING
     left: Structure = NOTHING
+    told: tuple[Told, ...] = ()
 
     def rivals(self) -> list[Trial]:
         """Other sets of as many causes that explain the data about as well as the best."""
@@ -116,13 +119,15 @@ def _candidates(model: Model, bench: Bench, signatures: Sequence[tuple[Effect, l
     for kind, columns in TWINS.items():
         effect = kind.neutral(setup)
         spreads = [PRIOR_STEPS * item.scale for item in effect.numbers()]
-        found.append(Candidate(start=effect, widened=dict(zip(columns, spreads, strict=True))))
+        names = tuple(item.name for item in effect.numbers())
+        found.append(Candidate(start=effect, of=names, widened=dict(zip(columns, spreads, strict=True))))
     if "time_offset" in model.extra:
         time = TimeOffset.neutral(setup)
-        found.append(Candidate(start=time, columns=model.extra["time_offset"], spread=(PRIOR_STEPS * time.numbers()[0].scale,)))
+        spread = (PRIOR_STEPS * time.numbers()[0].scale,)
+        found.append(Candidate(start=time, of=("offset",), columns=model.extra["time_offset"], spread=spread))
     for place, lump in zip(model.extra["lumps"], lump_places(bench), strict=True):
         start = StiffInclusion(x=lump.x, y=lump.y, z=lump.z, radius=lump.radius, stiffness_ratio=1.0)
-        found.append(Candidate(start=start, columns=(place,), spread=(2.0,)))
+        found.append(Candidate(start=start, of=("stiffness_ratio",), columns=(place,), spread=(2.0,)))
     for place, (effect, predictions) in zip(model.extra.get("signatures", ()), signatures, strict=True):
         if any(np.any(p.columns.shape) and np.isfinite(p.gap).any() for p in predictions):
             found.append(Candidate(start=effect, columns=(place,), spread=(1.0,)))
@@ -206,6 +211,7 @@ def search(bench: Bench, seed: int) -> Findings:
     blocks = bench.tempered(screened)
     chance = null_gains(blocks, screened.nuisance, bench.nuisances.precision, candidates, NULL_DRAWS, seed)
     findings.bound = max(float(np.quantile(chance, NULL_QUANTILE)), LEAST_GAIN)
+    findings.told = ambiguity_map(blocks, screened.nuisance, bench.nuisances.precision, candidates, findings.bound)
     for candidate, gain in zip(candidates, gains, strict=True):
         name = candidate.start.name
         findings.screened[name] = max(float(gain), findings.screened.get(name, -np.inf))

@@ -120,6 +120,7 @@ def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder |
     report: dict[str, Any] = {
         "format": 1, "dataset": dataset.name, "verdict": verdict, "causes": causes, "ranking": _ranking(findings, named),
         "not_identifiable": _not_identifiable(dataset), "unexplained": _unexplained(bench, findings), "gain": None,
+        "ambiguity_map": [one.to_json() for one in findings.told],
         "evidence": {
             "gain_nats": round(findings.best.gain, 2) if findings.best else 0.0, "bound_nats": round(findings.bound, 2),
             "baseline_misfit": round(findings.misfit, 4), "structure": round(findings.structure.ratio, 4),

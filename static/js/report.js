@@ -14,6 +14,7 @@ export function showReport(heading, report, patterns, palette) {
     report.gain ? section("Error on sequences not fitted on", report.gain.unit ?? "mm", gain(report.gain, causes.length > 0)) : null,
     patterns ? section(causes.length ? "The error and its explanation" : "The error that is left", "", patternSection(patterns, heading.size, palette, causes.length > 0)) : null,
     report.ranking?.length ? section("Ranking", "", ranking(report.ranking, causes.map(({ effect }) => effect))) : null,
+    report.ambiguity_map?.length ? section("What this data can tell", "smallest that would be named", told(report.ambiguity_map)) : null,
     report.unexplained ? section("Unexplained", "", unexplained(report.unexplained)) : null,
     report.not_identifiable?.length ? section("Cannot be told from this data", "", report.not_identifiable.map(blind)) : null);
   panel().scrollTop = 0;
@@ -71,6 +72,29 @@ function ranking(entries, named) {
       element("div", { class: named.includes(effect) ? "bar first" : "bar" }, element("i", { style: { width: `${100 * Math.max(0, removed ?? 0)}%` } })),
       element("span", { class: "number" }, percent(removed)), element("span", { class: "number" }, percent(probability))]));
 }
+
+function told(rows) {
+  return element("div", { class: "told" }, rows.flatMap((row) => {
+    const alike = row.alike[0];
+    const like = alike && alike.share >= 0.3 ? `${percent(alike.share)} like ${words(alike.effect)}` : "like nothing else";
+    return [element("strong", {}, capital(words(row.effect))), element("span", { class: "number" }, smallest(row)), element("small", {}, like)];
+  }));
+}
+
+/** The smallest size of an effect that this data would show: worst of each unit, best place of a lump, share of a finite cause. */
+function smallest({ limits, typical, at }) {
+  const sizes = limits.map(({ change, factor, share }) => change ?? factor ?? share ?? null);
+  if (sizes.includes(null)) return "not at any size";
+  if ("factor" in limits[0]) return `${round(sizes[0])} times at best; half of the places ${typical.factor ? `${round(typical.factor)} times` : "not at any size"}`;
+  if ("share" in limits[0]) return `${percent(sizes[0])} of ${Object.entries(at).map(([name, entry]) => `${words(name)} ${reading(entry)}`).join(", ")}`;
+  const worst = {};
+  for (const { unit, change } of limits) worst[unit] = Math.max(change, worst[unit] ?? 0);
+  return Object.entries(worst).map(([unit, value]) => reading({ value, unit })).join(", ");
+}
+
+const round = (value) => Number(value.toPrecision(2));
+
+const reading = (entry) => { const shown = parameter(entry); return shown.unit ? `${shown.value} ${shown.unit}` : shown.value; };
 
 function unexplained({ fraction, where, when: time, structure, structure_bound: bound }) {
   const times = typeof structure === "number" ? `What is left is ${structure.toFixed(2)} times what chance gives, where more than ${bound.toFixed(2)} would be an error with a pattern.` : "";

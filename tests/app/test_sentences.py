@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from app.sentences import PHRASES, cause_phrase, quantity, verdict_sentence
+from app.sentences import PHRASES, cause_phrase, limit_phrase, quantity, verdict_sentence
 from core.synthetic import HIDDEN, draw_scenario
 
 
@@ -64,3 +64,43 @@ def test_quantities_have_the_unit_people_read_and_two_digits(value: Any, unit: s
 def test_report_on_disk_and_sentence_need_no_more_than_json(report: dict[str, Any], tmp_path: Path) -> None:
     (tmp_path / "report.json").write_text(json.dumps(report))
     assert verdict_sentence(json.loads((tmp_path / "report.json").read_text())) == verdict_sentence(report)
+
+
+@pytest.mark.parametrize(
+    ("limits", "typical", "at", "words"),
+    [
+        ([{"parameter": "radius", "unit": "m", "change": 1.24e-4}], {}, {}, "0.12 mm"),
+        (
+            [
+                {"parameter": "tx", "unit": "m", "change": 1e-4},
+                {"parameter": "ty", "unit": "m", "change": 2e-4},
+                {"parameter": "rx", "unit": "rad", "change": 0.01},
+            ],
+            {},
+            {},
+            "0.20 mm, 0.57°",
+        ),
+        (
+            [{"parameter": "stiffness_ratio", "unit": "1", "factor": 1.4}],
+            {"parameter": "stiffness_ratio", "unit": "1", "factor": 2.6},
+            {"x": {"value": 0.01, "unit": "m"}},
+            "1.4 times where it shows best, 2.6 times at half of the places",
+        ),
+        (
+            [{"parameter": "stiffness_ratio", "unit": "1", "factor": 1.4}],
+            {"parameter": "stiffness_ratio", "unit": "1", "factor": None},
+            {},
+            "1.4 times where it shows best, at half of the places not at any size",
+        ),
+        (
+            [{"share": 0.45}],
+            {"share": 0.5},
+            {"edge": {"value": "-x", "unit": ""}, "extent": {"value": 0.014, "unit": "m"}},
+            "45 % of what edge -x, extent 14 mm does",
+        ),
+        ([{"share": None}], {"share": None}, {}, "not at any size"),
+    ],
+    ids=["change", "worst of each unit", "factor", "hidden places", "share", "never"],
+)
+def test_limits_are_said_in_words(limits: list[Any], typical: Any, at: dict[str, Any], words: str) -> None:
+    assert plain(limit_phrase({"limits": limits, "typical": typical, "at": at})) == words
