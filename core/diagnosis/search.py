@@ -16,7 +16,7 @@ from core.diagnosis.intervals import stands
 from core.diagnosis.prediction import Prediction
 from core.diagnosis.screening import Candidate, linear_gains, null_gains, right_sides
 from core.diagnosis.structure import NOTHING, Structure, structure_of
-from core.effects import Effect
+from core.effects import OUTSIDE, Effect
 from core.effects.load import Gravity
 from core.effects.material import StiffInclusion
 from core.effects.sensor import TimeOffset
@@ -46,7 +46,7 @@ HOPELESS = 60.0
 RIVAL = 8.0
 """Rivals this close to the best [nats] are named too: the difference of two log densities that differ by d has a spread of
 about sqrt(2 d), so 8 nats are two of its standard deviations."""
-_FINITE: tuple[type[Effect], ...] = (BaseSlip, BaseDetachment, Gravity)
+_FINITE: tuple[type[Effect], ...] = (BaseSlip, BaseDetachment, Gravity, *OUTSIDE)
 
 
 @dataclass(frozen=True, eq=False)

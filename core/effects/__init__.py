@@ -1,25 +1,27 @@
 """The catalogue of causes. A new one is one class in a file of this folder and one entry here.
 
-The engine replays all of them. A diagnosis weighs those in `DIAGNOSED`, for which its false alarms were counted.
+The engine replays all of them. A diagnosis weighs those in `DIAGNOSED`: those for which its false alarms were counted, and what
+other packages bring (`OUTSIDE`; how is in the README beside this file).
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from core.effects.base import Effect, Parameter, Slot
+from core.effects.base import Effect, Parameter, Slot, parameter
 from core.effects.load import Gravity
 from core.effects.material import PoissonRatio, StiffInclusion
 from core.effects.memory import PermanentSet, Viscoelasticity
+from core.effects.outside import outside_effects
 from core.effects.sensor import CameraRegistration, TimeOffset
 from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
 from core.effects.support import BaseCompliance, BaseDetachment, BaseSlip
 from core.effects.tool import ToolCompliance, ToolFriction, ToolOffset, ToolRadius
 from core.errors import EffectError
 
-__all__ = ["CATALOGUE", "DIAGNOSED", "Effect", "Parameter", "Slot", "effect_named", "from_json"]
+__all__ = ["CATALOGUE", "DIAGNOSED", "OUTSIDE", "Effect", "Parameter", "Slot", "effect_named", "from_json", "parameter"]
 
-DIAGNOSED: tuple[type[Effect], ...] = (
+_COUNTED: tuple[type[Effect], ...] = (
     PoissonRatio,
     StiffInclusion,
     ToolRadius,
@@ -30,8 +32,7 @@ DIAGNOSED: tuple[type[Effect], ...] = (
     TimeOffset,
     CameraRegistration,
 )
-CATALOGUE: tuple[type[Effect], ...] = (
-    *DIAGNOSED,
+_REPLAYED: tuple[type[Effect], ...] = (
     SurfaceLayer,
     StiffnessGradient,
     StrainStiffening,
@@ -42,6 +43,9 @@ CATALOGUE: tuple[type[Effect], ...] = (
     ToolCompliance,
     ToolFriction,
 )
+OUTSIDE = outside_effects(effect.name for effect in (*_COUNTED, *_REPLAYED))
+DIAGNOSED = (*_COUNTED, *OUTSIDE)
+CATALOGUE = (*DIAGNOSED, *_REPLAYED)
 
 
 def effect_named(name: str) -> type[Effect]:
