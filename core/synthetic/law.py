@@ -16,7 +16,7 @@ from numba import njit
 
 from core.frames import FloatArray
 
-__all__ = ["SECOND_INVARIANT_SHARE", "assemble_obstacle", "assemble_solid", "constants", "solid_energy"]
+__all__ = ["SECOND_INVARIANT_SHARE", "assemble_obstacle", "assemble_solid", "constants", "deformation_gradient", "solid_energy"]
 
 SECOND_INVARIANT_SHARE = 0.1
 SOFT_GAP = 0.03e-3
@@ -33,7 +33,7 @@ def constants(young_modulus: FloatArray, poisson_ratio: float) -> tuple[FloatArr
 
 
 @njit(cache=True, fastmath=_FAST)
-def _gradient(u: Any, nodes: Any, g: Any, f: Any) -> float:
+def deformation_gradient(u: Any, nodes: Any, g: Any, f: Any) -> float:
     """Fill the deformation gradient f (3, 3) and return its determinant."""
     for i in range(3):
         for j in range(3):
@@ -59,7 +59,7 @@ def solid_energy(u: Any, elements: Any, gradients: Any, weights: Any, c10: Any, 
         volume = 0.0
         mean = 0.0
         for q in range(weights.shape[1]):
-            det = _gradient(u, elements[e], gradients[e, q], f)
+            det = deformation_gradient(u, elements[e], gradients[e, q], f)
             if det <= 1e-3:
                 return np.inf
             w = weights[e, q]
@@ -90,7 +90,7 @@ def assemble_solid(  # noqa: PLR0912
         volume = 0.0
         mean = 0.0
         for q in range(points):
-            dets[q] = _gradient(u, elements[e], gradients[e, q], fs[q])
+            dets[q] = deformation_gradient(u, elements[e], gradients[e, q], fs[q])
             volume += weights[e, q]
             mean += weights[e, q] * dets[q]
         mean /= volume
