@@ -104,6 +104,17 @@ def _late(values: Values, _: Sequence[float] | None) -> str:
     return f"that the camera's clock runs {quantity(abs(values['offset']), 's')} {early}"
 
 
+def _fibres(values: Values, _: Sequence[float] | None) -> str:
+    stiffer = f"{values['stiffness_ratio']:.2g} times as stiff along one direction as across"
+    return f"fibres: the phantom is {stiffer}, {quantity(values['direction'], 'rad')} from its long side"
+
+
+def _gradient(values: Values, _: Sequence[float] | None) -> str:
+    ratio = values["log_ratio"]
+    where, other = ("top", "base") if ratio >= 0 else ("base", "top")
+    return f"that the stiffness changes with the height: the {where} is {math.exp(abs(ratio)):.2g} times as stiff as the {other}"
+
+
 PHRASES: dict[str, Callable[[Any, Sequence[float] | None], str]] = {
     "stiff_inclusion": _lump,
     "tool_offset": _shift,
@@ -115,4 +126,9 @@ PHRASES: dict[str, Callable[[Any, Sequence[float] | None], str]] = {
     "base_detachment": lambda v, _: f"that the base is loose {quantity(v['extent'], 'm')} inwards from {SIDES[v['edge']]}",
     "gravity": lambda v, _: f"the phantom's own weight, ρg/E = {v['specific_weight_over_stiffness']:.2g} per metre",
     "surface_layer": lambda v, _: f"a skin {quantity(v['thickness'], 'm')} thick, {v['stiffness_ratio']:.2g} times as stiff",
+    "stiffness_gradient": _gradient,
+    "strain_stiffening": lambda v, _: f"that the material stiffens with strain, Gent's J_m = {v['J_m']:.2g}",
+    "anisotropy": _fibres,
+    "base_compliance": lambda v, _: f"a support that gives way, with springs of {v['stiffness_over_E']:.2g} E per metre",
+    "tool_compliance": lambda v, _: f"a tool that gives way under load, C E = {v['compliance_times_stiffness']:.2g} per metre",
 }

@@ -58,11 +58,18 @@ class Result:
         return self.verdict == ("found" if wanted else "none") and {one["effect"] for one in self.named} == wanted
 
 
-def all_cases(seed: int, controls: int = 10) -> list[Case]:
-    """Each effect that the virtual bench can hide once, and the controls; every case has a seed of its own."""
-    from core.synthetic import HIDDEN  # noqa: PLC0415 (heavy)
+def all_cases(seed: int, controls: int = 10, effects: Sequence[str] | None = None) -> list[Case]:
+    """Each effect once and the controls; every case has a seed of its own.
 
-    cases = [Case(f"{effect}-{seed}", 1000 * seed + 1 + place, effect) for place, effect in enumerate(HIDDEN)]
+    Effects are those that a diagnosis weighs, or the ones named, of which the virtual bench can hide more; an unknown one is a
+    RunError.
+    """
+    from core.synthetic import HIDDEN, WEIGHED  # noqa: PLC0415 (heavy)
+
+    wanted, known = WEIGHED if effects is None else effects, list(HIDDEN)
+    if strange := [effect for effect in wanted if effect not in known]:
+        raise RunError(f"the virtual bench cannot hide {', '.join(strange)}; it knows {', '.join(known)}", effect=strange[0])
+    cases = [Case(f"{effect}-{seed}", 1000 * seed + 1 + known.index(effect), effect) for effect in wanted]
     return cases + [Case(f"control-{seed}-{place:02d}", 1000 * seed + 500 + place, None) for place in range(controls)]
 
 
@@ -114,10 +121,12 @@ def run_case(case: Case, folder: Path) -> Result:
 
 def scenario_of(case: Case) -> Any:
     """The first scenario drawn from the case's seeds that hides this effect at a clear size."""
-    from core.synthetic import Scenario, draw_scenario  # noqa: PLC0415 (heavy)
+    from core.synthetic import HIDDEN, WEIGHED, Scenario, draw_scenario  # noqa: PLC0415 (heavy)
 
     if case.effect is None:
         return Scenario()
+    if case.effect in HIDDEN and case.effect not in WEIGHED:
+        return draw_scenario(TRIES * case.seed, among=(case.effect,))
     for attempt in range(TRIES):
         scenario = draw_scenario(TRIES * case.seed + attempt)
         if scenario.hidden(case.effect) is not None:

@@ -1,4 +1,4 @@
-"""The virtual block under a whole motion: solved at key places along the way, with its base held or slipping."""
+"""The virtual block under a whole motion: solved at key places along the way, its base held, slipping or on springs."""
 
 from __future__ import annotations
 
@@ -12,29 +12,19 @@ from scipy.spatial import Delaunay, cKDTree
 from core.errors import SolveError
 from core.frames import FloatArray
 from core.synthetic.block import Block, Grading, IntArray, mesh_block
-from core.synthetic.equilibrium import Equilibrium, GivesWay, Solid, State
+from core.synthetic.body import levels_of, solid_of, true_offset, true_radius
+from core.synthetic.equilibrium import Equilibrium, GivesWay, State
 from core.synthetic.motion import Motion, Probe
 from core.synthetic.scenario import Scenario
 from core.synthetic.track import Moment, Passage, Stretch, Track
+from core.synthetic.yielding import give_way
 
-__all__ = ["neutral_displacement", "perform", "rest_surface", "true_offset", "true_radius"]
+__all__ = ["neutral_displacement", "perform", "rest_surface"]
 
 KEY_SPACING = 1.0e-3
 SLIDING_SPACING = 1.3e-3
 GRAVITY = 9.81
 SHORTER, MOST_SHORT = 1.0e-3, 4.5e-3
-
-
-def true_radius(scenario: Scenario) -> float:
-    """Of the tool [m]."""
-    hidden = scenario.hidden("tool_radius")
-    return hidden.value("radius") if hidden else scenario.tool_radius
-
-
-def true_offset(scenario: Scenario) -> FloatArray:
-    """True minus stated centre of the tool (3,), phantom frame [m]."""
-    hidden = scenario.hidden("tool_offset")
-    return np.array([hidden.value(name) for name in ("dx", "dy", "dz")]) if hidden else np.zeros(3)
 
 
 def perform(scenario: Scenario, motion: Motion, fine: float | None = None) -> Track:
@@ -81,7 +71,7 @@ def neutral_displacement(scenario: Scenario, stretch: Stretch, centre: FloatArra
 
 def rest_surface(scenario: Scenario) -> tuple[FloatArray, FloatArray, IntArray]:
     """The untouched block: drawn surface of the stated shape (s, 3), its displacement (s, 3) [m], and triangles (t, 3)."""
-    block = mesh_block(scenario.size, Grading(np.zeros((1, 3)), np.zeros(1), np.full(1, 8e-3), 8e-3, 0.5))
+    block = mesh_block(scenario.size, Grading(np.zeros((1, 3)), np.zeros(1), np.full(1, 8e-3), 8e-3, 0.5, levels_of(scenario)))
     bench = _Bench(scenario, block, np.zeros(3))
     bench.close()
     return block.surface_rest, bench.settled, block.surface_faces
@@ -108,7 +98,7 @@ def _grading(scenario: Scenario, probe: Probe, fine: float) -> Grading:
         points = np.concatenate([points, [[lump.value(axis) for axis in "xyz"]]])
         reach = np.append(reach, lump.value("radius"))
         edges = np.append(edges, max(fine, 0.7 * lump.value("radius")))
-    return Grading(points, reach, edges)
+    return Grading(points, reach, edges, levels=levels_of(scenario))
 
 
 def _on_surface(centres: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
@@ -124,12 +114,14 @@ class _Bench:
 
     def __init__(self, scenario: Scenario, block: Block, slip: FloatArray) -> None:
         self.block = block
-        self.solver = Equilibrium(block, _solid(scenario, block))
+        self.solver = Equilibrium(block, solid_of(scenario, block))
         self.offset = true_offset(scenario)
         self.radius = true_radius(scenario)
         hidden = scenario.hidden("base_slip")
         self.friction = hidden.value("friction_coefficient") if hidden else None
         self.weight = scenario.mass * GRAVITY
+        giving = scenario.hidden("tool_compliance")
+        self.softness = giving.value("compliance_times_stiffness") / scenario.young_modulus if giving else 0.0
         self.slip = slip
         self.settled = np.asarray(block.surface @ self.solver.rest.displacement)
         self._tree = cKDTree(block.surface_rest + self.settled)
@@ -176,11 +168,11 @@ class _Bench:
         return np.asarray(self._tree.query(centres - self.slip)[0]) - self.radius
 
     def moment(self, centre: FloatArray) -> Moment:
-        state = self._elastic(centre - self.slip)
+        state = self._balanced(centre - self.slip)
         if self.friction is not None and self._excess(state) > 0:
             state = self._slide(centre, state)
         surface = np.asarray(self.block.surface @ state.displacement) + self.slip
-        return Moment(surface, self.slip[:2].copy(), state.push, state.penetration)
+        return Moment(surface, self.slip[:2].copy(), state.push, state.penetration, state.centre + self.slip - centre)
 
     def _excess(self, state: State) -> float:
         """Sideways push beyond what friction holds [N]."""
@@ -204,8 +196,18 @@ class _Bench:
             if not short < length < long:
                 length = 0.5 * (short + long) if np.isfinite(long) else short + 0.3e-3
             self.slip = start + length * direction
-            state = self._elastic(centre - self.slip)
+            state = self._balanced(centre - self.slip)
         raise SolveError(f"the base of the virtual block finds no rest after sliding {length * 1e3:.2g} mm", residual=excess)
+
+    def _balanced(self, centre: FloatArray) -> State:
+        """With the tool, or the end of the shaft on which it gives way, at `centre` (3,) [m] in the frame of the slid block."""
+        if not self.softness:
+            return self._elastic(centre)
+        before = self._last
+        state = give_way(centre, self.softness, centre - self.softness * before.push, self._elastic)
+        # The next place is guessed from the last two that were balanced, not from two on the way to one.
+        self._before, self._last = before, state
+        return state
 
     def _elastic(self, centre: FloatArray) -> State:
         if self._tree.query(centre)[0] > self.radius + 0.1e-3:
@@ -237,25 +239,3 @@ class _Bench:
         places = np.clip(nodes - step * 0.999, nodes.min(axis=0), nodes.max(axis=0))
         moved = LinearNDInterpolator(self._mesh, self._last.displacement)(places)
         return np.where(self.solver.solid.held[:, None] | np.isnan(moved), self._last.displacement, moved)
-
-
-def _solid(scenario: Scenario, block: Block) -> Solid:
-    modulus = np.full(block.weights.shape, scenario.young_modulus)
-    lump = scenario.hidden("stiff_inclusion")
-    if lump is not None:
-        inside = np.linalg.norm(block.places - [lump.value(axis) for axis in "xyz"], axis=2) < lump.value("radius")
-        modulus[inside] *= lump.value("stiffness_ratio")
-    nu, weight = scenario.hidden("poisson_ratio"), scenario.hidden("gravity")
-    held = block.nodes[:, 2] < 1e-9
-    strip = scenario.hidden("base_detachment")
-    if strip is not None:
-        axis, sign = "xy".index(str(strip.parameters["edge"])[1]), -1.0 if str(strip.parameters["edge"])[0] == "-" else 1.0
-        held &= scenario.size[axis] / 2 - sign * block.nodes[:, axis] >= strip.value("extent")
-    return Solid(
-        young_modulus=modulus,
-        poisson_ratio=nu.value("nu") if nu else scenario.poisson_ratio,
-        weight=weight.value("specific_weight_over_stiffness") * scenario.young_modulus if weight else 0.0,
-        held=held,
-        tool_radius=true_radius(scenario),
-        lifts=strip is not None,
-    )

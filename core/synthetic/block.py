@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ class Grading:
         fine: (n,) longest edge there [m].
         coarse: longest edge anywhere [m].
         growth: longest edge per distance [1].
+        levels: heights between two materials, which no element crosses [m].
     """
 
     points: FloatArray
@@ -35,6 +37,7 @@ class Grading:
     fine: FloatArray
     coarse: float = 12e-3
     growth: float = 0.6
+    levels: tuple[float, ...] = ()
 
     def allowed(self, places: FloatArray) -> FloatArray:
         """The longest edge (n,) [m] allowed at `places` (n, 3)."""
@@ -123,7 +126,8 @@ def _refined(size: tuple[float, float, float], grading: Grading) -> Any:
     from skfem import MeshTet  # noqa: PLC0415
 
     cells = np.maximum(np.ceil(np.array(size) / grading.coarse).astype(int), 2)
-    x, y, z = (np.linspace(0.0, length, count + 1) for length, count in zip(size, cells, strict=True))
+    x, y = (np.linspace(0.0, length, count + 1) for length, count in zip(size[:2], cells[:2], strict=True))
+    z = _heights(size[2], int(cells[2]), grading)
     mesh = MeshTet.init_tensor(x - size[0] / 2, y - size[1] / 2, z)
     for _ in range(40):
         corners = mesh.p[:, mesh.t]
@@ -135,6 +139,15 @@ def _refined(size: tuple[float, float, float], grading: Grading) -> Any:
             break
         mesh = mesh.refined(large)
     raise MeshError(f"{mesh.t.shape[1]} elements do not reach edges of {grading.fine.min() * 1e3:.2g} mm; ask for a coarser grid")
+
+
+def _heights(height: float, count: int, grading: Grading) -> FloatArray:
+    """Where layers of elements begin and end before they are refined (k,) [m]."""
+    if not grading.levels:
+        return np.linspace(0.0, height, count + 1)
+    ends = [0.0, *sorted(grading.levels), height]
+    parts = [np.linspace(low, high, 1 + int(np.ceil((high - low) / grading.coarse))) for low, high in pairwise(ends)]
+    return np.unique(np.concatenate(parts))
 
 
 def _sampling(basis: Any) -> Sampling:

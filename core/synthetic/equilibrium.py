@@ -10,7 +10,9 @@ import numpy as np
 from core.errors import SolveError
 from core.frames import FloatArray
 from core.synthetic.block import Block, Sampling
+from core.synthetic.fibres import assemble_fibres, fibre_energy
 from core.synthetic.law import assemble_obstacle, assemble_solid, constants, solid_energy
+from core.synthetic.stiffening import assemble_stiffening, stiffening_energy
 from core.synthetic.system import System
 
 __all__ = ["Equilibrium", "GivesWay", "Solid", "State"]
@@ -36,6 +38,9 @@ class Solid:
         held: (n,) bool, nodes that do not move.
         tool_radius: [m].
         lifts: whether some of the base may lift off the table.
+        stretch_limit: J_m of Gent's law [1]; None for a material without.
+        fibres: (3,) unit vector along them; None for a material without. fibre_modulus: theirs over Young's modulus [1].
+        springs: (f, q) per area, in all directions, at the points of the sole [N/m^3]; None for a base without.
     """
 
     young_modulus: FloatArray
@@ -44,6 +49,10 @@ class Solid:
     held: Any
     tool_radius: float
     lifts: bool
+    stretch_limit: float | None = None
+    fibres: FloatArray | None = None
+    fibre_modulus: float = 0.0
+    springs: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -74,12 +83,15 @@ class Equilibrium:
         self.modulus = float(np.median(solid.young_modulus))
         self._hardest = PENALTY_OVER_E * float(np.sqrt(self.modulus * solid.young_modulus.max()))
         self._constants = self._elastic()
+        self._shear = 2 * (self._constants[0] + self._constants[1])
+        self._sole = block.elements[block.sole.owner]
         free = np.full(len(block.nodes), -1, dtype=np.int64)
         self._free = np.nonzero(~solid.held)[0]
         free[self._free] = np.arange(len(self._free))
         self._system = System(block.elements, free)
         self._stiffness = np.zeros((len(block.elements), 10, 10, 3, 3))
         self._load = self._own_weight()
+        self._springs = self._under_base()
         self._tolerance = 1e-4 * self.modulus * solid.tool_radius**2
         self.iterations = 0
         self._penalty = 0.0
@@ -96,6 +108,13 @@ class Equilibrium:
         nodal = np.einsum("eq,qa->ea", self.block.weights, bary)
         np.add.at(load[:, 2], self.block.elements, -self.solid.weight * nodal)
         return load
+
+    def _under_base(self) -> FloatArray:
+        """Stiffness (f, 10, 10) [N/m] of the springs under the facets of the sole, the same in all directions."""
+        sole, springs = self.block.sole, self.solid.springs
+        if springs is None:
+            return np.zeros((0, 10, 10))
+        return np.asarray(np.einsum("fq,fqa,fqb->fab", springs * sole.weights, sole.values, sole.values))
 
     def state(self, centre: FloatArray, start: State, guess: FloatArray | None = None) -> State:
         """The equilibrium with the tool's centre at `centre` [m], from `start` or a nearer `guess` of the displacement (n, 3) [m].
@@ -190,27 +209,50 @@ class Equilibrium:
         return 0.0
 
     def _energy(self, u: FloatArray, centre: FloatArray) -> float:
-        block = self.block
-        energy = solid_energy(u, block.elements, block.gradients, block.weights, *self._constants)
+        energy = self._stored(u)
         if np.isfinite(energy):
             for sampling, where, radius in self._obstacles(centre):
                 energy += self._press(u, sampling, where, radius, False, _UNUSED)[0]
         return energy - float(np.sum(self._load * u))
 
     def _assemble(self, u: FloatArray, centre: FloatArray) -> tuple[float, FloatArray, FloatArray, FloatArray, FloatArray, float]:
-        block = self.block
         force = -self._load
         self._stiffness[:] = 0.0
-        energy = solid_energy(u, block.elements, block.gradients, block.weights, *self._constants)
+        energy = self._stored(u)
         push, coupling, total, deepest = np.zeros(3), np.zeros((len(u), 3, 3)), np.zeros((3, 3)), 0.0
         if np.isfinite(energy):
-            assemble_solid(u, block.elements, block.gradients, block.weights, *self._constants, self._stiffness, force)
+            self._resist(u, force)
             for sampling, where, radius in self._obstacles(centre):
                 of_tool = (push, coupling, total) if radius > 0 else (np.zeros(3), np.zeros_like(coupling), np.zeros((3, 3)))
                 part, depth = self._press(u, sampling, where, radius, True, (self._stiffness, force, *of_tool))
                 energy += part
                 deepest = max(deepest, depth)
         return energy - float(np.sum(self._load * u)), force, push, coupling, total, deepest
+
+    def _stored(self, u: FloatArray) -> float:
+        """Energy [J] of the block and of the springs under it."""
+        solid, grid = self.solid, (u, self.block.elements, self.block.gradients, self.block.weights)
+        energy = float(solid_energy(*grid, *self._constants))
+        if solid.stretch_limit is not None and np.isfinite(energy):
+            energy += stiffening_energy(*grid, self._shear, solid.stretch_limit)
+        if solid.fibres is not None:
+            energy += fibre_energy(*grid, solid.fibre_modulus * solid.young_modulus, solid.fibres)
+        if len(self._springs):
+            moved = u[self._sole]
+            energy += 0.5 * float(np.einsum("fai,fab,fbi->", moved, self._springs, moved))
+        return energy
+
+    def _resist(self, u: FloatArray, force: FloatArray) -> None:
+        """Add what block and springs do to `force` (n, 3) [N] and to the stiffness."""
+        solid, grid = self.solid, (u, self.block.elements, self.block.gradients, self.block.weights)
+        assemble_solid(*grid, *self._constants, self._stiffness, force)
+        if solid.stretch_limit is not None:
+            assemble_stiffening(*grid, self._shear, solid.stretch_limit, self._stiffness, force)
+        if solid.fibres is not None:
+            assemble_fibres(*grid, solid.fibre_modulus * solid.young_modulus, solid.fibres, self._stiffness, force)
+        if len(self._springs):
+            np.add.at(force, self._sole, np.einsum("fab,fbi->fai", self._springs, u[self._sole]))
+            np.add.at(self._stiffness, self.block.sole.owner, self._springs[..., None, None] * np.eye(3))
 
     def _obstacles(self, centre: FloatArray) -> list[tuple[Sampling, FloatArray, float]]:
         tool = (self.block.skin, centre, self.solid.tool_radius)

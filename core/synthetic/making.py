@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation
 from core.errors import RunError
 from core.frames import FloatArray, Transform
 from core.progress import Report, silent
-from core.synthetic.bench import neutral_displacement, perform, rest_surface, true_offset, true_radius
+from core.synthetic.bench import neutral_displacement, perform, rest_surface
+from core.synthetic.body import true_offset, true_radius
 from core.synthetic.camera import DepthCamera, Scene, place_camera
 from core.synthetic.motion import Motion, draw_motion
 from core.synthetic.scenario import Scenario
@@ -187,7 +188,7 @@ def _moved(job: _Job) -> DepthCamera:
 
 
 def _scene(job: _Job, track: Track, instant: float) -> Scene:
-    centre = job.motion.centre(np.array([instant]))[0] + true_offset(job.scenario)
+    centre = job.motion.centre(np.array([instant]))[0] + true_offset(job.scenario) + track.at(instant).deflection(instant)
     return Scene(track.surface(instant), centre, job.motion.axis, true_radius(job.scenario))
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from core.errors import EffectError
 
-__all__ = ["HIDDEN", "SHORT_PROTOCOL", "HiddenEffect", "Scenario", "draw_scenario"]
+__all__ = ["HIDDEN", "SHORT_PROTOCOL", "WEIGHED", "HiddenEffect", "Scenario", "draw_scenario"]
 
 HIDDEN: Mapping[str, Mapping[str, str]] = {
     "poisson_ratio": {"nu": "1"},
@@ -21,9 +21,20 @@ HIDDEN: Mapping[str, Mapping[str, str]] = {
     "gravity": {"specific_weight_over_stiffness": "1/m"},
     "time_offset": {"offset": "s"},
     "camera_registration": {"translation": "m", "rotation": "rad"},
+    "surface_layer": {"thickness": "m", "stiffness_ratio": "1"},
+    "stiffness_gradient": {"log_ratio": "1"},
+    "strain_stiffening": {"J_m": "1"},
+    "anisotropy": {"direction": "rad", "stiffness_ratio": "1"},
+    "base_compliance": {"stiffness_over_E": "1/m"},
+    "tool_compliance": {"compliance_times_stiffness": "1/m"},
 }
 """The effects that the virtual bench can hide, with the unit of each parameter; names are those of the catalogue."""
 
+WEIGHED = (
+    "poisson_ratio", "stiff_inclusion", "tool_radius", "tool_offset", "base_slip", "base_detachment", "gravity", "time_offset",
+    "camera_registration",
+)  # fmt: skip
+"""Those that a diagnosis weighs, and that are hidden unless others are asked for."""
 
 SHORT_PROTOCOL = ("poke-top-01", "poke-top-02", "poke-side-01", "poke-side-02", "drag-01")
 """Every kind of motion to fit on, and a push from another side, which shows most causes, to test on."""
@@ -128,22 +139,37 @@ _CLEAR: Mapping[str, _Draw] = {
     "gravity": lambda rng: {"specific_weight_over_stiffness": _between(rng, 1.7, 2.6, 2)},
     "time_offset": lambda rng: {"offset": _either(rng, (0.08, 0.25), (-0.25, -0.08), decimals=3)},
     "camera_registration": lambda rng: {"translation": _between(rng, 1.5e-3, 4e-3), "rotation": _between(rng, 0.018, 0.044)},
+    "surface_layer": lambda rng: {"thickness": _between(rng, 1.5e-3, 3e-3), "stiffness_ratio": _between(rng, 4.0, 8.0, 1)},
+    "stiffness_gradient": lambda rng: {"log_ratio": _either(rng, (-1.6, -1.0), (1.0, 1.6), decimals=2)},
+    "strain_stiffening": lambda rng: {"J_m": _between(rng, 0.8, 1.6, 2)},
+    # Stronger fibres kink where a push from the side presses them together.
+    "anisotropy": lambda rng: {"direction": _between(rng, 0.0, 3.14, 3), "stiffness_ratio": _between(rng, 2.5, 4.0, 2)},
+    "base_compliance": lambda rng: {"stiffness_over_E": _between(rng, 20.0, 50.0, 1)},
+    "tool_compliance": lambda rng: {"compliance_times_stiffness": _between(rng, 20.0, 45.0, 1)},
 }
 
 
-def draw_scenario(seed: int, effects: int = 1, clear: bool = True) -> Scenario:
-    """A scenario with that many different hidden effects, of sizes well above the sensor's noise.
+def draw_scenario(seed: int, effects: int = 1, clear: bool = True, among: Sequence[str] = WEIGHED) -> Scenario:
+    """A scenario with that many different hidden effects of those `among`, of sizes well above the sensor's noise.
 
-    With `clear` false each effect is drawn a third as far from its neutral value: visible to some diagnoses only.
+    With `clear` false each effect is drawn a third as far from its neutral value: visible to some diagnoses only. Raises
+    EffectError where one of `among` is not in HIDDEN.
     """
+    if strange := [name for name in among if name not in HIDDEN]:
+        raise EffectError(f"the virtual bench cannot hide {strange[0]!r}; it knows {', '.join(HIDDEN)}", effect=strange[0])
     rng = np.random.default_rng([seed, 7919])
-    names = rng.choice(list(_CLEAR), size=effects, replace=False)
+    names = rng.choice(list(among), size=effects, replace=False)
     hidden = tuple(HiddenEffect(str(name), _CLEAR[str(name)](rng)) for name in names)
     return Scenario(effects=hidden if clear else tuple(_fainter(one) for one in hidden))
 
 
 _NEUTRAL: Mapping[str, float] = {"nu": 0.45, "tool_radius": 0.005, "stiffness_ratio": 1.0}
-_SHRINKING = ("dx", "dy", "dz", "extent", "specific_weight_over_stiffness", "offset", "translation", "rotation")
+_SHRINKING = (
+    "dx", "dy", "dz", "extent", "specific_weight_over_stiffness", "offset", "translation", "rotation",
+    "log_ratio", "compliance_times_stiffness",
+)  # fmt: skip
+_GROWING = ("J_m", "stiffness_over_E")
+"""Neutral where they are infinite, and by their inverse as far from it as they are strong."""
 
 
 def _fainter(hidden: HiddenEffect) -> HiddenEffect:
@@ -154,6 +180,8 @@ def _fainter(hidden: HiddenEffect) -> HiddenEffect:
             parameters[name] = round(_NEUTRAL[key] + (float(value) - _NEUTRAL[key]) / 3, 6)
         elif name in _SHRINKING:
             parameters[name] = round(float(value) / 3, 6)
+        elif name in _GROWING:
+            parameters[name] = round(float(value) * 3, 6)
         elif name == "friction_coefficient":
             parameters[name] = round(float(value) * 1.5, 4)
     return HiddenEffect(hidden.effect, parameters)

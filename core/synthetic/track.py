@@ -25,12 +25,14 @@ class Moment:
         slip: (2,) of the base in the plane [m].
         push: (3,) force of the tool on the block [N].
         penetration: the deepest surface point inside the tool [m].
+        deflection: (3,) of the tool's centre under load [m].
     """
 
     surface: FloatArray
     slip: FloatArray
     push: FloatArray
     penetration: float
+    deflection: FloatArray
 
 
 @dataclass(frozen=True)
@@ -46,9 +48,17 @@ class Passage:
     def _between(self) -> Any:
         return PchipInterpolator(self.arcs, np.stack([moment.surface for moment in self.moments]))
 
+    @cached_property
+    def _way(self) -> Any:
+        return PchipInterpolator(self.arcs, np.stack([moment.deflection for moment in self.moments]))
+
     def surface(self, arc: float) -> FloatArray:
         """Displacement (s, 3) [m] at an arc length [m], by monotone cubics between the keys."""
         return np.asarray(self._between(np.clip(arc, self.arcs[0], self.arcs[-1])))
+
+    def deflection(self, arc: float) -> FloatArray:
+        """Of the tool's centre under load (3,) [m] at an arc length [m], likewise."""
+        return np.asarray(self._way(np.clip(arc, self.arcs[0], self.arcs[-1])))
 
 
 @dataclass(frozen=True)
@@ -78,6 +88,14 @@ class Stretch:
             if time < passage.end:
                 return last
         return last
+
+    def deflection(self, time: float) -> FloatArray:
+        """Of the tool's centre under load (3,) [m] at a time [s]."""
+        for passage in self.passages:
+            if passage.begin <= time <= passage.end:
+                return passage.deflection(float(self.probe.arc(np.array([time]))[0]))
+        ended = [passage for passage in self.passages if passage.end < time]
+        return ended[-1].deflection(float(self.probe.arc(np.array([ended[-1].end]))[0])) if ended else np.zeros(3)
 
     @property
     def deepest(self) -> list[float]:

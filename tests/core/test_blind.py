@@ -8,19 +8,41 @@ from typing import Any
 import pytest
 
 from core.blind import Case, Result, all_cases, run_suite, scenario_of
+from core.effects import DIAGNOSED, OUTSIDE
 from core.errors import RunError
-from core.synthetic import HIDDEN
+from core.synthetic import HIDDEN, WEIGHED
 
 
 def result(name: str, hidden: list[str], verdict: str, named: list[str]) -> Result:
     return Result(name, 0, [{"effect": one} for one in hidden], verdict, [{"effect": one} for one in named], 40.0, 20.0, 0.9, 1.0)
 
 
-def test_suite_hides_every_effect_once_and_nothing_ten_times() -> None:
+def test_suite_hides_every_effect_that_is_weighed_once_and_nothing_ten_times() -> None:
     cases = all_cases(seed=3)
-    assert [case.effect for case in cases if case.effect] == list(HIDDEN)
+    assert [case.effect for case in cases if case.effect] == list(WEIGHED)
     assert sum(case.effect is None for case in cases) == 10
     assert len({case.name for case in cases}) == len({case.seed for case in cases}) == len(cases)
+
+
+def test_other_effects_are_hidden_where_they_are_asked_for_and_leave_the_cases_of_the_rest_alone() -> None:
+    everything = all_cases(seed=3, effects=list(HIDDEN))
+    assert [case.effect for case in everything if case.effect] == list(HIDDEN)
+    assert set(all_cases(seed=3)) <= set(everything)
+    assert len({case.seed for case in everything}) == len(everything)
+    with pytest.raises(RunError, match="cannot hide moon; it knows poisson_ratio"):
+        all_cases(seed=3, effects=["moon"])
+
+
+def test_bench_and_diagnosis_list_the_same_effects_as_weighed() -> None:
+    assert tuple(effect.name for effect in DIAGNOSED if effect not in OUTSIDE) == WEIGHED
+
+
+def test_cases_are_those_that_earlier_results_are_of() -> None:
+    assert Case("camera_registration-7", 7009, "camera_registration") in all_cases(seed=7)
+    drawn = {case.effect: dict(scenario_of(case).effects[0].parameters) for case in all_cases(seed=7, controls=0)}
+    assert drawn["poisson_ratio"] == {"nu": 0.325}
+    assert drawn["tool_offset"] == {"dx": 0.00108, "dy": 0.00013, "dz": -0.00138}
+    assert drawn["camera_registration"] == {"translation": 0.0023, "rotation": 0.0232}
 
 
 @pytest.mark.parametrize("effect", HIDDEN)

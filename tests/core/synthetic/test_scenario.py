@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import pytest
 
+from core.effects import effect_named, from_json
 from core.errors import EffectError
-from core.synthetic.scenario import HIDDEN, HiddenEffect, draw_scenario
+from core.synthetic.scenario import HIDDEN, WEIGHED, HiddenEffect, draw_scenario
 
 
 def test_unknown_effect_names_the_known_ones() -> None:
     with pytest.raises(EffectError, match=r"cannot hide 'moon'.*stiff_inclusion"):
         HiddenEffect("moon")
+
+
+def test_unknown_effect_is_not_drawn() -> None:
+    with pytest.raises(EffectError, match=r"cannot hide 'moon'.*tool_compliance"):
+        draw_scenario(0, among=("gravity", "moon"))
 
 
 def test_missing_parameter_is_named() -> None:
@@ -23,9 +29,28 @@ def test_same_seed_draws_the_same_scenario() -> None:
     assert draw_scenario(4) != draw_scenario(5)
 
 
-def test_every_effect_is_drawn_sooner_or_later() -> None:
-    drawn = {hidden.effect for seed in range(80) for hidden in draw_scenario(seed).effects}
-    assert drawn == set(HIDDEN)
+def test_scenarios_are_those_drawn_before_there_were_more_effects() -> None:
+    assert draw_scenario(0).effects == (HiddenEffect("base_slip", {"friction_coefficient": 0.15}),)
+    offset = HiddenEffect("tool_offset", {"dx": 0.00219, "dy": -0.00024, "dz": -0.0005})
+    assert draw_scenario(3, effects=2).effects == (offset, HiddenEffect("gravity", {"specific_weight_over_stiffness": 2.05}))
+    assert draw_scenario(5, clear=False).effects == (HiddenEffect("base_detachment", {"edge": "-y", "extent": 0.004567}),)
+    assert draw_scenario(11).effects == (HiddenEffect("poisson_ratio", {"nu": 0.328}),)
+
+
+@pytest.mark.parametrize("among", [WEIGHED, tuple(HIDDEN)], ids=["weighed", "all"])
+def test_every_effect_is_drawn_sooner_or_later(among: tuple[str, ...]) -> None:
+    drawn = {hidden.effect for seed in range(120) for hidden in draw_scenario(seed, among=among).effects}
+    assert drawn == set(among)
+
+
+@pytest.mark.parametrize("effect", [effect for effect in HIDDEN if effect != "camera_registration"])
+def test_engine_knows_what_is_hidden_by_the_same_names_and_within_its_bounds(effect: str) -> None:
+    units = {item.name: item.unit for item in effect_named(effect).parameters()}
+    assert units == HIDDEN[effect]
+    for seed in range(20):
+        for clear in (True, False):
+            (hidden,) = draw_scenario(seed, clear=clear, among=(effect,)).effects
+            assert from_json({"effect": effect, "parameters": dict(hidden.parameters)}).values() == hidden.parameters
 
 
 def test_two_effects_are_different() -> None:
@@ -34,8 +59,18 @@ def test_two_effects_are_different() -> None:
         assert first.effect != second.effect
 
 
-def test_fainter_effects_lie_nearer_to_neutral() -> None:
-    for seed in range(30):
-        (clear,), (faint,) = draw_scenario(seed).effects, draw_scenario(seed, clear=False).effects
-        if clear.effect == "tool_radius":
-            assert abs(faint.value("radius") - 0.005) < abs(clear.value("radius") - 0.005)
+NEUTRAL = {"tool_radius": 0.005, "stiffness_ratio": 1.0, "nu": 0.45}
+ENDLESS = ("J_m", "stiffness_over_E", "friction_coefficient")
+PLACES = ("x", "y", "z", "radius", "edge", "thickness", "direction")
+"""What says where a cause is and not how strong."""
+
+
+@pytest.mark.parametrize("effect", HIDDEN)
+def test_fainter_effects_lie_nearer_to_neutral(effect: str) -> None:
+    for seed in range(10):
+        (clear,), (faint,) = (draw_scenario(seed, clear=one, among=(effect,)).effects for one in (True, False))
+        for name in HIDDEN[effect]:
+            if effect == "tool_radius" or name not in PLACES:
+                far, near = (one.value(name) for one in (clear, faint))
+                neutral = NEUTRAL.get("tool_radius" if effect == "tool_radius" else name, 0.0)
+                assert near > far if name in ENDLESS else abs(near - neutral) < abs(far - neutral) or far == neutral

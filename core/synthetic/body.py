@@ -1,0 +1,92 @@
+"""What the virtual block is made of and stands on, from what a scenario hides."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from core.frames import FloatArray
+from core.synthetic.block import Block
+from core.synthetic.equilibrium import Solid
+from core.synthetic.fibres import fibre_modulus
+from core.synthetic.scenario import Scenario
+
+__all__ = ["levels_of", "solid_of", "true_offset", "true_radius"]
+
+BoolArray = np.ndarray[Any, np.dtype[np.bool_]]
+
+
+def true_radius(scenario: Scenario) -> float:
+    """Of the tool [m]."""
+    hidden = scenario.hidden("tool_radius")
+    return hidden.value("radius") if hidden else scenario.tool_radius
+
+
+def true_offset(scenario: Scenario) -> FloatArray:
+    """True minus stated centre of the tool (3,) before anything is touched, phantom frame [m]."""
+    hidden = scenario.hidden("tool_offset")
+    return np.array([hidden.value(name) for name in ("dx", "dy", "dz")]) if hidden else np.zeros(3)
+
+
+def levels_of(scenario: Scenario) -> tuple[float, ...]:
+    """Heights between two materials [m]: under a skin, where there is one."""
+    skin = scenario.hidden("surface_layer")
+    return (scenario.size[2] - skin.value("thickness"),) if skin else ()
+
+
+def solid_of(scenario: Scenario, block: Block) -> Solid:
+    """The solid that fills `block`."""
+    nu, weight = scenario.hidden("poisson_ratio"), scenario.hidden("gravity")
+    limit, fibres, springs = (scenario.hidden(name) for name in ("strain_stiffening", "anisotropy", "base_compliance"))
+    poisson_ratio = nu.value("nu") if nu else scenario.poisson_ratio
+    angle = fibres.value("direction") if fibres else 0.0
+    held = _held(scenario, block.nodes)
+    return Solid(
+        young_modulus=_modulus(scenario, block),
+        poisson_ratio=poisson_ratio,
+        weight=weight.value("specific_weight_over_stiffness") * scenario.young_modulus if weight else 0.0,
+        held=np.zeros_like(held) if springs else held,
+        tool_radius=true_radius(scenario),
+        lifts=scenario.hidden("base_detachment") is not None,
+        stretch_limit=limit.value("J_m") if limit else None,
+        fibres=np.array([np.cos(angle), np.sin(angle), 0.0]) if fibres else None,
+        fibre_modulus=fibre_modulus(fibres.value("stiffness_ratio"), poisson_ratio) if fibres else 0.0,
+        springs=_springs(scenario, block, springs.value("stiffness_over_E")) if springs else None,
+    )
+
+
+def _modulus(scenario: Scenario, block: Block) -> FloatArray:
+    """Young's modulus (e, 4) at the volume points [Pa]."""
+    modulus = np.full(block.weights.shape, scenario.young_modulus)
+    lump, skin, slope = (scenario.hidden(name) for name in ("stiff_inclusion", "surface_layer", "stiffness_gradient"))
+    height = scenario.size[2]
+    if lump is not None:
+        inside = np.linalg.norm(block.places - [lump.value(axis) for axis in "xyz"], axis=2) < lump.value("radius")
+        modulus[inside] *= lump.value("stiffness_ratio")
+    if skin is not None:
+        modulus[block.places[..., 2] > height - skin.value("thickness")] *= skin.value("stiffness_ratio")
+    if slope is not None:
+        modulus *= np.exp(slope.value("log_ratio") * (block.places[..., 2] / height - 0.5))
+    return modulus
+
+
+def _held(scenario: Scenario, nodes: FloatArray) -> BoolArray:
+    """Which of the nodes (n, 3) a rigid support holds (n,)."""
+    return (nodes[:, 2] < 1e-9) & _bonded(scenario, nodes)
+
+
+def _bonded(scenario: Scenario, places: FloatArray) -> BoolArray:
+    """Whether the base is fixed to what it stands on at places (..., 3) of it."""
+    strip = scenario.hidden("base_detachment")
+    if strip is None:
+        return np.ones(places.shape[:-1], dtype=bool)
+    edge = str(strip.parameters["edge"])
+    axis, sign = "xy".index(edge[1]), -1.0 if edge[0] == "-" else 1.0
+    return np.asarray(scenario.size[axis] / 2 - sign * places[..., axis] >= strip.value("extent"))
+
+
+def _springs(scenario: Scenario, block: Block, stiffness_over_modulus: float) -> FloatArray:
+    """Stiffness per area at the points of the sole (f, q) [N/m^3]; none where the base is loose."""
+    places = np.einsum("fqa,fai->fqi", block.sole.values, block.nodes[block.elements[block.sole.owner]])
+    return np.where(_bonded(scenario, places), stiffness_over_modulus * scenario.young_modulus, 0.0)

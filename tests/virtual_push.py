@@ -1,0 +1,36 @@
+"""One push on the virtual block, from above or from the side, with something hidden in it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from core.frames import FloatArray
+from core.synthetic.bench import perform
+from core.synthetic.motion import Motion, Probe
+from core.synthetic.scenario import HiddenEffect, Scenario
+from core.synthetic.track import Track
+
+COARSE = 3.6e-3
+RADIUS = Scenario().tool_radius
+X, Y, Z = Scenario().size
+CLEAR = 4e-3
+"""How far from the block a push begins [m]."""
+
+
+def way(depth: float, side: bool = False) -> FloatArray:
+    """Stated centres (2, 3) [m] of a push: where it begins, and `depth` into the top, or into the side at +y."""
+    start = np.array([2e-3, Y / 2 + RADIUS, 0.023] if side else [4e-3, 2e-3, Z + RADIUS])
+    inwards = np.array([0.0, -1.0, 0.0] if side else [0.0, 0.0, -1.0])
+    return np.stack([start - CLEAR * inwards, start + depth * inwards])
+
+
+def hide(effect: str, **parameters: float | str) -> HiddenEffect:
+    return HiddenEffect(effect, parameters)
+
+
+def push(*effects: HiddenEffect, depth: float = 4e-3, side: bool = False, fine: float = COARSE) -> Track:
+    """In one second, held for another, and back."""
+    waypoints = way(depth, side)
+    length = CLEAR + depth
+    probe = Probe(waypoints, np.array([1.0, 2.0, 3.0, 4.0]), np.array([0.0, length, length, 0.0]))
+    return perform(Scenario(effects=effects), Motion("poke-top-01", np.array([0.0, 0.0, -1.0]), (probe,), 5.0), fine)
