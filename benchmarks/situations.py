@@ -24,7 +24,7 @@ from core.effects import CATALOGUE, Effect, Slot
 from core.fem.model import Probe
 from core.fem.newton import Outcome
 from core.frames import FloatArray
-from core.grading import REPLAY_GRID
+from core.grading import DIAGNOSIS_GRID
 from core.mesh import GridSpec
 from core.meshing import Meshing
 from core.replay import Equilibrium, Replay, replay
@@ -37,7 +37,7 @@ GRIDS = (GridSpec(nodes=(13, 5, 5)), GridSpec(nodes=(9, 7, 6), spacing=2e-3), Gr
 DEEPEST = 0.4 * SIZE[2]
 LONGEST_JUMP = 5e-3
 BY_SIZE = 0.1
-"""Share of the situations that take the mesh of `palpate replay` [1], whose edges go by size."""
+"""Share of the situations that take the mesh of a diagnosis [1], whose edges go by size."""
 INSIDE = 5e-4
 """Surface points deeper inside the tool than this [m] are a fault."""
 
@@ -101,7 +101,7 @@ def draw_situation(seed: int) -> Situation:
     way, grid = _way(random, radius), GRIDS[int(random.integers(len(GRIDS)))]
     times = np.cumsum(10 ** random.uniform(-2, 1, len(way)))
     by_size = random.random() < BY_SIZE
-    return Situation(setup, way, times, REPLAY_GRID.for_tool(radius) if by_size else grid, tuple(effects))
+    return Situation(setup, way, times, DIAGNOSIS_GRID.for_tool(radius) if by_size else grid, tuple(effects))
 
 
 def faults(situation: Situation, frames: list[Equilibrium]) -> list[str]:
