@@ -94,7 +94,11 @@ function smallest({ limits, typical, at }) {
 
 const round = (value) => Number(value.toPrecision(2));
 
-const reading = (entry) => { const shown = parameter(entry); return shown.unit ? `${shown.value} ${shown.unit}` : shown.value; };
+function reading(entry) {
+  const { value, unit } = parameter(entry);
+  const number = Number(value);
+  return `${Number.isFinite(number) ? round(number) : value}${unit && unit !== "°" ? ` ${unit}` : unit}`;
+}
 
 function unexplained({ fraction, where, when: time, structure, structure_bound: bound }) {
   const times = typeof structure === "number" ? `What is left is ${structure.toFixed(2)} times what chance gives, where more than ${bound.toFixed(2)} would be an error with a pattern.` : "";

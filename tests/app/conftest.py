@@ -48,6 +48,22 @@ REPORT: dict[str, Any] = {
         }
     ],
     "ranking": [{"effect": "poisson_ratio", "probability": 0.01, "error_removed": 0.22}],
+    "ambiguity_map": [
+        {
+            "effect": "tool_radius", "limits": [{"parameter": "radius", "unit": "m", "change": 1.2e-4}],
+            "typical": {"parameter": "radius", "unit": "m", "change": 1.2e-4}, "at": {},
+            "alike": [{"effect": "tool_offset", "share": 0.83}, {"effect": "gravity", "share": 0.1}],
+        },
+        {
+            "effect": "stiff_inclusion", "limits": [{"parameter": "stiffness_ratio", "unit": "1", "factor": 1.42}],
+            "typical": {"parameter": "stiffness_ratio", "unit": "1", "factor": None}, "at": {"x": {"value": 0.01, "unit": "m"}},
+            "alike": [{"effect": "tool_radius", "share": 0.2}],
+        },
+        {
+            "effect": "base_detachment", "limits": [{"share": 0.454}], "typical": {"share": 0.6},
+            "at": {"edge": {"value": "-x", "unit": ""}, "extent": {"value": 0.014, "unit": "m"}}, "alike": [],
+        },
+    ],
     "not_identifiable": [{"effect": "young_modulus", "why": "the shape does not depend on it", "measure_instead": "a force"}],
     "unexplained": {"fraction": 0.04, "where": "nowhere", "when": "never"},
     "gain": {

@@ -19,6 +19,7 @@ from broken_datasets import BREAKAGES, write_valid_dataset
 
 from app import console
 from app.cli import main
+from app.commands.diagnosis import print_report
 from app.console import agrees, parameters_text, progress, verdict_cells, verdict_table, write_json
 from app.stop import Stop
 from core.errors import Cancelled
@@ -224,3 +225,13 @@ def test_json_appears_whole_or_not_at_all(tmp_path: Path) -> None:
     with pytest.raises(TypeError):
         write_json(tmp_path / "deep" / "report.json", {"a": object()})
     assert [path.name for path in (tmp_path / "deep").iterdir()] == ["report.json"]
+
+
+def test_report_is_printed_with_what_the_data_can_tell(
+    report: dict[str, Any], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(console.out, "width", 200)
+    print_report(report)
+    shown = capsys.readouterr().out.replace("\N{NO-BREAK SPACE}", " ")
+    assert "What this data can tell" in shown
+    assert "0.12 mm" in shown and "tool_offset (83 %)" in shown and "1.4 times" in shown

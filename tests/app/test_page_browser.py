@@ -111,6 +111,14 @@ def test_page_opens_on_the_verdict_and_the_worst_frame(page: Page, tmp_path: Pat
     assert (tmp_path / "page.png").stat().st_size > 50_000
 
 
+def test_panel_says_what_the_data_can_tell(page: Page) -> None:
+    page.open()
+    told = page.page.inner_text(".told").replace("\N{NO-BREAK SPACE}", " ")
+    assert "Tool radius" in told and "0.12 mm" in told and "83 % like tool offset" in told
+    assert "1.4 times at best; half of the places not at any size" in told and "like nothing else" in told
+    assert "45 % of edge -x, extent 14 mm" in told
+
+
 def test_scrubbing_stepping_and_playing_move_the_scene(page: Page) -> None:
     page.open()
     sums = set()

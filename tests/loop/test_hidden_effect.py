@@ -11,7 +11,7 @@ import pytest
 
 from core.dataset import open_dataset
 from core.diagnosis import diagnose
-from core.effects import from_json
+from core.effects import DIAGNOSED, from_json
 from core.synthetic import HiddenEffect, Scenario, make_dataset
 
 FEW = ("poke-top-01", "poke-top-02", "poke-top-03", "poke-side-01")
@@ -37,6 +37,15 @@ def test_late_clock_is_named_with_its_size(late_clock: tuple[Path, dict[str, Any
     offset = report["causes"][0]["parameters"]["offset"]
     assert offset["value"] == pytest.approx(0.15, abs=0.02)
     assert offset["low"] < offset["value"] < offset["high"]
+
+
+def test_the_map_of_what_can_be_told_is_whole_and_sees_the_hidden_clock(late_clock: tuple[Path, dict[str, Any]]) -> None:
+    rows = {row["effect"]: row for row in late_clock[1]["ambiguity_map"]}
+    assert set(rows) == {effect.name for effect in DIAGNOSED}
+    assert 0.5e-3 < rows["time_offset"]["limits"][0]["change"] < 0.05  # a third of what is hidden at most
+    for name, row in rows.items():
+        assert {one["effect"] for one in row["alike"]} == set(rows) - {name}
+        assert all(0.0 <= one["share"] <= 1.0 for one in row["alike"])
 
 
 def test_naming_it_removes_most_of_the_error_on_unseen_sequences(late_clock: tuple[Path, dict[str, Any]]) -> None:
