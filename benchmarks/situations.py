@@ -1,4 +1,4 @@
-"""Random situations that a replay must survive: `python -m benchmarks.situations [COUNT] [SEED] [--workers N]`.
+"""Random situations that a replay must survive: `python -m benchmarks.situations [COUNT] [SEED] [--workers N] [--by-size SHARE]`.
 
 Materials up to nu = 0.49, neo-Hooke and Gent, two effects at a time, pokes into the top and the sides and over the rim by up to
 40 % of the height, jumps of up to 5 mm between frames. No frame may end with an exception, a NaN, an inverted element that is
@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from rich.console import Console
@@ -84,8 +85,8 @@ def _way(random: np.random.Generator, radius: float) -> FloatArray:
     return np.array(way)
 
 
-def draw_situation(seed: int) -> Situation:
-    """The situation of this seed."""
+def draw_situation(seed: int, by_size: float = BY_SIZE) -> Situation:
+    """The situation of this seed, where the share `by_size` [1] of all take a mesh whose edges go by size."""
     random = np.random.default_rng(seed)
     radius = float(random.uniform(3.5e-3, 8e-3))
     limit = float(random.uniform(3.0, 50.0)) if random.random() < 0.3 else None
@@ -100,8 +101,8 @@ def draw_situation(seed: int) -> Situation:
         setup = effects[-1].apply(setup)
     way, grid = _way(random, radius), GRIDS[int(random.integers(len(GRIDS)))]
     times = np.cumsum(10 ** random.uniform(-2, 1, len(way)))
-    by_size = random.random() < BY_SIZE
-    return Situation(setup, way, times, DIAGNOSIS_GRID.for_tool(radius) if by_size else grid, tuple(effects))
+    sized = random.random() < by_size
+    return Situation(setup, way, times, DIAGNOSIS_GRID.for_tool(radius) if sized else grid, tuple(effects))
 
 
 def faults(situation: Situation, frames: list[Equilibrium]) -> list[str]:
@@ -145,9 +146,9 @@ def _name(grid: Meshing) -> str:
     return str(grid.nodes) if isinstance(grid, GridSpec) else "by size"
 
 
-def attempt(seed: int) -> Trial:
+def attempt(seed: int, by_size: float = BY_SIZE) -> Trial:
     """Replay the situation of this seed, whatever happens."""
-    begin, situation = time.process_time(), draw_situation(seed)
+    begin, situation = time.process_time(), draw_situation(seed, by_size)
     label = f"{' and '.join(effect.name for effect in situation.effects)}, {_name(situation.grid)}"
     try:
         frames = replay(situation.setup, situation.centres, situation.grid, times=situation.times)
@@ -157,19 +158,20 @@ def attempt(seed: int) -> Trial:
     return Trial(seed, label, tuple(frame.outcome for frame in frames), tuple(found), time.process_time() - begin)
 
 
-def _attempts(seeds: range, workers: int) -> Iterator[Trial]:
+def _attempts(seeds: range, workers: int, by_size: float) -> Iterator[Trial]:
     """The trials in the order of their seeds, each as soon as it and those before it are done."""
+    trial = partial(attempt, by_size=by_size)
     if workers == 1:
-        yield from map(attempt, seeds)
+        yield from map(trial, seeds)
         return
     with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
-        yield from pool.map(attempt, seeds)
+        yield from pool.map(trial, seeds)
 
 
-def main(count: int, seed: int, workers: int = 1) -> int:
+def main(count: int, seed: int, workers: int = 1, by_size: float = BY_SIZE) -> int:
     """Try `count` situations from `seed` on in so many processes; 1 when one of them shows a fault."""
     console, outcomes, wrong, cpu = Console(), Counter[Outcome](), 0, 0.0
-    for trial in _attempts(range(seed, seed + count), workers):
+    for trial in _attempts(range(seed, seed + count), workers, by_size):
         if trial.found or set(trial.outcomes) - {Outcome.CONVERGED}:
             console.print(str(trial), highlight=False, soft_wrap=True)
         outcomes.update(trial.outcomes)
@@ -189,4 +191,5 @@ if __name__ == "__main__":
     parser.add_argument("count", nargs="?", type=int, default=100, help="how many")
     parser.add_argument("seed", nargs="?", type=int, default=0, help="of the first; the others follow")
     parser.add_argument("--workers", type=int, default=1, help="processes that share them")
+    parser.add_argument("--by-size", type=float, default=BY_SIZE, help="share of them whose mesh's edges go by size")
     sys.exit(main(**vars(parser.parse_args())))
