@@ -1,4 +1,5 @@
-"""The blind suite: datasets with one hidden effect each and controls with none, diagnosed by a process that is not told."""
+"""The blind suite: datasets with one hidden effect each, with what no effect expresses, and with nothing, diagnosed by a process
+that is not told."""
 
 from __future__ import annotations
 
@@ -23,7 +24,7 @@ TRIES = 400
 
 @dataclass(frozen=True)
 class Case:
-    """One dataset to be made: its name, the seed of everything random in it, and the effect hidden (None in a control)."""
+    """One dataset to be made: its name, the seed of everything random in it, and the effect or disturbance (None in a control)."""
 
     name: str
     seed: int
@@ -38,7 +39,7 @@ class Result:
         hidden, named: effects with their parameters, as in a truth file and in a report.
         gain, bound: of the named causes, or of the best that was not named, and the least that is [nats].
         removed: share of the reducible error that the named causes remove on test sequences [1], if any.
-        seconds: of the diagnosis alone.
+        seconds: of the diagnosis alone. outside: name of the disturbance that no effect of the catalogue expresses, if any.
     """
 
     name: str
@@ -50,26 +51,31 @@ class Result:
     bound: float
     removed: float | None
     seconds: float
+    outside: str = ""
 
     @property
     def right(self) -> bool:
-        """Whether exactly what is hidden was named."""
+        """Whether exactly what is hidden was named; of what lies outside the catalogue, whether no single cause was."""
+        if self.outside:
+            return self.verdict in ("unexplained", "ambiguous")
         wanted = {one["effect"] for one in self.hidden}
         return self.verdict == ("found" if wanted else "none") and {one["effect"] for one in self.named} == wanted
 
 
 def all_cases(seed: int, controls: int = 10, effects: Sequence[str] | None = None) -> list[Case]:
-    """Each effect once and the controls; every case has a seed of its own.
+    """Each effect once, each disturbance once, and the controls; every case has a seed of its own.
 
     Effects are those that a diagnosis weighs, or the ones named, of which the virtual bench can hide more; an unknown one is a
     RunError.
     """
-    from core.synthetic import HIDDEN, WEIGHED  # noqa: PLC0415 (heavy)
+    from core.synthetic import DISTURBANCES, HIDDEN, WEIGHED  # noqa: PLC0415 (heavy)
 
     wanted, known = WEIGHED if effects is None else effects, list(HIDDEN)
     if strange := [effect for effect in wanted if effect not in known]:
         raise RunError(f"the virtual bench cannot hide {', '.join(strange)}; it knows {', '.join(known)}", effect=strange[0])
     cases = [Case(f"{effect}-{seed}", 1000 * seed + 1 + known.index(effect), effect) for effect in wanted]
+    if effects is None:
+        cases += [Case(f"{name}-{seed}", 1000 * seed + 401 + place, name) for place, name in enumerate(DISTURBANCES)]
     return cases + [Case(f"control-{seed}-{place:02d}", 1000 * seed + 500 + place, None) for place in range(controls)]
 
 
@@ -115,16 +121,18 @@ def run_case(case: Case, folder: Path) -> Result:
     gain = evidence["gain_nats"] if said["causes"] else max(row["gain_nats"] for row in said["ranking"])
     return Result(
         case.name, case.seed, truth.as_dict()["effects"], said["verdict"], said["causes"], gain, evidence["bound_nats"], removed,
-        round(seconds, 1),
+        round(seconds, 1), "".join(one.name for one in truth.disturbances),
     )  # fmt: skip
 
 
 def scenario_of(case: Case) -> Any:
     """The first scenario drawn from the case's seeds that hides this effect at a clear size."""
-    from core.synthetic import HIDDEN, WEIGHED, Scenario, draw_scenario  # noqa: PLC0415 (heavy)
+    from core.synthetic import DISTURBANCES, HIDDEN, WEIGHED, Scenario, draw_disturbance, draw_scenario  # noqa: PLC0415 (heavy)
 
     if case.effect is None:
         return Scenario()
+    if case.effect in DISTURBANCES:
+        return Scenario(disturbances=(draw_disturbance(case.effect, case.seed),))
     if case.effect in HIDDEN and case.effect not in WEIGHED:
         return draw_scenario(TRIES * case.seed, among=(case.effect,))
     for attempt in range(TRIES):

@@ -21,15 +21,22 @@ def blind(
     workers: Annotated[int, typer.Option(min=1, help="Datasets at the same time.")] = 2,
     only: Annotated[str | None, typer.Option(help="Only cases whose name contains this.")] = None,
 ) -> None:
-    """Hide each effect once at a clear size, and nothing ten times; print what was said. Can be stopped and taken up again."""
+    """Hide each effect once at a clear size, what no effect expresses, and nothing ten times; print what was said.
+
+    Can be stopped and taken up again.
+    """
     cases = [case for case in all_cases(seed, controls) if only is None or only in case.name]
     with progress("blind suite") as report:
         results = run_suite(folder, cases, workers, report)
     out.print(_table(cases, results))
-    for kind, hidden in (("effects", True), ("controls", False)):
-        those = [result for result in results if bool(result.hidden) is hidden]
-        named = "" if hidden else f", a cause named in {sum(bool(result.named) for result in those)}"
+    for kind in ("effects", "outside the catalogue", "controls"):
+        those = [result for result in results if _kind(result) == kind]
+        named = "" if kind == "effects" else f", a cause named in {sum(bool(result.named) for result in those)}"
         out.print(f"{sum(result.right for result in those)} of {len(those)} {kind} right{named}", highlight=False)
+
+
+def _kind(result: Result) -> str:
+    return "outside the catalogue" if result.outside else "effects" if result.hidden else "controls"
 
 
 def _table(cases: list[Case], results: list[Result]) -> Table:
@@ -39,7 +46,7 @@ def _table(cases: list[Case], results: list[Result]) -> Table:
     for result in results:
         removed = "–" if result.removed is None else f"{100 * result.removed:.0f} %"
         table.add_row(
-            result.name, _causes(result.hidden) or "nothing", result.verdict, _causes(result.named) or "–",
+            result.name, _causes(result.hidden) or result.outside or "nothing", result.verdict, _causes(result.named) or "–",
             f"{result.gain:.0f} ({result.bound:.0f}) nats", removed, f"{result.seconds:.0f} s",
             "[green]✓[/]" if result.right else "[red]✗[/]",
         )  # fmt: skip

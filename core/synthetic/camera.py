@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from core.frames import FloatArray, Transform
+from core.synthetic.disturbance import Disturbance, rippled
 
 __all__ = ["DepthCamera", "Scene", "place_camera", "tool_solid"]
 
@@ -45,6 +46,7 @@ class DepthCamera:
         sigma: of the depth noise at 0.35 m; it grows with the distance squared [m].
         density: points on the block in one cloud, about.
         on_block: (n,) bool, pixels that see the block at rest.
+        disturbances: of the depth.
     """
 
     phantom_from_camera: Transform
@@ -54,6 +56,7 @@ class DepthCamera:
     sigma: float
     density: int
     on_block: Any
+    disturbances: tuple[Disturbance, ...] = ()
 
     def depth(self, scene: Scene) -> tuple[FloatArray, Any]:
         """True depth of each pixel [m], infinite for nothing, and what it sees: 0 block, 1 table, more the tool, -1 nothing."""
@@ -73,7 +76,11 @@ class DepthCamera:
         depth = self._flying(depth, rng)
         keep = rng.random(len(depth)) < self._chance(what)
         seen = np.nonzero(keep & np.isfinite(depth))[0]
-        z = depth[seen] + self.bias[seen] + rng.normal(size=len(seen)) * self.sigma * (depth[seen] / 0.35) ** 2
+        z = (
+            rippled(self.disturbances, depth[seen])
+            + self.bias[seen]
+            + rng.normal(size=len(seen)) * self.sigma * (depth[seen] / 0.35) ** 2
+        )
         stray = rng.random(len(seen)) < 0.006
         z[stray] *= rng.uniform(0.75, 1.3, stray.sum())
         z = np.round(z / QUANTUM) * QUANTUM

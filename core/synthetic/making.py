@@ -19,6 +19,7 @@ from core.progress import Report, silent
 from core.synthetic.bench import neutral_displacement, perform, rest_surface
 from core.synthetic.body import true_offset, true_radius
 from core.synthetic.camera import DepthCamera, Scene, place_camera
+from core.synthetic.disturbance import drifted
 from core.synthetic.motion import Motion, draw_motion
 from core.synthetic.scenario import Scenario
 from core.synthetic.track import Track
@@ -84,6 +85,7 @@ def _fill(folder: Path, scenario: Scenario, seed: int, workers: int, report: Rep
     camera = place_camera(
         rng, scenario.size, (rest + settled, faces), seen, scenario.density, scenario.noise * rng.uniform(0.9, 1.1)
     )
+    camera = replace(camera, disturbances=scenario.disturbances)
     shift = _camera_shift(scenario, rng)
     write_ply(folder / "rest.ply", camera.cloud(Scene((rest + settled, faces), None, np.array([0.0, 0.0, -1.0]), 1.0), rng))
     _write_touches(folder, scenario, robot_from_phantom, (rest, settled), rng)
@@ -101,7 +103,9 @@ def _fill(folder: Path, scenario: Scenario, seed: int, workers: int, report: Rep
         stopped = "; a push there stopped short where the block gives way" if any(record.shortened) else ""
         report(0.05 + 0.95 * (done + 1) / len(jobs), f"recorded {done + 1} of {len(jobs)} sequences{stopped}")
     visibility = float(np.sqrt(np.mean(squares))) if squares else 0.0
-    return Truth(scenario.effects, visibility, camera.phantom_from_camera, robot_from_phantom, shift, shortened)
+    return Truth(
+        scenario.effects, visibility, camera.phantom_from_camera, robot_from_phantom, shift, shortened, scenario.disturbances
+    )  # fmt: skip
 
 
 def _motions(scenario: Scenario, seen: FloatArray, seed: int) -> list[Motion]:
@@ -175,16 +179,16 @@ def _record(job: _Job) -> _Record:
     files = [f"clouds/{number:06d}.ply" for number in range(len(instants))]
     stamps = start + instants + (hidden.value("offset") if hidden else 0.0) + rng.uniform(-1e-3, 1e-3, len(instants))
     write_clouds(job.folder / "clouds.csv", stamps, files)
-    camera = _moved(job)
     for file, instant in zip(files, instants.tolist(), strict=True):
-        write_ply(job.folder / file, camera.cloud(_scene(job, track, instant), rng))
+        write_ply(job.folder / file, _camera(job, instant).cloud(_scene(job, track, instant), rng))
     return _Record(planned.name, _visibility(job, track), shortened)
 
 
-def _moved(job: _Job) -> DepthCamera:
-    camera = job.camera
-    pose = job.camera_shift @ camera.phantom_from_camera
-    return DepthCamera(pose, camera.rays, camera.shape, camera.bias, camera.sigma, camera.density, camera.on_block)
+def _camera(job: _Job, instant: float) -> DepthCamera:
+    """The camera where it stands at this time [s] of the sequence."""
+    away = np.random.default_rng([job.seed, 3])  # in the same direction in all sequences
+    drift = drifted(job.scenario.disturbances, instant / job.motion.duration, away)
+    return replace(job.camera, phantom_from_camera=drift @ job.camera_shift @ job.camera.phantom_from_camera)
 
 
 def _scene(job: _Job, track: Track, instant: float) -> Scene:

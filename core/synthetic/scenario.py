@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from core.errors import EffectError
+from core.synthetic.disturbance import Disturbance
 
 __all__ = ["HIDDEN", "SHORT_PROTOCOL", "WEIGHED", "HiddenEffect", "Scenario", "draw_scenario"]
 
@@ -65,6 +66,7 @@ class Scenario:
 
     Attributes:
         effects: what is really there and believed by nobody.
+        disturbances: what is wrong and no effect of the catalogue.
         sequences: names; what stands before the number is the kind of motion: poke-top, poke-side or drag.
         size: of the block [m].
         mass: [kg].
@@ -80,6 +82,7 @@ class Scenario:
     """
 
     effects: tuple[HiddenEffect, ...] = ()
+    disturbances: tuple[Disturbance, ...] = ()
     sequences: tuple[str, ...] = ("poke-top-01", "poke-top-02", "poke-top-03", "poke-side-01", "poke-side-02", "drag-01", "drag-02")
     size: tuple[float, float, float] = (0.0687, 0.0393, 0.0358)
     mass: float = 0.10401

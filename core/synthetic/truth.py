@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from core.frames import Transform
+from core.synthetic.disturbance import DISTURBANCES, Disturbance
 from core.synthetic.scenario import HIDDEN, HiddenEffect
 
 __all__ = ["Truth", "truth_path"]
@@ -24,6 +25,7 @@ class Truth:
         phantom_from_camera: as `rest.ply` was taken.
         robot_from_phantom: of the robot's true frame.
         camera_shift: phantom frame; `camera_shift @ phantom_from_camera` holds in the sequences.
+        disturbances: what no effect of the catalogue expresses; the verdict is then unexplained.
         shortened: by sequence, how far each of its pushes stopped short of its plan because the block gave way [m].
     """
 
@@ -33,17 +35,19 @@ class Truth:
     robot_from_phantom: Transform
     camera_shift: Transform = field(default_factory=Transform)
     shortened: Mapping[str, list[float]] = field(default_factory=dict)
+    disturbances: tuple[Disturbance, ...] = ()
 
     @property
     def verdict(self) -> str:
-        """What a perfect diagnosis says: found or none."""
-        return "found" if self.effects else "none"
+        """What a perfect diagnosis says: found, unexplained or none."""
+        return "unexplained" if self.disturbances else "found" if self.effects else "none"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values: each parameter with its unit, the visibility in mm."""
         return {
             "verdict": self.verdict,
-            "effects": [_described(hidden) for hidden in self.effects],
+            "effects": [_described(hidden.effect, hidden.parameters, HIDDEN) for hidden in self.effects],
+            **self._disturbed(),
             "visibility_mm": round(self.visibility * 1e3, 4),
             "stopped_short_mm": {name: [round(part * 1e3, 3) for part in parts] for name, parts in self.shortened.items()},
             "registration": {
@@ -53,6 +57,11 @@ class Truth:
                 "camera_shift": self.camera_shift.matrix.tolist(),
             },
         }
+
+    def _disturbed(self) -> dict[str, Any]:
+        """Said only where there is something: most truths have no such entry."""
+        found = [_described(one.name, one.parameters, DISTURBANCES) for one in self.disturbances]
+        return {"disturbances": found} if found else {}
 
     def save(self, path: Path) -> None:
         """Write JSON."""
@@ -64,9 +73,8 @@ def truth_path(folder: Path) -> Path:
     return folder.with_name(folder.name + ".truth.json")
 
 
-def _described(hidden: HiddenEffect) -> dict[str, Any]:
-    units = HIDDEN[hidden.effect]
+def _described(name: str, values: Mapping[str, float | str], units: Mapping[str, Mapping[str, str]]) -> dict[str, Any]:
     return {
-        "effect": hidden.effect,
-        "parameters": {name: {"value": value, "unit": units[name]} for name, value in hidden.parameters.items()},
+        "effect": name,
+        "parameters": {key: {"value": value, "unit": units[name][key]} for key, value in values.items()},
     }
