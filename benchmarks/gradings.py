@@ -15,7 +15,7 @@ from rich.table import Table
 from benchmarks.reference import SETUP
 from benchmarks.stopwatch import timed
 from core.frames import FloatArray
-from core.grading import DIAGNOSIS_GRID, FINE_GRID, PAGE_GRID, REPLAY_GRID
+from core.grading import FINE_GRID, PAGE_GRID, REPLAY_GRID
 from core.mesh import GridSpec
 from core.meshing import Meshing
 from core.replay import replay, require_converged
@@ -28,7 +28,6 @@ TARGET = (0.06, 0.06)
 _FILE = Path(__file__).with_name("gradings.npz")
 GRIDS: dict[str, Meshing] = {
     "graded by size": REPLAY_GRID,
-    "graded by size, diagnosis": DIAGNOSIS_GRID,
     "graded by size, fine": FINE_GRID,
     "graded by size, page": PAGE_GRID,
     "trilinear 15x11x9, 1.2 mm": GridSpec(nodes=(15, 11, 9), spacing=1.2e-3),

@@ -25,7 +25,7 @@ from core.effects import CATALOGUE, Effect, Slot
 from core.fem.model import Probe
 from core.fem.newton import Outcome
 from core.frames import FloatArray
-from core.grading import DIAGNOSIS_GRID
+from core.grading import Grading
 from core.mesh import GridSpec
 from core.meshing import Meshing
 from core.replay import Equilibrium, Replay, replay
@@ -37,8 +37,8 @@ SIZE = (0.0687, 0.0393, 0.0358)
 GRIDS = (GridSpec(nodes=(13, 5, 5)), GridSpec(nodes=(9, 7, 6), spacing=2e-3), GridSpec(nodes=(9, 7, 5), spacing=2e-3, order=2))
 DEEPEST = 0.4 * SIZE[2]
 LONGEST_JUMP = 5e-3
-BY_SIZE = 0.1
-"""Share of the situations that take the mesh of a diagnosis [1], whose edges go by size."""
+BY_SIZE, SIZED = 0.1, Grading(spacing=1.3e-3, along=0.8, inward=1.0, longest=0.35)
+"""Share of the situations whose mesh goes by sizes [1], and those: a little coarser than a diagnosis takes them."""
 INSIDE = 5e-4
 """Surface points deeper inside the tool than this [m] are a fault."""
 
@@ -102,7 +102,7 @@ def draw_situation(seed: int, by_size: float = BY_SIZE) -> Situation:
     way, grid = _way(random, radius), GRIDS[int(random.integers(len(GRIDS)))]
     times = np.cumsum(10 ** random.uniform(-2, 1, len(way)))
     sized = random.random() < by_size
-    return Situation(setup, way, times, DIAGNOSIS_GRID.for_tool(radius) if sized else grid, tuple(effects))
+    return Situation(setup, way, times, SIZED.for_tool(radius) if sized else grid, tuple(effects))
 
 
 def faults(situation: Situation, frames: list[Equilibrium]) -> list[str]:

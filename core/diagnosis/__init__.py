@@ -22,7 +22,7 @@ from core.diagnosis.static import StaticChannel
 from core.diagnosis.verdict import report_of
 from core.diagnosis.workers import Workers
 from core.errors import DiagnosisError, RunError
-from core.grading import DIAGNOSIS_GRID, FINE_GRID, PAGE_GRID
+from core.grading import FINE_GRID, PAGE_GRID, REPLAY_GRID
 from core.meshing import Meshing
 from core.progress import Report, part, silent
 from core.registration import Registration, register, setup_from
@@ -104,7 +104,7 @@ def _run(
     replays: bool,
 ) -> dict[str, Any]:
     fitted, unseen = data
-    grid, fine = DIAGNOSIS_GRID.for_tool(setup.tool.radius), FINE_GRID.for_tool(setup.tool.radius)
+    grid, fine = REPLAY_GRID.for_tool(setup.tool.radius), FINE_GRID.for_tool(setup.tool.radius)
     static = StaticChannel.of(dataset.rest_cloud(), cleaner_for(dataset, registration), setup, grid)
     names = [item.name for item in fitted]
     bench = Bench(setup, registration, pool, names, static, grid, fine, part(report, 0.05, 0.75))
@@ -153,5 +153,5 @@ def _model(dataset: Dataset, setup: Setup, findings: Findings, fitted: list[str]
     effects = [effect.to_json() for effect in findings.best.model.effects] if findings.best else []
     return {
         "format": 1, "version": 1, "dataset": dataset.name, "parent": None, "fitted_on": fitted, "effects": effects,
-        "setup": setup.as_dict(), "grid": asdict(DIAGNOSIS_GRID.for_tool(setup.tool.radius)),
+        "setup": setup.as_dict(), "grid": asdict(REPLAY_GRID.for_tool(setup.tool.radius)),
     }  # fmt: skip
