@@ -23,6 +23,9 @@ from core.errors import DatasetError, RunError
 
 __all__ = ["diagnose", "print_report", "run_diagnosis", "truth_beside"]
 
+ALIKE = 0.3
+"""Share of a pattern from which on a rival that imitates so much of it is mentioned [1]; the page has the same."""
+
 
 def diagnose(
     datasets: Annotated[list[Path], typer.Argument(help="Dataset folders.", show_default=False)],
@@ -111,8 +114,9 @@ def _told(rows: list[dict[str, Any]]) -> Table:
     table.add_column("would be named from")
     table.add_column("looks most like")
     for row in rows:
-        alike = row["alike"][0] if row["alike"] else None
-        table.add_row(row["effect"], limit_phrase(row), f"{alike['effect']} ({100 * alike['share']:.0f} %)" if alike else "–")
+        alike = [one for one in row["alike"] if one["share"] >= ALIKE][:1]
+        like = "".join(f"{one['effect']} ({100 * one['share']:.0f} %)" for one in alike)
+        table.add_row(row["effect"], limit_phrase(row), like or "nothing else")
     return table
 
 

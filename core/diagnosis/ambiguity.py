@@ -26,7 +26,8 @@ class Limit:
 
     Attributes:
         parameter: that is changed; empty where it is a share of what a finite cause does. unit: of the parameter.
-        size: change of the parameter, of its logarithm where `log`, or share [1]; infinite for what cannot be seen at any size.
+        size: change of the parameter, of its logarithm where `log`, or share [1]; infinite where not even from one of the
+            parameter's bounds to the other would be seen.
     """
 
     parameter: str
@@ -37,8 +38,8 @@ class Limit:
     def to_json(self) -> dict[str, Any]:
         """`change`, `factor` or `share`; None where no size would be seen."""
         kind = "factor" if self.log else "change" if self.parameter else "share"
-        size = math.exp(self.size) if self.log and self.size < 20 else self.size
-        value = float(f"{size:.3g}") if math.isfinite(size) and size < 1e6 else None
+        size = math.exp(self.size) if self.log else self.size
+        value = float(f"{size:.3g}") if math.isfinite(size) else None
         return {**({"parameter": self.parameter, "unit": self.unit} if self.parameter else {}), kind: value}
 
 
@@ -118,10 +119,12 @@ def detection_limits(
         nothing, something = linear_gains(blocks, np.array([0 * right, right]), nuisance, known, [candidate])[:, 0]
         risen = float(something - nothing)
         size = spread * math.sqrt(max(bound - float(nothing), 0.0) / risen) if risen > 0 else math.inf
-        item = numbers[candidate.of[place]] if candidate.of else None
-        found.append(
-            Limit(parameter=item.name if item else "", unit=item.unit if item else "1", size=size, log=bool(item and item.log))
-        )
+        if not candidate.of:
+            found.append(Limit(parameter="", unit="1", size=size))
+            continue
+        item = numbers[candidate.of[place]]
+        widest = item.coordinate(item.high) - item.coordinate(item.low)
+        found.append(Limit(parameter=item.name, unit=item.unit, size=size if size <= widest else math.inf, log=item.log))
     return tuple(found)
 
 

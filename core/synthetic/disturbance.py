@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from core.errors import EffectError
 from core.frames import FloatArray, Transform
+from core.synthetic.naming import check_named
 
 __all__ = ["DISTURBANCES", "Disturbance", "draw_disturbance", "drifted", "rippled"]
 
@@ -25,6 +25,10 @@ DISTURBANCES: Mapping[str, Mapping[str, str]] = {
 `camera_drift`: how far the camera is off at a sequence's end, by which it was off the other way at its beginning. `depth_ripple`:
 depth z is read as z (1 + amplitude sin(2 pi z / period)).
 """
+_CLEAR: Mapping[str, Mapping[str, tuple[float, float]]] = {
+    "camera_drift": {"translation": (1.0e-3, 2.0e-3), "rotation": (0.008, 0.016)},
+    "depth_ripple": {"amplitude": (1.5e-3, 3.0e-3), "period": (14e-3, 24e-3)},
+}
 
 
 @dataclass(frozen=True)
@@ -35,24 +39,14 @@ class Disturbance:
     parameters: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.name not in DISTURBANCES:
-            known = ", ".join(DISTURBANCES)
-            raise EffectError(f"the virtual bench knows no disturbance {self.name!r}; it knows {known}", effect=self.name)
-        if set(self.parameters) != set(DISTURBANCES[self.name]):
-            wanted, got = ", ".join(DISTURBANCES[self.name]), ", ".join(self.parameters) or "none"
-            raise EffectError(f"{self.name} needs the parameters {wanted}, got {got}", effect=self.name)
+        check_named(self.name, self.parameters, DISTURBANCES, "disturb by")
 
 
 def draw_disturbance(name: str, seed: int) -> Disturbance:
     """One of a clear size; EffectError for an unknown name."""
     rng = np.random.default_rng([seed, 104729])
-    ranges = {
-        "camera_drift": {"translation": (1.0e-3, 2.0e-3), "rotation": (0.008, 0.016)},
-        "depth_ripple": {"amplitude": (1.5e-3, 3.0e-3), "period": (14e-3, 24e-3)},
-    }
-    if name not in ranges:
-        return Disturbance(name)
-    return Disturbance(name, {key: round(float(rng.uniform(*span)), 5) for key, span in ranges[name].items()})
+    ranges = _CLEAR.get(name, {})
+    return Disturbance(name, {key: round(float(rng.uniform(*span)), 5) for key, span in ranges.items()})
 
 
 def drifted(disturbances: Sequence[Disturbance], share: float, rng: np.random.Generator) -> Transform:

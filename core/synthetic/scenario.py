@@ -9,6 +9,7 @@ import numpy as np
 
 from core.errors import EffectError
 from core.synthetic.disturbance import Disturbance
+from core.synthetic.naming import check_named
 
 __all__ = ["HIDDEN", "SHORT_PROTOCOL", "WEIGHED", "HiddenEffect", "Scenario", "draw_scenario"]
 
@@ -49,11 +50,7 @@ class HiddenEffect:
     parameters: Mapping[str, float | str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.effect not in HIDDEN:
-            raise EffectError(f"the virtual bench cannot hide {self.effect!r}; it knows {', '.join(HIDDEN)}", effect=self.effect)
-        if set(self.parameters) != set(HIDDEN[self.effect]):
-            wanted, got = ", ".join(HIDDEN[self.effect]), ", ".join(self.parameters) or "none"
-            raise EffectError(f"{self.effect} needs the parameters {wanted}, got {got}", effect=self.effect)
+        check_named(self.effect, self.parameters, HIDDEN, "hide")
 
     def value(self, name: str) -> float:
         """A numeric parameter."""

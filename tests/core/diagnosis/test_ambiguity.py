@@ -16,13 +16,15 @@ from core.effects.sensor import TimeOffset
 from core.effects.tool import ToolOffset
 from core.frames import FloatArray
 
-NUISANCE, KNOWN = (0, 1, 2), np.diag([2.0, 1.0, 4.0])
+PER_METRE = 1e3
+"""Columns of the nuisances are this many times larger than those of the causes, so that a tool's offset can be theirs."""
+NUISANCE, KNOWN = (0, 1, 2), np.diag([2.0, 1.0, 4.0]) * PER_METRE**2
 BOUND = 25.0
 TIME = Candidate(start=TimeOffset.neutral(SETUP), of=("offset",), columns=(3,), spread=(0.5,))
 LUMP = Candidate(start=StiffInclusion.neutral(SETUP), of=("stiffness_ratio",), columns=(4,), spread=(2.0,))
 FAR_LUMP = Candidate(start=StiffInclusion.neutral(SETUP), of=("stiffness_ratio",), columns=(6,), spread=(2.0,))
 WEIGHT = Candidate(start=Gravity(specific_weight_over_stiffness=1.5), columns=(5,), spread=(1.0,))
-OFFSET = Candidate(start=ToolOffset.neutral(SETUP), of=("dx", "dy", "dz"), widened={0: 5.0, 1: 5.0, 2: 5.0})
+OFFSET = Candidate(start=ToolOffset.neutral(SETUP), of=("dx", "dy", "dz"), widened=dict.fromkeys(NUISANCE, 5.0 / PER_METRE))
 
 
 def _columns() -> list[FloatArray]:
@@ -36,6 +38,7 @@ def _columns() -> list[FloatArray]:
         flat = flat.reshape(raw.shape) * 10.0
         flat[..., 4] = np.cos(np.pi / 6) * flat[..., 3] + np.sin(np.pi / 6) * flat[..., 4]
         flat[..., 6] = 0.05 * flat[..., 4]
+        flat[..., :3] *= PER_METRE
         found.append(flat)
     return found
 
@@ -56,7 +59,7 @@ def test_mimicry_is_the_squared_cosine(blocks):
 
 
 def test_what_a_rival_has_more_freedom_for_it_imitates_at_least_as_well(blocks):
-    both = Candidate(start=OFFSET.start, of=OFFSET.of, widened={0: 5.0}, columns=(3,), spread=(1.0,))
+    both = Candidate(start=OFFSET.start, of=OFFSET.of, widened={0: 5.0 / PER_METRE}, columns=(3,), spread=(1.0,))
     assert mimicry(blocks, NUISANCE, KNOWN, LUMP, both) >= mimicry(blocks, NUISANCE, KNOWN, LUMP, TIME) - 1e-12
     assert mimicry(blocks, NUISANCE, KNOWN, TIME, TIME) == pytest.approx(1.0)
 
@@ -88,6 +91,18 @@ def test_what_moves_nothing_is_seen_at_no_size(blocks):
     ]
     limit = detection_limits(still, NUISANCE, KNOWN, WEIGHT, BOUND)[0]
     assert limit.size == np.inf and limit.to_json() == {"share": None}
+
+
+def test_more_than_the_parameter_can_be_is_no_size(blocks):
+    """A lump is 0.05 to 50 times as stiff: its logarithm spans 7, and no factor beyond that is promised to be seen."""
+    for loudness in (1.0, 1e2, 1e3, 1e6):
+        loud = [Block(block.name, block.gram / loudness, block.values) for block in blocks]
+        limit = detection_limits(loud, NUISANCE, KNOWN, LUMP, BOUND)[0]
+        ratio = LUMP.start.numbers()[-1]
+        assert limit.size == np.inf or limit.size <= np.log(ratio.high / ratio.low)
+        told = limit.to_json()["factor"]
+        assert told is None if limit.size == np.inf else told == pytest.approx(np.exp(limit.size), rel=1e-2)
+    assert limit.size == np.inf
 
 
 def test_map_takes_the_place_that_is_seen_best_and_says_what_half_of_them_reach(blocks):

@@ -54,12 +54,15 @@ def test_drawn_ones_are_clear_and_repeat_themselves(name: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "parameters", "words"),
-    [("moon", {}, "no disturbance 'moon'"), ("depth_ripple", {"period": 0.1}, "needs the parameters")],
+    [
+        ("moon", {}, "cannot disturb by 'moon'; it knows camera_drift, depth_ripple"),
+        ("depth_ripple", {"period": 0.1}, "needs the parameters"),
+    ],
 )
 def test_unknown_ones_and_missing_numbers_are_told(name: str, parameters: dict[str, float], words: str) -> None:
     with pytest.raises(EffectError, match=words):
         Disturbance(name, parameters)
-    with pytest.raises(EffectError, match="no disturbance"):
+    with pytest.raises(EffectError, match="cannot disturb by 'moon'"):
         draw_disturbance("moon", 0)
 
 
