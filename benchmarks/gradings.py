@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -17,14 +17,18 @@ from benchmarks.stopwatch import timed
 from core.frames import FloatArray
 from core.grading import FINE_GRID, PAGE_GRID, REPLAY_GRID
 from core.mesh import GridSpec
-from core.meshing import Meshing
-from core.replay import replay, require_converged
+from core.meshing import Mesh, Meshing
+from core.replay import replay, require_converged, rest
+from core.setup import Load, Setup
 
 __all__ = ["run"]
 
 FINEST = GridSpec(nodes=(29, 21, 17), spacing=0.7e-3, order=2)
 TARGET = (0.06, 0.06)
 """That the mesh of `palpate replay` may be off at half the way and at its end, the worst place counted [1]."""
+HEAVY = replace(SETUP, load=Load(specific_weight_over_stiffness=1.8))
+SMOOTH, MOST_SAG = GridSpec(nodes=(33, 21, 19), spacing=1.5e-3, order=2), 30e-6
+"""A mesh that knows the sag to a few um, and by how much that of a replay may be off [m]."""
 _FILE = Path(__file__).with_name("gradings.npz")
 GRIDS: dict[str, Meshing] = {
     "graded by size": REPLAY_GRID,
@@ -78,6 +82,43 @@ def _truth() -> Pushes:
         return Pushes(stored["displacement"].astype(float), stored["force"])
 
 
+@dataclass(frozen=True)
+class _Still:
+    """A grid whose mesh stays where it was made for a tool at `place` (3,) [m]."""
+
+    grid: Meshing
+    place: FloatArray
+
+    def mesh(self, setup: Setup, centre: FloatArray) -> Mesh:
+        return self.grid.mesh(setup, self.place)
+
+    def finer(self) -> _Still:
+        return replace(self, grid=self.grid.finer())
+
+
+def _sags() -> Table:
+    """How far the sag of a heavy block is off, and how much it hangs on where the mesh is fine."""
+    title = f"Sag under {HEAVY.load.specific_weight_over_stiffness:g} /m, RMS; the mesh is fine at each of those places in turn"
+    table = Table("mesh", "off by at most, um", "meshes apart by, um", title=title)
+    points = HEAVY.geometry.surface_points()
+    truth = rest(HEAVY, SMOOTH).move(points)
+    for name, grid in {"graded by size, without a longest edge": replace(REPLAY_GRID, longest=1.0), **GRIDS}.items():
+        sags = [rest(HEAVY, _Still(grid, way[-1])).move(points) for way in _ways()]
+        off = max(_rms(sag - truth) for sag in sags)
+        apart = max(_rms(one - other) for one in sags for other in sags)
+        table.add_row(name, f"{1e6 * off:.0f}", f"{1e6 * apart:.0f}")
+        if grid is REPLAY_GRID and max(off, apart) > MOST_SAG:
+            raise RuntimeError(
+                f"the sag of a replay's mesh is {1e6 * off:.0f} um off and hangs by {1e6 * apart:.0f} um on its place"
+            )
+    table.caption = f"the sag itself: {1e3 * _rms(truth - points):.2f} mm"
+    return table
+
+
+def _rms(vectors: FloatArray) -> float:
+    return float(np.sqrt((vectors**2).sum(axis=1).mean()))
+
+
 def run() -> list[Table]:
     """Errors and time of each way; the mesh of `palpate replay` must keep what is promised of it at every place."""
     title = "Seven pushes (top, sides, slanted), error over the free surface half way / at the end"
@@ -92,7 +133,7 @@ def run() -> list[Table]:
         table.add_row(name, str(nodes), *both, f"{1e3 * seconds / count:.0f}")
         if grid is REPLAY_GRID and (displacement.max(axis=0) > TARGET).any():
             raise RuntimeError(f"the mesh of a replay is off by {both[0]}")
-    return [table]
+    return [table, _sags()]
 
 
 if __name__ == "__main__":

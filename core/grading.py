@@ -5,7 +5,7 @@ edge. Seven pushes all over the block are 3.5 % off with 1700 to 2200 nodes grad
 7 to 9 % and 16 %, although a poke in the very middle of the top, alone, is 8 % off there (`python -m benchmarks gradings`).
 
 Far from the tool the edges stop growing, at a third of the shortest side. Where they do not, the sag of a heavy block is off
-by 6 % and changes as much with the place of the focus, so that a push into a side speaks against a weight that is there.
+by a tenth and changes as much with the place of the focus, so that a push into a side speaks against a weight that is there.
 """
 
 from __future__ import annotations
