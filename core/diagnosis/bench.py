@@ -13,10 +13,11 @@ from core.diagnosis.hypothesis import Model, Nuisances
 from core.diagnosis.noise import Noise, noises
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted
 from core.diagnosis.static import StaticChannel
+from core.diagnosis.tangent import SMALL, Tangent
 from core.diagnosis.workers import Workers
 from core.effects import Effect
 from core.effects.material import PoissonRatio
-from core.effects.sensor import CameraRegistration, TimeOffset
+from core.effects.sensor import CameraRegistration
 from core.effects.support import BaseSlip
 from core.effects.tool import ToolRadius
 from core.frames import FloatArray
@@ -30,7 +31,6 @@ __all__ = ["Bench"]
 
 PRIOR_STEPS = 4.0
 """Prior standard deviation of a search coordinate, in its scales."""
-_SMALL = 1e-3
 _SLIDING_STEP = 0.05
 _TRUST = 2.5
 _ITERATIONS = 4
@@ -71,7 +71,7 @@ class Bench:
         effect = effects[index]
         item = effect.numbers()[number]
         coordinates = effect.coordinates
-        step = _SMALL * item.scale
+        step = SMALL * item.scale
         if item.coordinate(item.high) - coordinates[number] < step:
             step = -step
         coordinates[number] += step
@@ -85,7 +85,7 @@ class Bench:
 
     def _nuisance_setups(self, setup: Setup) -> list[tuple[Setup, float]]:
         """A slightly larger tool, a slightly other Poisson ratio, and the camera moved and turned."""
-        step = _SMALL * 3e-4
+        step = SMALL * 3e-4
         found: list[tuple[Setup, float]] = [(ToolRadius(radius=setup.tool.radius + step).apply(setup), step)]
         nu = setup.material.poisson_ratio
         change = -2e-4 if nu > 0.494 else 2e-4
@@ -93,20 +93,16 @@ class Bench:
         camera = CameraRegistration.neutral(setup)
         for number, item in enumerate(camera.numbers()):
             values = [0.0] * 6
-            values[number] = _SMALL * item.scale
+            values[number] = SMALL * item.scale
             found.append((camera.moved(values).apply(setup), values[number]))
         return found
 
-    def _wanted(self, effects: Sequence[Effect], setup: Setup, extras: Sequence[Effect], lumps: Sequence[Inclusion]) -> Wanted:
+    def _wanted(self, effects: Sequence[Effect], setup: Setup, tangents: Sequence[Tangent], lumps: Sequence[Inclusion]) -> Wanted:
         pairs = self._nuisance_setups(setup)
         for index, effect in enumerate(effects):
             for number in range(len(effect.numbers())):
                 pairs.append((setup, 1.0) if isinstance(effect, BaseSlip) else self._moved(effects, index, number))
-        for extra in extras:
-            for number, item in enumerate(extra.numbers()):
-                coordinates = extra.coordinates
-                coordinates[number] += _SMALL * item.scale
-                pairs.append((extra.at(coordinates).apply(setup), _SMALL * item.scale))
+        pairs += [tangent.changed(setup) for tangent in tangents]
         return Wanted(
             setups=tuple(s for s, _ in pairs), steps=tuple(h for _, h in pairs), lumps=tuple(lumps),
             pivot=self.registration.robot_pivot,
@@ -123,14 +119,14 @@ class Bench:
         self,
         effects: Sequence[Effect],
         starts: Sequence[Prediction] | None = None,
-        extras: Sequence[Effect] = (),
+        tangents: Sequence[Tangent] = (),
         lumps: Sequence[Inclusion] = (),
     ) -> Model:
-        """The hypothesis with these effects; `extras` are effects at their present value whose columns are wanted too."""
+        """The hypothesis with these effects; columns of `tangents` and `lumps` are wanted too."""
         setup = self._apply(effects)
-        predictions = [f.result() for f in self.predict(effects, self._wanted(effects, setup, extras, lumps), starts)]
+        predictions = [f.result() for f in self.predict(effects, self._wanted(effects, setup, tangents, lumps), starts)]
         predictions = self._sliding_columns(effects, predictions)
-        return self.assemble(tuple(effects), setup, predictions, extras, len(lumps))
+        return self.assemble(tuple(effects), setup, predictions, tangents, len(lumps))
 
     def _sliding_columns(self, effects: Sequence[Effect], predictions: list[Prediction]) -> list[Prediction]:
         """Friction's columns by a second replay: where a base slid depends on all pushes before."""
@@ -147,24 +143,23 @@ class Bench:
         return predictions
 
     def assemble(
-        self, effects: tuple[Effect, ...], setup: Setup, predictions: Sequence[Prediction], extras: Sequence[Effect], lumps: int
+        self, effects: tuple[Effect, ...], setup: Setup, predictions: Sequence[Prediction], tangents: Sequence[Tangent], lumps: int
     ) -> Model:
         """Quadratic forms and the meaning of their columns."""
         count = predictions[0].columns.shape[2]
         at = TOOL_COLUMNS + 8
         own = sum(len(effect.numbers()) for effect in effects)
         columns, at = tuple(range(at, at + own)), at + own
-        extra: dict[str, tuple[int, ...]] = {}
-        for item in extras:
-            extra[item.name], at = tuple(range(at, at + len(item.numbers()))), at + len(item.numbers())
+        extra = {"tangents": tuple(range(at, at + len(tangents)))}
+        at += len(tangents)
         extra["lumps"] = tuple(range(at, at + lumps))
         nuisance = (*range(TOOL_COLUMNS + 8), count)
         if not self.noises:
-            return Model(effects, setup, tuple(predictions), (), columns, extra, nuisance)
+            return Model(effects, setup, tuple(predictions), (), columns, extra, nuisance, tuple(tangents))
         blocks = [noise.block(item) for noise, item in zip(self.noises, predictions, strict=True)]
         if self.static:
             blocks.append(self.static.block(self.setup, setup, self.grid, count + 1, self._own_static(effects, columns)))
-        return Model(effects, setup, tuple(predictions), tuple(blocks), columns, extra, nuisance)
+        return Model(effects, setup, tuple(predictions), tuple(blocks), columns, extra, nuisance, tuple(tangents))
 
     def _own_static(self, effects: tuple[Effect, ...], columns: tuple[int, ...]) -> dict[int, tuple[Setup, float]]:
         """Columns of the effects that change the rest shape, with the setup a little changed and the step."""
@@ -178,14 +173,13 @@ class Bench:
 
     # -- baseline and noise -----------------------------------------------------------------------------------------------------
 
-    def baseline(self, lumps: Sequence[Inclusion]) -> Model:
+    def baseline(self, tangents: Sequence[Tangent], lumps: Sequence[Inclusion]) -> Model:
         """The stated setup on two meshes; from here on the noise is known."""
-        time = [TimeOffset.neutral(self.setup)]
-        model = self.evaluate((), extras=time, lumps=lumps)
+        model = self.evaluate((), tangents=tangents, lumps=lumps)
         fine = [f.result() for f in self.predict((), None, model.predictions, self.fine)]
         places = model.extra["lumps"]
         self.noises = noises(model.predictions, fine, self.surface, slice(places[0], places[-1] + 1))
-        model = self.assemble((), self.setup, model.predictions, time, len(lumps))
+        model = self.assemble((), self.setup, model.predictions, tangents, len(lumps))
         self.temperature = self.misfit(model)
         return model
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from core.diagnosis.evidence import Block
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction
+from core.diagnosis.tangent import Tangent
 from core.effects import Effect
 from core.effects.material import PoissonRatio
 from core.effects.sensor import CameraRegistration
@@ -75,7 +76,7 @@ class Model:
     Attributes:
         effects: its causes. setup: the stated setup with them. predictions: per sequence. blocks: quadratic forms.
         columns: index of the column of each search coordinate of each effect, in order.
-        extra: further columns by name. nuisance: columns of the nuisances.
+        extra: further columns by name. nuisance: columns of the nuisances. tangents: what the columns `extra["tangents"]` are.
     """
 
     effects: tuple[Effect, ...]
@@ -85,6 +86,7 @@ class Model:
     columns: tuple[int, ...]
     extra: dict[str, tuple[int, ...]]
     nuisance: tuple[int, ...]
+    tangents: tuple[Tangent, ...] = ()
 
     @property
     def scales(self) -> FloatArray:

@@ -9,22 +9,19 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from core.diagnosis.ambiguity import Told, ambiguity_map
-from core.diagnosis.bench import PRIOR_STEPS, Bench
+from core.diagnosis.bench import Bench
+from core.diagnosis.candidates import Signature, begin, candidates_of, lump_places, signatures, tangents
 from core.diagnosis.evidence import fit, predictive_gain
-from core.diagnosis.hypothesis import TWINS, Model
+from core.diagnosis.hypothesis import Model
 from core.diagnosis.intervals import stands
 from core.diagnosis.prediction import Prediction
 from core.diagnosis.screening import Candidate, linear_gains, null_gains, right_sides
 from core.diagnosis.structure import NOTHING, Structure, structure_of
-from core.effects import OUTSIDE, Effect
-from core.effects.load import Gravity
+from core.effects import Effect
 from core.effects.material import StiffInclusion
-from core.effects.sensor import TimeOffset
-from core.effects.support import BaseDetachment, BaseSlip
 from core.effects.tool import ToolOffset
-from core.setup import Inclusion
 
-__all__ = ["MOST_CAUSES", "Findings", "Trial", "lump_places", "search"]
+__all__ = ["MOST_CAUSES", "Findings", "Trial", "search"]
 
 MOST_CAUSES = 2
 NULL_DRAWS = 400
@@ -46,7 +43,6 @@ HOPELESS = 60.0
 RIVAL = 8.0
 """Rivals this close to the best [nats] are named too: the difference of two log densities that differ by d has a spread of
 about sqrt(2 d), so 8 nats are two of its standard deviations."""
-_FINITE: tuple[type[Effect], ...] = (BaseSlip, BaseDetachment, Gravity, *OUTSIDE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,55 +90,6 @@ class Findings:
         return close
 
 
-def lump_places(bench: Bench) -> tuple[Inclusion, ...]:
-    """Places of the coarse grid of inclusions."""
-    return tuple(
-        Inclusion(x=s.x, y=s.y, z=s.z, radius=s.radius, stiffness_ratio=s.stiffness_ratio)
-        for s in StiffInclusion.starts(bench.setup)
-    )
-
-
-def _signatures(bench: Bench, baseline: Model) -> list[tuple[Effect, list[Prediction]]]:
-    """What effects without a derivative at their neutral value do at finite sizes."""
-    starts = [effect for kind in _FINITE for effect in kind.starts(bench.setup)]
-    pending = [(effect, bench.predict([effect], None, baseline.predictions)) for effect in starts]
-    found = []
-    for number, (effect, futures) in enumerate(pending):
-        bench.tell(f"what {effect.name} would do", 0.15 + 0.25 * number / len(pending))
-        found.append((effect, [future.result() for future in futures]))
-    return found
-
-
-def _candidates(model: Model, bench: Bench, signatures: Sequence[tuple[Effect, list[Prediction]]]) -> list[Candidate]:
-    """Every effect of the catalogue that is not in the model yet, as columns of it."""
-    setup, found = model.setup, []
-    for kind, columns in TWINS.items():
-        effect = kind.neutral(setup)
-        spreads = [PRIOR_STEPS * item.scale for item in effect.numbers()]
-        names = tuple(item.name for item in effect.numbers())
-        found.append(Candidate(start=effect, of=names, widened=dict(zip(columns, spreads, strict=True))))
-    if "time_offset" in model.extra:
-        time = TimeOffset.neutral(setup)
-        spread = (PRIOR_STEPS * time.numbers()[0].scale,)
-        found.append(Candidate(start=time, of=("offset",), columns=model.extra["time_offset"], spread=spread))
-    for place, lump in zip(model.extra["lumps"], lump_places(bench), strict=True):
-        start = StiffInclusion(x=lump.x, y=lump.y, z=lump.z, radius=lump.radius, stiffness_ratio=1.0)
-        found.append(Candidate(start=start, of=("stiffness_ratio",), columns=(place,), spread=(2.0,)))
-    for place, (effect, predictions) in zip(model.extra.get("signatures", ()), signatures, strict=True):
-        if any(np.any(p.columns.shape) and np.isfinite(p.gap).any() for p in predictions):
-            found.append(Candidate(start=effect, columns=(place,), spread=(1.0,)))
-    return [candidate for candidate in found if candidate.start.name not in model.names]
-
-
-def _start(candidate: Candidate, model: Model, bench: Bench) -> Effect:
-    """Where to begin the refit: for a lump, the stiffness that the linear fit asks for."""
-    if not isinstance(candidate.start, StiffInclusion):
-        return candidate.start
-    columns, precision = candidate.precision(list(model.nuisance), bench.nuisances.precision)
-    log_ratio = float(fit(bench.tempered(model), columns, precision).change[-1])
-    return replace(candidate.start, stiffness_ratio=float(np.exp(np.clip(1.5 * log_ratio, -1.8, 1.8))))
-
-
 def _beyond_first_order(bench: Bench, model: Model, candidates: Sequence[Candidate]) -> list[Candidate]:
     """What to refit whatever its linear gain: the tool's offset, and the candidate whose stated accuracy the data break most.
 
@@ -181,11 +128,9 @@ def _distance(one: Effect, other: Effect) -> float:
     return 0.0
 
 
-def _screen(
-    bench: Bench, model: Model, signatures: Sequence[tuple[Effect, list[Prediction]]], origin: Model
-) -> tuple[Model, list[Candidate], np.ndarray]:
-    with_columns = bench.block_with(model, signatures, origin)
-    candidates = _candidates(with_columns, bench, signatures)
+def _screen(bench: Bench, model: Model, finite: Sequence[Signature], origin: Model) -> tuple[Model, list[Candidate], np.ndarray]:
+    with_columns = bench.block_with(model, finite, origin)
+    candidates = candidates_of(with_columns, bench, finite)
     blocks = bench.tempered(with_columns)
     nuisance = (*with_columns.nuisance, *with_columns.columns)
     gains = linear_gains(blocks, right_sides(blocks), nuisance, bench.precision(with_columns), candidates)[0]
@@ -203,11 +148,11 @@ def _trial(
 def search(bench: Bench, seed: int) -> Findings:
     """Find up to MOST_CAUSES causes."""
     bench.tell("replaying the stated setup on two meshes", 0.02)
-    baseline = bench.baseline(lump_places(bench))
+    baseline = bench.baseline(tangents(bench.setup), lump_places(bench))
     findings = Findings(baseline, misfit=bench.misfit(baseline))
     findings.structure = findings.left = structure_of(bench, baseline, seed)
-    signatures = _signatures(bench, baseline)
-    screened, candidates, gains = _screen(bench, baseline, signatures, baseline)
+    finite = signatures(bench, baseline)
+    screened, candidates, gains = _screen(bench, baseline, finite, baseline)
     blocks = bench.tempered(screened)
     chance = null_gains(blocks, screened.nuisance, bench.nuisances.precision, candidates, NULL_DRAWS, seed)
     findings.bound = max(float(np.quantile(chance, NULL_QUANTILE)), LEAST_GAIN)
@@ -219,7 +164,7 @@ def search(bench: Bench, seed: int) -> Findings:
     for order in range(MOST_CAUSES):
         bench.tell("looking for a second cause" if order else "fitting the most promising causes", 0.45 + 0.25 * order)
         if order:
-            screened, candidates, gains = _again(bench, current.model, signatures, baseline)
+            screened, candidates, gains = _again(bench, current.model, finite, baseline)
         step = _forward(bench, findings, current, screened, candidates, gains)
         if step is None:
             break
@@ -235,13 +180,11 @@ def search(bench: Bench, seed: int) -> Findings:
     return findings
 
 
-def _again(
-    bench: Bench, model: Model, signatures: Sequence[tuple[Effect, list[Prediction]]], baseline: Model
-) -> tuple[Model, list[Candidate], np.ndarray]:
+def _again(bench: Bench, model: Model, finite: Sequence[Signature], baseline: Model) -> tuple[Model, list[Candidate], np.ndarray]:
     """Screen the catalogue on top of a model that has causes already."""
-    time = [] if "time_offset" in model.names else [TimeOffset.neutral(model.setup)]
-    extended = bench.evaluate(model.effects, model.predictions, extras=time, lumps=lump_places(bench))
-    return _screen(bench, extended, signatures, baseline)
+    wanted = tangents(model.setup, besides=model.names)
+    extended = bench.evaluate(model.effects, model.predictions, wanted, lump_places(bench))
+    return _screen(bench, extended, finite, baseline)
 
 
 def _forward(
@@ -251,7 +194,7 @@ def _forward(
     trials: list[Trial] = []
     settled = [] if current.model.effects else _beyond_first_order(bench, screened, candidates)
     for candidate in _shortlist(gains, candidates, PROMISING * _needed(findings, current), settled):
-        effects = [*current.model.effects, _start(candidate, screened, bench)]
+        effects = [*current.model.effects, begin(candidate, screened, bench)]
         hopeless = max([bench.objective(current.model), *(bench.objective(trial.model) - HOPELESS for trial in trials)])
         trials.append(_trial(bench, effects, current.model.predictions, current.model, hopeless))
     trials.sort(key=lambda trial: -trial.gain)

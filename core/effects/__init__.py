@@ -31,16 +31,16 @@ _COUNTED: tuple[type[Effect], ...] = (
     Gravity,
     TimeOffset,
     CameraRegistration,
-)
-_REPLAYED: tuple[type[Effect], ...] = (
     SurfaceLayer,
     StiffnessGradient,
     StrainStiffening,
     Anisotropy,
-    Viscoelasticity,
-    PermanentSet,
     BaseCompliance,
     ToolCompliance,
+)
+_REPLAYED: tuple[type[Effect], ...] = (
+    Viscoelasticity,
+    PermanentSet,
     ToolFriction,
 )
 OUTSIDE = outside_effects(effect.name for effect in (*_COUNTED, *_REPLAYED))

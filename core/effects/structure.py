@@ -101,6 +101,11 @@ class Anisotropy(Effect):
     def starts(cls, setup: Setup) -> Sequence[Self]:
         return [cls(direction=angle, stiffness_ratio=3.0) for angle in (0.0, math.pi / 4, math.pi / 2, 3 * math.pi / 4)]
 
+    def at(self, coordinates: Sequence[float]) -> Self:
+        """As for every effect, but a direction that turns past the x axis comes in again at the other end."""
+        direction, *strength = coordinates
+        return super().at([direction % math.pi, *strength])
+
     def apply(self, setup: Setup) -> Setup:
         if self.stiffness_ratio == 1.0 and setup.material.fibres is None:
             return setup

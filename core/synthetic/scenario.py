@@ -34,7 +34,8 @@ HIDDEN: Mapping[str, Mapping[str, str]] = {
 
 WEIGHED = (
     "poisson_ratio", "stiff_inclusion", "tool_radius", "tool_offset", "base_slip", "base_detachment", "gravity", "time_offset",
-    "camera_registration",
+    "camera_registration", "surface_layer", "stiffness_gradient", "strain_stiffening", "anisotropy", "base_compliance",
+    "tool_compliance",
 )  # fmt: skip
 """Those that a diagnosis weighs, and that are hidden unless others are asked for."""
 

@@ -25,7 +25,7 @@ USE = """
 import json, warnings
 warnings.simplefilter("error")
 import numpy as np
-from core.diagnosis.search import _FINITE
+from core.diagnosis.candidates import FINITE
 from core.effects import CATALOGUE, DIAGNOSED, OUTSIDE, effect_named, from_json
 from core.mesh import GridSpec
 from core.replay import replay
@@ -33,7 +33,7 @@ from core.setup import Box, Setup, Tool
 
 setup = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3))
 vessel = effect_named("vessel")
-assert OUTSIDE == (vessel,) and vessel in CATALOGUE and vessel in DIAGNOSED and vessel in _FINITE
+assert OUTSIDE == (vessel,) and vessel in CATALOGUE and vessel in DIAGNOSED and vessel in FINITE
 start = vessel.starts(setup)[0]
 assert from_json(json.loads(json.dumps(start.to_json()))) == start
 grid, way = GridSpec(nodes=(9, 7, 6), spacing=2e-3), np.array([[0.0, -4e-3, 0.0358 + 5e-3 - 4e-3]])
