@@ -11,6 +11,7 @@ import numpy as np
 from core.diagnosis.evidence import Block, fit, log_evidence, predictive_score
 from core.diagnosis.hypothesis import Model, Nuisances
 from core.diagnosis.noise import Noise, noises
+from core.diagnosis.ordered import ORDERED
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted
 from core.diagnosis.static import StaticChannel
 from core.diagnosis.tangent import SMALL, Tangent
@@ -18,7 +19,6 @@ from core.diagnosis.workers import Workers
 from core.effects import Effect
 from core.effects.material import PoissonRatio
 from core.effects.sensor import CameraRegistration
-from core.effects.support import BaseSlip
 from core.effects.tool import ToolRadius
 from core.frames import FloatArray
 from core.measurement import Surface
@@ -31,7 +31,8 @@ __all__ = ["Bench"]
 
 PRIOR_STEPS = 4.0
 """Prior standard deviation of a search coordinate, in its scales."""
-_SLIDING_STEP = 0.05
+_ORDERED_STEP = 0.25
+"""Step of a derivative by two replays, in the scale of what is moved."""
 _TRUST = 2.5
 _ITERATIONS = 4
 
@@ -101,7 +102,7 @@ class Bench:
         pairs = self._nuisance_setups(setup)
         for index, effect in enumerate(effects):
             for number in range(len(effect.numbers())):
-                pairs.append((setup, 1.0) if isinstance(effect, BaseSlip) else self._moved(effects, index, number))
+                pairs.append((setup, 1.0) if isinstance(effect, ORDERED) else self._moved(effects, index, number))
         pairs += [tangent.changed(setup) for tangent in tangents]
         return Wanted(
             setups=tuple(s for s, _ in pairs), steps=tuple(h for _, h in pairs), lumps=tuple(lumps),
@@ -125,21 +126,22 @@ class Bench:
         """The hypothesis with these effects; columns of `tangents` and `lumps` are wanted too."""
         setup = self._apply(effects)
         predictions = [f.result() for f in self.predict(effects, self._wanted(effects, setup, tangents, lumps), starts)]
-        predictions = self._sliding_columns(effects, predictions)
+        predictions = self._ordered_columns(effects, predictions)
         return self.assemble(tuple(effects), setup, predictions, tangents, len(lumps))
 
-    def _sliding_columns(self, effects: Sequence[Effect], predictions: list[Prediction]) -> list[Prediction]:
-        """Friction's columns by a second replay: where a base slid depends on all pushes before."""
+    def _ordered_columns(self, effects: Sequence[Effect], predictions: list[Prediction]) -> list[Prediction]:
+        """Columns of effects in whose replays a frame hangs on all those before it: by one more replay for each number."""
         column = TOOL_COLUMNS + 8
         for index, effect in enumerate(effects):
-            if isinstance(effect, BaseSlip):
-                rougher = effect.at([effect.coordinates[0] + _SLIDING_STEP])
-                others = [f.result() for f in self.predict([*effects[:index], rougher, *effects[index + 1 :]], None, predictions)]
-                for number, (here, there) in enumerate(zip(predictions, others, strict=True)):
-                    columns = here.columns.copy()
-                    columns[..., column] = np.nan_to_num((there.gap - here.gap) / _SLIDING_STEP)
-                    predictions[number] = replace(here, columns=columns)
-            column += len(effect.numbers())
+            for number, item in enumerate(effect.numbers()):
+                if isinstance(effect, ORDERED):
+                    coordinates, step = effect.coordinates, _ORDERED_STEP * item.scale
+                    step = -step if coordinates[number] + step > item.coordinate(item.high) else step
+                    coordinates[number] += step
+                    changed = [*effects[:index], effect.at(coordinates), *effects[index + 1 :]]
+                    others = [f.result() for f in self.predict(changed, None, predictions)]
+                    predictions = [here.with_column(there, column, step) for here, there in zip(predictions, others, strict=True)]
+                column += 1
         return predictions
 
     def assemble(

@@ -17,10 +17,11 @@ from core.diagnosis.tangent import Tangent
 from core.effects import OUTSIDE, Effect
 from core.effects.load import Gravity
 from core.effects.material import StiffInclusion
+from core.effects.memory import PermanentSet, Viscoelasticity
 from core.effects.sensor import TimeOffset
 from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
 from core.effects.support import BaseCompliance, BaseDetachment, BaseSlip
-from core.effects.tool import ToolCompliance
+from core.effects.tool import ToolCompliance, ToolFriction
 from core.setup import Inclusion, Setup
 
 __all__ = ["FINITE", "Signature", "begin", "candidates_of", "lump_places", "signatures", "tangents"]
@@ -28,9 +29,11 @@ __all__ = ["FINITE", "Signature", "begin", "candidates_of", "lump_places", "sign
 Signature = tuple[Effect, list[Prediction]]
 """An effect of a finite size, and every sequence replayed with it."""
 
-FINITE: tuple[type[Effect], ...] = (BaseSlip, BaseDetachment, Gravity, BaseCompliance, *OUTSIDE)
-"""Effects without a derivative where they are nothing: a base that is held and one that may move have other unknowns, and sag moves
-the registration, too."""
+FINITE: tuple[type[Effect], ...] = (
+    BaseSlip, BaseDetachment, Gravity, BaseCompliance, *OUTSIDE,
+)  # fmt: skip
+"""Effects without a derivative where they are nothing: a base that is held and one that may move have other unknowns, sag moves the
+registration, too, and what the tool or the material remembers hangs on all frames before."""
 _LIMITED = 6.0
 """J_m [1] whose whole action, to first order, is the column of a material that stiffens."""
 _LEAST_SHARE, _MOST_SHARE = 0.2, 4.0
@@ -104,7 +107,7 @@ def candidates_of(model: Model, bench: Bench, finite: Sequence[Signature]) -> li
 def begin(candidate: Candidate, model: Model, bench: Bench) -> Effect:
     """Where to begin the refit: at the size that the linear fit asks for, where the column tells of a size."""
     start = candidate.start
-    if candidate.widened or isinstance(start, (TimeOffset, BaseSlip, BaseDetachment, Gravity, *OUTSIDE)):
+    if candidate.widened or isinstance(start, (TimeOffset, BaseSlip, BaseDetachment, Gravity, ToolFriction, *OUTSIDE)):
         return start
     columns, precision = candidate.precision(list(model.nuisance), bench.nuisances.precision)
     change = float(fit(bench.tempered(model), columns, precision).change[-1])
@@ -112,6 +115,10 @@ def begin(candidate: Candidate, model: Model, bench: Bench) -> Effect:
         return start.moved([start.J_m / _share(change)])
     if isinstance(start, BaseCompliance):
         return start.moved([start.stiffness_over_E / _share(change)])
+    if isinstance(start, Viscoelasticity):
+        return start.moved([start.relaxed_fraction * _share(change), start.time_constant])
+    if isinstance(start, PermanentSet):
+        return start.moved([start.retained_fraction * _share(change)])
     if isinstance(start, StiffInclusion):
         change *= 1.5
     if isinstance(start, Anisotropy) and change < 0:  # softer along is stiffer across

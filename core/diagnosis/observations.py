@@ -23,6 +23,8 @@ TRAVEL = 7e-4
 SMOOTHING = 0.02
 """Half the time [s] over which the robot's pose is averaged: streams carry noise of some hundredths of a millimetre."""
 MOST_POINTS = 20000
+_RECOVERY = (0.5, 1.5, 5.0)
+"""Time since the tool was last near the block [s] at which untouched frames part: a material may recover in the meantime."""
 _TURN, _TURN_STEP = 5e-5, 0.02
 """A place counts as deeper than a group's own from this difference on [m]; time between the places that are looked at [s]."""
 FAR = np.array([0.0, 0.0, 10.0])
@@ -91,18 +93,27 @@ class Observations:
         poses = setup.phantom_from_robot.apply(smooth_centres(self.kinematics, self.times - setup.sensor.time_offset))
         return np.array([poses[list(g.frames)].mean(axis=0) if g.frames else FAR for g in self.groups])
 
+    def instant(self, group: Group, setup: Setup) -> float | None:
+        """When a group's frames were taken, on the robot's clock [s]; None for the rest cloud."""
+        return float(self.times[list(group.frames)].mean()) - setup.sensor.time_offset if group.frames else None
+
+    def way(self, setup: Setup) -> tuple[FloatArray, FloatArray]:
+        """Times (t,) [s] of the recording, on the robot's clock, and stated tool centres (t, 3) [m], phantom frame."""
+        times = np.arange(self.times[0], self.times[-1], _TURN_STEP) - setup.sensor.time_offset
+        return times, setup.phantom_from_robot.apply(smooth_centres(self.kinematics, times))
+
     def turns(self, setup: Setup) -> list[FloatArray | None]:
         """For each group the place (3,) [m] where the tool was deepest since the group before; None where that is its own place.
 
         A base that slides has gone as far as the deepest push took it, whether a cloud was taken there or not.
         """
-        times = np.arange(self.times[0], self.times[-1], _TURN_STEP)
-        way = setup.phantom_from_robot.apply(smooth_centres(self.kinematics, times - setup.sensor.time_offset))
+        times, way = self.way(setup)
         depths = _depth(setup.box.size, way)
         found: list[FloatArray | None] = []
         last = np.inf
         for group, centre in zip(self.groups, self.centres(setup), strict=True):
-            now = float(self.times[list(group.frames)].mean()) if group.frames else np.inf
+            instant = self.instant(group, setup)
+            now = np.inf if instant is None else instant
             between = np.flatnonzero((times > last) & (times <= now))
             last = now
             deepest = between[np.argmax(depths[between])] if len(between) else None
@@ -111,12 +122,16 @@ class Observations:
         return found
 
 
-def _split(centres: FloatArray, free: np.ndarray) -> list[list[int]]:
-    """Runs of frames: all clear of the block, or within TRAVEL of the run's first."""
+def _split(centres: FloatArray, free: np.ndarray, times: FloatArray) -> list[list[int]]:
+    """Runs of frames: all clear of the block, and about as long after a release; or within TRAVEL of the run's first."""
     runs: list[list[int]] = []
+    released = -np.inf
+    since = np.zeros(len(times), dtype=int)
     for frame, centre in enumerate(centres):
         last = runs[-1] if runs else None
-        joins = last is not None and free[last[0]] == free[frame]
+        released = released if free[frame] else times[frame]
+        since[frame] = np.searchsorted(_RECOVERY, times[frame] - released)
+        joins = last is not None and free[last[0]] == free[frame] and (not free[frame] or since[last[0]] == since[frame])
         if joins and last is not None and (free[frame] or np.linalg.norm(centre - centres[last[0]]) < TRAVEL):
             last.append(frame)
         else:
@@ -147,7 +162,7 @@ def observe(
     poses = tool_poses(kinematics, times, setup.phantom_from_robot, shaft)
     groups = [Group((), rest[cleaner.clean(rest).indices], True, True)] if rest is not None else []
     probes = np.cumsum(np.diff(free.astype(int), prepend=1) < 0)
-    runs = _thin(_split(centres, free), free, most)
+    runs = _thin(_split(centres, free, times), free, most)
     for number, run in enumerate(runs):
         picked = run if len(run) <= 12 else [run[i] for i in np.linspace(0, len(run) - 1, 12).round().astype(int)]
         clouds = [sequence.cloud(frame) for frame in picked]

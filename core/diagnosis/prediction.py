@@ -9,6 +9,7 @@ import numpy as np
 
 from core.diagnosis.comparison import Compared, Sample, choose, compare, observe
 from core.diagnosis.observations import Observations
+from core.diagnosis.ordered import Past, forgetful
 from core.fem.model import rule_of
 from core.fem.newton import Outcome
 from core.fem.stiffness import lump_share
@@ -64,6 +65,12 @@ class Prediction:
     columns: FloatArray
     equilibria: tuple[Equilibrium, ...]
     samples: tuple[Sample, ...]
+
+    def with_column(self, other: Prediction, column: int, step: float) -> Prediction:
+        """With what another setup, a step away, does to each gap as one of the columns."""
+        columns = self.columns.copy()
+        columns[..., column] = np.nan_to_num((other.gap - self.gap) / step)
+        return replace(self, columns=columns)
 
     @property
     def failed(self) -> tuple[int, ...]:
@@ -168,18 +175,21 @@ def predict(
     moves = np.zeros((len(wanted.setups) if wanted else 0, len(data.groups), 3))
     for number, other in enumerate(wanted.setups if wanted else ()):
         moves[number] = touch_correction(other, grid).apply(data.centres(other)) - centres
-    columns = _Columns(block, wanted) if wanted else None
+    columns = _Columns(block, wanted) if wanted and not setup.remembers else None
     gap, count, spread, changes, frames, chosen = [], [], [], [], [], []
-    turns = data.turns(setup) if setup.support.friction_coefficient is not None else [None] * len(centres)
+    past = Past(data, block, true_from_stated) if setup.remembers else None
+    slides = past is None and setup.support.friction_coefficient is not None
+    turns = data.turns(setup) if slides else [None] * len(centres)
     previous: Equilibrium | None = None
     for number, (group, centre) in enumerate(zip(data.groups, centres, strict=True)):
         turn = turns[number]
         if turn is not None:
             block.step(true_from_stated.apply(turn[None])[0], previous)
-        start = starts[number] if starts is not None and starts[number].in_contact else previous
-        frame = block.step(centre, start)
-        if frame.outcome is not Outcome.CONVERGED and start is not previous:
-            frame = block.step(centre, previous)
+        if past is not None:
+            frame = past.reach(centre, data.instant(group, setup))
+        else:
+            start = starts[number] if starts is not None and starts[number].in_contact else previous
+            frame = block.sought(centre, (start, previous))
         previous = frame if frame.outcome is Outcome.CONVERGED else None
         sample = samples[number] if samples is not None else choose(group, setup, frame, surface)
         compared = compare(group, setup, frame, surface, sample)
@@ -192,6 +202,10 @@ def predict(
         if columns is not None:
             changes.append(columns.project(frame, moves[:, number], compared, group.reference).astype(np.float32))
     stacked: FloatArray = np.stack(changes) if changes else np.zeros((len(gap), surface.patches, 0))
+    if wanted and past is not None:
+        # What a little change does to all that a frame hangs on is no first-order change of the frame: it is stated without memory.
+        plain = replace(wanted, setups=tuple(forgetful(other) for other in wanted.setups))
+        stacked = predict(data, forgetful(setup), grid, plain, starts, tolerance, chosen).columns
     return Prediction(
         data.name, np.array(gap), np.array(count, dtype=float), np.array(spread), stacked, tuple(frames), tuple(chosen)
     )

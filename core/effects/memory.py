@@ -50,7 +50,7 @@ class PermanentSet(Effect):
 
     @classmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:
-        return [cls(retained_fraction=fraction) for fraction in (0.1, 0.3)]
+        return [cls(retained_fraction=0.15)]
 
     def apply(self, setup: Setup) -> Setup:
         return replace(setup, material=replace(setup.material, retained_fraction=self.retained_fraction))

@@ -77,7 +77,7 @@ class BaseCompliance(Effect):
 
     @classmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:
-        return [cls(stiffness_over_E=stiffness) for stiffness in (40.0, 200.0)]
+        return [cls(stiffness_over_E=60.0)]
 
     def apply(self, setup: Setup) -> Setup:
         stiffness = None if self.stiffness_over_E >= _RIGID else self.stiffness_over_E

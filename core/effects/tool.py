@@ -90,7 +90,7 @@ class ToolFriction(Effect):
 
     @classmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:
-        return [cls(friction_coefficient=friction) for friction in (0.2, 0.6)]
+        return [cls(friction_coefficient=friction) for friction in (0.15, 0.5)]
 
     def apply(self, setup: Setup) -> Setup:
         return replace(setup, tool=replace(setup.tool, friction_coefficient=self.friction_coefficient))

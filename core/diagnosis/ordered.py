@@ -1,0 +1,85 @@
+"""Replays in which a group hangs on all that was done before it: the tool drags the surface, or the material remembers.
+
+Groups are few and lie far apart in time. Between two of them the replay is led along the way that the tool took, by places so near
+to one another that a drag is followed, and a hold, or the rest after a release, is lived through.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from core.diagnosis.observations import CLEARANCE, FAR, Observations, clear_of
+from core.effects.memory import PermanentSet, Viscoelasticity
+from core.effects.support import BaseSlip
+from core.effects.tool import ToolFriction
+from core.fem.newton import Outcome
+from core.frames import FloatArray, Transform
+from core.replay import Equilibrium, Replay
+from core.setup import Setup
+
+__all__ = ["ORDERED", "Past", "forgetful"]
+
+ORDERED = (BaseSlip, ToolFriction, Viscoelasticity, PermanentSet)
+"""Effects in whose replays a frame hangs on those before it."""
+
+TRAVEL, HOLD = 1e-3, 0.4
+"""Longest motion [m] and longest time [s] between two places while the tool is near the block."""
+REST = 1.5
+"""Longest time between two places while it is not, as a multiple of the time since it left; a shortest one is HOLD [1]."""
+
+
+def forgetful(setup: Setup) -> Setup:
+    """The setup without what makes a frame hang on those before it."""
+    material = replace(setup.material, relaxation=(), retained_fraction=0.0)
+    return replace(setup, material=material, tool=replace(setup.tool, friction_coefficient=0.0))
+
+
+class Past:
+    """Leads a block from group to group in order of time.
+
+    Args:
+        data: the sequence. block: its replay, whose setup remembers. moved: from stated to true places of the tool.
+    """
+
+    def __init__(self, data: Observations, block: Replay, moved: Transform) -> None:
+        self._block, self._last, self._left = block, -np.inf, -np.inf
+        self._frame: Equilibrium | None = None
+        self._times, way = data.way(block.setup)
+        self._way = moved.apply(way)
+        self._near = clear_of(block.setup.box.size, self._way) < block.setup.tool.radius + CLEARANCE
+
+    def reach(self, centre: FloatArray, time: float | None) -> Equilibrium:
+        """What is found with the tool's stated centre here (3,) [m] at a group's time [s]; None for a block long at rest."""
+        if time is None:
+            return self._block.step(FAR, None, float(self._times[0]) - 1.0)
+        for number in self._places(time):
+            self._last = float(self._times[number])
+            self._step(self._way[number], self._last)
+        self._last = max(time, self._last)
+        return self._step(centre, self._last)
+
+    def _step(self, centre: FloatArray, time: float) -> Equilibrium:
+        frame = self._block.sought(centre, (self._frame,), time)
+        if frame.outcome is Outcome.CONVERGED:
+            self._frame = frame
+        return frame
+
+    def _places(self, until: float) -> list[int]:
+        """Numbers of the places to be led through before this time [s]."""
+        found: list[int] = []
+        last = int(np.searchsorted(self._times, self._last)) if np.isfinite(self._last) else 0
+        for number in range(last, int(np.searchsorted(self._times, until))):
+            far = float(np.linalg.norm(self._way[number] - self._way[last]))
+            long = self._times[number] - self._times[last]
+            if self._near[number]:
+                wanted = far > TRAVEL or long > HOLD or not self._near[last]
+                self._left = float(self._times[number])
+            else:
+                away = self._times[last] - self._left
+                wanted = np.isfinite(self._left) and (self._near[last] or long > max(HOLD, REST * away))
+            if wanted:
+                found.append(number)
+                last = number
+        return found
