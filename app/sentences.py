@@ -54,6 +54,9 @@ def limit_phrase(row: dict[str, Any]) -> str:
     shares = [limit["share"] for limit in row["limits"] if "share" in limit]
     if None in (*factors, *shares, *(limit.get("change", 0.0) for limit in row["limits"])):
         return "not at any size"
+    at = ", ".join(f"{name.replace('_', ' ')} {quantity(one['value'], one['unit'])}" for name, one in row["at"].items())
+    if factors and "x" not in row["at"]:  # has no place
+        return f"{quantity(factors[0], '1')} times" + (f" at {at}" if at else "")
     if factors:
         typical = row["typical"]["factor"]
         spread = (
@@ -61,7 +64,6 @@ def limit_phrase(row: dict[str, Any]) -> str:
         )
         return f"{quantity(factors[0], '1')} times where it shows best, {spread}"
     if shares:
-        at = ", ".join(f"{name.replace('_', ' ')} {quantity(one['value'], one['unit'])}" for name, one in row["at"].items())
         return f"{quantity(100 * shares[0], '1')}{NARROW}% of what {at} does"
     worst: dict[str, float] = {}
     for limit in row["limits"]:

@@ -89,8 +89,14 @@ def test_report_on_disk_and_sentence_need_no_more_than_json(report: dict[str, An
         (
             [{"parameter": "stiffness_ratio", "unit": "1", "factor": 1.4}],
             {"parameter": "stiffness_ratio", "unit": "1", "factor": None},
-            {},
+            {"x": {"value": 0.01, "unit": "m"}},
             "1.4 times where it shows best, at half of the places not at any size",
+        ),
+        (
+            [{"parameter": "stiffness_ratio", "unit": "1", "factor": 1.3}],
+            {"parameter": "stiffness_ratio", "unit": "1", "factor": 1.6},
+            {"thickness": {"value": 0.002, "unit": "m"}},
+            "1.3 times at thickness 2.0 mm",
         ),
         (
             [{"share": 0.45}],
@@ -100,7 +106,7 @@ def test_report_on_disk_and_sentence_need_no_more_than_json(report: dict[str, An
         ),
         ([{"share": None}], {"share": None}, {}, "not at any size"),
     ],
-    ids=["change", "worst of each unit", "factor", "hidden places", "share", "never"],
+    ids=["change", "worst of each unit", "factor", "hidden places", "skin", "share", "never"],
 )
 def test_limits_are_said_in_words(limits: list[Any], typical: Any, at: dict[str, Any], words: str) -> None:
     assert plain(limit_phrase({"limits": limits, "typical": typical, "at": at})) == words
