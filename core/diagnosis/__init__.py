@@ -12,6 +12,7 @@ from typing import Any
 
 from core.cleaning import cleaner_for, find_shaft_axis
 from core.dataset import Dataset
+from core.diagnosis.assurance import assured
 from core.diagnosis.bench import Bench
 from core.diagnosis.gain import Ladder, ladder
 from core.diagnosis.observations import Observations, observe_all
@@ -112,7 +113,7 @@ def _run(
     model = findings.best.model if findings.best else findings.baseline
     report(0.75, "measuring the gain on test sequences")
     gain = _gain(unseen, pool, setup, model.setup, fine, seed) if unseen else None
-    result = report_of(dataset, bench, findings, gain, "test")
+    result = assured(report_of(dataset, bench, findings, gain, "test"), bench, fitted, findings)
     (making / "replays").mkdir()
     (making / "pictures").mkdir()
     if replays:

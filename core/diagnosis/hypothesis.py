@@ -18,7 +18,7 @@ from core.frames import FloatArray
 from core.registration import Registration
 from core.setup import Setup
 
-__all__ = ["TWINS", "Model", "Nuisances"]
+__all__ = ["TWINS", "Model", "Nuisances", "with_effects"]
 
 TIP = 1e-4
 RADIUS = 5e-5
@@ -102,3 +102,10 @@ class Model:
     def names(self) -> tuple[str, ...]:
         """The effects' names."""
         return tuple(effect.name for effect in self.effects)
+
+
+def with_effects(setup: Setup, effects: Sequence[Effect]) -> Setup:
+    """The setup with all of them in it, one after another."""
+    for effect in effects:
+        setup = effect.apply(setup)
+    return setup
