@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-__all__ = ["cause_phrase", "limit_phrase", "quantity", "verdict_sentence"]
+__all__ = ["cause_phrase", "control_sentences", "limit_phrase", "probe_sentence", "quantity", "verdict_sentence"]
 
 NARROW = "\N{NO-BREAK SPACE}"
 Values = dict[str, float]
@@ -69,6 +69,32 @@ def limit_phrase(row: dict[str, Any]) -> str:
     for limit in row["limits"]:
         worst[limit["unit"]] = max(limit["change"], worst.get(limit["unit"], 0.0))
     return ", ".join(quantity(change, unit) for unit, change in worst.items())
+
+
+def control_sentences(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """What the controls of each cause say: one sentence on those that it passed, one on each that it did not."""
+    said = []
+    for effect in dict.fromkeys(row["effect"] for row in rows):
+        own, name = [row for row in rows if row["effect"] == effect], effect.replace("_", " ")
+        passed = [row for row in own if row["passed"]]
+        if passed:
+            most = max(0.0, *(row["kept"] or 0.0 for row in passed))
+            where = _listed([f"the {row['control']}" for row in passed], "or")
+            said.append(f"with {where}, {name} keeps {100 * most:.0f}{NARROW}% of its gain at most")
+        for row in own:
+            if row["passed"] is False:
+                kept = f"still keeps {100 * row['kept']:.0f}{NARROW}% of its gain"
+                said.append(f"with the {row['control']}, {name} {kept}, so that it may not come of the pushes")
+        if all(row["passed"] is None for row in own):
+            said.append(f"none says anything of {name}: {own[0].get('why', 'it does not depend on the pushes')}")
+    return said
+
+
+def probe_sentence(row: dict[str, Any]) -> str:
+    """A row of the report's next probes: what to do, and what it would tell."""
+    apart = " from ".join("nothing" if name == "none" else name.replace("_", " ") for name in row["separates"])
+    chance = f" with {100 * row['probability']:.0f}{NARROW}% chance" if "probability" in row else ""
+    return f"{row['text']}: tells {apart}{chance}"
 
 
 def _gain(report: dict[str, Any]) -> str:

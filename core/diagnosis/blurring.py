@@ -161,7 +161,7 @@ class _Replayed:
         size = np.linalg.norm(self.moved(row), axis=1)[:, None]
         found = [DISPLACEMENT_ERROR * size * self.scene.basis]
         frame = self.frames.get(row)
-        if frame is None or not frame.in_contact or not self.has_columns:
+        if frame is None or not frame.in_contact or not self.has_columns or not self.scene.lumps:
             return np.concatenate([*found, np.zeros((len(size), len(self.scene.lumps)))], axis=1)
         factors = np.array([lump_share(lump, rule_of(frame.mesh)) for lump in self.scene.lumps])
         found.append(STIFFNESS_ERROR * self._along_normals(frame, stiffness_changes(self.block, frame, factors)))

@@ -33,8 +33,6 @@ _FAST = 3.0
 """Of the speed that was usual, where clocks are in question."""
 _ENOUGH = 0.9
 """Half the depth will do where it gives this share of the nats [1]."""
-_APART = 0.012
-"""Places nearer than this [m] are one proposal."""
 _IMAGINED = 2
 """Effects that are imagined at their detection limits where no cause was named."""
 _INSTEAD = {
@@ -99,7 +97,7 @@ def next_probe(bench: Bench, data: Sequence[Observations], findings: Findings) -
     scene = _scene(bench, findings)
     pending = [bench.workers.run(nats_of, scene, [pair.models for pair in pairs], push) for push in tried]
     found = [_advice(push, pairs, future.result()) for push, future in zip(tried, pending, strict=True)]
-    return [*_instead(pairs), *(one.to_json() for one in _apart(sorted(found, key=lambda one: -one.chances)))]
+    return [*_instead(pairs), *(one.to_json() for one in _choices(sorted(found, key=lambda one: -one.chances)))]
 
 
 def _scene(bench: Bench, findings: Findings) -> Scene:
@@ -125,15 +123,12 @@ def _advice(push: Push, pairs: Sequence[Pair], nats: list[tuple[float, float]]) 
     return Advice(push, pairs[best], full[best], float(np.sum(chances)) + 1e-6 * float(np.sum(full)))
 
 
-def _apart(found: Sequence[Advice]) -> list[Advice]:
-    """The first few that are not the same push a little beside."""
+def _choices(found: Sequence[Advice]) -> list[Advice]:
+    """The first few, each of its own kind and side: not every place can be reached in every laboratory."""
     chosen: list[Advice] = []
     for one in found:
-        near = [
-            other for other in chosen
-            if np.linalg.norm(np.subtract(one.push.place, other.push.place)) < _APART and one.push.side == other.push.side
-        ]  # fmt: skip
-        if not near and one.nats > 0:
+        same = any((other.push.kind, other.push.side) == (one.push.kind, one.push.side) for other in chosen)
+        if not same and one.nats > 0:
             chosen.append(one)
     return chosen[:SHOWN]
 

@@ -78,7 +78,7 @@ class Push:
     def text(self) -> str:
         """What to do, in words."""
         shown = ", ".join(f"{1e3 * value:.0f}" for value in self.place[: 2 if self.side == "top" else 3])
-        words = f"press {1e3 * self.depth:.1g} mm deep {_NAMED[self.side]} at ({shown}) mm"
+        words = f"press {1e3 * self.depth:.2g} mm deep {_NAMED[self.side]} at ({shown}) mm"
         if self.kind == "drag":
             axis = int(np.abs(self.along).argmax())
             words += f" and drag {1e3 * abs(self.along[axis]):.0f} mm along {'+' if self.along[axis] > 0 else '-'}{'xyz'[axis]}"

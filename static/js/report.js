@@ -15,6 +15,8 @@ export function showReport(heading, report, patterns, palette) {
     patterns ? section(causes.length ? "The error and its explanation" : "The error that is left", "", patternSection(patterns, heading.size, palette, causes.length > 0)) : null,
     report.ranking?.length ? section("Ranking", "", ranking(report.ranking, causes.map(({ effect }) => effect))) : null,
     report.ambiguity_map?.length ? section("What this data can tell", "smallest that would be named", told(report.ambiguity_map)) : null,
+    report.controls?.length ? section("Controls", "motions that were not made", controls(report.controls)) : null,
+    report.next_probe?.length ? section("Next probe", "would tell most", report.next_probe.map(probe)) : null,
     report.unexplained ? section("Unexplained", "", unexplained(report.unexplained)) : null,
     report.not_identifiable?.length ? section("Cannot be told from this data", "", report.not_identifiable.map(blind)) : null);
   panel().scrollTop = 0;
@@ -98,6 +100,21 @@ function reading(entry) {
   const { value, unit } = parameter(entry);
   const number = Number(value);
   return `${Number.isFinite(number) ? round(number) : value}${unit && unit !== "°" ? ` ${unit}` : unit}`;
+}
+
+/** One line for each cause under each falsified motion: the share of its gain that is left. */
+function controls(rows) {
+  const several = new Set(rows.map(({ effect }) => effect)).size > 1;
+  return element("div", { class: "told" }, rows.flatMap(({ control, effect, kept, passed, why }) => [
+    element("strong", {}, capital(control)),
+    element("span", { class: passed === false ? "number failed" : "number" }, passed === null ? "says nothing" : `${percent(Math.max(0, kept))} of the gain left`),
+    element("small", {}, [several || passed === false ? capital(words(effect)) : "", passed === false ? "it may not come of the pushes" : passed === null ? words(why) : ""].filter(Boolean).join(": "))]));
+}
+
+function probe({ text, separates, probability }) {
+  const names = separates.map((name) => (name === "none" ? "nothing" : words(name)));
+  const chance = typeof probability === "number" ? `, ${percent(probability)} likely to decide` : "";
+  return element("div", { class: "probe" }, element("span", {}, capital(text)), element("small", {}, `${capital(names[0])} or ${names[1]}${chance}`));
 }
 
 function unexplained({ fraction, where, when: time, structure, structure_bound: bound }) {

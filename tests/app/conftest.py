@@ -64,6 +64,33 @@ REPORT: dict[str, Any] = {
             "at": {"edge": {"value": "-x", "unit": ""}, "extent": {"value": 0.014, "unit": "m"}}, "alike": [],
         },
     ],
+    "controls": [
+        {
+            "control": "clock shifted", "effect": "stiff_inclusion",
+            "gain_nats": 1.2, "true_nats": 90.0, "kept": 0.0133, "alike": 0.01,
+            "passed": True,
+        },
+        {
+            "control": "geometry mirrored", "effect": "stiff_inclusion",
+            "gain_nats": 63.0, "true_nats": 90.0, "kept": 0.7, "alike": 0.2,
+            "passed": False,
+        },
+        {
+            "control": "paths swapped", "effect": "stiff_inclusion",
+            "gain_nats": 80.0, "true_nats": 90.0, "kept": 0.8889, "alike": 0.9,
+            "passed": None, "why": "with these motions stiff_inclusion would look 90 % as it does with the true ones",
+        },
+    ],
+    "next_probe": [
+        {
+            "kind": "top", "place": [0.012, -0.008, 0.0358], "direction": [0.0, 0.0, -1.0], "depth": 0.006,
+            "separates": ["stiff_inclusion", "tool_radius"], "nats": 17.2, "probability": 0.94,
+            "text": "press 6 mm deep on the top at (12, -8) mm",
+        },
+        {
+            "kind": "measurement", "separates": ["gravity", "geometry_scale"], "text": "measure the block with a calliper",
+        },
+    ],
     "not_identifiable": [{"effect": "young_modulus", "why": "the shape does not depend on it", "measure_instead": "a force"}],
     "unexplained": {"fraction": 0.04, "where": "nowhere", "when": "never"},
     "gain": {

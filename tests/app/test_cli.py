@@ -236,3 +236,13 @@ def test_report_is_printed_with_what_the_data_can_tell(
     assert "What this data can tell" in shown
     assert "0.12 mm" in shown and "tool_offset (83 %)" in shown and "1.4 times" in shown
     assert "nothing else" in shown and "(20 %)" not in shown
+
+
+def test_report_is_printed_with_its_controls_and_the_next_probe(
+    report: dict[str, Any], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(console.out, "width", 200)
+    print_report(report)
+    shown = capsys.readouterr().out.replace("\N{NO-BREAK SPACE}", " ")
+    assert "control: with the clock shifted, stiff inclusion keeps 1 % of its gain at most" in shown
+    assert "next probe: press 6 mm deep on the top at (12, -8) mm" in shown and "calliper" not in shown

@@ -119,6 +119,15 @@ def test_panel_says_what_the_data_can_tell(page: Page) -> None:
     assert "45 % of edge -x, extent 14 mm" in told
 
 
+def test_panel_says_what_the_controls_gave_and_what_to_push_next(page: Page) -> None:
+    page.open()
+    shown = page.page.inner_text("#panel").replace("\N{NO-BREAK SPACE}", " ")
+    assert "1 % of the gain left" in shown and "70 % of the gain left" in shown and "says nothing" in shown
+    assert "Stiff inclusion: it may not come of the pushes" in shown
+    assert "Press 6 mm deep on the top at (12, -8) mm" in shown and "94 % likely to decide" in shown
+    assert "Measure the block with a calliper" in shown
+
+
 def test_scrubbing_stepping_and_playing_move_the_scene(page: Page) -> None:
     page.open()
     sums = set()

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from app.sentences import PHRASES, cause_phrase, limit_phrase, quantity, verdict_sentence
+from app.sentences import PHRASES, cause_phrase, control_sentences, limit_phrase, probe_sentence, quantity, verdict_sentence
 from core.synthetic import HIDDEN, draw_scenario
 
 
@@ -110,3 +110,17 @@ def test_report_on_disk_and_sentence_need_no_more_than_json(report: dict[str, An
 )
 def test_limits_are_said_in_words(limits: list[Any], typical: Any, at: dict[str, Any], words: str) -> None:
     assert plain(limit_phrase({"limits": limits, "typical": typical, "at": at})) == words
+
+
+def test_controls_say_what_is_left_of_the_gain(report: dict[str, Any]) -> None:
+    passed, failed = (plain(said) for said in control_sentences(report["controls"]))
+    assert passed == "with the clock shifted, stiff inclusion keeps 1 % of its gain at most"
+    assert failed.startswith("with the geometry mirrored, stiff inclusion still keeps 70 % of its gain")
+    (nothing,) = control_sentences(report["controls"][2:])
+    assert nothing.startswith("none says anything of stiff inclusion: with these motions") and control_sentences([]) == []
+
+
+def test_next_probe_says_what_to_do_and_what_it_tells(report: dict[str, Any]) -> None:
+    pushed, measured = (plain(probe_sentence(row)) for row in report["next_probe"])
+    assert pushed == "press 6 mm deep on the top at (12, -8) mm: tells stiff inclusion from tool radius with 94 % chance"
+    assert measured == "measure the block with a calliper: tells gravity from geometry scale"

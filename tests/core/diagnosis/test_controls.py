@@ -87,7 +87,7 @@ def data() -> list[Observations]:
 def test_tool_that_is_too_small_passes_every_control_on_replays(data):
     with Workers(data, 1) as workers:
         bench = Bench(SETUP, registration(), workers, [item.name for item in data], None, GRID, GRID)
-        baseline = bench.evaluate((), ())
+        baseline = bench.evaluate(())
         shape = baseline.predictions[0].gap.shape
         bench.noises = [
             Noise(np.where(np.isfinite(p.gap), p.count / 1e-8, 0.0), np.nan_to_num(p.gap), np.zeros(shape), np.zeros((*shape, 0)))

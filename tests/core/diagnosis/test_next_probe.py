@@ -7,7 +7,7 @@ import pytest
 from pushed_block import EYE, GRID, SETUP, TOP
 
 from core.diagnosis.blurring import Scene, Survivor, _divergence, nats_of
-from core.diagnosis.next_probe import Pair, _advice, _apart
+from core.diagnosis.next_probe import Pair, _advice, _choices
 from core.diagnosis.pushes import Push, pushes
 from core.effects.material import StiffInclusion
 from core.effects.sensor import TimeOffset
@@ -84,11 +84,11 @@ def test_chance_is_even_where_the_bound_is_expected_and_certain_far_beyond():
 
 def test_best_push_is_the_one_over_the_lump(scene):
     pair = Pair((NOTHING, LUMP), ("none", "stiff_inclusion"), (25.0, 25.0))
-    tried = [push for push in pushes(SETUP, 5e-3, drags=False) if push.kind == "top"]
+    tried = pushes(SETUP, 5e-3, drags=False)[:18]
     found = [_advice(push, [pair], nats_of(scene, [pair.models], push)) for push in tried]
-    best = _apart(sorted(found, key=lambda one: -one.chances))
-    assert len(best) == 3 and np.linalg.norm(np.subtract(best[0].push.place[:2], (0.02, 0.0))) < 0.011
+    best = _choices(sorted(found, key=lambda one: -one.chances))
+    assert best[0].push.side == "top" and np.linalg.norm(np.subtract(best[0].push.place[:2], (0.02, 0.0))) < 0.011
     row = best[0].to_json()
     assert row["separates"] == ["none", "stiff_inclusion"] and row["direction"] == [0.0, 0.0, -1.0]
     assert row["nats"] > 0 and 0 <= row["probability"] <= 1 and row["text"].startswith("press")
-    assert len({one.push.place for one in best}) == 3 and best[0].nats >= best[1].nats >= best[2].nats
+    assert len({one.push.side for one in best}) == len(best) > 1 and best[0].nats >= best[1].nats
