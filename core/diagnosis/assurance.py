@@ -1,4 +1,4 @@
-"""What a report says beyond its verdict: whether the causes pass their controls, and which push to make next."""
+"""What a report says beyond its verdict: controls, what of each cause the data determine, and which push to make next."""
 
 from __future__ import annotations
 
@@ -6,20 +6,40 @@ from collections.abc import Sequence
 from typing import Any
 
 from core.diagnosis.bench import Bench
-from core.diagnosis.controls import controls, warnings_of
+from core.diagnosis.controls import Control, controls, warnings_of
 from core.diagnosis.next_probe import next_probe
 from core.diagnosis.observations import Observations
+from core.diagnosis.profiles import profiles
 from core.diagnosis.search import Findings
 
 __all__ = ["assured"]
 
 
 def assured(report: dict[str, Any], bench: Bench, data: Sequence[Observations], findings: Findings) -> dict[str, Any]:
-    """The report with `controls` and `next_probe`; a control that a cause does not pass is a warning, and changes no verdict."""
-    checked = controls(bench, data, findings.best.model, findings.baseline) if findings.best else ()
+    """The report with `controls` and `next_probe`, and `identifiability` of each parameter of the best model's causes.
+
+    A control that a cause does not pass is a warning, and changes no verdict.
+    """
+    checked: Sequence[Control] = ()
+    names: dict[str, dict[str, str]] = {}
+    open_rows: list[dict[str, Any]] = []
+    if findings.best:
+        checked = controls(bench, data, findings.best.model, findings.baseline)
+        told, open_rows = profiles(bench, findings.best.model)
+        names = dict(zip(findings.best.model.names, told, strict=True))
     return {
         **report,
+        "causes": [_identified(cause, names.get(cause["effect"], {})) for cause in report["causes"]],
+        "not_identifiable": [*report["not_identifiable"], *open_rows],
         "controls": [one.to_json() for one in checked],
         "next_probe": next_probe(bench, data, findings),
         "warnings": [*report["warnings"], *warnings_of(checked)],
     }
+
+
+def _identified(cause: dict[str, Any], told: dict[str, str]) -> dict[str, Any]:
+    """The cause whose parameters say how well they are determined, those that were looked at."""
+    entries = {
+        name: {**entry, "identifiability": told[name]} if name in told else entry for name, entry in cause["parameters"].items()
+    }
+    return {**cause, "parameters": entries}
