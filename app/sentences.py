@@ -6,7 +6,15 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-__all__ = ["cause_phrase", "control_sentences", "limit_phrase", "probe_sentence", "quantity", "verdict_sentence"]
+__all__ = [
+    "cause_phrase",
+    "control_sentences",
+    "determined_sentences",
+    "limit_phrase",
+    "probe_sentence",
+    "quantity",
+    "verdict_sentence",
+]
 
 NARROW = "\N{NO-BREAK SPACE}"
 Values = dict[str, float]
@@ -93,8 +101,22 @@ def control_sentences(rows: Sequence[dict[str, Any]]) -> list[str]:
 def probe_sentence(row: dict[str, Any]) -> str:
     """A row of the report's next probes: what to do, and what it would tell."""
     apart = " from ".join("nothing" if name == "none" else name.replace("_", " ") for name in row["separates"])
-    chance = f" with {100 * row['probability']:.0f}{NARROW}% chance" if "probability" in row else ""
+    likely = row.get("probability")
+    chance = "" if likely is None else f", {'more than 99' if likely > 0.99 else f'{100 * likely:.0f}'}{NARROW}% likely to decide"
     return f"{row['text']}: tells {apart}{chance}"
+
+
+def determined_sentences(causes: Sequence[dict[str, Any]]) -> list[str]:
+    """Of each cause the parameters that the data do not enclose on both sides."""
+    said = []
+    for cause in causes:
+        for name, entry in cause.get("parameters", {}).items():
+            told, label = entry.get("identifiability", "interval"), f"{cause['effect']} {name}".replace("_", " ")
+            if told in ("at least", "at most"):
+                said.append(f"{label} is {told} {quantity(entry['low' if told == 'at least' else 'high'], entry['unit'])}")
+            elif told != "interval":
+                said.append(f"{label} is {told} from this data")
+    return said
 
 
 def _gain(report: dict[str, Any]) -> str:

@@ -42,11 +42,18 @@ function cause({ effect, probability, parameters }) {
     const shown = parameter(entry);
     return element("tr", {}, element("th", {}, words(name)),
       element("td", { class: "number" }, element("b", {}, shown.value), shown.unit ? ` ${shown.unit}` : ""),
-      element("td", { class: "number interval" }, shown.interval));
+      element("td", { class: "number interval" }, determined(entry) ?? shown.interval));
   });
   return element("div", { class: "cause" },
     element("div", { class: "cause-head" }, element("strong", {}, capital(words(effect))), element("span", {}, `probability ${percent(probability)}`)),
     element("table", {}, element("tbody", {}, rows)));
+}
+
+/** In place of an interval that is open on a side, or none at all. */
+function determined({ identifiability, unit, low, high }) {
+  if (identifiability === "at least") return `at least ${parameter({ value: low, unit }).value}`;
+  if (identifiability === "at most") return `at most ${parameter({ value: high, unit }).value}`;
+  return identifiability === "not identifiable" ? "not determined" : null;
 }
 
 function gain({ baseline, extended, noise_floor: floor, unit = "mm", reducible_removed: removed, paper_metric: paper, split, ...others }, named) {
@@ -113,7 +120,7 @@ function controls(rows) {
 
 function probe({ text, separates, probability }) {
   const names = separates.map((name) => (name === "none" ? "nothing" : words(name)));
-  const chance = typeof probability === "number" ? `, ${percent(probability)} likely to decide` : "";
+  const chance = typeof probability === "number" ? `, ${probability > 0.99 ? "more than 99 %" : percent(probability)} likely to decide` : "";
   return element("div", { class: "probe" }, element("span", {}, capital(text)), element("small", {}, `${capital(names[0])} or ${names[1]}${chance}`));
 }
 

@@ -6,7 +6,16 @@ from typing import Any
 
 import pytest
 
-from app.sentences import PHRASES, cause_phrase, control_sentences, limit_phrase, probe_sentence, quantity, verdict_sentence
+from app.sentences import (
+    PHRASES,
+    cause_phrase,
+    control_sentences,
+    determined_sentences,
+    limit_phrase,
+    probe_sentence,
+    quantity,
+    verdict_sentence,
+)
 from core.synthetic import HIDDEN, draw_scenario
 
 
@@ -122,5 +131,16 @@ def test_controls_say_what_is_left_of_the_gain(report: dict[str, Any]) -> None:
 
 def test_next_probe_says_what_to_do_and_what_it_tells(report: dict[str, Any]) -> None:
     pushed, measured = (plain(probe_sentence(row)) for row in report["next_probe"])
-    assert pushed == "press 6 mm deep on the top at (12, -8) mm: tells stiff inclusion from tool radius with 94 % chance"
+    assert pushed == "press 6 mm deep on the top at (12, -8) mm: tells stiff inclusion from tool radius, 94 % likely to decide"
+    assert "more than 99 % likely" in plain(probe_sentence({**report["next_probe"][0], "probability": 0.999}))
     assert measured == "measure the block with a calliper: tells gravity from geometry scale"
+
+
+def test_parameters_that_the_data_do_not_enclose_are_named(report: dict[str, Any]) -> None:
+    (cause,) = report["causes"]
+    assert determined_sentences([cause]) == []
+    ratio = {"value": 9.0, "unit": "1", "low": 4.1, "high": 20.0}
+    for told, words in {"at least": "at least 4.1", "at most": "at most 20", "not identifiable": "not identifiable from"}.items():
+        parameters = {"stiffness_ratio": {**ratio, "identifiability": told}, "x": {**ratio, "identifiability": "interval"}}
+        (said,) = determined_sentences([{**cause, "parameters": parameters}])
+        assert said.startswith(f"stiff inclusion stiffness ratio is {words}")
