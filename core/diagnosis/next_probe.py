@@ -77,7 +77,7 @@ class Advice:
         """As the report has it."""
         return {
             "kind": self.push.kind, "place": [round(value, 5) for value in self.push.place],
-            "direction": self.push.direction.tolist(), "depth": round(self.push.depth, 5), "separates": list(self.pair.names),
+            "direction": (self.push.direction + 0.0).tolist(), "depth": round(self.push.depth, 5), "separates": list(self.pair.names),
             "nats": round(self.nats, 2), "probability": round(self.pair.chance(self.nats), 4), "text": self.push.text(),
         }  # fmt: skip
 
