@@ -112,13 +112,12 @@ def _chosen(bench: Bench, data: Sequence[Observations], model: Model, baseline: 
         (_pattern(there, here) ** 2 * noise.weights).sum(axis=1)
         for there, here, noise in zip(model.predictions, baseline.predictions, bench.noises, strict=True)
     ]
-    most = max(len(item.groups) for item in data) if model.setup.remembers else MOST_GROUPS
     chosen = {}
     for number in sorted(np.argsort([-size.sum() for size in shown])[:MOST_SEQUENCES].tolist()):
         groups = data[number].groups
         clear = [row for row, group in enumerate(groups) if group.free or group.reference]
         near = [row for row in np.argsort(-shown[number]).tolist() if row not in clear]
-        chosen[number] = sorted([*clear, *near[:most]])
+        chosen[number] = sorted([*clear, *near[:MOST_GROUPS]])
     return chosen
 
 

@@ -19,10 +19,11 @@ from scipy.stats import norm
 from core.diagnosis.ambiguity import Told
 from core.diagnosis.bench import Bench
 from core.diagnosis.blurring import Scene, Survivor, nats_of, survivor
+from core.diagnosis.candidates import lump_places
 from core.diagnosis.noise import patch_variance
 from core.diagnosis.observations import Observations
 from core.diagnosis.pushes import Push, depth_reached, pushes, speed_reached
-from core.diagnosis.search import RIVAL, Findings, Trial, lump_places
+from core.diagnosis.search import RIVAL, Findings, Trial
 from core.effects import Effect
 from core.grading import PAGE_GRID
 
@@ -77,8 +78,9 @@ class Advice:
         """As the report has it."""
         return {
             "kind": self.push.kind, "place": [round(value, 5) for value in self.push.place],
-            "direction": (self.push.direction + 0.0).tolist(), "depth": round(self.push.depth, 5), "separates": list(self.pair.names),
-            "nats": round(self.nats, 2), "probability": round(self.pair.chance(self.nats), 4), "text": self.push.text(),
+            "direction": (self.push.direction + 0.0).tolist(), "depth": round(self.push.depth, 5),
+            "separates": list(self.pair.names), "nats": round(self.nats, 2),
+            "probability": round(self.pair.chance(self.nats), 4), "text": self.push.text(),
         }  # fmt: skip
 
 
@@ -191,6 +193,6 @@ def _at_limit(told: Told) -> tuple[Effect, float]:
         return start, min(limit.size, 1.0)
     number = [item.name for item in start.numbers()].index(limit.parameter)
     coordinates, item = start.coordinates, start.numbers()[number]
-    widest = item.coordinate(item.high) - coordinates[number]
-    coordinates[number] += limit.size if limit.size <= widest else -min(limit.size, coordinates[number] - item.coordinate(item.low))
+    above, below = item.coordinate(item.high) - coordinates[number], coordinates[number] - item.coordinate(item.low)
+    coordinates[number] += min(limit.size, above) if above >= min(limit.size, below) else -min(limit.size, below)
     return start.at(coordinates), 1.0
