@@ -83,6 +83,7 @@ def controls(bench: Bench, data: Sequence[Observations], model: Model, baseline:
     Args:
         data: what the bench's sequences are, in its order. baseline: the stated setup, which is the model without a single cause.
     """
+    bench.tell("trying the causes on motions that were not made")
     chosen = _chosen(bench, data, model, baseline)
     others = [[effect for effect in model.effects if effect is not left] for left in model.effects]
     setups = [model.setup, *(with_effects(bench.setup, rest) for rest in others)]

@@ -126,6 +126,7 @@ def profiles(bench: Bench, model: Model) -> tuple[list[dict[str, str]], list[dic
         if left < 2:
             break
         place, effect = names[index]
+        bench.tell(f"how far {items[index].name} of {effect} may be off")
         found = profile(evidence, model.coordinates, covariance, index, items[index])
         left -= found.evaluations
         told[place][items[index].name] = found.told

@@ -1,18 +1,30 @@
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from pushed_block import EYE, GRID, SETUP, TOP
+from pushed_block import EYE, GRID, SETUP, TOP, prediction, registration
 
+from core.diagnosis.ambiguity import Limit, Told
+from core.diagnosis.bench import Bench
 from core.diagnosis.blurring import Scene, Survivor, _divergence, nats_of
-from core.diagnosis.next_probe import Pair, _advice, _choices
+from core.diagnosis.evidence import Block, gram
+from core.diagnosis.hypothesis import Model, with_effects
+from core.diagnosis.next_probe import Pair, _advice, _choices, _instead, pairs_of
+from core.diagnosis.prediction import TOOL_COLUMNS
 from core.diagnosis.pushes import Push, pushes
+from core.diagnosis.screening import Candidate
+from core.diagnosis.search import RIVAL, Findings, Trial
+from core.diagnosis.structure import Structure
+from core.diagnosis.workers import Workers
+from core.effects import Effect
 from core.effects.material import StiffInclusion
 from core.effects.sensor import TimeOffset
 from core.effects.tool import ToolRadius
 from core.measurement import Surface
+from core.mesh import GridSpec
 
 NOTHING = Survivor(SETUP)
 LUMP = Survivor(StiffInclusion(x=0.02, y=0.0, z=0.026, radius=7e-3, stiffness_ratio=8.0).apply(SETUP))
@@ -92,3 +104,71 @@ def test_best_push_is_the_one_over_the_lump(scene):
     assert row["separates"] == ["none", "stiff_inclusion"] and row["direction"] == [0.0, 0.0, -1.0]
     assert row["nats"] > 0 and 0 <= row["probability"] <= 1 and row["text"].startswith("press")
     assert len({one.push.side for one in best}) == len(best) > 1 and best[0].nats >= best[1].nats
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Bench]:
+    """The stated setup with its priors; nothing is replayed here."""
+    with Workers([], 1) as workers:
+        yield Bench(SETUP, registration(), workers, ["poke-01"], None, GridSpec(), GridSpec())
+
+
+def _trial(bench: Bench, gain: float, *effects: Effect) -> Trial:
+    """A refit whose data know nothing but noise."""
+    own = sum(len(effect.numbers()) for effect in effects)
+    first, shape = TOOL_COLUMNS + 8, (4, bench.surface.patches)
+    columns = 1e-5 * np.random.default_rng(0).standard_normal((*shape, first + own + 1))
+    gap = np.zeros(shape)
+    block = Block("poke-01", *gram(gap, columns, np.full(shape, 1e8)))
+    nuisance = (*range(first), first + own)
+    model = Model(
+        effects, with_effects(SETUP, effects), (prediction(gap),), (block,), tuple(range(first, first + own)), {}, nuisance
+    )  # fmt: skip
+    return Trial(model, gain, 1.0)
+
+
+def _findings(bench: Bench, *trials: Trial) -> Findings:
+    return Findings(_trial(bench, 0.0).model, trials[0] if trials else None, list(trials))
+
+
+RADIUS = ToolRadius(radius=4.2e-3)
+HARD = StiffInclusion(x=0.0, y=0.0, z=0.02, radius=7e-3, stiffness_ratio=4.0)
+
+
+def test_rivals_are_told_apart_and_the_best_needs_less_to_win(bench):
+    trials = [_trial(bench, 90.0, RADIUS), _trial(bench, 85.0, HARD), _trial(bench, 20.0, TimeOffset(offset=0.1))]
+    (pair,) = pairs_of(bench, _findings(bench, *trials))
+    assert pair.names == ("tool_radius", "stiff_inclusion") and pair.needed == (RIVAL - 5, RIVAL + 5)
+    known, open_numbers = pair.models[0].covariance, pair.models[1].varied
+    assert known is not None and known.shape == (9, 9) and len(open_numbers) == 5
+
+
+def test_cause_found_alone_is_weighed_against_what_came_next_or_against_nothing(bench):
+    trials = [_trial(bench, 90.0, RADIUS), _trial(bench, 20.0, HARD)]
+    assert [pair.names for pair in pairs_of(bench, _findings(bench, *trials))] == [("tool_radius", "stiff_inclusion")]
+    assert [pair.names for pair in pairs_of(bench, _findings(bench, trials[0]))] == [("tool_radius", "none")]
+
+
+def test_where_nothing_was_found_what_hides_best_is_asked_for_at_its_limit(bench):
+    findings, neutral = _findings(bench), replace(HARD, stiffness_ratio=1.0)
+    faint = Limit(parameter="radius", unit="m", size=4e-4)
+    clear = Limit(parameter="stiffness_ratio", unit="1", size=0.2, log=True)
+    findings.told = (
+        Told(
+            Candidate(start=neutral, of=("stiffness_ratio",), columns=(15,), spread=(2.0,)),
+            (clear,),
+            clear,
+        ),
+        Told(Candidate(start=ToolRadius(radius=5e-3), of=("radius",), widened={6: 1.2e-3}), (faint,), faint),
+    )
+    first, second = pairs_of(bench, findings)
+    assert first.names == ("none", "tool_radius") and first.models[1].setup.tool.radius == pytest.approx(5.4e-3)
+    assert second.models[1].setup.material.inclusions[0].stiffness_ratio == pytest.approx(np.exp(0.2))
+    findings.structure = Structure(50.0, 20.0, 30.0)
+    assert pairs_of(bench, findings) == []
+
+
+def test_families_that_no_push_tells_apart_get_another_measurement(bench):
+    rest = Pair((NOTHING, NOTHING), ("viscoelasticity + tool_radius", "permanent_set + tool_radius"), (8.0, 8.0))
+    (row,) = _instead([rest, Pair((NOTHING, LUMP), ("none", "stiff_inclusion"), (8.0, 8.0))])
+    assert "several time constants" in row["text"] and row["kind"] == "measurement"
