@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,7 @@ def _parabola(coordinates: FloatArray) -> float:
     return float(-0.5 * ((coordinates - AT) ** 2 / np.diag(SURE)).sum())
 
 
-def _saturating(sign: float) -> object:
+def _saturating(sign: float) -> Callable[[FloatArray], float]:
     """Falls as a parabola on one side and stays within a nat on the other."""
 
     def evidence(coordinates: FloatArray) -> float:
