@@ -181,4 +181,5 @@ PHRASES: dict[str, Callable[[Any, Sequence[float] | None], str]] = {
     "anisotropy": _fibres,
     "base_compliance": lambda v, _: f"a support that gives way, with springs of {v['stiffness_over_E']:.2g} E per metre",
     "tool_compliance": lambda v, _: f"a tool that gives way under load, C E = {v['compliance_times_stiffness']:.2g} per metre",
+    "young_modulus": lambda v, _: f"another stiffness: Young's modulus is {quantity(v['E'], 'Pa')}",
 }

@@ -10,7 +10,7 @@ from typing import Any
 
 from core.effects.base import Effect, Parameter, Slot, parameter
 from core.effects.load import Gravity
-from core.effects.material import PoissonRatio, StiffInclusion
+from core.effects.material import PoissonRatio, StiffInclusion, YoungModulus
 from core.effects.memory import PermanentSet, Viscoelasticity
 from core.effects.outside import outside_effects
 from core.effects.sensor import CameraRegistration, TimeOffset
@@ -42,6 +42,7 @@ _REPLAYED: tuple[type[Effect], ...] = (
     Viscoelasticity,
     PermanentSet,
     ToolFriction,
+    YoungModulus,
 )
 OUTSIDE = outside_effects(effect.name for effect in (*_COUNTED, *_REPLAYED))
 DIAGNOSED = (*_COUNTED, *OUTSIDE)

@@ -9,7 +9,7 @@ from typing import Self
 from core.effects.base import Effect, Slot, parameter
 from core.setup import Inclusion, Setup
 
-__all__ = ["PoissonRatio", "StiffInclusion"]
+__all__ = ["PoissonRatio", "StiffInclusion", "YoungModulus"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,3 +65,27 @@ class StiffInclusion(Effect):
             return setup
         lump = Inclusion(x=self.x, y=self.y, z=self.z, radius=self.radius, stiffness_ratio=self.stiffness_ratio)
         return replace(setup, material=replace(setup.material, inclusions=(*setup.material.inclusions, lump)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class YoungModulus(Effect):
+    """Another stiffness than assumed; shows only against something with a force scale of its own, a measured force above all.
+
+    What is stated over E (own weight, springs, a tool that gives way) stays as it is over E. The replay's force is right to about
+    3 %: its grid and its law in equal parts, and the sensor's gain.
+    """
+
+    name, enters = "young_modulus", Slot.MATERIAL
+    summary = "the material is stiffer or softer than assumed, in all"
+    E: float = parameter("Pa", low=10.0, high=1e8, scale=0.15, log=True, accuracy=0.03)
+
+    @classmethod
+    def neutral(cls, setup: Setup) -> Self:
+        return cls(E=setup.material.young_modulus)
+
+    @classmethod
+    def starts(cls, setup: Setup) -> Sequence[Self]:
+        return [cls(E=factor * setup.material.young_modulus) for factor in (0.7, 1.4)]
+
+    def apply(self, setup: Setup) -> Setup:
+        return replace(setup, material=replace(setup.material, young_modulus=self.E))

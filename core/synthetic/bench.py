@@ -121,7 +121,7 @@ class _Bench:
         self.friction = hidden.value("friction_coefficient") if hidden else None
         self.weight = scenario.mass * GRAVITY
         giving = scenario.hidden("tool_compliance")
-        self.softness = giving.value("compliance_times_stiffness") / scenario.young_modulus if giving else 0.0
+        self.softness = giving.value("compliance_times_stiffness") / scenario.true_modulus if giving else 0.0
         self.slip = slip
         self.settled = np.asarray(block.surface @ self.solver.rest.displacement)
         self._tree = cKDTree(block.surface_rest + self.settled)

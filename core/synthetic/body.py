@@ -45,7 +45,7 @@ def solid_of(scenario: Scenario, block: Block) -> Solid:
     return Solid(
         young_modulus=_modulus(scenario, block),
         poisson_ratio=poisson_ratio,
-        weight=weight.value("specific_weight_over_stiffness") * scenario.young_modulus if weight else 0.0,
+        weight=weight.value("specific_weight_over_stiffness") * scenario.true_modulus if weight else 0.0,
         held=np.zeros_like(held) if springs else held,
         tool_radius=true_radius(scenario),
         lifts=scenario.hidden("base_detachment") is not None,
@@ -58,7 +58,7 @@ def solid_of(scenario: Scenario, block: Block) -> Solid:
 
 def _modulus(scenario: Scenario, block: Block) -> FloatArray:
     """Young's modulus (e, 4) at the volume points [Pa]."""
-    modulus = np.full(block.weights.shape, scenario.young_modulus)
+    modulus = np.full(block.weights.shape, scenario.true_modulus)
     lump, skin, slope = (scenario.hidden(name) for name in ("stiff_inclusion", "surface_layer", "stiffness_gradient"))
     height = scenario.size[2]
     if lump is not None:
@@ -89,4 +89,4 @@ def _bonded(scenario: Scenario, places: FloatArray) -> BoolArray:
 def _springs(scenario: Scenario, block: Block, stiffness_over_modulus: float) -> FloatArray:
     """Stiffness per area at the points of the sole (f, q) [N/m^3]; none where the base is loose."""
     places = np.einsum("fqa,fai->fqi", block.sole.values, block.nodes[block.elements[block.sole.owner]])
-    return np.where(_bonded(scenario, places), stiffness_over_modulus * scenario.young_modulus, 0.0)
+    return np.where(_bonded(scenario, places), stiffness_over_modulus * scenario.true_modulus, 0.0)

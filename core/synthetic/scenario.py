@@ -29,6 +29,7 @@ HIDDEN: Mapping[str, Mapping[str, str]] = {
     "anisotropy": {"direction": "rad", "stiffness_ratio": "1"},
     "base_compliance": {"stiffness_over_E": "1/m"},
     "tool_compliance": {"compliance_times_stiffness": "1/m"},
+    "young_modulus": {"E": "Pa"},
 }
 """The effects that the virtual bench can hide, with the unit of each parameter; names are those of the catalogue."""
 
@@ -68,7 +69,7 @@ class Scenario:
         sequences: names; what stands before the number is the kind of motion: poke-top, poke-side or drag.
         size: of the block [m].
         mass: [kg].
-        young_modulus: true and believed [Pa].
+        young_modulus: believed, and true unless another one is hidden [Pa].
         poisson_ratio: believed [1].
         tool_radius: believed [m].
         touch_offset: tool centre above the landmark at touch [m].
@@ -97,6 +98,12 @@ class Scenario:
     def hidden(self, effect: str) -> HiddenEffect | None:
         """The effect of that name, if it is hidden here."""
         return next((hidden for hidden in self.effects if hidden.effect == effect), None)
+
+    @property
+    def true_modulus(self) -> float:
+        """Young's modulus of the block [Pa]."""
+        hidden = self.hidden("young_modulus")
+        return hidden.value("E") if hidden else self.young_modulus
 
 
 _Draw = Callable[[np.random.Generator], dict[str, float | str]]
@@ -147,6 +154,7 @@ _CLEAR: Mapping[str, _Draw] = {
     "anisotropy": lambda rng: {"direction": _between(rng, 0.0, 3.14, 3), "stiffness_ratio": _between(rng, 2.5, 4.0, 2)},
     "base_compliance": lambda rng: {"stiffness_over_E": _between(rng, 20.0, 50.0, 1)},
     "tool_compliance": lambda rng: {"compliance_times_stiffness": _between(rng, 20.0, 45.0, 1)},
+    "young_modulus": lambda rng: {"E": _either(rng, (2.5e3, 3.6e3), (6.9e3, 10e3), decimals=0)},
 }
 
 
@@ -164,7 +172,7 @@ def draw_scenario(seed: int, effects: int = 1, clear: bool = True, among: Sequen
     return Scenario(effects=hidden if clear else tuple(_fainter(one) for one in hidden))
 
 
-_NEUTRAL: Mapping[str, float] = {"nu": 0.45, "tool_radius": 0.005, "stiffness_ratio": 1.0}
+_NEUTRAL: Mapping[str, float] = {"nu": 0.45, "tool_radius": 0.005, "stiffness_ratio": 1.0, "E": 5e3}
 _SHRINKING = (
     "dx", "dy", "dz", "extent", "specific_weight_over_stiffness", "offset", "translation", "rotation",
     "log_ratio", "compliance_times_stiffness",

@@ -59,7 +59,7 @@ def test_two_effects_are_different() -> None:
         assert first.effect != second.effect
 
 
-NEUTRAL = {"tool_radius": 0.005, "stiffness_ratio": 1.0, "nu": 0.45}
+NEUTRAL = {"tool_radius": 0.005, "stiffness_ratio": 1.0, "nu": 0.45, "E": 5e3}
 ENDLESS = ("J_m", "stiffness_over_E", "friction_coefficient")
 PLACES = ("x", "y", "z", "radius", "edge", "thickness", "direction")
 """What says where a cause is and not how strong."""
