@@ -18,7 +18,7 @@ from core.meshing import Meshing
 from core.replay import Equilibrium
 from core.setup import Setup
 
-__all__ = ["Workers"]
+__all__ = ["Workers", "bound_to_parent"]
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _DIE_WITH_PARENT = 1
@@ -27,11 +27,16 @@ T = TypeVar("T")
 _DATA: dict[str, Observations] = {}
 
 
-def _begin(data: Sequence[Observations]) -> None:
-    """Keep the measurements in this process, and end with the one that started it (Linux)."""
+def bound_to_parent() -> None:
+    """Leave Ctrl-C to the process that started this one, and end with it (Linux)."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(ctypes, "CDLL") and os.name == "posix" and os.uname().sysname == "Linux":
         ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGTERM)
+
+
+def _begin(data: Sequence[Observations]) -> None:
+    """Keep the measurements in this process."""
+    bound_to_parent()
     _DATA.update({item.name: item for item in data})
 
 

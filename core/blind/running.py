@@ -1,0 +1,191 @@
+"""The suite at work: one process for each case, results on disk as they come, nothing left behind when it is stopped."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import tempfile
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from functools import cache
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from core.blind.cases import Case, scenario_of
+from core.blind.results import Result, add_result, read_results
+from core.errors import RunError
+from core.progress import Report, silent
+
+__all__ = ["code_digest", "run_case", "run_suite"]
+
+Run = Callable[[Case, Path], Result]
+_PATIENCE = 5.0
+"""A process that was told to end gets this long [s] before it is killed."""
+
+
+def run_suite(
+    folder: Path,
+    cases: Sequence[Case],
+    workers: int,
+    report: Report = silent,
+    *,
+    any_version: bool = False,
+    again: bool = False,
+    run: Run | None = None,
+) -> list[Result]:
+    """The results of all cases, in their order; those in `folder`/results.jsonl are taken from there, new ones are added to it.
+
+    Args:
+        workers: cases at the same time. any_version: whether results of other versions of the code are taken, too; without it they
+            are a RunError. again: whether cases that ended in an error are done again. run: what does one case.
+
+    Raises RunError where a result of the same name is of another case.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / "results.jsonl"
+    known = _known(file, cases, any_version, again)
+    wanted = [case for case in cases if case.name not in known]
+    done = len(cases) - len(wanted)
+    report(done / max(1, len(cases)), f"{done} of {len(cases)} were there already")
+    place = Path(tempfile.mkdtemp(prefix=".making-", dir=folder))
+    try:
+        for result in _outcomes(wanted, place, workers, run or run_case):
+            known[result.name] = result
+            add_result(file, result)
+            done += 1
+            report(done / len(cases), f"{result.name}: {result.verdict}")
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+    return [known[case.name] for case in cases]
+
+
+def run_case(case: Case, folder: Path) -> Result:
+    """Make the dataset, diagnose it without a look at the truth, and compare; nothing but the result is kept.
+
+    Whatever goes wrong on the way is a result, too: with the error, and counted as wrong.
+    """
+    from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
+    from core.diagnosis import diagnose  # noqa: PLC0415 (heavy)
+    from core.synthetic import make_dataset  # noqa: PLC0415 (heavy)
+
+    place, doing, began, seconds = folder / case.name, "making the dataset", time.monotonic(), 0.0
+    hidden: list[dict[str, Any]] = []
+    outside: list[dict[str, Any]] = []
+    try:
+        scenario = scenario_of(case)
+        made = make_dataset(place / "dataset", scenario, case.seed)
+        hidden, outside = _truth(made, scenario.size)
+        doing, began = "diagnosing it", time.monotonic()
+        said = diagnose(open_dataset(place / "dataset"), place / "run", workers=1, replays=False)
+        seconds = round(time.monotonic() - began, 1)
+    except Exception as error:  # any one: 200 cases must not end with it
+        return Result(
+            case, hidden, outside=outside, seconds=seconds, code=code_digest(), error=f"{doing}: {type(error).__name__}: {error}"
+        )
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+    from core.blind.sizes import size_over_limit  # noqa: PLC0415 (heavy)
+
+    told = said.pop("ambiguity_map", [])
+    size = size_over_limit(made.effects, told, scenario, made.camera_shift)
+    said["ambiguity_map"] = [row for row in told if row["effect"] in case.hidden]
+    return Result(case, hidden, said, outside, size, seconds, code_digest())
+
+
+@cache
+def code_digest() -> str:
+    """Of the sources that a result follows from: all of `core` but the suite itself, which may score old results anew."""
+    root = Path(__file__).parent.parent
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        if path.parent != Path(__file__).parent:
+            digest.update(f"{path.relative_to(root).as_posix()}\n".encode() + path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def _truth(made: Any, size: Sequence[float]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Hidden effects and disturbances; a camera's pose in the terms of a report."""
+    from core.blind.sizes import camera_pose  # noqa: PLC0415 (heavy)
+
+    described = made.as_dict()
+    for entry in described["effects"]:
+        if entry["effect"] == "camera_registration":
+            pose = camera_pose(made.camera_shift, size)
+            far = sum(pose[name] ** 2 for name in ("tx", "ty", "tz")) ** 0.5
+            entry["parameters"]["translation"]["value"] = far
+            entry["parameters"] |= {
+                name: {"value": value, "unit": "m" if name[0] == "t" else "rad"} for name, value in pose.items()
+            }
+    return described["effects"], described.get("disturbances", [])
+
+
+def _known(file: Path, cases: Sequence[Case], any_version: bool, again: bool) -> dict[str, Result]:
+    wanted, digest = {case.name: case for case in cases}, code_digest()
+    known: dict[str, Result] = {}
+    for result in read_results(file):
+        case = wanted.get(result.name)
+        if case is None or (again and result.error):
+            known.pop(result.name, None)
+            continue
+        if result.case != case:
+            text = f"{file}: {result.name} was {result.case}, now it is {case}; name another folder, or remove the row"
+            raise RunError(text, case=result.name)
+        if result.code != digest and not any_version:
+            text = (
+                f"{file}: {result.name} was made by version {result.code or 'unknown'} of the code, this is {digest}; "
+                "name another folder, or allow any version: the summary then says which there are"
+            )
+            raise RunError(text, case=result.name)
+        known[result.name] = result
+    return known
+
+
+def _outcomes(cases: Sequence[Case], place: Path, workers: int, run: Run) -> Iterator[Result]:
+    """Results as they come. Each case has a process of its own, so that one that dies takes no other along."""
+    context, waiting = get_context("forkserver"), deque(cases)
+    running: dict[Future[Result], tuple[Case, ProcessPoolExecutor]] = {}
+    try:
+        while waiting or running:
+            while waiting and len(running) < workers:
+                case, pool = waiting.popleft(), ProcessPoolExecutor(1, context, _begin)
+                running[pool.submit(run, case, place)] = (case, pool)
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                case, pool = running.pop(future)
+                result = _result(future, case)
+                pool.shutdown()
+                yield result
+    finally:
+        for _, pool in running.values():
+            _end(pool)
+
+
+def _result(future: Future[Result], case: Case) -> Result:
+    try:
+        return future.result()
+    except BrokenProcessPool:
+        error = "its process was ended from outside, or by running out of memory"
+    except Exception as problem:
+        error = f"{type(problem).__name__}: {problem}"
+    return Result(case, code=code_digest(), error=error)
+
+
+def _begin() -> None:
+    from core.diagnosis.workers import bound_to_parent  # noqa: PLC0415 (heavy)
+
+    bound_to_parent()
+
+
+def _end(pool: ProcessPoolExecutor) -> None:
+    """Stop what still runs, and wait until it has."""
+    processes = list((pool._processes or {}).values())
+    pool.shutdown(wait=False, cancel_futures=True)
+    for process in processes:
+        process.terminate()
+    for process in processes:
+        process.join(_PATIENCE)
+        if process.is_alive():
+            process.kill()
