@@ -2,58 +2,100 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.table import Table
 
-from app.console import out, parameters_text, progress
-from core.blind import Case, Result, all_cases, run_suite
+from app.blind_tables import TITLES, figure_text, hidden_text, named_text, target_text
+from app.console import out, progress, write_json
+from core.blind import Result, all_cases, draw_cases, run_suite, summary_of
 
 __all__ = ["blind"]
+
+CONTROLS = 10
 
 
 def blind(
     folder: Annotated[Path, typer.Option(help="Where the results go; what stands there is not done again.")] = Path("runs/blind"),
+    scenarios: Annotated[
+        int | None, typer.Option(min=1, help="Draw so many cases of all kinds; without it each effect is hidden once.")
+    ] = None,
+    kinds: Annotated[
+        str | None, typer.Option(help="Of --scenarios only these: control, clear, subtle, pair, outside, twins, modulus.")
+    ] = None,
+    effects: Annotated[str | None, typer.Option(help="Hide only these, parted by commas; all that are weighed without.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="All hidden parameters follow from it.")] = 0,
-    controls: Annotated[int, typer.Option(min=0, help="Datasets in which nothing is hidden.")] = 10,
-    workers: Annotated[int, typer.Option(min=1, help="Datasets at the same time.")] = 2,
+    controls: Annotated[
+        int | None, typer.Option(min=0, help="Cases in which nothing is hidden; 10, or a quarter of --scenarios without.")
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Cases at the same time.")] = 2,
     only: Annotated[str | None, typer.Option(help="Only cases whose name contains this.")] = None,
+    short: Annotated[bool, typer.Option("--short", help="Five sequences instead of seven: sooner done, and tells less.")] = False,
+    any_version: Annotated[bool, typer.Option("--any-version", help="Take results of other versions of the code, too.")] = False,
+    again: Annotated[bool, typer.Option("--again", help="Do those again that ended in an error.")] = False,
 ) -> None:
-    """Hide each effect once at a clear size, what no effect expresses, and nothing ten times; print what was said.
+    """Hide effects, what no effect expresses, and nothing; say how often, and how well, a diagnosis that is not told finds it.
 
-    Can be stopped and taken up again.
+    Writes results.jsonl, summary.json and report.html into the folder. Can be stopped and taken up again.
     """
-    cases = [case for case in all_cases(seed, controls) if only is None or only in case.name]
+    wanted = _parted(effects)
+    if scenarios is None:
+        if kinds is not None:
+            raise typer.BadParameter("--kinds needs --scenarios, the number of cases to draw")
+        cases = all_cases(seed, CONTROLS if controls is None else controls, wanted, short)
+    else:
+        cases = draw_cases(seed, scenarios, _parted(kinds), wanted, controls, short)
+    cases = [case for case in cases if only is None or only in case.name]
     with progress("blind suite") as report:
-        results = run_suite(folder, cases, workers, report)
-    out.print(_table(cases, results))
-    for kind in ("effects", "outside the catalogue", "controls"):
-        those = [result for result in results if _kind(result) == kind]
-        named = "" if kind == "effects" else f", a cause named in {sum(bool(result.named) for result in those)}"
-        out.print(f"{sum(result.right for result in those)} of {len(those)} {kind} right{named}", highlight=False)
+        results = run_suite(folder, cases, workers, report, any_version=any_version, again=again)
+    summary = summary_of(results, seed)
+    _write(folder, summary, results)
+    out.print(_cases(results))
+    out.print(_targets(summary["targets"]))
+    for kind, counted in summary["kinds"].items():
+        right, false = counted["right"], counted["false_name"]
+        named = f", a cause falsely named in {false['hits']}" if kind in ("control", "outside", "modulus") else ""
+        out.print(f"{TITLES[kind]}: {right['hits']} of {right['n']} right{named}", highlight=False)
+    out.print(f"{folder / 'report.html'}", highlight=False, soft_wrap=True)
 
 
-def _kind(result: Result) -> str:
-    return "outside the catalogue" if result.outside else "effects" if result.hidden else "controls"
+def _parted(text: str | None) -> list[str] | None:
+    return None if text is None else [part.strip() for part in text.split(",") if part.strip()]
 
 
-def _table(cases: list[Case], results: list[Result]) -> Table:
+def _write(folder: Path, summary: dict[str, Any], results: Sequence[Result]) -> None:
+    from app.blind_page import blind_page  # noqa: PLC0415 (heavy)
+
+    write_json(folder / "summary.json", summary)
+    aside = folder / ".report.html.part"
+    aside.write_text(blind_page(summary, results))
+    os.replace(aside, folder / "report.html")
+
+
+def _cases(results: Sequence[Result]) -> Table:
     table = Table(title="blind suite", header_style="bold")
     for column in ("case", "hidden", "verdict", "named", "gain (bound)", "reducible error removed", "time", ""):
         table.add_column(column, overflow="fold")
     for result in results:
         removed = "–" if result.removed is None else f"{100 * result.removed:.0f} %"
         table.add_row(
-            result.name, _causes(result.hidden) or result.outside or "nothing", result.verdict, _causes(result.named) or "–",
-            f"{result.gain:.0f} ({result.bound:.0f}) nats", removed, f"{result.seconds:.0f} s",
-            "[green]✓[/]" if result.right else "[red]✗[/]",
+            result.name, hidden_text(result), result.verdict, named_text(result), f"{result.gain:.0f} ({result.bound:.0f}) nats",
+            removed, f"{result.seconds:.0f} s", "[green]✓[/]" if result.right else "[red]✗[/]",
         )  # fmt: skip
-    if len(results) < len(cases):
-        table.caption = f"{len(cases) - len(results)} cases without a result"
     return table
 
 
-def _causes(causes: list[dict[str, Any]]) -> str:
-    return "; ".join(f"{cause['effect']}: {parameters_text(cause)}" for cause in causes)
+def _targets(targets: Sequence[dict[str, Any]]) -> Table:
+    """Those that these cases say something about."""
+    table = Table(title="targets", header_style="bold")
+    for column in ("", "target", "reached", "95 % interval", ""):
+        table.add_column(column, overflow="fold")
+    for one in targets:
+        if one["met"] is not None:
+            mark = "[green]✓[/]" if one["met"] else "[red]✗[/]"
+            table.add_row(one["text"], target_text(one), *figure_text(one["reached"], one["unit"]), mark)
+    return table

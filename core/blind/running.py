@@ -18,6 +18,7 @@ from typing import Any
 from core.blind.cases import Case, scenario_of
 from core.blind.results import Result, add_result, read_results
 from core.errors import RunError
+from core.processes import bound_to_parent
 from core.progress import Report, silent
 
 __all__ = ["code_digest", "run_case", "run_suite"]
@@ -147,11 +148,12 @@ def _known(file: Path, cases: Sequence[Case], any_version: bool, again: bool) ->
 def _outcomes(cases: Sequence[Case], place: Path, workers: int, run: Run) -> Iterator[Result]:
     """Results as they come. Each case has a process of its own, so that one that dies takes no other along."""
     context, waiting = get_context("forkserver"), deque(cases)
+    context.set_forkserver_preload(["core.blind"])
     running: dict[Future[Result], tuple[Case, ProcessPoolExecutor]] = {}
     try:
         while waiting or running:
             while waiting and len(running) < workers:
-                case, pool = waiting.popleft(), ProcessPoolExecutor(1, context, _begin)
+                case, pool = waiting.popleft(), ProcessPoolExecutor(1, context, bound_to_parent)
                 running[pool.submit(run, case, place)] = (case, pool)
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 case, pool = running.pop(future)
@@ -171,12 +173,6 @@ def _result(future: Future[Result], case: Case) -> Result:
     except Exception as problem:
         error = f"{type(problem).__name__}: {problem}"
     return Result(case, code=code_digest(), error=error)
-
-
-def _begin() -> None:
-    from core.diagnosis.workers import bound_to_parent  # noqa: PLC0415 (heavy)
-
-    bound_to_parent()
 
 
 def _end(pool: ProcessPoolExecutor) -> None:

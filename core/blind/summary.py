@@ -101,8 +101,8 @@ def _pairs(results: Sequence[Result]) -> dict[str, int]:
     for result in results:
         if result.case.kind == "pair":
             hits = len(result.truth & set(result.named))
-            extra = ", and more" if set(result.named) - result.truth else ""
-            found[f"{('none', 'one', 'both')[hits]} named{extra}"] += 1
+            extra = ", and another" if set(result.named) - result.truth else ""
+            found[f"{('neither', 'one', 'both')[hits]} named{extra}"] += 1
     return dict(found)
 
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import ctypes
 import multiprocessing
 import os
-import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from types import TracebackType
@@ -15,23 +13,16 @@ from core.diagnosis.comparison import Sample
 from core.diagnosis.observations import Observations
 from core.diagnosis.prediction import Prediction, Wanted, predict
 from core.meshing import Meshing
+from core.processes import bound_to_parent
 from core.replay import Equilibrium
 from core.setup import Setup
 
-__all__ = ["Workers", "bound_to_parent"]
+__all__ = ["Workers"]
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-_DIE_WITH_PARENT = 1
 P = ParamSpec("P")
 T = TypeVar("T")
 _DATA: dict[str, Observations] = {}
-
-
-def bound_to_parent() -> None:
-    """Leave Ctrl-C to the process that started this one, and end with it (Linux)."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if hasattr(ctypes, "CDLL") and os.name == "posix" and os.uname().sysname == "Linux":
-        ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGTERM)
 
 
 def _begin(data: Sequence[Observations]) -> None:

@@ -1,0 +1,40 @@
+"""What a case of the blind suite may do in its process: picklable, and at once."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+from core.blind import Case, Result
+from core.blind.running import code_digest
+
+NOTHING = {
+    "verdict": "none", "causes": [], "ranking": [], "not_identifiable": [], "gain": None,
+    "evidence": {"gain_nats": 0.0, "bound_nats": 25.0},
+}  # fmt: skip
+
+
+def finish(case: Case, folder: Path) -> Result:
+    """A case in which nothing is found."""
+    return Result(case, report=NOTHING, code=code_digest())
+
+
+def finish_or_die(case: Case, folder: Path) -> Result:
+    """Ends its own process as one without memory is ended, if its name says so."""
+    if "dies" in case.name:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return finish(case, folder)
+
+
+def finish_or_wait(case: Case, folder: Path) -> Result:
+    """Waits for a minute, if its name says so, and leaves its process number beside the folder; others end once it does."""
+    note = folder.parent / "waits.pid"
+    if "waits" in case.name:
+        note.with_suffix(".part").write_text(str(os.getpid()))
+        note.with_suffix(".part").rename(note)
+        time.sleep(60.0)
+    while not note.exists():
+        time.sleep(0.01)
+    return finish(case, folder)

@@ -1,0 +1,137 @@
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+
+from core.blind import KINDS, MIX, Case, all_cases, draw_cases, scenario_of
+from core.blind.cases import ALIKE
+from core.effects import DIAGNOSED, OUTSIDE
+from core.errors import RunError
+from core.synthetic import DISTURBANCES, HIDDEN, SHORT_PROTOCOL, WEIGHED
+
+
+def effects_of(cases: list[Case]) -> list[str]:
+    return [case.hidden[0] for case in cases if case.kind == "clear"]
+
+
+def test_small_suite_hides_every_effect_that_is_weighed_and_every_disturbance_once_and_nothing_ten_times() -> None:
+    cases = all_cases(seed=3)
+    assert [case.hidden for case in cases if case.hidden] == [(name,) for name in (*WEIGHED, *DISTURBANCES)]
+    assert sum(case.kind == "control" for case in cases) == 10
+    assert len({case.name for case in cases}) == len({case.seed for case in cases}) == len(cases)
+
+
+def test_other_effects_are_hidden_where_they_are_asked_for_and_leave_the_cases_of_the_rest_alone() -> None:
+    everything = all_cases(seed=3, effects=list(HIDDEN))
+    assert effects_of(everything) == list(HIDDEN)
+    assert {case for case in all_cases(seed=3) if case.kind != "outside"} <= set(everything)
+    assert len({case.seed for case in everything}) == len(everything)
+    with pytest.raises(RunError, match="cannot hide moon; it knows poisson_ratio"):
+        all_cases(seed=3, effects=["moon"])
+
+
+def test_bench_and_diagnosis_list_the_same_effects_as_weighed() -> None:
+    assert tuple(effect.name for effect in DIAGNOSED if effect not in OUTSIDE) == WEIGHED
+
+
+def test_drawn_suite_has_its_mix() -> None:
+    assert sum(MIX.values()) == pytest.approx(1.0) and set(MIX) == set(KINDS)
+    cases = draw_cases(5, 200)
+    counted = Counter(case.kind for case in cases)
+    assert {kind: counted[kind] for kind in KINDS} == {kind: round(200 * MIX[kind]) for kind in KINDS}
+    assert counted["control"] == 50
+    assert len({case.name for case in cases}) == len({case.seed for case in cases}) == 200
+
+
+def test_larger_suite_begins_with_the_smaller_one_and_another_seed_is_another_suite() -> None:
+    assert draw_cases(5, 200)[:30] == draw_cases(5, 30)
+    assert not set(draw_cases(5, 30)) & set(draw_cases(6, 30))
+
+
+def test_each_effect_comes_once_before_any_comes_again() -> None:
+    drawn = effects_of(draw_cases(5, 2 * len(WEIGHED), kinds=["clear"]))
+    assert sorted(drawn[: len(WEIGHED)]) == sorted(drawn[len(WEIGHED) :]) == sorted(WEIGHED)
+    pairs = [case.hidden for case in draw_cases(5, 30, kinds=["pair"])]
+    assert len(set(pairs)) == 30 and all(len(set(pair)) == 2 for pair in pairs)
+
+
+def test_kinds_effects_and_controls_are_as_asked_for() -> None:
+    cases = draw_cases(5, 20, kinds=["pair", "clear"], effects=["gravity", "tool_radius"])
+    assert {case.kind for case in cases} == {"pair", "clear"}
+    assert {name for case in cases for name in case.hidden} == {"gravity", "tool_radius"}
+    assert Counter(case.kind for case in draw_cases(5, 20, kinds=["clear"], controls=5)) == {"clear": 15, "control": 5}
+    assert {case.hidden[0] for case in draw_cases(5, 10, kinds=["twins"])} <= set(ALIKE)
+
+
+@pytest.mark.parametrize(
+    ("asked", "says"),
+    [
+        ({"kinds": ["moon"]}, "no kind of case is called 'moon'; known are control, clear"),
+        ({"effects": ["moon"]}, "cannot hide moon"),
+        ({"controls": 21}, "21 controls are more than the 20 scenarios"),
+        ({"kinds": ["twins"], "effects": ["gravity"]}, "gravity gives no case of the kind twins"),
+        ({"kinds": ["pair"], "effects": ["gravity"]}, "gravity gives no case of the kind pair"),
+        ({"kinds": ["control"], "controls": 3}, "no kind of case is left"),
+    ],
+)
+def test_what_cannot_be_drawn_is_said(asked: dict[str, list[str]], says: str) -> None:
+    with pytest.raises(RunError, match=says):
+        draw_cases(5, 20, **asked)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("effect", HIDDEN)
+def test_case_hides_its_effect_and_the_same_one_each_time(effect: str) -> None:
+    case = Case("case", 7, "clear", (effect,))
+    scenario = scenario_of(case)
+    assert [hidden.effect for hidden in scenario.effects] == [effect]
+    assert scenario == scenario_of(case)
+    assert scenario != scenario_of(Case("case", 8, "clear", (effect,)))
+
+
+def test_case_hides_the_same_whatever_else_is_weighed() -> None:
+    cases = all_cases(7, 0, ["gravity", "poisson_ratio"])
+    drawn = {case.hidden[0]: dict(scenario_of(case).effects[0].parameters) for case in cases}
+    assert drawn == {"gravity": {"specific_weight_over_stiffness": 2.54}, "poisson_ratio": {"nu": 0.293}}
+
+
+def test_subtle_case_hides_a_third_of_a_clear_one() -> None:
+    clear, subtle = (scenario_of(Case("case", 7, kind, ("time_offset",))).effects[0] for kind in ("clear", "subtle"))
+    assert subtle.value("offset") == pytest.approx(clear.value("offset") / 3, abs=1e-6)
+
+
+def test_control_hides_nothing() -> None:
+    scenario = scenario_of(Case("control", 1, "control"))
+    assert scenario.effects == () and scenario.disturbances == ()
+
+
+def test_pair_hides_both() -> None:
+    scenario = scenario_of(Case("case", 7, "pair", ("gravity", "tool_radius")))
+    assert {hidden.effect for hidden in scenario.effects} == {"gravity", "tool_radius"}
+
+
+@pytest.mark.parametrize("name", DISTURBANCES)
+def test_case_outside_the_catalogue_hides_no_effect(name: str) -> None:
+    scenario = scenario_of(Case("case", 7, "outside", (name,)))
+    assert scenario.effects == () and [one.name for one in scenario.disturbances] == [name]
+
+
+def test_offset_among_look_alikes_is_vertical_and_as_long() -> None:
+    clear, twin = (scenario_of(Case("case", 7, kind, ("tool_offset",))).effects[0] for kind in ("clear", "twins"))
+    length = sum(clear.value(name) ** 2 for name in ("dx", "dy", "dz")) ** 0.5
+    assert (twin.value("dx"), twin.value("dy")) == (0.0, 0.0)
+    assert twin.value("dz") * clear.value("dz") > 0 and abs(twin.value("dz")) == pytest.approx(length, abs=1e-5)
+
+
+def test_modulus_alone_differs_from_what_is_believed_by_a_quarter_or_more() -> None:
+    for case in draw_cases(5, 10, kinds=["modulus"]):
+        scenario = scenario_of(case)
+        assert [hidden.effect for hidden in scenario.effects] == ["young_modulus"]
+        assert not 0.75 < scenario.true_modulus / scenario.young_modulus < 1.25
+
+
+def test_short_case_records_fewer_sequences_of_the_same() -> None:
+    (long,), (short,) = (draw_cases(5, 1, short=short) for short in (False, True))
+    assert scenario_of(short).sequences == SHORT_PROTOCOL != scenario_of(long).sequences
+    assert scenario_of(short).effects == scenario_of(long).effects
+    assert Case.from_json(short.to_json()) == short

@@ -1,0 +1,73 @@
+"""Sizes over the detection limit, from maps as a report has them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from core.blind.sizes import camera_pose, size_over_limit
+from core.effects.sensor import CameraRegistration
+from core.frames import Transform
+from core.setup import Box, Setup, Tool
+from core.synthetic import HiddenEffect, Scenario
+
+
+def row(effect: str, *limits: dict[str, Any], typical: dict[str, Any] | None = None, at: dict[str, float] | None = None) -> Any:
+    fixed = {name: {"value": value, "unit": "1"} for name, value in (at or {}).items()}
+    return {"effect": effect, "limits": list(limits), "typical": typical or limits[0], "at": fixed, "alike": []}
+
+
+def size(hidden: HiddenEffect, told: Any, shift: Transform | None = None) -> float | None:
+    return size_over_limit([hidden], [told], Scenario(), shift or Transform())
+
+
+def test_change_is_counted_from_what_is_believed() -> None:
+    told = row("tool_radius", {"parameter": "radius", "unit": "m", "change": 0.5e-3})
+    assert size(HiddenEffect("tool_radius", {"radius": 3.5e-3}), told) == pytest.approx(3.0)
+
+
+def test_several_parameters_add_up_as_squares_and_what_is_never_seen_adds_nothing() -> None:
+    limits = [{"parameter": name, "unit": "m", "change": change} for name, change in (("dx", 1e-3), ("dy", None), ("dz", 0.5e-3))]
+    offset = HiddenEffect("tool_offset", {"dx": 3e-3, "dy": 9e-3, "dz": -2e-3})
+    assert size(offset, row("tool_offset", *limits)) == pytest.approx(5.0)
+
+
+def test_lump_is_measured_by_the_limit_of_half_of_the_places_and_by_its_logarithm() -> None:
+    best, typical = ({"parameter": "stiffness_ratio", "unit": "1", "factor": factor} for factor in (1.5, 2.0))
+    lump = HiddenEffect("stiff_inclusion", {"x": 0.0, "y": 0.0, "z": 0.025, "radius": 7e-3, "stiffness_ratio": 8.0})
+    assert size(lump, row("stiff_inclusion", best, typical=typical)) == pytest.approx(3.0, abs=1e-3)
+
+
+def test_share_gives_a_size_only_where_the_surface_moves_in_proportion() -> None:
+    sag = row("gravity", {"share": 0.25}, at={"specific_weight_over_stiffness": 1.5})
+    assert size(HiddenEffect("gravity", {"specific_weight_over_stiffness": 3.0}), sag) == pytest.approx(8.0)
+    slip = row("base_slip", {"share": 0.01}, at={"friction_coefficient": 0.08})
+    assert size(HiddenEffect("base_slip", {"friction_coefficient": 0.1}), slip) is None
+
+
+def test_nothing_and_two_effects_have_no_size() -> None:
+    told = [row("tool_radius", {"parameter": "radius", "unit": "m", "change": 0.5e-3})]
+    one = HiddenEffect("tool_radius", {"radius": 3.5e-3})
+    assert size_over_limit([], told, Scenario(), Transform()) is None
+    assert size_over_limit([one, one], told, Scenario(), Transform()) is None
+    assert size_over_limit([one], [], Scenario(), Transform()) is None
+
+
+def test_camera_pose_is_the_motion_that_a_diagnosis_fits() -> None:
+    setup = Setup(geometry=Box(size=Scenario().size), tool=Tool(radius=5e-3))
+    fitted = {"tx": 1e-3, "ty": -2e-3, "tz": 5e-4, "rx": 0.02, "ry": -0.01, "rz": 0.03}
+    pose = camera_pose(CameraRegistration(**fitted).shift(setup), Scenario().size)
+    assert pose == pytest.approx(fitted, abs=1e-12)
+
+
+def test_cameras_size_is_of_its_whole_pose() -> None:
+    limits = [{"parameter": f"t{axis}", "unit": "m", "change": 1e-3} for axis in "xyz"]
+    limits += [{"parameter": f"r{axis}", "unit": "rad", "change": 0.02} for axis in "xyz"]
+    hidden = HiddenEffect("camera_registration", {"translation": 3e-3, "rotation": 0.0})
+    shift = Transform.from_vector(3e-3 * np.array([2.0, 1.0, 2.0]) / 3, np.zeros(3))
+    assert size(hidden, row("camera_registration", *limits), shift) == pytest.approx(3.0, abs=1e-3)
+    turned = Transform.from_vector(np.zeros(3), [0.0, 0.0, 0.04])
+    assert size(hidden, row("camera_registration", *limits), turned) == pytest.approx(math.hypot(0.0, 2.0), abs=1e-3)
