@@ -6,11 +6,12 @@ import os
 import signal
 import time
 from pathlib import Path
+from typing import Any
 
 from core.blind import Case, Result
 from core.blind.running import code_digest
 
-NOTHING = {
+NOTHING: dict[str, Any] = {
     "verdict": "none", "causes": [], "ranking": [], "not_identifiable": [], "gain": None,
     "evidence": {"gain_nats": 0.0, "bound_nats": 25.0},
 }  # fmt: skip

@@ -33,7 +33,7 @@ def result(
     names = tuple(hidden.split())
     entries = {key: {"value": value, "unit": "" if isinstance(value, str) else "m"} for key, value in (truth or {}).items()}
     effects = [] if kind == "outside" else [{"effect": one, "parameters": entries} for one in names]
-    report = {
+    report: dict[str, Any] = {
         "verdict": verdict, "causes": causes or [], "not_identifiable": UNTOLD if untold else [],
         "ranking": [{"effect": one, "probability": chance, "gain_nats": 3.0} for one, chance in (ranking or {}).items()],
         "evidence": {"gain_nats": 60.0, "bound_nats": 25.0}, "gain": None,

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from app.blind_tables import TITLES, figure_text, hidden_text, named_text, target_text
 from app.console import out, progress, write_json
-from core.blind import Result, all_cases, draw_cases, run_suite, summary_of
+from core.blind import Result, all_cases, draw_cases, known_results, run_suite, summary_of
 
 __all__ = ["blind"]
 
@@ -36,6 +36,9 @@ def blind(
     only: Annotated[str | None, typer.Option(help="Only cases whose name contains this.")] = None,
     short: Annotated[bool, typer.Option("--short", help="Five sequences instead of seven: sooner done, and tells less.")] = False,
     any_version: Annotated[bool, typer.Option("--any-version", help="Take results of other versions of the code, too.")] = False,
+    score: Annotated[
+        bool, typer.Option("--score", help="Run nothing: score what is there, also of a suite that still runs.")
+    ] = False,
     again: Annotated[bool, typer.Option("--again", help="Do those again that ended in an error.")] = False,
 ) -> None:
     """Hide effects, what no effect expresses, and nothing; say how often, and how well, a diagnosis that is not told finds it.
@@ -50,9 +53,12 @@ def blind(
     else:
         cases = draw_cases(seed, scenarios, _parted(kinds), wanted, controls, short)
     cases = [case for case in cases if only is None or only in case.name]
-    with progress("blind suite") as report:
-        results = run_suite(folder, cases, workers, report, any_version=any_version, again=again)
-    summary = summary_of(results, seed)
+    if score:
+        results = known_results(folder, cases, any_version)
+    else:
+        with progress("blind suite") as report:
+            results = run_suite(folder, cases, workers, report, any_version=any_version, again=again)
+    summary = summary_of(results, seed, missing=len(cases) - len(results))
     _write(folder, summary, results)
     out.print(_cases(results))
     out.print(_targets(summary["targets"]))

@@ -147,8 +147,8 @@ class Result:
         return cls(**{**data, "case": Case.from_json(data["case"])})
 
 
-def read_results(file: Path) -> list[Result]:
-    """All whole rows; a last one that is torn, as a kill while writing leaves it, is cut off the file and so done again.
+def read_results(file: Path, mend: bool = False) -> list[Result]:
+    """All whole rows; a last one that is torn, as a kill while writing leaves it, does not count. `mend` cuts it off the file.
 
     RunError for any other row that is not a result.
     """
@@ -161,7 +161,8 @@ def read_results(file: Path) -> list[Result]:
             results.append(Result.from_json(json.loads(line)))
         except (ValueError, TypeError, KeyError) as error:
             if number == len(lines):
-                _rewrite(file, lines[:-1])
+                if mend:
+                    _rewrite(file, lines[:-1])
                 break
             text = f"{file}, row {number} is not a result of this suite ({error}); remove the row to have it done again"
             raise RunError(text, row=number) from error

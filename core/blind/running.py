@@ -21,9 +21,10 @@ from core.errors import RunError
 from core.processes import bound_to_parent
 from core.progress import Report, silent
 
-__all__ = ["code_digest", "run_case", "run_suite"]
+__all__ = ["code_digest", "known_results", "run_case", "run_suite"]
 
 Run = Callable[[Case, Path], Result]
+_FILE = "results.jsonl"
 _PATIENCE = 5.0
 """A process that was told to end gets this long [s] before it is killed."""
 
@@ -47,8 +48,9 @@ def run_suite(
     Raises RunError where a result of the same name is of another case.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    file = folder / "results.jsonl"
-    known = _known(file, cases, any_version, again)
+    file = folder / _FILE
+    read_results(file, mend=True)
+    known = {one.name: one for one in known_results(folder, cases, any_version) if not (again and one.error)}
     wanted = [case for case in cases if case.name not in known]
     done = len(cases) - len(wanted)
     report(done / max(1, len(cases)), f"{done} of {len(cases)} were there already")
@@ -62,6 +64,28 @@ def run_suite(
     finally:
         shutil.rmtree(place, ignore_errors=True)
     return [known[case.name] for case in cases]
+
+
+def known_results(folder: Path, cases: Sequence[Case], any_version: bool = False) -> list[Result]:
+    """Those of these cases that are done, in their order; of two of one name the later. RunError as from `run_suite`."""
+    file = folder / _FILE
+    wanted, digest = {case.name: case for case in cases}, code_digest()
+    known: dict[str, Result] = {}
+    for result in read_results(file):
+        case = wanted.get(result.name)
+        if case is None:
+            continue
+        if result.case != case:
+            text = f"{file}: {result.name} was {result.case}, now it is {case}; name another folder, or remove the row"
+            raise RunError(text, case=result.name)
+        if result.code != digest and not any_version:
+            text = (
+                f"{file}: {result.name} was made by version {result.code or 'unknown'} of the code, this is {digest}; "
+                "name another folder, or allow any version: the summary then says which there are"
+            )
+            raise RunError(text, case=result.name)
+        known[result.name] = result
+    return [known[case.name] for case in cases if case.name in known]
 
 
 def run_case(case: Case, folder: Path) -> Result:
@@ -122,27 +146,6 @@ def _truth(made: Any, size: Sequence[float]) -> tuple[list[dict[str, Any]], list
                 name: {"value": value, "unit": "m" if name[0] == "t" else "rad"} for name, value in pose.items()
             }
     return described["effects"], described.get("disturbances", [])
-
-
-def _known(file: Path, cases: Sequence[Case], any_version: bool, again: bool) -> dict[str, Result]:
-    wanted, digest = {case.name: case for case in cases}, code_digest()
-    known: dict[str, Result] = {}
-    for result in read_results(file):
-        case = wanted.get(result.name)
-        if case is None or (again and result.error):
-            known.pop(result.name, None)
-            continue
-        if result.case != case:
-            text = f"{file}: {result.name} was {result.case}, now it is {case}; name another folder, or remove the row"
-            raise RunError(text, case=result.name)
-        if result.code != digest and not any_version:
-            text = (
-                f"{file}: {result.name} was made by version {result.code or 'unknown'} of the code, this is {digest}; "
-                "name another folder, or allow any version: the summary then says which there are"
-            )
-            raise RunError(text, case=result.name)
-        known[result.name] = result
-    return known
 
 
 def _outcomes(cases: Sequence[Case], place: Path, workers: int, run: Run) -> Iterator[Result]:

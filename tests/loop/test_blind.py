@@ -1,32 +1,27 @@
-"""The whole loop, blind: an effect drawn at a fresh seed has to be named, and nothing where nothing is hidden."""
+"""The short form of the blind suite: an effect drawn at a fresh seed has to be named, and nothing where nothing is hidden."""
 
 from __future__ import annotations
 
 import secrets
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-from core.dataset import open_dataset
-from core.diagnosis import diagnose
-from core.synthetic import SHORT_PROTOCOL, Scenario, draw_scenario, make_dataset
+from app.blind_page import blind_page
+from core.blind import draw_cases, run_suite, summary_of
 
 
-def _diagnosed(scenario: Scenario, seed: int, folder: Path) -> dict[str, Any]:
-    make_dataset(folder / "hidden", replace(scenario, sequences=SHORT_PROTOCOL), seed, workers=2)
-    return diagnose(open_dataset(folder / "hidden"), folder / "run", workers=2, replays=False)
-
-
-def test_effect_of_a_fresh_seed_is_named(tmp_path: Path) -> None:
+def test_effect_of_a_fresh_seed_is_named_and_nothing_where_nothing_is_hidden(tmp_path: Path) -> None:
     seed = secrets.randbelow(1_000_000)
-    scenario = draw_scenario(seed)
-    print(f"seed {seed}: {scenario.effects}")  # noqa: T201 (a failure must be repeatable)
-    report = _diagnosed(scenario, seed, tmp_path)
-    assert report["verdict"] == "found", f"seed {seed}: {report['verdict']}"
-    assert {cause["effect"] for cause in report["causes"]} == {effect.effect for effect in scenario.effects}, f"seed {seed}"
-
-
-def test_control_without_any_effect_names_none(tmp_path: Path) -> None:
-    report = _diagnosed(Scenario(), 11, tmp_path)
-    assert report["verdict"] == "none"
-    assert report["causes"] == []
+    fresh = draw_cases(seed, 1, kinds=["clear"], short=True)
+    control = draw_cases(11, 1, kinds=["control"], short=True)
+    cases = [*fresh, *control]
+    print(f"seed {seed}: {fresh}")  # noqa: T201 (a failure must be repeatable)
+    results = run_suite(tmp_path, cases, workers=2)
+    found, nothing = results
+    assert not found.error and not nothing.error, f"seed {seed}: {found.error}{nothing.error}"
+    assert found.right, f"seed {seed}: {found.verdict}, {found.named} where {found.hidden} is hidden"
+    assert (nothing.verdict, nothing.causes) == ("none", [])
+    assert found.report["gain"]["noise_floor"] > 0 and found.probabilities[found.named[0]] > 0.5
+    summary = summary_of(results, seed)
+    assert [summary["kinds"][kind]["right"]["hits"] for kind in ("clear", "control")] == [1, 1]
+    assert "2 of 2 cases right" in blind_page(summary, results)
+    assert [path.name for path in tmp_path.iterdir()] == ["results.jsonl"]

@@ -101,7 +101,8 @@ def test_last_row_that_was_torn_is_cut_off(tmp_path: Path) -> None:
     add_result(file, result("control", name="a"))
     whole = file.read_text()
     file.write_text(whole + whole[:40])
-    assert [one.name for one in read_results(file)] == ["a"]
+    assert [one.name for one in read_results(file)] == ["a"] and file.read_text() != whole
+    assert [one.name for one in read_results(file, mend=True)] == ["a"] and file.read_text() == whole
     add_result(file, result("control", name="b"))
     assert [one.name for one in read_results(file)] == ["a", "b"]
 

@@ -41,6 +41,15 @@ def test_case_that_raises_is_a_result_with_its_error(tmp_path: Path) -> None:
     assert not one.right
 
 
+def test_row_that_was_torn_is_done_again(tmp_path: Path) -> None:
+    run_suite(tmp_path, [control("a")], workers=1, run=blind_processes.finish)
+    file = tmp_path / "results.jsonl"
+    file.write_text(file.read_text() + file.read_text()[:60])
+    found = run_suite(tmp_path, [control("a"), control("b")], workers=1, run=blind_processes.finish)
+    assert [one.name for one in found] == ["a", "b"]
+    assert [json.loads(line)["case"]["name"] for line in file.read_text().splitlines()] == ["a", "b"]
+
+
 def test_process_that_dies_takes_no_other_along(tmp_path: Path) -> None:
     cases = [control("dies"), *(control(name) for name in "abc")]
     found = run_suite(tmp_path, cases, workers=2, run=blind_processes.finish_or_die)

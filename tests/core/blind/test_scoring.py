@@ -62,7 +62,8 @@ def test_direction_comes_round_at_half_a_turn() -> None:
 
 
 def inclusion(x: float, y: float, z: float, at: tuple[float, float, float], name: str) -> Result:
-    named = cause("stiff_inclusion", **{key: (v, v - 1e-3, v + 1e-3) for key, v in zip("xyz", (x, y, z), strict=True)})
+    said = {key: (value, value - 1e-3, value + 1e-3) for key, value in zip("xyz", (x, y, z), strict=True)}
+    named = cause("stiff_inclusion", 0.99, **said)
     truth = dict(zip("xyz", at, strict=True))
     return result("clear", "stiff_inclusion", "found", [named], name=name, truth=truth)
 
