@@ -20,6 +20,8 @@ __all__ = ["camera_pose", "size_over_limit"]
 
 _PROPORTIONAL = ("specific_weight_over_stiffness", "compliance_times_stiffness", "log_ratio")
 """Parameters in proportion to which the surface moves, so that a share of what one size does is that share of the size."""
+_INVERSE = ("J_m", "stiffness_over_E")
+"""The same of their inverse: they are nothing where they are infinite."""
 
 
 def size_over_limit(
@@ -68,9 +70,11 @@ def _part(
     neutral: Mapping[str, float | str],
 ) -> float | None:
     if "share" in limit:
-        name = next((name for name in at if name in _PROPORTIONAL), None)
-        if name is None or limit["share"] is None or len(at) > 1:
+        name = next(iter(at), "")
+        if name not in (*_PROPORTIONAL, *_INVERSE) or limit["share"] is None or len(at) > 1:
             return None
+        if name in _INVERSE:
+            return float(at[name]["value"] / true[name]) / float(limit["share"])
         here, there = true[name] - float(neutral[name]), at[name]["value"] - float(neutral[name])
         return float(abs(here / there)) / float(limit["share"])
     item = next(item for item in effect.numbers() if item.name == limit["parameter"])

@@ -44,6 +44,8 @@ def test_lump_is_measured_by_the_limit_of_half_of_the_places_and_by_its_logarith
 def test_share_gives_a_size_only_where_the_surface_moves_in_proportion() -> None:
     sag = row("gravity", {"share": 0.25}, at={"specific_weight_over_stiffness": 1.5})
     assert size(HiddenEffect("gravity", {"specific_weight_over_stiffness": 3.0}), sag) == pytest.approx(8.0)
+    stiffening = row("strain_stiffening", {"share": 0.5}, at={"J_m": 6.0})
+    assert size(HiddenEffect("strain_stiffening", {"J_m": 1.5}), stiffening) == pytest.approx(8.0)
     slip = row("base_slip", {"share": 0.01}, at={"friction_coefficient": 0.08})
     assert size(HiddenEffect("base_slip", {"friction_coefficient": 0.1}), slip) is None
 
