@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import shutil
 import tempfile
 import time
@@ -18,7 +19,7 @@ from typing import Any
 from core.blind.cases import Case, scenario_of
 from core.blind.results import Result, add_result, read_results
 from core.errors import RunError
-from core.processes import bound_to_parent
+from core.processes import bound_to
 from core.progress import Report, silent
 
 __all__ = ["code_digest", "known_results", "run_case", "run_suite"]
@@ -156,7 +157,7 @@ def _outcomes(cases: Sequence[Case], place: Path, workers: int, run: Run) -> Ite
     try:
         while waiting or running:
             while waiting and len(running) < workers:
-                case, pool = waiting.popleft(), ProcessPoolExecutor(1, context, bound_to_parent)
+                case, pool = waiting.popleft(), ProcessPoolExecutor(1, context, bound_to, (os.getpid(),))
                 running[pool.submit(run, case, place)] = (case, pool)
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 case, pool = running.pop(future)

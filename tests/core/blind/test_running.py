@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +19,8 @@ from core.blind import Case, run_suite
 from core.blind.results import add_result
 from core.blind.running import code_digest
 from core.errors import Cancelled, RunError
+
+TESTS = Path(blind_processes.__file__).parent
 
 
 def control(name: str) -> Case:
@@ -95,6 +99,22 @@ def test_stopped_suite_keeps_what_is_done_and_leaves_no_process_behind(tmp_path:
     assert _gone(waiting)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["results.jsonl", "waits.pid"]
     assert len((tmp_path / "results.jsonl").read_text().splitlines()) == 1
+
+
+def test_suite_that_is_killed_leaves_no_process_behind(tmp_path: Path) -> None:
+    suite = (
+        "from pathlib import Path; import sys, blind_processes; from core.blind import Case, run_suite\n"
+        "if __name__ == '__main__':\n"
+        "    run_suite(Path(sys.argv[1]), [Case('waits', 1, 'control')], 1, run=blind_processes.finish_or_wait)\n"
+    )
+    (tmp_path / "suite.py").write_text(suite)
+    searched = os.pathsep.join(str(path) for path in (TESTS, TESTS.parent))
+    with subprocess.Popen([sys.executable, tmp_path / "suite.py", tmp_path], env=os.environ | {"PYTHONPATH": searched}) as started:
+        while not (tmp_path / "waits.pid").exists():
+            assert started.poll() is None
+            time.sleep(0.05)
+        started.kill()
+    assert _gone(int((tmp_path / "waits.pid").read_text()))
 
 
 def _gone(pid: int) -> bool:
