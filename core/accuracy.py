@@ -9,13 +9,14 @@ the error up to ten times.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from core.fem.newton import Outcome
 from core.frames import FloatArray
 from core.memory import refuse_memory
+from core.mesh import meshing_for
 from core.meshing import Meshing
 from core.progress import Report, silent
 from core.replay import Equilibrium, Replay
@@ -64,7 +65,8 @@ def mesh_errors(setup: Setup, frames: Sequence[Equilibrium], grid: Meshing, *, r
     A touch that finds no equilibrium on the finer grid is left out: `hardest_frames` tells how many there are.
     """
     refuse_memory(setup.material, "the mesh's error is estimated in single frames, which do not know those before;")
-    block, points = Replay(setup, grid.finer()), setup.geometry.surface_points()
+    finer = meshing_for(setup, grid).finer()
+    block, points = Replay(replace(setup, element_size=None), finer), setup.geometry.surface_points()
     found = []
     keys = hardest_frames(frames)
     for done, number in enumerate(keys):

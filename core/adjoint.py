@@ -30,7 +30,7 @@ from core.instants import Instant, instants_of, tool_shifts
 from core.memory import History, Memory
 from core.memory_adjoint import MemoryStep, added, nothing
 from core.replay import Equilibrium, Replay
-from core.sensitivity import GivingTool, gives, local_probe, same_body, tool_slopes
+from core.sensitivity import GivingTool, gives, local_probe, mesh_in, refuse_other_grid, same_body, tool_slopes
 from core.setup import Setup
 from core.slide_adjoint import SlideStep
 
@@ -56,14 +56,14 @@ class _Body:
     """A setup's block, put back to any instant."""
 
     def __init__(self, block: Replay, setup: Setup) -> None:
-        self.setup, self.memory = setup, Memory.of(setup, block.grid, block.free.mesh)
+        self.block, self.setup, self.memory = block, setup, Memory.of(setup, block.grid, block.free.mesh)
 
     def begin(self, instant: Instant) -> BlockModel:
         """The model in the step that leads there."""
         frame, memory = instant.frame, self.memory
-        model = BlockModel(self.setup, frame.mesh, dense=frame.dense)
+        model = BlockModel(self.setup, mesh_in(self.block, self.setup, frame), dense=frame.dense)
         model.harden(frame.hardness)
-        model.expect(_positions(frame), (local_probe(frame),))
+        model.expect(model.mesh.nodes + frame.displacement, (local_probe(frame),))
         if memory is not None and instant.past is not None:
             memory.history = instant.past
             if instant.time is None:
@@ -75,7 +75,8 @@ class _Body:
 
     def find(self, instant: Instant, probe: Probe, past: Past | None) -> _Found:
         """With the tool here, and with friction with this beginning of the step."""
-        model, positions = self.begin(instant), _positions(instant.frame)
+        model = self.begin(instant)
+        positions = model.mesh.nodes + instant.frame.displacement
         if past is not None:
             model.grip = renewed(model, positions, probe, past, self.setup.tool.friction_coefficient)
         ways = None if model.grip is None else hold_of(model, positions, probe, model.grip).ways
@@ -87,6 +88,7 @@ class _Body:
 def _check(block: Replay, frames: Sequence[Equilibrium], setups: Sequence[Setup]) -> None:
     """Raise SetupError for what this does not go through."""
     material, tool = block.setup.material, block.setup.tool
+    refuse_other_grid(block, setups)
     for setup in (block.setup, *setups):
         if setup.tool.friction_coefficient and not tool.friction_coefficient:
             raise SetupError("a change adds friction that the block does not have; give it a little", key="friction_coefficient")
@@ -97,6 +99,9 @@ def _check(block: Replay, frames: Sequence[Equilibrium], setups: Sequence[Setup]
             raise SetupError("a change adds a term of relaxation; give the block one, of fraction 0", key="relaxation")
         if setup.material.retained_fraction and not material.retained_fraction:
             raise SetupError("a change adds a set that the block has not kept; give it a small one", key="retained_fraction")
+    if block.setup.remembers and any(setup.geometry != block.setup.geometry for setup in setups):
+        told = "a block that changes its size while it remembers has no gradients by the adjoint; take differences of whole replays"
+        raise SetupError(told, key="geometry")
     if any(frame.slip.any() for frame in frames):
         _check_slid([block.setup, *setups])
 

@@ -17,7 +17,7 @@ import numpy as np
 from core.frames import FloatArray
 from core.mesh import IntArray
 from core.replay import Equilibrium
-from core.setup import Box
+from core.setup import Box, Setup
 
 __all__ = ["Gaps", "PatchMeans", "Surface", "gaps", "gaps_beside", "patch_means", "plain_means", "within_spread"]
 
@@ -34,15 +34,22 @@ _BESIDE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """The free surface of a block as a triangle mesh of material points, and its patches.
+    """The free surface of a block as a triangle mesh of material points, and its patches; in number those of the stated block.
 
     Attributes:
         geometry: the block. spacing: of the vertices, at most [m]. patch: edge length of a patch, about [m].
+        stated: the block whose lengths count for spacing and patch; None where that is `geometry`.
     """
 
     geometry: Box
     spacing: float = 1.5e-3
     patch: float = 4e-3
+    stated: Box | None = None
+
+    @classmethod
+    def of(cls, setup: Setup, spacing: float = 1.5e-3) -> Surface:
+        """That of a setup."""
+        return cls(setup.box, spacing=spacing, stated=setup.registered)
 
     def axes(self, side: str) -> tuple[int, int, int]:
         """Normal axis and the two axes in the plane, right-handed about the outward normal."""
@@ -53,8 +60,20 @@ class Surface:
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Lowest and highest corner at rest, (3,) each [m]."""
-        x, y, z = self.geometry.size
-        return np.array([-x / 2, -y / 2, 0.0]), np.array([x / 2, y / 2, z])
+        return self.geometry.low, self.geometry.high
+
+    @cached_property
+    def _lengths(self) -> FloatArray:
+        """Of the stated block (3,) [m]."""
+        return np.array((self.stated or self.geometry).size)
+
+    def own(self, places: FloatArray) -> FloatArray:
+        """Rest positions (m, 3) [m] of the material that lies there in the stated block."""
+        return places if self.stated is None else places * (np.array(self.geometry.size) / self._lengths)
+
+    def on_stated(self, places: FloatArray) -> FloatArray:
+        """The inverse of `own`."""
+        return places if self.stated is None else places * (self._lengths / np.array(self.geometry.size))
 
     @cached_property
     def _mesh(self) -> tuple[FloatArray, IntArray, IntArray]:
@@ -62,7 +81,7 @@ class Surface:
         vertices, faces, sides, count = [], [], [], 0
         for number, side in enumerate(SIDES):
             normal, first, second = self.axes(side)
-            steps = [max(2, int(np.ceil((high[a] - low[a]) / self.spacing)) + 1) for a in (first, second)]
+            steps = [max(2, int(np.ceil(self._lengths[a] / self.spacing)) + 1) for a in (first, second)]
             lines = [np.linspace(low[a], high[a], n) for a, n in zip((first, second), steps, strict=True)]
             grid = np.meshgrid(*lines, indexing="ij")
             points = np.empty((grid[0].size, 3))
@@ -94,11 +113,10 @@ class Surface:
 
     @cached_property
     def _layout(self) -> tuple[list[tuple[int, int]], IntArray]:
-        low, high = self.bounds
         shapes = []
         for side in SIDES:
             _, first, second = self.axes(side)
-            nx, ny = (max(1, round((high[a] - low[a]) / self.patch)) for a in (first, second))
+            nx, ny = (max(1, round(self._lengths[a] / self.patch)) for a in (first, second))
             shapes.append((nx, ny))
         return shapes, np.concatenate([[0], np.cumsum([a * b for a, b in shapes])])
 

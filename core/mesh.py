@@ -16,12 +16,12 @@ from core.axes import even_axis, graded_axis
 from core.errors import MeshError
 from core.fem.elements import HEXAHEDRA
 from core.frames import FloatArray
-from core.meshing import FINER, Connectivity, IntArray
+from core.meshing import FINER, Connectivity, IntArray, Meshing
 
 if TYPE_CHECKING:
     from core.setup import Setup
 
-__all__ = ["BoxMesh", "GridSpec", "IntArray", "box_mesh", "focus_of", "with_middles"]
+__all__ = ["BoxMesh", "GridSpec", "IntArray", "box_mesh", "focus_of", "meshing_for", "with_middles"]
 
 _FOCUS_STEP = 2e-4
 
@@ -116,6 +116,11 @@ class BoxMesh:
     axes: tuple[FloatArray, FloatArray, FloatArray]
     focus: FloatArray
     order: int = 1
+
+    def scaled(self, factors: FloatArray) -> BoxMesh:
+        """The same hexahedra in a block whose lengths are these times as long (3,) [1]."""
+        x, y, z = (axis * factor for axis, factor in zip(self.axes, factors, strict=True))
+        return BoxMesh((x, y, z), self.focus * factors, self.order)
 
     def __getstate__(self) -> dict[str, Any]:
         """Only what it was made of travels between processes; the rest is made again when asked for."""
@@ -252,6 +257,14 @@ def box_mesh(size: tuple[float, float, float], grid: GridSpec, focus: FloatArray
     if grid.order == 2:
         axes = [with_middles(axis) for axis in axes]
     return BoxMesh((axes[0], axes[1], axes[2]), centre, grid.order)
+
+
+def meshing_for(setup: Setup, grid: Meshing) -> Meshing:
+    """What a replay is meshed with: this, or the even grid of trilinear hexahedra that the setup asks for in its place."""
+    if setup.element_size is None:
+        return grid
+    nx, ny, nz = (max(2, round(length / setup.element_size) + 1) for length in setup.box.size)
+    return GridSpec(nodes=(nx, ny, nz))
 
 
 @lru_cache(maxsize=64)

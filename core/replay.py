@@ -22,6 +22,7 @@ from core.fem.newton import RELATIVE_TOLERANCE, Outcome, Solution, blocked, solv
 from core.fem.path import FREE_STEP, first_touch, lead
 from core.frames import FloatArray
 from core.memory import Memory, State
+from core.mesh import meshing_for
 from core.meshing import Mesh, Meshing
 from core.progress import Report, silent
 from core.setup import Setup
@@ -37,18 +38,18 @@ class Replay:
     """A block that is led through the tool's positions one after another.
 
     Args:
-        setup: what is believed. grid: the mesh. tolerance: residual at which a frame counts as converged, over the push.
+        setup: what is believed. grid: the mesh, unless the setup has one. tolerance: residual of a converged frame, over the push.
     """
 
     def __init__(self, setup: Setup, grid: Meshing, tolerance: float = RELATIVE_TOLERANCE) -> None:
-        self.setup, self.grid, self.tolerance = setup, grid, tolerance
+        self.setup, self.grid, self.tolerance = setup, meshing_for(setup, grid), tolerance
         self._offset, self._follower = np.array(setup.tool.offset), Follower()
         self._model: BlockModel | None = None
         self._mesh: Mesh | None = None
         self._before: tuple[Equilibrium, Equilibrium] | None = None
         self.slip, self.dense = np.zeros(2), False
-        self._rest_mesh = grid.mesh(setup, np.array([0.0, 0.0, setup.geometry.height]))
-        self.memory = Memory.of(setup, grid, self._rest_mesh)
+        self._rest_mesh = self.grid.mesh(setup, np.array([0.0, 0.0, setup.geometry.height]))
+        self.memory = Memory.of(setup, self.grid, self._rest_mesh)
         if self.memory is not None:
             self.memory.start(self.free)
 
@@ -251,8 +252,7 @@ class Replay:
                 break
             self.slip = self.slip + step
             way.append(self.held(probe, way[-1]))
-        before = [*frame.way, replace(frame, way=()), *way[1:]]
-        return self._after(before[:-1], way[-1])
+        return self._after([*frame.way, replace(frame, way=()), *way[1:]][:-1], way[-1])
 
 
 def rest(setup: Setup, grid: Meshing) -> Equilibrium:

@@ -19,12 +19,14 @@ from core.fem.factor import NotPositiveDefinite
 from core.fem.model import BlockModel, Probe
 from core.frames import FloatArray
 from core.memory import refuse_memory
+from core.mesh import BoxMesh
+from core.meshing import Mesh
 from core.replay import Equilibrium, Replay
 from core.setup import Setup
 
 __all__ = [
     "TOOL_STEP", "Change", "GivingTool", "displacement_changes", "factorise_at", "gives", "local_probe", "loss_changes",
-    "same_body", "stiffness_changes", "tool_slopes",
+    "mesh_in", "refuse_other_grid", "same_body", "stiffness_changes", "tool_slopes",
 ]  # fmt: skip
 
 Change = tuple[Setup, FloatArray]
@@ -56,6 +58,14 @@ def local_probe(frame: Equilibrium) -> Probe:
     return Probe(frame.probe.centre - np.append(frame.slip, 0.0), frame.probe.radius)
 
 
+def refuse_other_grid(block: Replay, setups: Sequence[Setup]) -> None:
+    """Raise SetupError where a change asks for another grid."""
+    for setup in setups:
+        if setup.element_size != block.setup.element_size:
+            told = "a grid of other elements is no small change of this one; take differences of whole replays"
+            raise SetupError(told, key="element_size", value=setup.element_size)
+
+
 def _holds(block: Replay, frame: Equilibrium) -> bool:
     """Whether anything deforms the block at all."""
     return bool(frame.in_contact or block.setup.load.specific_weight_over_stiffness)
@@ -83,18 +93,26 @@ def _unbalanced(block: Replay, frame: Equilibrium, model: BlockModel, changes: S
         shift = np.zeros(3) if gives(block.setup, setup) else _shift(block, setup, move)
         if same and setup.tool.radius == block.setup.tool.radius and not shift.any():  # only the sensor differs
             continue
-        other = model if same else BlockModel(setup, frame.mesh, dense=frame.dense)
+        other = model if same else BlockModel(setup, mesh_in(block, setup, frame), dense=frame.dense)
+        there = other.mesh.nodes + frame.displacement
         other.harden(frame.hardness)
-        other.expect(positions, (here,))
+        other.expect(there, (here,))
         probe = Probe(here.centre + shift, here.radius + setup.tool.radius - block.setup.tool.radius)
-        right[:, column] = residual - other.assemble(positions, probe, tangent=False).residual
+        right[:, column] = residual - other.assemble(there, probe, tangent=False).residual
     return right
 
 
 def same_body(block: Replay, setup: Setup) -> bool:
     """Whether the setup differs from the block's in the tool and the sensor at most."""
     here = block.setup
-    return setup.material == here.material and setup.load == here.load and setup.support == here.support
+    return all(getattr(setup, part) == getattr(here, part) for part in ("material", "load", "support", "geometry"))
+
+
+def mesh_in(block: Replay, setup: Setup, frame: Equilibrium) -> Mesh:
+    """The frame's mesh, in the setup's block where that has another size."""
+    if setup.geometry == block.setup.geometry or not isinstance(frame.mesh, BoxMesh):
+        return frame.mesh
+    return frame.mesh.scaled(np.array(setup.box.size) / np.array(block.setup.box.size))
 
 
 def _shift(block: Replay, setup: Setup, move: FloatArray) -> FloatArray:
@@ -135,6 +153,7 @@ class GivingTool:
     ) -> None:
         """`solve` is for the transposed tangent, where it is not the symmetric one that the model's factor is of."""
         self._block, self._model, self._here = block, model, local_probe(frame)
+        self._frame = frame
         self._positions = frame.mesh.nodes + frame.displacement
         self._compliance = block.setup.tool.compliance_times_stiffness
         state = model.assemble(self._positions, self._here, tangent=False)
@@ -164,11 +183,16 @@ class GivingTool:
         return found
 
     def _pushed(self, setup: Setup) -> FloatArray:
-        """Change of the force on the tool (3,) over E with another radius, all else staying where it is."""
-        wider = setup.tool.radius - self._block.setup.tool.radius
-        if not wider:
+        """Change of the force on the tool (3,) over E with another radius or surface, the displacement staying as it is."""
+        wider, model = setup.tool.radius - self._block.setup.tool.radius, self._model
+        mesh = mesh_in(self._block, setup, self._frame)
+        if not wider and mesh is model.mesh:
             return np.zeros(3)
-        state = self._model.assemble(self._positions, Probe(self._here.centre, self._here.radius + wider), tangent=False)
+        if mesh is not model.mesh:
+            model = BlockModel(setup, mesh, dense=model.dense)
+            model.harden(self._model.hardness)
+        positions = self._positions + (mesh.nodes - self._model.mesh.nodes)
+        state = model.assemble(positions, Probe(self._here.centre, self._here.radius + wider), tangent=False)
         return np.asarray(-state.push - self._force)
 
 
@@ -181,9 +205,11 @@ def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[Ch
             moves with it (3,) [m]. The base may not change between held and free to move; where it has slid, it stays.
 
     Returns:
-        (len(changes), n, 3) changes of the nodes' displacement [m]; zero where nothing holds the tool against the block.
+        (len(changes), n, 3) changes of the nodes' displacement from where they are at rest [m]; zero where nothing holds the tool
+        against the block.
     """
     _memoryless(block.setup, *(setup for setup, _ in changes))
+    refuse_other_grid(block, [setup for setup, _ in changes])
     result = np.zeros((len(changes), *frame.displacement.shape))
     model = factorise_at(block, frame) if _holds(block, frame) else None
     if model is None or not changes:
@@ -207,6 +233,7 @@ def loss_changes(block: Replay, frame: Equilibrium, slope: FloatArray, changes: 
         (len(changes),) changes of the function; zero where nothing holds the tool against the block.
     """
     _memoryless(block.setup, *(setup for setup, _ in changes))
+    refuse_other_grid(block, [setup for setup, _ in changes])
     model = factorise_at(block, frame) if _holds(block, frame) else None
     if model is None or not changes:
         return np.zeros(len(changes))

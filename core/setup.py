@@ -5,13 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import numpy as np
+
 from core.bounds import within as _within
 from core.box import Box
 from core.errors import SetupError
-from core.frames import Transform
+from core.frames import FloatArray, Transform
+from core.material import Fibres, Inclusion, Layer, Material, MaterialLaw, Relaxation
 from core.shape.body import Shape
 
 __all__ = [
+    "PAIRINGS",
     "Box",
     "Detachment",
     "Edge",
@@ -27,101 +31,15 @@ __all__ = [
     "Shape",
     "Support",
     "Tool",
+    "Touching",
 ]
 
-MaterialLaw = Literal["neo_hooke", "corotational"]
 Edge = Literal["-x", "+x", "-y", "+y"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Inclusion:
-    """A ball of other stiffness: centre in the phantom frame [m], radius [m], stiffness of lump over rest [1]."""
-
-    x: float
-    y: float
-    z: float
-    radius: float
-    stiffness_ratio: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Layer:
-    """A skin of other stiffness on the top: thickness [m], stiffness of skin over rest [1]."""
-
-    thickness: float
-    stiffness_ratio: float
-
-    def __post_init__(self) -> None:
-        _within("layer thickness", self.thickness, 1e-5, 2.0, "m")
-        _within("layer stiffness_ratio", self.stiffness_ratio, 1e-3, 1e3, "")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fibres:
-    """Stiffer along one direction in the plane: its angle from the x axis [rad], E along over E across [1]."""
-
-    direction: float
-    stiffness_ratio: float
-
-    def __post_init__(self) -> None:
-        _within("fibres stiffness_ratio", self.stiffness_ratio, 1.0, 1e3, "")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Relaxation:
-    """One term of a Prony series: the share of the shear modulus that relaxes [1], and its time constant [s]."""
-
-    fraction: float
-    time_constant: float
-
-    def __post_init__(self) -> None:
-        _within("relaxation fraction", self.fraction, 0.0, 1.0, "")
-        _within("relaxation time_constant", self.time_constant, 1e-6, 1e9, "s")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Material:
-    """What the block is made of.
-
-    Attributes:
-        young_modulus: at rest [Pa]; of a material that relaxes, that of a motion faster than it does. poisson_ratio: likewise [1].
-        law: of elasticity. inclusions: lumps inside. layer: a skin on the top.
-        log_ratio: ln of Young's modulus at the top over that at the base, its geometric mean kept [1].
-        stretch_limit: J_m of Gent's law [1], where the material is stretched to its limit; None for a material without.
-        fibres: along one direction; None for a material that is the same in all.
-        relaxation: terms of a Prony series, whose fractions add up to less than one. retained_fraction: of the largest strain
-            that stays when the load is gone [1]. Both as `core.memory` has them.
-    """
-
-    young_modulus: float = 5.0e3
-    poisson_ratio: float = 0.45
-    law: MaterialLaw = "neo_hooke"
-    inclusions: tuple[Inclusion, ...] = ()
-    layer: Layer | None = None
-    log_ratio: float = 0.0
-    stretch_limit: float | None = None
-    fibres: Fibres | None = None
-    relaxation: tuple[Relaxation, ...] = ()
-    retained_fraction: float = 0.0
-
-    def __post_init__(self) -> None:
-        _within("young_modulus", self.young_modulus, 1.0, 1e9, "Pa")
-        _within("poisson_ratio", self.poisson_ratio, -0.5, 0.4999, "")
-        _within("log_ratio", self.log_ratio, -7.0, 7.0, "")
-        if self.stretch_limit is not None:
-            _within("stretch_limit", self.stretch_limit, 0.1, 1e6, "")
-            if self.law == "corotational":
-                raise SetupError("the corotational law has no stretch_limit; use neo_hooke with it", key="stretch_limit")
-        _within("relaxed fractions in all", sum(term.fraction for term in self.relaxation), 0.0, 0.99, "")
-        _within("retained_fraction", self.retained_fraction, 0.0, 0.9, "")
-        if self.remembers and self.law == "corotational":
-            key = "relaxation" if self.relaxation else "retained_fraction"
-            raise SetupError(f"the corotational law has no {key}; use neo_hooke with it", key=key)
-
-    @property
-    def remembers(self) -> bool:
-        """Whether its stress depends on what was done to it before."""
-        return bool(self.relaxation or self.retained_fraction)
+PAIRINGS = (
+    "as-paired", "swap-1-2", "swap-1-3", "swap-1-4", "swap-2-3", "swap-2-4", "swap-3-4", "turn-1", "turn-2", "turn-3",
+)  # fmt: skip
+"""How touches can really be paired with landmarks: as stated, two rows of touches.csv for each other, or each with the landmark of
+the row so many further on, after the last with the first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,12 +104,57 @@ class Sensor:
     Attributes:
         depth_sigma: the maker's stated accuracy [m].
         time_offset: cloud stamp minus robot stamp of the same instant [s].
+        depth_offset, depth_scale: what it reads of a depth z along its axis: depth_scale z + depth_offset [m], [1].
         camera_shift: where the camera registration is off: true phantom_from_camera = camera_shift @ stated one.
     """
 
     depth_sigma: float = 0.002
     time_offset: float = 0.0
     camera_shift: Transform = field(default_factory=Transform)
+    depth_offset: float = 0.0
+    depth_scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        _within("sensor depth_offset", self.depth_offset, -0.2, 0.2, "m")
+        _within("sensor depth_scale", self.depth_scale, 0.5, 2.0, "")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Touching:
+    """How the landmarks were touched, which gave phantom_from_robot.
+
+    Attributes:
+        misses: (x, y, z) [m] of each moved touch minus its landmark under the stated registration, phantom frame; none were any.
+        lift: height of the tool's centre over the landmark at a touch [m].
+        pairing: which landmark each touch was really of, one of PAIRINGS.
+        scale: of the touched polygon over that of the landmarks [1]. inset: how far inside each touch was made, along x and along
+            y [m]: a ball does not stay on a corner.
+    """
+
+    misses: tuple[tuple[float, float, float], ...] = ()
+    lift: float = 0.0
+    pairing: str = "as-paired"
+    scale: float = 1.0
+    inset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.pairing not in PAIRINGS:
+            raise SetupError(f"pairing = {self.pairing!r} is none of {', '.join(PAIRINGS)}", key="pairing", value=self.pairing)
+        _within("touching scale", self.scale, 0.1, 10.0, "")
+
+    def order(self, count: int) -> list[int]:
+        """The landmark, by its row, that each of `count` touches was really of; SetupError where there are too few."""
+        order, (kind, *words) = list(range(count)), self.pairing.split("-")
+        if kind == "as":
+            return order
+        rows = [int(word) for word in words]
+        if max(rows) > count - (kind == "turn"):
+            raise SetupError(f"pairing {self.pairing!r} needs more than {count} touches", key="pairing", value=self.pairing)
+        if kind == "turn":
+            return order[rows[0] :] + order[: rows[0]]
+        first, second = (row - 1 for row in rows)
+        order[first], order[second] = second, first
+        return order
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -200,8 +163,11 @@ class Setup:
 
     Attributes:
         mass: of the phantom [kg].
-        landmarks: (x, y, z) [m] of the points whose touches gave phantom_from_robot; they sag with the block.
+        geometry: of the body. registered: what the registrations took it for; None where that is `geometry`.
+        landmarks: (x, y, z) [m] of the points whose touches gave phantom_from_robot, on what was registered; they sag with the
+            block. touching: how they were touched.
         phantom_from_robot, phantom_from_camera: the stated registrations.
+        element_size: edges of the even grid that replaces whatever a replay is meshed with [m]; None for none.
     """
 
     geometry: Box | Shape
@@ -211,11 +177,19 @@ class Setup:
     support: Support = field(default_factory=Support)
     sensor: Sensor = field(default_factory=Sensor)
     mass: float = 0.1
+    registered: Box | None = None
     landmarks: tuple[tuple[float, float, float], ...] = ()
+    touching: Touching = field(default_factory=Touching)
     phantom_from_robot: Transform = field(default_factory=Transform)
     phantom_from_camera: Transform = field(default_factory=Transform)
+    element_size: float | None = None
 
     def __post_init__(self) -> None:
+        if self.element_size is not None:
+            _within("element_size", self.element_size, 5e-4, 1.0, "m")
+        if self.touching.misses and len(self.touching.misses) != len(self.landmarks):
+            told = f"{len(self.touching.misses)} touches miss {len(self.landmarks)} landmarks; state one miss for each"
+            raise SetupError(told, key="misses")
         if isinstance(self.geometry, Shape):
             self._check_shape(self.geometry)
 
@@ -237,6 +211,21 @@ class Setup:
         return self.geometry
 
     @property
+    def stated_geometry(self) -> Box | Shape:
+        """What the registrations took the geometry for."""
+        return self.registered or self.geometry
+
+    @property
+    def stated_box(self) -> Box:
+        """The same of a block; SetupError for other shapes."""
+        return self.registered or self.box
+
+    @property
+    def scale(self) -> FloatArray:
+        """True over stated lengths of the block along x, y, z (3,) [1]."""
+        return np.ones(3) if self.registered is None else np.array(self.box.size) / np.array(self.registered.size)
+
+    @property
     def shape(self) -> Shape:
         """The geometry of a body that is no block; SetupError for a block."""
         if isinstance(self.geometry, Box):
@@ -248,15 +237,11 @@ class Setup:
         """Whether a frame depends on all those before it, so that none may be left out."""
         return bool(self.tool.friction_coefficient) or self.material.remembers
 
-    @property
-    def phantom_from_camera_true(self) -> Transform:
-        """The camera registration including the sensor's believed shift."""
-        return self.sensor.camera_shift @ self.phantom_from_camera
-
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON, SI units."""
         return {
             "geometry": self.geometry.as_dict(),
+            "registered": None if self.registered is None else self.registered.as_dict(),
             "material": {
                 "law": self.material.law,
                 "young_modulus": self.material.young_modulus,
@@ -285,7 +270,12 @@ class Setup:
                 "depth_sigma": self.sensor.depth_sigma,
                 "time_offset": self.sensor.time_offset,
                 "camera_shift": self.sensor.camera_shift.matrix.tolist(),
+                "depth_offset": self.sensor.depth_offset,
+                "depth_scale": self.sensor.depth_scale,
             },
+            "landmarks": [list(place) for place in self.landmarks],
+            "touching": {**vars(self.touching), "misses": [list(miss) for miss in self.touching.misses]},
+            "element_size": self.element_size,
             "mass": self.mass,
             "phantom_from_robot": self.phantom_from_robot.matrix.tolist(),
             "phantom_from_camera": self.phantom_from_camera.matrix.tolist(),

@@ -23,6 +23,8 @@ def obstacle(setup: Setup) -> str | None:
     """The key of a setup that keeps it out of a batch; None when nothing does."""
     if type(setup.geometry) is not Box:
         return "geometry"
+    if setup.element_size is not None:
+        return "element_size"
     if setup.material.law != "neo_hooke":
         return "material.law"
     for name, held in _HELD.items():

@@ -27,7 +27,7 @@ from core.grading import FINE_GRID, PAGE_GRID, REPLAY_GRID
 from core.meshing import Meshing
 from core.progress import Report, part, silent
 from core.registration import Registration, register, setup_from
-from core.setup import Setup
+from core.setup import Setup, Touching
 
 __all__ = ["diagnose"]
 
@@ -90,7 +90,9 @@ def _splits(dataset: Dataset) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 def _stated(dataset: Dataset, registration: Registration) -> Setup:
     landmarks = tuple(dataset.config.landmarks[name] for name in dataset.touches.names)
-    return replace(setup_from(dataset, registration), landmarks=landmarks)
+    misses = tuple((float(x), float(y), float(z)) for x, y, z in registration.touch_residuals)
+    touching = Touching(misses=misses, lift=dataset.config.touch_offset)
+    return replace(setup_from(dataset, registration), landmarks=landmarks, touching=touching)
 
 
 def _run(

@@ -8,11 +8,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from core.diagnosis.observations import Group
-from core.frames import FloatArray, Transform
+from core.frames import FloatArray
 from core.measurement import Gaps, PatchMeans, Surface, gaps, gaps_beside, plain_means, within_spread
 from core.mesh import IntArray
 from core.replay import Equilibrium
 from core.setup import Setup
+from core.sight import sight_of
 
 __all__ = ["Compared", "Sample", "choose", "compare", "observe"]
 
@@ -40,7 +41,7 @@ class Sample:
 
     Attributes:
         index: (m,) of the group's points. patch: (m,). gap: (m,) of the baseline [m], which stands where nothing is near.
-        foot: (m, 3) rest positions of the material points that they met [m]. side: (m,) on which these lie.
+        foot: (m, 3) rest positions on the stated block of the material points that they met [m]. side: (m,) on which these lie.
         facing: (m,) cosine between the baseline's normal and the way back to the camera.
     """
 
@@ -74,9 +75,9 @@ class Compared:
         np.add.at(total, patch, values)
         return np.asarray(total / np.maximum(self.means.count, 1)[:, None])
 
-    def along_sight(self, moved: Transform) -> FloatArray:
-        """Change of the averages (p,) [m] when the camera's points are moved."""
-        shift = moved.apply(self.points) - self.points
+    def along_sight(self, moved: FloatArray) -> FloatArray:
+        """Change of the averages (p,) [m] when the camera's points lie at (m, 3) [m] instead."""
+        shift = moved - self.points
         surface = np.einsum("mi,mi->m", shift[self.seen.index], self.seen.normal)
         ball = np.einsum("ti,ti->t", shift[self.tool], self.away)
         values, patch = np.concatenate([surface, ball]), np.concatenate([self.seen.patch, self.patch])
@@ -96,20 +97,20 @@ def observe(frame: Equilibrium, compared: Compared) -> sp.csr_matrix:
 
 def choose(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) -> Sample:
     """The points to average, by the model at hand: those on clear parts of the surface, without stray ones."""
-    points, pose = _placed(group, setup)
-    seen = gaps(points, pose.translation, frame, surface)
+    points, camera = _placed(group, setup)
+    seen = gaps(points, camera, frame, surface)
     kept = within_spread(seen.gap, seen.patch, surface.patches)
     index, patch = seen.index[kept].astype(np.int32), seen.patch[kept].astype(np.int32)
     return Sample(
-        index, patch, seen.gap[kept].astype(np.float32), seen.facing[kept].astype(np.float32), seen.foot[kept].astype(np.float32),
-        seen.side[kept].astype(np.int8),
+        index, patch, seen.gap[kept].astype(np.float32), seen.facing[kept].astype(np.float32),
+        surface.on_stated(seen.foot[kept]).astype(np.float32), seen.side[kept].astype(np.int8),
     )  # fmt: skip
 
 
-def _placed(group: Group, setup: Setup) -> tuple[FloatArray, Transform]:
-    """The group's points in the phantom frame, and the camera's pose; the reference was seen before the camera could move."""
-    pose = setup.phantom_from_camera if group.reference else setup.phantom_from_camera_true
-    return pose.apply(group.points), pose
+def _placed(group: Group, setup: Setup) -> tuple[FloatArray, FloatArray]:
+    """The group's points in the phantom frame, and the camera's place (3,) there [m]."""
+    sight = sight_of(setup, reference=group.reference)
+    return sight.place(group.points), sight.pose.translation
 
 
 def _along_rays(seen: Gaps, sample: Sample) -> Gaps:
@@ -129,11 +130,12 @@ def _met_or_beside(points: FloatArray, camera: FloatArray, frame: Equilibrium, s
     from the other place where that is much nearer, so that its gap does not jump by millimetres as the rim passes its ray.
     """
     met = gaps(points, camera, frame, surface, everything=True)
-    away = np.linalg.norm(met.foot - sample.foot[met.index], axis=1) > JUMP
+    usual = surface.own(sample.foot.astype(float))
+    away = np.linalg.norm(met.foot - usual[met.index], axis=1) > JUMP
     elsewhere = np.concatenate([np.setdiff1d(np.arange(len(points)), met.index), met.index[away]])
     if not len(elsewhere):
         return met
-    foot, side = sample.foot[elsewhere].astype(float), sample.side[elsewhere].astype(np.int64)
+    foot, side = usual[elsewhere], sample.side[elsewhere].astype(np.int64)
     beside = replace(gaps_beside(points[elsewhere], camera, frame, surface, foot, side), index=elsewhere)
     by_ray = np.full(len(points), np.inf)
     by_ray[met.index] = np.abs(met.gap)
@@ -145,9 +147,9 @@ def _met_or_beside(points: FloatArray, camera: FloatArray, frame: Equilibrium, s
 
 def compare(group: Group, setup: Setup, frame: Equilibrium, surface: Surface, sample: Sample) -> Compared:
     """The sample's points, where they meet the surface, and their averages; points of the model's tool lie off the tool."""
-    points, pose = _placed(group, setup)
+    points, camera = _placed(group, setup)
     points = points[sample.index]
-    seen = _along_rays(_met_or_beside(points, pose.translation, frame, surface, sample), sample)
+    seen = _along_rays(_met_or_beside(points, camera, frame, surface, sample), sample)
     values = sample.gap.astype(float)
     near = np.abs(seen.gap - values[seen.index]) < FARTHEST_CHANGE
     values[seen.index[near]] = seen.gap[near]

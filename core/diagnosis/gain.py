@@ -21,6 +21,7 @@ from core.frames import FloatArray
 from core.measurement import Surface
 from core.metrics import paper_distance
 from core.setup import Setup
+from core.sight import sight_of
 
 __all__ = ["Ladder", "fixed_pattern", "ladder"]
 
@@ -118,9 +119,9 @@ def _rms(sums: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _paper(data: Sequence[Observations], predictions: Sequence[Prediction], setup: Setup) -> float:
     """The paper's metric [m], mean over touched groups."""
-    surface, pose, found = Surface(setup.box), setup.phantom_from_camera_true, []
+    surface, sight, found = Surface.of(setup), sight_of(setup), []
     for item, prediction in zip(data, predictions, strict=True):
         for number, group in enumerate(item.groups):
             if not group.free and number not in prediction.failed:
-                found.append(paper_distance(pose.apply(group.points[:_PAPER_POINTS]), prediction.equilibria[number], surface))
+                found.append(paper_distance(sight.place(group.points[:_PAPER_POINTS]), prediction.equilibria[number], surface))
     return float(np.mean(found)) if found else float("nan")

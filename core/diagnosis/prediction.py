@@ -13,15 +13,16 @@ from core.diagnosis.ordered import Past, forgetful
 from core.fem.model import rule_of
 from core.fem.newton import Outcome
 from core.fem.stiffness import lump_share
-from core.frames import FloatArray, Transform
+from core.frames import FloatArray
 from core.measurement import Surface
 from core.meshing import Meshing
-from core.registration.robot import fit_robot
-from core.replay import Equilibrium, Replay, rest
+from core.replay import Equilibrium, Replay
 from core.sensitivity import TOOL_STEP, displacement_changes, stiffness_changes
 from core.setup import Inclusion, Setup
+from core.sight import sight_of
+from core.touches import touch_correction
 
-__all__ = ["TOOL_COLUMNS", "Prediction", "Sample", "Wanted", "predict", "touch_correction"]
+__all__ = ["TOOL_COLUMNS", "Prediction", "Sample", "Wanted", "predict"]
 
 TOOL_COLUMNS = 6
 """Columns that always come first: the tool moved along x, y, z and turned about the robot registration's pivot."""
@@ -78,19 +79,16 @@ class Prediction:
         return tuple(i for i, frame in enumerate(self.equilibria) if frame.outcome is not Outcome.CONVERGED)
 
 
-def touch_correction(setup: Setup, grid: Meshing) -> Transform:
-    """Stated to true phantom_from_robot: the touched landmarks had sagged, while the registration took them for unloaded."""
-    if not setup.load.specific_weight_over_stiffness or len(setup.landmarks) < 3:
-        return Transform()
-    landmarks = np.array(setup.landmarks)
-    return fit_robot(landmarks, rest(setup, grid).move(landmarks)).phantom_from_robot
-
-
 class _Columns:
     """Changes of a group's displacement, projected on what is seen of it."""
 
     def __init__(self, block: Replay, wanted: Wanted) -> None:
         self.block, self.wanted = block, wanted
+        here = block.setup
+        self._seen = {at_rest: sight_of(here, reference=at_rest) for at_rest in (False, True)}
+        self._others = [{at_rest: sight_of(other, reference=at_rest) for at_rest in (False, True)} for other in wanted.setups]
+        self._grown = [other.scale / here.scale - 1.0 for other in wanted.setups]
+        self._alike = not any(growth.any() for growth in self._grown)
 
     def displacement(self, frame: Equilibrium, moves: FloatArray) -> FloatArray:
         """(k, n, 3) for the tool's motion, the setups and the lumps; `moves` (s, 3) are the setups' own tool motions [m]."""
@@ -140,16 +138,18 @@ class _Columns:
     def project(self, frame: Equilibrium, moves: FloatArray, compared: Compared, reference: bool) -> FloatArray:
         """(p, k) changes of the patch averages; the reference was seen before the camera could move."""
         values = np.zeros((len(compared.means.mean), TOOL_COLUMNS + len(self.wanted.setups) + len(self.wanted.lumps)))
-        if frame.in_contact or self.block.setup.load.specific_weight_over_stiffness:
+        if frame.in_contact or self.block.setup.load.specific_weight_over_stiffness or not self._alike:
             fields = self.displacement(frame, moves)
+            for number, (growth, step) in enumerate(zip(self._grown, self.wanted.steps, strict=True)):
+                fields[TOOL_COLUMNS + number] += frame.mesh.nodes * growth / step
             values = -(observe(frame, compared) @ fields.reshape(len(fields), -1).T)
         if len(compared.tool):
             centre, radius = self.of_ball(frame, moves)
             values -= compared.average(compared.away @ centre.T + radius, compared.patch)
-        here = self.block.setup.phantom_from_camera_true
-        for number, (other, step) in enumerate(zip(self.wanted.setups, self.wanted.steps, strict=True)):
-            if not reference and other.sensor.camera_shift is not self.block.setup.sensor.camera_shift:
-                moved = other.phantom_from_camera_true @ here.inverse()
+        here = self._seen[reference]
+        for number, (others, step) in enumerate(zip(self._others, self.wanted.steps, strict=True)):
+            if not others[reference].same(here):
+                moved = others[reference].place(here.read(compared.points))
                 values[:, TOOL_COLUMNS + number] += compared.along_sight(moved) / step
         return values
 
@@ -169,7 +169,7 @@ def predict(
         starts: equilibria of a similar setup, one per group, to begin from.
         wanted: changes to state; none without it. samples: which points to average; chosen anew without them.
     """
-    surface, block = Surface(setup.box), Replay(setup, grid, tolerance)
+    surface, block = Surface.of(setup), Replay(setup, grid, tolerance)
     true_from_stated = touch_correction(setup, grid)
     centres = true_from_stated.apply(data.centres(setup))
     moves = np.zeros((len(wanted.setups) if wanted else 0, len(data.groups), 3))

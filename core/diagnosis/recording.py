@@ -11,7 +11,6 @@ from scipy.spatial import cKDTree
 from core.cleaning import Cleaner, tool_poses
 from core.dataset import open_dataset
 from core.diagnosis.observations import smooth_centres
-from core.diagnosis.prediction import touch_correction
 from core.fem.newton import Outcome
 from core.frames import FloatArray
 from core.measurement import Gaps, Surface, gaps
@@ -19,6 +18,8 @@ from core.meshing import Meshing
 from core.metrics import paper_distance
 from core.replay import Equilibrium, replay
 from core.setup import Setup
+from core.sight import sight_of
+from core.touches import touch_correction
 
 __all__ = ["Recorded", "record"]
 
@@ -65,11 +66,11 @@ def _rms(errors: FloatArray) -> float:
 
 
 def _side(setup: Setup, frames: list[Equilibrium], clouds: list[FloatArray]) -> Recorded:
-    surface, pose = Surface(setup.box, spacing=VERTEX_SPACING), setup.phantom_from_camera_true
+    surface, sight = Surface.of(setup, VERTEX_SPACING), sight_of(setup)
     moved, errors, distance, paper = [], [], [], []
     for frame, cloud in zip(frames, clouds, strict=True):
-        points = pose.apply(cloud)
-        seen = gaps(points, pose.translation, frame, surface)
+        points = sight.place(cloud)
+        seen = gaps(points, sight.pose.translation, frame, surface)
         moved.append(frame.move(surface.vertices))
         errors.append(_vertex_errors(seen, surface))
         distance.append(_rms(errors[-1]))
@@ -103,7 +104,7 @@ def record(
         frames = replay(setup, centres, grid, starts=frames or None, tolerance=1e-3)
         sides.append(_side(setup, frames, clouds))
     before, after = sides
-    surface = Surface(stated.box, spacing=VERTEX_SPACING)
+    surface = Surface.of(stated, VERTEX_SPACING)
     floor = after.distance[after.free] if after.free.any() else after.distance
     np.savez_compressed(
         target, time=times, cloud_index=index, faces=surface.faces, rest=surface.vertices.astype(np.float32),
@@ -112,7 +113,7 @@ def record(
         tool_radius_raw=np.array(stated.tool.radius), tool_radius_extended=np.array(found.tool.radius),
         error_raw=before.error.astype(np.float32), error_extended=after.error.astype(np.float32),
         distance_raw=before.distance, distance_extended=after.distance, paper_raw=before.paper, paper_extended=after.paper,
-        noise_floor=np.array(float(np.nanmean(floor))), camera_raw=stated.phantom_from_camera_true.matrix,
-        camera_extended=found.phantom_from_camera_true.matrix, outcome=np.maximum(before.outcome, after.outcome),
+        noise_floor=np.array(float(np.nanmean(floor))), camera_raw=sight_of(stated).pose.matrix,
+        camera_extended=sight_of(found).pose.matrix, outcome=np.maximum(before.outcome, after.outcome),
     )  # fmt: skip
     return name

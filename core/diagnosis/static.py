@@ -20,6 +20,7 @@ from core.meshing import Meshing
 from core.registration import motion_jacobian
 from core.replay import rest
 from core.setup import Setup
+from core.sight import sight_of
 
 __all__ = ["StaticChannel"]
 
@@ -38,7 +39,8 @@ class StaticChannel:
     """The rest cloud, reduced; every model is compared at the same places.
 
     Attributes:
-        patches: (p,) patches of the surface that were seen. centres, normals: (p, 3) of those [m], phantom frame.
+        centres, normals: (p, 3) of the patches of the surface that were seen [m], phantom frame.
+        table: (t, 3) of the table's cells [m].
         residual: (p + t,) of the stated model, at the patches and at the table's cells [m].
         factor: Cholesky factor of its covariance (p + t, p + t) [m^2], the camera's pose and bias included.
         bias, reach: of the camera's smooth error [m].
@@ -46,6 +48,7 @@ class StaticChannel:
 
     centres: FloatArray
     normals: FloatArray
+    table: FloatArray
     residual: FloatArray
     factor: FloatArray
     bias: float
@@ -55,38 +58,47 @@ class StaticChannel:
     def of(cls, cloud: FloatArray, cleaner: Cleaner, setup: Setup, grid: Meshing) -> StaticChannel:
         """From the raw rest cloud (n, 3) [m], camera frame, under the stated setup."""
         clean = cleaner.clean(cloud)
-        places, height, scatter = _table_cells(clean.table_points)
-        surface, pose = Surface(setup.box), setup.phantom_from_camera
-        seen = gaps(pose.apply(cloud[clean.indices]), pose.translation, rest(setup, grid), surface)
+        table, height, scatter = _table_cells(clean.table_points)
+        surface, sight = Surface.of(setup), sight_of(setup, reference=True)
+        seen = gaps(sight.place(cloud[clean.indices]), sight.pose.translation, rest(setup, grid), surface)
         means = patch_means(seen.gap, seen.patch, surface.patches, least=_LEAST_POINTS)
         used = np.flatnonzero(np.isfinite(means.mean) & (means.count >= _LEAST_POINTS))
         centres, normals = surface.patch_centres[used], surface.patch_normals[used]
         white = np.concatenate([float(np.nanmedian(means.spread[used])) ** 2 / np.maximum(means.count[used], 1), scatter])
         residual = np.concatenate([means.mean[used], height])
-        places = np.concatenate([centres, places])
+        places = np.concatenate([centres, table])
         directions = np.concatenate([normals, np.tile([0.0, 0.0, 1.0], (len(height), 1))])
         pivot = np.array([0.0, 0.0, setup.box.size[2]])
         moved = np.einsum("ni,nij->nj", directions, motion_jacobian(places, pivot))
         free = np.column_stack([moved, _bulges(places[: len(used)], normals, len(residual))])
         covariance, bias, reach = _camera_errors(places, white, residual, free)
         covariance += _POSE_FREEDOM**2 * moved @ np.diag([1, 1, 1, 100, 100, 100]) @ moved.T
-        return cls(centres, normals, residual, cho_factor(covariance)[0], bias, reach)
+        return cls(centres, normals, table, residual, cho_factor(covariance)[0], bias, reach)
 
     def block(self, stated: Setup, setup: Setup, grid: Meshing, columns: int, varied: dict[int, tuple[Setup, float]]) -> Block:
         """Quadratic form with the pose and the bias integrated out.
 
         Args:
             stated: setup under which the channel was made. setup: of the model.
-            columns: total number of columns. varied: column to (setup a little changed, step) for those that change the rest shape.
+            columns: total number of columns. varied: column to (setup a little changed, step) for the effects that the block or the
+                camera shows at rest (`Effect.at_rest`).
         """
-        here, shape = rest(stated, grid).move(self.centres), rest(setup, grid).move(self.centres)
+        before, here = self._gap(stated, stated, grid), self._gap(stated, setup, grid)
         stacked = np.zeros((len(self.residual), 1 + columns))
-        stacked[:, 0] = self.residual
-        stacked[: len(self.centres), 0] -= np.einsum("ni,ni->n", shape - here, self.normals)
+        stacked[:, 0] = self.residual + here - before
         for column, (other, step) in varied.items():
-            change = rest(other, grid).move(self.centres) - shape
-            stacked[: len(self.centres), 1 + column] = -np.einsum("ni,ni->n", change, self.normals) / step
+            stacked[:, 1 + column] = (self._gap(stated, other, grid) - here) / step
         return Block("rest", stacked.T @ cho_solve((self.factor, False), stacked), float(len(self.residual)))
+
+    def _gap(self, stated: Setup, setup: Setup, grid: Meshing) -> FloatArray:
+        """Measured minus simulated (p + t,) [m] under a setup, had the stated one left nothing but its sag.
+
+        What was measured lies, under the stated setup, about where its block and the table are.
+        """
+        rays = sight_of(stated, reference=True).read(np.concatenate([self.centres, self.table]))
+        gap = sight_of(setup, reference=True).place(rays)
+        gap[: len(self.centres)] -= rest(setup, grid).move(Surface.of(setup).own(self.centres))
+        return np.concatenate([np.einsum("ni,ni->n", gap[: len(self.centres)], self.normals), gap[len(self.centres) :, 2]])
 
 
 def _table_cells(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -9,14 +9,15 @@ from __future__ import annotations
 from typing import Any
 
 from core.effects.base import Effect, Parameter, Slot, parameter
+from core.effects.geometry import GeometryScale, MeshResolution
 from core.effects.load import Gravity
 from core.effects.material import PoissonRatio, StiffInclusion, YoungModulus
 from core.effects.memory import PermanentSet, Viscoelasticity
 from core.effects.outside import outside_effects
-from core.effects.sensor import CameraRegistration, TimeOffset
+from core.effects.sensor import CameraRegistration, DepthBias, TimeOffset
 from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
 from core.effects.support import BaseCompliance, BaseDetachment, BaseSlip
-from core.effects.tool import ToolCompliance, ToolFriction, ToolOffset, ToolRadius
+from core.effects.tool import LandmarkMismatch, ToolCompliance, ToolFriction, ToolOffset, ToolRadius
 from core.errors import EffectError
 
 __all__ = ["CATALOGUE", "DIAGNOSED", "OUTSIDE", "Effect", "Parameter", "Slot", "effect_named", "from_json", "parameter"]
@@ -43,6 +44,10 @@ _REPLAYED: tuple[type[Effect], ...] = (
     PermanentSet,
     ToolFriction,
     YoungModulus,
+    DepthBias,
+    GeometryScale,
+    LandmarkMismatch,
+    MeshResolution,
 )
 OUTSIDE = outside_effects(effect.name for effect in (*_COUNTED, *_REPLAYED))
 DIAGNOSED = (*_COUNTED, *OUTSIDE)

@@ -109,6 +109,11 @@ class Effect(ABC):
         return tuple(item for item in cls.parameters() if not item.choices)
 
     @classmethod
+    def at_rest(cls) -> bool:
+        """Whether the rest cloud shows it, so that a diagnosis asks what it changes there."""
+        return cls.enters in (Slot.LOAD, Slot.GEOMETRY)
+
+    @classmethod
     @abstractmethod
     def neutral(cls, setup: Setup) -> Self:
         """The instance that changes nothing in this setup."""

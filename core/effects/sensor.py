@@ -12,7 +12,7 @@ from core.effects.base import Effect, Slot, parameter
 from core.frames import Transform
 from core.setup import Setup
 
-__all__ = ["CameraRegistration", "TimeOffset"]
+__all__ = ["CameraRegistration", "DepthBias", "TimeOffset"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +61,7 @@ class CameraRegistration(Effect):
 
     def shift(self, setup: Setup) -> Transform:
         """Stated to true position of a measured point, phantom frame."""
-        middle = np.array([0.0, 0.0, setup.geometry.size[2] / 2])
+        middle = np.array([0.0, 0.0, setup.stated_geometry.size[2] / 2])
         turn = Transform.from_vector(np.zeros(3), [self.rx, self.ry, self.rz])
         return Transform(turn.rotation, middle - turn.rotation @ middle + np.array([self.tx, self.ty, self.tz]))
 
@@ -75,3 +75,33 @@ class CameraRegistration(Effect):
             "rotation": (float(np.linalg.norm([self.rx, self.ry, self.rz])), "rad"),
             **super().reported(),
         }
+
+
+@dataclass(frozen=True, kw_only=True)
+class DepthBias(Effect):
+    """The camera reads too near or far, or stretches depth: a depth z along its axis is read as scale z + offset.
+
+    It read so already when it was registered. A registration makes up for all of it that is a rigid motion, which is nearly all of
+    an offset; a scale makes the block look larger or smaller (see `core.sight`).
+    """
+
+    name, enters = "depth_bias", Slot.SENSOR
+    summary = "the camera reads too near or far, or stretches depth"
+    offset: float = parameter("m", low=-0.05, high=0.05, scale=2e-3)
+    scale: float = parameter("1", low=0.85, high=1.15, scale=5e-3)
+
+    @classmethod
+    def at_rest(cls) -> bool:
+        """The cloud of a block at rest is misread like any other."""
+        return True
+
+    @classmethod
+    def neutral(cls, setup: Setup) -> Self:
+        return cls(offset=setup.sensor.depth_offset, scale=setup.sensor.depth_scale)
+
+    @classmethod
+    def starts(cls, setup: Setup) -> Sequence[Self]:
+        return [cls(offset=setup.sensor.depth_offset, scale=scale) for scale in (0.97, 1.03)]
+
+    def apply(self, setup: Setup) -> Setup:
+        return replace(setup, sensor=replace(setup.sensor, depth_offset=self.offset, depth_scale=self.scale))

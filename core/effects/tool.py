@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from core.effects.base import Effect, Slot, parameter
-from core.setup import Setup
+from core.setup import PAIRINGS, Setup
 
-__all__ = ["ToolCompliance", "ToolFriction", "ToolOffset", "ToolRadius"]
+__all__ = ["LandmarkMismatch", "ToolCompliance", "ToolFriction", "ToolOffset", "ToolRadius"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,3 +94,34 @@ class ToolFriction(Effect):
 
     def apply(self, setup: Setup) -> Setup:
         return replace(setup, tool=replace(setup.tool, friction_coefficient=self.friction_coefficient))
+
+
+@dataclass(frozen=True, kw_only=True)
+class LandmarkMismatch(Effect):
+    """Touches paired with the wrong landmarks, or made beside them.
+
+    The tool then is where the same touches, laid on the right places, put it (see `core.touches`). A polygon of another size about
+    the same middle puts it where it was: `scale`, and `inset` at corners that lie evenly around, show in what the touches miss by,
+    and in no replay.
+    """
+
+    name, enters = "landmark_mismatch", Slot.TOOL
+    summary = "the touches were of other places than stated"
+    pairing: str = parameter("", choices=PAIRINGS)
+    scale: float = parameter("1", low=0.6, high=1.6, scale=0.02)
+    inset: float = parameter("m", low=-0.01, high=0.02, scale=5e-4)
+
+    @classmethod
+    def neutral(cls, setup: Setup) -> Self:
+        here = setup.touching
+        return cls(pairing=here.pairing, scale=here.scale, inset=here.inset)
+
+    @classmethod
+    def starts(cls, setup: Setup) -> Sequence[Self]:
+        """Every other pairing as it is, and the stated one with touches inside the corners."""
+        others = [cls(pairing=pairing, scale=1.0, inset=0.0) for pairing in PAIRINGS[1:]]
+        return [*others, cls(pairing=PAIRINGS[0], scale=0.85, inset=0.0), cls(pairing=PAIRINGS[0], scale=1.0, inset=3e-3)]
+
+    def apply(self, setup: Setup) -> Setup:
+        touching = replace(setup.touching, pairing=self.pairing, scale=self.scale, inset=self.inset)
+        return replace(setup, touching=touching)

@@ -12,7 +12,7 @@ from core.frames import FloatArray
 IndexArray = np.ndarray[Any, np.dtype[np.int64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
-__all__ = ["EDGE", "FACES", "TABLE_REACH", "Assignment", "Planes", "assign", "box_distance", "camera_planes"]
+__all__ = ["EDGE", "FACES", "NORMALS", "TABLE_REACH", "Assignment", "Planes", "assign", "box_distance", "camera_planes"]
 
 FACES = ("top", "-x", "+x", "-y", "+y", "table")
 NORMALS = np.array([[0, 0, 1], [-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, 1]], dtype=float)

@@ -9,6 +9,7 @@ from core.effects.sensor import CameraRegistration
 from core.measurement import Surface
 from core.replay import rest
 from core.setup import Setup
+from core.sight import sight_of
 
 SURFACE, BLOCK = Surface(SETUP.box), rest(SETUP, GRID)
 SHIFT = np.array([5e-3, 1e-3, 0.0])
@@ -41,7 +42,7 @@ def test_ray_that_misses_the_true_block_does_not_count_against_it():
 def test_ray_that_misses_feels_how_the_surface_moves():
     found = _compared(5e-5, MOVED)
     side = CameraRegistration(tx=5e-3, ty=1.1e-3, tz=0.0, rx=0.0, ry=0.0, rz=0.0).apply(SETUP)
-    moved = side.phantom_from_camera_true @ MOVED.phantom_from_camera_true.inverse()
+    moved = sight_of(side).place(sight_of(MOVED).read(found.points))
     change = found.along_sight(moved)[found.means.count > 0]
     assert np.allclose(change, -1e-4, atol=1e-6)
 

@@ -9,7 +9,7 @@ from pushed_block import GRID, POSE, SETUP, SIZE, TOP, dwelling, observed, poke,
 from core.diagnosis import prediction as prediction_module
 from core.diagnosis.noise import Noise
 from core.diagnosis.observations import Group, Observations
-from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted, predict, touch_correction
+from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted, predict
 from core.effects.sensor import CameraRegistration
 from core.frames import FloatArray
 from core.measurement import Surface
@@ -17,6 +17,7 @@ from core.mesh import GridSpec
 from core.registration import small_motion
 from core.replay import rest
 from core.setup import Inclusion, Load, Setup, Tool
+from core.touches import touch_correction
 
 PIVOT = np.array([0.0, 0.0, TOP])
 CENTRES = np.array([poke(-8e-3), poke(2e-3), poke(4e-3)])

@@ -1,0 +1,68 @@
+"""Causes in the block's shape, and in what it is cut into."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+from core.effects.base import Effect, Slot, parameter
+from core.setup import Box, Setup
+
+__all__ = ["GeometryScale", "MeshResolution"]
+
+_FINEST = 2e-3
+"""Edges of elements [m] up to which a grid is not called coarse, whatever it is."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GeometryScale(Effect):
+    """The phantom is not the stated size: its true lengths over the stated ones.
+
+    The registrations took it for the stated size. With the true one the same touches and the same rest cloud put robot and camera
+    elsewhere (see `core.touches` and `core.sight`).
+    """
+
+    name, enters = "geometry_scale", Slot.GEOMETRY
+    summary = "the phantom is not the stated size"
+    scale_x: float = parameter("1", low=0.7, high=1.4, scale=0.01)
+    scale_y: float = parameter("1", low=0.7, high=1.4, scale=0.01)
+    scale_z: float = parameter("1", low=0.7, high=1.4, scale=0.01)
+
+    @classmethod
+    def neutral(cls, setup: Setup) -> Self:
+        x, y, z = (float(factor) for factor in setup.scale)
+        return cls(scale_x=x, scale_y=y, scale_z=z)
+
+    @classmethod
+    def starts(cls, setup: Setup) -> Sequence[Self]:
+        factors = [[1.05 if axis == other else 1.0 for other in range(3)] for axis in range(3)]
+        return [cls(scale_x=x, scale_y=y, scale_z=z) for x, y, z in factors]
+
+    def apply(self, setup: Setup) -> Setup:
+        if (self.scale_x, self.scale_y, self.scale_z) == (1.0, 1.0, 1.0):
+            return replace(setup, geometry=setup.stated_geometry, registered=None)
+        stated = setup.stated_box
+        x, y, z = stated.size
+        true = Box(size=(self.scale_x * x, self.scale_y * y, self.scale_z * z))
+        return replace(setup, geometry=true, registered=stated)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshResolution(Effect):
+    """Nothing in the world: the simulation's own grid is too coarse. An even grid of trilinear hexahedra of this size."""
+
+    name, enters = "mesh_resolution", Slot.GEOMETRY
+    summary = "the simulation's own grid is too coarse"
+    element_size: float = parameter("m", low=_FINEST, high=2e-2, scale=0.3, log=True)
+
+    @classmethod
+    def neutral(cls, setup: Setup) -> Self:
+        return cls(element_size=_FINEST if setup.element_size is None else min(max(setup.element_size, _FINEST), 2e-2))
+
+    @classmethod
+    def starts(cls, setup: Setup) -> Sequence[Self]:
+        return [cls(element_size=size) for size in (5e-3, 9e-3)]
+
+    def apply(self, setup: Setup) -> Setup:
+        return replace(setup, element_size=None if self.element_size <= _FINEST else self.element_size)
