@@ -39,6 +39,8 @@ DEEPEST = 0.4 * SIZE[2]
 LONGEST_JUMP = 5e-3
 BY_SIZE, SIZED = 0.1, Grading(spacing=1.3e-3, along=0.8, inward=1.0, longest=0.35)
 """Share of the situations whose mesh goes by sizes [1], and those: a little coarser than a diagnosis takes them."""
+DRAWN = ("geometry_scale", "landmark_mismatch", "young_modulus", "mesh_resolution")
+"""Effects that change what a situation draws anyway: stiffness, the tool's place against the block, and the grid."""
 INSIDE = 5e-4
 """Surface points deeper inside the tool than this [m] are a fault."""
 
@@ -94,7 +96,7 @@ def draw_situation(seed: int, by_size: float = BY_SIZE) -> Situation:
         young_modulus=float(10 ** random.uniform(1, 6)), poisson_ratio=float(random.uniform(0.0, 0.49)), stretch_limit=limit
     )
     setup = Setup(geometry=Box(size=SIZE), tool=Tool(radius=radius), material=material, mass=0.104)
-    kinds = [kind for kind in CATALOGUE if kind.enters is not Slot.SENSOR]
+    kinds = [kind for kind in CATALOGUE if kind.enters is not Slot.SENSOR and kind.name not in DRAWN]
     effects = []
     for index in random.choice(len(kinds), size=2, replace=False):
         effects.append(_effect(random, kinds[int(index)], setup))

@@ -16,6 +16,8 @@ from core.mesh import GridSpec
 from core.registration import Registration
 from core.replay import Equilibrium, replay, rest
 from core.setup import Box, Setup, Tool
+from core.sight import sight_of
+from core.touches import touch_correction
 
 SIZE = (0.0687, 0.0393, 0.0358)
 TOP = SIZE[2]
@@ -34,18 +36,20 @@ def looking_at(eye: FloatArray, target: FloatArray) -> Transform:
 
 POSE = looking_at(EYE, np.array([0.0, 0.0, TOP / 2]))
 SETUP = Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3), mass=0.104, phantom_from_camera=POSE)
+CORNERS = tuple((x * SIZE[0] / 2, y * SIZE[1] / 2, TOP) for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1)))
+"""Landmarks (x, y, z) [m] that are touched."""
 
 
-def seen_points(frame: Equilibrium, count: int, noise: float, seed: int) -> FloatArray:
-    """Points (n, 3) [m] of the sides that face the camera, with noise [m] along the rays; camera frame."""
+def seen_points(frame: Equilibrium, count: int, noise: float, seed: int, truth: Setup = SETUP) -> FloatArray:
+    """Points (n, 3) [m] of the sides that face the camera, with noise [m] along the rays, as a camera reads them; camera frame."""
     random = np.random.default_rng(seed)
     low, high = np.array([-SIZE[0] / 2, -SIZE[1] / 2, 0.0]), np.array([SIZE[0] / 2, SIZE[1] / 2, TOP])
     sides = []
     for axis, end in ((2, high), (0, low), (1, low)):
         sample = random.uniform(low, high, (count // 3, 3))
         sample[:, axis] = end[axis]
-        sides.append(frame.move(sample))
-    points = POSE.inverse().apply(np.concatenate(sides))
+        sides.append(frame.move(sample * truth.scale))
+    points = sight_of(truth).read(np.concatenate(sides))
     away = points / np.linalg.norm(points, axis=1)[:, None]
     return points + away * (noise * random.standard_normal(len(points)))[:, None]
 
@@ -61,9 +65,9 @@ def dwelling(centres: FloatArray) -> tuple[FloatArray, Kinematics]:
 def observed(truth: Setup, centres: FloatArray, *, count: int = 6000, noise: float = 3e-4, seed: int = 0) -> Observations:
     """One sequence of a block that behaves like `truth`; one group per place (g, 3) [m] at which the tool is stated to be."""
     times, stream = dwelling(centres)
-    frames = replay(truth, centres, GRID)
+    frames = replay(truth, touch_correction(truth, GRID).apply(centres), GRID)
     groups = [
-        Group((number,), seen_points(frame, count, noise, seed + number), not frame.in_contact, probe=1)
+        Group((number,), seen_points(frame, count, noise, seed + number, truth), not frame.in_contact, probe=1)
         for number, frame in enumerate(frames)
     ]
     return Observations("poke-01", times, stream, tuple(groups))

@@ -133,6 +133,7 @@ class _SpinningTool(Tool):
     [
         ({}, None),
         ({"material": Material(law="corotational")}, "material.law"),
+        ({"element_size": 6e-3}, "element_size"),
         ({"support": Support(friction_coefficient=0.3)}, "support.friction_coefficient"),
         ({"support": Support(detached=(Detachment(edge="+x", extent=0.01),))}, "support.detached"),
         ({"support": Support(stiffness_over_E=200.0)}, "support.stiffness_over_E"),

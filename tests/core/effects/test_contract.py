@@ -7,17 +7,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pushed_block import looking_at
 
 from core.effects import CATALOGUE, Effect, Slot, effect_named, from_json
 from core.effects.material import YoungModulus
-from core.effects.sensor import CameraRegistration
+from core.effects.sensor import CameraRegistration, TimeOffset
 from core.effects.tool import ToolOffset
 from core.errors import EffectError
 from core.mesh import GridSpec
 from core.replay import Equilibrium, replay
 from core.setup import Box, Setup, Tool
+from core.sight import sight_of
+from core.touches import touch_correction
 
-SETUP = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3), mass=0.104)
+SIZE = (0.0687, 0.0393, 0.0358)
+CORNERS = tuple((x * SIZE[0] / 2, y * SIZE[1] / 2, SIZE[2]) for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1)))
+SETUP = Setup(
+    geometry=Box(size=SIZE), tool=Tool(radius=5e-3), mass=0.104, landmarks=CORNERS,
+    phantom_from_camera=looking_at(np.array([-0.19, -0.16, 0.28]), np.array([0.0, 0.0, 0.018])),
+)  # fmt: skip
 GRID = GridSpec(nodes=(9, 7, 6), spacing=2e-3)
 POKE = np.array([[5e-3, 2e-3, 0.0358 + 5e-3 - depth] for depth in (1e-3, 3e-3, 5e-3)])
 RELEASE = np.concatenate([POKE, POKE[:1] + np.array([0.0, 0.0, 4e-3])])
@@ -43,7 +51,11 @@ VOCABULARY = {
     "base_compliance": {"stiffness_over_E": "1/m"},
     "tool_compliance": {"compliance_times_stiffness": "1/m"},
     "tool_friction": {"friction_coefficient": "1"},
+    "depth_bias": {"offset": "m", "scale": "1"},
+    "geometry_scale": {"scale_x": "1", "scale_y": "1", "scale_z": "1"},
+    "landmark_mismatch": {"pairing": "", "scale": "1", "inset": "m"},
     "young_modulus": {"E": "Pa"},
+    "mesh_resolution": {"element_size": "m"},
 }
 
 # One finite size of each, for the tests that need a change.
@@ -66,7 +78,11 @@ EXAMPLES: dict[str, dict[str, float | str]] = {
     "base_compliance": {"stiffness_over_E": 60.0},
     "tool_compliance": {"compliance_times_stiffness": 20.0},
     "tool_friction": {"friction_coefficient": 0.5},
-    "young_modulus": {"E": 8e3},
+    "depth_bias": {"offset": 3e-3, "scale": 1.02},
+    "geometry_scale": {"scale_x": 1.03, "scale_y": 0.98, "scale_z": 1.04},
+    "landmark_mismatch": {"pairing": "turn-1", "scale": 0.9, "inset": 1e-3},
+    "young_modulus": {"E": 1.0e4},
+    "mesh_resolution": {"element_size": 9e-3},
 }
 EACH = pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
 
@@ -115,7 +131,7 @@ def test_neutral_changes_nothing_in_a_replay(effect, baseline):
         assert np.allclose(frame.displacement, wanted.displacement, atol=1e-9)
         assert np.allclose(frame.slip, wanted.slip) and np.allclose(frame.force, wanted.force, rtol=1e-6, atol=1e-9)
     assert setup.sensor.time_offset == SETUP.sensor.time_offset
-    assert np.allclose(setup.sensor.camera_shift.matrix, np.eye(4))
+    assert sight_of(setup).same(sight_of(SETUP)) and np.array_equal(touch_correction(setup, GRID).matrix, np.eye(4))
 
 
 @EACH
@@ -125,14 +141,18 @@ def test_example_changes_replay_or_sensor(effect):
     if effect.enters is Slot.SENSOR:
         assert _setup_as_text(replace(setup, sensor=SETUP.sensor)) == _setup_as_text(SETUP)
         assert _setup_as_text(setup) != _setup_as_text(SETUP)
+        assert effect is TimeOffset or not sight_of(setup).same(sight_of(SETUP))
         return
     way = side if effect.enters is Slot.SUPPORT else RELEASE if setup.material.remembers else POKE
-    found, without = (replay(one, way, GRID, times=TIMES[: len(way)])[-1] for one in (setup, SETUP))
+    found, without = (
+        replay(one, touch_correction(one, GRID).apply(way), GRID, times=TIMES[: len(way)])[-1] for one in (setup, SETUP)
+    )
     point = np.array([[3e-3, 1e-3, 0.0358]])
-    if effect is YoungModulus:  # a position-driven block takes the same shape whatever its stiffness
-        assert np.allclose(found.force, 1.6 * without.force, rtol=1e-9) and np.array_equal(found.move(point), without.move(point))
-        return
-    assert np.linalg.norm(found.move(point) - without.move(point)) > 2e-5
+    moved = np.linalg.norm(found.move(point * setup.scale) - without.move(point))
+    if effect is YoungModulus:  # the shape is that of any other stiffness, and the force is not
+        assert moved < 1e-9 and np.allclose(found.force, 2 * without.force, rtol=1e-9)
+    else:
+        assert moved > 2e-5
 
 
 @EACH

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from deforming import DEFORMING
 
+from core.adjoint import replay_loss_changes
 from core.effects import CATALOGUE, Slot, from_json
 from core.effects.memory import PermanentSet, Viscoelasticity
 from core.effects.tool import ToolFriction
@@ -19,6 +20,8 @@ from core.setup import Box, Load, Material, Setup, Support, Tool
 
 SETUP = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3), mass=0.104)
 GRID = GridSpec(nodes=(9, 7, 6), spacing=2e-3)
+EVEN = GridSpec(nodes=(13, 9, 7))
+"""Whose elements grow with the block."""
 POKE = np.array([[5e-3, 2e-3, 0.0358 + 5e-3 - depth] for depth in (1e-3, 3e-3, 5e-3)])
 
 
@@ -32,6 +35,13 @@ def _with_detachment(extent: float) -> Setup:
 
 def _with_lump(ratio: float = 4.0, x: float = 6e-3, radius: float = 6e-3) -> Setup:
     return _with("stiff_inclusion", x=x, y=1e-3, z=0.024, radius=radius, stiffness_ratio=ratio)
+
+
+LARGER = 1.0 + 1e-5
+
+
+def _scaled(factors: dict[str, float]) -> Setup:
+    return _with("geometry_scale", **{"scale_x": 1.0, "scale_y": 1.0, "scale_z": 1.0, **factors})
 
 
 CHANGES = {
@@ -74,14 +84,23 @@ CHANGES = {
         replace(_with("tool_compliance", compliance_times_stiffness=20.0), material=Material(poisson_ratio=0.4501)),
     ),
     "base_compliance": (_with("base_compliance", stiffness_over_E=60.0), _with("base_compliance", stiffness_over_E=60.06)),
-    "young_modulus": (SETUP, _with("young_modulus", E=5.005e3)),
+    **{f"geometry_scale {axis}": (_scaled({}), _scaled({f"scale_{axis}": LARGER})) for axis in "xyz"},
+    "geometry_scale of a heavy block": (
+        replace(SETUP, load=Load(specific_weight_over_stiffness=1.5)),
+        replace(_scaled({"scale_z": LARGER}), load=Load(specific_weight_over_stiffness=1.5)),
+    ),
+    "young_modulus": (SETUP, _with("young_modulus", E=7e3)),
+    "landmark_mismatch": (SETUP, _with("landmark_mismatch", pairing="as-paired", scale=0.9, inset=1e-3)),
 }
+STILL = ("base_slip", "young_modulus", "landmark_mismatch")
+"""What moves nothing while the tool stays where it is against the block."""
 
 
 @pytest.mark.parametrize("name", CHANGES)
 def test_sensitivity_is_the_difference_of_two_solves(name):
     setup, changed = CHANGES[name]
-    block, other = Replay(setup, GRID, tolerance=1e-10), Replay(changed, GRID, tolerance=1e-10)
+    grid = EVEN if name.startswith("geometry_scale") else GRID
+    block, other = Replay(setup, grid, tolerance=1e-10), Replay(changed, grid, tolerance=1e-10)
     frame = None
     for centre in POKE:
         frame = block.step(centre, frame)
@@ -89,7 +108,7 @@ def test_sensitivity_is_the_difference_of_two_solves(name):
     solved = other.step(POKE[-1], frame)
     wanted = solved.displacement - frame.displacement
     found = displacement_changes(block, frame, [(changed, np.zeros(3))])[0]
-    if name in ("base_slip", "young_modulus"):
+    if name in STILL:
         assert np.abs(found).max() < 1e-9 and np.abs(wanted).max() < 1e-9
         return
     assert np.linalg.norm(wanted) > 1e-7
@@ -137,6 +156,47 @@ def test_effect_that_remembers_has_no_change_of_one_frame_to_first_order(effect)
             ask(block, frame, [(setup, np.zeros(3))])
 
 
+@pytest.mark.parametrize("giving", [0.0, 20.0], ids=["held", "giving"])
+@pytest.mark.parametrize("axis", "xyz")
+def test_adjoint_gradient_by_the_block_s_size_is_that_of_full_solves(axis, giving):
+    """The displacement is that of the material point from where it is at rest in each block."""
+
+    def sized(factor: float) -> Setup:
+        setup = _scaled({f"scale_{axis}": factor})
+        return replace(setup, tool=Tool(radius=5e-3, compliance_times_stiffness=giving))
+
+    block, frames = Replay(sized(1.0), EVEN, tolerance=1e-11), []
+    for centre in POKE:
+        frames.append(block.step(centre, frames[-1] if frames else None))
+    slope, step = 0.2 * frames[-1].displacement, 1e-5
+    near = [(sized(1.0 + sign * step), np.zeros(3)) for sign in (1, -1)]
+    around = [Replay(setup, EVEN, tolerance=1e-11).step(POKE[-1], frames[-1]).displacement for setup, _ in near]
+    wanted = float((slope * (around[0] - around[1])).sum())
+    rise, fall = loss_changes(block, frames[-1], slope, near)
+    assert rise - fall == pytest.approx(wanted, rel=0.01)
+    slopes = [np.zeros_like(slope), np.zeros_like(slope), slope]
+    assert np.subtract(*replay_loss_changes(block, frames, slopes, near)) == pytest.approx(wanted, rel=0.01)
+
+
+def test_grid_of_other_elements_and_a_size_that_is_remembered_have_no_gradient():
+    block, frames = Replay(SETUP, GRID), [Replay(SETUP, GRID).step(POKE[0])]
+    coarse = [(_with("mesh_resolution", element_size=6e-3), np.zeros(3))]
+    slopes = [frame.displacement for frame in frames]
+    for ask in (
+        lambda: displacement_changes(block, frames[0], coarse),
+        lambda: loss_changes(block, frames[0], slopes[0], coarse),
+        lambda: replay_loss_changes(block, frames, slopes, coarse),
+    ):
+        with pytest.raises(SetupError, match="differences of whole replays") as caught:
+            ask()
+        assert caught.value.where["key"] == "element_size"
+    kept = PermanentSet(retained_fraction=0.2)
+    larger = [(kept.apply(_scaled({"scale_x": LARGER})), np.zeros(3))]
+    with pytest.raises(SetupError, match="changes its size while it remembers"):
+        replay_loss_changes(Replay(kept.apply(SETUP), GRID), frames, slopes, larger, [0.0])
+
+
 def test_every_effect_that_deforms_the_block_has_its_gradient_checked_or_turned_down():
-    checked = {*DEFORMING, "base_slip", "young_modulus", *(effect.name for effect in REMEMBERING)}
+    turned_down = {*(effect.name for effect in REMEMBERING), "mesh_resolution"}
+    checked = {*DEFORMING, *STILL, "geometry_scale", *turned_down}
     assert {effect.name for effect in CATALOGUE if effect.enters is not Slot.SENSOR} == checked
