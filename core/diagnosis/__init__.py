@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 import tempfile
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,7 @@ from core.grading import FINE_GRID, PAGE_GRID, REPLAY_GRID
 from core.meshing import Meshing
 from core.progress import Report, part, silent
 from core.registration import Registration, register, setup_from
-from core.setup import Setup, Touching
+from core.setup import Setup
 
 __all__ = ["diagnose"]
 
@@ -55,7 +55,7 @@ def diagnose(
     report(0.0, "reading every cloud")
     dataset.validate(part(report, 0.0, 0.02))
     registration = register(dataset)
-    setup = _stated(dataset, registration)
+    setup = setup_from(dataset, registration)
     data = observe_all(dataset, fitted, setup, registration, FIT_GROUPS, part(report, 0.02, 0.04))
     unseen = observe_all(dataset, tested, setup, registration, TEST_GROUPS, part(report, 0.04, 0.05))
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -86,13 +86,6 @@ def _splits(dataset: Dataset) -> tuple[tuple[str, ...], tuple[str, ...]]:
     if any(not len(dataset.sequence(name)) for name in (*fitted, *config.test)):
         raise DiagnosisError("sequences without clouds cannot be diagnosed yet; leave them out of [splits]", key="splits")
     return fitted, tuple(config.test)
-
-
-def _stated(dataset: Dataset, registration: Registration) -> Setup:
-    landmarks = tuple(dataset.config.landmarks[name] for name in dataset.touches.names)
-    misses = tuple((float(x), float(y), float(z)) for x, y, z in registration.touch_residuals)
-    touching = Touching(misses=misses, lift=dataset.config.touch_offset)
-    return replace(setup_from(dataset, registration), landmarks=landmarks, touching=touching)
 
 
 def _run(

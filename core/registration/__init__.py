@@ -15,7 +15,7 @@ from core.registration.pairing import TouchProposal, propose
 from core.registration.pose import motion_jacobian, small_motion
 from core.registration.robot import RobotFit, fit_robot
 from core.registration.uncertainty import PRIOR
-from core.setup import Box, Material, Sensor, Setup, Tool
+from core.setup import Box, Material, Sensor, Setup, Tool, Touching
 
 __all__ = [
     "CameraFit",
@@ -97,14 +97,17 @@ def register(dataset: Dataset, report: Report = silent) -> Registration:
 
 
 def setup_from(dataset: Dataset, registration: Registration) -> Setup:
-    """What the experimenter believes, with the registrations found."""
+    """What the experimenter believes, with the registrations found and the touches that they rest on."""
     config = dataset.config
+    misses = tuple((float(x), float(y), float(z)) for x, y, z in registration.touch_residuals)
     return Setup(
         geometry=Box(size=config.size),
         tool=Tool(radius=config.tool_radius),
         material=Material(young_modulus=config.young_modulus, poisson_ratio=config.poisson_ratio),
         sensor=Sensor(depth_sigma=config.depth_sigma),
         mass=config.mass,
+        landmarks=tuple(config.landmarks[name] for name in dataset.touches.names),
+        touching=Touching(misses=misses, lift=config.touch_offset),
         phantom_from_robot=registration.phantom_from_robot,
         phantom_from_camera=registration.phantom_from_camera,
     )

@@ -44,7 +44,7 @@ def _as_deep_as_it_goes(scenario: Scenario, probe: Probe, slip: FloatArray, fine
     """One probe from a base that has slipped by `slip` (3,) [m], and the slip after it."""
     for short in np.arange(0.0, MOST_SHORT, SHORTER):
         tried = probe.shallower(float(short))
-        block = mesh_block(scenario.size, _grading(scenario, tried, fine))
+        block = mesh_block(scenario.true_size, _grading(scenario, tried, fine))
         bench = _Bench(scenario, block, slip)
         try:
             return Stretch(tried, block.surface_rest, block.surface_faces, bench.settled + slip, bench.passages(tried)), bench.slip
@@ -56,29 +56,38 @@ def _as_deep_as_it_goes(scenario: Scenario, probe: Probe, slip: FloatArray, fine
 
 
 def neutral_displacement(scenario: Scenario, stretch: Stretch, centre: FloatArray) -> FloatArray:
-    """Displacement (s, 3) [m] of the drawn surface of `stretch` with no hidden effect and the tool's stated centre (3,) [m]."""
-    low, high = _bounds(scenario)
-    bench = _Bench(
-        replace(scenario, effects=()), mesh_block(scenario.size, _grading(scenario, stretch.probe, scenario.fine)), np.zeros(3)
-    )
+    """Displacement (s, 3) [m] of the drawn surface of `stretch` with no hidden effect and the tool's stated centre (3,) [m].
+
+    Where the block has another size than believed, it is from the true rest shape to where the believed block would have been.
+    """
+    believed = replace(scenario, effects=())
+    low, high = _bounds(believed)
+    grading = _grading(scenario if scenario.true_size == scenario.size else believed, stretch.probe, scenario.fine)
+    bench = _Bench(believed, mesh_block(scenario.size, grading), np.zeros(3))
     try:
         outwards = centre - np.clip(centre, low, high)
         outwards = outwards / np.linalg.norm(outwards) if np.any(outwards) else stretch.probe.outwards
-        return [bench.moment(centre + outwards * clear) for clear in np.arange(8e-3, -1e-9, -1.6e-3)][-1].surface
+        surface = [bench.moment(centre + outwards * clear) for clear in np.arange(8e-3, -1e-9, -1.6e-3)][-1].surface
+        if scenario.true_size == scenario.size:
+            return surface
+        places = stretch.rest * (np.array(scenario.size) / np.array(scenario.true_size))
+        nearest = cKDTree(bench.block.surface_rest).query(places)[1]
+        return np.asarray(places + surface[nearest] - stretch.rest)
     finally:
         bench.close()
 
 
 def rest_surface(scenario: Scenario) -> tuple[FloatArray, FloatArray, IntArray]:
-    """The untouched block: drawn surface of the stated shape (s, 3), its displacement (s, 3) [m], and triangles (t, 3)."""
-    block = mesh_block(scenario.size, Grading(np.zeros((1, 3)), np.zeros(1), np.full(1, 8e-3), 8e-3, 0.5, levels_of(scenario)))
+    """The untouched block: drawn surface of the true shape (s, 3), its displacement (s, 3) [m], and triangles (t, 3)."""
+    grading = Grading(np.zeros((1, 3)), np.zeros(1), np.full(1, 8e-3), 8e-3, 0.5, levels_of(scenario))
+    block = mesh_block(scenario.true_size, grading)
     bench = _Bench(scenario, block, np.zeros(3))
     bench.close()
     return block.surface_rest, bench.settled, block.surface_faces
 
 
 def _bounds(scenario: Scenario) -> tuple[FloatArray, FloatArray]:
-    x, y, z = scenario.size
+    x, y, z = scenario.true_size
     return np.array([-x / 2, -y / 2, 0.0]), np.array([x / 2, y / 2, z])
 
 

@@ -32,7 +32,7 @@ def true_offset(scenario: Scenario) -> FloatArray:
 def levels_of(scenario: Scenario) -> tuple[float, ...]:
     """Heights between two materials [m]: under a skin, where there is one."""
     skin = scenario.hidden("surface_layer")
-    return (scenario.size[2] - skin.value("thickness"),) if skin else ()
+    return (scenario.true_size[2] - skin.value("thickness"),) if skin else ()
 
 
 def solid_of(scenario: Scenario, block: Block) -> Solid:
@@ -60,7 +60,7 @@ def _modulus(scenario: Scenario, block: Block) -> FloatArray:
     """Young's modulus (e, 4) at the volume points [Pa]."""
     modulus = np.full(block.weights.shape, scenario.true_modulus)
     lump, skin, slope = (scenario.hidden(name) for name in ("stiff_inclusion", "surface_layer", "stiffness_gradient"))
-    height = scenario.size[2]
+    height = scenario.true_size[2]
     if lump is not None:
         inside = np.linalg.norm(block.places - [lump.value(axis) for axis in "xyz"], axis=2) < lump.value("radius")
         modulus[inside] *= lump.value("stiffness_ratio")
@@ -83,7 +83,7 @@ def _bonded(scenario: Scenario, places: FloatArray) -> BoolArray:
         return np.ones(places.shape[:-1], dtype=bool)
     edge = str(strip.parameters["edge"])
     axis, sign = "xy".index(edge[1]), -1.0 if edge[0] == "-" else 1.0
-    return np.asarray(scenario.size[axis] / 2 - sign * places[..., axis] >= strip.value("extent"))
+    return np.asarray(scenario.true_size[axis] / 2 - sign * places[..., axis] >= strip.value("extent"))
 
 
 def _springs(scenario: Scenario, block: Block, stiffness_over_modulus: float) -> FloatArray:

@@ -46,7 +46,7 @@ class DepthCamera:
         sigma: of the depth noise at 0.35 m; it grows with the distance squared [m].
         density: points on the block in one cloud, about.
         on_block: (n,) bool, pixels that see the block at rest.
-        disturbances: of the depth.
+        disturbances: of the depth. offset, scale: a depth z is read as scale z + offset, before what disturbs it [m], [1].
     """
 
     phantom_from_camera: Transform
@@ -57,6 +57,8 @@ class DepthCamera:
     density: int
     on_block: Any
     disturbances: tuple[Disturbance, ...] = ()
+    offset: float = 0.0
+    scale: float = 1.0
 
     def depth(self, scene: Scene) -> tuple[FloatArray, Any]:
         """True depth of each pixel [m], infinite for nothing, and what it sees: 0 block, 1 table, more the tool, -1 nothing."""
@@ -77,7 +79,7 @@ class DepthCamera:
         keep = rng.random(len(depth)) < self._chance(what)
         seen = np.nonzero(keep & np.isfinite(depth))[0]
         z = (
-            rippled(self.disturbances, depth[seen])
+            rippled(self.disturbances, self.scale * depth[seen] + self.offset)
             + self.bias[seen]
             + rng.normal(size=len(seen)) * self.sigma * (depth[seen] / 0.35) ** 2
         )

@@ -32,6 +32,8 @@ __all__ = ["make_dataset"]
 KINEMATICS_NOISE = 0.05e-3
 TOUCH_NOISE = 0.15e-3
 MARGIN = 0.35
+_SEEN_OTHERWISE = ("time_offset", "camera_registration", "depth_bias", "landmark_mismatch")
+"""Effects that leave the block as it is at any instant."""
 
 
 @dataclass(frozen=True)
@@ -83,14 +85,14 @@ def _fill(folder: Path, scenario: Scenario, seed: int, workers: int, report: Rep
     report(0.0, "letting the block settle")
     rest, settled, faces = rest_surface(scenario)
     camera = place_camera(
-        rng, scenario.size, (rest + settled, faces), seen, scenario.density, scenario.noise * rng.uniform(0.9, 1.1)
+        rng, scenario.true_size, (rest + settled, faces), seen, scenario.density, scenario.noise * rng.uniform(0.9, 1.1)
     )
-    camera = replace(camera, disturbances=scenario.disturbances)
+    camera = replace(camera, disturbances=scenario.disturbances, **_misread(scenario))
     shift = _camera_shift(scenario, rng)
     write_ply(folder / "rest.ply", camera.cloud(Scene((rest + settled, faces), None, np.array([0.0, 0.0, -1.0]), 1.0), rng))
     _write_touches(folder, scenario, robot_from_phantom, (rest, settled), rng)
     guess = Transform.from_vector(rng.normal(size=3) * 2.5e-3, rng.normal(size=3) * 0.02) @ camera.phantom_from_camera
-    write_config(folder / "dataset.toml", f"block-{rng.integers(16**4):04x}", scenario, _landmarks(scenario), guess)
+    write_config(folder / "dataset.toml", f"block-{rng.integers(16**4):04x}", scenario, _landmarks(scenario.size), guess)
     jobs = [
         _Job(scenario, motion, camera, robot_from_phantom, shift, seen, folder / "sequences" / motion.name, seed)
         for motion in _motions(scenario, seen, seed)
@@ -108,10 +110,17 @@ def _fill(folder: Path, scenario: Scenario, seed: int, workers: int, report: Rep
     )  # fmt: skip
 
 
+def _misread(scenario: Scenario) -> dict[str, float]:
+    """How the camera misreads depth, from before it was registered."""
+    hidden = scenario.hidden("depth_bias")
+    return {name: hidden.value(name) for name in ("offset", "scale")} if hidden else {}
+
+
 def _motions(scenario: Scenario, seen: FloatArray, seed: int) -> list[Motion]:
+    """Planned by who sees the block as it is, whatever its stated size."""
     kinds = [name.rpartition("-")[0] for name in scenario.sequences]
     return [
-        draw_motion(name, kinds[:place].count(kinds[place]), scenario.size, scenario.tool_radius, seen, seed)
+        draw_motion(name, kinds[:place].count(kinds[place]), scenario.true_size, scenario.tool_radius, seen, seed)
         for place, name in enumerate(scenario.sequences)
     ]
 
@@ -140,9 +149,10 @@ def _camera_shift(scenario: Scenario, rng: np.random.Generator) -> Transform:
     return Transform.from_vector(step, turn * hidden.value("rotation") / np.linalg.norm(turn))
 
 
-def _landmarks(scenario: Scenario) -> dict[str, FloatArray]:
+def _landmarks(size: tuple[float, float, float]) -> dict[str, FloatArray]:
+    """The top's corners (3,) [m] of a block."""
     signs = ((1, 1), (1, -1), (-1, -1), (-1, 1))
-    x, y, z = scenario.size
+    x, y, z = size
     return {f"corner_{number}": np.array([a * x / 2, b * y / 2, z]) for number, (a, b) in enumerate(signs)}
 
 
@@ -153,11 +163,26 @@ def _write_touches(
     surface: tuple[FloatArray, FloatArray],
     rng: np.random.Generator,
 ) -> None:
-    """Touches of the corners where they really are, with the error of a careful hand."""
-    landmarks, (rest, settled) = _landmarks(scenario), surface
-    corners = np.array([place + settled[np.argmin(np.linalg.norm(rest - place, axis=1))] for place in landmarks.values()])
+    """Touches of the corners where they really are, or where they were taken to be, with the error of a careful hand."""
+    landmarks, (rest, settled) = _landmarks(scenario.true_size), surface
+    places = _mistaken(scenario, np.array(list(landmarks.values())))
+    corners = np.array([place + settled[np.argmin(np.linalg.norm(rest - place, axis=1))] for place in places])
     touched = corners + (0.0, 0.0, scenario.touch_offset) + rng.normal(size=(4, 3)) * TOUCH_NOISE
     write_touches(folder / "touches.csv", list(landmarks), robot_from_phantom.apply(touched))
+
+
+def _mistaken(scenario: Scenario, corners: FloatArray) -> FloatArray:
+    """The places (4, 3) [m] touched for these corners, in the order in which they are stated."""
+    hidden = scenario.hidden("landmark_mismatch")
+    if hidden is None:
+        return corners
+    kind, *rows = str(hidden.parameters["pairing"]).split("-")
+    touched = np.roll(corners, -int(rows[0]), axis=0) if kind == "turn" else corners.copy()
+    if kind == "swap":
+        one, other = (int(row) - 1 for row in rows)
+        touched[[one, other]] = corners[[other, one]]
+    flat = touched[:, :2] * hidden.value("scale")
+    return np.column_stack([flat - hidden.value("inset") * np.sign(flat), touched[:, 2]])
 
 
 def _record(job: _Job) -> _Record:
@@ -208,14 +233,14 @@ def _write_kinematics(job: _Job, start: float, rng: np.random.Generator) -> None
 
 
 def _visibility(job: _Job, track: Track) -> list[float]:
-    """Mean squares over the visible surface, where it is pushed hardest [m^2]."""
+    """Mean squares over the visible surface, where it is pushed hardest [m^2]; what touches and depth are off by is not in it."""
     if not job.scenario.effects:
         return []
     hidden = job.scenario.hidden("time_offset")
     late = hidden.value("offset") if hidden else 0.0
-    mechanical = any(effect.effect not in ("time_offset", "camera_registration") for effect in job.scenario.effects)
+    mechanical = any(effect.effect not in _SEEN_OTHERWISE for effect in job.scenario.effects)
     stretch = track.hardest
-    weights = visible_weights(stretch.rest, stretch.faces, job.scenario.size, job.seen)
+    weights = visible_weights(stretch.rest, stretch.faces, job.scenario.true_size, job.seen)
     squares = []
     for instant in stretch.deepest[1:] if mechanical else stretch.deepest:
         centre = job.motion.centre(np.array([instant + late]))[0]

@@ -30,6 +30,9 @@ HIDDEN: Mapping[str, Mapping[str, str]] = {
     "base_compliance": {"stiffness_over_E": "1/m"},
     "tool_compliance": {"compliance_times_stiffness": "1/m"},
     "young_modulus": {"E": "Pa"},
+    "depth_bias": {"offset": "m", "scale": "1"},
+    "geometry_scale": {"scale_x": "1", "scale_y": "1", "scale_z": "1"},
+    "landmark_mismatch": {"pairing": "", "scale": "1", "inset": "m"},
 }
 """The effects that the virtual bench can hide, with the unit of each parameter; names are those of the catalogue."""
 
@@ -46,7 +49,7 @@ SHORT_PROTOCOL = ("poke-top-01", "poke-top-02", "poke-side-01", "poke-side-02", 
 
 @dataclass(frozen=True)
 class HiddenEffect:
-    """One cause by its name in the catalogue, with its parameters in SI units (an edge is a word)."""
+    """One cause by its name in the catalogue, with its parameters in SI units (an edge and a pairing are words)."""
 
     effect: str
     parameters: Mapping[str, float | str] = field(default_factory=dict)
@@ -67,7 +70,7 @@ class Scenario:
         effects: what is really there and believed by nobody.
         disturbances: what is wrong and no effect of the catalogue.
         sequences: names; what stands before the number is the kind of motion: poke-top, poke-side or drag.
-        size: of the block [m].
+        size: of the block, believed [m].
         mass: [kg].
         young_modulus: believed, and true unless another one is hidden [Pa].
         poisson_ratio: believed [1].
@@ -94,6 +97,12 @@ class Scenario:
     robot_rate: float = 1000.0
     noise: float = 0.7e-3
     fine: float = 2.6e-3
+
+    @property
+    def true_size(self) -> tuple[float, float, float]:
+        """Of the block [m]."""
+        hidden, (x, y, z) = self.hidden("geometry_scale"), self.size
+        return (hidden.value("scale_x") * x, hidden.value("scale_y") * y, hidden.value("scale_z") * z) if hidden else self.size
 
     def hidden(self, effect: str) -> HiddenEffect | None:
         """The effect of that name, if it is hidden here."""
@@ -129,6 +138,21 @@ def _inclusion(rng: np.random.Generator) -> dict[str, float | str]:
     }
 
 
+def _stretch(rng: np.random.Generator) -> dict[str, float | str]:
+    return {"offset": _between(rng, -3e-3, 3e-3, 5), "scale": _either(rng, (0.955, 0.97), (1.03, 1.045))}
+
+
+def _sizes(rng: np.random.Generator) -> dict[str, float | str]:
+    wide = {name: _between(rng, 0.95, 1.05, 3) for name in ("scale_x", "scale_y")}
+    return {**wide, "scale_z": _either(rng, (0.93, 0.965), (1.035, 1.07), decimals=3)}
+
+
+def _mismatch(rng: np.random.Generator) -> dict[str, float | str]:
+    """As in the public recordings: corners taken for each other, and the polygon too small."""
+    pairing = str(rng.choice(["as-paired", "swap-1-2", "swap-1-3", "swap-2-4", "swap-3-4", "turn-1"]))
+    return {"pairing": pairing, "scale": _between(rng, 0.82, 0.9, 3), "inset": _between(rng, 0.5e-3, 2e-3)}
+
+
 def _offset(rng: np.random.Generator) -> dict[str, float | str]:
     direction = rng.normal(size=3)
     step = direction / np.linalg.norm(direction) * rng.uniform(1.2e-3, 2.5e-3)
@@ -155,6 +179,10 @@ _CLEAR: Mapping[str, _Draw] = {
     "base_compliance": lambda rng: {"stiffness_over_E": _between(rng, 20.0, 50.0, 1)},
     "tool_compliance": lambda rng: {"compliance_times_stiffness": _between(rng, 20.0, 45.0, 1)},
     "young_modulus": lambda rng: {"E": _either(rng, (2.5e3, 3.6e3), (6.9e3, 10e3), decimals=0)},
+    # The top then seems a millimetre and more too high or low.
+    "depth_bias": _stretch,
+    "geometry_scale": _sizes,
+    "landmark_mismatch": _mismatch,
 }
 
 
@@ -172,10 +200,12 @@ def draw_scenario(seed: int, effects: int = 1, clear: bool = True, among: Sequen
     return Scenario(effects=hidden if clear else tuple(_fainter(one) for one in hidden))
 
 
-_NEUTRAL: Mapping[str, float] = {"nu": 0.45, "tool_radius": 0.005, "stiffness_ratio": 1.0, "E": 5e3}
+_NEUTRAL: Mapping[str, float] = {
+    "nu": 0.45, "tool_radius": 0.005, "stiffness_ratio": 1.0, "E": 5e3, "scale": 1.0, "scale_x": 1.0, "scale_y": 1.0, "scale_z": 1.0,
+}  # fmt: skip
 _SHRINKING = (
     "dx", "dy", "dz", "extent", "specific_weight_over_stiffness", "offset", "translation", "rotation",
-    "log_ratio", "compliance_times_stiffness",
+    "log_ratio", "compliance_times_stiffness", "inset",
 )  # fmt: skip
 _GROWING = ("J_m", "stiffness_over_E")
 """Neutral where they are infinite, and by their inverse as far from it as they are strong."""
@@ -191,6 +221,8 @@ def _fainter(hidden: HiddenEffect) -> HiddenEffect:
             parameters[name] = round(float(value) / 3, 6)
         elif name in _GROWING:
             parameters[name] = round(float(value) * 3, 6)
+        elif name == "pairing":
+            parameters[name] = "as-paired"
         elif name == "friction_coefficient":
             parameters[name] = round(float(value) * 1.5, 4)
     return HiddenEffect(hidden.effect, parameters)

@@ -4,13 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pushed_block import GRID, POSE, SETUP, SIZE, TOP, dwelling, observed, poke, seen_points
+from pushed_block import CORNERS, GRID, POSE, SETUP, SIZE, TOP, dwelling, observed, poke, seen_points
 
 from core.diagnosis import prediction as prediction_module
 from core.diagnosis.noise import Noise
 from core.diagnosis.observations import Group, Observations
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted, predict
-from core.effects.sensor import CameraRegistration
+from core.effects.geometry import GeometryScale
+from core.effects.sensor import CameraRegistration, DepthBias
+from core.effects.tool import LandmarkMismatch
 from core.frames import FloatArray
 from core.measurement import Surface
 from core.mesh import GridSpec
@@ -25,6 +27,8 @@ TRUTH = replace(SETUP, tool=Tool(radius=5.3e-3, offset=(2e-4, 0.0, 1e-4)))
 LUMP = Inclusion(x=5e-3, y=0.0, z=0.024, radius=7e-3, stiffness_ratio=5.0)
 RADIUS_STEP, CAMERA_STEP, MOVE = 3e-7, 1e-6, 1e-5
 TIGHT = 1e-8
+GROWING = GridSpec(nodes=(13, 9, 7))
+"""An even grid: its elements grow with the block."""
 
 
 def _wider(step: float) -> Setup:
@@ -63,6 +67,18 @@ CHANGES: dict[str, tuple[int, Setup, float]] = {
 }
 
 
+TOUCHED = replace(SETUP, landmarks=CORNERS[:3])
+"""Three corners: what is wrong with their touches turns the tool."""
+NEAR = {
+    "depth_bias offset": DepthBias(offset=1e-6, scale=1.0),
+    "depth_bias scale": DepthBias(offset=0.0, scale=1.0 + 1e-5),
+    "geometry_scale x": GeometryScale(scale_x=1.0 + 1e-5, scale_y=1.0, scale_z=1.0),
+    "geometry_scale z": GeometryScale(scale_x=1.0, scale_y=1.0, scale_z=1.0 + 1e-5),
+    "landmark_mismatch inset": LandmarkMismatch(pairing="as-paired", scale=1.0, inset=1e-5),
+}
+"""Whose columns are compared with what twenty such steps do."""
+
+
 @pytest.fixture(scope="module")
 def data() -> Observations:
     """Two pushes, and a look at the untouched block, just as the stated setup has them."""
@@ -93,6 +109,41 @@ def test_column_is_the_difference_of_two_predictions(data, baseline, name):
     assert np.linalg.norm(found[1:] - wanted[1:]) < 0.02 * touched
     if name != "camera":
         assert not wanted[0].any() and not found[0].any()
+
+
+@pytest.fixture(scope="module")
+def of_touched(data) -> Prediction:
+    """The stated setup on elements that grow with the block, with the columns of all in NEAR."""
+    wanted = Wanted(setups=tuple(effect.apply(TOUCHED) for effect in NEAR.values()), steps=(1.0,) * len(NEAR), pivot=PIVOT)
+    return predict(data, TOUCHED, GROWING, wanted, tolerance=TIGHT)
+
+
+@pytest.mark.parametrize("name", NEAR)
+def test_column_of_what_the_registrations_rest_on_is_the_difference_of_two_predictions(data, of_touched, name):
+    effect, neutral = NEAR[name], type(NEAR[name]).neutral(TOUCHED)
+    steps = [20 * (here - zero) for here, zero in zip(effect.coordinates, neutral.coordinates, strict=True)]
+    far = neutral.moved(np.add(neutral.coordinates, steps)).apply(TOUCHED)
+    after = predict(data, far, GROWING, None, of_touched.equilibria, TIGHT, of_touched.samples)
+    difference = (after.gap - of_touched.gap) / 20
+    found = np.where(np.isfinite(difference), of_touched.columns[..., TOOL_COLUMNS + list(NEAR).index(name)], 0.0)
+    wanted = np.nan_to_num(difference)
+    assert np.linalg.norm(wanted) > 0
+    assert np.linalg.norm(found - wanted) < 0.05 * np.linalg.norm(wanted)
+
+
+@pytest.mark.parametrize(
+    "effect", [DepthBias(offset=1e-3, scale=1.03), GeometryScale(scale_x=1.03, scale_y=0.97, scale_z=0.96)], ids=["depth", "size"]
+)
+def test_block_that_was_registered_as_another_leaves_nothing_under_the_truth(effect):
+    stated = replace(SETUP, landmarks=CORNERS)
+    truth = effect.apply(stated)
+    item = observed(truth, CENTRES, noise=0.0)
+    believed = predict(item, stated, GRID)
+    right = predict(item, truth, GRID)
+    again = predict(item, truth, GRID, None, None, TIGHT, believed.samples)
+    assert right.gap.shape == again.gap.shape == believed.gap.shape  # the patches are those of the stated block
+    assert np.nanmax(np.abs(right.gap)) < 2e-5
+    assert np.sqrt(np.nanmean(again.gap**2)) < 0.15 * np.sqrt(np.nanmean(believed.gap**2))
 
 
 def test_where_a_grid_is_about_to_give_way_the_column_is_the_difference_over_a_motion_that_matters(monkeypatch):

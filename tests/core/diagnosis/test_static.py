@@ -9,10 +9,14 @@ from pushed_block import GRID, POSE, SETUP, SIZE, TOP, seen_points
 from core.cleaning import Cleaner
 from core.diagnosis.evidence import Block, fit
 from core.diagnosis.static import StaticChannel, _camera_errors
+from core.effects import Effect
+from core.effects.geometry import GeometryScale
+from core.effects.sensor import DepthBias
 from core.frames import FloatArray, Transform
 from core.registration import small_motion
 from core.replay import rest
 from core.setup import Load, Setup
+from core.sight import sight_of
 
 SAG, NOISE, STEP = 1.5, 4e-4, 1e-3
 PIVOT = np.array([0.0, 0.0, TOP])
@@ -23,14 +27,14 @@ def _sagging(weight: float) -> Setup:
 
 
 def _cloud(truth: Setup, seed: int) -> FloatArray:
-    """Raw rest cloud (n, 3) [m], camera frame: the sagged block and the table around it."""
+    """Raw rest cloud (n, 3) [m], camera frame: the block as it is, and the table around it."""
     random = np.random.default_rng(seed)
     table = random.uniform(-0.09, 0.09, (12000, 3)) * [1.0, 1.0, 0.0]
     table = table[(np.abs(table[:, :2]) > np.array(SIZE[:2]) / 2 + 0.008).any(axis=1)]
-    table = POSE.inverse().apply(table)
+    table = sight_of(truth).read(table)
     away = table / np.linalg.norm(table, axis=1)[:, None]
     table = table + away * (NOISE * random.standard_normal(len(table)))[:, None]
-    return np.concatenate([seen_points(rest(truth, GRID), 24000, NOISE, seed), table])
+    return np.concatenate([seen_points(rest(truth, GRID), 24000, NOISE, seed, truth), table])
 
 
 def _channel(truth: Setup, pose: Transform = POSE) -> StaticChannel:
@@ -108,3 +112,29 @@ def test_only_sides_that_the_camera_sees_are_compared(sagged):
     assert (sagged.normals @ np.array([-0.19, -0.16, 0.28]) > 0).all()
     assert len(sagged.normals) > 200
     assert len(sagged.residual) - len(sagged.normals) > 50  # the table's cells
+
+
+AT_REST = (DepthBias(offset=0.0, scale=1.03), GeometryScale(scale_x=1.0, scale_y=1.0, scale_z=0.96))
+
+
+@pytest.mark.parametrize("effect", AT_REST, ids=lambda effect: effect.name)
+def test_what_the_registration_left_of_size_and_depth_is_found_in_the_rest_cloud(effect: Effect):
+    truth, step = effect.apply(SETUP), 1e-4
+    name = "scale_z" if effect.name == "geometry_scale" else "scale"
+    near = replace(effect.neutral(SETUP), **{name: 1.0 + step}).apply(SETUP)
+    channel = _channel(truth)
+    stated = channel.block(SETUP, SETUP, GRID, 1, {0: (near, step)})
+    right = channel.block(SETUP, truth, GRID, 1, {})
+    assert right.gram[0, 0] < 1.2 * right.values
+    assert stated.gram[0, 0] > right.gram[0, 0] + 20
+    solution = fit([stated], [0], np.array([[1e-6]]))
+    deviation = float(np.sqrt(solution.covariance[0, 0]))
+    wanted = getattr(effect, name) - 1.0
+    assert solution.change[0] == pytest.approx(wanted, abs=max(3 * deviation, 0.1 * abs(wanted)))
+    assert deviation < 0.3 * abs(wanted)
+
+
+def test_offset_of_depth_is_a_motion_of_the_camera_and_nearly_nothing_else():
+    channel = _channel(SETUP)
+    stated, far = (channel.block(SETUP, setup, GRID, 1, {}) for setup in (SETUP, DepthBias(offset=2e-3, scale=1.0).apply(SETUP)))
+    assert far.gram[0, 0] == pytest.approx(stated.gram[0, 0], abs=10.0)

@@ -22,6 +22,7 @@ STRONG = (
     (hide("anisotropy", direction=0.5, stiffness_ratio=3.5), False),
     (hide("base_compliance", stiffness_over_E=30.0), True),
     (hide("tool_compliance", compliance_times_stiffness=30.0), True),
+    (hide("geometry_scale", scale_x=0.96, scale_y=1.03, scale_z=0.94), False),
 )
 """Each with whether it is pushed from the side."""
 
