@@ -87,7 +87,8 @@ def _fill(folder: Path, scenario: Scenario, seed: int, workers: int, report: Rep
     camera = place_camera(
         rng, scenario.true_size, (rest + settled, faces), seen, scenario.density, scenario.noise * rng.uniform(0.9, 1.1)
     )
-    camera = replace(camera, disturbances=scenario.disturbances, **_misread(scenario))
+    offset, scale = _misread(scenario)
+    camera = replace(camera, disturbances=scenario.disturbances, offset=offset, scale=scale)
     shift = _camera_shift(scenario, rng)
     write_ply(folder / "rest.ply", camera.cloud(Scene((rest + settled, faces), None, np.array([0.0, 0.0, -1.0]), 1.0), rng))
     _write_touches(folder, scenario, robot_from_phantom, (rest, settled), rng)
@@ -110,10 +111,10 @@ def _fill(folder: Path, scenario: Scenario, seed: int, workers: int, report: Rep
     )  # fmt: skip
 
 
-def _misread(scenario: Scenario) -> dict[str, float]:
-    """How the camera misreads depth, from before it was registered."""
+def _misread(scenario: Scenario) -> tuple[float, float]:
+    """Offset [m] and scale [1] with which the camera misreads depth, from before it was registered."""
     hidden = scenario.hidden("depth_bias")
-    return {name: hidden.value(name) for name in ("offset", "scale")} if hidden else {}
+    return (hidden.value("offset"), hidden.value("scale")) if hidden else (0.0, 1.0)
 
 
 def _motions(scenario: Scenario, seen: FloatArray, seed: int) -> list[Motion]:
