@@ -11,7 +11,7 @@ from pushed_block import POSE, SETUP, SIZE, TOP
 from core.effects import Effect
 from core.effects.geometry import GeometryScale
 from core.effects.sensor import CameraRegistration, DepthBias
-from core.frames import FloatArray
+from core.frames import FloatArray, Transform
 from core.registration import fit_camera
 from core.setup import Setup
 from core.sight import Sight, sight_of
@@ -98,7 +98,7 @@ def test_registration_of_what_is_truly_seen_is_undone(effect: Effect, tolerance:
     found = sight_of(replace(setup, phantom_from_camera=stated)).pose
     block = np.concatenate([_side(name) for name in SIDES])
 
-    def off(pose: object) -> float:
+    def off(pose: Transform) -> float:
         return float(np.linalg.norm((pose @ POSE.inverse()).apply(block) - block, axis=1).max())
 
     assert off(found) < tolerance

@@ -121,8 +121,8 @@ def of_touched(data) -> Prediction:
 @pytest.mark.parametrize("name", NEAR)
 def test_column_of_what_the_registrations_rest_on_is_the_difference_of_two_predictions(data, of_touched, name):
     effect, neutral = NEAR[name], type(NEAR[name]).neutral(TOUCHED)
-    steps = [20 * (here - zero) for here, zero in zip(effect.coordinates, neutral.coordinates, strict=True)]
-    far = neutral.moved(np.add(neutral.coordinates, steps)).apply(TOUCHED)
+    pairs = zip(effect.coordinates, neutral.coordinates, strict=True)
+    far = neutral.moved([zero + 20 * (here - zero) for here, zero in pairs]).apply(TOUCHED)
     after = predict(data, far, GROWING, None, of_touched.equilibria, TIGHT, of_touched.samples)
     difference = (after.gap - of_touched.gap) / 20
     found = np.where(np.isfinite(difference), of_touched.columns[..., TOOL_COLUMNS + list(NEAR).index(name)], 0.0)

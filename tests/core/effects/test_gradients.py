@@ -165,7 +165,8 @@ def test_adjoint_gradient_by_the_block_s_size_is_that_of_full_solves(axis, givin
         setup = _scaled({f"scale_{axis}": factor})
         return replace(setup, tool=Tool(radius=5e-3, compliance_times_stiffness=giving))
 
-    block, frames = Replay(sized(1.0), EVEN, tolerance=1e-11), []
+    block = Replay(sized(1.0), EVEN, tolerance=1e-11)
+    frames: list[Equilibrium] = []
     for centre in POKE:
         frames.append(block.step(centre, frames[-1] if frames else None))
     slope, step = 0.2 * frames[-1].displacement, 1e-5
