@@ -13,7 +13,7 @@ from core.diagnosis.evidence import fit
 from core.diagnosis.hypothesis import Model, with_effects
 from core.diagnosis.noise import DISPLACEMENT_ERROR, FIELD_LENGTH, STIFFNESS_ERROR, smooth_basis
 from core.diagnosis.ordered import ORDERED
-from core.diagnosis.prediction import TOOL_COLUMNS, touch_correction
+from core.diagnosis.prediction import TOOL_COLUMNS
 from core.diagnosis.pushes import Push
 from core.effects.material import PoissonRatio
 from core.effects.tool import ToolRadius
@@ -25,6 +25,7 @@ from core.meshing import Meshing
 from core.replay import Equilibrium, Replay
 from core.sensitivity import TOOL_STEP, displacement_changes, stiffness_changes
 from core.setup import Inclusion, Setup
+from core.touches import touch_correction
 
 __all__ = ["Scene", "Survivor", "nats_of", "survivor"]
 

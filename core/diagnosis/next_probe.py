@@ -26,6 +26,7 @@ from core.diagnosis.pushes import Push, depth_reached, pushes, speed_reached
 from core.diagnosis.search import RIVAL, Findings, Trial
 from core.effects import Effect
 from core.grading import PAGE_GRID
+from core.sight import sight_of
 
 __all__ = ["Advice", "Pair", "next_probe", "pairs_of"]
 
@@ -109,7 +110,7 @@ def _scene(bench: Bench, findings: Findings) -> Scene:
     return Scene(
         stated=survivor(bench, findings.baseline), lumps=lump_places(bench), centres=surface.patch_centres,
         normals=surface.patch_normals, count=np.concatenate(counts).mean(axis=0), variance=patch_variance(predictions),
-        eye=bench.setup.phantom_from_camera_true.translation, pivot=bench.registration.robot_pivot,
+        eye=sight_of(bench.setup).pose.translation, pivot=bench.registration.robot_pivot,
         grid=PAGE_GRID.for_tool(bench.setup.tool.radius), temperature=bench.temperature,
     )  # fmt: skip
 

@@ -201,7 +201,8 @@ def draw_scenario(seed: int, effects: int = 1, clear: bool = True, among: Sequen
 
 
 _NEUTRAL: Mapping[str, float] = {
-    "nu": 0.45, "tool_radius": 0.005, "stiffness_ratio": 1.0, "E": 5e3, "scale": 1.0, "scale_x": 1.0, "scale_y": 1.0, "scale_z": 1.0,
+    "nu": 0.45, "tool_radius": 0.005, "stiffness_ratio": 1.0, "E": 5e3,
+    "scale": 1.0, "scale_x": 1.0, "scale_y": 1.0, "scale_z": 1.0,
 }  # fmt: skip
 _SHRINKING = (
     "dx", "dy", "dz", "extent", "specific_weight_over_stiffness", "offset", "translation", "rotation",
