@@ -23,7 +23,7 @@ from core.diagnosis.static import StaticChannel
 from core.diagnosis.verdict import report_of
 from core.diagnosis.workers import Workers
 from core.errors import DiagnosisError, RunError
-from core.grading import FINE_GRID, PAGE_GRID, REPLAY_GRID
+from core.grading import FINE_GRID, PAGE_GRID, REPLAY_GRID, SCREEN_GRID
 from core.meshing import Meshing
 from core.progress import Report, part, silent
 from core.registration import Registration, register, setup_from
@@ -104,6 +104,7 @@ def _run(
     static = StaticChannel.of(dataset.rest_cloud(), cleaner_for(dataset, registration), setup, grid)
     names = [item.name for item in fitted]
     bench = Bench(setup, registration, pool, names, static, grid, fine, part(report, 0.05, 0.75))
+    bench.rough = SCREEN_GRID.for_tool(setup.tool.radius)
     findings = search(bench, seed)
     model = findings.best.model if findings.best else findings.baseline
     report(0.75, "measuring the gain on test sequences")

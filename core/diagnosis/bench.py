@@ -53,7 +53,7 @@ class Bench:
     ) -> None:
         self.setup, self.registration, self.workers, self.static = setup, registration, workers, static
         self.names, self._report, self._done = tuple(names), report, 0.0
-        self.grid, self.fine = grid, fine
+        self.grid, self.fine, self.rough = grid, fine, grid
         self.nuisances = Nuisances.of(registration)
         self.surface = Surface(setup.box)
         self.temperature = 1.0

@@ -22,6 +22,7 @@ from core.effects.sensor import TimeOffset
 from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
 from core.effects.support import BaseCompliance, BaseDetachment, BaseSlip
 from core.effects.tool import ToolCompliance, ToolFriction
+from core.meshing import Meshing
 from core.setup import Inclusion, Setup
 
 __all__ = ["FINITE", "Signature", "begin", "candidates_of", "lump_places", "signatures", "tangents"]
@@ -74,14 +75,26 @@ def _step(effect: Effect, name: str, spread: float | None = None) -> Tangent:
 
 
 def signatures(bench: Bench, baseline: Model) -> list[Signature]:
-    """What effects without a derivative at their neutral value do at finite sizes."""
+    """What effects without a derivative at their neutral value do at finite sizes, by the difference of two rough replays.
+
+    Sag alone is replayed on the mesh of the diagnosis: on the rough one its pattern has a correlation of 0.89 with what it should be,
+    the others' 0.99.
+    """
     starts = [effect for kind in FINITE for effect in kind.starts(bench.setup)]
-    pending = [(effect, bench.predict([effect], None, baseline.predictions)) for effect in starts]
-    found = []
+    plain = bench.predict([], None, baseline.predictions, bench.rough)
+    pending = [(effect, bench.predict([effect], None, baseline.predictions, _mesh_for(effect, bench))) for effect in starts]
+    rough, found = [future.result() for future in plain], list[Signature]()
     for number, (effect, futures) in enumerate(pending):
         bench.tell(f"what {effect.name} would do", 0.15 + 0.25 * number / len(pending))
-        found.append((effect, [future.result() for future in futures]))
+        changed = [future.result() for future in futures]
+        without = baseline.predictions if _mesh_for(effect, bench) is bench.grid else rough
+        rows = zip(baseline.predictions, changed, without, strict=True)
+        found.append((effect, [replace(other, gap=here.gap + other.gap - zero.gap) for here, other, zero in rows]))
     return found
+
+
+def _mesh_for(effect: Effect, bench: Bench) -> Meshing:
+    return bench.grid if isinstance(effect, Gravity) else bench.rough
 
 
 def candidates_of(model: Model, bench: Bench, finite: Sequence[Signature]) -> list[Candidate]:
