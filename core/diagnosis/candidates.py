@@ -77,8 +77,8 @@ def _step(effect: Effect, name: str, spread: float | None = None) -> Tangent:
 def signatures(bench: Bench, baseline: Model) -> list[Signature]:
     """What effects without a derivative at their neutral value do at finite sizes, by the difference of two rough replays.
 
-    Sag alone is replayed on the mesh of the diagnosis: on the rough one its pattern has a correlation of 0.89 with what it should be,
-    the others' 0.99.
+    Sag alone is replayed on the mesh of the diagnosis: on the rough one its pattern has a correlation of 0.89 with what it should
+    be, the others' 0.99.
     """
     starts = [effect for kind in FINITE for effect in kind.starts(bench.setup)]
     plain = bench.predict([], None, baseline.predictions, bench.rough)
