@@ -9,6 +9,7 @@ goes back through them.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -25,8 +26,8 @@ from core.replay import Equilibrium, Replay
 from core.setup import Setup
 
 __all__ = [
-    "TOOL_STEP", "Change", "GivingTool", "displacement_changes", "factorise_at", "gives", "local_probe", "loss_changes",
-    "mesh_in", "refuse_other_grid", "same_body", "stiffness_changes", "tool_slopes",
+    "TOOL_STEP", "Change", "GivingTool", "displacement_changes", "factorise_at", "force_changes", "gives", "local_probe",
+    "loss_changes", "mesh_in", "refuse_other_grid", "same_body", "stiffness_changes", "tool_slopes",
 ]  # fmt: skip
 
 Change = tuple[Setup, FloatArray]
@@ -80,14 +81,14 @@ def _memoryless(*setups: Setup) -> None:
             raise SetupError(told, key="friction_coefficient")
 
 
-def _unbalanced(block: Replay, frame: Equilibrium, model: BlockModel, changes: Sequence[Change]) -> FloatArray:
-    """Minus the change of the residual (u, len(changes)) over E [m^2] at the frame's displacement.
+def _unbalanced(block: Replay, frame: Equilibrium, model: BlockModel, changes: Sequence[Change]) -> tuple[FloatArray, FloatArray]:
+    """At the frame's displacement, minus the changes of the residual (u, len(changes)) and of the tool's push (3, len(changes)).
 
-    A tool that gives way stays where it is here; `GivingTool` moves it.
+    Both over E [m^2]. A tool that gives way stays where it is here; `GivingTool` moves it.
     """
     positions, here = frame.mesh.nodes + frame.displacement, local_probe(frame)
-    residual = model.assemble(positions, here, tangent=False).residual
-    right = np.zeros((len(residual), len(changes)))
+    state = model.assemble(positions, here, tangent=False)
+    right, eased = np.zeros((len(state.residual), len(changes))), np.zeros((3, len(changes)))
     for column, (setup, move) in enumerate(changes):
         same = same_body(block, setup)
         shift = np.zeros(3) if gives(block.setup, setup) else _shift(block, setup, move)
@@ -98,14 +99,17 @@ def _unbalanced(block: Replay, frame: Equilibrium, model: BlockModel, changes: S
         other.harden(frame.hardness)
         other.expect(there, (here,))
         probe = Probe(here.centre + shift, here.radius + setup.tool.radius - block.setup.tool.radius)
-        right[:, column] = residual - other.assemble(there, probe, tangent=False).residual
-    return right
+        changed = other.assemble(there, probe, tangent=False)
+        right[:, column], eased[:, column] = state.residual - changed.residual, state.push - changed.push
+    return right, eased
 
 
 def same_body(block: Replay, setup: Setup) -> bool:
-    """Whether the setup differs from the block's in the tool and the sensor at most."""
+    """Whether the setup differs from the block's in the tool, the sensor and the modulus at most, which all else is over."""
     here = block.setup
-    return all(getattr(setup, part) == getattr(here, part) for part in ("material", "load", "support", "geometry"))
+    material = replace(setup.material, young_modulus=here.material.young_modulus)
+    parts = ("load", "support", "geometry")
+    return material == here.material and all(getattr(setup, part) == getattr(here, part) for part in parts)
 
 
 def mesh_in(block: Replay, setup: Setup, frame: Equilibrium) -> Mesh:
@@ -214,11 +218,40 @@ def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[Ch
     model = factorise_at(block, frame) if _holds(block, frame) else None
     if model is None or not changes:
         return result
-    free = model.topology.factor.solve(_unbalanced(block, frame, model, changes))
+    free = model.topology.factor.solve(_unbalanced(block, frame, model, changes)[0])
     if gives(block.setup, *(setup for setup, _ in changes)):
         free = GivingTool(block, frame, model).moved(changes, free)
     result[:, model.topology.free] = free.T
     return result
+
+
+def force_changes(block: Replay, frame: Equilibrium, changes: Sequence[Change], displacements: FloatArray) -> FloatArray:
+    """How the force on the tool changes (len(changes), 3) [N], to first order.
+
+    With B the change of the residual as the tool moves, that of the force on it by the displacement is -B': both are of one energy.
+
+    Args:
+        displacements: (len(changes), n, 3) what these changes bring about, as from `displacement_changes` [m].
+    """
+    _memoryless(block.setup, *(setup for setup, _ in changes))
+    found = np.zeros((len(changes), 3))
+    if not frame.in_contact or not changes:
+        return found
+    block.dense = frame.dense
+    model = block.model(frame.mesh)
+    model.harden(frame.hardness)
+    positions, here, modulus = frame.mesh.nodes + frame.displacement, local_probe(frame), block.setup.material.young_modulus
+    model.expect(positions, (here,))
+    coupling, harder = tool_slopes(model, positions, here)
+    found = _unbalanced(block, frame, model, changes)[1].T - displacements[:, model.topology.free] @ coupling
+    for number, (setup, move) in enumerate(changes):
+        if gives(block.setup, setup):
+            # The tool's own way is ds + dc f + c df, as `GivingTool` has it, and pushes it by H of that.
+            giving = block.setup.tool.compliance_times_stiffness
+            driven = _shift(block, setup, move) + (setup.tool.compliance_times_stiffness - giving) * frame.force / modulus
+            found[number] = np.linalg.solve(np.eye(3) + giving * harder, found[number] - harder @ driven)
+        found[number] += (setup.material.young_modulus / modulus - 1) * frame.force / modulus
+    return found * modulus
 
 
 def loss_changes(block: Replay, frame: Equilibrium, slope: FloatArray, changes: Sequence[Change]) -> FloatArray:
@@ -237,7 +270,7 @@ def loss_changes(block: Replay, frame: Equilibrium, slope: FloatArray, changes: 
     model = factorise_at(block, frame) if _holds(block, frame) else None
     if model is None or not changes:
         return np.zeros(len(changes))
-    right = _unbalanced(block, frame, model, changes)
+    right = _unbalanced(block, frame, model, changes)[0]
     adjoint = model.topology.factor.solve(slope[model.topology.free])
     if not gives(block.setup, *(setup for setup, _ in changes)):
         return np.asarray(adjoint @ right)

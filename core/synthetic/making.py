@@ -20,12 +20,13 @@ from core.synthetic.bench import neutral_displacement, perform, rest_surface
 from core.synthetic.body import true_offset, true_radius
 from core.synthetic.camera import DepthCamera, Scene, place_camera
 from core.synthetic.disturbance import drifted
+from core.synthetic.force import ForceSensor
 from core.synthetic.motion import Motion, draw_motion
 from core.synthetic.scenario import Scenario
 from core.synthetic.track import Track
 from core.synthetic.truth import Truth, truth_path
 from core.synthetic.visibility import changed, visible_weights
-from core.synthetic.writing import write_clouds, write_config, write_kinematics, write_ply, write_touches
+from core.synthetic.writing import write_clouds, write_config, write_forces, write_kinematics, write_ply, write_touches
 
 __all__ = ["make_dataset"]
 
@@ -198,6 +199,7 @@ def _record(job: _Job) -> _Record:
     (job.folder / "clouds").mkdir(parents=True)
     start = rng.uniform(5.0, 45.0)
     _write_kinematics(job, start, rng)
+    _write_forces(job, track, start)
     hidden = job.scenario.hidden("time_offset")
     count = int((job.motion.duration - 2 * MARGIN) * job.scenario.rate)
     instants = MARGIN + np.arange(count) / job.scenario.rate + rng.uniform(-0.6e-3, 0.6e-3, count)
@@ -231,6 +233,17 @@ def _write_kinematics(job: _Job, start: float, rng: np.random.Generator) -> None
     turn = Rotation.align_vectors(job.motion.axis[None], [[0.0, 0.0, 1.0]])[0] * Rotation.from_euler("z", rng.uniform(0, 2 * np.pi))
     quaternion = (Rotation.from_matrix(job.robot_from_phantom.rotation) * turn).as_quat()
     write_kinematics(job.folder / "kinematics.csv", times, job.robot_from_phantom.apply(centres), quaternion)
+
+
+def _write_forces(job: _Job, track: Track, start: float) -> None:
+    """What the sensor in the tool says, on the robot's clock; its draws leave all others as they are without it."""
+    if job.scenario.force_noise is None:
+        return
+    sensor = ForceSensor.draw(job.scenario.force_noise, np.random.default_rng([job.seed, 4]))
+    rng = np.random.default_rng([job.seed, 5, *job.motion.name.encode()])
+    times = sensor.instants(job.motion.duration, rng)
+    on_tool = -track.push(times) @ job.robot_from_phantom.rotation.T
+    write_forces(job.folder / "forces.csv", start + times, sensor.read(times, on_tool, rng))
 
 
 def _visibility(job: _Job, track: Track) -> list[float]:

@@ -81,6 +81,7 @@ class Scenario:
         robot_rate: tool poses per second [1/s].
         noise: standard deviation of a depth at 0.35 m [m].
         fine: longest element edge at the contact [m].
+        force_noise: standard deviation of one sample of the force on the tool [N]; None for a tool without a force sensor.
     """
 
     effects: tuple[HiddenEffect, ...] = ()
@@ -97,6 +98,7 @@ class Scenario:
     robot_rate: float = 1000.0
     noise: float = 0.7e-3
     fine: float = 2.6e-3
+    force_noise: float | None = None
 
     @property
     def true_size(self) -> tuple[float, float, float]:

@@ -49,6 +49,10 @@ class Passage:
         return PchipInterpolator(self.arcs, np.stack([moment.surface for moment in self.moments]))
 
     @cached_property
+    def _force(self) -> Any:
+        return PchipInterpolator(self.arcs, np.stack([moment.push for moment in self.moments]))
+
+    @cached_property
     def _way(self) -> Any:
         return PchipInterpolator(self.arcs, np.stack([moment.deflection for moment in self.moments]))
 
@@ -59,6 +63,10 @@ class Passage:
     def deflection(self, arc: float) -> FloatArray:
         """Of the tool's centre under load (3,) [m] at an arc length [m], likewise."""
         return np.asarray(self._way(np.clip(arc, self.arcs[0], self.arcs[-1])))
+
+    def push(self, arcs: FloatArray) -> FloatArray:
+        """Force of the tool on the block (n, 3) [N] at arc lengths (n,) [m], likewise."""
+        return np.asarray(self._force(np.clip(arcs, self.arcs[0], self.arcs[-1])))
 
 
 @dataclass(frozen=True)
@@ -97,6 +105,14 @@ class Stretch:
         ended = [passage for passage in self.passages if passage.end < time]
         return ended[-1].deflection(float(self.probe.arc(np.array([ended[-1].end]))[0])) if ended else np.zeros(3)
 
+    def push(self, times: FloatArray) -> FloatArray:
+        """Force of the tool on the block (n, 3) [N] at times (n,) [s]; while it stands between two passages, that of the first."""
+        found = np.zeros((len(times), 3))
+        for passage in self.passages:
+            begun = times >= passage.begin
+            found[begun] = passage.push(self.probe.arc(np.minimum(times[begun], passage.end)))
+        return found
+
     @property
     def deepest(self) -> list[float]:
         """Two instants [s]: on the way in, and half way through."""
@@ -122,6 +138,14 @@ class Track:
         """The drawn surface at a time [s]: vertices (s, 3) [m] and triangles (t, 3)."""
         stretch = self.at(time)
         return stretch.rest + stretch.displacement(time), stretch.faces
+
+    def push(self, times: FloatArray) -> FloatArray:
+        """Force of the tool on the block (n, 3) [N] at times (n,) [s]."""
+        found = np.zeros((len(times), 3))
+        for stretch in self.stretches:
+            begun = times >= stretch.probe.times[0]
+            found[begun] = stretch.push(times[begun])
+        return found
 
     @property
     def moments(self) -> list[Moment]:

@@ -9,7 +9,7 @@ import numpy as np
 from core.frames import FloatArray, Transform
 from core.synthetic.scenario import Scenario
 
-__all__ = ["write_clouds", "write_config", "write_kinematics", "write_ply", "write_touches"]
+__all__ = ["write_clouds", "write_config", "write_forces", "write_kinematics", "write_ply", "write_touches"]
 
 
 def write_ply(path: Path, points: FloatArray) -> None:
@@ -24,6 +24,12 @@ def write_kinematics(path: Path, times: FloatArray, positions: FloatArray, quate
     turn = ",".join(f"{part:.7f}" for part in quaternion)
     rows = [f"{t:.5f},{x:.7f},{y:.7f},{z:.7f},{turn}" for t, (x, y, z) in zip(times.tolist(), positions.tolist(), strict=True)]
     path.write_text("\n".join(["t,x,y,z,qx,qy,qz,qw", *rows]) + "\n")
+
+
+def write_forces(path: Path, times: FloatArray, forces: FloatArray) -> None:
+    """Force on the tool: times (n,) [s], forces (n, 3) [N] in the robot frame."""
+    rows = [f"{t:.5f},{x:.6f},{y:.6f},{z:.6f}" for t, (x, y, z) in zip(times.tolist(), forces.tolist(), strict=True)]
+    path.write_text("\n".join(["t,fx,fy,fz", *rows]) + "\n")
 
 
 def write_clouds(path: Path, times: FloatArray, files: list[str]) -> None:

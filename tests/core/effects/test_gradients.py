@@ -15,7 +15,7 @@ from core.effects.tool import ToolFriction
 from core.errors import SetupError
 from core.mesh import GridSpec
 from core.replay import Equilibrium, Replay
-from core.sensitivity import displacement_changes, loss_changes
+from core.sensitivity import displacement_changes, force_changes, loss_changes
 from core.setup import Box, Load, Material, Setup, Support, Tool
 
 SETUP = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3), mass=0.104)
@@ -107,7 +107,9 @@ def test_sensitivity_is_the_difference_of_two_solves(name):
     assert frame is not None
     solved = other.step(POKE[-1], frame)
     wanted = solved.displacement - frame.displacement
-    found = displacement_changes(block, frame, [(changed, np.zeros(3))])[0]
+    moved = displacement_changes(block, frame, [(changed, np.zeros(3))])
+    found, pressed = moved[0], force_changes(block, frame, [(changed, np.zeros(3))], moved)[0]
+    assert np.linalg.norm(pressed - (solved.force - frame.force)) < 0.02 * np.linalg.norm(solved.force - frame.force) + 1e-9
     if name in STILL:
         assert np.abs(found).max() < 1e-9 and np.abs(wanted).max() < 1e-9
         return
