@@ -103,7 +103,9 @@ def _run(
     grid, fine = REPLAY_GRID.for_tool(setup.tool.radius), FINE_GRID.for_tool(setup.tool.radius)
     static = StaticChannel.of(dataset.rest_cloud(), cleaner_for(dataset, registration), setup, grid)
     names = [item.name for item in fitted]
-    bench = Bench(setup, registration, pool, names, static, grid, fine, part(report, 0.05, 0.75))
+    bench = Bench(
+        setup, registration, pool, names, static, grid, fine, part(report, 0.05, 0.75), any(item.forces for item in fitted)
+    )
     bench.rough = SCREEN_GRID.for_tool(setup.tool.radius)
     findings = search(bench, seed)
     model = findings.best.model if findings.best else findings.baseline

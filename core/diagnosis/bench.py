@@ -17,7 +17,7 @@ from core.diagnosis.static import StaticChannel
 from core.diagnosis.tangent import SMALL, Tangent
 from core.diagnosis.workers import Workers
 from core.effects import Effect
-from core.effects.material import PoissonRatio
+from core.effects.material import PoissonRatio, YoungModulus
 from core.effects.sensor import CameraRegistration
 from core.effects.tool import ToolRadius
 from core.frames import FloatArray
@@ -50,11 +50,13 @@ class Bench:
         grid: Meshing,
         fine: Meshing,
         report: Report = silent,
+        forces: bool = False,
     ) -> None:
         self.setup, self.registration, self.workers, self.static = setup, registration, workers, static
         self.names, self._report, self._done = tuple(names), report, 0.0
         self.grid, self.fine, self.rough = grid, fine, grid
-        self.nuisances = Nuisances.of(registration)
+        self.nuisances = Nuisances.of(registration, forces)
+        self._first = TOOL_COLUMNS + 8 + forces
         self.surface = Surface(setup.box)
         self.temperature = 1.0
         self.noises: list[Noise] = []
@@ -85,7 +87,7 @@ class Bench:
         return setup
 
     def _nuisance_setups(self, setup: Setup) -> list[tuple[Setup, float]]:
-        """A slightly larger tool, a slightly other Poisson ratio, and the camera moved and turned."""
+        """A slightly larger tool, a slightly other Poisson ratio, the camera moved and turned, and with forces the modulus."""
         step = SMALL * 3e-4
         found: list[tuple[Setup, float]] = [(ToolRadius(radius=setup.tool.radius + step).apply(setup), step)]
         nu = setup.material.poisson_ratio
@@ -96,6 +98,9 @@ class Bench:
             values = [0.0] * 6
             values[number] = SMALL * item.scale
             found.append((camera.moved(values).apply(setup), values[number]))
+        if self.nuisances.forces:
+            modulus = YoungModulus.neutral(setup)
+            found.append((modulus.at([modulus.coordinates[0] + SMALL]).apply(setup), SMALL))
         return found
 
     def _wanted(self, effects: Sequence[Effect], setup: Setup, tangents: Sequence[Tangent], lumps: Sequence[Inclusion]) -> Wanted:
@@ -131,7 +136,7 @@ class Bench:
 
     def _ordered_columns(self, effects: Sequence[Effect], predictions: list[Prediction]) -> list[Prediction]:
         """Columns of effects in whose replays a frame hangs on all those before it: by one more replay for each number."""
-        column = TOOL_COLUMNS + 8
+        column = self._first
         for index, effect in enumerate(effects):
             for number, item in enumerate(effect.numbers()):
                 if isinstance(effect, ORDERED):
@@ -149,13 +154,13 @@ class Bench:
     ) -> Model:
         """Quadratic forms and the meaning of their columns."""
         count = predictions[0].columns.shape[2]
-        at = TOOL_COLUMNS + 8
+        at = self._first
         own = sum(len(effect.numbers()) for effect in effects)
         columns, at = tuple(range(at, at + own)), at + own
         extra = {"tangents": tuple(range(at, at + len(tangents)))}
         at += len(tangents)
         extra["lumps"] = tuple(range(at, at + lumps))
-        nuisance = (*range(TOOL_COLUMNS + 8), count)
+        nuisance = (*range(self._first), count)
         if not self.noises:
             return Model(effects, setup, tuple(predictions), (), columns, extra, nuisance, tuple(tangents))
         blocks = [noise.block(item) for noise, item in zip(self.noises, predictions, strict=True)]
@@ -194,8 +199,10 @@ class Bench:
         blocks, count = [], model.predictions[0].columns.shape[2]
         for number, noise in enumerate(self.noises):
             here, zero = model.predictions[number], origin.predictions[number]
-            added = [np.nan_to_num(other[number].gap - zero.gap)[..., None] for _, other in signatures]
-            blocks.append(noise.block(replace(here, columns=np.concatenate([here.columns, *added], axis=2))))
+            for _, other in signatures:
+                surface, force = other[number].less(zero)
+                here = here.beside(surface[..., None], None if force is None else force[..., None])
+            blocks.append(noise.block(here))
         places = tuple(range(count, count + len(signatures)))
         if self.static:
             varied = {

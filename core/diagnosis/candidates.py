@@ -16,7 +16,7 @@ from core.diagnosis.screening import Candidate
 from core.diagnosis.tangent import Tangent
 from core.effects import OUTSIDE, Effect
 from core.effects.load import Gravity
-from core.effects.material import StiffInclusion
+from core.effects.material import StiffInclusion, YoungModulus
 from core.effects.memory import PermanentSet, Viscoelasticity
 from core.effects.sensor import TimeOffset
 from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
@@ -101,6 +101,8 @@ def candidates_of(model: Model, bench: Bench, finite: Sequence[Signature]) -> li
     """Every effect of the catalogue that is not in the model yet, as columns of it."""
     setup, found = model.setup, []
     for kind, columns in TWINS.items():
+        if kind is YoungModulus and not bench.nuisances.forces:
+            continue
         effect = kind.neutral(setup)
         spreads = [PRIOR_STEPS * item.scale for item in effect.numbers()]
         names = tuple(item.name for item in effect.numbers())

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from core.diagnosis.evidence import Block, gram
+from core.diagnosis.force import force_discrepancy, force_scatter
 from core.diagnosis.prediction import Prediction
 from core.frames import FloatArray
 from core.measurement import Surface
@@ -48,13 +49,22 @@ def smooth_basis(centres: FloatArray, length: float) -> FloatArray:
     return np.asarray(bumps / np.linalg.norm(bumps, axis=1, keepdims=True))
 
 
+def _rows(item: Prediction) -> tuple[FloatArray, FloatArray]:
+    """Gaps (g, r) of the surface's patches [m] and, where there is one, of the force's three components [N]; columns (g, r, k)."""
+    if item.felt is None:
+        return item.gap, item.columns
+    return np.concatenate([item.gap, item.felt.gap], axis=1), np.concatenate([item.columns, item.felt.columns], axis=1)
+
+
 @dataclass(frozen=True, eq=False)
 class Noise:
     """The noise of one sequence under the baseline; the same weights serve every model, so that scores compare.
 
+    Rows are the surface's patches in metres and, of a sequence with forces, three more in newtons, one for each component.
+
     Attributes:
-        weights: (g, p) inverse variances [1/m^2]. residual: (g, p) of the baseline [m], zero where unseen.
-        mesh: (g, p) fine minus default mesh [m]. discrepancy: (g, p, d) columns of the engine's own error, unit variance.
+        weights: (g, r) inverse variances [1/m^2]. residual: (g, r) of the baseline [m], zero where unseen.
+        mesh: (g, r) fine minus default mesh [m]. discrepancy: (g, r, d) columns of the engine's own error, unit variance.
     """
 
     weights: FloatArray
@@ -65,41 +75,55 @@ class Noise:
     @classmethod
     def of(cls, baseline: Prediction, fine: Prediction, surface: Surface, variance: FloatArray, lumps: slice) -> Noise:
         """From the baseline on two meshes; `lumps` are the baseline's columns for a softer or stiffer spot."""
-        seen = np.isfinite(baseline.gap) & np.isfinite(fine.gap)
+        (gap, columns), finer = _rows(baseline), _rows(fine)[0]
+        seen = np.isfinite(gap) & np.isfinite(finer)
         seen[list(set(baseline.failed) | set(fine.failed))] = False
-        mesh = np.where(seen, fine.gap - baseline.gap, 0.0)
-        scatter = variance / np.maximum(baseline.count, 1) + _WHITE_FLOOR**2 + (0.5 * mesh) ** 2
+        mesh = np.where(seen, finer - gap, 0.0)
+        scatter = variance / np.maximum(baseline.count, 1) + _WHITE_FLOOR**2
+        if baseline.felt is not None:
+            scatter = np.concatenate([scatter, force_scatter(baseline.felt)], axis=1)
+        scatter = scatter + (0.5 * mesh) ** 2
         centres = surface.patch_centres
         size = np.array([
             np.linalg.norm(frame.move(centres) - centres, axis=1) if frame.in_contact else np.zeros(len(centres))
             for frame in baseline.equilibria
         ])  # fmt: skip
         displacement = DISPLACEMENT_ERROR * size[..., None] * smooth_basis(centres, FIELD_LENGTH)
-        stiffness = STIFFNESS_ERROR * baseline.columns[..., lumps].astype(float)
+        if baseline.felt is not None:
+            displacement = _aside(displacement, force_discrepancy(baseline.felt, baseline.equilibria))
+        stiffness = STIFFNESS_ERROR * columns[..., lumps].astype(float)
         weights = np.where(seen, 1 / scatter, 0.0)
-        return cls(weights, np.where(seen, baseline.gap, 0.0), mesh, np.concatenate([displacement, stiffness], axis=2))
+        return cls(weights, np.where(seen, gap, 0.0), mesh, np.concatenate([displacement, stiffness], axis=2))
 
     def remeshed(self, model: Prediction, fine: Prediction) -> Noise:
         """With the mesh's error as it is in another model; all else stays, so that no patch gains or loses weight."""
-        seen = np.isfinite(model.gap) & np.isfinite(fine.gap) & (self.weights > 0)
+        gap, finer = _rows(model)[0], _rows(fine)[0]
+        seen = np.isfinite(gap) & np.isfinite(finer) & (self.weights > 0)
         seen[list(set(model.failed) | set(fine.failed))] = False
-        return replace(self, mesh=np.where(seen, fine.gap - model.gap, self.mesh))
+        return replace(self, mesh=np.where(seen, finer - gap, self.mesh))
 
     def block(self, prediction: Prediction) -> Block:
         """Quadratic form of a model's residual and columns (mesh error last), with the discrepancy integrated out.
 
         Where a model lost sight of a patch or found no equilibrium, the baseline's residual stands: nothing is gained there.
         """
-        usable = np.isfinite(prediction.gap) & (self.weights > 0)
+        gap, columns = _rows(prediction)
+        usable = np.isfinite(gap) & (self.weights > 0)
         usable[list(prediction.failed)] = False
-        residual = np.where(usable, prediction.gap, self.residual) + self.mesh
-        columns = np.where(usable[..., None], prediction.columns, 0.0)
+        residual = np.where(usable, gap, self.residual) + self.mesh
+        columns = np.where(usable[..., None], columns, 0.0)
         stacked = np.concatenate([columns, self.mesh[..., None], self.discrepancy], axis=2)
         matrix, values = gram(residual, stacked, self.weights)
         kept = matrix.shape[0] - self.discrepancy.shape[2]
         cross, inner = matrix[:kept, kept:], matrix[kept:, kept:]
         reduced = matrix[:kept, :kept] - cross @ np.linalg.solve(inner + np.eye(len(inner)), cross.T)
         return Block(prediction.name, reduced, values)
+
+
+def _aside(surface: FloatArray, force: FloatArray) -> FloatArray:
+    """(g, p + 3, d + e) of columns (g, p, d) of the surface and others (g, 3, e) of the force, which say nothing of each other."""
+    nothing = [np.zeros((*rows.shape[:2], other.shape[2])) for rows, other in ((surface, force), (force, surface))]
+    return np.concatenate([np.concatenate([surface, nothing[0]], axis=2), np.concatenate([nothing[1], force], axis=2)], axis=1)
 
 
 def noises(baseline: Sequence[Prediction], fine: Sequence[Prediction], surface: Surface, lumps: slice) -> list[Noise]:

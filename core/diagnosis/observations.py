@@ -9,19 +9,19 @@ import numpy as np
 
 from core.cleaning import Cleaner, cleaner_for, find_shaft_axis, tool_poses
 from core.dataset import Dataset, Kinematics, Sequence
+from core.diagnosis.force import ForceRecord
+from core.diagnosis.smoothing import smooth_centres
 from core.frames import FloatArray
 from core.progress import Report, silent
 from core.registration import Registration
 from core.setup import Setup
 
-__all__ = ["Group", "Observations", "clear_of", "observe", "observe_all", "smooth_centres"]
+__all__ = ["Group", "Observations", "clear_of", "observe", "observe_all"]
 
 CLEARANCE = 1.5e-3
 """A tool farther than this from the stated block [m] does not touch it, whatever is slightly wrong."""
 TRAVEL = 7e-4
 """Frames whose tool moved less than this [m] are one group."""
-SMOOTHING = 0.02
-"""Half the time [s] over which the robot's pose is averaged: streams carry noise of some hundredths of a millimetre."""
 MOST_POINTS = 20000
 _RECOVERY = (0.5, 1.5, 5.0)
 """Time since the tool was last near the block [s] at which untouched frames part: a material may recover in the meantime."""
@@ -29,20 +29,6 @@ _TURN, _TURN_STEP = 5e-5, 0.02
 """A place counts as deeper than a group's own from this difference on [m]; time between the places that are looked at [s]."""
 FAR = np.array([0.0, 0.0, 10.0])
 """Where the tool is said to be when there is none [m]."""
-
-
-def smooth_centres(kinematics: Kinematics, times: FloatArray) -> FloatArray:
-    """Tool centres (m, 3) [m] in the robot frame at `times` (m,) [s], averaged over a few hundredths of a second."""
-    t, x = kinematics.time, kinematics.position
-    integral = np.concatenate([np.zeros((1, 3)), np.cumsum((x[1:] + x[:-1]) / 2 * np.diff(t)[:, None], axis=0)])
-
-    def until(at: FloatArray) -> FloatArray:
-        return np.stack([np.interp(at, t, integral[:, axis]) for axis in range(3)], axis=-1)
-
-    low, high = np.clip(times - SMOOTHING, t[0], t[-1]), np.clip(times + SMOOTHING, t[0], t[-1])
-    width = (high - low)[..., None]
-    mean = (until(high) - until(low)) / np.maximum(width, 1e-9)
-    return np.where(width > 1e-6, mean, np.stack([np.interp(times, t, x[:, axis]) for axis in range(3)], axis=-1))
 
 
 def clear_of(size: tuple[float, float, float], centres: FloatArray) -> FloatArray:
@@ -81,12 +67,14 @@ class Observations:
 
     Attributes:
         times: (f,) cloud stamps [s]. kinematics: the robot's stream. groups: in the order of time.
+        forces: on the tool, if they were measured.
     """
 
     name: str
     times: FloatArray
     kinematics: Kinematics
     groups: tuple[Group, ...]
+    forces: ForceRecord | None = None
 
     def centres(self, setup: Setup) -> FloatArray:
         """Stated tool centre (g, 3) [m] of each group, phantom frame, under the setup's clock and registration."""
@@ -101,6 +89,19 @@ class Observations:
         """Times (t,) [s] of the recording, on the robot's clock, and stated tool centres (t, 3) [m], phantom frame."""
         times = np.arange(self.times[0], self.times[-1], _TURN_STEP) - setup.sensor.time_offset
         return times, setup.phantom_from_robot.apply(smooth_centres(self.kinematics, times))
+
+    def felt(self, setup: Setup) -> tuple[FloatArray, FloatArray] | None:
+        """Force on the tool (g, 3) [N] in each group, phantom frame, and its standard deviation (g,) [N]; NaN where none is known.
+
+        Forces and poses have one clock. Where the camera's is off, both are those of another instant, and still of the same one.
+        """
+        if self.forces is None:
+            return None
+        measured, strayed = self.forces.at(self.times - setup.sensor.time_offset)
+        frames = [list(group.frames) for group in self.groups]
+        force = np.array([measured[one].mean(axis=0) if one else np.full(3, np.nan) for one in frames])
+        variance = [self.forces.white / len(one) + strayed[one].mean() if one else np.nan for one in frames]
+        return force @ setup.phantom_from_robot.rotation.T, np.sqrt(variance)
 
     def turns(self, setup: Setup) -> list[FloatArray | None]:
         """For each group the place (3,) [m] where the tool was deepest since the group before; None where that is its own place.
@@ -170,7 +171,15 @@ def observe(
         if len(points) > MOST_POINTS:
             points = points[np.random.default_rng(number).choice(len(points), MOST_POINTS, replace=False)]
         groups.append(Group(tuple(picked), points, bool(free[run[0]]), probe=int(probes[run[0]])))
-    return Observations(sequence.name, times, kinematics, tuple(groups))
+    return Observations(sequence.name, times, kinematics, tuple(groups), _forces(sequence, setup))
+
+
+def _forces(sequence: Sequence, setup: Setup) -> ForceRecord | None:
+    """The sequence's forces without their bias, which shows wherever the tool is clear of the block as stated."""
+    if sequence.forces is None:
+        return None
+    centres = setup.phantom_from_robot.apply(smooth_centres(sequence.kinematics, sequence.forces.time))
+    return ForceRecord.of(sequence.forces, clear_of(setup.box.size, centres) > setup.tool.radius + CLEARANCE)
 
 
 def observe_all(

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from core.diagnosis.comparison import Compared, Sample, choose, compare, observe
+from core.diagnosis.force import Felt
 from core.diagnosis.observations import Observations
 from core.diagnosis.ordered import Past, forgetful
 from core.fem.model import rule_of
@@ -17,7 +19,7 @@ from core.frames import FloatArray
 from core.measurement import Surface
 from core.meshing import Meshing
 from core.replay import Equilibrium, Replay
-from core.sensitivity import TOOL_STEP, displacement_changes, stiffness_changes
+from core.sensitivity import TOOL_STEP, Change, displacement_changes, force_changes, stiffness_changes
 from core.setup import Inclusion, Setup
 from core.sight import sight_of
 from core.touches import touch_correction
@@ -56,7 +58,7 @@ class Prediction:
     Attributes:
         gap: (g, p) mean of measured minus simulated [m], NaN where unseen. count: (g, p) points. spread: (g, p) [m].
         columns: (g, p, k) change of gap: TOOL_COLUMNS, then setups, then lumps.
-        equilibria: of each group. samples: of each group, for the predictions of other models.
+        equilibria: of each group. samples: of each group, for the predictions of other models. felt: forces, if there are any.
     """
 
     name: str
@@ -66,45 +68,90 @@ class Prediction:
     columns: FloatArray
     equilibria: tuple[Equilibrium, ...]
     samples: tuple[Sample, ...]
-
-    def with_column(self, other: Prediction, column: int, step: float) -> Prediction:
-        """With what another setup, a step away, does to each gap as one of the columns."""
-        columns = self.columns.copy()
-        columns[..., column] = np.nan_to_num((other.gap - self.gap) / step)
-        return replace(self, columns=columns)
+    felt: Felt | None = None
 
     @property
     def failed(self) -> tuple[int, ...]:
         """Groups without equilibrium."""
         return tuple(i for i, frame in enumerate(self.equilibria) if frame.outcome is not Outcome.CONVERGED)
 
+    def beside(self, surface: FloatArray, force: FloatArray | None = None) -> Prediction:
+        """With further columns last: of the surface's gap (g, p, m), and of the force's (g, 3, m), which are else zero."""
+        columns = np.concatenate([self.columns, surface], axis=2)
+        if self.felt is None:
+            return replace(self, columns=columns)
+        none = np.zeros((len(surface), 3, surface.shape[2]))
+        return replace(self, columns=columns, felt=self.felt.beside(none if force is None else force))
+
+    def with_column(self, other: Prediction, column: int, step: float) -> Prediction:
+        """With what another setup changes over its step in place of a column."""
+        surface, force = other.less(self)
+        columns = self.columns.copy()
+        columns[..., column] = surface / step
+        if self.felt is None or force is None:
+            return replace(self, columns=columns)
+        own = self.felt.columns.copy()
+        own[..., column] = force / step
+        return replace(self, columns=columns, felt=replace(self.felt, columns=own))
+
+    def less(self, origin: Prediction) -> tuple[FloatArray, FloatArray | None]:
+        """What this model's gaps have over another's, of the surface (g, p) [m] and of the force (g, 3) [N]; zero where unseen."""
+        felt = None if self.felt is None or origin.felt is None else np.nan_to_num(self.felt.gap - origin.felt.gap)
+        return np.nan_to_num(self.gap - origin.gap), felt
+
 
 class _Columns:
-    """Changes of a group's displacement, projected on what is seen of it."""
+    """Changes of a group's displacement, projected on what is seen of it, and of the force on the tool, if that is `felt`."""
 
-    def __init__(self, block: Replay, wanted: Wanted) -> None:
-        self.block, self.wanted = block, wanted
+    def __init__(self, block: Replay, wanted: Wanted, felt: bool) -> None:
+        self.block, self.wanted, self.felt = block, wanted, felt
         here = block.setup
         self._seen = {at_rest: sight_of(here, reference=at_rest) for at_rest in (False, True)}
         self._others = [{at_rest: sight_of(other, reference=at_rest) for at_rest in (False, True)} for other in wanted.setups]
         self._grown = [other.scale / here.scale - 1.0 for other in wanted.setups]
         self._alike = not any(growth.any() for growth in self._grown)
 
-    def displacement(self, frame: Equilibrium, moves: FloatArray) -> FloatArray:
-        """(k, n, 3) for the tool's motion, the setups and the lumps; `moves` (s, 3) are the setups' own tool motions [m]."""
+    @property
+    def count(self) -> int:
+        """Of all columns."""
+        return TOOL_COLUMNS + len(self.wanted.setups) + len(self.wanted.lumps)
+
+    def changes(self, frame: Equilibrium, moves: FloatArray) -> FloatArray:
+        """(k, n + 1, 3) for the tool's motion, the setups and the lumps: of the nodes [m], and last of the force [N].
+
+        `moves` (s, 3) are the setups' own tool motions [m].
+        """
         setup, wanted = self.block.setup, self.wanted
         steps = [(setup, TOOL_STEP * axis) for axis in np.eye(3)]
         steps += [(other, move) for other, move in zip(wanted.setups, moves, strict=True)]
-        changed = displacement_changes(self.block, frame, steps)
+        changed = self._with_forces(frame, steps, displacement_changes(self.block, frame, steps))
         tool = changed[:3] / TOOL_STEP
-        for axis in np.flatnonzero(np.abs(tool).max(axis=(1, 2)) > _MOST_RESPONSE):
+        for axis in np.flatnonzero(np.abs(tool[:, :-1]).max(axis=(1, 2)) > _MOST_RESPONSE):
             self._span(frame, int(axis), tool, changed[3:], moves)
         arm = frame.probe.centre - wanted.pivot
         turned = [np.tensordot(np.cross(axis, arm), tool, axes=1) for axis in np.eye(3)]
         scaled = changed[3:] / np.array(wanted.steps)[:, None, None] if wanted.steps else changed[3:]
         factors = np.array([lump_share(lump, rule_of(frame.mesh)) for lump in wanted.lumps])
-        lumps = stiffness_changes(self.block, frame, factors) if wanted.lumps else changed[:0]
+        still = [(setup, np.zeros(3))] * len(factors)
+        lumps = self._with_forces(frame, still, stiffness_changes(self.block, frame, factors)) if still else changed[:0]
         return np.concatenate([tool, np.array(turned), scaled, lumps])
+
+    def _with_forces(self, frame: Equilibrium, steps: Sequence[Change], moved: FloatArray) -> FloatArray:
+        """Displacements (k, n, 3) [m], and last the forces that come with them [N]; zero where none is felt."""
+        pressed = force_changes(self.block, frame, steps, moved) if self.felt else np.zeros((len(moved), 3))
+        return np.concatenate([moved, pressed[:, None]], axis=1)
+
+    def of_force(self, changes: FloatArray, measured: FloatArray) -> FloatArray:
+        """(3, k) changes of measured minus simulated force [N], from `changes` (k, n + 1, 3) and the measured force (3,) [N].
+
+        A measured force turns with the robot's registration. Another clock finds another instant, but force and place of the same.
+        """
+        found = -changes[:, -1].T
+        found[:, 3:6] += np.cross(np.eye(3), np.nan_to_num(measured)).T
+        for number, other in enumerate(self.wanted.setups):
+            if other.sensor.time_offset != self.block.setup.sensor.time_offset:
+                found[:, TOOL_COLUMNS + number] = 0.0
+        return found
 
     def _span(self, frame: Equilibrium, axis: int, tool: FloatArray, changed: FloatArray, moves: FloatArray) -> None:
         """Put what a finite motion of the tool along an axis does in place of its derivative, in all columns it has a share in.
@@ -116,7 +163,9 @@ class _Columns:
         sides = [self.block.held(replace(frame.probe, centre=frame.probe.centre + sign * step), frame) for sign in (1, -1)]
         if any(side.outcome is not Outcome.CONVERGED for side in sides):
             return
-        ahead, behind = (side.mesh.interpolate(side.displacement, frame.mesh.nodes) for side in sides)
+        ahead, behind = (
+            np.concatenate([side.mesh.interpolate(side.displacement, frame.mesh.nodes), side.force[None]]) for side in sides
+        )
         wrong, tool[axis] = tool[axis].copy(), (ahead - behind) / (2 * _SPAN)
         stated = np.array(self.block.setup.tool.offset)
         for column, (other, move) in enumerate(zip(self.wanted.setups, moves, strict=True)):
@@ -135,14 +184,23 @@ class _Columns:
         radius = np.concatenate([np.zeros(6), np.array(growth) / steps[:, 0] if growth else [], np.zeros(len(lumps))])
         return centre, radius
 
-    def project(self, frame: Equilibrium, moves: FloatArray, compared: Compared, reference: bool) -> FloatArray:
-        """(p, k) changes of the patch averages; the reference was seen before the camera could move."""
-        values = np.zeros((len(compared.means.mean), TOOL_COLUMNS + len(self.wanted.setups) + len(self.wanted.lumps)))
+    def of_group(self, frame: Equilibrium, moves: FloatArray) -> FloatArray:
+        """As `changes`, with how the block itself grows; zero where nothing holds the block against anything."""
         if frame.in_contact or self.block.setup.load.specific_weight_over_stiffness or not self._alike:
-            fields = self.displacement(frame, moves)
-            for number, (growth, step) in enumerate(zip(self._grown, self.wanted.steps, strict=True)):
-                fields[TOOL_COLUMNS + number] += frame.mesh.nodes * growth / step
-            values = -(observe(frame, compared) @ fields.reshape(len(fields), -1).T)
+            found = self.changes(frame, moves)
+        else:
+            found = np.zeros((self.count, len(frame.displacement) + 1, 3))
+        for number, (growth, step) in enumerate(zip(self._grown, self.wanted.steps, strict=True)):
+            found[TOOL_COLUMNS + number, :-1] += frame.mesh.nodes * growth / step
+        return found
+
+    def project(
+        self, frame: Equilibrium, changes: FloatArray, moves: FloatArray, compared: Compared, reference: bool
+    ) -> FloatArray:
+        """(p, k) changes of the patch averages; the reference was seen before the camera could move."""
+        values = np.zeros((len(compared.means.mean), self.count))
+        if changes[:, :-1].any():
+            values = -(observe(frame, compared) @ changes[:, :-1].reshape(len(changes), -1).T)
         if len(compared.tool):
             centre, radius = self.of_ball(frame, moves)
             values -= compared.average(compared.away @ centre.T + radius, compared.patch)
@@ -175,8 +233,9 @@ def predict(
     moves = np.zeros((len(wanted.setups) if wanted else 0, len(data.groups), 3))
     for number, other in enumerate(wanted.setups if wanted else ()):
         moves[number] = touch_correction(other, grid).apply(data.centres(other)) - centres
-    columns = _Columns(block, wanted) if wanted and not setup.remembers else None
-    gap, count, spread, changes, frames, chosen = [], [], [], [], [], []
+    measured = data.felt(setup)
+    columns = _Columns(block, wanted, measured is not None) if wanted and not setup.remembers else None
+    gap, count, spread, changes, pressed, frames, chosen = [], [], [], [], [], [], []
     past = Past(data, block, true_from_stated) if setup.remembers else None
     slides = past is None and setup.support.friction_coefficient is not None
     turns = data.turns(setup) if slides else [None] * len(centres)
@@ -200,12 +259,24 @@ def predict(
         spread.append(means.spread)
         frames.append(frame)
         if columns is not None:
-            changes.append(columns.project(frame, moves[:, number], compared, group.reference).astype(np.float32))
+            moved = columns.of_group(frame, moves[:, number])
+            changes.append(columns.project(frame, moved, moves[:, number], compared, group.reference).astype(np.float32))
+            if measured is not None:
+                pressed.append(columns.of_force(moved, measured[0][number]).astype(np.float32))
     stacked: FloatArray = np.stack(changes) if changes else np.zeros((len(gap), surface.patches, 0))
     if wanted and past is not None:
         # What a little change does to all that a frame hangs on is no first-order change of the frame: it is stated without memory.
         plain = replace(wanted, setups=tuple(forgetful(other) for other in wanted.setups))
-        stacked = predict(data, forgetful(setup), grid, plain, starts, tolerance, chosen).columns
+        forgotten = predict(data, forgetful(setup), grid, plain, starts, tolerance, chosen)
+        stacked, pressed = forgotten.columns, [] if forgotten.felt is None else list(forgotten.felt.columns)
     return Prediction(
-        data.name, np.array(gap), np.array(count, dtype=float), np.array(spread), stacked, tuple(frames), tuple(chosen)
-    )
+        data.name, np.array(gap), np.array(count, dtype=float), np.array(spread), stacked, tuple(frames), tuple(chosen),
+        None if measured is None else _felt(measured, frames, pressed),
+    )  # fmt: skip
+
+
+def _felt(measured: tuple[FloatArray, FloatArray], frames: Sequence[Equilibrium], columns: Sequence[Any]) -> Felt:
+    """Measured forces and their deviation beside those of the frames, with the changes (3, k) of each, if any."""
+    force = np.array([frame.force if frame.in_contact else np.zeros(3) for frame in frames])
+    stacked: FloatArray = np.stack(columns) if columns else np.zeros((len(frames), 3, 0))
+    return Felt(measured[0] - force, measured[1], force, stacked)

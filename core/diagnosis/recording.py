@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from core.cleaning import Cleaner, tool_poses
 from core.dataset import open_dataset
-from core.diagnosis.observations import smooth_centres
+from core.diagnosis.smoothing import smooth_centres
 from core.fem.newton import Outcome
 from core.frames import FloatArray
 from core.measurement import Gaps, Surface, gaps

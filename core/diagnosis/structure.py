@@ -7,7 +7,7 @@ same projection of draws from the noise model, with the nuisances fitted anew in
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import gamma
@@ -68,7 +68,7 @@ def _with_modes(model: Model, bench: Bench) -> list[Block]:
     basis, blocks = smooth_basis(bench.surface.patch_centres, MODE_LENGTH), []
     for noise, item in zip(bench.noises, model.predictions, strict=True):
         modes = _depth(item)[:, None, None] * basis
-        blocks.append(noise.block(replace(item, columns=np.concatenate([item.columns, modes], axis=2))))
+        blocks.append(noise.block(item.beside(modes)))
     return blocks
 
 

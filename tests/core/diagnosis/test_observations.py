@@ -11,7 +11,8 @@ from small_dataset import ply_bytes
 
 from core.cleaning import Cleaner
 from core.dataset import Kinematics, Sequence
-from core.diagnosis.observations import FAR, SMOOTHING, TRAVEL, Observations, clear_of, observe, smooth_centres
+from core.diagnosis.observations import FAR, TRAVEL, Observations, clear_of, observe
+from core.diagnosis.smoothing import SMOOTHING, smooth_centres
 from core.frames import FloatArray, Transform
 from core.mesh import GridSpec
 from core.registration import small_motion
