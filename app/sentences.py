@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 __all__ = [
+    "between",
     "cause_phrase",
     "control_sentences",
     "determined_sentences",
@@ -31,6 +32,12 @@ def quantity(value: Any, unit: str, digits: int = 2) -> str:
     places = max(0, digits - 1 - math.floor(math.log10(abs(scaled)))) if scaled and math.isfinite(scaled) else 0
     text = f"{scaled:.{min(places, 4)}f}"
     return f"{text}{'' if shown in ('', '°') else NARROW}{shown}"
+
+
+def between(entry: dict[str, Any]) -> str:
+    """A parameter of a report with its interval: 5.1 kPa (4.8 kPa to 5.4 kPa)."""
+    value, low, high = (quantity(entry[name], entry["unit"], 3) for name in ("value", "low", "high"))
+    return f"{value} ({low} to {high})"
 
 
 def verdict_sentence(report: dict[str, Any], size: Sequence[float] | None = None) -> str:
@@ -124,6 +131,10 @@ def _gain(report: dict[str, Any]) -> str:
     if not isinstance(removed.get("value"), (int, float)):
         return ""
     naming = "naming it" if len(report.get("causes", [])) == 1 else "naming them"
+    force = report["gain"].get("force") or {}
+    if [cause["effect"] for cause in report["causes"]] == ["young_modulus"] and force:  # no shape tells of it
+        before, after = (quantity(force[name], "N") for name in ("baseline", "extended"))
+        return f"; {naming} brings the error of the force on the test sequences from {before} to {after}"
     if removed["value"] < 0.005:
         return f"; on the test sequences {naming} removes no error, so that they do not confirm it"
     return f"; {naming} removes {100 * removed['value']:.0f}{NARROW}% of the error that can be removed"
@@ -175,6 +186,7 @@ PHRASES: dict[str, Callable[[Any, Sequence[float] | None], str]] = {
     "base_slip": lambda v, _: f"that the base slides on the table, with a friction coefficient of {v['friction_coefficient']:.2g}",
     "base_detachment": lambda v, _: f"that the base is loose {quantity(v['extent'], 'm')} inwards from {SIDES[v['edge']]}",
     "gravity": lambda v, _: f"the phantom's own weight, ρg/E = {v['specific_weight_over_stiffness']:.2g} per metre",
+    "young_modulus": lambda v, _: f"how stiff the phantom is in all: its Young's modulus is {quantity(v['E'], 'Pa')}",
     "surface_layer": lambda v, _: f"a skin {quantity(v['thickness'], 'm')} thick, {v['stiffness_ratio']:.2g} times as stiff",
     "stiffness_gradient": _gradient,
     "strain_stiffening": lambda v, _: f"that the material stiffens with strain, Gent's J_m = {v['J_m']:.2g}",

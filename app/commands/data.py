@@ -163,6 +163,11 @@ def _print_summary(dataset: Dataset, summary: DatasetSummary, found: Registratio
     touches = f", missing their landmarks by {1e3 * found.touch_rms:.2f} mm RMS" if found else ""
     tool = f"tool radius {1e3 * summary.tool_radius:.1f} mm"
     out.print(f"phantom {size} mm, {tool}, {len(summary.touches)} touches{touches}", highlight=False)
+    felt = [one for one in summary.sequences if one.forces]
+    if felt:
+        fitted = any(one.split in ("train", "validation") for one in felt)
+        told = "so that Young's modulus can be told" if fitted else "but in none to fit on, so that Young's modulus cannot be told"
+        out.print(f"forces in {len(felt)} of {len(summary.sequences)} sequences, {told}", highlight=False)
     for lack in summary.lacks:
         out.print(f"[yellow]lacks[/] {escape(lack.sentence)}", highlight=False)
 

@@ -18,7 +18,7 @@ from rich.table import Table
 from rich.text import Text
 
 from app.console import out, progress, verdict_cells, verdict_table, write_json
-from app.sentences import control_sentences, determined_sentences, limit_phrase, probe_sentence, verdict_sentence
+from app.sentences import between, control_sentences, determined_sentences, limit_phrase, probe_sentence, verdict_sentence
 from core.errors import DatasetError, RunError
 
 __all__ = ["diagnose", "print_report", "run_diagnosis", "truth_beside"]
@@ -88,6 +88,9 @@ def print_report(report: dict[str, Any]) -> None:
     )
     if shown:
         lines.append(Text(f"error on the {gain.get('split', 'test')} sequences: {shown}"))
+    for one in report.get("identified", []):
+        shown = ", ".join(f"{name} {between(entry)}" for name, entry in one["parameters"].items())
+        lines.append(Text(f"identified: {one['effect']}: {shown}; {one.get('why', '')}", style="dim"))
     for one in report.get("not_identifiable", []):
         lines.append(Text(f"not identifiable: {one['effect']}: {one.get('why', '')}", style="dim"))
     lines += [Text(said, style="dim") for said in determined_sentences(report.get("causes", []))]

@@ -17,7 +17,7 @@ from core.diagnosis.smoothing import SMOOTHING, averaged
 from core.frames import FloatArray
 from core.replay import Equilibrium
 
-__all__ = ["FORCE_ERROR", "FORCE_SCATTER", "Felt", "ForceRecord", "force_discrepancy", "force_scatter"]
+__all__ = ["FORCE_ERROR", "FORCE_SCATTER", "Felt", "ForceRecord", "force_discrepancy", "force_scatter", "rms_force"]
 
 FORCE_ERROR, FORCE_SCATTER = 0.03, 0.01
 """Standard deviations of the engine's relative error of the force: of a push as a whole, and of each place on its own [1].
@@ -138,3 +138,13 @@ def force_discrepancy(felt: Felt, frames: Sequence[Equilibrium]) -> FloatArray:
     push = np.cumsum(np.diff(touched.astype(int), prepend=0) == 1)
     one_of = touched[:, None] & (push[:, None] == np.arange(1, push.max(initial=0) + 1))
     return np.asarray(FORCE_ERROR * felt.force[:, :, None] * one_of[:, None, :])
+
+
+def rms_force(felt: Sequence[tuple[Felt, BoolArray]]) -> tuple[float, float]:
+    """RMS length of measured minus simulated force [N] over groups chosen by masks (g,), and that of the sensor's noise."""
+    gaps = np.concatenate([one.gap[chosen] for one, chosen in felt])
+    noise = np.concatenate([one.noise[chosen] for one, chosen in felt])
+    known = np.isfinite(gaps).all(axis=1)
+    if not known.any():
+        return 0.0, 0.0
+    return float(np.sqrt((gaps[known] ** 2).sum(axis=1).mean())), float(np.sqrt(3 * (noise[known] ** 2).mean()))

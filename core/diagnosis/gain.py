@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from core.diagnosis.force import rms_force
 from core.diagnosis.noise import patch_variance
 from core.diagnosis.observations import Observations
 from core.diagnosis.prediction import Prediction
@@ -40,6 +41,7 @@ class Ladder:
         baseline, extended: of the stated and the extended model. noise_floor: what the scatter of single points leaves.
         removed: (value, low, high) of (baseline - extended) / (baseline - noise floor); 95 % interval from resampled probes.
         paper: the paper's metric (baseline, extended) [m]. probes: how many pushes of the tool were resampled.
+        force: RMS of measured minus simulated force (baseline, extended, noise floor) [N]; None where none was measured.
     """
 
     baseline: float
@@ -48,6 +50,7 @@ class Ladder:
     removed: tuple[float, float, float]
     paper: tuple[float, float]
     probes: int
+    force: tuple[float, float, float] | None = None
 
 
 def fixed_pattern(item: Observations, model: Prediction) -> tuple[FloatArray, FloatArray]:
@@ -102,7 +105,22 @@ def ladder(
         baseline=float(whole[0][0]), extended=float(whole[1][0]), noise_floor=float(whole[2][0]),
         removed=(float(_share(*whole)[0]), float(low), float(high)),
         paper=(_paper(data, baseline, stated), _paper(data, extended, found)), probes=len(probes),
+        force=_force(baseline, extended),
     )  # fmt: skip
+
+
+def _force(baseline: Sequence[Prediction], extended: Sequence[Prediction]) -> tuple[float, float, float] | None:
+    """RMS force error (baseline, extended, noise floor) [N] in groups in which the tool of either model presses."""
+    before, after = [], []
+    for one, other in zip(baseline, extended, strict=True):
+        if one.felt is not None and other.felt is not None:
+            touched = [a.in_contact or b.in_contact for a, b in zip(one.equilibria, other.equilibria, strict=True)]
+            before.append((one.felt, np.array(touched)))
+            after.append((other.felt, np.array(touched)))
+    if not before:
+        return None
+    raw, floor = rms_force(before)
+    return raw, rms_force(after)[0], floor
 
 
 def _rms(sums: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -9,15 +9,18 @@ import numpy as np
 from scipy.stats import t
 
 from core.diagnosis.bench import Bench
-from core.diagnosis.evidence import Block, fit
-from core.diagnosis.hypothesis import Model
+from core.diagnosis.evidence import FLAT, Block, fit
+from core.diagnosis.hypothesis import TWINS, Model
+from core.effects.material import YoungModulus
 from core.effects.sensor import CameraRegistration
 from core.frames import FloatArray
 
-__all__ = ["intervals", "stands"]
+__all__ = ["intervals", "modulus_interval", "stands"]
 
 _NORMAL_95 = 1.96
 _INTERVAL_STEPS = 400
+_LEAST_FACTOR = 1e-2
+"""Of the stated modulus: forces that fit best with the wrong sign say that there is next to no stiffness."""
 _ANY_SHARE = 10.0
 """Prior deviation of a pattern's share in the data: anything."""
 
@@ -80,6 +83,25 @@ def intervals(bench: Bench, model: Model) -> list[dict[str, dict[str, Any]]]:
         found.append(entry)
         at += number
     return found
+
+
+def modulus_interval(bench: Bench, model: Model) -> tuple[float, float, float] | None:
+    """Young's modulus and its 95 % interval [Pa] by the forces alone, whatever was stated of it; None without forces.
+
+    For a model that does not have the modulus among its causes.
+    """
+    if not bench.nuisances.forces:
+        return None
+    (own,) = TWINS[YoungModulus]
+    nuisances = bench.nuisances.precision.copy()
+    nuisances[own, own] *= FLAT
+    columns, precision = [*model.nuisance, *model.columns], bench.precision(model, nuisances)
+    change, deviation = _robust(bench.tempered(model), columns, precision, slice(own, own + 1))
+    # A force is linear in the modulus, so that the fit is exact in it and not in its logarithm.
+    factor = max(1.0 + float(change[0]), _LEAST_FACTOR)
+    spread = float(np.hypot(deviation[0] / factor, YoungModulus.numbers()[0].accuracy))
+    low, value, high = model.setup.material.young_modulus * factor * np.exp(_NORMAL_95 * spread * np.array([-1.0, 0.0, 1.0]))
+    return float(value), float(low), float(high)
 
 
 def _magnitudes(effect: CameraRegistration, spread: FloatArray) -> dict[str, dict[str, Any]]:

@@ -10,14 +10,17 @@ from core.dataset import Dataset
 from core.diagnosis.bench import Bench
 from core.diagnosis.gain import Ladder
 from core.diagnosis.hypothesis import Model
-from core.diagnosis.intervals import intervals
+from core.diagnosis.intervals import intervals, modulus_interval
 from core.diagnosis.search import Findings, Trial
-from core.effects import DIAGNOSED
+from core.effects import DIAGNOSED, Effect
+from core.effects.material import YoungModulus
 
 __all__ = ["UNEXPLAINED_MISFIT", "report_of", "verdict_of"]
 
 UNEXPLAINED_MISFIT = 1.25
 """Misfit per value above which structured error is left: the engine's own accuracy is in the noise already."""
+MOST_DOUBT = 2.0
+"""A modulus whose interval reaches up to more than this many times its value is not identified [1]."""
 _TEMPERATURE = 4.0
 """Gains are divided by this before they become probabilities: predictive densities of a model that is not true are over-sure."""
 
@@ -59,10 +62,11 @@ def _causes(bench: Bench, findings: Findings, trials: list[Trial]) -> list[dict[
     return found
 
 
-def _ranking(findings: Findings, named: set[str]) -> list[dict[str, Any]]:
+def _ranking(bench: Bench, findings: Findings, named: set[str]) -> list[dict[str, Any]]:
     chances = _probabilities(findings)
     rows = []
-    for kind in DIAGNOSED:
+    kinds: tuple[type[Effect], ...] = (*DIAGNOSED, YoungModulus) if bench.nuisances.forces else DIAGNOSED
+    for kind in kinds:
         if kind.name in named:
             continue
         alone = [t for t in findings.trials if t.model.names == (kind.name,)]
@@ -117,9 +121,10 @@ def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder |
     trials = [*best, *findings.rivals()] if verdict == "ambiguous" else best
     causes = _causes(bench, findings, trials)
     named = {cause["effect"] for cause in causes}
+    known, unknown = _modulus(bench, findings, named)
     report: dict[str, Any] = {
-        "format": 1, "dataset": dataset.name, "verdict": verdict, "causes": causes, "ranking": _ranking(findings, named),
-        "not_identifiable": _not_identifiable(dataset), "unexplained": _unexplained(bench, findings), "gain": None,
+        "format": 1, "dataset": dataset.name, "verdict": verdict, "causes": causes, "ranking": _ranking(bench, findings, named),
+        "identified": known, "not_identifiable": unknown, "unexplained": _unexplained(bench, findings), "gain": None,
         "ambiguity_map": [one.to_json() for one in findings.told],
         "evidence": {
             "gain_nats": round(findings.best.gain, 2) if findings.best else 0.0, "bound_nats": round(findings.bound, 2),
@@ -138,17 +143,30 @@ def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder |
             "paper_metric": {"baseline": round(gain.paper[0] * 1e3, 4), "extended": round(gain.paper[1] * 1e3, 4)},
             "probes": gain.probes,
         }  # fmt: skip
+        if gain.force is not None:
+            names = ("baseline", "extended", "noise_floor")
+            report["gain"]["force"] = {"unit": "N"} | {n: round(v, 5) for n, v in zip(names, gain.force, strict=True)}
     return report
 
 
-def _not_identifiable(dataset: Dataset) -> list[dict[str, str]]:
-    """Young's modulus on position-driven data without forces."""
-    if all(dataset.sequence(name).forces is not None for name in dataset.sequences):
-        return []
-    return [
-        {
-            "effect": "young_modulus",
-            "why": "the tool is driven by position and no force was measured: a block of any stiffness takes the same shape",
-            "measure_instead": "the force on the tool (forces.csv), or a drop of known weight on the block",
-        }
-    ]
+def _modulus(bench: Bench, findings: Findings, named: set[str]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """What the data tell of Young's modulus where it is no cause: its entry of `identified`, or that of `not_identifiable`."""
+    if YoungModulus.name in named:
+        return [], []
+    model = findings.best.model if findings.best else findings.baseline
+    interval = modulus_interval(bench, model)
+    if interval is None:
+        why = "the tool is driven by position and no force was measured: a block of any stiffness takes the same shape"
+        return [], [_unknown(why, "the force on the tool (forces.csv), or a drop of known weight on the block")]
+    value, low, high = interval
+    if high > MOST_DOUBT * value:
+        why = f"the measured forces leave anything between {low:.3g} and {high:.3g} Pa open: they hardly stand out of their noise"
+        return [], [_unknown(why, "deeper pushes, or with a sensor of less noise")]
+    stated = bench.setup.material.young_modulus
+    why = f"the measured forces fix it within {100 * (high / value - 1):.0f} %; {stated:.4g} Pa were stated"
+    parameters = {"E": {"value": value, "unit": "Pa", "low": low, "high": high}}
+    return [{"effect": YoungModulus.name, "why": why, "stated": stated, "parameters": parameters}], []
+
+
+def _unknown(why: str, instead: str) -> dict[str, str]:
+    return {"effect": YoungModulus.name, "why": why, "measure_instead": instead}

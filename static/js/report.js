@@ -18,6 +18,7 @@ export function showReport(heading, report, patterns, palette) {
     report.controls?.length ? section("Controls", "motions that were not made", controls(report.controls)) : null,
     report.next_probe?.length ? section("Next probe", "would tell most", report.next_probe.map(probe)) : null,
     report.unexplained ? section("Unexplained", "", unexplained(report.unexplained)) : null,
+    report.identified?.length ? section("Told by the forces", "interval", report.identified.map(known)) : null,
     report.not_identifiable?.length ? section("Cannot be told from this data", "", report.not_identifiable.map(blind)) : null);
   panel().scrollTop = 0;
 }
@@ -130,6 +131,10 @@ function unexplained({ fraction, where, when: time, structure, structure_bound: 
   const place = [where, time].filter(Boolean).join("; ");
   return element("p", { class: "gain-note" }, element("b", {}, percent(fraction)), ` of the structured error is left${place ? `: ${place}` : ""}.`);
 }
+
+const known = ({ effect, why, parameters }) => element("div", { class: "note-card" }, element("strong", {}, capital(words(effect))),
+  Object.entries(parameters).map(([name, entry]) => `${words(name)} = ${parameter(entry).value} ${parameter(entry).unit} (${parameter(entry).interval}). `),
+  why ? `${capital(why)}.` : "");
 
 const blind = ({ effect, why, measure_instead: instead }) => element("div", { class: "note-card" },
   element("strong", {}, capital(words(effect))), why ? `${capital(why)}. ` : "", instead ? `Measure instead: ${instead}.` : "");

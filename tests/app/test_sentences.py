@@ -51,6 +51,15 @@ def test_every_effect_the_bench_can_hide_has_its_own_words() -> None:
         assert "an effect called" not in cause_phrase({"effect": hidden.effect, "parameters": parameters}, (0.07, 0.04, 0.036))
 
 
+def test_what_no_shape_tells_of_is_judged_by_the_force(report: dict[str, Any]) -> None:
+    stiffer = {"effect": "young_modulus", "parameters": {"E": {"value": 7512.0, "unit": "Pa"}}}
+    gain = {**report["gain"], "force": {"unit": "N", "baseline": 0.0712, "extended": 0.0051, "noise_floor": 0.005}}
+    assert plain(verdict_sentence({**report, "causes": [stiffer], "gain": gain})) == (
+        "The simulation misses how stiff the phantom is in all: its Young's modulus is 7.5 kPa; "
+        "naming it brings the error of the force on the test sequences from 0.071 N to 0.0051 N."
+    )
+
+
 def test_effect_of_somebody_else_is_called_by_its_name() -> None:
     assert cause_phrase({"effect": "frozen_core", "parameters": {}}) == "an effect called frozen core"
 
@@ -101,6 +110,7 @@ def test_report_on_disk_and_sentence_need_no_more_than_json(report: dict[str, An
             {"x": {"value": 0.01, "unit": "m"}},
             "1.4 times where it shows best, at half of the places not at any size",
         ),
+        ([{"parameter": "E", "unit": "Pa", "factor": 1.25}], {"parameter": "E", "unit": "Pa", "factor": 1.25}, {}, "1.3 times"),
         (
             [{"parameter": "stiffness_ratio", "unit": "1", "factor": 1.3}],
             {"parameter": "stiffness_ratio", "unit": "1", "factor": 1.6},
@@ -115,7 +125,7 @@ def test_report_on_disk_and_sentence_need_no_more_than_json(report: dict[str, An
         ),
         ([{"share": None}], {"share": None}, {}, "not at any size"),
     ],
-    ids=["change", "worst of each unit", "factor", "hidden places", "skin", "share", "never"],
+    ids=["change", "worst of each unit", "factor", "hidden places", "no place", "skin", "share", "never"],
 )
 def test_limits_are_said_in_words(limits: list[Any], typical: Any, at: dict[str, Any], words: str) -> None:
     assert plain(limit_phrase({"limits": limits, "typical": typical, "at": at})) == words

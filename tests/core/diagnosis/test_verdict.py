@@ -227,7 +227,9 @@ def test_report_keeps_the_contract(bench, dataset):
 
 
 def test_stiffness_is_not_identifiable_without_forces(bench, dataset):
-    (entry,) = report_of(dataset, bench, _findings(bench, accepted=False, misfit=1.0), None, "test")["not_identifiable"]
+    report = report_of(dataset, bench, _findings(bench, accepted=False, misfit=1.0), None, "test")
+    (entry,) = report["not_identifiable"]
+    assert report["identified"] == []
     assert entry["effect"] == "young_modulus"
     assert "force" in entry["measure_instead"] and entry["why"]
 

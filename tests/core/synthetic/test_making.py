@@ -119,6 +119,25 @@ def test_same_seed_gives_the_same_files(plain: tuple[Dataset, Truth], tmp_path: 
     assert len(same) == len(files)
 
 
+def test_forces_are_written_beside_the_same_files(plain: tuple[Dataset, Truth], tmp_path: Path) -> None:
+    dataset, truth = plain
+    make_dataset(tmp_path / "felt", replace(QUICK, force_noise=0.02), seed=11)
+    files = [str(path.relative_to(dataset.path)) for path in dataset.path.rglob("*") if path.is_file()]
+    assert filecmp.cmpfiles(dataset.path, tmp_path / "felt", files, shallow=False)[1:] == ([], [])
+    sequence = open_dataset(tmp_path / "felt").sequence("poke-top-01")
+    assert sequence.forces is not None and dataset.sequence("poke-top-01").forces is None
+    time, force = sequence.forces.time, sequence.forces.force @ truth.robot_from_phantom.rotation
+    place = truth.robot_from_phantom.inverse().apply(sequence.kinematics.position_at(time))
+    depth = dataset.config.size[2] + dataset.config.tool_radius - place[:, 2]
+    assert np.median(np.diff(time)) == pytest.approx(1 / 250, rel=0.01)
+    felt = force[depth > 0.9 * depth.max()].mean(axis=0) - force[depth < -1e-3].mean(axis=0)
+    # Hertz, for a shallow push of a ball into a half space; the ball is pushed in deeper than its radius.
+    hertz = 4 / 3 * 5e3 / (1 - 0.45**2) * np.sqrt(dataset.config.tool_radius) * (0.95 * depth.max()) ** 1.5
+    assert 0.6 * hertz < felt[2] < 1.4 * hertz  # the block pushes the tool up
+    assert np.linalg.norm(felt[:2]) < 0.3 * felt[2]
+    assert np.diff(force[depth < -1e-3], axis=0).std() == pytest.approx(0.02 * np.sqrt(2), rel=0.05)
+
+
 def test_existing_folder_is_left_alone(tmp_path: Path) -> None:
     with pytest.raises(RunError, match="exists already"):
         make_dataset(tmp_path, QUICK, seed=1)

@@ -44,6 +44,20 @@ def _size(field: FloatArray) -> float:
     return float(np.sqrt(np.mean(np.sum(field**2, axis=-1))))
 
 
+@pytest.mark.parametrize("side", [False, True], ids=["from above", "from the side"])
+def test_stiffer_block_takes_the_same_shape_and_pushes_back_in_proportion(side: bool) -> None:
+    stiffer = hide("young_modulus", E=8e3)
+    (true,), (plain,) = (push(*hidden, depth=DEPTH, side=side, fine=2.6e-3).stretches for hidden in ((stiffer,), ()))
+    replayed, force = _replayed((stiffer,), side, true.rest)
+    last, stated = true.passages[0].moments[-1], plain.passages[0].moments[-1]
+    assert _size(last.surface - stated.surface) < 2e-3 * _size(stated.surface)
+    assert np.allclose(last.push, 1.6 * stated.push, rtol=5e-3, atol=1e-3)
+    assert np.linalg.norm(last.push - force) < 0.06 * np.linalg.norm(force)
+    assert _size(last.surface - replayed) < 0.07 * _size(last.surface)
+    at = true.passages[0]
+    assert np.allclose(true.push(np.array([at.begin, at.end])), [np.zeros(3), last.push])
+
+
 @pytest.mark.parametrize(("effect", "side"), STRONG, ids=[one.effect for one, _ in STRONG])
 def test_bench_and_replay_agree_on_a_push(effect: HiddenEffect, side: bool) -> None:
     stretch = push(effect, depth=DEPTH, side=side, fine=2.6e-3).stretches[0]
