@@ -203,7 +203,7 @@ def bench() -> Iterator[Bench]:
 
 @pytest.fixture(scope="module")
 def baseline(bench) -> Model:
-    return bench.baseline(LUMPS)
+    return bench.baseline((), LUMPS)
 
 
 def test_modulus_is_told_from_forces_whatever_was_stated(bench, baseline):
