@@ -186,7 +186,6 @@ PHRASES: dict[str, Callable[[Any, Sequence[float] | None], str]] = {
     "base_slip": lambda v, _: f"that the base slides on the table, with a friction coefficient of {v['friction_coefficient']:.2g}",
     "base_detachment": lambda v, _: f"that the base is loose {quantity(v['extent'], 'm')} inwards from {SIDES[v['edge']]}",
     "gravity": lambda v, _: f"the phantom's own weight, ρg/E = {v['specific_weight_over_stiffness']:.2g} per metre",
-    "young_modulus": lambda v, _: f"how stiff the phantom is in all: its Young's modulus is {quantity(v['E'], 'Pa')}",
     "surface_layer": lambda v, _: f"a skin {quantity(v['thickness'], 'm')} thick, {v['stiffness_ratio']:.2g} times as stiff",
     "stiffness_gradient": _gradient,
     "strain_stiffening": lambda v, _: f"that the material stiffens with strain, Gent's J_m = {v['J_m']:.2g}",

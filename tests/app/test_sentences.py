@@ -55,7 +55,7 @@ def test_what_no_shape_tells_of_is_judged_by_the_force(report: dict[str, Any]) -
     stiffer = {"effect": "young_modulus", "parameters": {"E": {"value": 7512.0, "unit": "Pa"}}}
     gain = {**report["gain"], "force": {"unit": "N", "baseline": 0.0712, "extended": 0.0051, "noise_floor": 0.005}}
     assert plain(verdict_sentence({**report, "causes": [stiffer], "gain": gain})) == (
-        "The simulation misses how stiff the phantom is in all: its Young's modulus is 7.5 kPa; "
+        "The simulation misses another stiffness: Young's modulus is 7.5 kPa; "
         "naming it brings the error of the force on the test sequences from 0.071 N to 0.0051 N."
     )
 
