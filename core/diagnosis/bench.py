@@ -173,7 +173,7 @@ class Bench:
         varied, at = {}, 0
         for index, effect in enumerate(effects):
             for number in range(len(effect.numbers())):
-                if effect.enters.value == "load":
+                if effect.at_rest():
                     varied[columns[at]] = self._moved(effects, index, number)
                 at += 1
         return varied
@@ -208,7 +208,7 @@ class Bench:
             varied = {
                 place: (effect.apply(model.setup), 1.0)
                 for place, (effect, _) in zip(places, signatures, strict=True)
-                if effect.enters.value == "load"
+                if effect.at_rest()
             }
             varied |= self._own_static(model.effects, model.columns)
             blocks.append(self.static.block(self.setup, model.setup, self.grid, count + len(signatures) + 1, varied))

@@ -89,7 +89,7 @@ def signatures(bench: Bench, baseline: Model) -> list[Signature]:
         changed = [future.result() for future in futures]
         without = baseline.predictions if _mesh_for(effect, bench) is bench.grid else rough
         rows = zip(baseline.predictions, changed, without, strict=True)
-        found.append((effect, [replace(other, gap=here.gap + other.gap - zero.gap) for here, other, zero in rows]))
+        found.append((effect, [other.upon(here, zero) for here, other, zero in rows]))
     return found
 
 

@@ -22,7 +22,7 @@ from core.diagnosis.falsified import FALSIFIED
 from core.diagnosis.hypothesis import Model, with_effects
 from core.diagnosis.noise import Noise
 from core.diagnosis.observations import Observations
-from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, predict
+from core.diagnosis.prediction import Prediction, predict
 from core.diagnosis.screening import Candidate, linear_gains, right_sides
 from core.effects import Effect
 from core.frames import FloatArray
@@ -110,7 +110,7 @@ def controls(bench: Bench, data: Sequence[Observations], model: Model, baseline:
 def _chosen(bench: Bench, data: Sequence[Observations], model: Model, baseline: Model) -> dict[int, list[int]]:
     """Number of each sequence that is falsified to its groups: all that are clear of the block, and some near it."""
     shown = [
-        (_pattern(there, here) ** 2 * noise.weights).sum(axis=1)
+        (_pattern(there, here) ** 2 * noise.weights[:, : bench.surface.patches]).sum(axis=1)
         for there, here, noise in zip(model.predictions, baseline.predictions, bench.noises, strict=True)
     ]
     chosen = {}
@@ -150,30 +150,32 @@ def _blocks(
     blocks = []
     for place, (number, index) in enumerate(chosen.items()):
         here = origin[number]
-        nuisances = model.predictions[number].columns[index][..., : TOOL_COLUMNS + 8]
+        nuisances = model.predictions[number].columns[index][..., : len(bench.nuisances.precision) - 1]
         own = np.stack([pattern[place] for pattern in patterns], axis=2)
         there = replace(
             here, gap=here.gap[index], count=here.count[index], spread=here.spread[index],
-            equilibria=tuple(here.equilibria[row] for row in index), columns=np.concatenate([nuisances, own], axis=2),
+            equilibria=tuple(here.equilibria[row] for row in index), columns=np.concatenate([nuisances, own], axis=2), felt=None,
         )  # fmt: skip
-        block = _of_groups(bench.noises[number], index).block(there)
+        block = _of_surface(bench.noises[number], index, bench.surface.patches).block(there)
         blocks.append(Block(block.name, block.gram / bench.temperature, block.values))
     if bench.static:
         # The rest cloud saw no motion at all: what a cause explains of it, it explains with any.
         before, effect = added
-        first = TOOL_COLUMNS + 8
-        varied = {first + place: (effect.apply(before), 1.0) for place in range(len(patterns)) if effect.enters.value == "load"}
+        first = len(bench.nuisances.precision) - 1
+        varied = {first + place: (effect.apply(before), 1.0) for place in range(len(patterns)) if effect.at_rest()}
         blocks.append(bench.static.block(bench.setup, before, bench.grid, first + len(patterns) + 1, varied))
     return blocks
 
 
-def _of_groups(noise: Noise, index: list[int]) -> Noise:
-    return Noise(noise.weights[index], noise.residual[index], noise.mesh[index], noise.discrepancy[index])
+def _of_surface(noise: Noise, index: list[int], patches: int) -> Noise:
+    """Of some groups, and of the surface alone where forces were measured, too."""
+    parts = (noise.weights, noise.residual, noise.mesh, noise.discrepancy)
+    return Noise(*(part[index][:, :patches] for part in parts))
 
 
 def judge(bench: Bench, blocks: Sequence[Block], effect: Effect, names: Sequence[str]) -> list[Control]:
     """One control for each of the names; columns of the blocks are nuisances, the true pattern, one for each name, mesh error."""
-    first = TOOL_COLUMNS + 8
+    first = len(bench.nuisances.precision) - 1
     nuisance, known = (*range(first), first + 1 + len(names)), bench.nuisances.precision
     own = [Candidate(start=effect, columns=(first + number,), spread=(1.0,)) for number in range(1 + len(names))]
     gains = linear_gains(blocks, right_sides(blocks), nuisance, known, own)[0]

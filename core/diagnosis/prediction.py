@@ -94,6 +94,13 @@ class Prediction:
         own[..., column] = force / step
         return replace(self, columns=columns, felt=replace(self.felt, columns=own))
 
+    def upon(self, base: Prediction, origin: Prediction) -> Prediction:
+        """With gaps as if what this model changes over `origin`, both on another mesh, had been done to `base`."""
+        felt = self.felt
+        if felt is not None and base.felt is not None and origin.felt is not None:
+            felt = replace(felt, gap=base.felt.gap + felt.gap - origin.felt.gap)
+        return replace(self, gap=base.gap + self.gap - origin.gap, felt=felt)
+
     def less(self, origin: Prediction) -> tuple[FloatArray, FloatArray | None]:
         """What this model's gaps have over another's, of the surface (g, p) [m] and of the force (g, 3) [N]; zero where unseen."""
         felt = None if self.felt is None or origin.felt is None else np.nan_to_num(self.felt.gap - origin.felt.gap)
