@@ -176,6 +176,15 @@ def _gradient(values: Values, _: Sequence[float] | None) -> str:
     return f"that the stiffness changes with the height: the {where} is {math.exp(abs(ratio)):.2g} times as stiff as the {other}"
 
 
+def _beside(values: Values, _: Sequence[float] | None) -> str:
+    size = f"{values['scale']:.3g} times as far apart, {quantity(values['inset'], 'm')} inside"
+    return f"that the touches were of other places: {values['pairing']}, {size}"
+
+
+def _size(values: Values, _: Sequence[float] | None) -> str:
+    return "another size of the phantom: " + " × ".join(f"{values[f'scale_{axis}']:.3g}" for axis in "xyz") + " of the stated one"
+
+
 PHRASES: dict[str, Callable[[Any, Sequence[float] | None], str]] = {
     "stiff_inclusion": _lump,
     "tool_offset": _shift,
@@ -192,5 +201,8 @@ PHRASES: dict[str, Callable[[Any, Sequence[float] | None], str]] = {
     "anisotropy": _fibres,
     "base_compliance": lambda v, _: f"a support that gives way, with springs of {v['stiffness_over_E']:.2g} E per metre",
     "tool_compliance": lambda v, _: f"a tool that gives way under load, C E = {v['compliance_times_stiffness']:.2g} per metre",
+    "depth_bias": lambda v, _: f"a camera that misreads depth, by {quantity(v['offset'], 'm')} and {v['scale']:.3g} times",
+    "geometry_scale": _size,
+    "landmark_mismatch": _beside,
     "young_modulus": lambda v, _: f"another stiffness: Young's modulus is {quantity(v['E'], 'Pa')}",
 }
