@@ -30,11 +30,17 @@ def test_same_seed_draws_the_same_scenario() -> None:
 
 
 def test_scenarios_are_those_drawn_before_there_were_more_effects() -> None:
-    assert draw_scenario(0).effects == (HiddenEffect("base_slip", {"friction_coefficient": 0.15}),)
+    first = WEIGHED[:9]
+    assert draw_scenario(0, among=first).effects == (HiddenEffect("base_slip", {"friction_coefficient": 0.15}),)
     offset = HiddenEffect("tool_offset", {"dx": 0.00219, "dy": -0.00024, "dz": -0.0005})
-    assert draw_scenario(3, effects=2).effects == (offset, HiddenEffect("gravity", {"specific_weight_over_stiffness": 2.05}))
-    assert draw_scenario(5, clear=False).effects == (HiddenEffect("base_detachment", {"edge": "-y", "extent": 0.004567}),)
-    assert draw_scenario(11).effects == (HiddenEffect("poisson_ratio", {"nu": 0.328}),)
+    assert draw_scenario(3, effects=2, among=first).effects == (
+        offset,
+        HiddenEffect("gravity", {"specific_weight_over_stiffness": 2.05}),
+    )
+    assert draw_scenario(5, clear=False, among=first).effects == (
+        HiddenEffect("base_detachment", {"edge": "-y", "extent": 0.004567}),
+    )
+    assert draw_scenario(11, among=first).effects == (HiddenEffect("poisson_ratio", {"nu": 0.328}),)
 
 
 @pytest.mark.parametrize("among", [WEIGHED, tuple(HIDDEN)], ids=["weighed", "all"])
