@@ -193,7 +193,9 @@ def _forward(
     """The best further cause that gains more than the bound and that is no accident of one sequence, else None."""
     trials: list[Trial] = []
     settled = [] if current.model.effects else _beyond_first_order(bench, screened, candidates)
-    for candidate in _shortlist(gains, candidates, PROMISING * _needed(findings, current), settled):
+    chosen = _shortlist(gains, candidates, PROMISING * _needed(findings, current), settled)
+    # What is refitted whatever its gain comes last, when a better one may show that it is hopeless.
+    for candidate in sorted(chosen, key=lambda one: one in settled):
         effects = [*current.model.effects, begin(candidate, screened, bench)]
         hopeless = max([bench.objective(current.model), *(bench.objective(trial.model) - HOPELESS for trial in trials)])
         trials.append(_trial(bench, effects, current.model.predictions, current.model, hopeless))
