@@ -12,10 +12,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse as sp
 
 from core.errors import SetupError
-from core.fem.elastic import assemble_elastic
 from core.fem.factor import NotPositiveDefinite
 from core.fem.model import BlockModel, Probe
 from core.frames import FloatArray
@@ -27,7 +25,7 @@ from core.setup import Setup
 
 __all__ = [
     "TOOL_STEP", "Change", "GivingTool", "displacement_changes", "factorise_at", "force_changes", "gives", "local_probe",
-    "loss_changes", "mesh_in", "refuse_other_grid", "same_body", "stiffness_changes", "tool_slopes",
+    "loss_changes", "mesh_in", "refuse_histories", "refuse_other_grid", "same_body", "tool_slopes",
 ]  # fmt: skip
 
 Change = tuple[Setup, FloatArray]
@@ -72,7 +70,7 @@ def _holds(block: Replay, frame: Equilibrium) -> bool:
     return bool(frame.in_contact or block.setup.load.specific_weight_over_stiffness)
 
 
-def _memoryless(*setups: Setup) -> None:
+def refuse_histories(*setups: Setup) -> None:
     """Raise SetupError where a frame hangs on those before it."""
     told = "a frame that hangs on those before it has no first-order changes of its own; ask for those of the whole replay"
     for setup in setups:
@@ -212,7 +210,7 @@ def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[Ch
         (len(changes), n, 3) changes of the nodes' displacement from where they are at rest [m]; zero where nothing holds the tool
         against the block.
     """
-    _memoryless(block.setup, *(setup for setup, _ in changes))
+    refuse_histories(block.setup, *(setup for setup, _ in changes))
     refuse_other_grid(block, [setup for setup, _ in changes])
     result = np.zeros((len(changes), *frame.displacement.shape))
     model = factorise_at(block, frame) if _holds(block, frame) else None
@@ -233,7 +231,7 @@ def force_changes(block: Replay, frame: Equilibrium, changes: Sequence[Change], 
     Args:
         displacements: (len(changes), n, 3) what these changes bring about, as from `displacement_changes` [m].
     """
-    _memoryless(block.setup, *(setup for setup, _ in changes))
+    refuse_histories(block.setup, *(setup for setup, _ in changes))
     found = np.zeros((len(changes), 3))
     if not frame.in_contact or not changes:
         return found
@@ -265,7 +263,7 @@ def loss_changes(block: Replay, frame: Equilibrium, slope: FloatArray, changes: 
     Returns:
         (len(changes),) changes of the function; zero where nothing holds the tool against the block.
     """
-    _memoryless(block.setup, *(setup for setup, _ in changes))
+    refuse_histories(block.setup, *(setup for setup, _ in changes))
     refuse_other_grid(block, [setup for setup, _ in changes])
     model = factorise_at(block, frame) if _holds(block, frame) else None
     if model is None or not changes:
@@ -277,50 +275,3 @@ def loss_changes(block: Replay, frame: Equilibrium, slope: FloatArray, changes: 
     tool = GivingTool(block, frame, model)
     adjoint, place = tool.adjoint(adjoint)
     return np.asarray(adjoint @ right + place @ tool.driven(changes))
-
-
-def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray) -> FloatArray:
-    """Displacements that small changes of the stiffness within the body bring about, to first order.
-
-    Args:
-        log_factors: (m, e, q) logarithm of new over old stiffness, at the quadrature points of the frame's mesh.
-
-    Returns:
-        (m, n, 3) [m]; cheap in m, since a point's share of the residual is what it alone would resist with.
-    """
-    _memoryless(block.setup)
-    result = np.zeros((len(log_factors), *frame.displacement.shape))
-    model = factorise_at(block, frame) if frame.in_contact else None
-    if model is None:
-        return result
-    forces = point_forces(model, frame.mesh.nodes + frame.displacement)
-    elements, points = model.mu.shape
-    unknown = np.repeat(model.topology.unknown[model.topology.elements].reshape(elements, 1, -1), points, axis=1)
-    used = unknown >= 0
-    column = np.broadcast_to(np.arange(elements * points).reshape(elements, points, 1), unknown.shape)
-    shape = (int(model.topology.unknown.max()) + 1, elements * points)
-    gather = sp.csr_matrix((forces.reshape(unknown.shape)[used], (unknown[used], column[used])), shape=shape)
-    right = gather @ sp.csc_matrix(log_factors.reshape(len(log_factors), -1).T)
-    free = -model.topology.factor.solve(right.toarray())
-    if gives(block.setup):
-        free = GivingTool(block, frame, model).moved([(block.setup, np.zeros(3))] * len(log_factors), free)
-    result[:, model.topology.free] = free.T
-    return result
-
-
-def point_forces(model: BlockModel, positions: FloatArray) -> FloatArray:
-    """Internal forces over E that the stiffness at each quadrature point puts on its element's nodes (e, q, a, 3) [m^2].
-
-    Forces are linear in the stiffness, so each point's are those of a body that has none elsewhere.
-    """
-    elements, points = model.mu.shape
-    corners = model.topology.elements.shape[1]
-    apart = np.arange(corners * elements).reshape(elements, corners)
-    where = positions[model.topology.elements].reshape(-1, 3)
-    forces = np.empty((elements, points, corners, 3))
-    for point in range(points):
-        mu, bulk, force = np.zeros_like(model.mu), np.zeros_like(model.bulk), np.zeros((corners * elements, 3))
-        mu[:, point], bulk[:, point] = model.mu[:, point], model.bulk[:, point]
-        assemble_elastic(model.law, model.rule, apart, mu, bulk, where, np.empty((0, 0, 0), np.int32), force, np.empty(0))
-        forces[:, point] = force.reshape(elements, corners, 3)
-    return forces

@@ -21,9 +21,10 @@ from core.fem.model import rule_of
 from core.fem.newton import Outcome
 from core.fem.stiffness import lump_share
 from core.frames import FloatArray
+from core.local_stiffness import stiffness_changes
 from core.meshing import Meshing
 from core.replay import Equilibrium, Replay
-from core.sensitivity import TOOL_STEP, displacement_changes, stiffness_changes
+from core.sensitivity import TOOL_STEP, displacement_changes
 from core.setup import Inclusion, Setup
 from core.touches import touch_correction
 

@@ -20,7 +20,7 @@ from core.diagnosis.comparison import Sample
 from core.diagnosis.evidence import Block, fit
 from core.diagnosis.falsified import FALSIFIED
 from core.diagnosis.hypothesis import Model, with_effects
-from core.diagnosis.noise import Noise
+from core.diagnosis.noise import Noise, rows_of
 from core.diagnosis.observations import Observations
 from core.diagnosis.prediction import Prediction, predict
 from core.diagnosis.screening import Candidate, linear_gains, right_sides
@@ -110,7 +110,7 @@ def controls(bench: Bench, data: Sequence[Observations], model: Model, baseline:
 def _chosen(bench: Bench, data: Sequence[Observations], model: Model, baseline: Model) -> dict[int, list[int]]:
     """Number of each sequence that is falsified to its groups: all that are clear of the block, and some near it."""
     shown = [
-        (_pattern(there, here) ** 2 * noise.weights[:, : bench.surface.patches]).sum(axis=1)
+        (_pattern(there, here) ** 2 * noise.weights).sum(axis=1)
         for there, here, noise in zip(model.predictions, baseline.predictions, bench.noises, strict=True)
     ]
     chosen = {}
@@ -130,14 +130,14 @@ def _origin(bench: Bench, effects: Sequence[Effect], model: Model, baseline: Mod
 
 
 def _false_patterns(item: Observations, setups: Sequence[Setup], grid: Meshing, samples: Sequence[Sample]) -> list[FloatArray]:
-    """What tells the first setup from each of the others (g, p) [m] along falsified motions, at points that are settled."""
+    """What tells the first setup from each of the others (g, r) along falsified motions, at points that are settled."""
     whole = predict(item, setups[0], grid, samples=samples)
     return [_pattern(whole, predict(item, setup, grid, starts=whole.equilibria, samples=samples)) for setup in setups[1:]]
 
 
 def _pattern(extended: Prediction, origin: Prediction) -> FloatArray:
-    """What a cause changes (g, p) [m]; zero where a replay failed or a patch was lost."""
-    change = np.nan_to_num(extended.gap - origin.gap)
+    """What a cause changes in each row of the noise (g, r); zero where a replay failed or a patch was lost."""
+    change = np.nan_to_num(rows_of(extended)[0] - rows_of(origin)[0])
     change[list({*extended.failed, *origin.failed})] = 0.0
     return change
 
@@ -147,36 +147,31 @@ def _blocks(
     patterns: Sequence[Sequence[FloatArray]], added: tuple[Setup, Effect],
 ) -> list[Block]:  # fmt: skip
     """Quadratic forms of what the model without the cause leaves; columns are nuisances, patterns, and the mesh's error."""
-    blocks = []
+    blocks, first = [], len(bench.nuisances.precision) - 1
     for place, (number, index) in enumerate(chosen.items()):
         here = origin[number]
-        nuisances = model.predictions[number].columns[index][..., : len(bench.nuisances.precision) - 1]
+        nuisances = rows_of(model.predictions[number])[1][index][..., :first]
         own = np.stack([pattern[place] for pattern in patterns], axis=2)
-        there = replace(
-            here, gap=here.gap[index], count=here.count[index], spread=here.spread[index],
-            equilibria=tuple(here.equilibria[row] for row in index), columns=np.concatenate([nuisances, own], axis=2), felt=None,
-        )  # fmt: skip
-        block = _of_surface(bench.noises[number], index, bench.surface.patches).block(there)
+        there = here.of_groups(index).with_rows(np.concatenate([nuisances, own], axis=2))
+        block = _of_groups(bench.noises[number], index).block(there)
         blocks.append(Block(block.name, block.gram / bench.temperature, block.values))
     if bench.static:
         # The rest cloud saw no motion at all: what a cause explains of it, it explains with any.
         before, effect = added
-        first = len(bench.nuisances.precision) - 1
         varied = {first + place: (effect.apply(before), 1.0) for place in range(len(patterns)) if effect.at_rest()}
         blocks.append(bench.static.block(bench.setup, before, bench.grid, first + len(patterns) + 1, varied))
     return blocks
 
 
-def _of_surface(noise: Noise, index: list[int], patches: int) -> Noise:
-    """Of some groups, and of the surface alone where forces were measured, too."""
-    parts = (noise.weights, noise.residual, noise.mesh, noise.discrepancy)
-    return Noise(*(part[index][:, :patches] for part in parts))
+def _of_groups(noise: Noise, index: list[int]) -> Noise:
+    return Noise(noise.weights[index], noise.residual[index], noise.mesh[index], noise.discrepancy[index])
 
 
 def judge(bench: Bench, blocks: Sequence[Block], effect: Effect, names: Sequence[str]) -> list[Control]:
     """One control for each of the names; columns of the blocks are nuisances, the true pattern, one for each name, mesh error."""
-    first = len(bench.nuisances.precision) - 1
-    nuisance, known = (*range(first), first + 1 + len(names)), bench.nuisances.precision
+    known = bench.nuisances.precision
+    first = len(known) - 1
+    nuisance = (*range(first), first + 1 + len(names))
     own = [Candidate(start=effect, columns=(first + number,), spread=(1.0,)) for number in range(1 + len(names))]
     gains = linear_gains(blocks, right_sides(blocks), nuisance, known, own)[0]
     for number, candidate in enumerate(own):

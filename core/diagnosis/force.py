@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -120,6 +121,17 @@ class Felt:
     noise: FloatArray
     force: FloatArray
     columns: FloatArray
+
+    @classmethod
+    def of(cls, measured: tuple[FloatArray, FloatArray], frames: Sequence[Equilibrium], columns: Sequence[Any]) -> Felt:
+        """From forces and their deviations, a model's frames, and the changes (3, k) of each, if any."""
+        force = np.array([frame.force if frame.in_contact else np.zeros(3) for frame in frames])
+        stacked: FloatArray = np.stack(columns) if columns else np.zeros((len(frames), 3, 0))
+        return cls(measured[0] - force, measured[1], force, stacked)
+
+    def of_groups(self, index: list[int]) -> Felt:
+        """These groups alone."""
+        return Felt(self.gap[index], self.noise[index], self.force[index], self.columns[index])
 
     def beside(self, added: FloatArray) -> Felt:
         """With further columns (g, 3, m) last."""

@@ -18,7 +18,7 @@ from core.diagnosis.prediction import Prediction
 from core.frames import FloatArray
 from core.measurement import Surface
 
-__all__ = ["DISPLACEMENT_ERROR", "STIFFNESS_ERROR", "Noise", "noises", "patch_variance", "smooth_basis"]
+__all__ = ["DISPLACEMENT_ERROR", "STIFFNESS_ERROR", "Noise", "noises", "patch_variance", "rows_of", "smooth_basis"]
 
 DISPLACEMENT_ERROR = 0.02
 """Standard deviation of the engine's relative error of displacement, smooth over FIELD_LENGTH along the surface [1]."""
@@ -49,7 +49,7 @@ def smooth_basis(centres: FloatArray, length: float) -> FloatArray:
     return np.asarray(bumps / np.linalg.norm(bumps, axis=1, keepdims=True))
 
 
-def _rows(item: Prediction) -> tuple[FloatArray, FloatArray]:
+def rows_of(item: Prediction) -> tuple[FloatArray, FloatArray]:
     """Gaps (g, r) of the surface's patches [m] and, where there is one, of the force's three components [N]; columns (g, r, k)."""
     if item.felt is None:
         return item.gap, item.columns
@@ -75,7 +75,7 @@ class Noise:
     @classmethod
     def of(cls, baseline: Prediction, fine: Prediction, surface: Surface, variance: FloatArray, lumps: slice) -> Noise:
         """From the baseline on two meshes; `lumps` are the baseline's columns for a softer or stiffer spot."""
-        (gap, columns), finer = _rows(baseline), _rows(fine)[0]
+        (gap, columns), finer = rows_of(baseline), rows_of(fine)[0]
         seen = np.isfinite(gap) & np.isfinite(finer)
         seen[list(set(baseline.failed) | set(fine.failed))] = False
         mesh = np.where(seen, finer - gap, 0.0)
@@ -97,7 +97,7 @@ class Noise:
 
     def remeshed(self, model: Prediction, fine: Prediction) -> Noise:
         """With the mesh's error as it is in another model; all else stays, so that no patch gains or loses weight."""
-        gap, finer = _rows(model)[0], _rows(fine)[0]
+        gap, finer = rows_of(model)[0], rows_of(fine)[0]
         seen = np.isfinite(gap) & np.isfinite(finer) & (self.weights > 0)
         seen[list(set(model.failed) | set(fine.failed))] = False
         return replace(self, mesh=np.where(seen, finer - gap, self.mesh))
@@ -107,7 +107,7 @@ class Noise:
 
         Where a model lost sight of a patch or found no equilibrium, the baseline's residual stands: nothing is gained there.
         """
-        gap, columns = _rows(prediction)
+        gap, columns = rows_of(prediction)
         usable = np.isfinite(gap) & (self.weights > 0)
         usable[list(prediction.failed)] = False
         residual = np.where(usable, gap, self.residual) + self.mesh

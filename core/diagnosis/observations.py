@@ -11,7 +11,7 @@ from core.cleaning import Cleaner, cleaner_for, find_shaft_axis, tool_poses
 from core.dataset import Dataset, Kinematics, Sequence
 from core.diagnosis.force import ForceRecord
 from core.diagnosis.smoothing import smooth_centres
-from core.frames import FloatArray
+from core.frames import FloatArray, Transform
 from core.progress import Report, silent
 from core.registration import Registration
 from core.setup import Setup
@@ -90,18 +90,19 @@ class Observations:
         times = np.arange(self.times[0], self.times[-1], _TURN_STEP) - setup.sensor.time_offset
         return times, setup.phantom_from_robot.apply(smooth_centres(self.kinematics, times))
 
-    def felt(self, setup: Setup) -> tuple[FloatArray, FloatArray] | None:
+    def felt(self, phantom_from_robot: Transform, late: float) -> tuple[FloatArray, FloatArray] | None:
         """Force on the tool (g, 3) [N] in each group, phantom frame, and its standard deviation (g,) [N]; NaN where none is known.
 
+        `late` is the cloud stamp minus the robot's of one instant [s].
         Forces and poses have one clock. Where the camera's is off, both are those of another instant, and still of the same one.
         """
         if self.forces is None:
             return None
-        measured, strayed = self.forces.at(self.times - setup.sensor.time_offset)
+        measured, strayed = self.forces.at(self.times - late)
         frames = [list(group.frames) for group in self.groups]
         force = np.array([measured[one].mean(axis=0) if one else np.full(3, np.nan) for one in frames])
         variance = [self.forces.white / len(one) + strayed[one].mean() if one else np.nan for one in frames]
-        return force @ setup.phantom_from_robot.rotation.T, np.sqrt(variance)
+        return force @ phantom_from_robot.rotation.T, np.sqrt(variance)
 
     def turns(self, setup: Setup) -> list[FloatArray | None]:
         """For each group the place (3,) [m] where the tool was deepest since the group before; None where that is its own place.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -16,10 +15,11 @@ from core.fem.model import rule_of
 from core.fem.newton import Outcome
 from core.fem.stiffness import lump_share
 from core.frames import FloatArray
+from core.local_stiffness import stiffness_changes
 from core.measurement import Surface
 from core.meshing import Meshing
 from core.replay import Equilibrium, Replay
-from core.sensitivity import TOOL_STEP, Change, displacement_changes, force_changes, stiffness_changes
+from core.sensitivity import TOOL_STEP, Change, displacement_changes, force_changes
 from core.setup import Inclusion, Setup
 from core.sight import sight_of
 from core.touches import touch_correction
@@ -75,6 +75,20 @@ class Prediction:
         """Groups without equilibrium."""
         return tuple(i for i, frame in enumerate(self.equilibria) if frame.outcome is not Outcome.CONVERGED)
 
+    def of_groups(self, index: Sequence[int]) -> Prediction:
+        """These groups alone."""
+        own = list(index)
+        frames, points = tuple(self.equilibria[row] for row in own), tuple(self.samples[row] for row in own)
+        felt = None if self.felt is None else self.felt.of_groups(own)
+        seen = (self.gap[own], self.count[own], self.spread[own], self.columns[own])
+        return Prediction(self.name, *seen, frames, points, felt)
+
+    def with_rows(self, columns: FloatArray) -> Prediction:
+        """With other columns (g, p, k), or (g, p + 3, k) where the last rows are the force's."""
+        patches = self.gap.shape[1]
+        felt = None if self.felt is None else replace(self.felt, columns=columns[:, patches:])
+        return replace(self, columns=columns[:, :patches], felt=felt)
+
     def beside(self, surface: FloatArray, force: FloatArray | None = None) -> Prediction:
         """With further columns last: of the surface's gap (g, p, m), and of the force's (g, 3, m), which are else zero."""
         columns = np.concatenate([self.columns, surface], axis=2)
@@ -86,13 +100,10 @@ class Prediction:
     def with_column(self, other: Prediction, column: int, step: float) -> Prediction:
         """With what another setup changes over its step in place of a column."""
         surface, force = other.less(self)
-        columns = self.columns.copy()
-        columns[..., column] = surface / step
-        if self.felt is None or force is None:
-            return replace(self, columns=columns)
-        own = self.felt.columns.copy()
-        own[..., column] = force / step
-        return replace(self, columns=columns, felt=replace(self.felt, columns=own))
+        columns = [self.columns] if self.felt is None else [self.columns, self.felt.columns]
+        changed = np.concatenate(columns, axis=1)
+        changed[..., column] = (surface if force is None else np.concatenate([surface, force], axis=1)) / step
+        return self.with_rows(changed)
 
     def upon(self, base: Prediction, origin: Prediction) -> Prediction:
         """With gaps as if what this model changes over `origin`, both on another mesh, had been done to `base`."""
@@ -148,14 +159,16 @@ class _Columns:
         pressed = force_changes(self.block, frame, steps, moved) if self.felt else np.zeros((len(moved), 3))
         return np.concatenate([moved, pressed[:, None]], axis=1)
 
-    def of_force(self, changes: FloatArray, measured: FloatArray) -> FloatArray:
+    def of_force(self, changes: FloatArray, measured: FloatArray, turned: FloatArray) -> FloatArray:
         """(3, k) changes of measured minus simulated force [N], from `changes` (k, n + 1, 3) and the measured force (3,) [N].
 
-        A measured force turns with the robot's registration. Another clock finds another instant, but force and place of the same.
+        A measured force turns with the robot's registration; `turned` (s, 3, 3) is how far each of the setups turns it. Another
+        clock finds another instant, but force and place of the same.
         """
         found = -changes[:, -1].T
         found[:, 3:6] += np.cross(np.eye(3), np.nan_to_num(measured)).T
         for number, other in enumerate(self.wanted.setups):
+            found[:, TOOL_COLUMNS + number] += (turned[number] - np.eye(3)) @ np.nan_to_num(measured) / self.wanted.steps[number]
             if other.sensor.time_offset != self.block.setup.sensor.time_offset:
                 found[:, TOOL_COLUMNS + number] = 0.0
         return found
@@ -238,9 +251,13 @@ def predict(
     true_from_stated = touch_correction(setup, grid)
     centres = true_from_stated.apply(data.centres(setup))
     moves = np.zeros((len(wanted.setups) if wanted else 0, len(data.groups), 3))
+    true_from_robot = true_from_stated @ setup.phantom_from_robot
+    turned = np.zeros((len(moves), 3, 3))
     for number, other in enumerate(wanted.setups if wanted else ()):
-        moves[number] = touch_correction(other, grid).apply(data.centres(other)) - centres
-    measured = data.felt(setup)
+        correction = touch_correction(other, grid)
+        moves[number] = correction.apply(data.centres(other)) - centres
+        turned[number] = (correction @ other.phantom_from_robot @ true_from_robot.inverse()).rotation
+    measured = data.felt(true_from_robot, setup.sensor.time_offset)
     columns = _Columns(block, wanted, measured is not None) if wanted and not setup.remembers else None
     gap, count, spread, changes, pressed, frames, chosen = [], [], [], [], [], [], []
     past = Past(data, block, true_from_stated) if setup.remembers else None
@@ -269,7 +286,7 @@ def predict(
             moved = columns.of_group(frame, moves[:, number])
             changes.append(columns.project(frame, moved, moves[:, number], compared, group.reference).astype(np.float32))
             if measured is not None:
-                pressed.append(columns.of_force(moved, measured[0][number]).astype(np.float32))
+                pressed.append(columns.of_force(moved, measured[0][number], turned).astype(np.float32))
     stacked: FloatArray = np.stack(changes) if changes else np.zeros((len(gap), surface.patches, 0))
     if wanted and past is not None:
         # What a little change does to all that a frame hangs on is no first-order change of the frame: it is stated without memory.
@@ -278,12 +295,5 @@ def predict(
         stacked, pressed = forgotten.columns, [] if forgotten.felt is None else list(forgotten.felt.columns)
     return Prediction(
         data.name, np.array(gap), np.array(count, dtype=float), np.array(spread), stacked, tuple(frames), tuple(chosen),
-        None if measured is None else _felt(measured, frames, pressed),
+        None if measured is None else Felt.of(measured, frames, pressed),
     )  # fmt: skip
-
-
-def _felt(measured: tuple[FloatArray, FloatArray], frames: Sequence[Equilibrium], columns: Sequence[Any]) -> Felt:
-    """Measured forces and their deviation beside those of the frames, with the changes (3, k) of each, if any."""
-    force = np.array([frame.force if frame.in_contact else np.zeros(3) for frame in frames])
-    stacked: FloatArray = np.stack(columns) if columns else np.zeros((len(frames), 3, 0))
-    return Felt(measured[0] - force, measured[1], force, stacked)

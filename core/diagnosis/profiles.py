@@ -8,7 +8,7 @@ with the other parameters moved to where the linearised fit has them. Where it d
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from core.diagnosis.bench import Bench
 from core.diagnosis.evidence import fit
 from core.diagnosis.hypothesis import Model, with_effects
+from core.diagnosis.noise import rows_of
 from core.effects import Parameter
 from core.frames import FloatArray
 
@@ -105,7 +106,7 @@ def _evidence(bench: Bench, model: Model, nuisances: FloatArray) -> Callable[[Fl
         if np.array_equal(coordinates, model.coordinates):
             return bench.objective(model, nuisances)
         replayed = [future.result() for future in bench.predict(effects, None, model.predictions)]
-        moved = [replace(there, columns=here.columns) for here, there in zip(model.predictions, replayed, strict=True)]
+        moved = [there.with_rows(rows_of(here)[1]) for here, there in zip(model.predictions, replayed, strict=True)]
         return bench.objective(bench.assemble(tuple(effects), with_effects(bench.setup, effects), moved, (), 0), nuisances)
 
     return value

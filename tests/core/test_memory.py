@@ -16,9 +16,10 @@ from core.fem import compliance, model
 from core.fem.elastic import Law, lame
 from core.fem.newton import Outcome
 from core.frames import FloatArray
+from core.local_stiffness import stiffness_changes
 from core.mesh import GridSpec
 from core.replay import Equilibrium, Replay, replay, require_converged, rest
-from core.sensitivity import displacement_changes, loss_changes, stiffness_changes
+from core.sensitivity import displacement_changes, loss_changes
 from core.setup import Box, Load, Material, Relaxation, Setup, Support, Tool
 
 SIZE = (0.0687, 0.0393, 0.0358)

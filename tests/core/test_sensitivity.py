@@ -13,8 +13,9 @@ from core.fem.model import BlockModel, rule_of
 from core.fem.newton import solve
 from core.fem.stiffness import lump_share
 from core.frames import FloatArray
+from core.local_stiffness import point_forces, stiffness_changes
 from core.replay import Equilibrium, Replay
-from core.sensitivity import TOOL_STEP, displacement_changes, factorise_at, point_forces, stiffness_changes
+from core.sensitivity import TOOL_STEP, displacement_changes, factorise_at
 from core.setup import Inclusion, Load, Sensor, Setup, Support
 
 TIGHT = 1e-10

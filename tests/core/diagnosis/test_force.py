@@ -142,8 +142,8 @@ def test_wrong_clock_leaves_force_and_place_together(item):
 
 def test_measured_force_is_turned_into_the_phantoms_frame(item):
     turned = replace(SETUP, phantom_from_robot=Transform.from_vector(np.zeros(3), np.array([0.0, 0.0, 0.5 * np.pi])))
-    measured, deviation = item.felt(SETUP) or (None, None)
-    along, _ = item.felt(turned) or (None, None)
+    measured, deviation = item.felt(SETUP.phantom_from_robot, 0.0) or (None, None)
+    along, _ = item.felt(turned.phantom_from_robot, 0.0) or (None, None)
     assert measured is not None and along is not None and deviation is not None
     assert np.allclose(along, np.stack([-measured[:, 1], measured[:, 0], measured[:, 2]], axis=1))
     assert np.allclose(deviation, 1e-3)
