@@ -14,7 +14,7 @@ from core.cleaning import cleaner_for, find_shaft_axis
 from core.dataset import Dataset
 from core.diagnosis.assurance import assured
 from core.diagnosis.bench import Bench
-from core.diagnosis.gain import Ladder, ladder
+from core.diagnosis.gain import Ladder, harm, ladder
 from core.diagnosis.observations import Observations, observe_all
 from core.diagnosis.patterns import draw_patterns, patterns
 from core.diagnosis.recording import record
@@ -111,6 +111,9 @@ def _run(
     model = findings.best.model if findings.best else findings.baseline
     report(0.75, "measuring the gain on test sequences")
     gain = _gain(unseen, pool, setup, model.setup, fine, seed) if unseen else None
+    if gain is not None and findings.best and (why := harm(findings.best.model.names, gain)):
+        findings.withdraw(why)
+        model, gain = findings.baseline, _gain(unseen, pool, setup, setup, fine, seed)
     result = assured(report_of(dataset, bench, findings, gain, "test"), bench, fitted, findings)
     (making / "replays").mkdir()
     (making / "pictures").mkdir()

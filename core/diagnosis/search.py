@@ -63,6 +63,7 @@ class Findings:
         bound: least gain of a cause [nats]. misfit: of the baseline, per value. screened: linear gain by effect name.
         structure: error of the baseline that is smooth and grows with the push. left: the same of the best model.
         told: what this experiment tells of each effect, whatever the data say.
+        withdrawn: why what was found is not named after all; empty where nothing was withdrawn.
     """
 
     baseline: Model
@@ -74,6 +75,13 @@ class Findings:
     structure: Structure = NOTHING
     left: Structure = NOTHING
     told: tuple[Told, ...] = ()
+    withdrawn: str = ""
+
+    def withdraw(self, why: str) -> None:
+        """Name nothing after all."""
+        names = self.best.model.names if self.best else ()
+        self.trials = [trial for trial in self.trials if trial.model.names != names]
+        self.best, self.left, self.withdrawn = None, self.structure, why
 
     def rivals(self) -> list[Trial]:
         """Other sets of as many causes that explain the data about as well as the best."""

@@ -132,7 +132,7 @@ def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder |
             "structure_bound": round(findings.structure.bound / findings.structure.expected, 4), "evaluations": bench.evaluations,
             "fitted_on": list(bench.names),
         },
-        "warnings": list(bench.registration.warnings),
+        "warnings": [*bench.registration.warnings, *([findings.withdrawn] if findings.withdrawn else [])],
     }  # fmt: skip
     if gain is not None:
         value, low, high = gain.removed

@@ -13,7 +13,7 @@ from small_dataset import write_valid_dataset
 from core.dataset import Dataset, open_dataset
 from core.diagnosis.bench import Bench
 from core.diagnosis.evidence import Block, gram
-from core.diagnosis.gain import Ladder
+from core.diagnosis.gain import Ladder, harm
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.intervals import intervals, stands
 from core.diagnosis.noise import Noise
@@ -238,6 +238,24 @@ def test_report_without_a_cause_names_none(bench, dataset):
     report = report_of(dataset, bench, _findings(bench, ((LUMP,), 2.0, 1.0), accepted=False, misfit=1.0), None, "test")
     assert report["verdict"] == "none" and report["causes"] == [] and report["gain"] is None
     assert len(report["ranking"]) == len(DIAGNOSED)
+
+
+def test_cause_that_makes_the_test_sequences_worse_is_withdrawn(bench, dataset):
+    findings = _findings(bench, ((RADIUS,), 106.0, 1.02), ((LUMP,), 8.0, 1.03), misfit=1.03)
+    worse = replace(LADDER, removed=(-0.75, -1.4, -0.31))
+    why = harm((RADIUS.name,), worse)
+    findings.withdraw(why)
+    report = report_of(dataset, bench, findings, LADDER, "test")
+    assert report["verdict"] == "none" and report["causes"] == []
+    assert report["warnings"] == ["the touches disagree", why]
+    assert why.startswith("tool_radius would explain") and "adds 75 % (31 to 140 %)" in why
+    chances = {row["effect"]: row["probability"] for row in report["ranking"]}
+    assert chances["tool_radius"] == 0.0 < chances["stiff_inclusion"]
+
+
+@pytest.mark.parametrize("removed", [(0.9, 0.8, 0.95), (0.0, 0.0, 0.0), (-0.3, -0.9, 0.1), (-0.05, -0.08, -0.02)])
+def test_cause_that_may_carry_over_is_kept(removed):
+    assert harm(("tool_radius",), replace(LADDER, removed=removed)) == ""
 
 
 def test_ambiguous_report_names_every_rival(bench, dataset):
