@@ -95,8 +95,10 @@ function told(rows) {
 function smallest({ limits, typical, at }) {
   const sizes = limits.map(({ change, factor, share }) => change ?? factor ?? share ?? null);
   if (sizes.includes(null)) return "not at any size";
+  const where = Object.entries(at).map(([name, entry]) => `${words(name)} ${reading(entry)}`).join(", ");
+  if ("factor" in limits[0] && !("x" in at)) return `${round(sizes[0])} times${where ? ` at ${where}` : ""}`; // has no place
   if ("factor" in limits[0]) return `${round(sizes[0])} times at best; half of the places ${typical.factor ? `${round(typical.factor)} times` : "not at any size"}`;
-  if ("share" in limits[0]) return `${percent(sizes[0])} of ${Object.entries(at).map(([name, entry]) => `${words(name)} ${reading(entry)}`).join(", ")}`;
+  if ("share" in limits[0]) return `${percent(sizes[0])} of ${where}`;
   const worst = {};
   for (const { unit, change } of limits) worst[unit] = Math.max(change, worst[unit] ?? 0);
   return Object.entries(worst).map(([unit, value]) => reading({ value, unit })).join(", ");
