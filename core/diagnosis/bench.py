@@ -15,7 +15,7 @@ from core.diagnosis.ordered import ORDERED
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted
 from core.diagnosis.static import StaticChannel
 from core.diagnosis.tangent import SMALL, Tangent
-from core.diagnosis.workers import Workers
+from core.diagnosis.workers import TOLERANCE, Workers
 from core.effects import Effect
 from core.effects.material import PoissonRatio, YoungModulus
 from core.effects.sensor import CameraRegistration
@@ -115,11 +115,12 @@ class Bench:
         )  # fmt: skip
 
     def predict(
-        self, effects: Sequence[Effect], wanted: Wanted | None, starts: Sequence[Prediction] | None, grid: Meshing | None = None
-    ) -> list[Future[Prediction]]:
+        self, effects: Sequence[Effect], wanted: Wanted | None, starts: Sequence[Prediction] | None,
+        grid: Meshing | None = None, tolerance: float = TOLERANCE,
+    ) -> list[Future[Prediction]]:  # fmt: skip
         """Begin the replays of all sequences with these effects."""
         self.evaluations += 1
-        return self.workers.submit(self.names, self._apply(effects), grid or self.grid, wanted, starts)
+        return self.workers.submit(self.names, self._apply(effects), grid or self.grid, wanted, starts, tolerance)
 
     def evaluate(
         self,

@@ -37,6 +37,8 @@ FINITE: tuple[type[Effect], ...] = (
 registration, too, and what the tool or the material remembers hangs on all frames before."""
 _LIMITED = 6.0
 """J_m [1] whose whole action, to first order, is the column of a material that stiffens."""
+_TOLERANCE = 2e-3
+"""Residual of a replay that screens [1], over the tool's push: an effect worth a refit moves the surface by several percent."""
 _LEAST_SHARE, _MOST_SHARE = 0.2, 4.0
 """Of a finite size's action: what of it a refit may begin with [1]."""
 _FARTHEST = 1.8
@@ -82,7 +84,8 @@ def signatures(bench: Bench, baseline: Model) -> list[Signature]:
     """
     starts = [effect for kind in FINITE for effect in kind.starts(bench.setup)]
     plain = bench.predict([], None, baseline.predictions, bench.rough)
-    pending = [(effect, bench.predict([effect], None, baseline.predictions, _mesh_for(effect, bench))) for effect in starts]
+    known = baseline.predictions
+    pending = [(effect, bench.predict([effect], None, known, _mesh_for(effect, bench), _TOLERANCE)) for effect in starts]
     rough, found = [future.result() for future in plain], list[Signature]()
     for number, (effect, futures) in enumerate(pending):
         bench.tell(f"what {effect.name} would do", 0.15 + 0.25 * number / len(pending))

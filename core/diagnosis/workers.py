@@ -17,9 +17,11 @@ from core.processes import bound_to_parent
 from core.replay import Equilibrium
 from core.setup import Setup
 
-__all__ = ["Workers"]
+__all__ = ["TOLERANCE", "Workers"]
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+TOLERANCE = 3e-4
+"""Residual of a replay over the tool's push [1]."""
 P = ParamSpec("P")
 T = TypeVar("T")
 _DATA: dict[str, Observations] = {}
@@ -73,7 +75,7 @@ class Workers:
         grid: Meshing,
         wanted: Wanted | None = None,
         starts: Sequence[Prediction] | None = None,
-        tolerance: float = 3e-4,
+        tolerance: float = TOLERANCE,
         same_points: bool = True,
     ) -> list[Future[Prediction]]:
         """Begin predicting these sequences under a setup.

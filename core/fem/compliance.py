@@ -35,17 +35,15 @@ _INNER_TOLERANCE = 1e-8
 class Compliance:
     """The answer of a body to forces near the tool, linearised at one state; `at` makes one."""
 
-    def __init__(
-        self, model: BlockModel, faces: IntArray, nodes: IntArray, answers: FloatArray, positions: FloatArray, probe: Probe
-    ) -> None:
-        self._faces, self._nodes, self._answers = faces, nodes, answers
+    def __init__(self, model: BlockModel, faces: IntArray, nodes: IntArray, positions: FloatArray, probe: Probe) -> None:
+        self._faces, self._nodes = faces, nodes
         self._unknown = model.topology.unknown[nodes].ravel()
         where = np.full(len(model.mesh.nodes), -1)
         where[nodes] = np.arange(len(nodes))
         self._local = np.ascontiguousarray(where[model.topology.surface[faces]])
         self._slots = _dense_slots(self._local, len(nodes))
         self._share = self._contact(model, positions[nodes], probe, bending=False)[1]
-        self._held = np.linalg.inv(answers[self._unknown])
+        self._held = np.linalg.inv(model.topology.factor.answers(self._unknown))
         self._stiffness = self._held - self._share
         self._topology, self._generation = model.topology, model.topology.factor.generation
 
@@ -70,10 +68,7 @@ class Compliance:
             top.factor.factorise(state.data)
         except NotPositiveDefinite:
             return None
-        unknown = top.unknown[nodes].ravel()
-        unit = np.zeros((len(state.residual), len(unknown)))
-        unit[unknown, np.arange(len(unknown))] = 1.0
-        return cls(model, near, nodes, top.factor.solve(unit), positions, probe)
+        return cls(model, near, nodes, positions, probe)
 
     def _contact(
         self, model: BlockModel, positions: FloatArray, probe: Probe, *, bending: bool = True
@@ -99,7 +94,9 @@ class Compliance:
             return None
         force, _ = self._contact(model, here + change.reshape(-1, 3), probe)
         moved = positions.copy()
-        moved[model.topology.free] -= free + self._answers @ (force - touched - self._share @ change)
+        further = np.zeros_like(residual)
+        further[self._unknown] = force - touched - self._share @ change
+        moved[model.topology.free] -= free + model.topology.factor.solve(further)
         return moved
 
     def _balance(self, model: BlockModel, here: FloatArray, probe: Probe, load: FloatArray) -> FloatArray | None:

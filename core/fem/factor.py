@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from core.frames import FloatArray
+from core.mesh import IntArray
 
 __all__ = ["Factor", "NotPositiveDefinite"]
 
@@ -27,4 +28,8 @@ class Factor(Protocol):
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve for one (n,) or several (n, m) right sides with the last factor."""
+        ...
+
+    def answers(self, unknowns: IntArray) -> FloatArray:
+        """The inverse's entries (m, m) between these unknowns (m,): how each answers a unit load on each."""
         ...

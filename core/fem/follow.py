@@ -18,6 +18,7 @@ _TIRED = 5
 """After so many steps in one frame the next one is given a new linearisation."""
 _SHRINKING = 0.5
 _ATTEMPTS = 4
+_LONGEST_PAUSE = 4
 
 
 class Follower:
@@ -25,9 +26,16 @@ class Follower:
 
     def __init__(self) -> None:
         self._compliance: Compliance | None = None
+        self._failures = self._pause = 0
 
     def solve(self, model: BlockModel, probe: Probe, start: FloatArray, tolerance: float) -> Solution | None:
-        """Equilibrium near `start` (n, 3) [m]; None where it takes a full Newton method to find it."""
+        """Equilibrium near `start` (n, 3) [m]; None where it takes a full Newton method to find it.
+
+        Failing again and again (as where a base comes loose) it does not even try for some frames.
+        """
+        if self._pause:
+            self._pause -= 1
+            return None
         positions, taken = start, 0
         for attempt in range(_ATTEMPTS):
             compliance = self._compliance
@@ -39,10 +47,13 @@ class Follower:
             positions, taken = solution.positions, taken + solution.iterations
             if solution.converged:
                 self._compliance = compliance if solution.iterations <= _TIRED else None
+                self._failures = 0
                 return replace(solution, iterations=taken)
             if attempt and not solution.iterations:
                 break
         self._compliance = None
+        self._failures += 1
+        self._pause = min(self._failures - 1, _LONGEST_PAUSE)
         return None
 
     def _steps(self, compliance: Compliance, model: BlockModel, probe: Probe, positions: FloatArray, tolerance: float) -> Solution:

@@ -10,7 +10,7 @@ import numpy as np
 
 from core.fem.follow import Follower
 from core.fem.model import BlockModel, Probe
-from core.fem.newton import MAX_PENETRATION, Outcome, Solution, solve
+from core.fem.newton import MAX_PENETRATION, Outcome, Solution, misfit, solve
 from core.frames import FloatArray
 from core.setup import Box, Shape
 
@@ -63,26 +63,46 @@ def _led(
     before, probe = probes
     steps = max(1, int(np.ceil(float(np.linalg.norm(probe.centre - before.centre)) / FREE_STEP)))
     if steps == 1:
-        near = follower.solve(model, probe, positions, tolerance)
+        near = follower.solve(model, probe, _carried(model, positions, before, probe), tolerance)
         return near if near is not None else solve(model, probe, positions, None if haste else before, tolerance)
     stages = [Probe(before.centre + share * (probe.centre - before.centre), probe.radius) for share in np.arange(1, steps) / steps]
-    hasty = _through(model, positions, [before, *stages, probe], tolerance, careful=False)
+    hasty = _through(model, positions, [before, *stages, probe], tolerance, follower, careful=False)
     if hasty.converged or haste:
         return hasty
-    careful = _through(model, positions, [before, *stages, probe], tolerance, careful=True)
+    careful = _through(model, positions, [before, *stages, probe], tolerance, None, careful=True)
     return replace(careful, iterations=hasty.iterations + careful.iterations)
 
 
-def _through(model: BlockModel, positions: FloatArray, probes: list[Probe], tolerance: float, careful: bool) -> Solution:
+def _carried(model: BlockModel, positions: FloatArray, before: Probe, probe: Probe) -> FloatArray:
+    """Positions (n, 3) [m] from which a step begins: those given, or with the surface carried along as the ball moves and grows.
+
+    A ball that draws back or shrinks loses touch with a body that stays where it is, whose whole push is then out of balance.
+    """
+    arm = positions - before.centre
+    distance = np.linalg.norm(arm, axis=1, keepdims=True)
+    reach = np.exp(-((np.maximum(distance / before.radius - 1.0, 0.0)) ** 2))
+    move = reach * (probe.centre - before.centre + (probe.radius - before.radius) * arm / np.maximum(distance, 1e-12))
+    carried = np.where(model.topology.free, positions + move, positions)
+    there, here = (model.assemble(place, probe, tangent=False) for place in (carried, positions))
+    return carried if misfit(model, there) < misfit(model, here) else positions
+
+
+def _through(
+    model: BlockModel, positions: FloatArray, probes: list[Probe], tolerance: float, follower: Follower | None, careful: bool
+) -> Solution:
     """The last of the solutions at each place after the first, or the first that is none."""
     rough = tolerance if careful else max(tolerance, STAGE_TOLERANCE)
-    solution = solve(model, probes[1], positions, probes[0] if careful else None, rough)
-    iterations = solution.iterations
-    for last, probe in pairwise(probes[1:]):
+    iterations = 0
+    for last, probe in pairwise(probes):
+        wanted = tolerance if probe is probes[-1] else rough
+        near = None
+        if follower is not None:
+            near = follower.solve(model, probe, _carried(model, positions, last, probe), wanted)
+        solution = near if near is not None else solve(model, probe, positions, last if careful else None, wanted)
+        iterations += solution.iterations
         if not solution.converged:
             break
-        solution = solve(model, probe, solution.positions, last if careful else None, tolerance if probe is probes[-1] else rough)
-        iterations += solution.iterations
+        positions = solution.positions
     return replace(solution, iterations=iterations)
 
 

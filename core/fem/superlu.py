@@ -8,6 +8,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from core.fem.factor import NotPositiveDefinite
 from core.frames import FloatArray
+from core.mesh import IntArray
 
 __all__ = ["SuperLUFactor"]
 
@@ -44,3 +45,7 @@ class SuperLUFactor:
         if self._lu is None:
             raise RuntimeError("nothing has been factorised yet")
         return np.ascontiguousarray(self._lu.solve(np.asarray(right, dtype=float)))
+
+    def answers(self, unknowns: IntArray) -> FloatArray:
+        """The inverse's entries (m, m) between these unknowns (m,)."""
+        return self.solve(np.eye(self._shape[0])[:, unknowns])[unknowns]
