@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from core.diagnosis.observations import Group
+from core.diagnosis.strays import among_neighbours
 from core.frames import FloatArray
 from core.measurement import Gaps, PatchMeans, Surface, gaps, gaps_beside, plain_means, within_spread
 from core.mesh import IntArray
@@ -100,6 +101,7 @@ def choose(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) -> 
     points, camera = _placed(group, setup)
     seen = gaps(points, camera, frame, surface)
     kept = within_spread(seen.gap, seen.patch, surface.patches)
+    kept[kept] = among_neighbours(seen.gap[kept], seen.patch[kept], surface)
     index, patch = seen.index[kept].astype(np.int32), seen.patch[kept].astype(np.int32)
     return Sample(
         index, patch, seen.gap[kept].astype(np.float32), seen.facing[kept].astype(np.float32),
