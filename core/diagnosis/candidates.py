@@ -94,7 +94,7 @@ def signatures(bench: Bench, baseline: Model) -> list[Signature]:
         bench.tell(f"what {effect.name} would do", 0.15 + 0.25 * number / len(pending))
         changed = [future.result() for future in futures]
         rows = zip(baseline.predictions, changed, without, strict=True)
-        found.append((effect, [other.upon(here, zero) for here, other, zero in rows]))
+        found.append((effect, [other.upon(here, zero).alone() for here, other, zero in rows]))
     return found
 
 
@@ -119,7 +119,7 @@ def candidates_of(model: Model, bench: Bench, finite: Sequence[Signature]) -> li
         start = StiffInclusion(x=lump.x, y=lump.y, z=lump.z, radius=lump.radius, stiffness_ratio=1.0)
         found.append(Candidate(start=start, of=("stiffness_ratio",), columns=(place,), spread=(2.0,)))
     for place, (effect, predictions) in zip(model.extra.get("signatures", ()), finite, strict=True):
-        if any(np.any(p.columns.shape) and np.isfinite(p.gap).any() for p in predictions):
+        if any(np.isfinite(p.gap).any() for p in predictions):
             found.append(Candidate(start=effect, columns=(place,), spread=(1.0,)))
     return [candidate for candidate in found if candidate.start.name not in model.names]
 
