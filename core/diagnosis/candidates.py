@@ -25,7 +25,7 @@ from core.effects.tool import ToolCompliance, ToolFriction
 from core.meshing import Meshing
 from core.setup import Inclusion, Setup
 
-__all__ = ["FINITE", "Signature", "begin", "candidates_of", "lump_places", "signatures", "tangents"]
+__all__ = ["FINITE", "TRACED", "Signature", "begin", "candidates_of", "lump_places", "signatures", "tangents"]
 
 Signature = tuple[Effect, list[Prediction]]
 """An effect of a finite size, and every sequence replayed with it."""
@@ -33,8 +33,10 @@ Signature = tuple[Effect, list[Prediction]]
 FINITE: tuple[type[Effect], ...] = (
     BaseSlip, BaseDetachment, Gravity, BaseCompliance, *OUTSIDE,
 )  # fmt: skip
-"""Effects without a derivative where they are nothing: a base that is held and one that may move have other unknowns, sag moves the
-registration, too, and what the tool or the material remembers hangs on all frames before."""
+"""Effects without a derivative where they are nothing: a base that is held and one that may move have other unknowns, and sag moves
+the registration, too."""
+TRACED: tuple[type[Effect], ...] = (Viscoelasticity, PermanentSet, ToolFriction)
+"""Effects that hang on all frames before, whose replays are led along the tool's whole way: screened by their traces."""
 _LIMITED = 6.0
 """J_m [1] whose whole action, to first order, is the column of a material that stiffens."""
 _TOLERANCE = 2e-3
@@ -93,7 +95,17 @@ def signatures(bench: Bench, baseline: Model) -> list[Signature]:
         without = baseline.predictions if _mesh_for(effect, bench) is bench.grid else rough
         rows = zip(baseline.predictions, changed, without, strict=True)
         found.append((effect, [other.upon(here, zero) for here, other, zero in rows]))
-    return found
+    return [*found, *_traced(bench, baseline)]
+
+
+def _traced(bench: Bench, baseline: Model) -> list[Signature]:
+    """What hangs on the past would do, to first order, for the cost of a few solves a group (see `core.diagnosis.traces`)."""
+    starts = [effect for kind in TRACED for effect in kind.starts(bench.setup)]
+    bench.tell("what the material or the tool would remember", 0.4)
+    pending = bench.workers.trace(bench.names, bench.setup, bench.grid, baseline.predictions, starts)
+    traces = [future.result() for future in pending]
+    rows = list(zip(traces, baseline.predictions, strict=True))
+    return [(effect, [own[number].on(plain) for own, plain in rows]) for number, effect in enumerate(starts)]
 
 
 def _mesh_for(effect: Effect, bench: Bench) -> Meshing:

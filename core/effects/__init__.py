@@ -38,11 +38,11 @@ _COUNTED: tuple[type[Effect], ...] = (
     Anisotropy,
     BaseCompliance,
     ToolCompliance,
-)
-_REPLAYED: tuple[type[Effect], ...] = (
     Viscoelasticity,
     PermanentSet,
     ToolFriction,
+)
+_REPLAYED: tuple[type[Effect], ...] = (
     YoungModulus,
     DepthBias,
     GeometryScale,
