@@ -9,17 +9,15 @@ from dataclasses import replace
 import numpy as np
 
 from core.diagnosis.evidence import Block, fit, log_evidence, predictive_score
-from core.diagnosis.hypothesis import Model, Nuisances
+from core.diagnosis.hypothesis import Model, Nuisances, nuisance_setups
 from core.diagnosis.noise import Noise, noises
-from core.diagnosis.ordered import ORDERED
+from core.diagnosis.ordered import ORDERED, TRACED
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted
 from core.diagnosis.static import StaticChannel
 from core.diagnosis.tangent import SMALL, Tangent
+from core.diagnosis.traces import moves, with_traces
 from core.diagnosis.workers import TOLERANCE, Workers
 from core.effects import Effect
-from core.effects.material import PoissonRatio, YoungModulus
-from core.effects.sensor import CameraRegistration
-from core.effects.tool import ToolRadius
 from core.frames import FloatArray
 from core.measurement import Surface
 from core.meshing import Meshing
@@ -61,6 +59,7 @@ class Bench:
         self.temperature = 1.0
         self.noises: list[Noise] = []
         self.evaluations = 0
+        self._plain: list[Model] = []
 
     def tell(self, text: str, done: float = 0.0) -> None:
         """Report what is being done; the share that is done [1] never falls."""
@@ -86,25 +85,8 @@ class Bench:
             setup = effect.apply(setup)
         return setup
 
-    def _nuisance_setups(self, setup: Setup) -> list[tuple[Setup, float]]:
-        """A slightly larger tool, a slightly other Poisson ratio, the camera moved and turned, and with forces the modulus."""
-        step = SMALL * 3e-4
-        found: list[tuple[Setup, float]] = [(ToolRadius(radius=setup.tool.radius + step).apply(setup), step)]
-        nu = setup.material.poisson_ratio
-        change = -2e-4 if nu > 0.494 else 2e-4
-        found.append((PoissonRatio(nu=nu + change).apply(setup), change))
-        camera = CameraRegistration.neutral(setup)
-        for number, item in enumerate(camera.numbers()):
-            values = [0.0] * 6
-            values[number] = SMALL * item.scale
-            found.append((camera.moved(values).apply(setup), values[number]))
-        if self.nuisances.forces:
-            modulus = YoungModulus.neutral(setup)
-            found.append((modulus.at([modulus.coordinates[0] + SMALL]).apply(setup), SMALL))
-        return found
-
     def _wanted(self, effects: Sequence[Effect], setup: Setup, tangents: Sequence[Tangent], lumps: Sequence[Inclusion]) -> Wanted:
-        pairs = self._nuisance_setups(setup)
+        pairs = nuisance_setups(setup, self.nuisances.forces)
         for index, effect in enumerate(effects):
             for number in range(len(effect.numbers())):
                 pairs.append((setup, 1.0) if isinstance(effect, ORDERED) else self._moved(effects, index, number))
@@ -131,9 +113,26 @@ class Bench:
     ) -> Model:
         """The hypothesis with these effects; columns of `tangents` and `lumps` are wanted too."""
         setup = self._apply(effects)
+        if any(isinstance(effect, TRACED) for effect in effects):
+            return self.assemble(tuple(effects), setup, self._led(effects, starts, tangents, lumps), tangents, len(lumps))
         predictions = [f.result() for f in self.predict(effects, self._wanted(effects, setup, tangents, lumps), starts)]
-        predictions = self._ordered_columns(effects, predictions)
-        return self.assemble(tuple(effects), setup, predictions, tangents, len(lumps))
+        model = self.assemble(tuple(effects), setup, self._ordered_columns(effects, predictions), tangents, len(lumps))
+        self._plain = [*self._plain[:1], model]
+        return model
+
+    def _led(
+        self, effects: Sequence[Effect], starts: Sequence[Prediction] | None, tangents: Sequence[Tangent],
+        lumps: Sequence[Inclusion],
+    ) -> list[Prediction]:  # fmt: skip
+        """Replays along the tool's whole way, with columns of one that remembers nothing, which is kept, and traces of what is."""
+        others = [effect for effect in effects if not isinstance(effect, TRACED)]
+        pending = self.predict(effects, None, starts)
+        known = [] if tangents or lumps else [model for model in self._plain if model.effects == tuple(others)]
+        plain = known[0] if known else self.evaluate(others, starts, tangents, lumps)
+        changed = self.workers.trace(self.names, plain.setup, self.grid, plain.predictions, moves(effects))
+        rows = zip(pending, plain.predictions, changed, strict=True)
+        extra = len(tangents) + len(lumps)
+        return [with_traces(led.result(), base, own.result(), effects, self._first, extra) for led, base, own in rows]
 
     def _ordered_columns(self, effects: Sequence[Effect], predictions: list[Prediction]) -> list[Prediction]:
         """Columns of effects in whose replays a frame hangs on all those before it: by one more replay for each number."""

@@ -11,6 +11,7 @@ import numpy as np
 from core.diagnosis.bench import PRIOR_STEPS, Bench
 from core.diagnosis.evidence import fit
 from core.diagnosis.hypothesis import TWINS, Model
+from core.diagnosis.ordered import TRACED
 from core.diagnosis.prediction import Prediction
 from core.diagnosis.screening import Candidate
 from core.diagnosis.tangent import Tangent
@@ -25,7 +26,7 @@ from core.effects.tool import ToolCompliance, ToolFriction
 from core.meshing import Meshing
 from core.setup import Inclusion, Setup
 
-__all__ = ["FINITE", "TRACED", "Signature", "begin", "candidates_of", "lump_places", "signatures", "tangents"]
+__all__ = ["FINITE", "Signature", "begin", "candidates_of", "lump_places", "signatures", "tangents"]
 
 Signature = tuple[Effect, list[Prediction]]
 """An effect of a finite size, and every sequence replayed with it."""
@@ -35,8 +36,6 @@ FINITE: tuple[type[Effect], ...] = (
 )  # fmt: skip
 """Effects without a derivative where they are nothing: a base that is held and one that may move have other unknowns, and sag moves
 the registration, too."""
-TRACED: tuple[type[Effect], ...] = (Viscoelasticity, PermanentSet, ToolFriction)
-"""Effects that hang on all frames before, whose replays are led along the tool's whole way: screened by their traces."""
 _LIMITED = 6.0
 """J_m [1] whose whole action, to first order, is the column of a material that stiffens."""
 _TOLERANCE = 2e-3

@@ -14,6 +14,7 @@ import numpy as np
 
 from core.diagnosis.comparison import Sample, compare, observe
 from core.diagnosis.observations import Observations
+from core.diagnosis.ordered import TRACED
 from core.diagnosis.prediction import Prediction
 from core.diagnosis.recollection import Recollection
 from core.diagnosis.rubbing import Spot, pulls, spot_of
@@ -31,7 +32,12 @@ from core.sensitivity import factorise_at, local_probe, tool_slopes
 from core.setup import Setup
 from core.touches import touch_correction
 
-__all__ = ["Trace", "traces_of"]
+__all__ = ["Trace", "moves", "traces_of", "with_traces"]
+
+_STEP = 0.25
+"""Of a derivative by two traces, in the scale of what is moved."""
+_LEAST_SCALE, _MOST_SCALE = 0.5, 2.0
+"""Of a trace that is drawn to what the replay along the whole way changes [1]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,3 +141,52 @@ def _state(
     # Measured minus simulated force on the tool, which the coupling of the residual tells (see `core.sensitivity.force_changes`).
     coupling = tool_slopes(look.model, look.frame.mesh.nodes + look.frame.displacement, local_probe(look.frame))[0]
     trace.force[number] = modulus * (answer @ coupling + drag)
+
+
+def _moved(effect: Effect, number: int) -> tuple[Effect, float]:
+    """With one search coordinate a step further, and the step."""
+    item, coordinates = effect.numbers()[number], effect.coordinates
+    step = _STEP * item.scale
+    step = -step if coordinates[number] + step > item.coordinate(item.high) else step
+    coordinates[number] += step
+    return effect.at(coordinates), step
+
+
+def moves(effects: Sequence[Effect]) -> list[Effect]:
+    """Those of the effects that are traced, each followed by itself with every number a step further."""
+    found = []
+    for effect in effects:
+        if isinstance(effect, TRACED):
+            found += [effect, *(_moved(effect, number)[0] for number in range(len(effect.numbers())))]
+    return found
+
+
+def with_traces(
+    led: Prediction, plain: Prediction, traces: Sequence[Trace], effects: Sequence[Effect], first: int, extra: int
+) -> Prediction:
+    """A replay along the whole way with columns: those of the plain replay, and of traced effects the differences of their traces.
+
+    Args:
+        plain: without the traced effects, whose columns have those of the other effects from `first` on, and then the extra ones.
+        traces: of `moves(effects)`. extra: how many of them to keep.
+    """
+    columns = plain.columns if plain.felt is None else np.concatenate([plain.columns, plain.felt.columns], axis=1)
+    rows = [trace.gap if plain.felt is None else np.concatenate([trace.gap, trace.force], axis=1) for trace in traces]
+    parts, own, at = [columns[..., :first]], 0, first
+    whole, scale = np.zeros_like(plain.gap), 1.0
+    for effect in effects:
+        count = len(effect.numbers())
+        if not isinstance(effect, TRACED):
+            parts.append(columns[..., at : at + count])
+            at += count
+            continue
+        whole = whole + traces[own].gap
+        steps = [_moved(effect, number)[1] for number in range(count)]
+        parts.append(np.stack([(rows[own + 1 + n] - rows[own]) / step for n, step in enumerate(steps)], axis=-1))
+        own += 1 + count
+    changed = led.less(plain)[0]
+    if whole.any():
+        scale = float(np.clip(np.sum(led.count * changed * whole) / np.sum(led.count * whole**2), _LEAST_SCALE, _MOST_SCALE))
+    for place, effect in enumerate(effects):
+        parts[1 + place] = parts[1 + place] * (scale if isinstance(effect, TRACED) else 1.0)
+    return led.with_rows(np.concatenate([*parts, columns[..., at : at + extra]], axis=2))

@@ -2,18 +2,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pushed_block import GRID, SETUP, TOP, seen_points
+from dragged_block import dragged
+from pushed_block import GRID, SETUP
 
-from core.dataset import Kinematics
-from core.diagnosis.observations import Group, Observations
+from core.diagnosis.observations import Observations
 from core.diagnosis.prediction import Prediction, predict
 from core.diagnosis.timeline import timeline_of
 from core.diagnosis.traces import traces_of
 from core.effects import Effect
 from core.effects.memory import PermanentSet, Viscoelasticity
 from core.effects.tool import ToolFriction
-from core.frames import FloatArray, Transform
-from core.replay import rest
+from core.frames import Transform
 
 EFFECTS: dict[str, Effect] = {
     "soon": Viscoelasticity(relaxed_fraction=0.5, time_constant=0.3),
@@ -22,25 +21,11 @@ EFFECTS: dict[str, Effect] = {
     "slips": ToolFriction(friction_coefficient=0.15),
     "sticks": ToolFriction(friction_coefficient=0.5),
 }
-LOOKS = (0.1, 0.9, 1.15, 1.35, 1.6, 2.1, 2.7, 3.4, 4.9)
-"""When the groups were seen [s]: before, on the way in, four times in the drag and its hold, and three times after the release."""
-
-
-def _centres(time: FloatArray) -> FloatArray:
-    """Down by 4 mm within a second, 6 mm aside until 1.6 s, there until 2.2 s, and away; tool centres (n, 3) [m]."""
-    depth = np.interp(time, [0.2, 1.0, 2.2, 2.6], [-8e-3, 4e-3, 4e-3, -8e-3])
-    aside = np.interp(time, [1.0, 1.6], [-3e-3, 3e-3])
-    return np.stack([aside, np.full_like(time, -2e-3), TOP + 5e-3 - depth], axis=1)
 
 
 @pytest.fixture(scope="module")
 def data() -> Observations:
-    stream = np.arange(0, 5.0, 2e-3)
-    kinematics = Kinematics(stream, _centres(stream), np.tile([0.0, 0.0, 0.0, 1.0], (len(stream), 1)))
-    points = seen_points(rest(SETUP, GRID), 3000, 0.0, 1)
-    free = (0, 6, 7, 8)
-    groups = (Group((), points, True, True), *(Group((number,), points, number in free) for number in range(len(LOOKS))))
-    return Observations("drag-01", np.array(LOOKS), kinematics, groups)
+    return dragged()
 
 
 @pytest.fixture(scope="module")
