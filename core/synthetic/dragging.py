@@ -9,7 +9,7 @@ and are renewed until they stay; e is lessened on the way there.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ __all__ = ["Dragging", "Rub", "assemble_rub"]
 
 CREEPS = (1e-4, 3e-5, 1e-5, 4e-6)
 """e [m], in turn; the last one stays."""
-_AGREED, _GOOD_ENOUGH, _MOST_TURNS = 0.01, 0.05, 14
+_AGREED, _GOOD_ENOUGH, _MOST_TURNS = 0.01, 0.05, 30
 """Change of what friction holds, over all of it [1], at which pressure and friction agree; the same where turns have run out."""
 
 
@@ -78,23 +78,32 @@ class Dragging:
 
         Raises SolveError where they never do.
         """
-        last = self._last
-        begun = last is not None and bool((last.depth > 0).any())
+        before = self._last
         # What stuck before sticks first: the tool takes it along.
-        seen = last if last is not None and begun else self._seen(solve(None), centre)
-        rub, change = self._rub(seen, 0), np.inf
+        seen = before if before is not None and (before.depth > 0).any() else self._seen(solve(None), centre)
+        rub, change, share = self._rub(seen, 0), np.inf, 1.0
         for turn in range(_MOST_TURNS):
             if rub is None:
                 return
             seen = self._seen(solve(rub), centre)
             renewed = self._rub(seen, turn + 1)
-            change = self._change(rub, renewed)
+            last, change = change, self._change(rub, renewed)
             if change < _AGREED and turn + 1 >= len(CREEPS):
                 return
-            rub = renewed
+            # Where pressure and friction drive one another to and fro they go only part of the way.
+            share = max(0.5 * share, 0.1) if change > 0.7 * last and turn >= len(CREEPS) else share
+            rub = self._mixed(rub, renewed, share)
         if change > _GOOD_ENOUGH:
             text = f"friction and pressure of the virtual tool find no agreement: they are {100 * change:.0f} % apart"
             raise SolveError(text, residual=change)
+
+    def _mixed(self, old: Rub, new: Rub | None, share: float) -> Rub | None:
+        """The new one, with limits only this share [1] of the way from the old ones'."""
+        if new is None or share == 1.0:
+            return new
+        limits = np.zeros(self._block.skin.weights.shape)
+        limits[old.facets] = old.limits
+        return replace(new, limits=share * new.limits + (1 - share) * limits[new.facets])
 
     def _change(self, before: Rub, now: Rub | None) -> float:
         """How much of what was held is held otherwise [1]."""
