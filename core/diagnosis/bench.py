@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.diagnosis.evidence import Block, fit, log_evidence, predictive_score
+from core.diagnosis.evidence import Block, explained, fit, log_evidence, predictive_score
 from core.diagnosis.hypothesis import Model, Nuisances, nuisance_setups
+from core.diagnosis.led import led
 from core.diagnosis.noise import Noise, noises
 from core.diagnosis.ordered import ORDERED, TRACED
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted
 from core.diagnosis.static import StaticChannel
 from core.diagnosis.tangent import SMALL, Tangent
-from core.diagnosis.traces import moves, with_traces
 from core.diagnosis.workers import TOLERANCE, Workers
 from core.effects import Effect
 from core.frames import FloatArray
@@ -25,14 +25,20 @@ from core.progress import Report, silent
 from core.registration import Registration
 from core.setup import Inclusion, Setup
 
-__all__ = ["Bench"]
+__all__ = ["PRIOR_STEPS", "TRUST", "Bench"]
 
 PRIOR_STEPS = 4.0
 """Prior standard deviation of a search coordinate, in its scales."""
 _ORDERED_STEP = 0.25
 """Step of a derivative by two replays, in the scale of what is moved."""
-_TRUST = 2.5
+TRUST = 2.5
+"""Longest step of a fit at once, in the scales of what it moves."""
 _ITERATIONS = 4
+_WORTH = 0.5
+"""A step that promises less [nats] is not made."""
+_OPTIMISM = (10.0, 3.0)
+"""A fit is given up where so many times what its next step promises would not save it, before the first step and after it: to
+first order a tool's shift by millimetres promises a small part of what it does."""
 
 
 class Bench:
@@ -59,7 +65,7 @@ class Bench:
         self.temperature = 1.0
         self.noises: list[Noise] = []
         self.evaluations = 0
-        self._plain: list[Model] = []
+        self.known: list[Model] = []
 
     def tell(self, text: str, done: float = 0.0) -> None:
         """Report what is being done; the share that is done [1] never falls."""
@@ -114,25 +120,11 @@ class Bench:
         """The hypothesis with these effects; columns of `tangents` and `lumps` are wanted too."""
         setup = self._apply(effects)
         if any(isinstance(effect, TRACED) for effect in effects):
-            return self.assemble(tuple(effects), setup, self._led(effects, starts, tangents, lumps), tangents, len(lumps))
+            return self.assemble(tuple(effects), setup, led(self, effects, starts, tangents, lumps), tangents, len(lumps))
         predictions = [f.result() for f in self.predict(effects, self._wanted(effects, setup, tangents, lumps), starts)]
         model = self.assemble(tuple(effects), setup, self._ordered_columns(effects, predictions), tangents, len(lumps))
-        self._plain = [*self._plain[:1], model]
+        self.known = [*self.known[:1], model]
         return model
-
-    def _led(
-        self, effects: Sequence[Effect], starts: Sequence[Prediction] | None, tangents: Sequence[Tangent],
-        lumps: Sequence[Inclusion],
-    ) -> list[Prediction]:  # fmt: skip
-        """Replays along the tool's whole way, with columns of one that remembers nothing, which is kept, and traces of what is."""
-        others = [effect for effect in effects if not isinstance(effect, TRACED)]
-        pending = self.predict(effects, None, starts)
-        known = [] if tangents or lumps else [model for model in self._plain if model.effects == tuple(others)]
-        plain = known[0] if known else self.evaluate(others, starts, tangents, lumps)
-        changed = self.workers.trace(self.names, plain.setup, self.grid, plain.predictions, moves(effects))
-        rows = zip(pending, plain.predictions, changed, strict=True)
-        extra = len(tangents) + len(lumps)
-        return [with_traces(led.result(), base, own.result(), effects, self._first, extra) for led, base, own in rows]
 
     def _ordered_columns(self, effects: Sequence[Effect], predictions: list[Prediction]) -> list[Prediction]:
         """Columns of effects in whose replays a frame hangs on all those before it: by one more replay for each number."""
@@ -250,15 +242,17 @@ class Bench:
     def refit(self, effects: Sequence[Effect], starts: Sequence[Prediction] | None, hopeless: float = -np.inf) -> Model:
         """Gauss-Newton with a trust region from these values; returns the best model met.
 
-        A model whose log evidence stays below `hopeless` after two steps is given up.
+        A model whose log evidence will hardly reach `hopeless` is given up.
         """
         self.tell(f"fitting {' and '.join(effect.name for effect in effects)}")
         return self._fitted(self.evaluate(effects, starts), self.nuisances.precision, hopeless)
 
     def _fitted(self, model: Model, nuisances: FloatArray, hopeless: float = -np.inf) -> Model:
-        best, radius = self.objective(model, nuisances), _TRUST
+        best, radius = self.objective(model, nuisances), TRUST
         for iteration in range(_ITERATIONS):
-            if iteration == 2 and best < hopeless:
+            promised = self._promised(model, nuisances)
+            lost = best + _OPTIMISM[min(iteration, 1)] * promised < hopeless or (iteration == 2 and best < hopeless)
+            if lost or promised < _WORTH:
                 break
             solution = fit(self.tempered(model), [*model.nuisance, *model.columns], self.precision(model, nuisances))
             change = solution.change[len(model.nuisance) :]
@@ -276,6 +270,11 @@ class Bench:
                 if radius < 0.1:
                     break
         return model
+
+    def _promised(self, model: Model, nuisances: FloatArray) -> float:
+        """What the best values of the model's search coordinates would gain to first order [nats]."""
+        blocks, whole = self.tempered(model), self.precision(model, nuisances)
+        return explained(blocks, [*model.nuisance, *model.columns], whole) - explained(blocks, model.nuisance, nuisances)
 
     def refine(self, model: Model) -> Model:
         """Fit an accepted model's parameters once more, with the mesh's error measured in it and not in the stated setup.

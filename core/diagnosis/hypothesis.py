@@ -120,15 +120,8 @@ class Model:
         return tuple(effect.name for effect in self.effects)
 
 
-def with_effects(setup: Setup, effects: Sequence[Effect]) -> Setup:
-    """The setup with all of them in it, one after another."""
-    for effect in effects:
-        setup = effect.apply(setup)
-    return setup
-
-
 def nuisance_setups(setup: Setup, forces: bool) -> list[tuple[Setup, float]]:
-    """A slightly larger tool, a slightly other Poisson ratio, the camera moved and turned, with forces the modulus; and steps."""
+    """Setups with each nuisance a little changed, and the steps: radius, Poisson's ratio, camera, with forces the modulus."""
     step = SMALL * 3e-4
     found: list[tuple[Setup, float]] = [(ToolRadius(radius=setup.tool.radius + step).apply(setup), step)]
     nu = setup.material.poisson_ratio
@@ -143,3 +136,10 @@ def nuisance_setups(setup: Setup, forces: bool) -> list[tuple[Setup, float]]:
         modulus = YoungModulus.neutral(setup)
         found.append((modulus.at([modulus.coordinates[0] + SMALL]).apply(setup), SMALL))
     return found
+
+
+def with_effects(setup: Setup, effects: Sequence[Effect]) -> Setup:
+    """The setup with all of them in it, one after another."""
+    for effect in effects:
+        setup = effect.apply(setup)
+    return setup

@@ -23,8 +23,8 @@ from core.setup import Setup
 __all__ = ["ORDERED", "TRACED", "Past", "forgetful"]
 
 TRACED: tuple[type[Effect], ...] = (Viscoelasticity, PermanentSet, ToolFriction)
-"""Effects whose replays are led along the tool's whole way; what they do is screened, and varied, by traces of the plain replay."""
-ORDERED = (BaseSlip, *TRACED)
+"""Effects whose replays are led along the tool's whole way; what they do is screened by traces of the plain replay."""
+ORDERED: tuple[type[Effect], ...] = (BaseSlip, *TRACED)
 """Effects in whose replays a frame hangs on those before it."""
 
 TRAVEL, HOLD = 1e-3, 0.4

@@ -32,7 +32,7 @@ from core.sensitivity import factorise_at, local_probe, tool_slopes
 from core.setup import Setup
 from core.touches import touch_correction
 
-__all__ = ["Trace", "moves", "traces_of", "with_traces"]
+__all__ = ["Trace", "moved", "moves", "traces_of", "with_traces"]
 
 _STEP = 0.25
 """Of a derivative by two traces, in the scale of what is moved."""
@@ -143,7 +143,7 @@ def _state(
     trace.force[number] = modulus * (answer @ coupling + drag)
 
 
-def _moved(effect: Effect, number: int) -> tuple[Effect, float]:
+def moved(effect: Effect, number: int) -> tuple[Effect, float]:
     """With one search coordinate a step further, and the step."""
     item, coordinates = effect.numbers()[number], effect.coordinates
     step = _STEP * item.scale
@@ -157,7 +157,7 @@ def moves(effects: Sequence[Effect]) -> list[Effect]:
     found = []
     for effect in effects:
         if isinstance(effect, TRACED):
-            found += [effect, *(_moved(effect, number)[0] for number in range(len(effect.numbers())))]
+            found += [effect, *(moved(effect, number)[0] for number in range(len(effect.numbers())))]
     return found
 
 
@@ -181,7 +181,7 @@ def with_traces(
             at += count
             continue
         whole = whole + traces[own].gap
-        steps = [_moved(effect, number)[1] for number in range(count)]
+        steps = [moved(effect, number)[1] for number in range(count)]
         parts.append(np.stack([(rows[own + 1 + n] - rows[own]) / step for n, step in enumerate(steps)], axis=-1))
         own += 1 + count
     changed = led.less(plain)[0]
