@@ -1,7 +1,7 @@
 """Hypotheses in which something is remembered: replayed along the tool's whole way once, and varied by traces.
 
-The trace of friction says how far the tool drags the surface, but not which part of the contact slips first: what a little more of it
-changes has a correlation of less than 0.85 with its trace, and is told by one more replay along the way.
+The trace of friction says how far the tool drags the surface, but not which part of the contact slips first: what a little more of
+it changes has a correlation of less than 0.85 with its trace, and is told by one more replay along the way.
 """
 
 from __future__ import annotations
