@@ -13,8 +13,8 @@ from core.diagnosis.hypothesis import Model, Nuisances
 from core.diagnosis.noise import Noise, noises
 from core.diagnosis.ordered import ORDERED
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted
-from core.diagnosis.static import StaticChannel
-from core.diagnosis.tangent import SMALL, Tangent
+from core.diagnosis.still import Still
+from core.diagnosis.tangent import SMALL, Tangent, changed_at_rest
 from core.diagnosis.workers import TOLERANCE, Workers
 from core.effects import Effect
 from core.effects.material import PoissonRatio, YoungModulus
@@ -46,7 +46,7 @@ class Bench:
         registration: Registration,
         workers: Workers,
         names: Sequence[str],
-        static: StaticChannel | None,
+        static: Still | None,
         grid: Meshing,
         fine: Meshing,
         report: Report = silent,
@@ -55,7 +55,7 @@ class Bench:
         self.setup, self.registration, self.workers, self.static = setup, registration, workers, static
         self.names, self._report, self._done = tuple(names), report, 0.0
         self.grid, self.fine, self.rough = grid, fine, grid
-        self.nuisances = Nuisances.of(registration, forces)
+        self.nuisances = Nuisances.of(registration.mended, forces)
         self._first = TOOL_COLUMNS + 8 + forces
         self.surface = Surface(setup.box)
         self.temperature = 1.0
@@ -165,29 +165,30 @@ class Bench:
         if not self.noises:
             return Model(effects, setup, tuple(predictions), (), columns, extra, nuisance, tuple(tangents))
         blocks = [noise.block(item) for noise, item in zip(self.noises, predictions, strict=True)]
-        if self.static:
-            blocks.append(self.static.block(self.setup, setup, self.grid, count + 1, self._own_static(effects, columns)))
-        return Model(effects, setup, tuple(predictions), tuple(blocks), columns, extra, nuisance, tuple(tangents))
+        model = Model(effects, setup, tuple(predictions), (), columns, extra, nuisance, tuple(tangents))
+        return replace(model, blocks=(*blocks, *self._still(model, count, {})))
 
-    def _own_static(self, effects: tuple[Effect, ...], columns: tuple[int, ...]) -> dict[int, tuple[Setup, float]]:
-        """Columns of the effects that change the rest shape, with the setup a little changed and the step."""
-        varied, at = {}, 0
-        for index, effect in enumerate(effects):
+    def _still(self, model: Model, count: int, varied: dict[int, tuple[Setup, float]]) -> list[Block]:
+        """What was measured without a push, of `count` columns and the mesh's error: the model's own, and those `varied`."""
+        if not self.static:
+            return []
+        found, at = {**varied, **changed_at_rest(model.tangents, model.extra["tangents"], model.setup)}, 0
+        for index, effect in enumerate(model.effects):
             for number in range(len(effect.numbers())):
                 if effect.at_rest():
-                    varied[columns[at]] = self._moved(effects, index, number)
+                    found[model.columns[at]] = self._moved(model.effects, index, number)
                 at += 1
-        return varied
+        return [self.static.block(self.setup, model.setup, self.grid, count + 1, found)]
 
     # -- baseline and noise -----------------------------------------------------------------------------------------------------
 
-    def baseline(self, tangents: Sequence[Tangent], lumps: Sequence[Inclusion]) -> Model:
-        """The stated setup on two meshes; from here on the noise is known."""
-        model = self.evaluate((), tangents=tangents, lumps=lumps)
-        fine = [f.result() for f in self.predict((), None, model.predictions, self.fine)]
+    def baseline(self, tangents: Sequence[Tangent], lumps: Sequence[Inclusion], effects: Sequence[Effect] = ()) -> Model:
+        """The stated setup with these effects on two meshes; from here on the noise is known."""
+        model = self.evaluate(effects, tangents=tangents, lumps=lumps)
+        fine = [f.result() for f in self.predict(effects, None, model.predictions, self.fine)]
         places = model.extra["lumps"]
         self.noises = noises(model.predictions, fine, self.surface, slice(places[0], places[-1] + 1))
-        model = self.assemble((), self.setup, model.predictions, tangents, len(lumps))
+        model = self.assemble(tuple(effects), model.setup, model.predictions, tangents, len(lumps))
         self.temperature = self.misfit(model)
         return model
 
@@ -205,14 +206,9 @@ class Bench:
                 here = here.beside(surface[..., None], None if force is None else force[..., None])
             blocks.append(noise.block(here))
         places = tuple(range(count, count + len(signatures)))
-        if self.static:
-            varied = {
-                place: (effect.apply(model.setup), 1.0)
-                for place, (effect, _) in zip(places, signatures, strict=True)
-                if effect.at_rest()
-            }
-            varied |= self._own_static(model.effects, model.columns)
-            blocks.append(self.static.block(self.setup, model.setup, self.grid, count + len(signatures) + 1, varied))
+        own = zip(places, (effect for effect, _ in signatures), strict=True)
+        varied = {place: (effect.apply(model.setup), 1.0) for place, effect in own if effect.at_rest()}
+        blocks += self._still(model, count + len(signatures), varied)
         nuisance = (*model.nuisance[:-1], count + len(signatures))
         return replace(model, blocks=tuple(blocks), nuisance=nuisance, extra={**model.extra, "signatures": places})
 

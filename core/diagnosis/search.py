@@ -12,8 +12,9 @@ from core.diagnosis.ambiguity import Told, ambiguity_map
 from core.diagnosis.bench import Bench
 from core.diagnosis.candidates import Signature, begin, candidates_of, lump_places, signatures, tangents
 from core.diagnosis.evidence import fit, predictive_gain
-from core.diagnosis.hypothesis import Model
+from core.diagnosis.hypothesis import Model, with_effects
 from core.diagnosis.intervals import stands
+from core.diagnosis.pairing import mispaired
 from core.diagnosis.prediction import Prediction
 from core.diagnosis.screening import Candidate, linear_gains, null_gains, right_sides
 from core.diagnosis.structure import NOTHING, Structure, structure_of
@@ -156,29 +157,35 @@ def _trial(
 def search(bench: Bench, seed: int) -> Findings:
     """Find up to MOST_CAUSES causes."""
     bench.tell("replaying the stated setup on two meshes", 0.02)
-    baseline = bench.baseline(tangents(bench.setup), lump_places(bench))
+    known = mispaired(bench.setup, bench.grid, bench.registration.repair)
+    names = [effect.name for effect in known]
+    origin = bench.baseline(tangents(with_effects(bench.setup, known), names), lump_places(bench), known)
+    baseline = bench.evaluate((), origin.predictions) if known else origin
     findings = Findings(baseline, misfit=bench.misfit(baseline))
     findings.structure = findings.left = structure_of(bench, baseline, seed)
-    finite = signatures(bench, baseline)
-    screened, candidates, gains = _screen(bench, baseline, finite, baseline)
-    blocks = bench.tempered(screened)
-    chance = null_gains(blocks, screened.nuisance, bench.nuisances.precision, candidates, NULL_DRAWS, seed)
+    finite = signatures(bench, origin)
+    screened, candidates, gains = _screen(bench, origin, finite, origin)
+    blocks, nuisance = bench.tempered(screened), (*screened.nuisance, *screened.columns)
+    chance = null_gains(blocks, nuisance, bench.precision(screened), candidates, NULL_DRAWS, seed)
     findings.bound = max(float(np.quantile(chance, NULL_QUANTILE)), LEAST_GAIN)
-    findings.told = ambiguity_map(blocks, screened.nuisance, bench.nuisances.precision, candidates, findings.bound)
+    findings.told = ambiguity_map(blocks, nuisance, bench.precision(screened), candidates, findings.bound)
     for candidate, gain in zip(candidates, gains, strict=True):
         name = candidate.start.name
         findings.screened[name] = max(float(gain), findings.screened.get(name, -np.inf))
     current = Trial(baseline, 0.0, findings.misfit)
-    for order in range(MOST_CAUSES):
+    if known:
+        current = findings.best = _trial(bench, known, origin.predictions, baseline)
+        findings.trials.append(current)
+    for order in range(len(known), MOST_CAUSES):
         bench.tell("looking for a second cause" if order else "fitting the most promising causes", 0.45 + 0.25 * order)
         if order:
-            screened, candidates, gains = _again(bench, current.model, finite, baseline)
+            screened, candidates, gains = _again(bench, current.model, finite, origin)
         step = _forward(bench, findings, current, screened, candidates, gains)
         if step is None:
             break
         current = findings.best = step
         bench.temperature = max(1.0, current.misfit)
-    if findings.best is not None and len(findings.best.model.effects) > 1:
+    if findings.best is not None and len(findings.best.model.effects) > 1 and not known:
         findings.best = _backward(bench, findings, findings.best)
     _rescore(bench, findings)
     if findings.best is not None:
@@ -188,11 +195,11 @@ def search(bench: Bench, seed: int) -> Findings:
     return findings
 
 
-def _again(bench: Bench, model: Model, finite: Sequence[Signature], baseline: Model) -> tuple[Model, list[Candidate], np.ndarray]:
+def _again(bench: Bench, model: Model, finite: Sequence[Signature], origin: Model) -> tuple[Model, list[Candidate], np.ndarray]:
     """Screen the catalogue on top of a model that has causes already."""
     wanted = tangents(model.setup, besides=model.names)
     extended = bench.evaluate(model.effects, model.predictions, wanted, lump_places(bench))
-    return _screen(bench, extended, finite, baseline)
+    return _screen(bench, extended, finite, origin)
 
 
 def _forward(

@@ -38,16 +38,16 @@ _COUNTED: tuple[type[Effect], ...] = (
     Anisotropy,
     BaseCompliance,
     ToolCompliance,
+    DepthBias,
+    GeometryScale,
+    LandmarkMismatch,
+    MeshResolution,
 )
 _REPLAYED: tuple[type[Effect], ...] = (
     Viscoelasticity,
     PermanentSet,
     ToolFriction,
     YoungModulus,
-    DepthBias,
-    GeometryScale,
-    LandmarkMismatch,
-    MeshResolution,
 )
 OUTSIDE = outside_effects(effect.name for effect in (*_COUNTED, *_REPLAYED))
 DIAGNOSED = (*_COUNTED, *OUTSIDE)

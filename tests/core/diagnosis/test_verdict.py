@@ -120,7 +120,7 @@ def test_structured_error_without_a_cause_is_unexplained(bench):
 @pytest.mark.parametrize("effect", [LUMP, RADIUS, NU, CAMERA, Gravity(specific_weight_over_stiffness=1.2)], ids=lambda e: e.name)
 def test_interval_holds_the_value_within_the_bounds(bench, effect):
     entry = intervals(bench, _model(bench, effect))[0]
-    assert set(entry) == set(effect.reported())
+    assert set(entry) == set(effect.reported(bench.setup))
     for item in effect.numbers():
         stated = entry[item.name]
         assert item.low <= stated["low"] < stated["value"] < stated["high"] <= item.high
