@@ -13,10 +13,12 @@ from core.diagnosis.hypothesis import Model, Nuisances
 from core.diagnosis.noise import Noise, noises
 from core.diagnosis.ordered import ORDERED
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted
+from core.diagnosis.resolution import OWN_GRID, under_stated, with_columns
 from core.diagnosis.still import Still
 from core.diagnosis.tangent import SMALL, Tangent, changed_at_rest
 from core.diagnosis.workers import TOLERANCE, Workers
 from core.effects import Effect
+from core.effects.geometry import MeshResolution
 from core.effects.material import PoissonRatio, YoungModulus
 from core.effects.sensor import CameraRegistration
 from core.effects.tool import ToolRadius
@@ -60,6 +62,7 @@ class Bench:
         self.surface = Surface(setup.box)
         self.temperature = 1.0
         self.noises: list[Noise] = []
+        self.on_own_grid: tuple[Prediction, ...] = ()
         self.evaluations = 0
 
     def tell(self, text: str, done: float = 0.0) -> None:
@@ -71,10 +74,8 @@ class Bench:
 
     def _moved(self, effects: Sequence[Effect], index: int, number: int) -> tuple[Setup, float]:
         """The setup with one search coordinate a little larger, and the step."""
-        effect = effects[index]
-        item = effect.numbers()[number]
-        coordinates = effect.coordinates
-        step = SMALL * item.scale
+        effect, item = effects[index], effects[index].numbers()[number]
+        coordinates, step = effect.coordinates, SMALL * item.scale
         if item.coordinate(item.high) - coordinates[number] < step:
             step = -step
         coordinates[number] += step
@@ -94,10 +95,8 @@ class Bench:
         change = -2e-4 if nu > 0.494 else 2e-4
         found.append((PoissonRatio(nu=nu + change).apply(setup), change))
         camera = CameraRegistration.neutral(setup)
-        for number, item in enumerate(camera.numbers()):
-            values = [0.0] * 6
-            values[number] = SMALL * item.scale
-            found.append((camera.moved(values).apply(setup), values[number]))
+        for item, along in zip(camera.numbers(), np.eye(6), strict=True):
+            found.append((camera.moved((SMALL * item.scale * along).tolist()).apply(setup), SMALL * item.scale))
         if self.nuisances.forces:
             modulus = YoungModulus.neutral(setup)
             found.append((modulus.at([modulus.coordinates[0] + SMALL]).apply(setup), SMALL))
@@ -107,7 +106,8 @@ class Bench:
         pairs = self._nuisance_setups(setup)
         for index, effect in enumerate(effects):
             for number in range(len(effect.numbers())):
-                pairs.append((setup, 1.0) if isinstance(effect, ORDERED) else self._moved(effects, index, number))
+                alone = isinstance(effect, (*ORDERED, MeshResolution))
+                pairs.append((setup, 1.0) if alone else self._moved(effects, index, number))
         pairs += [tangent.changed(setup) for tangent in tangents]
         return Wanted(
             setups=tuple(s for s, _ in pairs), steps=tuple(h for _, h in pairs), lumps=tuple(lumps),
@@ -185,9 +185,13 @@ class Bench:
     def baseline(self, tangents: Sequence[Tangent], lumps: Sequence[Inclusion], effects: Sequence[Effect] = ()) -> Model:
         """The stated setup with these effects on two meshes; from here on the noise is known."""
         model = self.evaluate(effects, tangents=tangents, lumps=lumps)
-        fine = [f.result() for f in self.predict(effects, None, model.predictions, self.fine)]
+        own, known = model.predictions, list(effects)
+        if model.setup.element_size is not None:
+            known.append(OWN_GRID)
+            own = self.on_own_grid = with_columns([f.result() for f in self.predict(known, None, own)], own)
+        fine = [f.result() for f in self.predict(known, None, own, self.fine)]
         places = model.extra["lumps"]
-        self.noises = noises(model.predictions, fine, self.surface, slice(places[0], places[-1] + 1))
+        self.noises = under_stated(noises(own, fine, self.surface, slice(places[0], places[-1] + 1)), model.predictions)
         model = self.assemble(tuple(effects), model.setup, model.predictions, tangents, len(lumps))
         self.temperature = self.misfit(model)
         return model

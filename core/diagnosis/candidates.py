@@ -12,6 +12,7 @@ from core.diagnosis.bench import PRIOR_STEPS, Bench
 from core.diagnosis.evidence import fit
 from core.diagnosis.hypothesis import TWINS, Model
 from core.diagnosis.prediction import Prediction
+from core.diagnosis.resolution import OWN_GRID, mesh_candidate
 from core.diagnosis.screening import Candidate
 from core.diagnosis.tangent import Tangent
 from core.effects import OUTSIDE, Effect
@@ -92,6 +93,7 @@ def signatures(bench: Bench, baseline: Model) -> list[Signature]:
     known = baseline.predictions
     pending = [(effect, bench.predict([*own, effect], None, known, _mesh_for(effect, bench), _TOLERANCE)) for effect in starts]
     rough, found = [future.result() for future in plain], list[Signature]()
+    found += [(OWN_GRID, list(bench.on_own_grid))] if bench.on_own_grid else []
     for number, (effect, futures) in enumerate(pending):
         bench.tell(f"what {effect.name} would do", 0.15 + 0.25 * number / len(pending))
         changed = [future.result() for future in futures]
@@ -124,6 +126,7 @@ def candidates_of(model: Model, bench: Bench, finite: Sequence[Signature]) -> li
     for place, (effect, predictions) in zip(model.extra.get("signatures", ()), finite, strict=True):
         if any(np.any(p.columns.shape) and np.isfinite(p.gap).any() for p in predictions):
             found.append(Candidate(start=effect, columns=(place,), spread=(1.0,)))
+    found += [] if bench.on_own_grid else [mesh_candidate(model)]
     return [candidate for candidate in found if candidate.start.name not in model.names]
 
 
@@ -141,7 +144,11 @@ def _same_effect(model: Model) -> list[list[tuple[int, Tangent]]]:
 def begin(candidate: Candidate, model: Model, bench: Bench) -> Effect:
     """Where to begin the refit: at the size that the linear fit asks for, where the column tells of a size."""
     start = candidate.start
-    if candidate.widened or isinstance(start, (TimeOffset, BaseSlip, BaseDetachment, Gravity, ToolFriction, *OUTSIDE)):
+    if (
+        candidate.widened
+        or start == OWN_GRID
+        or isinstance(start, (TimeOffset, BaseSlip, BaseDetachment, Gravity, ToolFriction, *OUTSIDE))
+    ):
         return start
     columns, precision = candidate.precision(list(model.nuisance), bench.nuisances.precision)
     changes = fit(bench.tempered(model), columns, precision).change[len(model.nuisance) :]

@@ -19,6 +19,7 @@ from core.diagnosis.prediction import Prediction
 from core.diagnosis.screening import Candidate, linear_gains, null_gains, right_sides
 from core.diagnosis.structure import NOTHING, Structure, structure_of
 from core.effects import Effect
+from core.effects.geometry import MeshResolution
 from core.effects.material import StiffInclusion
 from core.effects.tool import ToolOffset
 
@@ -111,7 +112,7 @@ def _beyond_first_order(bench: Bench, model: Model, candidates: Sequence[Candida
         own = [model.nuisance.index(column) for column in candidate.widened]
         pull = float(change[own] @ np.linalg.solve(covariance[np.ix_(own, own)], change[own]))
         chance = float(chi2.sf(pull, len(own))) if own else 1.0
-        if chance < least and not isinstance(candidate.start, ToolOffset):
+        if chance < least and not isinstance(candidate.start, (ToolOffset, MeshResolution)):
             least, strained = chance, [candidate]
     return [candidate for candidate in candidates if isinstance(candidate.start, ToolOffset)] + strained
 
@@ -125,7 +126,8 @@ def _shortlist(
         candidate = candidates[number]
         taken = [c for c in chosen if c.start.name == candidate.start.name]
         apart = all(_distance(candidate.start, other.start) > 0.015 for other in taken)
-        room = not taken or (isinstance(candidate.start, StiffInclusion) and len(taken) < 2 and apart)
+        nothing_finer = isinstance(candidate.start, MeshResolution) and candidate.widened
+        room = not (taken or nothing_finer) or (isinstance(candidate.start, StiffInclusion) and len(taken) < 2 and apart)
         if gains[number] > least and room and (taken or len({c.start.name for c in chosen}) < names):
             chosen.append(candidate)
     return chosen

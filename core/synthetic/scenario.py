@@ -41,7 +41,7 @@ WEIGHED = (
     "camera_registration", "surface_layer", "stiffness_gradient", "strain_stiffening", "anisotropy", "base_compliance",
     "tool_compliance",
 )  # fmt: skip
-"""Those that a diagnosis weighs, and that are hidden unless others are asked for."""
+"""Those that are hidden unless others are asked for: what a seed draws among them stays the same as more are weighed."""
 
 SHORT_PROTOCOL = ("poke-top-01", "poke-top-02", "poke-side-01", "poke-side-02", "drag-01")
 """Every kind of motion to fit on, and a push from another side, which shows most causes, to test on."""
