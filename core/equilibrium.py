@@ -54,7 +54,7 @@ class Equilibrium:
 
     def move(self, points: FloatArray) -> FloatArray:
         """Current positions of material points given by their rest positions (m, 3) [m]."""
-        return points + self.mesh.interpolate(self._moved, points)
+        return points + self.mesh.interpolate(self._moved, points) if self._moved.any() else points
 
 
 def require_converged(frames: Sequence[Equilibrium]) -> None:

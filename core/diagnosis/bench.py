@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Future
 from dataclasses import replace
 
 import numpy as np
 
-from core.diagnosis.evidence import Block, fit, log_evidence, predictive_score
-from core.diagnosis.hypothesis import Model, Nuisances
+from core.diagnosis.evidence import Block, explained, fit, log_evidence, predictive_score
+from core.diagnosis.hypothesis import Model, Nuisances, nuisance_setups
 from core.diagnosis.noise import Noise, noises
 from core.diagnosis.ordered import ORDERED
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted
 from core.diagnosis.resolution import OWN_GRID, under_stated, with_columns
 from core.diagnosis.still import Still
 from core.diagnosis.tangent import SMALL, Tangent, changed_at_rest
-from core.diagnosis.workers import TOLERANCE, Workers
+from core.diagnosis.workers import TOLERANCE, Pending, Workers
 from core.effects import Effect
 from core.effects.geometry import MeshResolution
-from core.effects.material import PoissonRatio, YoungModulus
-from core.effects.sensor import CameraRegistration
-from core.effects.tool import ToolRadius
 from core.frames import FloatArray
 from core.measurement import Surface
 from core.meshing import Meshing
@@ -29,14 +25,20 @@ from core.progress import Report, silent
 from core.registration import Registration
 from core.setup import Inclusion, Setup
 
-__all__ = ["Bench"]
+__all__ = ["PRIOR_STEPS", "TRUST", "Bench"]
 
 PRIOR_STEPS = 4.0
 """Prior standard deviation of a search coordinate, in its scales."""
 _ORDERED_STEP = 0.25
 """Step of a derivative by two replays, in the scale of what is moved."""
-_TRUST = 2.5
+TRUST = 2.5
+"""Longest step of a fit at once, in the scales of what it moves."""
 _ITERATIONS = 4
+_WORTH = 0.5
+"""A step that promises less [nats] is not made."""
+_OPTIMISM = (10.0, 3.0)
+"""A fit is given up where so many times what its next step promises would not save it, before the first step and after it: to
+first order a tool's shift by millimetres promises a small part of what it does."""
 
 
 class Bench:
@@ -87,23 +89,8 @@ class Bench:
             setup = effect.apply(setup)
         return setup
 
-    def _nuisance_setups(self, setup: Setup) -> list[tuple[Setup, float]]:
-        """A slightly larger tool, a slightly other Poisson ratio, the camera moved and turned, and with forces the modulus."""
-        step = SMALL * 3e-4
-        found: list[tuple[Setup, float]] = [(ToolRadius(radius=setup.tool.radius + step).apply(setup), step)]
-        nu = setup.material.poisson_ratio
-        change = -2e-4 if nu > 0.494 else 2e-4
-        found.append((PoissonRatio(nu=nu + change).apply(setup), change))
-        camera = CameraRegistration.neutral(setup)
-        for item, along in zip(camera.numbers(), np.eye(6), strict=True):
-            found.append((camera.moved((SMALL * item.scale * along).tolist()).apply(setup), SMALL * item.scale))
-        if self.nuisances.forces:
-            modulus = YoungModulus.neutral(setup)
-            found.append((modulus.at([modulus.coordinates[0] + SMALL]).apply(setup), SMALL))
-        return found
-
     def _wanted(self, effects: Sequence[Effect], setup: Setup, tangents: Sequence[Tangent], lumps: Sequence[Inclusion]) -> Wanted:
-        pairs = self._nuisance_setups(setup)
+        pairs = nuisance_setups(setup, self.nuisances.forces)
         for index, effect in enumerate(effects):
             for number in range(len(effect.numbers())):
                 alone = isinstance(effect, (*ORDERED, MeshResolution))
@@ -117,7 +104,7 @@ class Bench:
     def predict(
         self, effects: Sequence[Effect], wanted: Wanted | None, starts: Sequence[Prediction] | None,
         grid: Meshing | None = None, tolerance: float = TOLERANCE,
-    ) -> list[Future[Prediction]]:  # fmt: skip
+    ) -> list[Pending]:  # fmt: skip
         """Begin the replays of all sequences with these effects."""
         self.evaluations += 1
         return self.workers.submit(self.names, self._apply(effects), grid or self.grid, wanted, starts, tolerance)
@@ -251,15 +238,17 @@ class Bench:
     def refit(self, effects: Sequence[Effect], starts: Sequence[Prediction] | None, hopeless: float = -np.inf) -> Model:
         """Gauss-Newton with a trust region from these values; returns the best model met.
 
-        A model whose log evidence stays below `hopeless` after two steps is given up.
+        A model whose log evidence will hardly reach `hopeless` is given up.
         """
         self.tell(f"fitting {' and '.join(effect.name for effect in effects)}")
         return self._fitted(self.evaluate(effects, starts), self.nuisances.precision, hopeless)
 
     def _fitted(self, model: Model, nuisances: FloatArray, hopeless: float = -np.inf) -> Model:
-        best, radius = self.objective(model, nuisances), _TRUST
+        best, radius = self.objective(model, nuisances), TRUST
         for iteration in range(_ITERATIONS):
-            if iteration == 2 and best < hopeless:
+            promised = self._promised(model, nuisances)
+            lost = best + _OPTIMISM[min(iteration, 1)] * promised < hopeless or (iteration == 2 and best < hopeless)
+            if lost or promised < _WORTH:
                 break
             solution = fit(self.tempered(model), [*model.nuisance, *model.columns], self.precision(model, nuisances))
             change = solution.change[len(model.nuisance) :]
@@ -277,6 +266,11 @@ class Bench:
                 if radius < 0.1:
                     break
         return model
+
+    def _promised(self, model: Model, nuisances: FloatArray) -> float:
+        """What the best values of the model's search coordinates would gain to first order [nats]."""
+        blocks, whole = self.tempered(model), self.precision(model, nuisances)
+        return explained(blocks, [*model.nuisance, *model.columns], whole) - explained(blocks, model.nuisance, nuisances)
 
     def refine(self, model: Model) -> Model:
         """Fit an accepted model's parameters once more, with the mesh's error measured in it and not in the stated setup.

@@ -32,6 +32,8 @@ __all__ = ["Scene", "Survivor", "nats_of", "survivor"]
 
 _SMALL = 1e-3
 _FLOOR = 2e-5
+_TOLERANCE = 1e-3
+"""Residual of an imagined push [1], over the push itself."""
 _LEAST_POINTS = 2
 _SHAFT = np.linspace(0.0, 0.08, 9)
 """Where along the shaft [m] spheres of the tool's radius stand for it: it leaves the block the way the tool came."""
@@ -109,10 +111,10 @@ class Scene:
 
 
 class _Replayed:
-    """One model under one push."""
+    """One model under one push; its equilibria begin from those of another model `like` it, where there is one."""
 
-    def __init__(self, scene: Scene, model: Survivor, push: Push) -> None:
-        self.scene, self.model, self.block = scene, model, Replay(model.setup, scene.grid)
+    def __init__(self, scene: Scene, model: Survivor, push: Push, like: _Replayed | None = None) -> None:
+        self.scene, self.model, self.block = scene, model, Replay(model.setup, scene.grid, _TOLERANCE)
         stated = scene.stated.setup
         late = model.setup.sensor.time_offset - stated.sensor.time_offset
         centres = touch_correction(model.setup, scene.grid).apply(push.centres(stated.tool.radius, late))
@@ -122,7 +124,9 @@ class _Replayed:
         self.frames: dict[int, Equilibrium] = {}
         previous: Equilibrium | None = None
         for row in used:
-            previous = self.frames[row] = self.block.sought(centres[row], (previous,), float(push.times[row]))
+            near = None if like is None or model.setup.remembers else like.frames.get(row)
+            previous = self.frames[row] = self.block.sought(centres[row], (near, previous), float(push.times[row]))
+        self._engine: dict[int, FloatArray] = {}
 
     def moved(self, row: int) -> FloatArray:
         """How far patches (p, 3) [m] are from where they rest; zero where nothing is left of the push."""
@@ -160,6 +164,11 @@ class _Replayed:
 
     def engine(self, row: int) -> FloatArray:
         """The engine's own error (p, k) [m], likewise."""
+        if row not in self._engine:
+            self._engine[row] = self._errors(row)
+        return self._engine[row]
+
+    def _errors(self, row: int) -> FloatArray:
         size = np.linalg.norm(self.moved(row), axis=1)[:, None]
         found = [DISPLACEMENT_ERROR * size * self.scene.basis]
         frame = self.frames.get(row)
@@ -193,7 +202,7 @@ def nats_of(scene: Scene, pairs: Sequence[tuple[Survivor, Survivor]], push: Push
 
     def replayed(model: Survivor) -> _Replayed:
         if id(model) not in known:
-            known[id(model)] = _Replayed(scene, model, push)
+            known[id(model)] = _Replayed(scene, model, push, next(iter(known.values()), None))
         return known[id(model)]
 
     found = []

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.diagnosis.bench import PRIOR_STEPS, Bench
+from core.diagnosis.bench import PRIOR_STEPS, TRUST, Bench
 from core.diagnosis.evidence import fit
 from core.diagnosis.hypothesis import TWINS, Model
 from core.diagnosis.prediction import Prediction
@@ -41,8 +41,8 @@ _LIMITED = 6.0
 """J_m [1] whose whole action, to first order, is the column of a material that stiffens."""
 _TOGETHER: tuple[type[Effect], ...] = (DepthBias, GeometryScale, LandmarkMismatch)
 """Effects whose numbers are one candidate: what each does alone is as good as any."""
-_TOLERANCE = 2e-3
-"""Residual of a replay that screens [1], over the tool's push: an effect worth a refit moves the surface by several percent."""
+_TOLERANCE = 1e-2
+"""Residual of a replay that screens [1], over the tool's push: its pattern has a correlation of 0.999 with that at 3e-4."""
 _LEAST_SHARE, _MOST_SHARE = 0.2, 4.0
 """Of a finite size's action: what of it a refit may begin with [1]."""
 _FARTHEST = 1.8
@@ -88,18 +88,18 @@ def signatures(bench: Bench, baseline: Model) -> list[Signature]:
     be, the others' 0.99.
     """
     starts = [effect for kind in FINITE for effect in kind.starts(bench.setup)]
-    own = baseline.effects
-    plain = bench.predict(own, None, baseline.predictions, bench.rough)
-    known = baseline.predictions
-    pending = [(effect, bench.predict([*own, effect], None, known, _mesh_for(effect, bench), _TOLERANCE)) for effect in starts]
-    rough, found = [future.result() for future in plain], list[Signature]()
-    found += [(OWN_GRID, list(bench.on_own_grid))] if bench.on_own_grid else []
-    for number, (effect, futures) in enumerate(pending):
+    rough = [future.result() for future in bench.predict(baseline.effects, None, baseline.predictions, bench.rough)]
+    known = [baseline.predictions if _mesh_for(effect, bench) is bench.grid else rough for effect in starts]
+    pending = [
+        bench.predict([*baseline.effects, effect], None, without, _mesh_for(effect, bench), _TOLERANCE)
+        for effect, without in zip(starts, known, strict=True)
+    ]
+    found: list[Signature] = [(OWN_GRID, [one.alone() for one in bench.on_own_grid])] if bench.on_own_grid else []
+    for number, (effect, without, futures) in enumerate(zip(starts, known, pending, strict=True)):
         bench.tell(f"what {effect.name} would do", 0.15 + 0.25 * number / len(pending))
         changed = [future.result() for future in futures]
-        without = baseline.predictions if _mesh_for(effect, bench) is bench.grid else rough
         rows = zip(baseline.predictions, changed, without, strict=True)
-        found.append((effect, [other.upon(here, zero) for here, other, zero in rows]))
+        found.append((effect, [other.upon(here, zero).alone() for here, other, zero in rows]))
     return found
 
 
@@ -124,7 +124,7 @@ def candidates_of(model: Model, bench: Bench, finite: Sequence[Signature]) -> li
         start = StiffInclusion(x=lump.x, y=lump.y, z=lump.z, radius=lump.radius, stiffness_ratio=1.0)
         found.append(Candidate(start=start, of=("stiffness_ratio",), columns=(place,), spread=(2.0,)))
     for place, (effect, predictions) in zip(model.extra.get("signatures", ()), finite, strict=True):
-        if any(np.any(p.columns.shape) and np.isfinite(p.gap).any() for p in predictions):
+        if any(np.isfinite(p.gap).any() for p in predictions):
             found.append(Candidate(start=effect, columns=(place,), spread=(1.0,)))
     found += [] if bench.on_own_grid else [mesh_candidate(model)]
     return [candidate for candidate in found if candidate.start.name not in model.names]
@@ -144,11 +144,9 @@ def _same_effect(model: Model) -> list[list[tuple[int, Tangent]]]:
 def begin(candidate: Candidate, model: Model, bench: Bench) -> Effect:
     """Where to begin the refit: at the size that the linear fit asks for, where the column tells of a size."""
     start = candidate.start
-    if (
-        candidate.widened
-        or start == OWN_GRID
-        or isinstance(start, (TimeOffset, BaseSlip, BaseDetachment, Gravity, ToolFriction, *OUTSIDE))
-    ):
+    if candidate.widened:
+        return _asked_for(candidate, model, bench)
+    if start == OWN_GRID or isinstance(start, (TimeOffset, BaseSlip, BaseDetachment, Gravity, ToolFriction, *OUTSIDE)):
         return start
     columns, precision = candidate.precision(list(model.nuisance), bench.nuisances.precision)
     changes = fit(bench.tempered(model), columns, precision).change[len(model.nuisance) :]
@@ -173,6 +171,15 @@ def _shared(start: StrainStiffening | BaseCompliance | Viscoelasticity | Permane
     if isinstance(start, Viscoelasticity):
         return start.moved([start.relaxed_fraction * share, start.time_constant])
     return start.moved([start.retained_fraction * share])
+
+
+def _asked_for(candidate: Candidate, model: Model, bench: Bench) -> Effect:
+    """What a stated accuracy that is left open pulls to, no farther than a fit's first step."""
+    columns, precision = candidate.precision(list(model.nuisance), bench.nuisances.precision)
+    change = fit(bench.tempered(model), columns, precision).change[[columns.index(column) for column in candidate.widened]]
+    scales = np.array([item.scale for item in candidate.start.numbers()])
+    step = change * min(1.0, TRUST / max(float(np.abs(change / scales).max()), 1e-12))
+    return candidate.start.at((np.array(candidate.start.coordinates) + step).tolist())
 
 
 def _share(change: float) -> float:

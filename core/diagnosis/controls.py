@@ -37,6 +37,8 @@ ALIKE = 0.5
 """Share of the cause's pattern that falsified motions may imitate [1]; beyond it the control says nothing about the cause."""
 KEPT = 0.5
 """Share of its gain that a cause may keep [1]: falsified motions that are `ALIKE` would leave a true one as much."""
+_TOLERANCE = 2e-3
+"""Residual of a falsified replay [1], over the tool's push; its mesh is the rough one."""
 FAINT = 8.0
 """Gains up to this [nats] are as good as none: two standard deviations of a difference of log densities of that size."""
 
@@ -91,7 +93,7 @@ def controls(bench: Bench, data: Sequence[Observations], model: Model, baseline:
     samples = [tuple(model.predictions[n].samples[row] for row in rows) for n, rows in chosen.items()]
     pending = {
         name: [
-            bench.workers.run(_false_patterns, item, setups, bench.grid, points)
+            bench.workers.run(_false_patterns, item, setups, bench.rough, points)
             for item, points in zip(falsify(thin, bench.setup), samples, strict=True)
         ]
         for name, falsify in FALSIFIED.items()
@@ -131,8 +133,9 @@ def _origin(bench: Bench, effects: Sequence[Effect], model: Model, baseline: Mod
 
 def _false_patterns(item: Observations, setups: Sequence[Setup], grid: Meshing, samples: Sequence[Sample]) -> list[FloatArray]:
     """What tells the first setup from each of the others (g, r) along falsified motions, at points that are settled."""
-    whole = predict(item, setups[0], grid, samples=samples)
-    return [_pattern(whole, predict(item, setup, grid, starts=whole.equilibria, samples=samples)) for setup in setups[1:]]
+    whole = predict(item, setups[0], grid, tolerance=_TOLERANCE, samples=samples)
+    others = [predict(item, setup, grid, None, whole.equilibria, _TOLERANCE, samples) for setup in setups[1:]]
+    return [_pattern(whole, other) for other in others]
 
 
 def _pattern(extended: Prediction, origin: Prediction) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from core.diagnosis.evidence import Block
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction
-from core.diagnosis.tangent import Tangent
+from core.diagnosis.tangent import SMALL, Tangent
 from core.effects import Effect
 from core.effects.material import PoissonRatio, YoungModulus
 from core.effects.sensor import CameraRegistration
@@ -18,7 +18,7 @@ from core.frames import FloatArray
 from core.registration import Registration
 from core.setup import Setup
 
-__all__ = ["TWINS", "Model", "Nuisances", "with_effects"]
+__all__ = ["TWINS", "Model", "Nuisances", "nuisance_setups", "with_effects"]
 
 TIP = 1e-4
 RADIUS = 5e-5
@@ -118,6 +118,24 @@ class Model:
     def names(self) -> tuple[str, ...]:
         """The effects' names."""
         return tuple(effect.name for effect in self.effects)
+
+
+def nuisance_setups(setup: Setup, forces: bool) -> list[tuple[Setup, float]]:
+    """Setups with each nuisance a little changed, and the steps: radius, Poisson's ratio, camera, with forces the modulus."""
+    step = SMALL * 3e-4
+    found: list[tuple[Setup, float]] = [(ToolRadius(radius=setup.tool.radius + step).apply(setup), step)]
+    nu = setup.material.poisson_ratio
+    change = -2e-4 if nu > 0.494 else 2e-4
+    found.append((PoissonRatio(nu=nu + change).apply(setup), change))
+    camera = CameraRegistration.neutral(setup)
+    for number, item in enumerate(camera.numbers()):
+        values = [0.0] * 6
+        values[number] = SMALL * item.scale
+        found.append((camera.moved(values).apply(setup), values[number]))
+    if forces:
+        modulus = YoungModulus.neutral(setup)
+        found.append((modulus.at([modulus.coordinates[0] + SMALL]).apply(setup), SMALL))
+    return found
 
 
 def with_effects(setup: Setup, effects: Sequence[Effect]) -> Setup:

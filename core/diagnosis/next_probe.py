@@ -25,7 +25,6 @@ from core.diagnosis.observations import Observations
 from core.diagnosis.pushes import Push, depth_reached, pushes, speed_reached
 from core.diagnosis.search import RIVAL, Findings, Trial
 from core.effects import Effect
-from core.grading import PAGE_GRID
 from core.sight import sight_of
 
 __all__ = ["Advice", "Pair", "next_probe", "pairs_of"]
@@ -111,7 +110,7 @@ def _scene(bench: Bench, findings: Findings) -> Scene:
         stated=survivor(bench, findings.baseline), lumps=lump_places(bench), centres=surface.patch_centres,
         normals=surface.patch_normals, count=np.concatenate(counts).mean(axis=0), variance=patch_variance(predictions),
         eye=sight_of(bench.setup).pose.translation, pivot=bench.registration.robot_pivot,
-        grid=PAGE_GRID.for_tool(bench.setup.tool.radius), temperature=bench.temperature,
+        grid=bench.rough, temperature=bench.temperature,
     )  # fmt: skip
 
 

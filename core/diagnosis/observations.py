@@ -22,7 +22,9 @@ CLEARANCE = 1.5e-3
 """A tool farther than this from the stated block [m] does not touch it, whatever is slightly wrong."""
 TRAVEL = 7e-4
 """Frames whose tool moved less than this [m] are one group."""
-MOST_POINTS = 20000
+MOST_POINTS, MOST_UNTOUCHED = 20000, 6000
+"""Points of a group, and of one with the tool clear of the block: there are many of those, and together they say how the camera
+sees the block at rest."""
 _RECOVERY = (0.5, 1.5, 5.0)
 """Time since the tool was last near the block [s] at which untouched frames part: a material may recover in the meantime."""
 _TURN, _TURN_STEP = 5e-5, 0.02
@@ -169,8 +171,9 @@ def observe(
         picked = run if len(run) <= 12 else [run[i] for i in np.linspace(0, len(run) - 1, 12).round().astype(int)]
         clouds = [sequence.cloud(frame) for frame in picked]
         points = np.concatenate([raw[cleaner.clean(raw, poses[frame]).indices] for frame, raw in zip(picked, clouds, strict=True)])
-        if len(points) > MOST_POINTS:
-            points = points[np.random.default_rng(number).choice(len(points), MOST_POINTS, replace=False)]
+        room = MOST_UNTOUCHED if free[run[0]] else MOST_POINTS
+        if len(points) > room:
+            points = points[np.random.default_rng(number).choice(len(points), room, replace=False)]
         groups.append(Group(tuple(picked), points, bool(free[run[0]]), probe=int(probes[run[0]])))
     return Observations(sequence.name, times, kinematics, tuple(groups), _forces(sequence, setup))
 

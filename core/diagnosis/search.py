@@ -55,6 +55,10 @@ class Trial:
     gain: float
     misfit: float
 
+    def scored(self) -> Trial:
+        """Without the replays, which nobody asks for of a model that was not accepted: they take most of the memory."""
+        return replace(self, model=replace(self.model, predictions=()))
+
 
 @dataclass(eq=False)
 class Findings:
@@ -217,9 +221,10 @@ def _forward(
         hopeless = max([bench.objective(current.model), *(bench.objective(trial.model) - HOPELESS for trial in trials)])
         trials.append(_trial(bench, effects, current.model.predictions, current.model, hopeless))
     trials.sort(key=lambda trial: -trial.gain)
-    findings.trials.extend(trials)
     enough = [trial for trial in trials if trial.gain > _needed(findings, current)]
-    return next((trial for trial in enough if stands(bench, trial.model, current.model)), None)
+    best = next((trial for trial in enough if stands(bench, trial.model, current.model)), None)
+    findings.trials.extend(trial if trial is best else trial.scored() for trial in trials)
+    return best
 
 
 def _needed(findings: Findings, current: Trial) -> float:

@@ -11,7 +11,7 @@ from small_dataset import ply_bytes
 
 from core.cleaning import Cleaner
 from core.dataset import Kinematics, Sequence
-from core.diagnosis.observations import FAR, TRAVEL, Observations, clear_of, observe
+from core.diagnosis.observations import FAR, MOST_UNTOUCHED, TRAVEL, Observations, clear_of, observe
 from core.diagnosis.smoothing import SMOOTHING, smooth_centres
 from core.frames import FloatArray, Transform
 from core.mesh import GridSpec
@@ -113,7 +113,8 @@ def test_thinning_keeps_untouched_groups_and_the_whole_range_of_touched_ones(seq
 def test_points_of_all_frames_of_a_group_are_cleaned_and_joined(sequence):
     for group in _observed(sequence).groups:
         raw = sum(sequence.count(frame) for frame in group.frames)
-        assert 0.5 * raw < len(group.points) <= raw
+        assert min(0.5 * raw, MOST_UNTOUCHED) <= len(group.points) <= raw
+        assert len(group.points) <= MOST_UNTOUCHED or not group.free
         assert clear_of(SIZE, POSE.apply(group.points)).max() < 0.01
 
 
