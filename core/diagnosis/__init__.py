@@ -20,6 +20,7 @@ from core.diagnosis.patterns import draw_patterns, patterns
 from core.diagnosis.recording import record
 from core.diagnosis.search import Findings, search
 from core.diagnosis.static import StaticChannel
+from core.diagnosis.still import Still
 from core.diagnosis.verdict import report_of
 from core.diagnosis.workers import Workers
 from core.errors import DiagnosisError, RunError
@@ -63,9 +64,10 @@ def diagnose(
     report(0.0, "reading every cloud")
     dataset.validate(part(report, 0.0, 0.02))
     registration = register(dataset)
-    setup = setup_from(dataset, registration)
-    data = observe_all(dataset, fitted, setup, registration, FIT_GROUPS, part(report, 0.02, 0.04))
-    unseen = observe_all(dataset, tested, setup, registration, TEST_GROUPS, part(report, 0.04, 0.05))
+    setup, mended = setup_from(dataset, registration), registration.mended
+    seen_from = setup_from(dataset, mended)
+    data = observe_all(dataset, fitted, seen_from, mended, FIT_GROUPS, part(report, 0.02, 0.04))
+    unseen = observe_all(dataset, tested, seen_from, mended, TEST_GROUPS, part(report, 0.04, 0.05))
     out.parent.mkdir(parents=True, exist_ok=True)
     making = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
     try:
@@ -109,7 +111,7 @@ def _run(
 ) -> dict[str, Any]:
     (fitted, unseen), (replays, assurance) = data, wanted
     grid, fine = REPLAY_GRID.for_tool(setup.tool.radius), FINE_GRID.for_tool(setup.tool.radius)
-    static = StaticChannel.of(dataset.rest_cloud(), cleaner_for(dataset, registration), setup, grid)
+    static = Still(StaticChannel.of(dataset.rest_cloud(), cleaner_for(dataset, registration), setup, grid))
     names = [item.name for item in fitted]
     bench = Bench(
         setup, registration, pool, names, static, grid, fine, part(report, 0.05, 0.75), any(item.forces for item in fitted)
@@ -142,7 +144,7 @@ def _record(
 ) -> None:
     """Every sequence under the stated and the extended setup, for the page."""
     stated, found = setups
-    cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration)
+    cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration.mended)
     page = PAGE_GRID.for_tool(stated.tool.radius)
     tasks = [
         pool.run(record, dataset.path, name, stated, found, cleaner, shaft, page, folder / f"{name}.npz")

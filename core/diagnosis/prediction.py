@@ -227,12 +227,12 @@ class _Columns:
             values = -(observe(frame, compared) @ changes[:, :-1].reshape(len(changes), -1).T)
         if len(compared.tool):
             centre, radius = self.of_ball(frame, moves)
-            values -= compared.average(compared.away @ centre.T + radius, compared.patch)
+            values -= compared.scale * compared.average(compared.away @ centre.T + radius, compared.patch)
         here = self._seen[reference]
         for number, (others, step) in enumerate(zip(self._others, self.wanted.steps, strict=True)):
             if not others[reference].same(here):
                 moved = others[reference].place(here.read(compared.points))
-                values[:, TOOL_COLUMNS + number] += compared.along_sight(moved) / step
+                values[:, TOOL_COLUMNS + number] += compared.along_sight(moved, others[reference].scale) / step
         return values
 
 

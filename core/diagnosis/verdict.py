@@ -11,8 +11,10 @@ from core.diagnosis.bench import Bench
 from core.diagnosis.gain import Ladder
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.intervals import INTERVAL_LEVEL, intervals, modulus_interval
+from core.diagnosis.resolution import too_coarse
 from core.diagnosis.search import Findings, Trial
 from core.effects import DIAGNOSED, Effect
+from core.effects.geometry import MeshResolution
 from core.effects.material import YoungModulus
 
 __all__ = ["UNEXPLAINED_MISFIT", "report_of", "verdict_of"]
@@ -130,6 +132,7 @@ def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder |
     causes = _causes(bench, findings, trials)
     named = {cause["effect"] for cause in causes}
     known, unknown = _modulus(bench, findings, named)
+    coarse = "" if bench.on_own_grid else too_coarse(findings.screened.get(MeshResolution.name, 0.0), findings.bound)
     report: dict[str, Any] = {
         "format": 1, "dataset": dataset.name, "verdict": verdict, "causes": causes, "interval_level": INTERVAL_LEVEL,
         "ranking": _ranking(bench, findings, named), "models": [_model(trial) for trial in findings.trials],
@@ -141,7 +144,7 @@ def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder |
             "structure_bound": round(findings.structure.bound / findings.structure.expected, 4), "evaluations": bench.evaluations,
             "fitted_on": list(bench.names),
         },
-        "warnings": [*bench.registration.warnings, *([findings.withdrawn] if findings.withdrawn else [])],
+        "warnings": [*bench.registration.warnings, *(text for text in (findings.withdrawn, coarse) if text)],
     }  # fmt: skip
     if gain is not None:
         value, low, high = gain.removed
