@@ -6,7 +6,20 @@ import sys
 
 from rich.console import Console
 
-from benchmarks import cleaning, convergence, dataset, effects, gradings, measurement, modulus, peers, replay, shapes, sweep
+from benchmarks import (
+    cleaning,
+    convergence,
+    dataset,
+    diagnosis,
+    effects,
+    gradings,
+    measurement,
+    modulus,
+    peers,
+    replay,
+    shapes,
+    sweep,
+)
 
 ALL = {
     "replay": replay.run,
@@ -20,6 +33,7 @@ ALL = {
     "measurement": measurement.run,
     "cleaning": cleaning.run,
     "dataset": dataset.run,
+    "diagnosis": diagnosis.run,
 }
 WIDTH = 140
 """Characters of a line where there is no terminal to ask."""

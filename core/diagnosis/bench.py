@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Future
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +15,7 @@ from core.diagnosis.ordered import ORDERED, TRACED
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted
 from core.diagnosis.static import StaticChannel
 from core.diagnosis.tangent import SMALL, Tangent
-from core.diagnosis.workers import TOLERANCE, Workers
+from core.diagnosis.workers import TOLERANCE, Pending, Workers
 from core.effects import Effect
 from core.frames import FloatArray
 from core.measurement import Surface
@@ -105,7 +104,7 @@ class Bench:
     def predict(
         self, effects: Sequence[Effect], wanted: Wanted | None, starts: Sequence[Prediction] | None,
         grid: Meshing | None = None, tolerance: float = TOLERANCE,
-    ) -> list[Future[Prediction]]:  # fmt: skip
+    ) -> list[Pending]:  # fmt: skip
         """Begin the replays of all sequences with these effects."""
         self.evaluations += 1
         return self.workers.submit(self.names, self._apply(effects), grid or self.grid, wanted, starts, tolerance)

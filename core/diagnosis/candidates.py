@@ -95,7 +95,7 @@ def signatures(bench: Bench, baseline: Model) -> list[Signature]:
         bench.tell(f"what {effect.name} would do", 0.15 + 0.25 * number / len(pending))
         changed = [future.result() for future in futures]
         rows = zip(baseline.predictions, changed, without, strict=True)
-        found.append((effect, [other.upon(here, zero) for here, other, zero in rows]))
+        found.append((effect, [other.upon(here, zero).alone() for here, other, zero in rows]))
     return [*found, *_traced(bench, baseline)]
 
 
@@ -106,7 +106,7 @@ def _traced(bench: Bench, baseline: Model) -> list[Signature]:
     pending = bench.workers.trace(bench.names, bench.setup, bench.grid, baseline.predictions, starts)
     traces = [future.result() for future in pending]
     rows = list(zip(traces, baseline.predictions, strict=True))
-    return [(effect, [own[number].on(plain) for own, plain in rows]) for number, effect in enumerate(starts)]
+    return [(effect, [own[number].on(plain).alone() for own, plain in rows]) for number, effect in enumerate(starts)]
 
 
 def _mesh_for(effect: Effect, bench: Bench) -> Meshing:
@@ -130,7 +130,7 @@ def candidates_of(model: Model, bench: Bench, finite: Sequence[Signature]) -> li
         start = StiffInclusion(x=lump.x, y=lump.y, z=lump.z, radius=lump.radius, stiffness_ratio=1.0)
         found.append(Candidate(start=start, of=("stiffness_ratio",), columns=(place,), spread=(2.0,)))
     for place, (effect, predictions) in zip(model.extra.get("signatures", ()), finite, strict=True):
-        if any(np.any(p.columns.shape) and np.isfinite(p.gap).any() for p in predictions):
+        if any(np.isfinite(p.gap).any() for p in predictions):
             found.append(Candidate(start=effect, columns=(place,), spread=(1.0,)))
     return [candidate for candidate in found if candidate.start.name not in model.names]
 

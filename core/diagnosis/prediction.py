@@ -112,6 +112,10 @@ class Prediction:
             felt = replace(felt, gap=base.felt.gap + felt.gap - origin.felt.gap)
         return replace(self, gap=base.gap + self.gap - origin.gap, felt=felt)
 
+    def alone(self) -> Prediction:
+        """The gaps without what takes most of the memory: for what is only compared."""
+        return replace(self, columns=self.columns[..., :0], equilibria=(), samples=())
+
     def less(self, origin: Prediction) -> tuple[FloatArray, FloatArray | None]:
         """What this model's gaps have over another's, of the surface (g, p) [m] and of the force (g, 3) [N]; zero where unseen."""
         felt = None if self.felt is None or origin.felt is None else np.nan_to_num(self.felt.gap - origin.felt.gap)

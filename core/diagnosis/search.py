@@ -47,11 +47,20 @@ about sqrt(2 d), so 8 nats are two of its standard deviations."""
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A refitted model and its gain over the baseline [nats], with the misfit per value it leaves."""
+    """A refitted model and its gain over the baseline [nats], with the misfit per value it leaves.
+
+    `parts` says where the gain comes from, once all trials are scored at one temperature: each block of data, and last the stated
+    accuracies.
+    """
 
     model: Model
     gain: float
     misfit: float
+    parts: tuple[float, ...] = ()
+
+    def scored(self) -> Trial:
+        """Without the replays, which nobody asks for of a model that was not accepted: they take most of the memory."""
+        return replace(self, model=replace(self.model, predictions=()))
 
 
 @dataclass(eq=False)
@@ -208,9 +217,10 @@ def _forward(
         hopeless = max([bench.objective(current.model), *(bench.objective(trial.model) - HOPELESS for trial in trials)])
         trials.append(_trial(bench, effects, current.model.predictions, current.model, hopeless))
     trials.sort(key=lambda trial: -trial.gain)
-    findings.trials.extend(trials)
     enough = [trial for trial in trials if trial.gain > _needed(findings, current)]
-    return next((trial for trial in enough if stands(bench, trial.model, current.model)), None)
+    best = next((trial for trial in enough if stands(bench, trial.model, current.model)), None)
+    findings.trials.extend(trial if trial is best else trial.scored() for trial in trials)
+    return best
 
 
 def _needed(findings: Findings, current: Trial) -> float:
@@ -241,7 +251,8 @@ def _rescore(bench: Bench, findings: Findings) -> None:
     reference = bench.score(findings.baseline)
     rescored = []
     for trial in findings.trials:
-        rescored.append(replace(trial, gain=predictive_gain(bench.score(trial.model), reference)[0]))
+        parts = bench.score(trial.model) - reference
+        rescored.append(replace(trial, gain=float(parts.sum()), parts=tuple(parts.tolist())))
     best = findings.best
     findings.trials = sorted(rescored, key=lambda trial: -trial.gain)
     if best is not None:

@@ -6,6 +6,7 @@ import multiprocessing
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import ParamSpec, Self, TypeVar
 
@@ -19,7 +20,7 @@ from core.processes import bound_to_parent
 from core.replay import Equilibrium
 from core.setup import Setup
 
-__all__ = ["TOLERANCE", "Workers"]
+__all__ = ["TOLERANCE", "Pending", "Workers"]
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 TOLERANCE = 3e-4
@@ -44,7 +45,21 @@ def _task(
     samples: Sequence[Sample] | None,
     tolerance: float,
 ) -> Prediction:
-    return predict(_DATA[name], setup, grid, wanted, starts, tolerance, samples)
+    found = predict(_DATA[name], setup, grid, wanted, starts, tolerance, samples)
+    return found if samples is None else replace(found, samples=())
+
+
+@dataclass(frozen=True, eq=False)
+class Pending:
+    """A prediction under way. Points that were chosen before are not sent back: they are most of what there is to send."""
+
+    future: Future[Prediction]
+    samples: tuple[Sample, ...] | None
+
+    def result(self) -> Prediction:
+        """Wait for it."""
+        found = self.future.result()
+        return found if self.samples is None else replace(found, samples=self.samples)
 
 
 def _trace(
@@ -85,7 +100,7 @@ class Workers:
         starts: Sequence[Prediction] | None = None,
         tolerance: float = TOLERANCE,
         same_points: bool = True,
-    ) -> list[Future[Prediction]]:
+    ) -> list[Pending]:
         """Begin predicting these sequences under a setup.
 
         Args:
@@ -95,7 +110,8 @@ class Workers:
         for number, name in enumerate(names):
             begin = None if starts is None else starts[number].equilibria
             points = None if starts is None or not same_points else starts[number].samples
-            pending.append(self._pool.submit(_task, name, setup, grid, wanted, begin, points, tolerance))
+            future = self._pool.submit(_task, name, setup, grid, wanted, begin, points, tolerance)
+            pending.append(Pending(future, points))
         return pending
 
     def trace(

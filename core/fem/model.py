@@ -87,7 +87,7 @@ class Topology:
         self.factor = factor_of(pattern)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=5)
 def topology(connectivity: Connectivity, held: bool) -> Topology:
     """The shared part of all meshes with this connectivity; `held` leaves the base nodes out of the unknowns."""
     return Topology(connectivity, held)
@@ -108,14 +108,14 @@ def _sprung(support: Support) -> bool:
     return bool(support.detached) or support.stiffness_over_E is not None
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=12)
 def rule_of(mesh: Mesh) -> Quadrature:
     """Quadrature of the elements: the mesh's alone."""
     shared = mesh.connectivity
     return quadrature(shared.element, mesh.nodes[shared.elements])
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=12)
 def surface_spots(mesh: Mesh, face: Face) -> SurfaceSpots:
     """The free surface's points in this quadrature of the elements' sides."""
     corners = mesh.nodes[mesh.connectivity.surface]
