@@ -165,7 +165,7 @@ def _trial(
 def search(bench: Bench, seed: int) -> Findings:
     """Find up to MOST_CAUSES causes."""
     bench.tell("replaying the stated setup on two meshes", 0.02)
-    baseline = bench.baseline(tangents(bench.setup), lump_places(bench))
+    baseline = bench.baseline(tangents(bench.setup, weighed=bench.weighed), lump_places(bench))
     findings = Findings(baseline, misfit=bench.misfit(baseline))
     findings.structure = findings.left = structure_of(bench, baseline, seed)
     finite = signatures(bench, baseline)
@@ -199,7 +199,7 @@ def search(bench: Bench, seed: int) -> Findings:
 
 def _again(bench: Bench, model: Model, finite: Sequence[Signature], baseline: Model) -> tuple[Model, list[Candidate], np.ndarray]:
     """Screen the catalogue on top of a model that has causes already."""
-    wanted = tangents(model.setup, besides=model.names)
+    wanted = tangents(model.setup, model.names, bench.weighed)
     extended = bench.evaluate(model.effects, model.predictions, wanted, lump_places(bench))
     return _screen(bench, extended, finite, baseline)
 
