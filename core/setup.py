@@ -36,10 +36,10 @@ __all__ = [
 
 Edge = Literal["-x", "+x", "-y", "+y"]
 PAIRINGS = (
-    "as-paired", "swap-1-2", "swap-1-3", "swap-1-4", "swap-2-3", "swap-2-4", "swap-3-4", "turn-1", "turn-2", "turn-3",
+    "as-paired", "swap-1-2", "swap-1-3", "swap-1-4", "swap-2-3", "swap-2-4", "swap-3-4", "turn-1", "turn-2", "turn-3", "reversed",
 )  # fmt: skip
 """How touches can really be paired with landmarks: as stated, two rows of touches.csv for each other, or each with the landmark of
-the row so many further on, after the last with the first."""
+the row so many further on, after the last with the first, or all in the reverse order."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,6 +147,8 @@ class Touching:
         order, (kind, *words) = list(range(count)), self.pairing.split("-")
         if kind == "as":
             return order
+        if kind == "reversed":
+            return order[::-1]
         rows = [int(word) for word in words]
         if max(rows) > count - (kind == "turn"):
             raise SetupError(f"pairing {self.pairing!r} needs more than {count} touches", key="pairing", value=self.pairing)

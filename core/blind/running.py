@@ -141,8 +141,6 @@ def _truth(made: Any, size: Sequence[float]) -> tuple[list[dict[str, Any]], list
     for entry in described["effects"]:
         if entry["effect"] == "camera_registration":
             pose = camera_pose(made.camera_shift, size)
-            far = sum(pose[name] ** 2 for name in ("tx", "ty", "tz")) ** 0.5
-            entry["parameters"]["translation"]["value"] = far
             entry["parameters"] |= {
                 name: {"value": value, "unit": "m" if name[0] == "t" else "rad"} for name, value in pose.items()
             }

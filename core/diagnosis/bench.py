@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -13,10 +14,13 @@ from core.diagnosis.led import led
 from core.diagnosis.noise import Noise, noises
 from core.diagnosis.ordered import ORDERED, TRACED
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted
-from core.diagnosis.static import StaticChannel
-from core.diagnosis.tangent import SMALL, Tangent
+from core.diagnosis.resolution import OWN_GRID, under_stated, with_columns
+from core.diagnosis.still import Still
+from core.diagnosis.tangent import SMALL, Tangent, changed_at_rest
+from core.diagnosis.weighed import weighed
 from core.diagnosis.workers import TOLERANCE, Pending, Workers
 from core.effects import Effect
+from core.effects.geometry import MeshResolution
 from core.frames import FloatArray
 from core.measurement import Surface
 from core.meshing import Meshing
@@ -41,7 +45,12 @@ first order a tool's shift by millimetres promises a small part of what it does.
 
 
 class Bench:
-    """Evaluates hypotheses about one dataset: stated setup, workers, noise and priors in one place."""
+    """Evaluates hypotheses about one dataset: stated setup, workers, noise and priors in one place.
+
+    Attributes:
+        weighed: effects that this data can tell. seen: whether any sequence has clouds. pushed: places and outward normals (k, 3)
+            of the pushes without clouds, under which a lump is looked for.
+    """
 
     def __init__(
         self,
@@ -49,22 +58,31 @@ class Bench:
         registration: Registration,
         workers: Workers,
         names: Sequence[str],
-        static: StaticChannel | None,
+        static: Still | None,
         grid: Meshing,
         fine: Meshing,
         report: Report = silent,
         forces: bool = False,
+        seen: bool = True,
     ) -> None:
         self.setup, self.registration, self.workers, self.static = setup, registration, workers, static
         self.names, self._report, self._done = tuple(names), report, 0.0
         self.grid, self.fine, self.rough = grid, fine, grid
-        self.nuisances = Nuisances.of(registration, forces)
+        self.nuisances = Nuisances.of(registration.mended, forces)
         self._first = TOOL_COLUMNS + 8 + forces
-        self.surface = Surface(setup.box)
+        self.weighed: tuple[type[Effect], ...] = weighed(setup, seen=seen, forces=forces)
+        self.seen = seen
+        self.pushed = (np.empty((0, 3)), np.empty((0, 3)))
         self.temperature = 1.0
         self.noises: list[Noise] = []
+        self.on_own_grid: tuple[Prediction, ...] = ()
         self.evaluations = 0
         self.known: list[Model] = []
+
+    @cached_property
+    def surface(self) -> Surface:
+        """What the camera sees; SetupError for what is no block."""
+        return Surface(self.setup.box)
 
     def tell(self, text: str, done: float = 0.0) -> None:
         """Report what is being done; the share that is done [1] never falls."""
@@ -75,10 +93,8 @@ class Bench:
 
     def _moved(self, effects: Sequence[Effect], index: int, number: int) -> tuple[Setup, float]:
         """The setup with one search coordinate a little larger, and the step."""
-        effect = effects[index]
-        item = effect.numbers()[number]
-        coordinates = effect.coordinates
-        step = SMALL * item.scale
+        effect, item = effects[index], effects[index].numbers()[number]
+        coordinates, step = effect.coordinates, SMALL * item.scale
         if item.coordinate(item.high) - coordinates[number] < step:
             step = -step
         coordinates[number] += step
@@ -94,7 +110,8 @@ class Bench:
         pairs = nuisance_setups(setup, self.nuisances.forces)
         for index, effect in enumerate(effects):
             for number in range(len(effect.numbers())):
-                pairs.append((setup, 1.0) if isinstance(effect, ORDERED) else self._moved(effects, index, number))
+                alone = isinstance(effect, (*ORDERED, MeshResolution))
+                pairs.append((setup, 1.0) if alone else self._moved(effects, index, number))
         pairs += [tangent.changed(setup) for tangent in tangents]
         return Wanted(
             setups=tuple(s for s, _ in pairs), steps=tuple(h for _, h in pairs), lumps=tuple(lumps),
@@ -155,29 +172,35 @@ class Bench:
         if not self.noises:
             return Model(effects, setup, tuple(predictions), (), columns, extra, nuisance, tuple(tangents))
         blocks = [noise.block(item) for noise, item in zip(self.noises, predictions, strict=True)]
-        if self.static:
-            blocks.append(self.static.block(self.setup, setup, self.grid, count + 1, self._own_static(effects, columns)))
-        return Model(effects, setup, tuple(predictions), tuple(blocks), columns, extra, nuisance, tuple(tangents))
+        model = Model(effects, setup, tuple(predictions), (), columns, extra, nuisance, tuple(tangents))
+        return replace(model, blocks=(*blocks, *self._still(model, count, {})))
 
-    def _own_static(self, effects: tuple[Effect, ...], columns: tuple[int, ...]) -> dict[int, tuple[Setup, float]]:
-        """Columns of the effects that change the rest shape, with the setup a little changed and the step."""
-        varied, at = {}, 0
-        for index, effect in enumerate(effects):
+    def _still(self, model: Model, count: int, varied: dict[int, tuple[Setup, float]]) -> list[Block]:
+        """What was measured without a push, of `count` columns and the mesh's error: the model's own, and those `varied`."""
+        if not self.static:
+            return []
+        found, at = {**varied, **changed_at_rest(model.tangents, model.extra["tangents"], model.setup)}, 0
+        for index, effect in enumerate(model.effects):
             for number in range(len(effect.numbers())):
                 if effect.at_rest():
-                    varied[columns[at]] = self._moved(effects, index, number)
+                    found[model.columns[at]] = self._moved(model.effects, index, number)
                 at += 1
-        return varied
+        return [self.static.block(self.setup, model.setup, self.grid, count + 1, found)]
 
     # -- baseline and noise -----------------------------------------------------------------------------------------------------
 
-    def baseline(self, tangents: Sequence[Tangent], lumps: Sequence[Inclusion]) -> Model:
-        """The stated setup on two meshes; from here on the noise is known."""
-        model = self.evaluate((), tangents=tangents, lumps=lumps)
-        fine = [f.result() for f in self.predict((), None, model.predictions, self.fine)]
+    def baseline(self, tangents: Sequence[Tangent], lumps: Sequence[Inclusion], effects: Sequence[Effect] = ()) -> Model:
+        """The stated setup with these effects on two meshes; from here on the noise is known."""
+        model = self.evaluate(effects, tangents=tangents, lumps=lumps)
+        own, known = model.predictions, list(effects)
+        if model.setup.element_size is not None:
+            known.append(OWN_GRID)
+            own = self.on_own_grid = with_columns([f.result() for f in self.predict(known, None, own)], own)
+        fine = [f.result() for f in self.predict(known, None, own, self.fine)]
         places = model.extra["lumps"]
-        self.noises = noises(model.predictions, fine, self.surface, slice(places[0], places[-1] + 1))
-        model = self.assemble((), self.setup, model.predictions, tangents, len(lumps))
+        surface = self.surface if self.seen else None
+        self.noises = under_stated(noises(own, fine, surface, slice(places[0], places[-1] + 1)), model.predictions)
+        model = self.assemble(tuple(effects), model.setup, model.predictions, tangents, len(lumps))
         self.temperature = self.misfit(model)
         return model
 
@@ -195,14 +218,9 @@ class Bench:
                 here = here.beside(surface[..., None], None if force is None else force[..., None])
             blocks.append(noise.block(here))
         places = tuple(range(count, count + len(signatures)))
-        if self.static:
-            varied = {
-                place: (effect.apply(model.setup), 1.0)
-                for place, (effect, _) in zip(places, signatures, strict=True)
-                if effect.at_rest()
-            }
-            varied |= self._own_static(model.effects, model.columns)
-            blocks.append(self.static.block(self.setup, model.setup, self.grid, count + len(signatures) + 1, varied))
+        own = zip(places, (effect for effect, _ in signatures), strict=True)
+        varied = {place: (effect.apply(model.setup), 1.0) for place, effect in own if effect.at_rest()}
+        blocks += self._still(model, count + len(signatures), varied)
         nuisance = (*model.nuisance[:-1], count + len(signatures))
         return replace(model, blocks=tuple(blocks), nuisance=nuisance, extra={**model.extra, "signatures": places})
 

@@ -9,20 +9,23 @@ from dataclasses import replace
 import numpy as np
 
 from core.diagnosis.bench import PRIOR_STEPS, TRUST, Bench
+from core.diagnosis.beneath import lumps_under
 from core.diagnosis.evidence import fit
 from core.diagnosis.hypothesis import TWINS, Model
 from core.diagnosis.ordered import TRACED
 from core.diagnosis.prediction import Prediction
+from core.diagnosis.resolution import OWN_GRID, mesh_candidate
 from core.diagnosis.screening import Candidate
 from core.diagnosis.tangent import Tangent
 from core.effects import OUTSIDE, Effect
+from core.effects.geometry import GeometryScale, MeshResolution
 from core.effects.load import Gravity
-from core.effects.material import StiffInclusion, YoungModulus
+from core.effects.material import StiffInclusion
 from core.effects.memory import PermanentSet, Viscoelasticity
-from core.effects.sensor import TimeOffset
+from core.effects.sensor import DepthBias, TimeOffset
 from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
 from core.effects.support import BaseCompliance, BaseDetachment, BaseSlip
-from core.effects.tool import ToolCompliance, ToolFriction
+from core.effects.tool import LandmarkMismatch, ToolCompliance, ToolFriction
 from core.meshing import Meshing
 from core.setup import Inclusion, Setup
 
@@ -38,6 +41,8 @@ FINITE: tuple[type[Effect], ...] = (
 the registration, too."""
 _LIMITED = 6.0
 """J_m [1] whose whole action, to first order, is the column of a material that stiffens."""
+_TOGETHER: tuple[type[Effect], ...] = (DepthBias, GeometryScale, LandmarkMismatch)
+"""Effects whose numbers are one candidate: what each does alone is as good as any."""
 _TOLERANCE = 1e-2
 """Residual of a replay that screens [1], over the tool's push: its pattern has a correlation of 0.999 with that at 3e-4."""
 _LEAST_SHARE, _MOST_SHARE = 0.2, 4.0
@@ -47,15 +52,17 @@ _FARTHEST = 1.8
 
 
 def lump_places(bench: Bench) -> tuple[Inclusion, ...]:
-    """Places of the coarse grid of inclusions."""
+    """Places of the coarse grid of inclusions; without clouds those under the pushes."""
+    if not bench.seen:
+        return lumps_under(*bench.pushed, bench.setup.geometry)
     return tuple(
         Inclusion(x=s.x, y=s.y, z=s.z, radius=s.radius, stiffness_ratio=s.stiffness_ratio)
         for s in StiffInclusion.starts(bench.setup)
     )
 
 
-def tangents(setup: Setup, besides: Sequence[str] = ()) -> tuple[Tangent, ...]:
-    """Effects whose action grows in proportion to a number near nothing, in this setup and not `besides`.
+def tangents(setup: Setup, besides: Sequence[str] = (), weighed: Sequence[type[Effect]] = ()) -> tuple[Tangent, ...]:
+    """Effects whose action grows in proportion to a number near nothing, in this setup and not `besides`; those that are `weighed`.
 
     Against replays at a finite size (a skin of 0.3 and 4 times, gradients of 0.7 and -1.2, J_m of 1 and 3, fibres of 3) the columns
     have correlations of 0.98, 0.999, 0.99 and 0.95 over the whitened data of a whole dataset, for a thirtieth of the time.
@@ -68,8 +75,10 @@ def tangents(setup: Setup, besides: Sequence[str] = ()) -> tuple[Tangent, ...]:
         Tangent(effect=StrainStiffening(J_m=_LIMITED), spread=1.0),
         *(_step(replace(start, stiffness_ratio=1.0), *ratio) for start in Anisotropy.starts(setup)),
         _step(ToolCompliance.neutral(setup), "compliance_times_stiffness"),
+        *(_step(kind.neutral(setup), item.name) for kind in _TOGETHER for item in kind.numbers()),
     ]
-    return tuple(tangent for tangent in found if tangent.effect.name not in besides)
+    kinds = tuple(weighed)
+    return tuple(item for item in found if item.effect.name not in besides and (not kinds or isinstance(item.effect, kinds)))
 
 
 def _step(effect: Effect, name: str, spread: float | None = None) -> Tangent:
@@ -83,14 +92,14 @@ def signatures(bench: Bench, baseline: Model) -> list[Signature]:
     Sag alone is replayed on the mesh of the diagnosis: on the rough one its pattern has a correlation of 0.89 with what it should
     be, the others' 0.99.
     """
-    starts = [effect for kind in FINITE for effect in kind.starts(bench.setup)]
-    rough = [future.result() for future in bench.predict([], None, baseline.predictions, bench.rough)]
+    starts = [effect for kind in FINITE if kind in bench.weighed for effect in kind.starts(bench.setup)]
+    rough = [future.result() for future in bench.predict(baseline.effects, None, baseline.predictions, bench.rough)]
     known = [baseline.predictions if _mesh_for(effect, bench) is bench.grid else rough for effect in starts]
     pending = [
-        bench.predict([effect], None, without, _mesh_for(effect, bench), _TOLERANCE)
+        bench.predict([*baseline.effects, effect], None, without, _mesh_for(effect, bench), _TOLERANCE)
         for effect, without in zip(starts, known, strict=True)
     ]
-    found: list[Signature] = []
+    found: list[Signature] = [(OWN_GRID, [one.alone() for one in bench.on_own_grid])] if bench.on_own_grid else []
     for number, (effect, without, futures) in enumerate(zip(starts, known, pending, strict=True)):
         bench.tell(f"what {effect.name} would do", 0.15 + 0.25 * number / len(pending))
         changed = [future.result() for future in futures]
@@ -101,7 +110,11 @@ def signatures(bench: Bench, baseline: Model) -> list[Signature]:
 
 def _traced(bench: Bench, baseline: Model) -> list[Signature]:
     """What hangs on the past would do, to first order, for the cost of a few solves a group (see `core.diagnosis.traces`)."""
-    starts = [effect for kind in TRACED for effect in kind.starts(bench.setup)]
+    if any(item.unseen for item in baseline.predictions):
+        return []  # short pushes that are felt alone leave nothing behind to be seen
+    starts = [effect for kind in TRACED if kind in bench.weighed for effect in kind.starts(bench.setup)]
+    if not starts:
+        return []
     bench.tell("what the material or the tool would remember", 0.4)
     pending = bench.workers.trace(bench.names, bench.setup, bench.grid, baseline.predictions, starts)
     traces = [future.result() for future in pending]
@@ -117,44 +130,66 @@ def candidates_of(model: Model, bench: Bench, finite: Sequence[Signature]) -> li
     """Every effect of the catalogue that is not in the model yet, as columns of it."""
     setup, found = model.setup, []
     for kind, columns in TWINS.items():
-        if kind is YoungModulus and not bench.nuisances.forces:
+        if kind not in bench.weighed:
             continue
         effect = kind.neutral(setup)
         spreads = [PRIOR_STEPS * item.scale for item in effect.numbers()]
         names = tuple(item.name for item in effect.numbers())
         found.append(Candidate(start=effect, of=names, widened=dict(zip(columns, spreads, strict=True))))
-    for place, tangent in zip(model.extra["tangents"], model.tangents, strict=True):
-        of = (tangent.of,) if tangent.of else ()
-        found.append(Candidate(start=tangent.effect, of=of, columns=(place,), spread=(tangent.spread,)))
+    for rows in _same_effect(model):
+        of, places = tuple(tangent.of for _, tangent in rows if tangent.of), tuple(place for place, _ in rows)
+        found.append(Candidate(start=rows[0][1].effect, of=of, columns=places, spread=tuple(one.spread for _, one in rows)))
     for place, lump in zip(model.extra["lumps"], lump_places(bench), strict=True):
         start = StiffInclusion(x=lump.x, y=lump.y, z=lump.z, radius=lump.radius, stiffness_ratio=1.0)
         found.append(Candidate(start=start, of=("stiffness_ratio",), columns=(place,), spread=(2.0,)))
     for place, (effect, predictions) in zip(model.extra.get("signatures", ()), finite, strict=True):
-        if any(np.isfinite(p.gap).any() for p in predictions):
+        if any(np.isfinite(p.gap).any() or (p.felt is not None and np.isfinite(p.felt.gap).any()) for p in predictions):
             found.append(Candidate(start=effect, columns=(place,), spread=(1.0,)))
+    found += [mesh_candidate(model)] if MeshResolution in bench.weighed and not bench.on_own_grid else []
     return [candidate for candidate in found if candidate.start.name not in model.names]
+
+
+def _same_effect(model: Model) -> list[list[tuple[int, Tangent]]]:
+    """The model's tangents with their columns; those of one effect that are weighed together in one list."""
+    found: list[list[tuple[int, Tangent]]] = []
+    for place, tangent in zip(model.extra["tangents"], model.tangents, strict=True):
+        if isinstance(tangent.effect, _TOGETHER) and found and found[-1][0][1].effect == tangent.effect:
+            found[-1].append((place, tangent))
+        else:
+            found.append([(place, tangent)])
+    return found
 
 
 def begin(candidate: Candidate, model: Model, bench: Bench) -> Effect:
     """Where to begin the refit: at the size that the linear fit asks for, where the column tells of a size."""
     start = candidate.start
-    if candidate.widened or isinstance(start, (TimeOffset, BaseSlip, BaseDetachment, Gravity, ToolFriction, *OUTSIDE)):
-        return _asked_for(candidate, model, bench) if candidate.widened else start
+    if candidate.widened:
+        return _asked_for(candidate, model, bench)
+    if start == OWN_GRID or isinstance(start, (TimeOffset, BaseSlip, BaseDetachment, Gravity, ToolFriction, *OUTSIDE)):
+        return start
     columns, precision = candidate.precision(list(model.nuisance), bench.nuisances.precision)
-    change = float(fit(bench.tempered(model), columns, precision).change[-1])
-    if isinstance(start, StrainStiffening):
-        return start.moved([start.J_m / _share(change)])
-    if isinstance(start, BaseCompliance):
-        return start.moved([start.stiffness_over_E / _share(change)])
-    if isinstance(start, Viscoelasticity):
-        return start.moved([start.relaxed_fraction * _share(change), start.time_constant])
-    if isinstance(start, PermanentSet):
-        return start.moved([start.retained_fraction * _share(change)])
+    changes = fit(bench.tempered(model), columns, precision).change[len(model.nuisance) :]
+    if isinstance(start, _TOGETHER):
+        return start.at([here + float(change) for here, change in zip(start.coordinates, changes, strict=True)])
+    change = float(changes[-1])
+    if isinstance(start, (StrainStiffening, BaseCompliance, Viscoelasticity, PermanentSet)):
+        return _shared(start, _share(change))
     if isinstance(start, StiffInclusion):
         change *= 1.5
     if isinstance(start, Anisotropy) and change < 0:  # softer along is stiffer across
         start, change = replace(start, direction=(start.direction + math.pi / 2) % math.pi), -change
     return _moved(start, candidate.of[0], change)
+
+
+def _shared(start: StrainStiffening | BaseCompliance | Viscoelasticity | PermanentSet, share: float) -> Effect:
+    """The effect doing this share [1] of what it does."""
+    if isinstance(start, StrainStiffening):
+        return start.moved([start.J_m / share])
+    if isinstance(start, BaseCompliance):
+        return start.moved([start.stiffness_over_E / share])
+    if isinstance(start, Viscoelasticity):
+        return start.moved([start.relaxed_fraction * share, start.time_constant])
+    return start.moved([start.retained_fraction * share])
 
 
 def _asked_for(candidate: Candidate, model: Model, bench: Bench) -> Effect:

@@ -58,9 +58,13 @@ class Sample:
 class Compared:
     """A group's sample under one model.
 
+    Gaps are lengths as the camera reads them: a model that says it reads them too long would otherwise shrink the noise with the
+    cloud, and gain by it whatever is true.
+
     Attributes:
         points: (m, 3) phantom frame [m]. seen: those that lie on the surface. means: of the gaps, by patch.
         tool: (t,) those that lie on the tool instead. away: (t, 3) unit vectors from its centre. patch: (t,) where they count.
+        scale: how much longer than it is the camera reads a length along its ray [1], which normals have in them, and not `away`.
     """
 
     points: FloatArray
@@ -69,6 +73,7 @@ class Compared:
     tool: IntArray
     away: FloatArray
     patch: IntArray
+    scale: float = 1.0
 
     def average(self, values: FloatArray, patch: IntArray) -> FloatArray:
         """Sums over the points of each patch (p, k) of (n, k) values, over all the patch's points."""
@@ -76,13 +81,17 @@ class Compared:
         np.add.at(total, patch, values)
         return np.asarray(total / np.maximum(self.means.count, 1)[:, None])
 
-    def along_sight(self, moved: FloatArray) -> FloatArray:
-        """Change of the averages (p,) [m] when the camera's points lie at (m, 3) [m] instead."""
+    def along_sight(self, moved: FloatArray, scale: float = 1.0) -> FloatArray:
+        """Change of the averages (p,) [m] when the camera's points lie at (m, 3) [m] instead, and it reads lengths `scale` [1].
+
+        What is noise in the points' motion cancels against what the scale does to the gaps.
+        """
         shift = moved - self.points
         surface = np.einsum("mi,mi->m", shift[self.seen.index], self.seen.normal)
-        ball = np.einsum("ti,ti->t", shift[self.tool], self.away)
+        ball = self.scale * np.einsum("ti,ti->t", shift[self.tool], self.away)
         values, patch = np.concatenate([surface, ball]), np.concatenate([self.seen.patch, self.patch])
-        return self.average(values[:, None], patch)[:, 0]
+        longer = scale / self.scale
+        return np.asarray(longer * self.average(values[:, None], patch)[:, 0] + (longer - 1.0) * np.nan_to_num(self.means.mean))
 
 
 def observe(frame: Equilibrium, compared: Compared) -> sp.csr_matrix:
@@ -98,26 +107,21 @@ def observe(frame: Equilibrium, compared: Compared) -> sp.csr_matrix:
 
 def choose(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) -> Sample:
     """The points to average, by the model at hand: those on clear parts of the surface, without stray ones."""
-    points, camera = _placed(group, setup)
-    seen = gaps(points, camera, frame, surface)
+    sight = sight_of(setup, reference=group.reference)
+    seen = gaps(sight.place(group.points), sight.pose.translation, frame, surface)
     kept = within_spread(seen.gap, seen.patch, surface.patches)
     kept[kept] = among_neighbours(seen.gap[kept], seen.patch[kept], surface)
     index, patch = seen.index[kept].astype(np.int32), seen.patch[kept].astype(np.int32)
     return Sample(
-        index, patch, seen.gap[kept].astype(np.float32), seen.facing[kept].astype(np.float32),
+        index, patch, (sight.scale * seen.gap[kept]).astype(np.float32), seen.facing[kept].astype(np.float32),
         surface.on_stated(seen.foot[kept]).astype(np.float32), seen.side[kept].astype(np.int8),
     )  # fmt: skip
 
 
-def _placed(group: Group, setup: Setup) -> tuple[FloatArray, FloatArray]:
-    """The group's points in the phantom frame, and the camera's place (3,) there [m]."""
-    sight = sight_of(setup, reference=group.reference)
-    return sight.place(group.points), sight.pose.translation
-
-
-def _along_rays(seen: Gaps, sample: Sample) -> Gaps:
-    """Gaps, and the normals that say how they change, as long as the baseline's surface would have made them of these rays."""
-    factor = np.minimum(sample.facing[seen.index] / np.maximum(seen.facing, 1e-6), _MOST_STRETCH)
+def _along_rays(seen: Gaps, sample: Sample, scale: float) -> Gaps:
+    """Gaps, and the normals that say how they change, as long as the baseline's surface would have made them of these rays, and as
+    a camera reads them whose lengths are `scale` times what they are [1]."""
+    factor = scale * np.minimum(sample.facing[seen.index] / np.maximum(seen.facing, 1e-6), _MOST_STRETCH)
     return replace(seen, gap=seen.gap * factor, normal=seen.normal * factor[:, None])
 
 
@@ -149,15 +153,15 @@ def _met_or_beside(points: FloatArray, camera: FloatArray, frame: Equilibrium, s
 
 def compare(group: Group, setup: Setup, frame: Equilibrium, surface: Surface, sample: Sample) -> Compared:
     """The sample's points, where they meet the surface, and their averages; points of the model's tool lie off the tool."""
-    points, camera = _placed(group, setup)
-    points = points[sample.index]
-    seen = _along_rays(_met_or_beside(points, camera, frame, surface, sample), sample)
+    sight = sight_of(setup, reference=group.reference)
+    points = sight.place(group.points[sample.index])
+    seen = _along_rays(_met_or_beside(points, sight.pose.translation, frame, surface, sample), sample, sight.scale)
     values = sample.gap.astype(float)
     near = np.abs(seen.gap - values[seen.index]) < FARTHEST_CHANGE
     values[seen.index[near]] = seen.gap[near]
     arm = points - frame.probe.centre
     distance = np.linalg.norm(arm, axis=1)
-    off_tool = distance - frame.probe.radius
+    off_tool = sight.scale * (distance - frame.probe.radius)
     on_tool = (np.abs(off_tool) < TOOL_REACH) & (np.abs(off_tool) < np.abs(values) - CLEARLY)
     values[on_tool] = off_tool[on_tool]
     kept, tool = ~on_tool[seen.index], np.flatnonzero(on_tool)
@@ -166,4 +170,4 @@ def compare(group: Group, setup: Setup, frame: Equilibrium, surface: Surface, sa
         index, seen.gap[kept], seen.foot[kept], seen.normal[kept], seen.facing[kept], sample.patch[index], seen.side[kept]
     )  # fmt: skip
     means = plain_means(values, sample.patch, surface.patches)
-    return Compared(points, seen, means, tool, arm[tool] / distance[tool, None], sample.patch[tool])
+    return Compared(points, seen, means, tool, arm[tool] / distance[tool, None], sample.patch[tool], sight.scale)

@@ -14,8 +14,9 @@ from core.diagnosis.hypothesis import TWINS, Model
 from core.effects.material import YoungModulus
 from core.effects.sensor import CameraRegistration
 from core.frames import FloatArray
+from core.setup import Setup
 
-__all__ = ["INTERVAL_LEVEL", "intervals", "modulus_interval", "stands"]
+__all__ = ["INTERVAL_LEVEL", "intervals", "modulus_interval", "spread_of", "stands"]
 
 INTERVAL_LEVEL = 0.95
 """Share of the intervals that are to hold the truth [1]."""
@@ -45,7 +46,7 @@ def _robust(blocks: Sequence[Block], columns: Sequence[int], precision: FloatArr
     return change, np.maximum(laplace, deviation * t.ppf(0.975, len(sequences) - 1) / _NORMAL_95)
 
 
-def _spread(bench: Bench, model: Model) -> FloatArray:
+def spread_of(bench: Bench, model: Model) -> FloatArray:
     """Half widths of the 95 % intervals over 1.96, one for each search coordinate, with what the replay's own error leaves."""
     own = slice(len(model.nuisance), None)
     robust = _robust(bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model), own)[1]
@@ -70,7 +71,7 @@ def stands(bench: Bench, model: Model, without: Model) -> bool:
 
 def intervals(bench: Bench, model: Model) -> list[dict[str, dict[str, Any]]]:
     """For each effect: name to value, unit and 95 % interval (magnitudes by sampling)."""
-    spread = _spread(bench, model)
+    spread = spread_of(bench, model)
     found, at = [], 0
     for effect in model.effects:
         number = len(effect.numbers())
@@ -78,10 +79,10 @@ def intervals(bench: Bench, model: Model) -> list[dict[str, dict[str, Any]]]:
         for item, value, sd in zip(effect.numbers(), effect.coordinates, spread[at : at + number], strict=True):
             low, high = item.value(value - _NORMAL_95 * sd), item.value(value + _NORMAL_95 * sd)
             entry[item.name] = {"value": item.value(value), "unit": item.unit, "low": low, "high": high}
-        for name, (reported, unit) in effect.reported().items():
+        for name, (reported, unit) in effect.reported(bench.setup).items():
             entry.setdefault(name, {"value": reported, "unit": unit})
         if isinstance(effect, CameraRegistration):
-            entry |= _magnitudes(effect, spread[at : at + number])
+            entry |= _magnitudes(effect, spread[at : at + number], bench.setup)
         found.append(entry)
         at += number
     return found
@@ -106,12 +107,12 @@ def modulus_interval(bench: Bench, model: Model) -> tuple[float, float, float] |
     return float(value), float(low), float(high)
 
 
-def _magnitudes(effect: CameraRegistration, spread: FloatArray) -> dict[str, dict[str, Any]]:
+def _magnitudes(effect: CameraRegistration, spread: FloatArray, setup: Setup) -> dict[str, dict[str, Any]]:
     drawn = np.array(effect.coordinates) + spread * np.random.default_rng(0).standard_normal((_INTERVAL_STEPS, 6))
-    found = {}
-    for name, part, unit in (("translation", slice(0, 3), "m"), ("rotation", slice(3, 6), "rad")):
-        low, high = np.quantile(np.linalg.norm(drawn[:, part], axis=1), [0.025, 0.975])
-        value = float(np.linalg.norm(np.array(effect.coordinates)[part]))
+    magnitudes, found = [effect.moved(one.tolist()).reported(setup) for one in drawn], {}
+    for name in ("translation", "rotation"):
+        value, unit = effect.reported(setup)[name]
+        low, high = np.quantile([float(one[name][0]) for one in magnitudes], [0.025, 0.975])
         # Noise only ever lengthens a short vector, so that the draws may all lie above its value.
-        found[name] = {"value": value, "unit": unit, "low": min(float(low), value), "high": max(float(high), value)}
+        found[name] = {"value": value, "unit": unit, "low": min(float(low), float(value)), "high": max(float(high), float(value))}
     return found

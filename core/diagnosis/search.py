@@ -12,12 +12,14 @@ from core.diagnosis.ambiguity import Told, ambiguity_map
 from core.diagnosis.bench import Bench
 from core.diagnosis.candidates import Signature, begin, candidates_of, lump_places, signatures, tangents
 from core.diagnosis.evidence import fit, predictive_gain
-from core.diagnosis.hypothesis import Model
+from core.diagnosis.hypothesis import Model, with_effects
 from core.diagnosis.intervals import stands
+from core.diagnosis.pairing import mispaired
 from core.diagnosis.prediction import Prediction
 from core.diagnosis.screening import Candidate, linear_gains, null_gains, right_sides
 from core.diagnosis.structure import NOTHING, Structure, structure_of
 from core.effects import Effect
+from core.effects.geometry import MeshResolution
 from core.effects.material import StiffInclusion
 from core.effects.tool import ToolOffset
 
@@ -119,7 +121,7 @@ def _beyond_first_order(bench: Bench, model: Model, candidates: Sequence[Candida
         own = [model.nuisance.index(column) for column in candidate.widened]
         pull = float(change[own] @ np.linalg.solve(covariance[np.ix_(own, own)], change[own]))
         chance = float(chi2.sf(pull, len(own))) if own else 1.0
-        if chance < least and not isinstance(candidate.start, ToolOffset):
+        if chance < least and not isinstance(candidate.start, (ToolOffset, MeshResolution)):
             least, strained = chance, [candidate]
     return [candidate for candidate in candidates if isinstance(candidate.start, ToolOffset)] + strained
 
@@ -133,7 +135,8 @@ def _shortlist(
         candidate = candidates[number]
         taken = [c for c in chosen if c.start.name == candidate.start.name]
         apart = all(_distance(candidate.start, other.start) > 0.015 for other in taken)
-        room = not taken or (isinstance(candidate.start, StiffInclusion) and len(taken) < 2 and apart)
+        nothing_finer = isinstance(candidate.start, MeshResolution) and candidate.widened
+        room = not (taken or nothing_finer) or (isinstance(candidate.start, StiffInclusion) and len(taken) < 2 and apart)
         if gains[number] > least and room and (taken or len({c.start.name for c in chosen}) < names):
             chosen.append(candidate)
     return chosen
@@ -165,29 +168,35 @@ def _trial(
 def search(bench: Bench, seed: int) -> Findings:
     """Find up to MOST_CAUSES causes."""
     bench.tell("replaying the stated setup on two meshes", 0.02)
-    baseline = bench.baseline(tangents(bench.setup), lump_places(bench))
+    known = mispaired(bench.setup, bench.grid, bench.registration.repair)
+    names = [effect.name for effect in known]
+    origin = bench.baseline(tangents(with_effects(bench.setup, known), names, bench.weighed), lump_places(bench), known)
+    baseline = bench.evaluate((), origin.predictions) if known else origin
     findings = Findings(baseline, misfit=bench.misfit(baseline))
     findings.structure = findings.left = structure_of(bench, baseline, seed)
-    finite = signatures(bench, baseline)
-    screened, candidates, gains = _screen(bench, baseline, finite, baseline)
-    blocks = bench.tempered(screened)
-    chance = null_gains(blocks, screened.nuisance, bench.nuisances.precision, candidates, NULL_DRAWS, seed)
+    finite = signatures(bench, origin)
+    screened, candidates, gains = _screen(bench, origin, finite, origin)
+    blocks, nuisance = bench.tempered(screened), (*screened.nuisance, *screened.columns)
+    chance = null_gains(blocks, nuisance, bench.precision(screened), candidates, NULL_DRAWS, seed)
     findings.bound = max(float(np.quantile(chance, NULL_QUANTILE)), LEAST_GAIN)
-    findings.told = ambiguity_map(blocks, screened.nuisance, bench.nuisances.precision, candidates, findings.bound)
+    findings.told = ambiguity_map(blocks, nuisance, bench.precision(screened), candidates, findings.bound)
     for candidate, gain in zip(candidates, gains, strict=True):
         name = candidate.start.name
         findings.screened[name] = max(float(gain), findings.screened.get(name, -np.inf))
     current = Trial(baseline, 0.0, findings.misfit)
-    for order in range(MOST_CAUSES):
+    if known:
+        current = findings.best = _trial(bench, known, origin.predictions, baseline)
+        findings.trials.append(current)
+    for order in range(len(known), MOST_CAUSES):
         bench.tell("looking for a second cause" if order else "fitting the most promising causes", 0.45 + 0.25 * order)
         if order:
-            screened, candidates, gains = _again(bench, current.model, finite, baseline)
+            screened, candidates, gains = _again(bench, current.model, finite, origin)
         step = _forward(bench, findings, current, screened, candidates, gains)
         if step is None:
             break
         current = findings.best = step
         bench.temperature = max(1.0, current.misfit)
-    if findings.best is not None and len(findings.best.model.effects) > 1:
+    if findings.best is not None and len(findings.best.model.effects) > 1 and not known:
         findings.best = _backward(bench, findings, findings.best)
     _rescore(bench, findings)
     if findings.best is not None:
@@ -197,11 +206,11 @@ def search(bench: Bench, seed: int) -> Findings:
     return findings
 
 
-def _again(bench: Bench, model: Model, finite: Sequence[Signature], baseline: Model) -> tuple[Model, list[Candidate], np.ndarray]:
+def _again(bench: Bench, model: Model, finite: Sequence[Signature], origin: Model) -> tuple[Model, list[Candidate], np.ndarray]:
     """Screen the catalogue on top of a model that has causes already."""
-    wanted = tangents(model.setup, besides=model.names)
+    wanted = tangents(model.setup, model.names, bench.weighed)
     extended = bench.evaluate(model.effects, model.predictions, wanted, lump_places(bench))
-    return _screen(bench, extended, finite, baseline)
+    return _screen(bench, extended, finite, origin)
 
 
 def _forward(

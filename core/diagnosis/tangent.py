@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from core.effects import Effect
 from core.setup import Setup
 
-__all__ = ["SMALL", "Tangent"]
+__all__ = ["SMALL", "Tangent", "changed_at_rest"]
 
 SMALL = 1e-3
 """Step of a derivative, in the scale of what is moved."""
@@ -35,3 +36,9 @@ class Tangent:
         step = SMALL * self.effect.numbers()[place].scale
         coordinates[place] += step
         return self.effect.at(coordinates).apply(setup), step
+
+
+def changed_at_rest(tangents: Sequence[Tangent], places: Sequence[int], setup: Setup) -> dict[int, tuple[Setup, float]]:
+    """Columns of the tangents that show while nothing is pushed: to the setup a little changed, and the step."""
+    own = zip(places, tangents, strict=True)
+    return {place: tangent.changed(setup) for place, tangent in own if tangent.effect.at_rest()}

@@ -42,14 +42,12 @@ _COUNTED: tuple[type[Effect], ...] = (
     Viscoelasticity,
     PermanentSet,
     ToolFriction,
-)
-_REPLAYED: tuple[type[Effect], ...] = (
-    YoungModulus,
     DepthBias,
     GeometryScale,
     LandmarkMismatch,
     MeshResolution,
 )
+_REPLAYED: tuple[type[Effect], ...] = (YoungModulus,)
 OUTSIDE = outside_effects(effect.name for effect in (*_COUNTED, *_REPLAYED))
 DIAGNOSED = (*_COUNTED, *OUTSIDE)
 CATALOGUE = (*DIAGNOSED, *_REPLAYED)

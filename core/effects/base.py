@@ -110,7 +110,7 @@ class Effect(ABC):
 
     @classmethod
     def at_rest(cls) -> bool:
-        """Whether the rest cloud shows it, so that a diagnosis asks what it changes there."""
+        """Whether the rest cloud or the touches show it, so that a diagnosis asks what it changes there."""
         return cls.enters in (Slot.LOAD, Slot.GEOMETRY)
 
     @classmethod
@@ -131,8 +131,8 @@ class Effect(ABC):
         """Name to value, SI."""
         return {item.name: getattr(self, item.name) for item in self.parameters()}
 
-    def reported(self) -> dict[str, tuple[float | str, str]]:
-        """Name to (value, unit) as a report states them; more than the fields where that helps the reader."""
+    def reported(self, setup: Setup) -> dict[str, tuple[float | str, str]]:
+        """Name to (value, unit) as a report states them of this setup; more than the fields where that helps the reader."""
         return {item.name: (getattr(self, item.name), item.unit) for item in self.parameters()}
 
     def moved(self, values: Sequence[float]) -> Self:

@@ -57,6 +57,11 @@ class MeshResolution(Effect):
     element_size: float = parameter("m", low=_FINEST, high=2e-2, scale=0.3, log=True)
 
     @classmethod
+    def at_rest(cls) -> bool:
+        """A block that nothing pushes has its shape on any grid."""
+        return False
+
+    @classmethod
     def neutral(cls, setup: Setup) -> Self:
         return cls(element_size=_FINEST if setup.element_size is None else min(max(setup.element_size, _FINEST), 2e-2))
 

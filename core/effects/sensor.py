@@ -68,12 +68,16 @@ class CameraRegistration(Effect):
     def apply(self, setup: Setup) -> Setup:
         return replace(setup, sensor=replace(setup.sensor, camera_shift=self.shift(setup) @ setup.sensor.camera_shift))
 
-    def reported(self) -> dict[str, tuple[float | str, str]]:
-        """Magnitudes first, then the full pose about the block's middle."""
+    def reported(self, setup: Setup) -> dict[str, tuple[float | str, str]]:
+        """Magnitudes of the motion in the phantom frame first, then the full pose about the block's middle.
+
+        The translation is that of the frame's origin, the middle of the base: a turn about the block's middle moves it, too.
+        """
+        shift = self.shift(setup)
         return {
-            "translation": (float(np.hypot(np.hypot(self.tx, self.ty), self.tz)), "m"),
-            "rotation": (float(np.linalg.norm([self.rx, self.ry, self.rz])), "rad"),
-            **super().reported(),
+            "translation": (float(np.linalg.norm(shift.translation)), "m"),
+            "rotation": (float(np.linalg.norm(shift.rotation_vector)), "rad"),
+            **super().reported(setup),
         }
 
 

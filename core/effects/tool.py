@@ -113,6 +113,11 @@ class LandmarkMismatch(Effect):
     inset: float = parameter("m", low=-0.01, high=0.02, scale=5e-4)
 
     @classmethod
+    def at_rest(cls) -> bool:
+        """The touches are evidence themselves."""
+        return True
+
+    @classmethod
     def neutral(cls, setup: Setup) -> Self:
         here = setup.touching
         return cls(pairing=here.pairing, scale=here.scale, inset=here.inset)

@@ -12,7 +12,7 @@ from core.frames import FloatArray, Transform
 from core.registration.faces import box_distance
 from core.registration.robot import rigid_fits, similarity
 
-__all__ = ["TouchProposal", "propose"]
+__all__ = ["CLEARLY_BETTER", "IMPOSSIBLE", "MUCH_BETTER", "TouchProposal", "blocked_share", "propose"]
 
 MUCH_BETTER = 0.5
 CLEARLY_BETTER = 1.0e-3
@@ -59,7 +59,7 @@ def propose(
     corners = np.array([expected[name] for name in landmarks])
     orders = np.array(list(_orders(len(landmarks))))
     rotations, translations, rms = rigid_fits(touches, corners[orders[:, rows]])
-    blocked = np.array([_blocked(tool_starts, size, Transform(r, t)) for r, t in zip(rotations, translations, strict=True)])
+    blocked = np.array([blocked_share(tool_starts, size, Transform(r, t)) for r, t in zip(rotations, translations, strict=True)])
     best = _best(orders, rms, blocked)
     pairing = tuple(landmarks[k] for k in orders[best][rows])
     scale, scale_sigma, left = similarity(touches, corners[orders[best][rows]])
@@ -88,7 +88,7 @@ def _orders(count: int) -> Iterator[tuple[int, ...]]:
         yield stated[::-1][shift:] + stated[::-1][:shift]
 
 
-def _blocked(tool_starts: FloatArray | None, size: tuple[float, float, float] | None, phantom_from_robot: Transform) -> float:
+def blocked_share(tool_starts: FloatArray | None, size: tuple[float, float, float] | None, phantom_from_robot: Transform) -> float:
     """Share of the starts [1] where no tool can have been: inside the block, or under the table."""
     if tool_starts is None or size is None or len(tool_starts) == 0:
         return 0.0

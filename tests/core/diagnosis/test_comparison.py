@@ -5,7 +5,7 @@ from pushed_block import GRID, POSE, SETUP, SIZE
 
 from core.diagnosis.comparison import Compared, choose, compare
 from core.diagnosis.observations import Group
-from core.effects.sensor import CameraRegistration
+from core.effects.sensor import CameraRegistration, DepthBias
 from core.measurement import Surface
 from core.replay import rest
 from core.setup import Setup
@@ -60,3 +60,43 @@ def test_gap_does_not_jump_where_a_rim_passes_the_ray():
         found = compare(group, lifted, BLOCK, SURFACE, sample).means
         # The gap counts along the ray, times the cosine that the stated surface has: the height by which the points lie off it.
         assert np.allclose(found.mean[found.count > 0], lift, atol=1e-5)
+
+
+def _top(noise: float) -> Group:
+    """Points of the top with noise along the rays [m], as a camera that reads depth as it is sees them."""
+    random = np.random.default_rng(2)
+    places = np.column_stack([random.uniform(-0.02, 0.02, 4000), random.uniform(-0.01, 0.01, 4000), np.full(4000, SIZE[2])])
+    points = POSE.inverse().apply(places)
+    away = points / np.linalg.norm(points, axis=1)[:, None]
+    return Group((0,), points + noise * random.standard_normal((4000, 1)) * away, False)
+
+
+def test_model_that_shrinks_the_cloud_does_not_shrink_its_noise():
+    group = _top(8e-4)
+    sample = choose(group, SETUP, BLOCK, SURFACE)
+    spreads = []
+    for scale in (1.0, 1.1):
+        setup = DepthBias(offset=0.0, scale=scale).apply(SETUP)
+        means = compare(group, setup, BLOCK, SURFACE, sample).means
+        spreads.append(means.spread[means.count > 20])
+    assert np.allclose(spreads[1], spreads[0], rtol=0.02)
+
+
+def test_column_of_a_stretch_is_the_difference_of_two_models_and_free_of_noise():
+    step = 1e-4
+    near = DepthBias(offset=0.0, scale=1.0 + step).apply(SETUP)
+    columns, means = [], []
+    for noise in (8e-4, 0.0):
+        group = _top(noise)
+        sample = choose(group, SETUP, BLOCK, SURFACE)
+        here, there = (compare(group, setup, BLOCK, SURFACE, sample) for setup in (SETUP, near))
+        moved = sight_of(near).place(sight_of(SETUP).read(here.points))
+        columns.append(here.along_sight(moved, sight_of(near).scale) / step)
+        means.append(np.nan_to_num(here.means.mean))
+        difference = np.nan_to_num(there.means.mean - here.means.mean) / step
+        assert np.allclose(columns[-1], difference, atol=2e-3)
+    seen = np.abs(columns[1]) > 0
+    assert seen.sum() > 20 and np.abs(means[0]).max() > 2e-4
+    # A column that took its noise from the residual would explain it.
+    assert abs(np.corrcoef((columns[0] - columns[1])[seen], means[0][seen])[0, 1]) < 0.5
+    assert np.std((columns[0] - columns[1])[seen]) < 0.2 * np.std(means[0][seen])

@@ -108,7 +108,7 @@ def test_catalogue_speaks_the_vocabulary():
 
 @EACH
 def test_report_states_the_parameters_by_name_and_unit(effect):
-    reported = {name: unit for name, (_, unit) in _example(effect).reported().items()}
+    reported = {name: unit for name, (_, unit) in _example(effect).reported(SETUP).items()}
     assert VOCABULARY[effect.name].items() <= reported.items()
 
 
