@@ -189,9 +189,11 @@ class Specimen:
             return self._found(centre)
         except GivesWay:
             raise
-        except SolveError:
-            if self.drag is None or self._stated is None or depth >= _MOST_HALVED:
+        except SolveError as error:
+            if self.drag is None or self._stated is None:
                 raise
+            if depth >= _MOST_HALVED:  # as deep as this tool can be led: the operator stops short of it
+                raise GivesWay(str(error)) from error
         self.resume(standing)
         middle = 0.5 * (self._stated + centre)
         state = self._reached(middle, depth + 1)
