@@ -1,7 +1,7 @@
 """The catalogue of causes. A new one is one class in a file of this folder and one entry here.
 
-The engine replays all of them. A diagnosis weighs those in `DIAGNOSED`: those for which its false alarms were counted, and what
-other packages bring (`OUTSIDE`; how is in the README beside this file).
+The engine replays all of them. A diagnosis weighs those in `DIAGNOSED`, and what other packages bring (`OUTSIDE`; how is in the
+README beside this file).
 """
 
 from __future__ import annotations
