@@ -172,6 +172,11 @@ def _fibres(values: Values, _: Sequence[float] | None) -> str:
     return f"fibres: the phantom is {stiffer}, {quantity(values['direction'], 'rad')} from its long side"
 
 
+def _relaxing(values: Values, _: Sequence[float] | None) -> str:
+    share, time = 100 * values["relaxed_fraction"], quantity(values["time_constant"], "s")
+    return f"that the material relaxes, by {share:.0f} % of its stiffness with a time constant of {time}"
+
+
 def _gradient(values: Values, _: Sequence[float] | None) -> str:
     ratio = values["log_ratio"]
     where, other = ("top", "base") if ratio >= 0 else ("base", "top")
@@ -215,6 +220,11 @@ PHRASES: dict[str, Callable[[Any, Sequence[float] | None], str]] = {
     "anisotropy": _fibres,
     "base_compliance": lambda v, _: f"a support that gives way, with springs of {v['stiffness_over_E']:.2g} E per metre",
     "tool_compliance": lambda v, _: f"a tool that gives way under load, C E = {v['compliance_times_stiffness']:.2g} per metre",
+    "viscoelasticity": _relaxing,
+    "permanent_set": lambda v, _: f"that {100 * v['retained_fraction']:.0f} % of the deformation stays after release",
+    "tool_friction": lambda v, _: (
+        f"that the tool drags the surface along, with a friction coefficient of {v['friction_coefficient']:.2g}"
+    ),
     "depth_bias": lambda v, _: f"a camera that misreads depth, by {quantity(v['offset'], 'm')} and {v['scale']:.3g} times",
     "geometry_scale": _size,
     "landmark_mismatch": _beside,

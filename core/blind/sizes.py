@@ -18,10 +18,18 @@ if TYPE_CHECKING:
 
 __all__ = ["camera_pose", "size_over_limit"]
 
-_PROPORTIONAL = ("specific_weight_over_stiffness", "compliance_times_stiffness", "log_ratio")
+_PROPORTIONAL = (
+    "specific_weight_over_stiffness",
+    "compliance_times_stiffness",
+    "log_ratio",
+    "relaxed_fraction",
+    "retained_fraction",
+)
 """Parameters in proportion to which the surface moves, so that a share of what one size does is that share of the size."""
 _INVERSE = ("J_m", "stiffness_over_E")
 """The same of their inverse: they are nothing where they are infinite."""
+_BESIDE = ("time_constant",)
+"""Parameters that say when something shows and not how strongly: a limit is stated at one of them."""
 
 
 def size_over_limit(
@@ -73,8 +81,9 @@ def _part(
     neutral: Mapping[str, float | str],
 ) -> float | None:
     if "share" in limit:
-        name = next(iter(at), "")
-        if name not in (*_PROPORTIONAL, *_INVERSE) or limit["share"] is None or len(at) > 1:
+        strengths = [name for name in at if name not in _BESIDE]
+        name = strengths[0] if len(strengths) == 1 else ""
+        if name not in (*_PROPORTIONAL, *_INVERSE) or limit["share"] is None:
             return None
         if name in _INVERSE:
             return float(at[name]["value"] / true[name]) / float(limit["share"])

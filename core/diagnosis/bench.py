@@ -9,8 +9,9 @@ import numpy as np
 
 from core.diagnosis.evidence import Block, explained, fit, log_evidence, predictive_score
 from core.diagnosis.hypothesis import Model, Nuisances, nuisance_setups
+from core.diagnosis.led import led
 from core.diagnosis.noise import Noise, noises
-from core.diagnosis.ordered import ORDERED
+from core.diagnosis.ordered import ORDERED, TRACED
 from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted
 from core.diagnosis.resolution import OWN_GRID, under_stated, with_columns
 from core.diagnosis.still import Still
@@ -66,6 +67,7 @@ class Bench:
         self.noises: list[Noise] = []
         self.on_own_grid: tuple[Prediction, ...] = ()
         self.evaluations = 0
+        self.known: list[Model] = []
 
     def tell(self, text: str, done: float = 0.0) -> None:
         """Report what is being done; the share that is done [1] never falls."""
@@ -118,9 +120,12 @@ class Bench:
     ) -> Model:
         """The hypothesis with these effects; columns of `tangents` and `lumps` are wanted too."""
         setup = self._apply(effects)
+        if any(isinstance(effect, TRACED) for effect in effects):
+            return self.assemble(tuple(effects), setup, led(self, effects, starts, tangents, lumps), tangents, len(lumps))
         predictions = [f.result() for f in self.predict(effects, self._wanted(effects, setup, tangents, lumps), starts)]
-        predictions = self._ordered_columns(effects, predictions)
-        return self.assemble(tuple(effects), setup, predictions, tangents, len(lumps))
+        model = self.assemble(tuple(effects), setup, self._ordered_columns(effects, predictions), tangents, len(lumps))
+        self.known = [*self.known[:1], model]
+        return model
 
     def _ordered_columns(self, effects: Sequence[Effect], predictions: list[Prediction]) -> list[Prediction]:
         """Columns of effects in whose replays a frame hangs on all those before it: by one more replay for each number."""

@@ -11,6 +11,7 @@ import numpy as np
 from core.diagnosis.bench import PRIOR_STEPS, TRUST, Bench
 from core.diagnosis.evidence import fit
 from core.diagnosis.hypothesis import TWINS, Model
+from core.diagnosis.ordered import TRACED
 from core.diagnosis.prediction import Prediction
 from core.diagnosis.resolution import OWN_GRID, mesh_candidate
 from core.diagnosis.screening import Candidate
@@ -35,8 +36,8 @@ Signature = tuple[Effect, list[Prediction]]
 FINITE: tuple[type[Effect], ...] = (
     BaseSlip, BaseDetachment, Gravity, BaseCompliance, *OUTSIDE,
 )  # fmt: skip
-"""Effects without a derivative where they are nothing: a base that is held and one that may move have other unknowns, sag moves the
-registration, too, and what the tool or the material remembers hangs on all frames before."""
+"""Effects without a derivative where they are nothing: a base that is held and one that may move have other unknowns, and sag moves
+the registration, too."""
 _LIMITED = 6.0
 """J_m [1] whose whole action, to first order, is the column of a material that stiffens."""
 _TOGETHER: tuple[type[Effect], ...] = (DepthBias, GeometryScale, LandmarkMismatch)
@@ -100,7 +101,17 @@ def signatures(bench: Bench, baseline: Model) -> list[Signature]:
         changed = [future.result() for future in futures]
         rows = zip(baseline.predictions, changed, without, strict=True)
         found.append((effect, [other.upon(here, zero).alone() for here, other, zero in rows]))
-    return found
+    return [*found, *_traced(bench, baseline)]
+
+
+def _traced(bench: Bench, baseline: Model) -> list[Signature]:
+    """What hangs on the past would do, to first order, for the cost of a few solves a group (see `core.diagnosis.traces`)."""
+    starts = [effect for kind in TRACED for effect in kind.starts(bench.setup)]
+    bench.tell("what the material or the tool would remember", 0.4)
+    pending = bench.workers.trace(bench.names, baseline.setup, bench.grid, baseline.predictions, starts)
+    traces = [future.result() for future in pending]
+    rows = list(zip(traces, baseline.predictions, strict=True))
+    return [(effect, [own[number].on(plain).alone() for own, plain in rows]) for number, effect in enumerate(starts)]
 
 
 def _mesh_for(effect: Effect, bench: Bench) -> Meshing:

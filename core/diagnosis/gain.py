@@ -66,9 +66,14 @@ def harm(names: Sequence[str], gain: Ladder) -> str:
     )
 
 
-def fixed_pattern(item: Observations, model: Prediction) -> tuple[FloatArray, FloatArray]:
-    """The camera's fixed pattern (p,) [m] in the frames clear of the block, and how many points it rests on (p,)."""
+def fixed_pattern(item: Observations, model: Prediction, before: bool = False) -> tuple[FloatArray, FloatArray]:
+    """The camera's fixed pattern (p,) [m] in the frames clear of the block, and how many points it rests on (p,).
+
+    Of a block that may keep a dent only those `before` the first touch count, if there are any.
+    """
     free = np.array([group.free for group in item.groups])[:, None]
+    early = np.array([group.free and not group.probe for group in item.groups])[:, None]
+    free = early if before and early.any() else free
     count = np.where(free & np.isfinite(model.gap), model.count, 0.0)
     total = count.sum(axis=0)
     return (np.nan_to_num(model.gap) * count).sum(axis=0) / np.maximum(total, 1), total
@@ -89,15 +94,20 @@ def ladder(
     found: Setup,
     seed: int,
 ) -> Ladder:
-    """Compare two models on test sequences, groups in touch only; probes are resampled whole."""
+    """Compare two models on test sequences; probes are resampled whole.
+
+    Groups in touch count, and of a material that remembers also what a push has left.
+    """
+    lasting = found.material.remembers
     variance, rows = patch_variance([*baseline, *extended]), []
     for item, before, after in zip(data, baseline, extended, strict=True):
-        (own, _), (other, known) = fixed_pattern(item, before), fixed_pattern(item, after)
+        (own, _), (other, known) = fixed_pattern(item, before, lasting), fixed_pattern(item, after, lasting)
         difference = own - other
         if not known.sum():
             raise DiagnosisError(f"{item.name} has no untouched frame, so its noise floor is unknown; name others in [splits] test")
         for number, group in enumerate(item.groups):
-            if group.free or number in before.failed or number in after.failed:
+            left = lasting and group.probe > 0
+            if (group.free and not left) or number in before.failed or number in after.failed:
                 continue
             seen = np.isfinite(before.gap[number]) & np.isfinite(after.gap[number]) & (known >= _LEAST_POINTS)
             count = after.count[number][seen]

@@ -16,8 +16,10 @@ from core.effects.sensor import CameraRegistration
 from core.frames import FloatArray
 from core.setup import Setup
 
-__all__ = ["intervals", "modulus_interval", "stands"]
+__all__ = ["INTERVAL_LEVEL", "intervals", "modulus_interval", "stands"]
 
+INTERVAL_LEVEL = 0.95
+"""Share of the intervals that are to hold the truth [1]."""
 _NORMAL_95 = 1.96
 _INTERVAL_STEPS = 400
 _LEAST_FACTOR = 1e-2

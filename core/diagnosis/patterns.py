@@ -45,9 +45,10 @@ def patterns(bench: Bench, data: Sequence[Observations], baseline: Model, found:
     untouched block already (sag, a camera that was moved) with it.
     """
     pairs = list(zip(data, baseline.predictions, found.predictions, strict=True))
-    compared = [_compare(item, before, after, whole=False) for item, before, after in pairs]
+    lasting = found.setup.material.remembers
+    compared = [_compare(item, before, after, whole=False, lasting=lasting) for item, before, after in pairs]
     if sum(still for _, still, _ in compared) > sum((rows.change**2 * rows.points).sum() for _, _, rows in compared):
-        compared = [_compare(item, before, after, whole=True) for item, before, after in pairs]
+        compared = [_compare(item, before, after, whole=True, lasting=lasting) for item, before, after in pairs]
     best: tuple[float, _Rows] | None = None
     for touched, _, rows in compared:
         for probe in np.unique(touched[touched > 0]):
@@ -74,11 +75,17 @@ class _Rows:
     change: FloatArray
 
 
-def _compare(item: Observations, before: Prediction, after: Prediction, *, whole: bool) -> tuple[FloatArray, float, _Rows]:
-    """Probe of each touched group (g,), how much the cause changes untouched frames, and the errors in the touched ones."""
-    (own, known), other = fixed_pattern(item, before), fixed_pattern(item, after)[0]
+def _compare(
+    item: Observations, before: Prediction, after: Prediction, *, whole: bool, lasting: bool
+) -> tuple[FloatArray, float, _Rows]:
+    """Probe of each touched group (g,), how much the cause changes untouched frames, and the errors in the touched ones.
+
+    What a push leaves in a material that remembers (`lasting`) is of that push.
+    """
+    (own, known), other = fixed_pattern(item, before, lasting), fixed_pattern(item, after, lasting)[0]
     seen = np.isfinite(before.gap) & np.isfinite(after.gap) & (known >= _LEAST_POINTS)
-    touched = np.array([0 if group.free else 1 + group.probe for group in item.groups])
+    counts = [not group.free or (lasting and group.probe > 0) for group in item.groups]
+    touched = np.array([1 + group.probe if one else 0 for group, one in zip(item.groups, counts, strict=True)])
     points = np.where(seen & (touched > 0)[:, None], before.count, 0.0)
     still = np.where(known >= _LEAST_POINTS, own - other, 0.0)
     error, change = np.where(seen, before.gap, 0.0), np.where(seen, before.gap - after.gap, 0.0)

@@ -101,7 +101,9 @@ def record(
             continue
         robot = touch_correction(setup, grid) @ setup.phantom_from_robot
         centres = robot.apply(smooth_centres(sequence.kinematics, times - setup.sensor.time_offset))
-        frames = replay(setup, centres, grid, starts=frames or None, tolerance=1e-3)
+        # What hangs on the past is replayed in the order of time, and from frame to frame.
+        starts = None if setup.remembers else frames or None
+        frames = replay(setup, centres, grid, times=times - setup.sensor.time_offset, starts=starts, tolerance=1e-3)
         sides.append(_side(setup, frames, clouds))
     before, after = sides
     surface = Surface.of(stated, VERTEX_SPACING)

@@ -49,11 +49,16 @@ about sqrt(2 d), so 8 nats are two of its standard deviations."""
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A refitted model and its gain over the baseline [nats], with the misfit per value it leaves."""
+    """A refitted model and its gain over the baseline [nats], with the misfit per value it leaves.
+
+    `parts` says where the gain comes from, once all trials are scored at one temperature: each block of data, and last the stated
+    accuracies.
+    """
 
     model: Model
     gain: float
     misfit: float
+    parts: tuple[float, ...] = ()
 
     def scored(self) -> Trial:
         """Without the replays, which nobody asks for of a model that was not accepted: they take most of the memory."""
@@ -255,7 +260,8 @@ def _rescore(bench: Bench, findings: Findings) -> None:
     reference = bench.score(findings.baseline)
     rescored = []
     for trial in findings.trials:
-        rescored.append(replace(trial, gain=predictive_gain(bench.score(trial.model), reference)[0]))
+        parts = bench.score(trial.model) - reference
+        rescored.append(replace(trial, gain=float(parts.sum()), parts=tuple(parts.tolist())))
     best = findings.best
     findings.trials = sorted(rescored, key=lambda trial: -trial.gain)
     if best is not None:

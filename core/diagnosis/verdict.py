@@ -10,7 +10,7 @@ from core.dataset import Dataset
 from core.diagnosis.bench import Bench
 from core.diagnosis.gain import Ladder
 from core.diagnosis.hypothesis import Model
-from core.diagnosis.intervals import intervals, modulus_interval
+from core.diagnosis.intervals import INTERVAL_LEVEL, intervals, modulus_interval
 from core.diagnosis.resolution import too_coarse
 from core.diagnosis.search import Findings, Trial
 from core.effects import DIAGNOSED, Effect
@@ -83,6 +83,14 @@ def _ranking(bench: Bench, findings: Findings, named: set[str]) -> list[dict[str
     return sorted(rows, key=lambda row: -row["gain_nats"])
 
 
+def _model(trial: Trial) -> dict[str, Any]:
+    """A set of causes that was fitted, and which data speak for it."""
+    blocks = [*(block.name for block in trial.model.blocks), "stated accuracies"]
+    parts = [{"of": name, "gain_nats": round(part, 2)} for name, part in zip(blocks, trial.parts, strict=bool(trial.parts))]
+    effects = [effect.to_json() for effect in trial.model.effects]
+    return {"effects": effects, "gain_nats": round(trial.gain, 2), "misfit": round(trial.misfit, 4), "parts": parts}
+
+
 def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
     """How much of the structured error is left, over what chance gives, and where and when it sits."""
     model = findings.best.model if findings.best else findings.baseline
@@ -126,7 +134,8 @@ def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder |
     known, unknown = _modulus(bench, findings, named)
     coarse = "" if bench.on_own_grid else too_coarse(findings.screened.get(MeshResolution.name, 0.0), findings.bound)
     report: dict[str, Any] = {
-        "format": 1, "dataset": dataset.name, "verdict": verdict, "causes": causes, "ranking": _ranking(bench, findings, named),
+        "format": 1, "dataset": dataset.name, "verdict": verdict, "causes": causes, "interval_level": INTERVAL_LEVEL,
+        "ranking": _ranking(bench, findings, named), "models": [_model(trial) for trial in findings.trials],
         "identified": known, "not_identifiable": unknown, "unexplained": _unexplained(bench, findings), "gain": None,
         "ambiguity_map": [one.to_json() for one in findings.told],
         "evidence": {

@@ -13,6 +13,8 @@ from typing import ParamSpec, Self, TypeVar
 from core.diagnosis.comparison import Sample
 from core.diagnosis.observations import Observations
 from core.diagnosis.prediction import Prediction, Wanted, predict
+from core.diagnosis.traces import Trace, traces_of
+from core.effects import Effect
 from core.meshing import Meshing
 from core.processes import bound_to_parent
 from core.replay import Equilibrium
@@ -60,6 +62,12 @@ class Pending:
         return found if self.samples is None else replace(found, samples=self.samples)
 
 
+def _trace(
+    name: str, setup: Setup, grid: Meshing, frames: Sequence[Equilibrium], samples: Sequence[Sample], effects: Sequence[Effect]
+) -> list[Trace]:
+    return traces_of(_DATA[name], setup, grid, frames, samples, effects)
+
+
 class Workers:
     """A pool of processes that predict sequences; use as a context manager.
 
@@ -105,6 +113,15 @@ class Workers:
             future = self._pool.submit(_task, name, setup, grid, wanted, begin, points, tolerance)
             pending.append(Pending(future, points))
         return pending
+
+    def trace(
+        self, names: Sequence[str], setup: Setup, grid: Meshing, plain: Sequence[Prediction], effects: Sequence[Effect]
+    ) -> list[Future[list[Trace]]]:
+        """Begin the traces of these effects in these sequences, whose replays without them are `plain`."""
+        return [
+            self._pool.submit(_trace, name, setup, grid, item.equilibria, item.samples, effects)
+            for name, item in zip(names, plain, strict=True)
+        ]
 
     def run(self, task: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Begin any other task of a module's top level."""

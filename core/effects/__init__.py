@@ -1,7 +1,8 @@
 """The catalogue of causes. A new one is one class in a file of this folder and one entry here.
 
-The engine replays all of them. A diagnosis weighs those in `DIAGNOSED`, and what other packages bring (`OUTSIDE`; how is in the
-README beside this file).
+The engine replays all of them. A diagnosis weighs those in `DIAGNOSED`: those that the virtual bench can hide and whose signature
+it can screen, relaxation, permanent set and friction of the tool among them by traces (`core.diagnosis.traces`), and what other
+packages bring (`OUTSIDE`; how is in the README beside this file).
 """
 
 from __future__ import annotations
@@ -38,17 +39,15 @@ _COUNTED: tuple[type[Effect], ...] = (
     Anisotropy,
     BaseCompliance,
     ToolCompliance,
+    Viscoelasticity,
+    PermanentSet,
+    ToolFriction,
     DepthBias,
     GeometryScale,
     LandmarkMismatch,
     MeshResolution,
 )
-_REPLAYED: tuple[type[Effect], ...] = (
-    Viscoelasticity,
-    PermanentSet,
-    ToolFriction,
-    YoungModulus,
-)
+_REPLAYED: tuple[type[Effect], ...] = (YoungModulus,)
 OUTSIDE = outside_effects(effect.name for effect in (*_COUNTED, *_REPLAYED))
 DIAGNOSED = (*_COUNTED, *OUTSIDE)
 CATALOGUE = (*DIAGNOSED, *_REPLAYED)

@@ -13,7 +13,7 @@ from scipy import sparse
 from core.errors import MeshError
 from core.frames import FloatArray
 
-__all__ = ["Block", "Grading", "Sampling", "mesh_block"]
+__all__ = ["Block", "Grading", "Sampling", "mesh_block", "shape_values"]
 
 IntArray = np.ndarray[Any, np.dtype[np.int64]]
 _PAIRS = [(a, b) for a in range(4) for b in range(a)]
@@ -178,3 +178,13 @@ def _lattice(divisions: int) -> tuple[FloatArray, IntArray]:
         if i + j < divisions - 1:
             triangles.append((index[i + 1, j], index[i + 1, j + 1], index[i, j + 1]))
     return np.array(list(index), dtype=float).T / divisions, np.array(triangles, dtype=np.int64)
+
+
+def shape_values() -> FloatArray:
+    """(4, 10) shape functions of the ten-node tetrahedron at its four volume points, scikit-fem's order."""
+    from skfem import ElementTetP2  # noqa: PLC0415
+    from skfem.quadrature import get_quadrature  # noqa: PLC0415
+
+    element = ElementTetP2()
+    places, _ = get_quadrature(element, 2)
+    return np.array([element.lbasis(places, number)[0] for number in range(10)]).T

@@ -10,6 +10,7 @@ from core.frames import FloatArray
 from core.synthetic.block import Block
 from core.synthetic.equilibrium import Solid
 from core.synthetic.fibres import fibre_modulus
+from core.synthetic.remembering import relaxed_share
 from core.synthetic.scenario import Scenario
 
 __all__ = ["levels_of", "solid_of", "true_offset", "true_radius"]
@@ -53,6 +54,7 @@ def solid_of(scenario: Scenario, block: Block) -> Solid:
         fibres=np.array([np.cos(angle), np.sin(angle), 0.0]) if fibres else None,
         fibre_modulus=fibre_modulus(fibres.value("stiffness_ratio"), poisson_ratio) if fibres else 0.0,
         springs=_springs(scenario, block, springs.value("stiffness_over_E")) if springs else None,
+        relaxed=relaxed_share(scenario),
     )
 
 

@@ -9,9 +9,11 @@ import numpy as np
 
 from core.errors import SolveError
 from core.frames import FloatArray
-from core.synthetic.block import Block, Sampling
+from core.synthetic.block import Block, Sampling, shape_values
+from core.synthetic.dragging import Rub, assemble_rub
 from core.synthetic.fibres import assemble_fibres, fibre_energy
 from core.synthetic.law import assemble_obstacle, assemble_solid, constants, solid_energy
+from core.synthetic.metric import assemble_metric, metric_energy
 from core.synthetic.stiffening import assemble_stiffening, stiffening_energy
 from core.synthetic.system import System
 
@@ -41,6 +43,7 @@ class Solid:
         stretch_limit: J_m of Gent's law [1]; None for a material without.
         fibres: (3,) unit vector along them; None for a material without. fibre_modulus: theirs over Young's modulus [1].
         springs: (f, q) per area, in all directions, at the points of the sole [N/m^3]; None for a base without.
+        relaxed: share of the shear modulus that has relaxed after a long rest [1].
     """
 
     young_modulus: FloatArray
@@ -53,6 +56,7 @@ class Solid:
     fibres: FloatArray | None = None
     fibre_modulus: float = 0.0
     springs: FloatArray | None = None
+    relaxed: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -75,15 +79,23 @@ class State:
 
 
 class Equilibrium:
-    """Solves one block for one tool position after the other, starting each from the last."""
+    """Solves one block for one tool position after the other, starting each from the last.
+
+    Attributes:
+        metric: (e, q, 3, 3) of what the material remembers (`core.synthetic.metric`), over its shear modulus; None of none.
+        rub: friction of the tool; None without.
+    """
 
     def __init__(self, block: Block, solid: Solid) -> None:
         self.block = block
         self.solid = solid
         self.modulus = float(np.median(solid.young_modulus))
-        self._hardest = PENALTY_OVER_E * float(np.sqrt(self.modulus * solid.young_modulus.max()))
+        self.metric: FloatArray | None = None
+        self.rub: Rub | None = None
+        self.hardest = PENALTY_OVER_E * float(np.sqrt(self.modulus * solid.young_modulus.max()))
         self._constants = self._elastic()
         self._shear = 2 * (self._constants[0] + self._constants[1])
+        self._whole = self._shear / (1 - solid.relaxed)
         self._sole = block.elements[block.sole.owner]
         free = np.full(len(block.nodes), -1, dtype=np.int64)
         self._free = np.nonzero(~solid.held)[0]
@@ -99,12 +111,12 @@ class Equilibrium:
         self.rest = self._advance(np.zeros_like(block.nodes), _NOWHERE, 0)
 
     def _elastic(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        c10, c01, lame = constants(self.solid.young_modulus, self.solid.poisson_ratio)
+        c10, c01, lame = constants(self.solid.young_modulus, self.solid.poisson_ratio, self.solid.relaxed)
         return c10, c01, np.average(lame, axis=1, weights=self.block.weights)
 
     def _own_weight(self) -> FloatArray:
         load = np.zeros_like(self.block.nodes)
-        bary = _shape_values()
+        bary = shape_values()
         nodal = np.einsum("eq,qa->ea", self.block.weights, bary)
         np.add.at(load[:, 2], self.block.elements, -self.solid.weight * nodal)
         return load
@@ -141,7 +153,7 @@ class Equilibrium:
             return self._advance(half.displacement, centre, depth + 1, half.centre)
 
     def _newton(self, displacement: FloatArray, centre: FloatArray, limit: int = 14, softness: float = 1.0) -> State:
-        self._penalty = softness * self._hardest
+        self._penalty = softness * self.hardest
         u = displacement.copy()
         energy = norm = np.inf
         convex = True
@@ -213,6 +225,7 @@ class Equilibrium:
         if np.isfinite(energy):
             for sampling, where, radius in self._obstacles(centre):
                 energy += self._press(u, sampling, where, radius, False, _UNUSED)[0]
+            energy += self._rubbed(u, centre, False, _UNUSED)
         return energy - float(np.sum(self._load * u))
 
     def _assemble(self, u: FloatArray, centre: FloatArray) -> tuple[float, FloatArray, FloatArray, FloatArray, FloatArray, float]:
@@ -227,6 +240,7 @@ class Equilibrium:
                 part, depth = self._press(u, sampling, where, radius, True, (self._stiffness, force, *of_tool))
                 energy += part
                 deepest = max(deepest, depth)
+            energy += self._rubbed(u, centre, True, (self._stiffness, force, push, coupling, total))
         return energy - float(np.sum(self._load * u)), force, push, coupling, total, deepest
 
     def _stored(self, u: FloatArray) -> float:
@@ -237,6 +251,8 @@ class Equilibrium:
             energy += stiffening_energy(*grid, self._shear, solid.stretch_limit)
         if solid.fibres is not None:
             energy += fibre_energy(*grid, solid.fibre_modulus * solid.young_modulus, solid.fibres)
+        if self.metric is not None and np.isfinite(energy):
+            energy += metric_energy(*grid, self._whole, self.metric)
         if len(self._springs):
             moved = u[self._sole]
             energy += 0.5 * float(np.einsum("fai,fab,fbi->", moved, self._springs, moved))
@@ -250,6 +266,8 @@ class Equilibrium:
             assemble_stiffening(*grid, self._shear, solid.stretch_limit, self._stiffness, force)
         if solid.fibres is not None:
             assemble_fibres(*grid, solid.fibre_modulus * solid.young_modulus, solid.fibres, self._stiffness, force)
+        if self.metric is not None:
+            assemble_metric(*grid, self._whole, self.metric, self._stiffness, force)
         if len(self._springs):
             np.add.at(force, self._sole, np.einsum("fab,fbi->fai", self._springs, u[self._sole]))
             np.add.at(self._stiffness, self.block.sole.owner, self._springs[..., None, None] * np.eye(3))
@@ -266,16 +284,13 @@ class Equilibrium:
         energy, deepest = assemble_obstacle(*parts, centre, radius, self._penalty, self._cautious, derivative, *out)
         return float(energy), float(deepest)
 
+    def _rubbed(self, u: FloatArray, centre: FloatArray, derivative: bool, out: tuple[FloatArray, ...]) -> float:
+        rub = self.rub
+        if rub is None:
+            return 0.0
+        parts = (u, self.block.nodes, self.block.elements, rub.owner, rub.values, rub.limits, rub.normals, rub.before, rub.creep)
+        return float(assemble_rub(*parts, centre, derivative, *out))
+
     def close(self) -> None:
         """Give the factor's memory back."""
         self._system.close()
-
-
-def _shape_values() -> FloatArray:
-    """(4, 10) shape functions of the ten-node tetrahedron at its four volume points, scikit-fem's order."""
-    from skfem import ElementTetP2  # noqa: PLC0415
-    from skfem.quadrature import get_quadrature  # noqa: PLC0415
-
-    element = ElementTetP2()
-    places, _ = get_quadrature(element, 2)
-    return np.array([element.lbasis(places, number)[0] for number in range(10)]).T

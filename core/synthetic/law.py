@@ -24,12 +24,14 @@ CAUTIOUS_GAP = 0.02
 _FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 
-def constants(young_modulus: FloatArray, poisson_ratio: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """c10, c01 and l [Pa] with the given E [Pa] and nu [1] at small strain."""
+def constants(young_modulus: FloatArray, poisson_ratio: float, relaxed: float = 0.0) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """c10, c01 and l [Pa] with the given E [Pa] and nu [1] at small strain, once this share of shear [1] has relaxed."""
     shear = young_modulus / (2 * (1 + poisson_ratio))
     lame = young_modulus * poisson_ratio / ((1 + poisson_ratio) * (1 - 2 * poisson_ratio))
+    bulk = lame + 2 / 3 * shear
+    shear = (1 - relaxed) * shear
     c01 = 0.5 * shear * SECOND_INVARIANT_SHARE
-    return 0.5 * shear - c01, c01, lame - 4 * c01
+    return 0.5 * shear - c01, c01, bulk - 2 / 3 * shear - 4 * c01
 
 
 @njit(cache=True, fastmath=_FAST)

@@ -49,6 +49,13 @@ class Probe:
         waypoints = self.waypoints + by * self.outwards * (np.arange(len(self.waypoints)) > 0)[:, None]
         return Probe(waypoints, self.times, np.where(self.arcs > 0, self.arcs - by, 0.0))
 
+    def when(self, leg: int, arcs: FloatArray) -> FloatArray:
+        """Times (n,) [s] at which the tool is at these arc lengths (n,) [m] between a knot and the next."""
+        times = np.linspace(self.times[leg], self.times[leg + 1], 400)
+        passed = self.arc(times)
+        order = slice(None) if passed[0] < passed[-1] else slice(None, None, -1)
+        return np.asarray(np.interp(arcs, passed[order], times[order]))
+
     def arc(self, times: FloatArray) -> FloatArray:
         """Arc length (n,) [m] at the times (n,) [s]."""
         return _eased(times, self.times, self.arcs)

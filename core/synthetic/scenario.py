@@ -11,7 +11,7 @@ from core.errors import EffectError
 from core.synthetic.disturbance import Disturbance
 from core.synthetic.naming import check_named
 
-__all__ = ["HIDDEN", "SHORT_PROTOCOL", "WEIGHED", "HiddenEffect", "Scenario", "draw_scenario"]
+__all__ = ["HIDDEN", "REMEMBERED", "SHORT_PROTOCOL", "STILL", "WEIGHED", "HiddenEffect", "Scenario", "draw_scenario"]
 
 HIDDEN: Mapping[str, Mapping[str, str]] = {
     "poisson_ratio": {"nu": "1"},
@@ -33,6 +33,9 @@ HIDDEN: Mapping[str, Mapping[str, str]] = {
     "depth_bias": {"offset": "m", "scale": "1"},
     "geometry_scale": {"scale_x": "1", "scale_y": "1", "scale_z": "1"},
     "landmark_mismatch": {"pairing": "", "scale": "1", "inset": "m"},
+    "viscoelasticity": {"relaxed_fraction": "1", "time_constant": "s"},
+    "permanent_set": {"retained_fraction": "1"},
+    "tool_friction": {"friction_coefficient": "1"},
 }
 """The effects that the virtual bench can hide, with the unit of each parameter; names are those of the catalogue."""
 
@@ -41,7 +44,13 @@ WEIGHED = (
     "camera_registration", "surface_layer", "stiffness_gradient", "strain_stiffening", "anisotropy", "base_compliance",
     "tool_compliance",
 )  # fmt: skip
-"""Those that are hidden unless others are asked for: what a seed draws among them stays the same as more are weighed."""
+"""Those that are hidden unless others are asked for."""
+
+REMEMBERED = ("viscoelasticity", "permanent_set", "tool_friction")
+"""What the block's past brings about. A diagnosis weighs it like the others; it is hidden only where it is asked for, so that a
+seed stands for the scenario that it stood for before."""
+STILL = ("depth_bias", "geometry_scale", "landmark_mismatch")
+"""What shows while nothing is pushed, in the rest cloud and the touches; hidden only where it is asked for, likewise."""
 
 SHORT_PROTOCOL = ("poke-top-01", "poke-top-02", "poke-side-01", "poke-side-02", "drag-01")
 """Every kind of motion to fit on, and a push from another side, which shows most causes, to test on."""
@@ -109,6 +118,11 @@ class Scenario:
     def hidden(self, effect: str) -> HiddenEffect | None:
         """The effect of that name, if it is hidden here."""
         return next((hidden for hidden in self.effects if hidden.effect == effect), None)
+
+    @property
+    def remembers(self) -> bool:
+        """Whether the material keeps something of what was done to it."""
+        return any(self.hidden(name) for name in ("viscoelasticity", "permanent_set"))
 
     @property
     def true_modulus(self) -> float:
@@ -185,6 +199,9 @@ _CLEAR: Mapping[str, _Draw] = {
     "depth_bias": _stretch,
     "geometry_scale": _sizes,
     "landmark_mismatch": _mismatch,
+    "viscoelasticity": lambda rng: {"relaxed_fraction": _between(rng, 0.4, 0.7, 3), "time_constant": _between(rng, 0.4, 2.5, 2)},
+    "permanent_set": lambda rng: {"retained_fraction": _between(rng, 0.12, 0.3, 3)},
+    "tool_friction": lambda rng: {"friction_coefficient": _between(rng, 0.3, 0.8, 3)},
 }
 
 
@@ -208,7 +225,7 @@ _NEUTRAL: Mapping[str, float] = {
 }  # fmt: skip
 _SHRINKING = (
     "dx", "dy", "dz", "extent", "specific_weight_over_stiffness", "offset", "translation", "rotation",
-    "log_ratio", "compliance_times_stiffness", "inset",
+    "log_ratio", "compliance_times_stiffness", "inset", "relaxed_fraction", "retained_fraction",
 )  # fmt: skip
 _GROWING = ("J_m", "stiffness_over_E")
 """Neutral where they are infinite, and by their inverse as far from it as they are strong."""
@@ -227,5 +244,6 @@ def _fainter(hidden: HiddenEffect) -> HiddenEffect:
         elif name == "pairing":
             parameters[name] = "as-paired"
         elif name == "friction_coefficient":
-            parameters[name] = round(float(value) * 1.5, 4)
+            weaker = 1.5 if hidden.effect == "base_slip" else 1 / 3
+            parameters[name] = round(float(value) * weaker, 4)
     return HiddenEffect(hidden.effect, parameters)

@@ -37,12 +37,24 @@ class Moment:
 
 @dataclass(frozen=True)
 class Passage:
-    """One straight run along a probe: `moments` at growing arc lengths `arcs` [m], from `begin` to `end` [s]."""
+    """One straight run along a probe, from `begin` to `end` [s]: `moments` at growing arc lengths `arcs` [m].
+
+    While the tool stands still and the block does not, `arcs` are times [s] instead: the passage is `timed`.
+    """
 
     begin: float
     end: float
     arcs: FloatArray
     moments: tuple[Moment, ...]
+    timed: bool = False
+
+    def keys(self, probe: Probe, times: FloatArray) -> FloatArray:
+        """What stands in the place of arc lengths (n,) at these times (n,) [s] of the probe."""
+        return times if self.timed else probe.arc(times)
+
+    def key(self, probe: Probe, time: float) -> float:
+        """The same at one time [s]."""
+        return float(self.keys(probe, np.array([time]))[0])
 
     @cached_property
     def _between(self) -> Any:
@@ -77,6 +89,7 @@ class Stretch:
         rest: (s, 3) drawn surface of the stated shape [m].
         faces: (t, 3).
         settled: (s, 3) displacement before the probe, slip included [m].
+        meshed: the probes for which the grid is fine.
     """
 
     probe: Probe
@@ -84,6 +97,7 @@ class Stretch:
     faces: IntArray
     settled: FloatArray
     passages: tuple[Passage, ...]
+    meshed: tuple[Probe, ...]
 
     def displacement(self, time: float) -> FloatArray:
         """Displacement (s, 3) from the stated shape [m] at a time [s]."""
@@ -92,7 +106,7 @@ class Stretch:
             if time < passage.begin:
                 return last
             instant = min(time, passage.end)
-            last = passage.surface(float(self.probe.arc(np.array([instant]))[0]))
+            last = passage.surface(passage.key(self.probe, instant))
             if time < passage.end:
                 return last
         return last
@@ -101,16 +115,16 @@ class Stretch:
         """Of the tool's centre under load (3,) [m] at a time [s]."""
         for passage in self.passages:
             if passage.begin <= time <= passage.end:
-                return passage.deflection(float(self.probe.arc(np.array([time]))[0]))
+                return passage.deflection(passage.key(self.probe, time))
         ended = [passage for passage in self.passages if passage.end < time]
-        return ended[-1].deflection(float(self.probe.arc(np.array([ended[-1].end]))[0])) if ended else np.zeros(3)
+        return ended[-1].deflection(ended[-1].key(self.probe, ended[-1].end)) if ended else np.zeros(3)
 
     def push(self, times: FloatArray) -> FloatArray:
         """Force of the tool on the block (n, 3) [N] at times (n,) [s]; while it stands between two passages, that of the first."""
         found = np.zeros((len(times), 3))
         for passage in self.passages:
             begun = times >= passage.begin
-            found[begun] = passage.push(self.probe.arc(np.minimum(times[begun], passage.end)))
+            found[begun] = passage.push(passage.keys(self.probe, np.minimum(times[begun], passage.end)))
         return found
 
     @property

@@ -46,6 +46,8 @@ def test_share_gives_a_size_only_where_the_surface_moves_in_proportion() -> None
     assert size(HiddenEffect("gravity", {"specific_weight_over_stiffness": 3.0}), sag) == pytest.approx(8.0)
     stiffening = row("strain_stiffening", {"share": 0.5}, at={"J_m": 6.0})
     assert size(HiddenEffect("strain_stiffening", {"J_m": 1.5}), stiffening) == pytest.approx(8.0)
+    relaxing = row("viscoelasticity", {"share": 0.1}, at={"relaxed_fraction": 0.5, "time_constant": 3.0})
+    assert size(HiddenEffect("viscoelasticity", {"relaxed_fraction": 0.6, "time_constant": 1.0}), relaxing) == pytest.approx(12.0)
     slip = row("base_slip", {"share": 0.01}, at={"friction_coefficient": 0.08})
     assert size(HiddenEffect("base_slip", {"friction_coefficient": 0.1}), slip) is None
 

@@ -76,7 +76,7 @@ def test_heavier_block_sags_further() -> None:
 
 def test_keys_are_dense_enough_to_interpolate(monkeypatch: pytest.MonkeyPatch) -> None:
     track = _track("poke-top-01")
-    monkeypatch.setattr("core.synthetic.bench.KEY_SPACING", 0.35e-3)
+    monkeypatch.setattr("core.synthetic.specimen.KEY_SPACING", 0.35e-3)
     dense = _track("poke-top-01")
     first = track.stretches[0].passages[0]
     for instant in np.linspace(first.begin, first.end, 9):

@@ -1,0 +1,192 @@
+"""Patterns of what hangs on the past, for the screening: one linear solve for each group and effect, and no replay.
+
+A replay that remembers is led along the tool's whole way (`core.diagnosis.ordered`), which costs many plain ones. Whether it is
+worth that is told by its trace: the change that it would bring about, taken from the plain replay's equilibria.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from core.diagnosis.comparison import Sample, compare, observe
+from core.diagnosis.observations import Observations
+from core.diagnosis.ordered import TRACED
+from core.diagnosis.prediction import Prediction
+from core.diagnosis.recollection import Recollection
+from core.diagnosis.rubbing import Spot, pulls, spot_of
+from core.diagnosis.timeline import Timeline, timeline_of
+from core.effects import Effect
+from core.effects.tool import ToolFriction
+from core.fem.factor import NotPositiveDefinite
+from core.fem.model import BlockModel
+from core.fem.newton import Outcome
+from core.frames import FloatArray
+from core.measurement import Surface
+from core.meshing import Meshing
+from core.replay import Equilibrium, Replay
+from core.sensitivity import factorise_at, local_probe, tool_slopes
+from core.setup import Setup
+from core.touches import touch_correction
+
+__all__ = ["Trace", "moved", "moves", "traces_of", "with_traces"]
+
+_STEP = 0.25
+"""Of a derivative by two traces, in the scale of what is moved."""
+_LEAST_SCALE, _MOST_SCALE = 0.5, 2.0
+"""Of a trace that is drawn to what the replay along the whole way changes [1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """What an effect changes, to first order: measured minus simulated gaps (g, p) [m], and forces on the tool (g, 3) [N]."""
+
+    gap: FloatArray
+    force: FloatArray
+
+    def on(self, plain: Prediction) -> Prediction:
+        """The plain prediction with the change in it."""
+        felt = None if plain.felt is None else replace(plain.felt, gap=plain.felt.gap + self.force)
+        return replace(plain, gap=plain.gap + self.gap, felt=felt)
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """One group: its frame, or the block without a tool on the grid of the last contact, and the model factorised there."""
+
+    frame: Equilibrium
+    model: BlockModel
+
+
+def traces_of(
+    data: Observations,
+    setup: Setup,
+    grid: Meshing,
+    frames: Sequence[Equilibrium],
+    samples: Sequence[Sample],
+    effects: Sequence[Effect],
+) -> list[Trace]:
+    """One trace of each effect, of the size that it has.
+
+    Args:
+        setup: without a memory. frames: of its replay, one for each group. samples: the points that are averaged.
+    """
+    block, surface = Replay(setup, grid), Surface.of(setup)
+    time = timeline_of(data, setup, touch_correction(setup, grid), tuple(frames))
+    rough = [effect for effect in effects if isinstance(effect, ToolFriction)]
+    lasting = [effect for effect in effects if not isinstance(effect, ToolFriction)]
+    past = Recollection(block, frames, time)
+    lacks = [past.lacks(effect) for effect in lasting]
+    spots: list[Spot | None] = []
+    shape, modulus = (len(frames), surface.patches), setup.material.young_modulus
+    found = {id(effect): Trace(np.zeros(shape), np.zeros((len(frames), 3))) for effect in effects}
+    kept: dict[int, tuple[_Look, Any]] = {}
+    for number, group in enumerate(data.groups):
+        touched = number in time.touched
+        if touched:
+            spots.append(None)
+        missing = {id(effect): own[number] for effect, own in zip(lasting, lacks, strict=True) if own[number] is not None}
+        look = _look(block, frames, number, time) if touched or missing else None
+        if look is None:
+            continue
+        seen = observe(look.frame, compare(group, setup, look.frame, surface, samples[number]))
+        answers = {}
+        for name, stress in missing.items():
+            assert stress is not None
+            answers[name] = look.model.topology.factor.solve(past.load(look.model, stress, look.frame.displacement))
+        if touched and rough:
+            spots[-1] = spot_of(look.model, look.frame)
+            kept[number] = (look, seen)
+        for name, answer in answers.items():
+            _state(found[name], number, look, seen, answer, modulus)
+    for effect in rough:
+        for pull, spot, number in zip(pulls(effect, time, spots), spots, time.touched, strict=True):
+            if spot is not None and pull.any():
+                look, seen = kept[number]
+                _state(found[id(effect)], number, look, seen, spot.answer @ pull, modulus, pull)
+    return [found[id(effect)] for effect in effects]
+
+
+def _look(block: Replay, frames: Sequence[Equilibrium], number: int, time: Timeline) -> _Look | None:
+    """None where no equilibrium, or no factor, is to be had."""
+    frame = frames[number]
+    if frame.outcome is not Outcome.CONVERGED:
+        return None
+    if frame.in_contact:
+        model = factorise_at(block, frame)
+        return None if model is None else _Look(frame, model)
+    before = [other for other in time.touched if time.instants[other] <= time.instants[number]]
+    mesh = frames[before[-1]].mesh if before else frame.mesh
+    still = replace(frame, mesh=mesh, displacement=frame.mesh.interpolate(frame.displacement, mesh.nodes))
+    model = block.model(mesh)
+    try:
+        model.topology.factor.factorise(model.assemble(mesh.nodes + still.displacement, None).data)
+    except NotPositiveDefinite:
+        return None
+    return _Look(still, model)
+
+
+def _state(
+    trace: Trace, number: int, look: _Look, seen: Any, answer: FloatArray, modulus: float, drag: FloatArray | float = 0.0
+) -> None:
+    """Put what the answer (u,) [m] changes into a group's row; `drag` (3,) pulls at the block itself, over E [m^2]."""
+    change = np.zeros_like(look.frame.displacement)
+    change[look.model.topology.free] = answer
+    trace.gap[number] = -(seen @ change.ravel())
+    if not look.frame.in_contact:
+        return
+    # Measured minus simulated force on the tool, which the coupling of the residual tells (see `core.sensitivity.force_changes`).
+    coupling = tool_slopes(look.model, look.frame.mesh.nodes + look.frame.displacement, local_probe(look.frame))[0]
+    trace.force[number] = modulus * (answer @ coupling + drag)
+
+
+def moved(effect: Effect, number: int) -> tuple[Effect, float]:
+    """With one search coordinate a step further, and the step."""
+    item, coordinates = effect.numbers()[number], effect.coordinates
+    step = _STEP * item.scale
+    step = -step if coordinates[number] + step > item.coordinate(item.high) else step
+    coordinates[number] += step
+    return effect.at(coordinates), step
+
+
+def moves(effects: Sequence[Effect]) -> list[Effect]:
+    """Those of the effects that are traced, each followed by itself with every number a step further."""
+    found = []
+    for effect in effects:
+        if isinstance(effect, TRACED):
+            found += [effect, *(moved(effect, number)[0] for number in range(len(effect.numbers())))]
+    return found
+
+
+def with_traces(
+    led: Prediction, plain: Prediction, traces: Sequence[Trace], effects: Sequence[Effect], first: int, extra: int
+) -> Prediction:
+    """A replay along the whole way with columns: those of the plain replay, and of traced effects the differences of their traces.
+
+    Args:
+        plain: without the traced effects, whose columns have those of the other effects from `first` on, and then the extra ones.
+        traces: of `moves(effects)`. extra: how many of them to keep.
+    """
+    columns = plain.columns if plain.felt is None else np.concatenate([plain.columns, plain.felt.columns], axis=1)
+    rows = [trace.gap if plain.felt is None else np.concatenate([trace.gap, trace.force], axis=1) for trace in traces]
+    parts, own, at = [columns[..., :first]], 0, first
+    whole, scale = np.zeros_like(plain.gap), 1.0
+    for effect in effects:
+        count = len(effect.numbers())
+        if not isinstance(effect, TRACED):
+            parts.append(columns[..., at : at + count])
+            at += count
+            continue
+        whole = whole + traces[own].gap
+        steps = [moved(effect, number)[1] for number in range(count)]
+        parts.append(np.stack([(rows[own + 1 + n] - rows[own]) / step for n, step in enumerate(steps)], axis=-1))
+        own += 1 + count
+    changed = led.less(plain)[0]
+    if whole.any():
+        scale = float(np.clip(np.sum(led.count * changed * whole) / np.sum(led.count * whole**2), _LEAST_SCALE, _MOST_SCALE))
+    for place, effect in enumerate(effects):
+        parts[1 + place] = parts[1 + place] * (scale if isinstance(effect, TRACED) else 1.0)
+    return led.with_rows(np.concatenate([*parts, columns[..., at : at + extra]], axis=2))
