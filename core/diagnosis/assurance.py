@@ -11,8 +11,14 @@ from core.diagnosis.next_probe import next_probe
 from core.diagnosis.observations import Observations
 from core.diagnosis.profiles import profiles
 from core.diagnosis.search import Findings
+from core.effects.tool import LandmarkMismatch
 
 __all__ = ["assured"]
+
+_AGAIN = {
+    "kind": "measurement", "separates": [LandmarkMismatch.name, "none"],
+    "text": "touch the landmarks once more, and name each as it is touched",
+}  # fmt: skip
 
 
 def assured(report: dict[str, Any], bench: Bench, data: Sequence[Observations], findings: Findings) -> dict[str, Any]:
@@ -24,7 +30,8 @@ def assured(report: dict[str, Any], bench: Bench, data: Sequence[Observations], 
     names: dict[str, dict[str, str]] = {}
     open_rows: list[dict[str, Any]] = []
     if findings.best:
-        checked = controls(bench, data, findings.best.model, findings.baseline)
+        # Without what no replay can do without, there is nothing to falsify.
+        checked = () if findings.known else controls(bench, data, findings.best.model, findings.baseline)
         told, open_rows = profiles(bench, findings.best.model)
         names = dict(zip(findings.best.model.names, told, strict=True))
     return {
@@ -32,7 +39,7 @@ def assured(report: dict[str, Any], bench: Bench, data: Sequence[Observations], 
         "causes": [_identified(cause, names.get(cause["effect"], {})) for cause in report["causes"]],
         "not_identifiable": [*report["not_identifiable"], *open_rows],
         "controls": [one.to_json() for one in checked],
-        "next_probe": next_probe(bench, data, findings),
+        "next_probe": [_AGAIN] if findings.known else next_probe(bench, data, findings),
         "warnings": [*report["warnings"], *warnings_of(checked)],
     }
 

@@ -75,6 +75,7 @@ class Findings:
         structure: error of the baseline that is smooth and grows with the push. left: the same of the best model.
         told: what this experiment tells of each effect, whatever the data say.
         withdrawn: why what was found is not named after all; empty where nothing was withdrawn.
+        known: what no replay could do without: touches that were surely of other landmarks.
     """
 
     baseline: Model
@@ -87,6 +88,7 @@ class Findings:
     left: Structure = NOTHING
     told: tuple[Told, ...] = ()
     withdrawn: str = ""
+    known: tuple[Effect, ...] = ()
 
     def withdraw(self, why: str) -> None:
         """Name nothing after all."""
@@ -172,8 +174,8 @@ def search(bench: Bench, seed: int) -> Findings:
     names = [effect.name for effect in known]
     origin = bench.baseline(tangents(with_effects(bench.setup, known), names), lump_places(bench), known)
     baseline = bench.evaluate((), origin.predictions) if known else origin
-    findings = Findings(baseline, misfit=bench.misfit(baseline))
-    findings.structure = findings.left = structure_of(bench, baseline, seed)
+    findings = Findings(baseline, misfit=bench.misfit(baseline), known=known)
+    findings.structure = findings.left = structure_of(bench, origin, seed)
     finite = signatures(bench, origin)
     screened, candidates, gains = _screen(bench, origin, finite, origin)
     blocks, nuisance = bench.tempered(screened), (*screened.nuisance, *screened.columns)
