@@ -12,6 +12,7 @@ __all__ = [
     "control_sentences",
     "determined_sentences",
     "limit_phrase",
+    "palpation_sentences",
     "probe_sentence",
     "quantity",
     "verdict_sentence",
@@ -57,6 +58,8 @@ def cause_phrase(cause: dict[str, Any], size: Sequence[float] | None = None) -> 
     """One cause as a noun phrase."""
     values = {name: entry.get("value") for name, entry in cause.get("parameters", {}).items()}
     phrase = PHRASES.get(cause["effect"])
+    if cause["effect"] == "stiff_inclusion" and "depth" in cause:
+        return _felt_lump(cause, values)
     try:
         return phrase(values, size) if phrase else f"an effect called {cause['effect'].replace('_', ' ')}"
     except (KeyError, TypeError):
@@ -150,6 +153,29 @@ def _lump(values: Values, size: Sequence[float] | None) -> str:
     kind = "stiff" if values["stiffness_ratio"] >= 1.0 else "soft"
     place = "" if size is None else f", {quantity(size[2] - values['z'], 'm')} under the top"
     return f"a {kind} lump, {quantity(2 * values['radius'], 'm')} across{place}"
+
+
+def _felt_lump(cause: dict[str, Any], values: Values) -> str:
+    """A lump that was felt and not seen: how deep it lies below the skin next to it."""
+    kind = "stiff" if values["stiffness_ratio"] >= 1.0 else "soft"
+    return f"a {kind} lump, {quantity(2 * values['radius'], 'm')} across, its centre {between(cause['depth'])} under the surface"
+
+
+def palpation_sentences(report: dict[str, Any]) -> list[str]:
+    """What was pushed, and of each lump where on the surface it is felt and how much tissue lies above it."""
+    palpation = report.get("palpation")
+    if not palpation:
+        return []
+    depth, force = (quantity(palpation[name]["value"], palpation[name]["unit"]) for name in ("depth", "force"))
+    said = [f"{palpation['pushes']} pushes, about {depth} deep, against about {force}"]
+    for cause in report.get("causes", []):
+        if footprint := cause.get("footprint"):
+            x, y, z = (quantity(value, "m") for value in footprint["middle"])
+            area = f"{1e4 * footprint['area']:.1f}{NARROW}cm²"
+            said.append(f"it is felt over {area} of the surface around ({x}, {y}, {z})")
+        if cover := cause.get("cover"):
+            said.append(f"{between(cover)} of tissue lie above it")
+    return said
 
 
 def _shift(values: Values, _: Sequence[float] | None) -> str:

@@ -45,6 +45,16 @@ class Box:
         """Places of the block (m, 3) [m] nearest to points (m, 3) [m]: the points themselves within it."""
         return np.clip(points, self.low, self.high)
 
+    def facing(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Distance (m,) [m] of points (m, 3) [m] to top and sides, negative within, and the normals (m, 3) of the side that faces
+        them; the base is no face.
+        """
+        beyond = np.concatenate([np.abs(points[:, :2]) - self.high[:2], points[:, 2:] - self.size[2]], axis=1)
+        distance = np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0)
+        side = beyond.argmax(axis=1)
+        normals = np.eye(3)[side] * np.where(side == 2, 1.0, np.sign(points[np.arange(len(points)), side]))[:, None]
+        return np.asarray(distance), np.asarray(normals)
+
     def surface_points(self) -> FloatArray:
         """Rest positions (m, 3) [m] spread evenly over the free surface."""
         from core.mesh import GridSpec, box_mesh  # noqa: PLC0415 (heavy)

@@ -107,7 +107,8 @@ _KEYS = {
     "a table is a number": Breakage(
         change(_TOML, lambda data: b"splits = 3\n" + data.split(b"[splits]")[0]), {"file": _TOML, "key": "splits"}, ("a table",)
     ),
-    "geometry is a mesh": _key('"box"', '"mesh"', "phantom.geometry", "'mesh'", "expected 'box'", value="'mesh'"),
+    "another geometry": _key('"box"', '"ball"', "phantom.geometry", "'ball'", "expected 'box', or 'mesh'", value="'ball'"),
+    "mesh with a size": _key('"box"', '"mesh"', "phantom.size", "expected no size for a mesh", value="[0.0687, 0.0393, 0.0358]"),
     "another tool": _key('"sphere"', '"cone"', "tool.shape", "'cone'", "expected 'sphere'"),
     "size in millimetres": _key(
         "[0.0687, 0.0393, 0.0358]", "[68.7, 39.3, 35.8]", "phantom.size[0]", "= 68.7", "millimetres", "0.0687 m"

@@ -6,7 +6,7 @@ import secrets
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -21,16 +21,25 @@ __all__ = ["demo"]
 def demo(
     seed: Annotated[int | None, typer.Option(min=0, help="What is hidden follows from it; drawn at random if not given.")] = None,
     effects: Annotated[int, typer.Option(min=0, max=2, help="How many effects to hide.")] = 1,
+    palpation: Annotated[
+        str | None,
+        typer.Option(help="Palpate by force alone, without a camera: a box or an organ, with a lump or with --effects 0."),
+    ] = None,
     show: Annotated[bool, typer.Option("--serve/--no-serve", help="Open the page afterwards.")] = True,
     folder: Annotated[Path, typer.Option(help="Where dataset and run go.")] = Path("runs/demo"),
     port: Annotated[int, typer.Option(min=0, max=65535)] = 8321,
     workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
 ) -> None:
     """Make a virtual phantom with a hidden effect, run the whole loop, and compare the verdict with the truth."""
+    if palpation not in (None, "box", "organ"):
+        raise typer.BadParameter(f"--palpation is box or organ, not {palpation!r}")
+    if palpation and effects > 1:
+        raise typer.BadParameter("--palpation hides one lump at most: --effects 0 or 1")
     chosen = secrets.randbelow(1_000_000) if seed is None else seed
-    out.print(f"seed [bold]{chosen}[/]  (the same again: palpate demo --seed {chosen})", highlight=False)
-    dataset = folder / "datasets" / f"demo-{chosen}-{effects}"
-    truth = _make(dataset, chosen, effects, workers)
+    again = f"palpate demo --seed {chosen}" + (f" --palpation {palpation}" if palpation else "")
+    out.print(f"seed [bold]{chosen}[/]  (the same again: {again})", highlight=False)
+    dataset = folder / "datasets" / f"{palpation or 'demo'}-{chosen}-{effects}"
+    truth = _make(dataset, chosen, effects, workers, palpation)
     run = folder / "runs" / f"{dataset.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     report, seconds = run_diagnosis(dataset, run, workers, chosen)
     print_report(report)
@@ -44,14 +53,23 @@ def demo(
         serve(settings, lambda address: announce(address, f"/?run={run.name}"))
 
 
-def _make(dataset: Path, seed: int, effects: int, workers: int) -> dict[str, Any]:
+def _make(dataset: Path, seed: int, effects: int, workers: int, palpation: str | None) -> dict[str, Any]:
     """The dataset of this seed with its truth; one that is there already is the same and is kept."""
     from app.commands.diagnosis import truth_beside  # noqa: PLC0415
-    from core.synthetic import SHORT_PROTOCOL, draw_scenario, make_dataset  # noqa: PLC0415 (heavy)
+    from core.synthetic import (  # noqa: PLC0415 (heavy)
+        SHORT_PROTOCOL,
+        draw_palpation,
+        draw_scenario,
+        make_dataset,
+        make_palpation,
+    )
 
     known = truth_beside(dataset) if dataset.is_dir() else None
     if known is not None:
         return known
     with progress("make the phantom") as report:
+        if palpation:
+            body: Literal["box", "organ"] = "box" if palpation == "box" else "organ"
+            return make_palpation(dataset, draw_palpation(body, effects, seed), seed, workers, report).as_dict()
         scenario = replace(draw_scenario(seed, effects), sequences=SHORT_PROTOCOL)
         return make_dataset(dataset, scenario, seed, workers, report).as_dict()

@@ -18,7 +18,15 @@ from rich.table import Table
 from rich.text import Text
 
 from app.console import out, progress, verdict_cells, verdict_table, write_json
-from app.sentences import between, control_sentences, determined_sentences, limit_phrase, probe_sentence, verdict_sentence
+from app.sentences import (
+    between,
+    control_sentences,
+    determined_sentences,
+    limit_phrase,
+    palpation_sentences,
+    probe_sentence,
+    verdict_sentence,
+)
 from core.errors import DatasetError, RunError
 
 __all__ = ["diagnose", "print_report", "run_diagnosis", "truth_beside"]
@@ -93,6 +101,7 @@ def print_report(report: dict[str, Any]) -> None:
         lines.append(Text(f"identified: {one['effect']}: {shown}; {one.get('why', '')}", style="dim"))
     for one in report.get("not_identifiable", []):
         lines.append(Text(f"not identifiable: {one['effect']}: {one.get('why', '')}", style="dim"))
+    lines += [Text(said) for said in palpation_sentences(report)]
     lines += [Text(said, style="dim") for said in determined_sentences(report.get("causes", []))]
     lines += [Text(f"control: {said}", style="dim") for said in control_sentences(report.get("controls") or [])]
     lines += [Text(f"next probe: {probe_sentence(row)}") for row in (report.get("next_probe") or [])[:1]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -12,10 +12,12 @@ from core.dataset.cloud import read_cloud, read_header
 from core.dataset.files import problem
 from core.dataset.schema import FILE, DatasetConfig, nearest, read_config
 from core.dataset.sequence import Sequence, read_sequence
+from core.dataset.surface import read_shape
 from core.dataset.table import FIRST_ROW, check_coordinates, read_labelled
 from core.errors import DatasetError
 from core.frames import FloatArray
 from core.progress import Report, silent
+from core.setup import Box, Shape
 
 __all__ = ["Dataset", "Touches", "open_dataset"]
 
@@ -33,13 +35,14 @@ class Touches:
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
-    """One phantom in one setup with its sequences; `sequences` are their names, sorted."""
+    """One phantom in one setup with its sequences; `sequences` are their names, sorted. `geometry` is as stated."""
 
     path: Path
     config: DatasetConfig
     touches: Touches
     has_rest: bool
     loaded: tuple[Sequence, ...]
+    geometry: Box | Shape
 
     @property
     def name(self) -> str:
@@ -50,6 +53,11 @@ class Dataset:
     def sequences(self) -> tuple[str, ...]:
         """Names of all sequences, sorted."""
         return tuple(sequence.name for sequence in self.loaded)
+
+    @cached_property
+    def observed(self) -> bool:
+        """Whether any sequence has clouds."""
+        return any(len(sequence) for sequence in self.loaded)
 
     def sequence(self, name: str) -> Sequence:
         """The sequence of this name."""
@@ -88,7 +96,7 @@ def open_dataset(path: Path | str) -> Dataset:
     """Open a dataset folder and check all but the points of its clouds; those are checked when read, or by `validate`."""
     root = Path(path)
     _check_folder(root)
-    config = read_config(root)
+    config, geometry = _stated(root)
     touches = _read_touches(root, config)
     sequences = tuple(read_sequence(root, name) for name in _sequence_names(root))
     _check_splits(config, [sequence.name for sequence in sequences])
@@ -98,7 +106,16 @@ def open_dataset(path: Path | str) -> Dataset:
     has_rest = observed or (root / "rest.ply").exists()
     if has_rest:
         read_header(root, "rest.ply")
-    return Dataset(root, config, touches, has_rest, sequences)
+    return Dataset(root, config, touches, has_rest, sequences, geometry)
+
+
+def _stated(root: Path) -> tuple[DatasetConfig, Box | Shape]:
+    """What dataset.toml states, and the phantom's geometry."""
+    config = read_config(root)
+    if not config.surface:
+        return config, Box(size=config.size)
+    shape = read_shape(root, config.surface)
+    return replace(config, size=shape.size), shape
 
 
 def _check_folder(root: Path) -> None:

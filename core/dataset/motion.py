@@ -1,6 +1,6 @@
-"""What a tool path does to the box as stated: pushes from above and from the side, drags; how deep, where, how fast.
+"""What a tool path does to the phantom as stated: pushes from above and from the side, drags; how deep, where, how fast.
 
-The stated box is rigid here, so that a depth is how far the sphere would overlap it.
+The stated phantom is rigid here, so that a depth is how far the sphere would overlap it.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ ContactKind = Literal["top", "side", "drag"]
 
 TOUCHING = 0.0005  # m; about what touches are good for, so nearer counts as touching
 RELEASED = 0.001  # m; two contacts are one unless the tool leaves this far in between
+_LEVEL = 0.7  # cosine; a surface that is less level is a side
 _STEP = 0.05  # s; positions are averaged over it, or their noise would be taken for speed
 
 
@@ -30,7 +31,7 @@ class Contact:
     Attributes:
         kind: "top" and "side" are pushes into that face, "drag" travels along it.
         start, end: on the robot's clock [s].
-        depth: deepest overlap of the sphere with the box at rest [m].
+        depth: deepest overlap of the sphere with the phantom at rest [m].
         place: tool centre at first touch, phantom frame [m].
         travel: how far it moves along the touched face [m].
         speed: that three quarters of the time stay below [m/s].
@@ -50,7 +51,7 @@ class Motion:
     """One sequence in the phantom frame.
 
     Attributes:
-        nearest: smallest gap between sphere and box at rest [m]; negative is the depth reached.
+        nearest: smallest gap between sphere and phantom at rest [m]; negative is the depth reached.
         untouched_before, untouched_after: clouds before the first and after the last contact.
         rest_after: time from the last contact to the last cloud, or row where there are no clouds [s].
     """
@@ -75,8 +76,9 @@ def box_gap(points: FloatArray, size: tuple[float, float, float], radius: float)
 def motion_of(dataset: Dataset, sequence: Sequence, phantom_from_robot: Transform) -> Motion:
     """What this sequence does, by the stated size, radius and registration."""
     time, path = smooth_path(sequence, phantom_from_robot)
-    gap = box_gap(path, dataset.config.size, dataset.config.tool_radius)
-    contacts = tuple(_contact(time[part], path[part], gap[part], dataset.config.size) for part in _episodes(gap))
+    distance, normals = dataset.geometry.facing(path)
+    gap = distance - dataset.config.tool_radius
+    contacts = tuple(_contact(time[part], path[part], gap[part], normals[part.start]) for part in _episodes(gap))
     last_seen = float(sequence.cloud_times[-1] if len(sequence) else time[-1])
     return Motion(
         contacts=contacts,
@@ -113,11 +115,11 @@ def _episodes(gap: FloatArray) -> list[slice]:
     return found
 
 
-def _contact(time: FloatArray, path: FloatArray, gap: FloatArray, size: tuple[float, float, float]) -> Contact:
-    face = int(_beyond(path[0], size).argmax())
-    travel, depth = float(np.linalg.norm(np.ptp(np.delete(path, face, axis=1), axis=0))), -float(gap.min())
+def _contact(time: FloatArray, path: FloatArray, gap: FloatArray, normal: FloatArray) -> Contact:
+    along = path - (path @ normal)[:, None] * normal
+    travel, depth = float(np.linalg.norm(np.ptp(along, axis=0))), -float(gap.min())
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1) / np.diff(time)
-    kind: ContactKind = "top" if face == 2 else "side"
+    kind: ContactKind = "top" if normal[2] > _LEVEL else "side"
     x, y, z = (float(value) for value in path[0])
     return Contact(
         # A slanted push wanders by about its own depth; a drag goes on for several times that.

@@ -17,6 +17,8 @@ LONG_REST = 2.0  # s; several time constants of the quicker soft materials
 OTHER_DEPTH = 1.25  # ratio that makes two depths different
 OTHER_SPEED = 2.0  # ratio that makes two speeds different
 OTHER_PLACE = 0.010  # m, between two places
+FEW_PUSHES = 12  # without clouds; fewer leave most of a phantom untouched
+SHALLOW = 0.002  # m; half of what a hand presses
 
 
 @dataclass(frozen=True)
@@ -30,17 +32,18 @@ class Lack:
 def lacks(motions: dict[str, Motion], observed: bool, forces: bool) -> tuple[Lack, ...]:
     """What these motions (by sequence), with or without any cloud and force, do not show."""
     found = [*_of_measurements(observed, forces)]
-    if motions:
-        found += [*_of_kinds(list(motions.values())), *_of_variety(list(motions.values()))]
-        if observed:
-            found += _of_rests(motions)
+    if motions and observed:
+        found += [*_of_kinds(list(motions.values())), *_of_variety(list(motions.values())), *_of_rests(motions)]
+    elif motions:
+        found += _of_palpation(list(motions.values()))
     return tuple(found)
 
 
 def _of_measurements(observed: bool, forces: bool) -> Iterable[Lack]:
     if not observed:
         yield Lack(
-            ("stiff_inclusion", "base_slip", "camera_registration"), "no clouds: the surface is not seen, only forces are compared"
+            ("base_slip", "camera_registration", "time_offset"),
+            "no clouds: the surface is not seen, only forces are compared; what the camera alone would show is not weighed",
         )
     if not forces:
         yield Lack(("young_modulus",), "no forces: the stiffness of a homogeneous block does not show; add forces.csv")
@@ -58,6 +61,18 @@ def _of_kinds(motions: list[Motion]) -> Iterable[Lack]:
             yield Lack(effects, f"no {name}: add two, elsewhere each")
         elif count == 1:
             yield Lack(effects, f"only one sequence with a {name}: repeat it elsewhere, so that one can be kept for the test")
+
+
+def _of_palpation(motions: list[Motion]) -> Iterable[Lack]:
+    """Of pushes that are felt and not seen."""
+    pushes = [contact for motion in motions for contact in motion.contacts]
+    if len(pushes) < FEW_PUSHES:
+        text = f"{len(pushes)} pushes in all: a lump between them is not felt, add more, none over {1e3 * OTHER_PLACE:.0f} mm away"
+        yield Lack(("stiff_inclusion",), text)
+    shallow = [contact for contact in pushes if contact.depth < SHALLOW]
+    if pushes and len(shallow) > len(pushes) / 2:
+        text = f"{len(shallow)} of {len(pushes)} pushes are less than {1e3 * SHALLOW:.0f} mm deep: deeper ones reach farther"
+        yield Lack(("stiff_inclusion", "young_modulus"), text)
 
 
 def _of_variety(motions: list[Motion]) -> Iterable[Lack]:

@@ -27,7 +27,8 @@ class DatasetConfig:
     """What dataset.toml states, SI units.
 
     Attributes:
-        size: edge lengths of the box (x, y, z) [m].
+        size: edge lengths of the box (x, y, z) [m]; of a mesh its extent, once its surface was read.
+        surface: file of a mesh, phantom frame, metres; empty for a box.
         mass: of the phantom [kg].
         fixed: what is believed to be held, always "base".
         young_modulus, poisson_ratio: beliefs about the material [Pa], [1].
@@ -42,6 +43,7 @@ class DatasetConfig:
 
     name: str
     size: Vector
+    surface: str
     mass: float
     fixed: str
     young_modulus: float
@@ -185,16 +187,27 @@ def _unit_hint(value: float, low: float, high: float, unit: str) -> str:
 
 def _phantom(keys: _Keys) -> dict[str, Any]:
     keys.only(("geometry", "surface", "size", "mass", "fixed", "young_modulus", "poisson_ratio"))
-    keys.choice("geometry", "box", "other shapes than a box cannot be replayed yet")
-    if "surface" in keys.values:
-        raise keys.wrong("surface", keys.values["surface"], "no surface for a box: remove this key")
     return {
-        "size": keys.vector("size", 1e-3, 2.0),
+        **_geometry(keys),
         "mass": keys.number("mass", 1e-5, 50.0, "kg"),
         "fixed": keys.choice("fixed", "base", "only a held base is supported"),
         "young_modulus": keys.number("young_modulus", 50.0, 1e9, "Pa", default=5.0e3),
         "poisson_ratio": keys.number("poisson_ratio", -0.5, 0.4999, "", default=0.45),
     }
+
+
+def _geometry(keys: _Keys) -> dict[str, Any]:
+    """Size of a box, or the surface of a mesh, whose size is that of its surface."""
+    geometry = keys.take("geometry")
+    if geometry not in ("box", "mesh"):
+        raise keys.wrong("geometry", geometry, "'box', or 'mesh' with surface = \"phantom.stl\": name one of the two")
+    if geometry == "box":
+        if "surface" in keys.values:
+            raise keys.wrong("surface", keys.values["surface"], "no surface for a box: remove this key")
+        return {"size": keys.vector("size", 1e-3, 2.0), "surface": ""}
+    if "size" in keys.values:
+        raise keys.wrong("size", keys.values["size"], "no size for a mesh, whose surface has it: remove this key")
+    return {"size": (0.0, 0.0, 0.0), "surface": keys.name("surface")}
 
 
 def _tool(keys: _Keys) -> float:

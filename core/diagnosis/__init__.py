@@ -14,13 +14,17 @@ from core.cleaning import cleaner_for, find_shaft_axis
 from core.dataset import Dataset
 from core.diagnosis.assurance import assured
 from core.diagnosis.bench import Bench
+from core.diagnosis.felt_gain import FeltLadder, felt_ladder
+from core.diagnosis.felt_picture import draw_palpation
 from core.diagnosis.gain import Ladder, harm, ladder
-from core.diagnosis.observations import Observations, observe_all
+from core.diagnosis.observations import Observations
+from core.diagnosis.palpation import palpated
 from core.diagnosis.patterns import draw_patterns, patterns
 from core.diagnosis.recording import record
 from core.diagnosis.search import Findings, search
 from core.diagnosis.static import StaticChannel
 from core.diagnosis.still import Still
+from core.diagnosis.unseen import observe_each, pushed_places
 from core.diagnosis.verdict import report_of
 from core.diagnosis.workers import Workers
 from core.errors import DiagnosisError, RunError
@@ -28,12 +32,14 @@ from core.grading import FINE_GRID, PAGE_GRID, REPLAY_GRID, SCREEN_GRID
 from core.meshing import Meshing
 from core.progress import Report, part, silent
 from core.registration import Registration, register, setup_from
-from core.setup import Setup
+from core.setup import Setup, Shape
+from core.shape.pushed import FINE_PUSHES, REPLAY_PUSHES, SCREEN_PUSHES
 
 __all__ = ["diagnose"]
 
-FIT_GROUPS = 14
-TEST_GROUPS = 24
+FIT_GROUPS, FIT_FELT = 14, 24
+TEST_GROUPS, TEST_FELT = 24, 32
+"""Groups of a sequence at most that are fitted, and that the gain is taken of: with clouds, and with forces alone."""
 
 
 def diagnose(
@@ -66,8 +72,8 @@ def diagnose(
     registration = register(dataset)
     setup, mended = setup_from(dataset, registration), registration.mended
     seen_from = setup_from(dataset, mended)
-    data = observe_all(dataset, fitted, seen_from, mended, FIT_GROUPS, part(report, 0.02, 0.04))
-    unseen = observe_all(dataset, tested, seen_from, mended, TEST_GROUPS, part(report, 0.04, 0.05))
+    data = observe_each(dataset, fitted, seen_from, mended, (FIT_GROUPS, FIT_FELT), part(report, 0.02, 0.04))
+    unseen = observe_each(dataset, tested, seen_from, mended, (TEST_GROUPS, TEST_FELT), part(report, 0.04, 0.05))
     out.parent.mkdir(parents=True, exist_ok=True)
     making = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
     try:
@@ -89,13 +95,24 @@ def _splits(dataset: Dataset) -> tuple[tuple[str, ...], tuple[str, ...]]:
             "and judged on others",
             key="splits",
         )
-    if not dataset.has_rest:
+    seen = any(len(dataset.sequence(name)) for name in (*fitted, *config.test))
+    if seen and not any(len(dataset.sequence(name)) for name in fitted):
+        raise DiagnosisError("[splits] only the test sequences have clouds; fit on some that have, or leave them out", key="splits")
+    if seen and config.test and not any(len(dataset.sequence(name)) for name in config.test):
         raise DiagnosisError(
-            "rest.ply is missing: without it the camera cannot be registered; record one raw cloud of the untouched phantom"
+            "[splits] no test sequence has clouds, though some that are fitted have; name one in test", key="splits"
         )
-    if any(not len(dataset.sequence(name)) for name in (*fitted, *config.test)):
-        raise DiagnosisError("sequences without clouds cannot be diagnosed yet; leave them out of [splits]", key="splits")
     return fitted, tuple(config.test)
+
+
+def _meshings(setup: Setup, data: list[Observations]) -> tuple[Meshing, Meshing, Meshing]:
+    """Of a diagnosis, the fine one and the rough one."""
+    radius = setup.tool.radius
+    if not isinstance(setup.geometry, Shape):
+        return REPLAY_GRID.for_tool(radius), FINE_GRID.for_tool(radius), SCREEN_GRID.for_tool(radius)
+    places = pushed_places(data, setup)[0]
+    found = [spec.for_tool(radius).at(places) for spec in (REPLAY_PUSHES, FINE_PUSHES, SCREEN_PUSHES)]
+    return found[0], found[1], found[2]
 
 
 def _run(
@@ -110,13 +127,14 @@ def _run(
     wanted: tuple[bool, bool],
 ) -> dict[str, Any]:
     (fitted, unseen), (replays, assurance) = data, wanted
-    grid, fine = REPLAY_GRID.for_tool(setup.tool.radius), FINE_GRID.for_tool(setup.tool.radius)
-    static = Still(StaticChannel.of(dataset.rest_cloud(), cleaner_for(dataset, registration), setup, grid))
+    grid, fine, rough = _meshings(setup, [*fitted, *unseen])
+    seen = any(not item.unseen for item in fitted)
+    static = Still(StaticChannel.of(dataset.rest_cloud(), cleaner_for(dataset, registration), setup, grid)) if seen else None
     names = [item.name for item in fitted]
     bench = Bench(
-        setup, registration, pool, names, static, grid, fine, part(report, 0.05, 0.75), any(item.forces for item in fitted)
+        setup, registration, pool, names, static, grid, fine, part(report, 0.05, 0.75), any(item.forces for item in fitted), seen
     )
-    bench.rough = SCREEN_GRID.for_tool(setup.tool.radius)
+    bench.rough, bench.pushed = rough, pushed_places(fitted, setup)
     findings = search(bench, seed)
     model = findings.best.model if findings.best else findings.baseline
     report(0.75, "measuring the gain on test sequences")
@@ -129,11 +147,16 @@ def _run(
         result = assured(result, bench, fitted, findings)
     (making / "replays").mkdir()
     (making / "pictures").mkdir()
-    if replays:
+    if replays and seen:
         _record(dataset, registration, (setup, model.setup), pool, making / "replays", part(report, 0.8, 1.0))
-    pictured = patterns(bench, fitted, findings.baseline, model)
-    pictured.save(making / "patterns.npz")
-    draw_patterns(pictured, bench.surface, making / "pictures" / "patterns.png")
+    if seen:
+        pictured = patterns(bench, fitted, findings.baseline, model)
+        pictured.save(making / "patterns.npz")
+        draw_patterns(pictured, bench.surface, making / "pictures" / "patterns.png")
+    else:
+        result, pushes, shown = palpated(result, bench, fitted, findings)
+        lump = next((cause for cause in result["causes"] if "cover" in cause), None)
+        draw_palpation(making / "pictures" / "palpation.png", setup.geometry, pushes, shown, lump)
     (making / "model.json").write_text(json.dumps(_model(dataset, model.setup, findings, names), indent=1))
     (making / "report.json").write_text(json.dumps(result, indent=1))
     return result
@@ -149,6 +172,7 @@ def _record(
     tasks = [
         pool.run(record, dataset.path, name, stated, found, cleaner, shaft, page, folder / f"{name}.npz")
         for name in dataset.sequences
+        if len(dataset.sequence(name))
     ]
     for number, task in enumerate(tasks):
         report(number / len(tasks), "replaying every sequence for the page")
@@ -157,7 +181,7 @@ def _record(
 
 def _gain(
     unseen: list[Observations], pool: Workers, setups: tuple[Setup, Setup], grid: Meshing, seed: int, lost: bool = False
-) -> Ladder | None:
+) -> Ladder | FeltLadder | None:
     """Of the stated and the found setup; where the stated one is `lost`, its tool far off, the other says which points count.
 
     None where the stated setup then finds an equilibrium in no frame in which the tool touches.
@@ -170,6 +194,8 @@ def _gain(
     touched = [{n for n, group in enumerate(item.groups) if not group.free} for item in unseen]
     if lost and all(own <= {*one.failed, *two.failed} for own, one, two in zip(touched, baseline, extended, strict=True)):
         return None
+    if all(item.unseen for item in unseen):
+        return felt_ladder(unseen, baseline, extended, seed)
     return ladder(unseen, baseline, extended, stated, found, seed)
 
 
@@ -178,5 +204,11 @@ def _model(dataset: Dataset, setup: Setup, findings: Findings, fitted: list[str]
     effects = [effect.to_json() for effect in findings.best.model.effects] if findings.best else []
     return {
         "format": 1, "version": 1, "dataset": dataset.name, "parent": None, "fitted_on": fitted, "effects": effects,
-        "setup": setup.as_dict(), "grid": asdict(REPLAY_GRID.for_tool(setup.tool.radius)),
+        "setup": setup.as_dict(), "grid": _described(setup),
     }  # fmt: skip
+
+
+def _described(setup: Setup) -> dict[str, Any]:
+    """How the model is meshed, plain values."""
+    spec = REPLAY_PUSHES if isinstance(setup.geometry, Shape) else REPLAY_GRID
+    return asdict(spec.for_tool(setup.tool.radius))

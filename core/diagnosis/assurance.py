@@ -7,6 +7,7 @@ from typing import Any
 
 from core.diagnosis.bench import Bench
 from core.diagnosis.controls import Control, controls, warnings_of
+from core.diagnosis.felt_controls import felt_controls
 from core.diagnosis.next_probe import next_probe
 from core.diagnosis.observations import Observations
 from core.diagnosis.profiles import profiles
@@ -30,8 +31,11 @@ def assured(report: dict[str, Any], bench: Bench, data: Sequence[Observations], 
     names: dict[str, dict[str, str]] = {}
     open_rows: list[dict[str, Any]] = []
     if findings.best:
-        # Without what no replay can do without, there is nothing to falsify.
-        checked = () if findings.known else controls(bench, data, findings.best.model, findings.baseline)
+        model = findings.best.model
+        if not findings.known:  # without that nothing can be replayed, and so nothing falsified
+            checked = (
+                controls(bench, data, model, findings.baseline) if bench.seen else felt_controls(bench, model, findings.baseline)
+            )
         told, open_rows = profiles(bench, findings.best.model)
         names = dict(zip(findings.best.model.names, told, strict=True))
     return {
@@ -39,7 +43,7 @@ def assured(report: dict[str, Any], bench: Bench, data: Sequence[Observations], 
         "causes": [_identified(cause, names.get(cause["effect"], {})) for cause in report["causes"]],
         "not_identifiable": [*report["not_identifiable"], *open_rows],
         "controls": [one.to_json() for one in checked],
-        "next_probe": [_AGAIN] if findings.known else next_probe(bench, data, findings),
+        "next_probe": [_AGAIN] if findings.known else next_probe(bench, data, findings) if bench.seen else [],
         "warnings": [*report["warnings"], *warnings_of(checked)],
     }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted
 from core.diagnosis.resolution import OWN_GRID, under_stated, with_columns
 from core.diagnosis.still import Still
 from core.diagnosis.tangent import SMALL, Tangent, changed_at_rest
+from core.diagnosis.weighed import weighed
 from core.diagnosis.workers import TOLERANCE, Pending, Workers
 from core.effects import Effect
 from core.effects.geometry import MeshResolution
@@ -43,7 +45,12 @@ first order a tool's shift by millimetres promises a small part of what it does.
 
 
 class Bench:
-    """Evaluates hypotheses about one dataset: stated setup, workers, noise and priors in one place."""
+    """Evaluates hypotheses about one dataset: stated setup, workers, noise and priors in one place.
+
+    Attributes:
+        weighed: effects that this data can tell. seen: whether any sequence has clouds. pushed: places and outward normals (k, 3)
+            of the pushes without clouds, under which a lump is looked for.
+    """
 
     def __init__(
         self,
@@ -56,18 +63,26 @@ class Bench:
         fine: Meshing,
         report: Report = silent,
         forces: bool = False,
+        seen: bool = True,
     ) -> None:
         self.setup, self.registration, self.workers, self.static = setup, registration, workers, static
         self.names, self._report, self._done = tuple(names), report, 0.0
         self.grid, self.fine, self.rough = grid, fine, grid
         self.nuisances = Nuisances.of(registration.mended, forces)
         self._first = TOOL_COLUMNS + 8 + forces
-        self.surface = Surface(setup.box)
+        self.weighed: tuple[type[Effect], ...] = weighed(setup, seen=seen, forces=forces)
+        self.seen = seen
+        self.pushed = (np.empty((0, 3)), np.empty((0, 3)))
         self.temperature = 1.0
         self.noises: list[Noise] = []
         self.on_own_grid: tuple[Prediction, ...] = ()
         self.evaluations = 0
         self.known: list[Model] = []
+
+    @cached_property
+    def surface(self) -> Surface:
+        """What the camera sees; SetupError for what is no block."""
+        return Surface(self.setup.box)
 
     def tell(self, text: str, done: float = 0.0) -> None:
         """Report what is being done; the share that is done [1] never falls."""
@@ -183,7 +198,8 @@ class Bench:
             own = self.on_own_grid = with_columns([f.result() for f in self.predict(known, None, own)], own)
         fine = [f.result() for f in self.predict(known, None, own, self.fine)]
         places = model.extra["lumps"]
-        self.noises = under_stated(noises(own, fine, self.surface, slice(places[0], places[-1] + 1)), model.predictions)
+        surface = self.surface if self.seen else None
+        self.noises = under_stated(noises(own, fine, surface, slice(places[0], places[-1] + 1)), model.predictions)
         model = self.assemble(tuple(effects), model.setup, model.predictions, tangents, len(lumps))
         self.temperature = self.misfit(model)
         return model

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from core.diagnosis.bench import PRIOR_STEPS, TRUST, Bench
+from core.diagnosis.beneath import lumps_under
 from core.diagnosis.evidence import fit
 from core.diagnosis.hypothesis import TWINS, Model
 from core.diagnosis.ordered import TRACED
@@ -17,9 +18,9 @@ from core.diagnosis.resolution import OWN_GRID, mesh_candidate
 from core.diagnosis.screening import Candidate
 from core.diagnosis.tangent import Tangent
 from core.effects import OUTSIDE, Effect
-from core.effects.geometry import GeometryScale
+from core.effects.geometry import GeometryScale, MeshResolution
 from core.effects.load import Gravity
-from core.effects.material import StiffInclusion, YoungModulus
+from core.effects.material import StiffInclusion
 from core.effects.memory import PermanentSet, Viscoelasticity
 from core.effects.sensor import DepthBias, TimeOffset
 from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
@@ -51,15 +52,17 @@ _FARTHEST = 1.8
 
 
 def lump_places(bench: Bench) -> tuple[Inclusion, ...]:
-    """Places of the coarse grid of inclusions."""
+    """Places of the coarse grid of inclusions; without clouds those under the pushes."""
+    if not bench.seen:
+        return lumps_under(*bench.pushed, bench.setup.geometry)
     return tuple(
         Inclusion(x=s.x, y=s.y, z=s.z, radius=s.radius, stiffness_ratio=s.stiffness_ratio)
         for s in StiffInclusion.starts(bench.setup)
     )
 
 
-def tangents(setup: Setup, besides: Sequence[str] = ()) -> tuple[Tangent, ...]:
-    """Effects whose action grows in proportion to a number near nothing, in this setup and not `besides`.
+def tangents(setup: Setup, besides: Sequence[str] = (), weighed: Sequence[type[Effect]] = ()) -> tuple[Tangent, ...]:
+    """Effects whose action grows in proportion to a number near nothing, in this setup and not `besides`; those that are `weighed`.
 
     Against replays at a finite size (a skin of 0.3 and 4 times, gradients of 0.7 and -1.2, J_m of 1 and 3, fibres of 3) the columns
     have correlations of 0.98, 0.999, 0.99 and 0.95 over the whitened data of a whole dataset, for a thirtieth of the time.
@@ -74,7 +77,8 @@ def tangents(setup: Setup, besides: Sequence[str] = ()) -> tuple[Tangent, ...]:
         _step(ToolCompliance.neutral(setup), "compliance_times_stiffness"),
         *(_step(kind.neutral(setup), item.name) for kind in _TOGETHER for item in kind.numbers()),
     ]
-    return tuple(tangent for tangent in found if tangent.effect.name not in besides)
+    kinds = tuple(weighed)
+    return tuple(item for item in found if item.effect.name not in besides and (not kinds or isinstance(item.effect, kinds)))
 
 
 def _step(effect: Effect, name: str, spread: float | None = None) -> Tangent:
@@ -88,7 +92,7 @@ def signatures(bench: Bench, baseline: Model) -> list[Signature]:
     Sag alone is replayed on the mesh of the diagnosis: on the rough one its pattern has a correlation of 0.89 with what it should
     be, the others' 0.99.
     """
-    starts = [effect for kind in FINITE for effect in kind.starts(bench.setup)]
+    starts = [effect for kind in FINITE if kind in bench.weighed for effect in kind.starts(bench.setup)]
     rough = [future.result() for future in bench.predict(baseline.effects, None, baseline.predictions, bench.rough)]
     known = [baseline.predictions if _mesh_for(effect, bench) is bench.grid else rough for effect in starts]
     pending = [
@@ -106,7 +110,11 @@ def signatures(bench: Bench, baseline: Model) -> list[Signature]:
 
 def _traced(bench: Bench, baseline: Model) -> list[Signature]:
     """What hangs on the past would do, to first order, for the cost of a few solves a group (see `core.diagnosis.traces`)."""
-    starts = [effect for kind in TRACED for effect in kind.starts(bench.setup)]
+    if any(item.unseen for item in baseline.predictions):
+        return []  # short pushes that are felt alone leave nothing behind to be seen
+    starts = [effect for kind in TRACED if kind in bench.weighed for effect in kind.starts(bench.setup)]
+    if not starts:
+        return []
     bench.tell("what the material or the tool would remember", 0.4)
     pending = bench.workers.trace(bench.names, baseline.setup, bench.grid, baseline.predictions, starts)
     traces = [future.result() for future in pending]
@@ -122,7 +130,7 @@ def candidates_of(model: Model, bench: Bench, finite: Sequence[Signature]) -> li
     """Every effect of the catalogue that is not in the model yet, as columns of it."""
     setup, found = model.setup, []
     for kind, columns in TWINS.items():
-        if kind is YoungModulus and not bench.nuisances.forces:
+        if kind not in bench.weighed:
             continue
         effect = kind.neutral(setup)
         spreads = [PRIOR_STEPS * item.scale for item in effect.numbers()]
@@ -135,9 +143,9 @@ def candidates_of(model: Model, bench: Bench, finite: Sequence[Signature]) -> li
         start = StiffInclusion(x=lump.x, y=lump.y, z=lump.z, radius=lump.radius, stiffness_ratio=1.0)
         found.append(Candidate(start=start, of=("stiffness_ratio",), columns=(place,), spread=(2.0,)))
     for place, (effect, predictions) in zip(model.extra.get("signatures", ()), finite, strict=True):
-        if any(np.isfinite(p.gap).any() for p in predictions):
+        if any(np.isfinite(p.gap).any() or (p.felt is not None and np.isfinite(p.felt.gap).any()) for p in predictions):
             found.append(Candidate(start=effect, columns=(place,), spread=(1.0,)))
-    found += [] if bench.on_own_grid else [mesh_candidate(model)]
+    found += [mesh_candidate(model)] if MeshResolution in bench.weighed and not bench.on_own_grid else []
     return [candidate for candidate in found if candidate.start.name not in model.names]
 
 

@@ -116,7 +116,8 @@ def _chosen(bench: Bench, data: Sequence[Observations], model: Model, baseline: 
         for there, here, noise in zip(model.predictions, baseline.predictions, bench.noises, strict=True)
     ]
     chosen = {}
-    for number in sorted(np.argsort([-size.sum() for size in shown])[:MOST_SEQUENCES].tolist()):
+    order = [number for number in np.argsort([-size.sum() for size in shown]).tolist() if not data[number].unseen]
+    for number in sorted(order[:MOST_SEQUENCES]):
         groups = data[number].groups
         clear = [row for row, group in enumerate(groups) if group.free or group.reference]
         near = [row for row in np.argsort(-shown[number]).tolist() if row not in clear]

@@ -26,8 +26,8 @@ class Block:
     values: float
 
 
-def gram(residual: FloatArray, columns: FloatArray, weights: FloatArray) -> tuple[FloatArray, float]:
-    """Gram matrix of residual and columns with each patch's weighted mean over the groups taken out.
+def gram(residual: FloatArray, columns: FloatArray, weights: FloatArray, centred: bool = True) -> tuple[FloatArray, float]:
+    """Gram matrix of residual and columns; where `centred`, with each patch's weighted mean over the groups taken out.
 
     Args:
         residual: (g, p) [m]. columns: (g, p, k). weights: (g, p) inverse variances [1/m^2], zero where unseen.
@@ -37,10 +37,12 @@ def gram(residual: FloatArray, columns: FloatArray, weights: FloatArray) -> tupl
     """
     stacked = np.concatenate([np.where(weights > 0, residual, 0.0)[..., None], columns], axis=2)
     total = weights.sum(axis=0)
-    mean = np.einsum("gp,gpk->pk", weights, stacked) / np.maximum(total, 1e-300)[:, None]
-    centred = (stacked - mean) * np.sqrt(weights)[..., None]
-    flat = centred.reshape(-1, centred.shape[2])
-    return np.asarray(flat.T @ flat), float((weights > 0).sum() - (total > 0).sum())
+    taken = float((total > 0).sum()) if centred else 0.0
+    if centred:
+        stacked = stacked - np.einsum("gp,gpk->pk", weights, stacked) / np.maximum(total, 1e-300)[:, None]
+    white = stacked * np.sqrt(weights)[..., None]
+    flat = white.reshape(-1, white.shape[2])
+    return np.asarray(flat.T @ flat), float((weights > 0).sum() - taken)
 
 
 @dataclass(frozen=True, eq=False)

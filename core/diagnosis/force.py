@@ -16,15 +16,22 @@ import numpy as np
 from core.dataset import Forces
 from core.diagnosis.smoothing import SMOOTHING, averaged
 from core.frames import FloatArray
+from core.meshing import IntArray
 from core.replay import Equilibrium
 
-__all__ = ["FORCE_ERROR", "FORCE_SCATTER", "Felt", "ForceRecord", "force_discrepancy", "force_scatter", "rms_force"]
+__all__ = [
+    "CONTACT_DEPTH", "FORCE_ERROR", "FORCE_SCATTER", "Felt", "ForceRecord", "depth_discrepancy", "force_discrepancy",
+    "force_scatter", "rms_force",
+]  # fmt: skip
 
 FORCE_ERROR, FORCE_SCATTER = 0.03, 0.01
 """Standard deviations of the engine's relative error of the force: of a push as a whole, and of each place on its own [1].
 
 The mesh of a replay is 1 to 2 % off, as much as its law and that of another program are apart at these depths, and sensors are
 calibrated to 1 %."""
+CONTACT_DEPTH = 1e-4
+"""Standard deviation of how deep a push went against what robot, registration and surface say, one for each push [m]: of the
+surface's triangles, of what a hand takes for the first touch, of a tool that is not quite a ball."""
 _CELL = 1.0
 """Longest stretch [s] over which an untouched sensor is averaged to one reading of its bias."""
 _LEAST_SAMPLES = 20
@@ -115,23 +122,29 @@ class Felt:
     Attributes:
         gap: (g, 3) measured minus simulated force on the tool [N]; NaN where none was measured. noise: (g,) its deviation [N].
         force: (g, 3) simulated [N]. columns: (g, 3, k) change of gap by what the columns of the surface's gap stand for.
+        push: (g,) number of each group's push, from 1; None where a push ends with a group that is clear.
     """
 
     gap: FloatArray
     noise: FloatArray
     force: FloatArray
     columns: FloatArray
+    push: IntArray | None = None
 
     @classmethod
-    def of(cls, measured: tuple[FloatArray, FloatArray], frames: Sequence[Equilibrium], columns: Sequence[Any]) -> Felt:
+    def of(
+        cls, measured: tuple[FloatArray, FloatArray], frames: Sequence[Equilibrium], columns: Sequence[Any],
+        push: IntArray | None = None,
+    ) -> Felt:  # fmt: skip
         """From forces and their deviations, a model's frames, and the changes (3, k) of each, if any."""
         force = np.array([frame.force if frame.in_contact else np.zeros(3) for frame in frames])
         stacked: FloatArray = np.stack(columns) if columns else np.zeros((len(frames), 3, 0))
-        return cls(measured[0] - force, measured[1], force, stacked)
+        return cls(measured[0] - force, measured[1], force, stacked, push)
 
     def of_groups(self, index: list[int]) -> Felt:
         """These groups alone."""
-        return Felt(self.gap[index], self.noise[index], self.force[index], self.columns[index])
+        push = None if self.push is None else self.push[index]
+        return Felt(self.gap[index], self.noise[index], self.force[index], self.columns[index], push)
 
     def beside(self, added: FloatArray) -> Felt:
         """With further columns (g, 3, m) last."""
@@ -146,10 +159,21 @@ def force_scatter(felt: Felt) -> FloatArray:
 
 def force_discrepancy(felt: Felt, frames: Sequence[Equilibrium]) -> FloatArray:
     """Columns (g, 3, pushes) [N] of the engine's own error, one for each push, of unit variance."""
+    return np.asarray(FORCE_ERROR * felt.force[:, :, None] * _pushes(felt, frames)[:, None, :])
+
+
+def depth_discrepancy(felt: Felt, frames: Sequence[Equilibrium]) -> FloatArray:
+    """Columns (g, 3, pushes) [N] of how deep each push really went, along its force, of unit variance."""
+    along = felt.force / np.maximum(np.linalg.norm(felt.force, axis=1, keepdims=True), 1e-12)
+    deeper = np.einsum("gik,gk->gi", felt.columns[..., :3], along)
+    return np.asarray(CONTACT_DEPTH * deeper[:, :, None] * _pushes(felt, frames)[:, None, :])
+
+
+def _pushes(felt: Felt, frames: Sequence[Equilibrium]) -> BoolArray:
+    """Which groups belong to which push (g, pushes)."""
     touched = np.array([frame.in_contact for frame in frames])
-    push = np.cumsum(np.diff(touched.astype(int), prepend=0) == 1)
-    one_of = touched[:, None] & (push[:, None] == np.arange(1, push.max(initial=0) + 1))
-    return np.asarray(FORCE_ERROR * felt.force[:, :, None] * one_of[:, None, :])
+    push = np.cumsum(np.diff(touched.astype(int), prepend=0) == 1) if felt.push is None else felt.push
+    return np.asarray(touched[:, None] & (push[:, None] == np.arange(1, push.max(initial=0) + 1)))
 
 
 def rms_force(felt: Sequence[tuple[Felt, BoolArray]]) -> tuple[float, float]:

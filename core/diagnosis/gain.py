@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from core.diagnosis.felt_gain import FeltLadder
 from core.diagnosis.force import rms_force
 from core.diagnosis.noise import patch_variance
 from core.diagnosis.observations import Observations
@@ -55,7 +56,7 @@ class Ladder:
     force: tuple[float, float, float] | None = None
 
 
-def harm(names: Sequence[str], gain: Ladder) -> str:
+def harm(names: Sequence[str], gain: Ladder | FeltLadder) -> str:
     """Why causes that make the test sequences worse are not named; empty where they do not (step 10 of the method: no transfer)."""
     value, low, high = gain.removed
     if high > -_WORSE:
@@ -99,8 +100,9 @@ def ladder(
     Groups in touch count, and of a material that remembers also what a push has left.
     """
     lasting = found.material.remembers
-    variance, rows = patch_variance([*baseline, *extended]), []
-    for item, before, after in zip(data, baseline, extended, strict=True):
+    seen_by_camera = [row for row in zip(data, baseline, extended, strict=True) if not row[0].unseen]
+    variance, rows = patch_variance([model for row in seen_by_camera for model in row[1:]]), []
+    for item, before, after in seen_by_camera:
         (own, _), (other, known) = fixed_pattern(item, before, lasting), fixed_pattern(item, after, lasting)
         difference = own - other
         if not known.sum():
@@ -163,6 +165,6 @@ def _paper(data: Sequence[Observations], predictions: Sequence[Prediction], setu
     surface, sight, found = Surface.of(setup), sight_of(setup), []
     for item, prediction in zip(data, predictions, strict=True):
         for number, group in enumerate(item.groups):
-            if not group.free and number not in prediction.failed:
+            if not item.unseen and not group.free and number not in prediction.failed:
                 found.append(paper_distance(sight.place(group.points[:_PAPER_POINTS]), prediction.equilibria[number], surface))
     return float(np.mean(found)) if found else float("nan")

@@ -16,7 +16,7 @@ from core.effects.sensor import CameraRegistration
 from core.frames import FloatArray
 from core.setup import Setup
 
-__all__ = ["INTERVAL_LEVEL", "intervals", "modulus_interval", "stands"]
+__all__ = ["INTERVAL_LEVEL", "intervals", "modulus_interval", "spread_of", "stands"]
 
 INTERVAL_LEVEL = 0.95
 """Share of the intervals that are to hold the truth [1]."""
@@ -46,7 +46,7 @@ def _robust(blocks: Sequence[Block], columns: Sequence[int], precision: FloatArr
     return change, np.maximum(laplace, deviation * t.ppf(0.975, len(sequences) - 1) / _NORMAL_95)
 
 
-def _spread(bench: Bench, model: Model) -> FloatArray:
+def spread_of(bench: Bench, model: Model) -> FloatArray:
     """Half widths of the 95 % intervals over 1.96, one for each search coordinate, with what the replay's own error leaves."""
     own = slice(len(model.nuisance), None)
     robust = _robust(bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model), own)[1]
@@ -71,7 +71,7 @@ def stands(bench: Bench, model: Model, without: Model) -> bool:
 
 def intervals(bench: Bench, model: Model) -> list[dict[str, dict[str, Any]]]:
     """For each effect: name to value, unit and 95 % interval (magnitudes by sampling)."""
-    spread = _spread(bench, model)
+    spread = spread_of(bench, model)
     found, at = [], 0
     for effect in model.effects:
         number = len(effect.numbers())

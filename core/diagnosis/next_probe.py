@@ -106,7 +106,7 @@ def next_probe(bench: Bench, data: Sequence[Observations], findings: Findings) -
 
 def _scene(bench: Bench, findings: Findings) -> Scene:
     """What the camera sees, as it has seen it so far."""
-    predictions, surface = findings.baseline.predictions, bench.surface
+    predictions, surface = [item for item in findings.baseline.predictions if not item.unseen], bench.surface
     counts = [item.count[[frame.in_contact for frame in item.equilibria]] for item in predictions]
     return Scene(
         stated=survivor(bench, findings.baseline), lumps=lump_places(bench), centres=surface.patch_centres,

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from core.diagnosis.evidence import Block, gram
-from core.diagnosis.force import force_discrepancy, force_scatter
+from core.diagnosis.force import depth_discrepancy, force_discrepancy, force_scatter
 from core.diagnosis.prediction import Prediction
 from core.frames import FloatArray
 from core.measurement import Surface
@@ -65,12 +65,15 @@ class Noise:
     Attributes:
         weights: (g, r) inverse variances [1/m^2]. residual: (g, r) of the baseline [m], zero where unseen.
         mesh: (g, r) fine minus default mesh [m]. discrepancy: (g, r, d) columns of the engine's own error, unit variance.
+        centred: whether each row has a constant of its own, as the camera's pattern is; forces alone have none, since their bias
+            was taken off.
     """
 
     weights: FloatArray
     residual: FloatArray
     mesh: FloatArray
     discrepancy: FloatArray
+    centred: bool = True
 
     @classmethod
     def of(cls, baseline: Prediction, fine: Prediction, surface: Surface, variance: FloatArray, lumps: slice) -> Noise:
@@ -95,6 +98,25 @@ class Noise:
         weights = np.where(seen, 1 / scatter, 0.0)
         return cls(weights, np.where(seen, gap, 0.0), mesh, np.concatenate([displacement, stiffness], axis=2))
 
+    @classmethod
+    def felt(cls, baseline: Prediction, fine: Prediction, lumps: slice) -> Noise:
+        """The same of a sequence without clouds: the force's rows alone, with how deep each push went as one more thing that is
+        known only so well.
+        """
+        (gap, columns), finer = rows_of(baseline), rows_of(fine)[0]
+        assert baseline.felt is not None
+        seen = np.isfinite(gap) & np.isfinite(finer)
+        seen[list(set(baseline.failed) | set(fine.failed))] = False
+        mesh = np.where(seen, finer - gap, 0.0)
+        scatter = force_scatter(baseline.felt) + (0.5 * mesh) ** 2
+        parts = [
+            force_discrepancy(baseline.felt, baseline.equilibria),
+            depth_discrepancy(baseline.felt, baseline.equilibria),
+            STIFFNESS_ERROR * columns[..., lumps].astype(float),
+        ]
+        weights = np.where(seen, 1 / scatter, 0.0)
+        return cls(weights, np.where(seen, gap, 0.0), mesh, np.concatenate(parts, axis=2), centred=False)
+
     def remeshed(self, model: Prediction, fine: Prediction) -> Noise:
         """With the mesh's error as it is in another model; all else stays, so that no patch gains or loses weight."""
         gap, finer = rows_of(model)[0], rows_of(fine)[0]
@@ -113,7 +135,7 @@ class Noise:
         residual = np.where(usable, gap, self.residual) + self.mesh
         columns = np.where(usable[..., None], columns, 0.0)
         stacked = np.concatenate([columns, self.mesh[..., None], self.discrepancy], axis=2)
-        matrix, values = gram(residual, stacked, self.weights)
+        matrix, values = gram(residual, stacked, self.weights, self.centred)
         kept = matrix.shape[0] - self.discrepancy.shape[2]
         cross, inner = matrix[:kept, kept:], matrix[kept:, kept:]
         reduced = matrix[:kept, :kept] - cross @ np.linalg.solve(inner + np.eye(len(inner)), cross.T)
@@ -126,7 +148,11 @@ def _aside(surface: FloatArray, force: FloatArray) -> FloatArray:
     return np.concatenate([np.concatenate([surface, nothing[0]], axis=2), np.concatenate([nothing[1], force], axis=2)], axis=1)
 
 
-def noises(baseline: Sequence[Prediction], fine: Sequence[Prediction], surface: Surface, lumps: slice) -> list[Noise]:
-    """The noise of every sequence."""
-    variance = patch_variance(baseline)
-    return [Noise.of(b, f, surface, variance, lumps) for b, f in zip(baseline, fine, strict=True)]
+def noises(baseline: Sequence[Prediction], fine: Sequence[Prediction], surface: Surface | None, lumps: slice) -> list[Noise]:
+    """The noise of every sequence; only those without clouds need no surface."""
+    seen = [item for item in baseline if not item.unseen]
+    variance = patch_variance(seen) if seen else np.empty(0)
+    return [
+        Noise.felt(b, f, lumps) if b.unseen or surface is None else Noise.of(b, f, surface, variance, lumps)
+        for b, f in zip(baseline, fine, strict=True)
+    ]

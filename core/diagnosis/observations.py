@@ -69,7 +69,8 @@ class Observations:
 
     Attributes:
         times: (f,) cloud stamps [s]. kinematics: the robot's stream. groups: in the order of time.
-        forces: on the tool, if they were measured.
+        forces: on the tool, if they were measured. unseen: whether there are no clouds, so that groups hold instants of the pushes
+            and no points.
     """
 
     name: str
@@ -77,6 +78,7 @@ class Observations:
     kinematics: Kinematics
     groups: tuple[Group, ...]
     forces: ForceRecord | None = None
+    unseen: bool = False
 
     def centres(self, setup: Setup) -> FloatArray:
         """Stated tool centre (g, 3) [m] of each group, phantom frame, under the setup's clock and registration."""

@@ -44,7 +44,7 @@ def patterns(bench: Bench, data: Sequence[Observations], baseline: Model, found:
     A cause that shows in the push is compared without what the untouched frames show, the camera's pattern; one that shows in the
     untouched block already (sag, a camera that was moved) with it.
     """
-    pairs = list(zip(data, baseline.predictions, found.predictions, strict=True))
+    pairs = [row for row in zip(data, baseline.predictions, found.predictions, strict=True) if not row[0].unseen]
     lasting = found.setup.material.remembers
     compared = [_compare(item, before, after, whole=False, lasting=lasting) for item, before, after in pairs]
     if sum(still for _, still, _ in compared) > sum((rows.change**2 * rows.points).sum() for _, _, rows in compared):

@@ -9,6 +9,7 @@ import numpy as np
 
 from core.diagnosis.comparison import Compared, Sample, choose, compare, observe
 from core.diagnosis.force import Felt
+from core.diagnosis.leading import led
 from core.diagnosis.observations import Observations
 from core.diagnosis.ordered import Past, forgetful
 from core.fem.model import rule_of
@@ -22,9 +23,8 @@ from core.replay import Equilibrium, Replay
 from core.sensitivity import TOOL_STEP, Change, displacement_changes, force_changes
 from core.setup import Inclusion, Setup
 from core.sight import sight_of
-from core.touches import touch_correction
 
-__all__ = ["TOOL_COLUMNS", "Prediction", "Sample", "Wanted", "predict"]
+__all__ = ["TOOL_COLUMNS", "Columns", "Prediction", "Sample", "Wanted", "predict"]
 
 TOOL_COLUMNS = 6
 """Columns that always come first: the tool moved along x, y, z and turned about the robot registration's pivot."""
@@ -58,7 +58,8 @@ class Prediction:
     Attributes:
         gap: (g, p) mean of measured minus simulated [m], NaN where unseen. count: (g, p) points. spread: (g, p) [m].
         columns: (g, p, k) change of gap: TOOL_COLUMNS, then setups, then lumps.
-        equilibria: of each group. samples: of each group, for the predictions of other models. felt: forces, if there are any.
+        equilibria: of each group. samples: of each group, for the predictions of other models; none without clouds, where there
+            are no patches. felt: forces, if there are any.
     """
 
     name: str
@@ -71,6 +72,11 @@ class Prediction:
     felt: Felt | None = None
 
     @property
+    def unseen(self) -> bool:
+        """Whether there are forces alone."""
+        return not self.gap.shape[1]
+
+    @property
     def failed(self) -> tuple[int, ...]:
         """Groups without equilibrium."""
         return tuple(i for i, frame in enumerate(self.equilibria) if frame.outcome is not Outcome.CONVERGED)
@@ -78,7 +84,8 @@ class Prediction:
     def of_groups(self, index: Sequence[int]) -> Prediction:
         """These groups alone."""
         own = list(index)
-        frames, points = tuple(self.equilibria[row] for row in own), tuple(self.samples[row] for row in own)
+        frames = tuple(self.equilibria[row] for row in own)
+        points = tuple(self.samples[row] for row in own) if self.samples else ()
         felt = None if self.felt is None else self.felt.of_groups(own)
         seen = (self.gap[own], self.count[own], self.spread[own], self.columns[own])
         return Prediction(self.name, *seen, frames, points, felt)
@@ -122,7 +129,7 @@ class Prediction:
         return np.nan_to_num(self.gap - origin.gap), felt
 
 
-class _Columns:
+class Columns:
     """Changes of a group's displacement, projected on what is seen of it, and of the force on the tool, if that is `felt`."""
 
     def __init__(self, block: Replay, wanted: Wanted, felt: bool) -> None:
@@ -252,17 +259,9 @@ def predict(
         wanted: changes to state; none without it. samples: which points to average; chosen anew without them.
     """
     surface, block = Surface.of(setup), Replay(setup, grid, tolerance)
-    true_from_stated = touch_correction(setup, grid)
-    centres = true_from_stated.apply(data.centres(setup))
-    moves = np.zeros((len(wanted.setups) if wanted else 0, len(data.groups), 3))
-    true_from_robot = true_from_stated @ setup.phantom_from_robot
-    turned = np.zeros((len(moves), 3, 3))
-    for number, other in enumerate(wanted.setups if wanted else ()):
-        correction = touch_correction(other, grid)
-        moves[number] = correction.apply(data.centres(other)) - centres
-        turned[number] = (correction @ other.phantom_from_robot @ true_from_robot.inverse()).rotation
-    measured = data.felt(true_from_robot, setup.sensor.time_offset)
-    columns = _Columns(block, wanted, measured is not None) if wanted and not setup.remembers else None
+    way = led(data, setup, grid, wanted)
+    true_from_stated, centres, moves, turned, measured = way.correction, way.centres, way.moves, way.turned, way.measured
+    columns = Columns(block, wanted, measured is not None) if wanted and not setup.remembers else None
     gap, count, spread, changes, pressed, frames, chosen = [], [], [], [], [], [], []
     past = Past(data, block, true_from_stated) if setup.remembers else None
     slides = past is None and setup.support.friction_coefficient is not None

@@ -172,7 +172,7 @@ def search(bench: Bench, seed: int) -> Findings:
     bench.tell("replaying the stated setup on two meshes", 0.02)
     known = mispaired(bench.setup, bench.grid, bench.registration.repair)
     names = [effect.name for effect in known]
-    origin = bench.baseline(tangents(with_effects(bench.setup, known), names), lump_places(bench), known)
+    origin = bench.baseline(tangents(with_effects(bench.setup, known), names, bench.weighed), lump_places(bench), known)
     baseline = bench.evaluate((), origin.predictions) if known else origin
     findings = Findings(baseline, misfit=bench.misfit(baseline), known=known)
     findings.structure = findings.left = structure_of(bench, origin, seed)
@@ -210,7 +210,7 @@ def search(bench: Bench, seed: int) -> Findings:
 
 def _again(bench: Bench, model: Model, finite: Sequence[Signature], origin: Model) -> tuple[Model, list[Candidate], np.ndarray]:
     """Screen the catalogue on top of a model that has causes already."""
-    wanted = tangents(model.setup, besides=model.names)
+    wanted = tangents(model.setup, model.names, bench.weighed)
     extended = bench.evaluate(model.effects, model.predictions, wanted, lump_places(bench))
     return _screen(bench, extended, finite, origin)
 

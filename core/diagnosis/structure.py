@@ -23,6 +23,8 @@ __all__ = ["NOTHING", "Structure", "explained_by_modes", "structure_of"]
 
 MODE_LENGTH = 12e-3
 """Distance between surface modes [m]: what a cause inside a block or at its base shows is no finer than this."""
+FELT_LENGTH = 12e-3
+"""The same between modes of the force, over the places that are pushed: a share of each push's own force."""
 DRAWS = 400
 QUANTILE = 0.999
 """Of what chance gives; by a gamma distribution with the draws' mean and variance, as a sum of squares nearly has. At one in a
@@ -65,11 +67,27 @@ def _depth(item: Prediction) -> FloatArray:
 
 def _with_modes(model: Model, bench: Bench) -> list[Block]:
     """The model's blocks whose last columns are the modes."""
-    basis, blocks = smooth_basis(bench.surface.patch_centres, MODE_LENGTH), []
+    seen = smooth_basis(bench.surface.patch_centres, MODE_LENGTH) if bench.seen else np.zeros((0, 0))
+    felt = smooth_basis(bench.pushed[0], FELT_LENGTH) if len(bench.pushed[0]) else np.zeros((0, 0))
+    blocks, at = [], 0
     for noise, item in zip(bench.noises, model.predictions, strict=True):
-        modes = _depth(item)[:, None, None] * basis
-        blocks.append(noise.block(item.beside(modes)))
+        modes = max(seen.shape[1], felt.shape[1])
+        if item.felt is not None and item.unseen:
+            push = np.asarray(item.felt.push)
+            names = np.unique(push)
+            own = felt[at + np.searchsorted(names, push)]
+            at += len(names)
+            force = _wide(item.felt.force[:, :, None] * own[:, None, :], modes)
+            blocks.append(noise.block(item.beside(np.zeros((len(own), 0, modes)), force)))
+        else:
+            blocks.append(noise.block(item.beside(_wide(_depth(item)[:, None, None] * seen, modes))))
     return blocks
+
+
+def _wide(columns: FloatArray, count: int) -> FloatArray:
+    """With so many columns (..., count), the further ones zero: all blocks have the same."""
+    missing = count - columns.shape[-1]
+    return np.concatenate([columns, np.zeros((*columns.shape[:-1], missing))], axis=-1) if missing else columns
 
 
 def explained_by_modes(

@@ -8,14 +8,15 @@ import numpy as np
 
 from core.dataset import Dataset
 from core.diagnosis.bench import Bench
+from core.diagnosis.felt_gain import FeltLadder
 from core.diagnosis.gain import Ladder
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.intervals import INTERVAL_LEVEL, intervals, modulus_interval
 from core.diagnosis.resolution import too_coarse
 from core.diagnosis.search import Findings, Trial
-from core.effects import DIAGNOSED, Effect
 from core.effects.geometry import MeshResolution
 from core.effects.material import YoungModulus
+from core.frames import FloatArray
 
 __all__ = ["UNEXPLAINED_MISFIT", "report_of", "verdict_of"]
 
@@ -67,8 +68,7 @@ def _causes(bench: Bench, findings: Findings, trials: list[Trial]) -> list[dict[
 def _ranking(bench: Bench, findings: Findings, named: set[str]) -> list[dict[str, Any]]:
     chances = _probabilities(findings)
     rows = []
-    kinds: tuple[type[Effect], ...] = (*DIAGNOSED, YoungModulus) if bench.nuisances.forces else DIAGNOSED
-    for kind in kinds:
+    for kind in bench.weighed:
         if kind.name in named:
             continue
         alone = [t for t in findings.trials if t.model.names == (kind.name,)]
@@ -96,10 +96,10 @@ def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
     model = findings.best.model if findings.best else findings.baseline
     worst = {block.name: block.gram[0, 0] / max(block.values, 1) for block in model.blocks if block.name != "rest"}
     when = max(worst, key=lambda name: worst[name])
-    patch, share = _worst_patch(model, bench)
+    place, share = _worst_patch(model, bench) if bench.seen else _worst_push(model, bench)
     before, left = findings.structure, findings.left
     fraction = max(left.ratio - 1.0, 0.0) / max(before.ratio, left.ratio, 1.0) if left.significant else 0.0
-    place = bench.surface.patch_centres[patch] * 1e3
+    place = 1e3 * place
     where = f"{100 * share:.0f} % of it within 8 mm of ({place[0]:.0f}, {place[1]:.0f}, {place[2]:.0f}) mm"
     return {
         "fraction": round(fraction, 4), "where": where, "when": f"most in {when}",
@@ -108,23 +108,38 @@ def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _worst_patch(model: Model, bench: Bench) -> tuple[int, float]:
-    """Patch with the largest squared residual around it, and its share of the whole."""
+def _worst_push(model: Model, bench: Bench) -> tuple[FloatArray, float]:
+    """Place (3,) [m] of the push with the largest squared error of the force around it, and its share of the whole."""
+    total: list[float] = []
+    for item in model.predictions:
+        assert item.felt is not None and item.felt.push is not None
+        squares = np.nan_to_num(item.felt.gap**2).sum(axis=1)
+        total += [float(squares[item.felt.push == name].sum()) for name in np.unique(item.felt.push)]
+    return _gathered(bench.pushed[0], np.array(total))
+
+
+def _gathered(centres: FloatArray, total: FloatArray) -> tuple[FloatArray, float]:
+    """Of places (p, 3) [m] that with the most of a total (p,) around it, and its share."""
+    around = (np.linalg.norm(centres[:, None] - centres, axis=2) < 8e-3) @ total
+    worst = int(around.argmax())
+    return centres[worst], float(around[worst] / max(total.sum(), 1e-300))
+
+
+def _worst_patch(model: Model, bench: Bench) -> tuple[FloatArray, float]:
+    """Centre (3,) [m] of the patch with the largest squared residual around it, and its share of the whole."""
     total = np.zeros(bench.surface.patches)
     for item in model.predictions:
+        if item.unseen:
+            continue
         touched = np.array([frame.in_contact for frame in item.equilibria])
         still = np.isfinite(item.gap) & ~touched[:, None]
         zero = np.where(still, item.gap, 0.0).sum(axis=0) / np.maximum(still.sum(axis=0), 1)
         away = np.where(still.any(axis=0), np.nan_to_num(item.gap - zero), 0.0)
         total += (away**2 * item.count * touched[:, None]).sum(axis=0)
-    centres = bench.surface.patch_centres
-    near = np.linalg.norm(centres[:, None] - centres, axis=2) < 8e-3
-    around = near @ total
-    worst = int(around.argmax())
-    return worst, float(around[worst] / max(total.sum(), 1e-300))
+    return _gathered(bench.surface.patch_centres, total)
 
 
-def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder | None, split: str) -> dict[str, Any]:
+def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder | FeltLadder | None, split: str) -> dict[str, Any]:
     """The report contract."""
     verdict = verdict_of(findings)
     best = [findings.best] if findings.best else []
@@ -146,7 +161,9 @@ def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder |
         },
         "warnings": [*bench.registration.warnings, *(text for text in (findings.withdrawn, coarse) if text)],
     }  # fmt: skip
-    if gain is not None:
+    if isinstance(gain, FeltLadder):
+        report["gain"] = gain.to_json(split)
+    elif gain is not None:
         value, low, high = gain.removed
         report["gain"] = {
             "split": split, "unit": "mm", "baseline": round(gain.baseline * 1e3, 4), "extended": round(gain.extended * 1e3, 4),

@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import ParamSpec, Self, TypeVar
 
 from core.diagnosis.comparison import Sample
+from core.diagnosis.felt_prediction import predict_forces
 from core.diagnosis.observations import Observations
 from core.diagnosis.prediction import Prediction, Wanted, predict
 from core.diagnosis.traces import Trace, traces_of
@@ -45,6 +46,8 @@ def _task(
     samples: Sequence[Sample] | None,
     tolerance: float,
 ) -> Prediction:
+    if _DATA[name].unseen:
+        return predict_forces(_DATA[name], setup, grid, wanted, starts, tolerance)
     found = predict(_DATA[name], setup, grid, wanted, starts, tolerance, samples)
     return found if samples is None else replace(found, samples=())
 
@@ -109,7 +112,7 @@ class Workers:
         pending = []
         for number, name in enumerate(names):
             begin = None if starts is None else starts[number].equilibria
-            points = None if starts is None or not same_points else starts[number].samples
+            points = None if starts is None or not same_points else starts[number].samples or None
             future = self._pool.submit(_task, name, setup, grid, wanted, begin, points, tolerance)
             pending.append(Pending(future, points))
         return pending

@@ -18,8 +18,9 @@ class Viscoelasticity(Effect):
 
     name, enters = "viscoelasticity", Slot.MATERIAL
     summary = "the material relaxes and recovers with delay"
-    relaxed_fraction: float = parameter("1", low=0.0, high=0.95, scale=0.1)
-    time_constant: float = parameter("s", low=1e-2, high=1e3, scale=0.5, log=True)
+    # A virtual push of 5 mm on two engines: the dents left differ by 5 %, and fade alike within 4 %.
+    relaxed_fraction: float = parameter("1", low=0.0, high=0.95, scale=0.1, accuracy=0.02)
+    time_constant: float = parameter("s", low=1e-2, high=1e3, scale=0.5, log=True, accuracy=0.04)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
@@ -42,7 +43,8 @@ class PermanentSet(Effect):
 
     name, enters = "permanent_set", Slot.MATERIAL
     summary = "part of the deformation stays after release"
-    retained_fraction: float = parameter("1", low=0.0, high=0.8, scale=0.05)
+    # The same push: the dents left differ by 2 to 3 %.
+    retained_fraction: float = parameter("1", low=0.0, high=0.8, scale=0.05, accuracy=0.006)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

@@ -82,7 +82,8 @@ class ToolFriction(Effect):
 
     name, enters = "tool_friction", Slot.TOOL
     summary = "the tool drags the surface along"
-    friction_coefficient: float = parameter("1", low=0.0, high=3.0, scale=0.1)
+    # Of a coefficient of 0.5 on two engines and two grids the surface is dragged as far within 3 %, as far as one of 0.515 does.
+    friction_coefficient: float = parameter("1", low=0.0, high=3.0, scale=0.1, accuracy=0.02)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

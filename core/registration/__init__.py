@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from core.dataset import Dataset
+from core.errors import RegistrationError
 from core.frames import FloatArray, Transform
 from core.progress import Report, silent
 from core.registration.camera import CameraFit, fit_camera
@@ -16,7 +17,7 @@ from core.registration.pose import motion_jacobian, small_motion
 from core.registration.repairing import Repair, repairs, resized, settled
 from core.registration.robot import RobotFit, fit_robot
 from core.registration.uncertainty import PRIOR
-from core.setup import Box, Material, Sensor, Setup, Tool, Touching
+from core.setup import Material, Sensor, Setup, Shape, Tool, Touching
 
 __all__ = [
     "CameraFit",
@@ -51,7 +52,7 @@ class Registration:
         weak_directions: of the camera's pose, in words.
         warnings: what a person should look at.
         proposal: another pairing or size of the touches that would fit better; never applied.
-        camera: the camera fit with its statistics; None without a rest cloud.
+        camera: the camera fit with its statistics; None without a rest cloud, or clouds that it could serve.
         repair: the pairing and the size of the touched polygon from which the measurement is looked at; None where they stand.
     """
 
@@ -88,8 +89,13 @@ def register(dataset: Dataset, report: Report = silent) -> Registration:
     report(0.2, "camera to phantom from the rest cloud")
     camera, found = None, _repairs(dataset, proposal)
     repair = found[0] if found else None
-    if dataset.has_rest:
+    if dataset.has_rest and dataset.observed:
         config = dataset.config
+        if isinstance(dataset.geometry, Shape):
+            raise RegistrationError(
+                f"{config.surface}: clouds are registered to a block only, not to other shapes yet; leave the clouds of this "
+                "dataset out, so that its forces are compared"
+            )
         camera = fit_camera(dataset.rest_cloud(), config.size, config.depth_sigma, config.to_phantom)
         report(0.7, "which way round the block lies")
         # A heading that was found by itself follows the tool; one that was given tells it which way round it came.
@@ -119,7 +125,7 @@ def setup_from(dataset: Dataset, registration: Registration) -> Setup:
     config = dataset.config
     misses = tuple((float(x), float(y), float(z)) for x, y, z in registration.touch_residuals)
     return Setup(
-        geometry=Box(size=config.size),
+        geometry=dataset.geometry,
         tool=Tool(radius=config.tool_radius),
         material=Material(young_modulus=config.young_modulus, poisson_ratio=config.poisson_ratio),
         sensor=Sensor(depth_sigma=config.depth_sigma),
@@ -136,14 +142,17 @@ def _register_robot(dataset: Dataset) -> tuple[RobotFit, TouchProposal | None]:
     lift = np.array([0.0, 0.0, config.touch_offset])
     expected = {name: np.asarray(place) + lift for name, place in config.landmarks.items()}
     robot = fit_robot(touches.positions, np.array([expected[name] for name in touches.names]))
-    return robot, propose(touches.names, touches.positions, expected, config.size, _tool_starts(dataset))
+    # Starts beside a rounded body lie within the box around it, and would seem to be blocked.
+    size = config.size if not isinstance(dataset.geometry, Shape) else None
+    return robot, propose(touches.names, touches.positions, expected, size, _tool_starts(dataset))
 
 
 def _repairs(dataset: Dataset, proposal: TouchProposal | None) -> tuple[Repair, ...]:
     config, touches = dataset.config, dataset.touches
     lift = np.array([0.0, 0.0, config.touch_offset])
     expected = np.array([np.asarray(config.landmarks[name]) + lift for name in touches.names])
-    found = repairs(touches.positions, expected, config.size, _tool_starts(dataset))
+    size = config.size if not isinstance(dataset.geometry, Shape) else None
+    found = repairs(touches.positions, expected, size, _tool_starts(dataset))
     if found or proposal is None or proposal.scale == 1.0:
         return found
     return (resized(touches.positions, expected),)

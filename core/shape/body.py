@@ -103,6 +103,22 @@ class Shape:
         inside = np.array([turns_around(self.triangles, self.vertices, point) > 0.5 for point in points], dtype=bool)
         return np.where(inside[:, None], points, places)
 
+    def facing(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Distance (m,) [m] of points (m, 3) [m] to the surface, negative within, and the surface's normals (m, 3) next to them."""
+        from core.shape.nearest import nearest  # noqa: PLC0415 (heavy)
+
+        number, places = nearest(np.ascontiguousarray(points, float), self.corners)
+        normals = self._normals[number]
+        distance = np.linalg.norm(points - places, axis=1)
+        return np.where(np.einsum("mi,mi->m", points - places, normals) < 0, -distance, distance), normals
+
+    @cached_property
+    def _normals(self) -> FloatArray:
+        """Outwards, of unit length (t, 3)."""
+        a, b, c = self.corners.transpose(1, 0, 2)
+        normals = np.cross(b - a, c - a)
+        return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
+
     def surface_points(self) -> FloatArray:
         """Rest positions (m, 3) [m] spread evenly over the free surface, without chance."""
         corners = self.corners[~self.held]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from core.frames import FloatArray
-from core.synthetic.block import Grading, IntArray, mesh_block
+from core.synthetic.block import Block, Grading, IntArray, mesh_block
 from core.synthetic.body import levels_of, true_offset, true_radius
 from core.synthetic.equilibrium import GivesWay
 from core.synthetic.motion import Motion, Probe
@@ -22,32 +22,43 @@ __all__ = ["neutral_displacement", "perform", "rest_surface"]
 SHORTER, MOST_SHORT = 1.0e-3, 4.5e-3
 
 
-def perform(scenario: Scenario, motion: Motion, fine: float | None = None) -> Track:
+Mesher = Callable[[Scenario, Probe, float], Block]
+"""A body for one probe of a scenario, fine where it touches."""
+
+
+def perform(scenario: Scenario, motion: Motion, fine: float | None = None, body: Mesher | None = None) -> Track:
     """Solve one motion of a scenario; every probe gets a grid that is fine where it touches, a block that remembers one for all.
+
+    Without a `body` it is the block's; one that remembers is always that.
 
     Pressed against a hard lump, the block gives way at some depth: it jumps aside, and the tool leads to no equilibrium any more.
     The operator stops such a push short of it; the track's motion is the one that was carried out.
     """
     fine = fine or scenario.fine
     ends = [*(float(probe.times[0]) for probe in motion.probes[1:]), motion.duration]
-    stretches = (_lasting if scenario.remembers else _apart)(scenario, motion.probes, ends, fine)
+    if scenario.remembers:
+        stretches = _lasting(scenario, motion.probes, ends, fine)
+    else:
+        stretches = _apart(scenario, motion.probes, ends, fine, body or _block)
     return Track(replace(motion, probes=tuple(stretch.probe for stretch in stretches)), tuple(stretches))
 
 
-def _apart(scenario: Scenario, probes: Sequence[Probe], ends: Sequence[float], fine: float) -> list[Stretch]:
+def _apart(scenario: Scenario, probes: Sequence[Probe], ends: Sequence[float], fine: float, body: Mesher) -> list[Stretch]:
     """Each probe on a grid of its own: of those before only the base's slip is left."""
     slip, stretches = np.zeros(3), []
     for probe, end in zip(probes, ends, strict=True):
-        stretch, slip = _as_deep_as_it_goes(scenario, probe, slip, fine, end)
+        stretch, slip = _as_deep_as_it_goes(scenario, probe, slip, fine, end, body)
         stretches.append(stretch)
     return stretches
 
 
-def _as_deep_as_it_goes(scenario: Scenario, probe: Probe, slip: FloatArray, fine: float, end: float) -> tuple[Stretch, FloatArray]:
+def _as_deep_as_it_goes(
+    scenario: Scenario, probe: Probe, slip: FloatArray, fine: float, end: float, body: Mesher
+) -> tuple[Stretch, FloatArray]:
     """One probe from a base that has slipped by `slip` (3,) [m], and the slip after it."""
     for short in np.arange(0.0, MOST_SHORT, SHORTER):
         tried = probe.shallower(float(short))
-        block = mesh_block(scenario.true_size, _grading(scenario, (tried,), fine))
+        block = body(scenario, tried, fine)
         bench = Specimen(scenario, block, slip)
         try:
             settled = bench.settled + slip
@@ -113,6 +124,10 @@ def rest_surface(scenario: Scenario) -> tuple[FloatArray, FloatArray, IntArray]:
     bench = Specimen(scenario, block, np.zeros(3))
     bench.close()
     return block.surface_rest, bench.settled, block.surface_faces
+
+
+def _block(scenario: Scenario, probe: Probe, fine: float) -> Block:
+    return mesh_block(scenario.true_size, _grading(scenario, (probe,), fine))
 
 
 def _bounds(scenario: Scenario) -> tuple[FloatArray, FloatArray]:

@@ -13,7 +13,7 @@ from scipy import sparse
 from core.errors import MeshError
 from core.frames import FloatArray
 
-__all__ = ["Block", "Grading", "Sampling", "mesh_block", "shape_values"]
+__all__ = ["Block", "Grading", "Sampling", "block_of", "mesh_block", "refined_to", "shape_values"]
 
 IntArray = np.ndarray[Any, np.dtype[np.int64]]
 _PAIRS = [(a, b) for a in range(4) for b in range(a)]
@@ -94,10 +94,14 @@ class Block:
 
 def mesh_block(size: tuple[float, float, float], grading: Grading) -> Block:
     """Fill the block with tetrahedra that are as small as `grading` asks; raises MeshError beyond 60 000 elements."""
+    logging.getLogger("skfem").setLevel(logging.ERROR)
+    return block_of(_refined(size, grading))
+
+
+def block_of(mesh: Any) -> Block:
+    """A body that stands on z = 0 from scikit-fem's mesh of its tetrahedra."""
     from skfem import Basis, ElementTetP2, FacetBasis  # noqa: PLC0415
 
-    logging.getLogger("skfem").setLevel(logging.ERROR)
-    mesh = _refined(size, grading)
     element = ElementTetP2()
     basis = Basis(mesh, element, intorder=2)
     base = mesh.facets_satisfying(lambda x: x[2] < 1e-9, boundaries_only=True)
@@ -128,7 +132,11 @@ def _refined(size: tuple[float, float, float], grading: Grading) -> Any:
     cells = np.maximum(np.ceil(np.array(size) / grading.coarse).astype(int), 2)
     x, y = (np.linspace(0.0, length, count + 1) for length, count in zip(size[:2], cells[:2], strict=True))
     z = _heights(size[2], int(cells[2]), grading)
-    mesh = MeshTet.init_tensor(x - size[0] / 2, y - size[1] / 2, z)
+    return refined_to(MeshTet.init_tensor(x - size[0] / 2, y - size[1] / 2, z), grading)
+
+
+def refined_to(mesh: Any, grading: Grading) -> Any:
+    """Scikit-fem's tetrahedra, halved until they are as small as `grading` asks; raises MeshError beyond 60 000."""
     for _ in range(40):
         corners = mesh.p[:, mesh.t]
         longest = np.max([np.linalg.norm(corners[:, a] - corners[:, b], axis=0) for a, b in _PAIRS], axis=0)

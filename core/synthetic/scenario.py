@@ -11,7 +11,7 @@ from core.errors import EffectError
 from core.synthetic.disturbance import Disturbance
 from core.synthetic.naming import check_named
 
-__all__ = ["HIDDEN", "REMEMBERED", "SHORT_PROTOCOL", "STILL", "WEIGHED", "HiddenEffect", "Scenario", "draw_scenario"]
+__all__ = ["HIDDEN", "SHORT_PROTOCOL", "WEIGHED", "HiddenEffect", "Scenario", "draw_scenario"]
 
 HIDDEN: Mapping[str, Mapping[str, str]] = {
     "poisson_ratio": {"nu": "1"},
@@ -44,13 +44,7 @@ WEIGHED = (
     "camera_registration", "surface_layer", "stiffness_gradient", "strain_stiffening", "anisotropy", "base_compliance",
     "tool_compliance",
 )  # fmt: skip
-"""Those that are hidden unless others are asked for."""
-
-REMEMBERED = ("viscoelasticity", "permanent_set", "tool_friction")
-"""What the block's past brings about. A diagnosis weighs it like the others; it is hidden only where it is asked for, so that a
-seed stands for the scenario that it stood for before."""
-STILL = ("depth_bias", "geometry_scale", "landmark_mismatch")
-"""What shows while nothing is pushed, in the rest cloud and the touches; hidden only where it is asked for, likewise."""
+"""Those that are hidden unless others are asked for: what a seed draws among them stays the same as more are weighed."""
 
 SHORT_PROTOCOL = ("poke-top-01", "poke-top-02", "poke-side-01", "poke-side-02", "drag-01")
 """Every kind of motion to fit on, and a push from another side, which shows most causes, to test on."""

@@ -9,7 +9,9 @@ import numpy as np
 from core.frames import FloatArray, Transform
 from core.synthetic.scenario import Scenario
 
-__all__ = ["write_clouds", "write_config", "write_forces", "write_kinematics", "write_ply", "write_touches"]
+__all__ = [
+    "write_clouds", "write_config", "write_felt_config", "write_forces", "write_kinematics", "write_ply", "write_touches",
+]  # fmt: skip
 
 
 def write_ply(path: Path, points: FloatArray) -> None:
@@ -47,12 +49,34 @@ def write_config(path: Path, name: str, scenario: Scenario, landmarks: dict[str,
     """dataset.toml: what the experimenter believes, and a first guess of the camera's pose."""
     matrix = ", ".join("[" + ", ".join(f"{value:.9f}" for value in row) + "]" for row in guess.matrix)
     lines = [
+        *_believed(name, scenario, "", landmarks),
+        "[camera]",
+        'name = "virtual depth camera"',
+        "depth_sigma = 0.002",
+        f"to_phantom = [{matrix}]",
+        "",
+        *_listed(_splits(scenario.sequences)),
+    ]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def write_felt_config(
+    path: Path, name: str, scenario: Scenario, surface: str, landmarks: dict[str, FloatArray], splits: dict[str, list[str]]
+) -> None:
+    """dataset.toml of a palpation without a camera, of a box or of what a `surface` encloses."""
+    path.write_text("\n".join([*_believed(name, scenario, surface, landmarks), *_listed(splits)]) + "\n")
+
+
+def _believed(name: str, scenario: Scenario, surface: str, landmarks: dict[str, FloatArray]) -> list[str]:
+    geometry = (
+        ['geometry = "mesh"', f'surface = "{surface}"'] if surface else ['geometry = "box"', f"size = {_list(scenario.size)}"]
+    )
+    return [
         "format = 1",
         f'name = "{name}"',
         "",
         "[phantom]",
-        'geometry = "box"',
-        f"size = {_list(scenario.size)}",
+        *geometry,
         f"mass = {scenario.mass}",
         'fixed = "base"',
         f"young_modulus = {scenario.young_modulus}",
@@ -66,18 +90,11 @@ def write_config(path: Path, name: str, scenario: Scenario, landmarks: dict[str,
         *(f"{key} = {_list(place)}" for key, place in landmarks.items()),
         f"touch_offset = {scenario.touch_offset}",
         "",
-        "[camera]",
-        'name = "virtual depth camera"',
-        "depth_sigma = 0.002",
-        f"to_phantom = [{matrix}]",
-        "",
-        "[splits]",
-        *(
-            f"{split} = [{', '.join(chr(34) + one + chr(34) for one in names)}]"
-            for split, names in _splits(scenario.sequences).items()
-        ),
     ]
-    path.write_text("\n".join(lines) + "\n")
+
+
+def _listed(splits: dict[str, list[str]]) -> list[str]:
+    return ["[splits]", *(f"{split} = [{', '.join(chr(34) + one + chr(34) for one in names)}]" for split, names in splits.items())]
 
 
 def _list(values: FloatArray | tuple[float, ...]) -> str:

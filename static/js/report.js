@@ -13,6 +13,7 @@ export function showReport(heading, report, patterns, palette) {
     causes.length ? section(causes.length > 1 ? "Causes" : "Cause", "interval", causes.map(cause)) : null,
     report.gain ? section("Error on sequences not fitted on", report.gain.unit ?? "mm", gain(report.gain, causes.length > 0)) : null,
     patterns ? section(causes.length ? "The error and its explanation" : "The error that is left", "", patternSection(patterns, heading.size, palette, causes.length > 0)) : null,
+    report.palpation ? section("Palpation", `${report.palpation.pushes} pushes`, palpation(heading.id, report.palpation, causes)) : null,
     report.ranking?.length ? section("Ranking", "", ranking(report.ranking, causes.map(({ effect }) => effect))) : null,
     report.ambiguity_map?.length ? section("What this data can tell", "smallest that would be named", told(report.ambiguity_map)) : null,
     report.controls?.length ? section("Controls", "motions that were not made", controls(report.controls)) : null,
@@ -48,6 +49,18 @@ function cause({ effect, probability, parameters }) {
   return element("div", { class: "cause" },
     element("div", { class: "cause-head" }, element("strong", {}, capital(words(effect))), element("span", {}, `probability ${percent(probability)}`)),
     element("table", {}, element("tbody", {}, rows)));
+}
+
+/** Pushes and footprint as drawn by the diagnosis, and what a hand would want to know of a lump. */
+function palpation(run, { depth, force, young_modulus: modulus }, causes) {
+  const rows = [["pushed", depth], ["resisted with", force], ...(modulus ? [["Young's modulus", modulus]] : []),
+    ...causes.flatMap((one) => one.cover ? [["depth of its centre", one.depth], ["tissue above it", one.cover]] : [])];
+  return [element("img", { src: `/api/runs/${encodeURIComponent(run)}/pictures/palpation.png`, alt: "The pushes from above with the footprint of what was found, and a cut through it", style: "width: 100%; border-radius: 8px; background: #fff" }),
+    element("table", {}, element("tbody", {}, rows.map(([name, entry]) => {
+      const shown = parameter(entry);
+      return element("tr", {}, element("th", {}, name), element("td", { class: "number" }, element("b", {}, shown.value), ` ${shown.unit}`),
+        element("td", { class: "number interval" }, entry.low === undefined ? "" : shown.interval));
+    })))];
 }
 
 /** In place of an interval that is open on a side, or none at all. */

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from pushed_block import POSE, SETUP, dwelling, poke, prediction, seen_points
 
-from core.diagnosis.gain import Ladder, ladder
+from core.diagnosis.gain import Ladder, fixed_pattern, ladder
 from core.diagnosis.observations import Group, Observations
 from core.diagnosis.prediction import Prediction
+from core.effects.memory import PermanentSet
 from core.errors import DiagnosisError
 from core.frames import FloatArray
 from core.measurement import Surface
@@ -176,3 +177,16 @@ def test_papers_metric_is_the_mean_over_touched_groups():
     found = _ladder([0, 1, 2], [FLOOR, 2e-3, 3e-3], [FLOOR, 2e-3, 3e-3])
     wanted = paper_distance(POSE.apply(CLOUD), rest(SETUP, GridSpec()), Surface(SETUP.box))
     assert found.paper == pytest.approx((wanted, wanted))
+
+
+def test_what_a_push_leaves_counts_where_the_material_remembers():
+    item = _observations([0, 1, 1, 2])
+    item = replace(item, groups=tuple(replace(g, free=n in (0, 2)) for n, g in enumerate(item.groups)))
+    stated, named = _model([0.0, 1e-3, 4e-3, 1e-3]), _model([0.0, 1e-3, 1e-3, 1e-3])
+    kept = PermanentSet(retained_fraction=0.2).apply(SETUP)
+    found = ladder([item], [stated], [named], SETUP, kept, seed=0)
+    assert found.baseline == pytest.approx(np.sqrt((1 + 16 + 1) / 3) * 1e-3)
+    assert found.extended == pytest.approx(1e-3) and found.probes == 2
+    # The dent is no pattern of the camera's, and without a memory no push is asked for it.
+    assert fixed_pattern(item, stated, True)[0] == pytest.approx(0.0)
+    assert np.abs(fixed_pattern(item, stated)[0]).max() > 1e-3

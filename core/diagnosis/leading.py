@@ -1,0 +1,50 @@
+"""Where the tool is led under a setup, and how that changes with others: the touches decide both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from core.diagnosis.observations import Observations
+from core.frames import FloatArray, Transform
+from core.meshing import Meshing
+from core.setup import Setup
+from core.touches import touch_correction
+
+if TYPE_CHECKING:
+    from core.diagnosis.prediction import Wanted
+
+__all__ = ["Led", "led"]
+
+
+@dataclass(frozen=True, eq=False)
+class Led:
+    """A sequence's groups under one setup.
+
+    Attributes:
+        correction: stated to true phantom_from_robot. centres: (g, 3) of the tool [m]. moves: (s, g, 3) how other setups move
+            them [m]. turned: (s, 3, 3) how these turn a measured force. measured: force on the tool (g, 3) and its deviation (g,)
+            [N]; None without forces.
+    """
+
+    correction: Transform
+    centres: FloatArray
+    moves: FloatArray
+    turned: FloatArray
+    measured: tuple[FloatArray, FloatArray] | None
+
+
+def led(data: Observations, setup: Setup, grid: Meshing, wanted: Wanted | None) -> Led:
+    """Under this setup, and the wanted ones; the grid is for the sag of the landmarks."""
+    correction = touch_correction(setup, grid)
+    centres = correction.apply(data.centres(setup))
+    moves = np.zeros((len(wanted.setups) if wanted else 0, len(data.groups), 3))
+    robot = correction @ setup.phantom_from_robot
+    turned = np.zeros((len(moves), 3, 3))
+    for number, other in enumerate(wanted.setups if wanted else ()):
+        there = touch_correction(other, grid)
+        moves[number] = there.apply(data.centres(other)) - centres
+        turned[number] = (there @ other.phantom_from_robot @ robot.inverse()).rotation
+    return Led(correction, centres, moves, turned, data.felt(robot, setup.sensor.time_offset))
