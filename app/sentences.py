@@ -81,6 +81,8 @@ def limit_phrase(row: dict[str, Any]) -> str:
             "at half of the places not at any size" if typical is None else f"{quantity(typical, '1')} times at half of the places"
         )
         return f"{quantity(factors[0], '1')} times where it shows best, {spread}"
+    if shares and row.get("effect") == "mesh_resolution":
+        return f"{quantity(shares[0], '1')} times what the replay's grid and a finer one differ by"
     if shares:
         return f"{quantity(100 * shares[0], '1')}{NARROW}% of what {at} does"
     worst: dict[str, float] = {}
@@ -207,9 +209,21 @@ def _gradient(values: Values, _: Sequence[float] | None) -> str:
     return f"that the stiffness changes with the height: the {where} is {math.exp(abs(ratio)):.2g} times as stiff as the {other}"
 
 
+def _paired(pairing: str) -> str:
+    """How touches were really paired, by the rows of touches.csv."""
+    kind, *rows = pairing.split("-")
+    if kind == "swap":
+        return f"rows {rows[0]} and {rows[1]} were taken for each other"
+    if kind == "turn":
+        return f"each row is of the landmark {rows[0]} further on"
+    return "the rows are in the reverse order" if kind == "reversed" else ""
+
+
 def _beside(values: Values, _: Sequence[float] | None) -> str:
-    size = f"{values['scale']:.3g} times as far apart, {quantity(values['inset'], 'm')} inside"
-    return f"that the touches were of other places: {values['pairing']}, {size}"
+    side = "inside" if values["inset"] >= 0 else "outside"
+    size = f"{values['scale']:.3g} times as far apart, {quantity(abs(values['inset']), 'm')} {side}"
+    parts = [part for part in (_paired(str(values["pairing"])), size) if part]
+    return f"that the touches were of other places than stated: {', '.join(parts)}"
 
 
 def _size(values: Values, _: Sequence[float] | None) -> str:
@@ -240,5 +254,6 @@ PHRASES: dict[str, Callable[[Any, Sequence[float] | None], str]] = {
     "depth_bias": lambda v, _: f"a camera that misreads depth, by {quantity(v['offset'], 'm')} and {v['scale']:.3g} times",
     "geometry_scale": _size,
     "landmark_mismatch": _beside,
+    "mesh_resolution": lambda v, _: f"a finer grid: the stated one is too coarse, {quantity(v['element_size'], 'm')} would do",
     "young_modulus": lambda v, _: f"another stiffness: Young's modulus is {quantity(v['E'], 'Pa')}",
 }

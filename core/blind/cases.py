@@ -59,8 +59,8 @@ class Case:
 def all_cases(seed: int, controls: int = 10, effects: Sequence[str] | None = None, short: bool = False) -> list[Case]:
     """Each effect once, each disturbance once, and the controls; every case has a seed of its own.
 
-    Effects are those that a diagnosis weighs, or the ones named, of which the virtual bench can hide more; an unknown one is a
-    RunError.
+    Effects are those of `core.synthetic.WEIGHED`, or the ones named, of which the virtual bench can hide more (a misread depth,
+    another size, touches of other places); an unknown one is a RunError.
     """
     from core.synthetic import DISTURBANCES, HIDDEN  # noqa: PLC0415 (heavy)
 
@@ -87,7 +87,7 @@ def draw_cases(
 
     Args:
         seed: everything that is hidden follows from it. kinds: those wanted, all without it.
-        effects: to be hidden, those that a diagnosis weighs without it. controls: so many of the cases hide nothing; as MIX has
+        effects: to be hidden, those of `core.synthetic.WEIGHED` without it. controls: so many of the cases hide nothing; as MIX has
             it without.
 
     Within a kind each effect (pair, disturbance) comes once before any comes again. Raises RunError for unknown names.

@@ -44,7 +44,8 @@ def size_over_limit(
         told: the report's ambiguity map. camera_shift: as the truth has it, phantom frame.
 
     Returns:
-        None where nothing or more than one effect is hidden, or where the map gives no limit in terms of its parameters.
+        None where nothing or more than one effect is hidden, where a word of it (a pairing, an edge) is not the believed one, which
+        has no size, or where the map gives no limit in terms of its parameters.
     """
     row = next((row for row in told if len(hidden) == 1 and row["effect"] == hidden[0].effect), None)
     if row is None:
@@ -54,6 +55,8 @@ def size_over_limit(
     except EffectError:
         return None
     true, neutral = _true_values(hidden[0], scenario, camera_shift), effect.neutral(_believed(scenario)).values()
+    if any(isinstance(value, str) and value != neutral[name] for name, value in hidden[0].parameters.items()):
+        return None
     limits = [row["typical"], *row["limits"][1:]]
     parts = [_part(limit, row["at"], effect, true, neutral) for limit in limits]
     known = [part for part in parts if part is not None]

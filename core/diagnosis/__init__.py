@@ -139,10 +139,10 @@ def _run(
     findings = search(bench, seed)
     model = findings.best.model if findings.best else findings.baseline
     report(0.75, "measuring the gain on test sequences")
-    gain = _gain(unseen, pool, setup, model.setup, fine, seed) if unseen else None
+    gain = _gain(unseen, pool, (setup, model.setup), fine, seed, bool(findings.known)) if unseen else None
     if gain is not None and findings.best and (why := harm(findings.best.model.names, gain)):
         findings.withdraw(why)
-        model, gain = findings.baseline, _gain(unseen, pool, setup, setup, fine, seed)
+        model, gain = findings.baseline, _gain(unseen, pool, (setup, setup), fine, seed)
     result = report_of(dataset, bench, findings, gain, "test")
     if assurance:
         result = assured(result, bench, fitted, findings)
@@ -180,10 +180,21 @@ def _record(
         task.result()
 
 
-def _gain(unseen: list[Observations], pool: Workers, stated: Setup, found: Setup, grid: Meshing, seed: int) -> Ladder | FeltLadder:
-    names = [item.name for item in unseen]
-    baseline = [future.result() for future in pool.submit(names, stated, grid)]
-    extended = baseline if found is stated else [future.result() for future in pool.submit(names, found, grid, None, baseline)]
+def _gain(
+    unseen: list[Observations], pool: Workers, setups: tuple[Setup, Setup], grid: Meshing, seed: int, lost: bool = False
+) -> Ladder | FeltLadder | None:
+    """Of the stated and the found setup; where the stated one is `lost`, its tool far off, the other says which points count.
+
+    None where the stated setup then finds an equilibrium in no frame in which the tool touches.
+    """
+    names, (stated, found) = [item.name for item in unseen], setups
+    first, second = (found, stated) if lost else (stated, found)
+    one = [future.result() for future in pool.submit(names, first, grid)]
+    other = one if first is second else [future.result() for future in pool.submit(names, second, grid, None, one)]
+    baseline, extended = (other, one) if lost else (one, other)
+    touched = [{n for n, group in enumerate(item.groups) if not group.free} for item in unseen]
+    if lost and all(own <= {*one.failed, *two.failed} for own, one, two in zip(touched, baseline, extended, strict=True)):
+        return None
     if all(item.unseen for item in unseen):
         return felt_ladder(unseen, baseline, extended, seed)
     return ladder(unseen, baseline, extended, stated, found, seed)

@@ -12,8 +12,14 @@ from core.diagnosis.findings import Findings
 from core.diagnosis.next_probe import next_probe
 from core.diagnosis.observations import Observations
 from core.diagnosis.profiles import profiles
+from core.effects.tool import LandmarkMismatch
 
 __all__ = ["assured"]
+
+_AGAIN = {
+    "kind": "measurement", "separates": [LandmarkMismatch.name, "none"],
+    "text": "touch the landmarks once more, and name each as it is touched",
+}  # fmt: skip
 
 
 def assured(report: dict[str, Any], bench: Bench, data: Sequence[Observations], findings: Findings) -> dict[str, Any]:
@@ -26,7 +32,10 @@ def assured(report: dict[str, Any], bench: Bench, data: Sequence[Observations], 
     open_rows: list[dict[str, Any]] = []
     if findings.best:
         model = findings.best.model
-        checked = controls(bench, data, model, findings.baseline) if bench.seen else felt_controls(bench, model, findings.baseline)
+        if not findings.known:  # without that nothing can be replayed, and so nothing falsified
+            checked = (
+                controls(bench, data, model, findings.baseline) if bench.seen else felt_controls(bench, model, findings.baseline)
+            )
         told, open_rows = profiles(bench, findings.best.model)
         names = dict(zip(findings.best.model.names, told, strict=True))
     return {
@@ -34,7 +43,7 @@ def assured(report: dict[str, Any], bench: Bench, data: Sequence[Observations], 
         "causes": [_identified(cause, names.get(cause["effect"], {})) for cause in report["causes"]],
         "not_identifiable": [*report["not_identifiable"], *open_rows],
         "controls": [one.to_json() for one in checked],
-        "next_probe": next_probe(bench, data, findings) if bench.seen else [],
+        "next_probe": [_AGAIN] if findings.known else next_probe(bench, data, findings) if bench.seen else [],
         "warnings": [*report["warnings"], *warnings_of(checked)],
     }
 

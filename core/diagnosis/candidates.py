@@ -116,7 +116,7 @@ def _traced(bench: Bench, baseline: Model) -> list[Signature]:
     if not starts:
         return []
     bench.tell("what the material or the tool would remember", 0.4)
-    pending = bench.workers.trace(bench.names, bench.setup, bench.grid, baseline.predictions, starts)
+    pending = bench.workers.trace(bench.names, baseline.setup, bench.grid, baseline.predictions, starts)
     traces = [future.result() for future in pending]
     rows = list(zip(traces, baseline.predictions, strict=True))
     return [(effect, [own[number].on(plain).alone() for own, plain in rows]) for number, effect in enumerate(starts)]

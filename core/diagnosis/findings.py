@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from core.diagnosis.ambiguity import Told
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.structure import NOTHING, Structure
+from core.effects import Effect
 
 __all__ = ["LEAST_GAIN", "RIVAL", "Findings", "Trial"]
 
@@ -48,6 +49,7 @@ class Findings:
         structure: error of the baseline that is smooth and grows with the push. left: the same of the best model.
         told: what this experiment tells of each effect, whatever the data say.
         withdrawn: why what was found is not named after all; empty where nothing was withdrawn.
+        known: what no replay could do without: touches that were surely of other landmarks.
     """
 
     baseline: Model
@@ -60,6 +62,7 @@ class Findings:
     left: Structure = NOTHING
     told: tuple[Told, ...] = ()
     withdrawn: str = ""
+    known: tuple[Effect, ...] = ()
 
     def withdraw(self, why: str) -> None:
         """Name nothing after all."""

@@ -40,6 +40,8 @@ _INSTEAD = {
     frozenset({"viscoelasticity", "permanent_set"}): "let the block rest for several time constants after a release and record it",
     frozenset({"gravity", "camera_registration"}): "record the untouched block again from another side, or turned on its side",
     frozenset({"gravity", "geometry_scale"}): "measure the block with a calliper",
+    frozenset({"depth_bias", "geometry_scale"}): "measure the block with a calliper",
+    frozenset({"landmark_mismatch", "geometry_scale"}): "measure the block with a calliper",
     frozenset({"camera_registration", "depth_bias"}): "record the untouched block from nearer and from farther away",
 }
 """What tells families apart that no push does."""

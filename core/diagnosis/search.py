@@ -57,8 +57,8 @@ def search(bench: Bench, seed: int) -> Findings:
     names = [effect.name for effect in known]
     origin = bench.baseline(tangents(with_effects(bench.setup, known), names, bench.weighed), lump_places(bench), known)
     baseline = bench.evaluate((), origin.predictions) if known else origin
-    findings = Findings(baseline, misfit=bench.misfit(baseline))
-    findings.structure = findings.left = structure_of(bench, baseline, seed)
+    findings = Findings(baseline, misfit=bench.misfit(baseline), known=known)
+    findings.structure = findings.left = structure_of(bench, origin, seed)
     finite = signatures(bench, origin)
     screened, candidates, gains = _screen(bench, origin, finite, origin)
     blocks, nuisance = bench.tempered(screened), (*screened.nuisance, *screened.columns)

@@ -52,6 +52,28 @@ def test_every_effect_the_bench_can_hide_has_its_own_words() -> None:
         assert "an effect called" not in cause_phrase({"effect": hidden.effect, "parameters": parameters}, (0.07, 0.04, 0.036))
 
 
+@pytest.mark.parametrize(
+    ("pairing", "words"),
+    [
+        ("as-paired", "than stated: 0.87 times as far apart, 1.2 mm inside"),
+        ("swap-1-3", "rows 1 and 3 were taken for each other, 0.87 times"),
+        ("turn-2", "each row is of the landmark 2 further on"),
+        ("reversed", "the rows are in the reverse order"),
+    ],
+)
+def test_pairing_is_said_by_the_rows_of_the_file(pairing: str, words: str) -> None:
+    values = {"pairing": pairing, "scale": 0.87, "inset": 1.2e-3}
+    cause = {"effect": "landmark_mismatch", "parameters": {name: {"value": value} for name, value in values.items()}}
+    assert words in plain(cause_phrase(cause))
+
+
+def test_grid_that_is_too_coarse_is_said_with_the_edge_that_would_do() -> None:
+    cause = {"effect": "mesh_resolution", "parameters": {"element_size": {"value": 2e-3}}}
+    assert "too coarse, 2.0 mm would do" in plain(cause_phrase(cause))
+    row = {"effect": "mesh_resolution", "limits": [{"share": 1.5}], "typical": {"share": 1.5}, "at": {"element_size": {}}}
+    assert plain(limit_phrase({**row, "at": {}})) == "1.5 times what the replay's grid and a finer one differ by"
+
+
 def test_what_no_shape_tells_of_is_judged_by_the_force(report: dict[str, Any]) -> None:
     stiffer = {"effect": "young_modulus", "parameters": {"E": {"value": 7512.0, "unit": "Pa"}}}
     gain = {**report["gain"], "force": {"unit": "N", "baseline": 0.0712, "extended": 0.0051, "noise_floor": 0.005}}
