@@ -8,12 +8,13 @@ from functools import cached_property
 
 import numpy as np
 
+from core.diagnosis.columns import TOOL_COLUMNS, Wanted
 from core.diagnosis.evidence import Block, explained, fit, log_evidence, predictive_score
 from core.diagnosis.hypothesis import Model, Nuisances, nuisance_setups
-from core.diagnosis.led import led
+from core.diagnosis.led import led, with_replays
 from core.diagnosis.noise import Noise, noises
 from core.diagnosis.ordered import ORDERED, TRACED
-from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted
+from core.diagnosis.prediction import Prediction
 from core.diagnosis.resolution import OWN_GRID, under_stated, with_columns
 from core.diagnosis.still import Still
 from core.diagnosis.tangent import SMALL, Tangent, changed_at_rest
@@ -32,8 +33,6 @@ __all__ = ["PRIOR_STEPS", "TRUST", "Bench"]
 
 PRIOR_STEPS = 4.0
 """Prior standard deviation of a search coordinate, in its scales."""
-_ORDERED_STEP = 0.25
-"""Step of a derivative by two replays, in the scale of what is moved."""
 TRUST = 2.5
 """Longest step of a fit at once, in the scales of what it moves."""
 _ITERATIONS = 4
@@ -138,24 +137,9 @@ class Bench:
         if any(isinstance(effect, TRACED) for effect in effects):
             return self.assemble(tuple(effects), setup, led(self, effects, starts, tangents, lumps), tangents, len(lumps))
         predictions = [f.result() for f in self.predict(effects, self._wanted(effects, setup, tangents, lumps), starts)]
-        model = self.assemble(tuple(effects), setup, self._ordered_columns(effects, predictions), tangents, len(lumps))
+        model = self.assemble(tuple(effects), setup, with_replays(self, effects, predictions), tangents, len(lumps))
         self.known = [*self.known[:1], model]
         return model
-
-    def _ordered_columns(self, effects: Sequence[Effect], predictions: list[Prediction]) -> list[Prediction]:
-        """Columns of effects in whose replays a frame hangs on all those before it: by one more replay for each number."""
-        column = self._first
-        for index, effect in enumerate(effects):
-            for number, item in enumerate(effect.numbers()):
-                if isinstance(effect, ORDERED):
-                    coordinates, step = effect.coordinates, _ORDERED_STEP * item.scale
-                    step = -step if coordinates[number] + step > item.coordinate(item.high) else step
-                    coordinates[number] += step
-                    changed = [*effects[:index], effect.at(coordinates), *effects[index + 1 :]]
-                    others = [f.result() for f in self.predict(changed, None, predictions)]
-                    predictions = [here.with_column(there, column, step) for here, there in zip(predictions, others, strict=True)]
-                column += 1
-        return predictions
 
     def assemble(
         self, effects: tuple[Effect, ...], setup: Setup, predictions: Sequence[Prediction], tangents: Sequence[Tangent], lumps: int

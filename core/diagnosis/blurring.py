@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from core.diagnosis.bench import Bench
+from core.diagnosis.columns import TOOL_COLUMNS
 from core.diagnosis.evidence import fit
 from core.diagnosis.hypothesis import Model, with_effects
 from core.diagnosis.noise import DISPLACEMENT_ERROR, FIELD_LENGTH, STIFFNESS_ERROR, smooth_basis
 from core.diagnosis.ordered import ORDERED
-from core.diagnosis.prediction import TOOL_COLUMNS
 from core.diagnosis.pushes import Push
 from core.effects.material import PoissonRatio
 from core.effects.tool import ToolRadius

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from core.diagnosis.columns import Columns, Wanted
 from core.diagnosis.force import Felt
 from core.diagnosis.leading import led
 from core.diagnosis.observations import Observations
 from core.diagnosis.ordered import forgetful
-from core.diagnosis.prediction import Columns, Prediction, Wanted
+from core.diagnosis.prediction import Prediction
 from core.errors import DiagnosisError
 from core.fem.newton import Outcome
 from core.frames import FloatArray

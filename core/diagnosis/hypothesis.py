@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from core.diagnosis.columns import TOOL_COLUMNS
 from core.diagnosis.evidence import Block
-from core.diagnosis.prediction import TOOL_COLUMNS, Prediction
+from core.diagnosis.prediction import Prediction
 from core.diagnosis.tangent import SMALL, Tangent
 from core.effects import Effect
 from core.effects.material import PoissonRatio, YoungModulus

@@ -14,7 +14,7 @@ from core.setup import Setup
 from core.touches import touch_correction
 
 if TYPE_CHECKING:
-    from core.diagnosis.prediction import Wanted
+    from core.diagnosis.columns import Wanted
 
 __all__ = ["Led", "led"]
 

@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import ParamSpec, Self, TypeVar
 
+from core.diagnosis.columns import Wanted
 from core.diagnosis.comparison import Sample
 from core.diagnosis.felt_prediction import predict_forces
 from core.diagnosis.observations import Observations
-from core.diagnosis.prediction import Prediction, Wanted, predict
+from core.diagnosis.prediction import Prediction, predict
 from core.diagnosis.traces import Trace, traces_of
 from core.effects import Effect
 from core.meshing import Meshing

@@ -8,12 +8,12 @@ import pytest
 from pushed_block import GRID, SETUP, observed, poke, registration
 
 from core.diagnosis.bench import Bench
+from core.diagnosis.columns import TOOL_COLUMNS
 from core.diagnosis.controls import ALIKE, FAINT, Control, controls, judge, warnings_of
 from core.diagnosis.evidence import Block, gram
 from core.diagnosis.falsified import FALSIFIED
 from core.diagnosis.noise import Noise
 from core.diagnosis.observations import Observations
-from core.diagnosis.prediction import TOOL_COLUMNS
 from core.diagnosis.workers import Workers
 from core.effects.tool import ToolRadius
 from core.mesh import GridSpec

@@ -7,9 +7,10 @@ import pytest
 from pushed_block import GRID, POSE, SETUP, TOP, seen_points
 
 from core.dataset import Kinematics
+from core.diagnosis.columns import TOOL_COLUMNS, Wanted
 from core.diagnosis.observations import Group, Observations
 from core.diagnosis.ordered import Past, forgetful
-from core.diagnosis.prediction import TOOL_COLUMNS, Wanted, predict
+from core.diagnosis.prediction import predict
 from core.effects import Effect
 from core.effects.memory import PermanentSet, Viscoelasticity
 from core.effects.tool import ToolFriction, ToolRadius

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from pushed_block import CORNERS, GRID, POSE, SETUP, SIZE, TOP, dwelling, observed, poke, seen_points
 
-from core.diagnosis import prediction as prediction_module
+from core.diagnosis import columns as columns_module
+from core.diagnosis.columns import TOOL_COLUMNS, Wanted
 from core.diagnosis.noise import Noise
 from core.diagnosis.observations import Group, Observations
-from core.diagnosis.prediction import TOOL_COLUMNS, Prediction, Wanted, predict
+from core.diagnosis.prediction import Prediction, predict
 from core.effects.geometry import GeometryScale
 from core.effects.sensor import CameraRegistration, DepthBias
 from core.effects.tool import LandmarkMismatch
@@ -162,7 +163,7 @@ def test_where_a_grid_is_about_to_give_way_the_column_is_the_difference_over_a_m
 
     assert miss(here.columns[..., 1]) < 0.35
     assert miss(here.columns[..., TOOL_COLUMNS]) < 0.35
-    monkeypatch.setattr(prediction_module, "_MOST_RESPONSE", np.inf)
+    monkeypatch.setattr(columns_module, "_MOST_RESPONSE", np.inf)
     assert miss(predict(item, SETUP, grid, wanted, tolerance=TIGHT).columns[..., 1]) > 1.0
 
 

@@ -7,9 +7,9 @@ import pytest
 from pushed_block import SETUP, prediction, registration
 
 from core.diagnosis.bench import Bench
+from core.diagnosis.columns import TOOL_COLUMNS
 from core.diagnosis.evidence import Block, gram
 from core.diagnosis.hypothesis import Model
-from core.diagnosis.prediction import TOOL_COLUMNS
 from core.diagnosis.screening import Candidate
 from core.diagnosis.shortlist import SHORTLIST, beyond_first_order, shortlist
 from core.diagnosis.workers import Workers
