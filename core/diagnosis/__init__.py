@@ -16,12 +16,13 @@ from core.diagnosis.assurance import assured
 from core.diagnosis.bench import Bench
 from core.diagnosis.felt_gain import FeltLadder, felt_ladder
 from core.diagnosis.felt_picture import draw_palpation
+from core.diagnosis.findings import Findings
 from core.diagnosis.gain import Ladder, harm, ladder
 from core.diagnosis.observations import Observations
 from core.diagnosis.palpation import palpated
 from core.diagnosis.patterns import draw_patterns, patterns
 from core.diagnosis.recording import record
-from core.diagnosis.search import Findings, search
+from core.diagnosis.search import search
 from core.diagnosis.static import StaticChannel
 from core.diagnosis.still import Still
 from core.diagnosis.unseen import observe_each, pushed_places

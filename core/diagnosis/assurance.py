@@ -8,10 +8,10 @@ from typing import Any
 from core.diagnosis.bench import Bench
 from core.diagnosis.controls import Control, controls, warnings_of
 from core.diagnosis.felt_controls import felt_controls
+from core.diagnosis.findings import Findings
 from core.diagnosis.next_probe import next_probe
 from core.diagnosis.observations import Observations
 from core.diagnosis.profiles import profiles
-from core.diagnosis.search import Findings
 from core.effects.tool import LandmarkMismatch
 
 __all__ = ["assured"]

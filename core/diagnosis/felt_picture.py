@@ -29,13 +29,16 @@ def draw_palpation(path: Path, body: Box | Shape, pushes: Pushes, shown: Footpri
     from matplotlib.figure import Figure
 
     wide = cause is not None
-    figure = Figure(figsize=(11.0 if wide else 6.2, 4.7), layout="constrained")
+    figure = Figure(figsize=(12.0 if wide else 6.2, 5.2), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(1, 2 if wide else 1, squeeze=False)[0]
     drawn = _from_above(axes[0], body, pushes, shown, cause)
-    figure.colorbar(drawn, ax=axes[0], shrink=0.8, label="measured force over the stated simulation's [%]")
+    bar = figure.colorbar(drawn, ax=axes[0], location="bottom", shrink=0.7, aspect=32, pad=0.02)
+    bar.set_label("measured force over the stated simulation's [%]", fontsize=9)
+    bar.ax.tick_params(labelsize=8)
     if cause is not None:
         _cut(axes[1], body, cause)
+        figure.legend(loc="outside lower right", ncols=2, frameon=False, fontsize=9)
     figure.savefig(path, dpi=130)
 
 
@@ -60,8 +63,6 @@ def _from_above(axes: Axes, body: Box | Shape, pushes: Pushes, shown: Footprint 
         axes.plot(
             x + radius * np.cos(turn), y + radius * np.sin(turn), color=FOUND, lw=1.3, ls="--", zorder=4, label="the lump below"
         )
-    if shown is not None or cause is not None:
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2, frameon=False, fontsize=9)
     axes.set_title("pushes, seen from above", fontsize=11)
     axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
     _plain(axes)
@@ -84,45 +85,49 @@ def _relief(axes: Axes, body: Box | Shape) -> None:
 
 
 def _cut(axes: Axes, body: Box | Shape, cause: dict[str, Any]) -> None:
-    """Through the lump's centre, along x: the body, the lump, and how deep it lies."""
+    """Through the lump's centre, the way the surface next to it leans most: the body, the lump, and how deep it lies."""
     from matplotlib.collections import LineCollection
 
-    values = {name: cause["parameters"][name]["value"] for name in ("x", "y", "z", "radius")}
-    axes.add_collection(LineCollection(list(1e3 * section(body, values["y"])), colors=INK, linewidths=1.8))
-    x, z, radius = (1e3 * values[name] for name in ("x", "z", "radius"))
+    centre = np.array([cause["parameters"][name]["value"] for name in ("x", "y", "z")])
+    distance, normals = body.facing(centre[None])
+    normal = normals[0]
+    across = 0 if abs(normal[0]) >= abs(normal[1]) else 1
+    shown = [across, 2]
+    outline = 1e3 * section(body, 1 - across, float(centre[1 - across]))
+    axes.add_collection(LineCollection(list(outline), colors=INK, linewidths=1.8))
+    middle, radius = 1e3 * centre[shown], 1e3 * cause["parameters"]["radius"]["value"]
     turn = np.linspace(0, 2 * np.pi, 120)
-    axes.fill(x + radius * np.cos(turn), z + radius * np.sin(turn), color=FOUND, alpha=0.28, ec=FOUND, lw=1.5)
+    axes.fill(middle[0] + radius * np.cos(turn), middle[1] + radius * np.sin(turn), color=FOUND, alpha=0.28, ec=FOUND, lw=1.5)
     depth, cover = cause["depth"], cause["cover"]
-    centre = np.array([[values["x"], values["y"], values["z"]]])
-    distance, normal = body.facing(centre)
-    top = 1e3 * (centre - distance[:, None] * normal)[0]
-    axes.plot([x, top[0]], [z, top[2]], color=FOUND, lw=1.2)
-    ends = np.array([[centre[0] + (depth["value"] - depth[end]) * normal[0]] for end in ("low", "high")])[:, 0] * 1e3
-    axes.plot(ends[:, 0], ends[:, 2], color=FOUND, lw=5, alpha=0.6, solid_capstyle="butt")
-    axes.plot(x, z, "o", color=FOUND, ms=4)
-    axes.set_title(f"centre {_between(depth)} deep, {_between(cover)} of tissue above it", fontsize=11)
-    axes.set(xlabel="x [mm]", ylabel="z [mm]", aspect="equal")
+    way = [centre, centre - distance[0] * normal]
+    span = [centre + (depth["value"] - depth[end]) * normal for end in ("low", "high")]
+    for ends, width in ((way, 1.2), (span, 5.0)):
+        line = 1e3 * np.array(ends)[:, shown]
+        axes.plot(line[:, 0], line[:, 1], color=FOUND, lw=width, alpha=0.8, solid_capstyle="butt")
+    axes.plot(*middle, "o", color=FOUND, ms=4)
+    axes.set_title(f"centre {_between(depth)} deep\n{_between(cover)} of tissue above it", fontsize=11)
+    axes.set(xlabel=f"{'xy'[across]} [mm]", ylabel="z [mm]", aspect="equal")
     axes.autoscale_view()
     axes.margins(0.06)
     _plain(axes)
 
 
-def section(body: Box | Shape, y: float) -> FloatArray:
-    """Where the plane at `y` [m] cuts the surface: segments (k, 2, 2) in x and z [m]."""
+def section(body: Box | Shape, axis: int, at: float) -> FloatArray:
+    """Where the plane x or y (`axis` 0 or 1) = `at` [m] cuts the surface: segments (k, 2, 2) in the other of the two, and z [m]."""
+    kept = [1 - axis, 2]
     if isinstance(body, Box):
-        x, z = body.size[0] / 2, body.size[2]
-        corners = np.array([[-x, 0.0], [x, 0.0], [x, z], [-x, z]])
+        side, height = body.size[1 - axis] / 2, body.size[2]
+        corners = np.array([[-side, 0.0], [side, 0.0], [side, height], [-side, height]])
         return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
     found = []
     for corners in body.corners:
-        side = corners[:, 1] - y
-        ends = []
+        away, ends = corners[:, axis] - at, []
         for a, b in ((0, 1), (1, 2), (2, 0)):
-            if (side[a] < 0) != (side[b] < 0):
-                share = side[a] / (side[a] - side[b])
+            if (away[a] < 0) != (away[b] < 0):
+                share = away[a] / (away[a] - away[b])
                 ends.append(corners[a] + share * (corners[b] - corners[a]))
         if len(ends) == 2:
-            found.append([end[[0, 2]] for end in ends])
+            found.append([end[kept] for end in ends])
     return np.array(found).reshape(-1, 2, 2)
 
 

@@ -20,10 +20,10 @@ from core.diagnosis.ambiguity import Told
 from core.diagnosis.bench import Bench
 from core.diagnosis.blurring import Scene, Survivor, nats_of, survivor
 from core.diagnosis.candidates import lump_places
+from core.diagnosis.findings import RIVAL, Findings, Trial
 from core.diagnosis.noise import patch_variance
 from core.diagnosis.observations import Observations
 from core.diagnosis.pushes import Push, depth_reached, pushes, speed_reached
-from core.diagnosis.search import RIVAL, Findings, Trial
 from core.effects import Effect
 from core.sight import sight_of
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from core.diagnosis.bench import Bench
+from core.diagnosis.findings import Findings
 from core.diagnosis.footprint import Footprint, depth_of, footprint_of
 from core.diagnosis.hypothesis import Model, with_effects
 from core.diagnosis.observations import Observations
-from core.diagnosis.search import Findings
 from core.diagnosis.unseen import deepest_rows
 from core.effects.material import StiffInclusion
 from core.frames import FloatArray

@@ -264,11 +264,9 @@ def predict(
     columns = Columns(block, wanted, measured is not None) if wanted and not setup.remembers else None
     gap, count, spread, changes, pressed, frames, chosen = [], [], [], [], [], [], []
     past = Past(data, block, true_from_stated) if setup.remembers else None
-    slides = past is None and setup.support.friction_coefficient is not None
-    turns = data.turns(setup) if slides else [None] * len(centres)
+    turns = data.turns(setup) if past is None and setup.support.friction_coefficient is not None else [None] * len(centres)
     previous: Equilibrium | None = None
-    for number, (group, centre) in enumerate(zip(data.groups, centres, strict=True)):
-        turn = turns[number]
+    for number, (group, centre, turn) in enumerate(zip(data.groups, centres, turns, strict=True)):
         if turn is not None:
             block.step(true_from_stated.apply(turn[None])[0], previous)
         if past is not None:
@@ -279,12 +277,11 @@ def predict(
         previous = frame if frame.outcome is Outcome.CONVERGED else None
         sample = samples[number] if samples is not None else choose(group, setup, frame, surface)
         compared = compare(group, setup, frame, surface, sample)
-        means = compared.means
         chosen.append(sample)
-        gap.append(means.mean)
-        count.append(means.count)
-        spread.append(means.spread)
-        frames.append(frame)
+        gap.append(compared.means.mean)
+        count.append(compared.means.count)
+        spread.append(compared.means.spread)
+        frames.append(replace(frame, way=()))  # what was on the way to it is for this replay alone
         if columns is not None:
             moved = columns.of_group(frame, moves[:, number])
             changes.append(columns.project(frame, moved, moves[:, number], compared, group.reference).astype(np.float32))

@@ -3,151 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2, norm
 
-from core.diagnosis.ambiguity import Told, ambiguity_map
+from core.diagnosis.ambiguity import ambiguity_map
 from core.diagnosis.bench import Bench
 from core.diagnosis.candidates import Signature, begin, candidates_of, lump_places, signatures, tangents
-from core.diagnosis.evidence import fit, predictive_gain
+from core.diagnosis.evidence import predictive_gain
+from core.diagnosis.findings import LEAST_GAIN, Findings, Trial
 from core.diagnosis.hypothesis import Model, with_effects
 from core.diagnosis.intervals import stands
 from core.diagnosis.pairing import mispaired
 from core.diagnosis.prediction import Prediction
 from core.diagnosis.screening import Candidate, linear_gains, null_gains, right_sides
-from core.diagnosis.structure import NOTHING, Structure, structure_of
+from core.diagnosis.shortlist import beyond_first_order, shortlist
+from core.diagnosis.structure import structure_of
 from core.effects import Effect
-from core.effects.geometry import MeshResolution
-from core.effects.material import StiffInclusion
-from core.effects.tool import ToolOffset
 
-__all__ = ["MOST_CAUSES", "Findings", "Trial", "search"]
+__all__ = ["MOST_CAUSES", "search"]
 
-MOST_CAUSES = 2
+MOST_CAUSES = 3
 NULL_DRAWS = 400
 NULL_QUANTILE = 0.99
-LEAST_GAIN = 25.0
-"""No cause is named for less [nats], whatever the null says: the noise model itself is only known so well.
-
-Of twenty controls of the virtual bench one offered 23, a weak lump of half the block's width such as the grid's own error looks
-like, and no other more than 10; the least that a hidden cause of clear size gained was 28, a lump that few pushes came near."""
-SHORTLIST = 3
-STRAINED = 4.0
-"""A cause that only widens a stated accuracy is refitted, whatever its linear gain, when the data pull its numbers as improbably
-far as one number by this many standard deviations: to first order the nuisance explains most of it already, and hides the rest."""
 PROMISING = 0.5
 """Share of the bound that a first cause must reach in the linear screening to be refitted; its refit may find more."""
 SECOND_FACTOR, SECOND_SHARE = 2.0, 0.25
 HOPELESS = 60.0
 """A candidate this far behind the best one [nats] after two steps of its fit, or behind the model without it, is given up."""
-RIVAL = 8.0
-"""Rivals this close to the best [nats] are named too: the difference of two log densities that differ by d has a spread of
-about sqrt(2 d), so 8 nats are two of its standard deviations."""
-
-
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """A refitted model and its gain over the baseline [nats], with the misfit per value it leaves.
-
-    `parts` says where the gain comes from, once all trials are scored at one temperature: each block of data, and last the stated
-    accuracies.
-    """
-
-    model: Model
-    gain: float
-    misfit: float
-    parts: tuple[float, ...] = ()
-
-    def scored(self) -> Trial:
-        """Without the replays, which nobody asks for of a model that was not accepted: they take most of the memory."""
-        return replace(self, model=replace(self.model, predictions=()))
-
-
-@dataclass(eq=False)
-class Findings:
-    """What the search found.
-
-    Attributes:
-        baseline: the stated setup. best: the model accepted, or None. trials: every refitted model, best first.
-        bound: least gain of a cause [nats]. misfit: of the baseline, per value. screened: linear gain by effect name.
-        structure: error of the baseline that is smooth and grows with the push. left: the same of the best model.
-        told: what this experiment tells of each effect, whatever the data say.
-        withdrawn: why what was found is not named after all; empty where nothing was withdrawn.
-        known: what no replay could do without: touches that were surely of other landmarks.
-    """
-
-    baseline: Model
-    best: Trial | None = None
-    trials: list[Trial] = field(default_factory=list)
-    bound: float = LEAST_GAIN
-    misfit: float = 1.0
-    screened: dict[str, float] = field(default_factory=dict)
-    structure: Structure = NOTHING
-    left: Structure = NOTHING
-    told: tuple[Told, ...] = ()
-    withdrawn: str = ""
-    known: tuple[Effect, ...] = ()
-
-    def withdraw(self, why: str) -> None:
-        """Name nothing after all."""
-        names = self.best.model.names if self.best else ()
-        self.trials = [trial for trial in self.trials if trial.model.names != names]
-        self.best, self.left, self.withdrawn = None, self.structure, why
-
-    def rivals(self) -> list[Trial]:
-        """Other sets of as many causes that explain the data about as well as the best."""
-        if self.best is None:
-            return []
-        best = self.best
-        named = {best.model.names}
-        close = []
-        for trial in self.trials:
-            names = trial.model.names
-            if len(names) == len(best.model.names) and names not in named and best.gain - trial.gain < RIVAL:
-                named.add(names)
-                close.append(trial)
-        return close
-
-
-def _beyond_first_order(bench: Bench, model: Model, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """What to refit whatever its linear gain: the tool's offset, and the candidate whose stated accuracy the data break most.
-
-    A tangent knows little of what a tool's shift does over millimetres: of 2.4 mm it finds 0.4.
-    """
-    change = fit(bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model)).change
-    covariance = np.linalg.inv(bench.nuisances.precision)
-    least, strained = 2 * float(norm.sf(STRAINED)), []
-    for candidate in candidates:
-        own = [model.nuisance.index(column) for column in candidate.widened]
-        pull = float(change[own] @ np.linalg.solve(covariance[np.ix_(own, own)], change[own]))
-        chance = float(chi2.sf(pull, len(own))) if own else 1.0
-        if chance < least and not isinstance(candidate.start, (ToolOffset, MeshResolution)):
-            least, strained = chance, [candidate]
-    return [candidate for candidate in candidates if isinstance(candidate.start, ToolOffset)] + strained
-
-
-def _shortlist(
-    gains: np.ndarray, candidates: Sequence[Candidate], least: float, settled: Sequence[Candidate] = ()
-) -> list[Candidate]:
-    """The settled ones, then the best start of each promising effect, best first; two places for a lump."""
-    chosen, names = list(settled), SHORTLIST + len(settled)
-    for number in np.argsort(-gains):
-        candidate = candidates[number]
-        taken = [c for c in chosen if c.start.name == candidate.start.name]
-        apart = all(_distance(candidate.start, other.start) > 0.015 for other in taken)
-        nothing_finer = isinstance(candidate.start, MeshResolution) and candidate.widened
-        room = not (taken or nothing_finer) or (isinstance(candidate.start, StiffInclusion) and len(taken) < 2 and apart)
-        if gains[number] > least and room and (taken or len({c.start.name for c in chosen}) < names):
-            chosen.append(candidate)
-    return chosen
-
-
-def _distance(one: Effect, other: Effect) -> float:
-    if isinstance(one, StiffInclusion) and isinstance(other, StiffInclusion):
-        return float(np.linalg.norm([one.x - other.x, one.y - other.y, one.z - other.z]))
-    return 0.0
 
 
 def _screen(bench: Bench, model: Model, finite: Sequence[Signature], origin: Model) -> tuple[Model, list[Candidate], np.ndarray]:
@@ -199,7 +82,7 @@ def search(bench: Bench, seed: int) -> Findings:
         current = findings.best = step
         bench.temperature = max(1.0, current.misfit)
     if findings.best is not None and len(findings.best.model.effects) > 1 and not known:
-        findings.best = _backward(bench, findings, findings.best)
+        findings.best = _reconsidered(bench, findings, findings.best, finite, origin)
     _rescore(bench, findings)
     if findings.best is not None:
         refined = bench.refine(findings.best.model)
@@ -220,8 +103,8 @@ def _forward(
 ) -> Trial | None:
     """The best further cause that gains more than the bound and that is no accident of one sequence, else None."""
     trials: list[Trial] = []
-    settled = [] if current.model.effects else _beyond_first_order(bench, screened, candidates)
-    chosen = _shortlist(gains, candidates, PROMISING * _needed(findings, current), settled)
+    settled = [] if current.model.effects else beyond_first_order(bench, screened, candidates)
+    chosen = shortlist(gains, candidates, PROMISING * _needed(findings, current), settled)
     # What is refitted whatever its gain comes last, when a better one may show that it is hopeless.
     for candidate in sorted(chosen, key=lambda one: one in settled):
         effects = [*current.model.effects, begin(candidate, screened, bench)]
@@ -245,15 +128,41 @@ def _needed(findings: Findings, current: Trial) -> float:
     return max(SECOND_FACTOR * findings.bound, SECOND_SHARE * current.gain)
 
 
-def _backward(bench: Bench, findings: Findings, best: Trial) -> Trial:
-    """Drop each cause in turn: what a later one explains as well need not stay."""
-    for index in range(len(best.model.effects)):
-        rest = [effect for number, effect in enumerate(best.model.effects) if number != index]
-        trial = _trial(bench, rest, best.model.predictions, findings.baseline)
-        findings.trials.append(trial)
-        lost = predictive_gain(bench.score(best.model), bench.score(trial.model))[0]
+def _reconsidered(bench: Bench, findings: Findings, best: Trial, finite: Sequence[Signature], origin: Model) -> Trial:
+    """Drop each cause in turn, for what a later one explains as well need not stay; or exchange it for one that does better."""
+    for name in best.model.names:
+        rest = [effect for effect in best.model.effects if effect.name != name]
+        if len(rest) == len(best.model.effects):  # exchanged already
+            continue
+        without = _trial(bench, rest, best.model.predictions, findings.baseline)
+        lost = predictive_gain(bench.score(best.model), bench.score(without.model))[0]
         if lost <= findings.bound:
-            return trial
+            findings.trials.append(without)
+            return without
+        findings.trials.append(without.scored())
+        best = _exchanged(bench, findings, (best, without), lost, _again(bench, without.model, finite, origin))
+    return best
+
+
+def _exchanged(
+    bench: Bench, findings: Findings, trials: tuple[Trial, Trial], lost: float, screening: tuple[Model, list[Candidate], np.ndarray]
+) -> Trial:
+    """The best of two trials, or one with another cause beside the second's, should that be better still.
+
+    Args:
+        trials: with a cause and without it. lost: what it is worth [nats]. screening: of the catalogue beside the second.
+    """
+    (best, without), (screened, candidates, gains) = trials, screening
+    others = [number for number, candidate in enumerate(candidates) if candidate.start.name not in best.model.names]
+    for candidate in shortlist(gains[others], [candidates[number] for number in others], PROMISING * lost)[:1]:
+        effects = [*without.model.effects, begin(candidate, screened, bench)]
+        bench.tell(f"trying {candidate.start.name} instead")
+        other = _trial(bench, effects, without.model.predictions, findings.baseline, bench.objective(best.model) - HOPELESS)
+        better = predictive_gain(bench.score(other.model), bench.score(best.model))[0] > 0
+        if better and stands(bench, other.model, without.model):
+            findings.trials.append(other)
+            return other
+        findings.trials.append(other.scored())
     return best
 
 

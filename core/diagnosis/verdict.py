@@ -9,11 +9,11 @@ import numpy as np
 from core.dataset import Dataset
 from core.diagnosis.bench import Bench
 from core.diagnosis.felt_gain import FeltLadder
+from core.diagnosis.findings import Findings, Trial
 from core.diagnosis.gain import Ladder
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.intervals import INTERVAL_LEVEL, intervals, modulus_interval
 from core.diagnosis.resolution import too_coarse
-from core.diagnosis.search import Findings, Trial
 from core.effects.geometry import MeshResolution
 from core.effects.material import YoungModulus
 from core.frames import FloatArray

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 __all__ = ["FINE_PUSHES", "REPLAY_PUSHES", "SCREEN_PUSHES", "PushedSpec"]
 
+_SLENDER = 0.2
+"""Of the body's shortest extent, half of the longest edge anywhere: fewer elements would cut its roundings off [1]."""
 _KEPT = 256
 """Meshes that a process keeps: three for each of some eighty pushes."""
 
@@ -41,7 +43,7 @@ class PushedSpec:
 
     places: tuple[tuple[float, float, float], ...] = ()
     reach: float = 4e-3
-    spacing: float = 1.3e-3
+    spacing: float = 1.6e-3
     growth: float = 0.6
     coarsest: float = 4e-3
 
@@ -79,13 +81,13 @@ def _filled(shape: Shape, place: tuple[float, float, float], spec: PushedSpec) -
     _, (centre,) = nearest(np.array([place]), shape.corners)
     size = TetSpec(
         path=((float(centre[0]), float(centre[1]), float(centre[2])),), radius=spec.reach, spacing=spec.spacing,
-        growth=spec.growth, coarsest=spec.coarsest,
+        growth=spec.growth, coarsest=max(spec.spacing, min(spec.coarsest, _SLENDER * min(shape.size))),
     )  # fmt: skip
     return fill(shape, size)
 
 
 REPLAY_PUSHES = PushedSpec()
-FINE_PUSHES = PushedSpec(spacing=0.95e-3, growth=0.5, coarsest=3.5e-3)
-SCREEN_PUSHES = PushedSpec(spacing=2e-3, growth=0.8, coarsest=5e-3)
+FINE_PUSHES = PushedSpec(spacing=1.25e-3, growth=0.55, coarsest=3.5e-3)
+SCREEN_PUSHES = PushedSpec(spacing=2.2e-3, growth=0.8, coarsest=5e-3)
 """For a ball of 5 mm; `for_tool` has those of others. A diagnosis takes the first, the fine one to say how far that is off, and the
 coarse one for what an effect would do."""

@@ -98,16 +98,16 @@ def mesh_block(size: tuple[float, float, float], grading: Grading) -> Block:
     return block_of(_refined(size, grading))
 
 
-def block_of(mesh: Any) -> Block:
-    """A body that stands on z = 0 from scikit-fem's mesh of its tetrahedra."""
+def block_of(mesh: Any, mapping: Any = None) -> Block:
+    """A body that stands on z = 0 from scikit-fem's mesh of its tetrahedra, and another mapping of these than usual."""
     from skfem import Basis, ElementTetP2, FacetBasis  # noqa: PLC0415
 
     element = ElementTetP2()
-    basis = Basis(mesh, element, intorder=2)
+    basis = Basis(mesh, element, intorder=2, mapping=mapping)
     base = mesh.facets_satisfying(lambda x: x[2] < 1e-9, boundaries_only=True)
     skin = np.setdiff1d(mesh.boundary_facets(), base)
     lattice, triangles = _lattice(3)
-    drawn = FacetBasis(mesh, element, facets=skin, quadrature=(lattice, np.ones(lattice.shape[1])))
+    drawn = FacetBasis(mesh, element, mapping=mapping, facets=skin, quadrature=(lattice, np.ones(lattice.shape[1])))
     nodes = np.ascontiguousarray(basis.doflocs.T)
     elements = np.ascontiguousarray(basis.element_dofs.T).astype(np.int64)
     surface = _operator(drawn, elements, len(nodes))
@@ -118,8 +118,8 @@ def block_of(mesh: Any) -> Block:
         gradients=np.ascontiguousarray(np.transpose([part[0].grad for part in basis.basis], (2, 3, 0, 1))),
         weights=np.ascontiguousarray(basis.dx),
         places=np.ascontiguousarray(np.transpose(np.asarray(basis.global_coordinates()), (1, 2, 0))),
-        skin=_sampling(FacetBasis(mesh, element, facets=skin, intorder=4)),
-        sole=_sampling(FacetBasis(mesh, element, facets=base, intorder=4)),
+        skin=_sampling(FacetBasis(mesh, element, mapping=mapping, facets=skin, intorder=4)),
+        sole=_sampling(FacetBasis(mesh, element, mapping=mapping, facets=base, intorder=4)),
         surface=surface,
         surface_rest=np.asarray(surface @ nodes),
         surface_faces=(triangles[None] + offsets).reshape(-1, 3),

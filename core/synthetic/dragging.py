@@ -24,7 +24,7 @@ __all__ = ["Dragging", "Rub", "assemble_rub"]
 
 CREEPS = (1e-4, 3e-5, 1e-5, 4e-6)
 """e [m], in turn; the last one stays."""
-_AGREED, _GOOD_ENOUGH, _MOST_TURNS = 0.01, 0.05, 30
+_AGREED, _GOOD_ENOUGH, _MOST_TURNS = 0.01, 0.05, 20
 """Change of what friction holds, over all of it [1], at which pressure and friction agree; the same where turns have run out."""
 
 
@@ -91,7 +91,7 @@ class Dragging:
             if change < _AGREED and turn + 1 >= len(CREEPS):
                 return
             # Where pressure and friction drive one another to and fro they go only part of the way.
-            share = max(0.5 * share, 0.1) if change > 0.7 * last and turn >= len(CREEPS) else share
+            share = max(0.5 * share, 0.1) if change > last and turn >= len(CREEPS) else min(1.5 * share, 1.0)
             rub = self._mixed(rub, renewed, share)
         if change > _GOOD_ENOUGH:
             text = f"friction and pressure of the virtual tool find no agreement: they are {100 * change:.0f} % apart"

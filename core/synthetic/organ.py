@@ -7,6 +7,7 @@ is given is a triangulation of it; the body that is pressed is another, finer on
 from __future__ import annotations
 
 import logging
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -112,7 +113,17 @@ def organ_block(places: FloatArray, reach: float, fine: float, within: Grading |
     spec = TetSpec(path=near, radius=reach, spacing=fine / 2, growth=0.5, coarsest=4e-3)
     solid = fill(Shape(*organ_surface(1.6e-3), name="organ"), spec)
     tetrahedra = _linear(solid.corners, solid.tetrahedra)
-    return block_of(_bent(MeshTet2.from_mesh(tetrahedra if within is None else refined_to(tetrahedra, within))))
+    bent = _bent(MeshTet2.from_mesh(tetrahedra if within is None else refined_to(tetrahedra, within)))
+    return block_of(bent, _mapped(bent))
+
+
+def _mapped(mesh: Any) -> Any:
+    """The mesh's mapping, whose inverse is found to what rounding leaves of it in a slender tetrahedron."""
+    from skfem.mapping import MappingIsoparametric  # noqa: PLC0415 (heavy)
+
+    mapping = MappingIsoparametric(mesh, mesh.elem(), mesh.bndelem)
+    mapping.invF = partial(mapping.invF, newton_tol=1e-9)
+    return mapping
 
 
 def _linear(corners: FloatArray, tetrahedra: IntArray) -> Any:

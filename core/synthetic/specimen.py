@@ -14,7 +14,7 @@ from core.frames import FloatArray
 from core.synthetic.block import Block
 from core.synthetic.body import solid_of, true_offset, true_radius
 from core.synthetic.dragging import Dragging, Rub
-from core.synthetic.equilibrium import Equilibrium, State
+from core.synthetic.equilibrium import Equilibrium, GivesWay, State
 from core.synthetic.motion import Probe
 from core.synthetic.remembering import Past, Remembering
 from core.synthetic.scenario import Scenario
@@ -26,6 +26,8 @@ __all__ = ["Specimen", "Standing"]
 KEY_SPACING, SLIDING_SPACING, DRAGGED_SPACING = 1.0e-3, 1.3e-3, 0.8e-3
 """Way between two keys [m]: of a tool that presses, that slides along, and that drags the surface along."""
 GRAVITY = 9.81
+_MOST_HALVED = 3
+"""How often a step of a tool that drags the surface along is halved, where it is too long."""
 _SET, _MOST_SETS = 2e-6, 12
 """Change of the displacement [m] at which an equilibrium and the set that it brings agree."""
 _FIRST_WAIT, _LONGER = (0.1, 0.25), 1.6
@@ -66,6 +68,7 @@ class Specimen:
         self._tree = cKDTree(block.surface_rest + self.settled)
         self._last = self._before = self.solver.rest
         self._mesh: Delaunay | None = None
+        self._stated: FloatArray | None = None
 
     def close(self) -> None:
         self.solver.close()
@@ -155,12 +158,13 @@ class Specimen:
     def moment(self, centre: FloatArray, time: float | None = None) -> Moment:
         """With the tool's stated centre here (3,) [m], at a time [s] for a block that remembers."""
         before = self._last
-        state = self._lived(centre, time) if self.memory is not None else self._found(centre)
+        state = self._lived(centre, time) if self.memory is not None else self._reached(centre)
         if self.drag is not None:
             self.drag.leave(state.displacement, state.centre)
         if self.memory is not None or self.drag is not None:
             # The next place is guessed from the last two that were found, not from two on the way to one.
             self._before, self._last = before, state
+        self._stated = centre
         surface = np.asarray(self.block.surface @ state.displacement) + self.slip
         return Moment(surface, self.slip[:2].copy(), state.push, state.penetration, state.centre + self.slip - centre)
 
@@ -169,7 +173,7 @@ class Specimen:
         memory = self.memory
         assert memory is not None
         self.solver.metric = memory.metric(time)
-        state = self._found(centre)
+        state = self._reached(centre)
         for _ in range(_MOST_SETS if memory.fraction else 0):
             self.solver.metric = memory.metric(time, memory.after(state.displacement, time).natural)
             before, state = state, self._found(centre)
@@ -177,6 +181,25 @@ class Specimen:
                 break
         memory.past = memory.after(state.displacement, time)
         return state
+
+    def _reached(self, centre: FloatArray, depth: int = 0) -> State:
+        """By way of nearer places, where friction and pressure find no agreement in one step."""
+        standing = self.standing
+        try:
+            return self._found(centre)
+        except GivesWay:
+            raise
+        except SolveError as error:
+            if self.drag is None or self._stated is None:
+                raise
+            if depth >= _MOST_HALVED:  # as deep as this tool can be led: the operator stops short of it
+                raise GivesWay(str(error)) from error
+        self.resume(standing)
+        middle = 0.5 * (self._stated + centre)
+        state = self._reached(middle, depth + 1)
+        self.drag.leave(state.displacement, state.centre)
+        self._stated = middle
+        return self._reached(centre, depth + 1)
 
     def _found(self, centre: FloatArray) -> State:
         """With friction under the base holding."""

@@ -12,6 +12,7 @@ from app.sentences import (
     control_sentences,
     determined_sentences,
     limit_phrase,
+    palpation_sentences,
     probe_sentence,
     quantity,
     verdict_sentence,
@@ -176,3 +177,25 @@ def test_parameters_that_the_data_do_not_enclose_are_named(report: dict[str, Any
         parameters = {"stiffness_ratio": {**ratio, "identifiability": told}, "x": {**ratio, "identifiability": "interval"}}
         (said,) = determined_sentences([{**cause, "parameters": parameters}])
         assert said.startswith(f"stiff inclusion stiffness ratio is {words}")
+
+
+def test_lump_that_was_felt_is_said_with_its_depth_footprint_and_cover() -> None:
+    lengths = {"x": 0.004, "y": 0.0, "z": 0.02, "radius": 0.0075}
+    parameters = {name: {"value": value, "unit": "m"} for name, value in lengths.items()}
+    parameters["stiffness_ratio"] = {"value": 6.0, "unit": "1"}
+    cause = {
+        "effect": "stiff_inclusion", "parameters": parameters,
+        "depth": {"value": 0.0113, "unit": "m", "low": 0.0094, "high": 0.0131},
+        "cover": {"value": 0.0038, "unit": "m", "low": 0.003, "high": 0.005},
+        "footprint": {"middle": [0.004, -0.001, 0.0313], "area": 3.2e-4},
+    }  # fmt: skip
+    palpation = {"pushes": 15, "depth": {"value": 0.004, "unit": "m"}, "force": {"value": 0.12, "unit": "N"}}
+    report = {"verdict": "found", "causes": [cause], "palpation": palpation}
+    assert plain(verdict_sentence(report)) == (
+        "The simulation misses a stiff lump, 15 mm across, its centre 11.3 mm (9.40 mm to 13.1 mm) under the surface."
+    )
+    pushed, felt, cover = (plain(said) for said in palpation_sentences(report))
+    assert pushed == "15 pushes, about 4.0 mm deep, against about 0.12 N"
+    assert felt == "it is felt over 3.2 cm² of the surface around (4.0 mm, -1.0 mm, 31 mm)"
+    assert cover == "3.80 mm (3.00 mm to 5.00 mm) of tissue lie above it"
+    assert palpation_sentences({"causes": [cause]}) == []

@@ -11,12 +11,12 @@ from virtual_push import hide, push
 
 from core.dataset import Forces, open_dataset
 from core.diagnosis.bench import Bench
+from core.diagnosis.findings import Findings
 from core.diagnosis.force import FORCE_ERROR, Felt, ForceRecord, force_discrepancy, force_scatter
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.intervals import modulus_interval
 from core.diagnosis.observations import Group, Observations
 from core.diagnosis.prediction import TOOL_COLUMNS, Wanted, predict
-from core.diagnosis.search import Findings
 from core.diagnosis.smoothing import SMOOTHING
 from core.diagnosis.verdict import report_of
 from core.diagnosis.workers import Workers

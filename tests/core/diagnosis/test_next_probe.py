@@ -11,12 +11,12 @@ from core.diagnosis.ambiguity import Limit, Told
 from core.diagnosis.bench import Bench
 from core.diagnosis.blurring import Scene, Survivor, _divergence, nats_of
 from core.diagnosis.evidence import Block, gram
+from core.diagnosis.findings import RIVAL, Findings, Trial
 from core.diagnosis.hypothesis import Model, with_effects
 from core.diagnosis.next_probe import Pair, _advice, _choices, _instead, pairs_of
 from core.diagnosis.prediction import TOOL_COLUMNS
 from core.diagnosis.pushes import Push, pushes
 from core.diagnosis.screening import Candidate
-from core.diagnosis.search import RIVAL, Findings, Trial
 from core.diagnosis.structure import Structure
 from core.diagnosis.workers import Workers
 from core.effects import Effect

@@ -13,6 +13,7 @@ from small_dataset import write_valid_dataset
 from core.dataset import Dataset, open_dataset
 from core.diagnosis.bench import Bench
 from core.diagnosis.evidence import Block, gram
+from core.diagnosis.findings import RIVAL, Findings, Trial
 from core.diagnosis.gain import Ladder, harm
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.intervals import intervals, stands
@@ -20,7 +21,6 @@ from core.diagnosis.noise import Noise
 from core.diagnosis.observations import Group, Observations
 from core.diagnosis.patterns import draw_patterns, patterns
 from core.diagnosis.prediction import TOOL_COLUMNS
-from core.diagnosis.search import RIVAL, Findings, Trial
 from core.diagnosis.structure import Structure
 from core.diagnosis.verdict import UNEXPLAINED_MISFIT, report_of, verdict_of
 from core.diagnosis.workers import Workers

@@ -11,7 +11,7 @@ from core.diagnosis.evidence import Block, gram
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.prediction import TOOL_COLUMNS
 from core.diagnosis.screening import Candidate
-from core.diagnosis.search import SHORTLIST, _beyond_first_order, _shortlist
+from core.diagnosis.shortlist import SHORTLIST, beyond_first_order, shortlist
 from core.diagnosis.workers import Workers
 from core.effects.load import Gravity
 from core.effects.material import PoissonRatio, StiffInclusion
@@ -54,32 +54,32 @@ def _pulled(bench: Bench, pulls: dict[int, float]) -> Model:
 
 
 def test_tools_offset_is_always_refitted(bench):
-    assert _beyond_first_order(bench, _pulled(bench, {}), [SAG, RADIUS, OFFSET, NU, CLOCK]) == [OFFSET]
+    assert beyond_first_order(bench, _pulled(bench, {}), [SAG, RADIUS, OFFSET, NU, CLOCK]) == [OFFSET]
 
 
 def test_the_worst_of_the_accuracies_that_the_data_break_is_refitted_too(bench):
     model = _pulled(bench, {TOOL_COLUMNS: 20.0, TOOL_COLUMNS + 1: 6.0})
-    assert _beyond_first_order(bench, model, [OFFSET, NU, RADIUS]) == [OFFSET, RADIUS]
+    assert beyond_first_order(bench, model, [OFFSET, NU, RADIUS]) == [OFFSET, RADIUS]
 
 
 def test_what_lies_within_the_stated_accuracy_is_not_refitted_for_it(bench):
     model = _pulled(bench, {0: 2.0, TOOL_COLUMNS: 3.0, TOOL_COLUMNS + 1: -2.5})
-    assert _beyond_first_order(bench, model, [SAG, RADIUS, NU, CLOCK]) == []
+    assert beyond_first_order(bench, model, [SAG, RADIUS, NU, CLOCK]) == []
 
 
 def test_settled_one_comes_first_and_takes_nobodys_place():
     candidates = [SAG, CLOCK, SLIDING, NU, RADIUS]
     gains = np.array([30.0, 50.0, 40.0, 20.0, -3.0])
-    assert _shortlist(gains, candidates, 10.0) == [CLOCK, SLIDING, SAG][:SHORTLIST]
-    assert _shortlist(gains, candidates, 10.0, [RADIUS]) == [RADIUS, CLOCK, SLIDING, SAG]
-    assert _shortlist(gains, candidates, 10.0, [CLOCK]) == [CLOCK, SLIDING, SAG, NU]
+    assert shortlist(gains, candidates, 10.0) == [CLOCK, SLIDING, SAG][:SHORTLIST]
+    assert shortlist(gains, candidates, 10.0, [RADIUS]) == [RADIUS, CLOCK, SLIDING, SAG]
+    assert shortlist(gains, candidates, 10.0, [CLOCK]) == [CLOCK, SLIDING, SAG, NU]
 
 
 def test_only_what_promises_enough_is_fitted():
-    assert _shortlist(np.array([9.0, 11.0, 2.0]), [SAG, CLOCK, NU], 10.0) == [CLOCK]
+    assert shortlist(np.array([9.0, 11.0, 2.0]), [SAG, CLOCK, NU], 10.0) == [CLOCK]
 
 
 def test_lump_begins_at_two_places_well_apart():
     candidates = [lump(0.0), lump(0.004), lump(0.02), lump(-0.02), CLOCK]
     gains = np.array([60.0, 55.0, 50.0, 45.0, 30.0])
-    assert _shortlist(gains, candidates, 10.0) == [candidates[0], candidates[2], CLOCK]
+    assert shortlist(gains, candidates, 10.0) == [candidates[0], candidates[2], CLOCK]

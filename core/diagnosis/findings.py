@@ -1,0 +1,85 @@
+"""What a search for causes found: every set of causes that was fitted, the one that is accepted, and what it was weighed by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from core.diagnosis.ambiguity import Told
+from core.diagnosis.hypothesis import Model
+from core.diagnosis.structure import NOTHING, Structure
+from core.effects import Effect
+
+__all__ = ["LEAST_GAIN", "RIVAL", "Findings", "Trial"]
+
+LEAST_GAIN = 25.0
+"""No cause is named for less [nats], whatever the null says: the noise model itself is only known so well.
+
+Of twenty controls of the virtual bench one offered 23, a weak lump of half the block's width such as the grid's own error looks
+like, and no other more than 10; the least that a hidden cause of clear size gained was 28, a lump that few pushes came near."""
+RIVAL = 8.0
+"""Rivals this close to the best [nats] are named too: the difference of two log densities that differ by d has a spread of
+about sqrt(2 d), so 8 nats are two of its standard deviations."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A refitted model and its gain over the baseline [nats], with the misfit per value it leaves.
+
+    `parts` says where the gain comes from, once all trials are scored at one temperature: each block of data, and last the stated
+    accuracies.
+    """
+
+    model: Model
+    gain: float
+    misfit: float
+    parts: tuple[float, ...] = ()
+
+    def scored(self) -> Trial:
+        """Without the replays, which nobody asks for of a model that was not accepted: they take most of the memory."""
+        return replace(self, model=replace(self.model, predictions=()))
+
+
+@dataclass(eq=False)
+class Findings:
+    """What the search found.
+
+    Attributes:
+        baseline: the stated setup. best: the model accepted, or None. trials: every refitted model, best first.
+        bound: least gain of a cause [nats]. misfit: of the baseline, per value. screened: linear gain by effect name.
+        structure: error of the baseline that is smooth and grows with the push. left: the same of the best model.
+        told: what this experiment tells of each effect, whatever the data say.
+        withdrawn: why what was found is not named after all; empty where nothing was withdrawn.
+        known: what no replay could do without: touches that were surely of other landmarks.
+    """
+
+    baseline: Model
+    best: Trial | None = None
+    trials: list[Trial] = field(default_factory=list)
+    bound: float = LEAST_GAIN
+    misfit: float = 1.0
+    screened: dict[str, float] = field(default_factory=dict)
+    structure: Structure = NOTHING
+    left: Structure = NOTHING
+    told: tuple[Told, ...] = ()
+    withdrawn: str = ""
+    known: tuple[Effect, ...] = ()
+
+    def withdraw(self, why: str) -> None:
+        """Name nothing after all."""
+        names = self.best.model.names if self.best else ()
+        self.trials = [trial for trial in self.trials if trial.model.names != names]
+        self.best, self.left, self.withdrawn = None, self.structure, why
+
+    def rivals(self) -> list[Trial]:
+        """Other sets of as many causes that explain the data about as well as the best."""
+        if self.best is None:
+            return []
+        best = self.best
+        named = {best.model.names}
+        close = []
+        for trial in self.trials:
+            names = trial.model.names
+            if len(names) == len(best.model.names) and names not in named and best.gain - trial.gain < RIVAL:
+                named.add(names)
+                close.append(trial)
+        return close
