@@ -103,7 +103,7 @@ def _forward(
 ) -> Trial | None:
     """The best further cause that gains more than the bound and that is no accident of one sequence, else None."""
     trials: list[Trial] = []
-    settled = [] if current.model.effects else beyond_first_order(bench, screened, candidates)
+    settled = beyond_first_order(bench, screened, candidates) if current.model.names == _known(findings) else []
     chosen = shortlist(gains, candidates, PROMISING * _needed(findings, current), settled)
     # What is refitted whatever its gain comes last, when a better one may show that it is hopeless.
     for candidate in sorted(chosen, key=lambda one: one in settled):
@@ -117,13 +117,18 @@ def _forward(
     return best
 
 
+def _known(findings: Findings) -> tuple[str, ...]:
+    return tuple(effect.name for effect in findings.known)
+
+
 def _needed(findings: Findings, current: Trial) -> float:
     """Least gain [nats] of the next cause.
 
     The mesh's error is known for the stated setup only; a found cause changes it, and what changes with it could pass for
-    another cause. So a second one must gain a good deal more than chance, and a fair share of what the first gained.
+    another cause. So a second one must gain a good deal more than chance, and a fair share of what the first gained. What nothing
+    could be replayed without was there when the noise was measured, and is no first cause in this sense.
     """
-    if not current.model.effects:
+    if current.model.names == _known(findings):
         return findings.bound
     return max(SECOND_FACTOR * findings.bound, SECOND_SHARE * current.gain)
 
