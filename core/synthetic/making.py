@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
@@ -13,7 +11,6 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from core.errors import RunError
 from core.frames import FloatArray, Transform
 from core.progress import Report, silent
 from core.synthetic.bench import neutral_displacement, perform, rest_surface
@@ -24,8 +21,9 @@ from core.synthetic.force import ForceSensor
 from core.synthetic.motion import Motion, draw_motion
 from core.synthetic.scenario import Scenario
 from core.synthetic.track import Track
-from core.synthetic.truth import Truth, truth_path
+from core.synthetic.truth import Truth
 from core.synthetic.visibility import changed, visible_weights
+from core.synthetic.whole import whole_or_nothing
 from core.synthetic.writing import write_clouds, write_config, write_forces, write_kinematics, write_ply, write_touches
 
 __all__ = ["make_dataset"]
@@ -63,18 +61,7 @@ def make_dataset(folder: Path, scenario: Scenario, seed: int, workers: int = 1, 
 
     The same scenario and seed give the same files, whatever the number of workers. Raises RunError where `folder` exists.
     """
-    if folder.exists():
-        raise RunError(f"{folder} exists already; choose another name or remove it", path=str(folder))
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-    try:
-        truth = _fill(aside, scenario, seed, workers, report)
-        aside.chmod(0o755)
-        truth.save(truth_path(folder))
-        aside.rename(folder)
-    except BaseException:
-        shutil.rmtree(aside, ignore_errors=True)
-        raise
+    truth = whole_or_nothing(folder, lambda aside: _fill(aside, scenario, seed, workers, report))
     report(1.0, f"made {folder.name}")
     return truth
 

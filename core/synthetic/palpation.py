@@ -7,8 +7,6 @@ that each depth is a little off; kinematics say where the tool was, not where it
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
@@ -19,7 +17,6 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from core.errors import RunError
 from core.frames import FloatArray, Transform
 from core.progress import Report, silent
 from core.synthetic.bench import perform
@@ -28,7 +25,8 @@ from core.synthetic.force import FORCE_NOISE, ForceSensor
 from core.synthetic.motion import Motion, Probe
 from core.synthetic.organ import AXES, organ_block, organ_normals, organ_places, organ_surface, write_surface
 from core.synthetic.scenario import HiddenEffect, Scenario
-from core.synthetic.truth import Truth, truth_path
+from core.synthetic.truth import Truth
+from core.synthetic.whole import whole_or_nothing
 from core.synthetic.writing import write_felt_config, write_forces, write_kinematics, write_touches
 
 __all__ = ["Body", "Palpation", "draw_palpation", "make_palpation"]
@@ -85,18 +83,7 @@ def draw_palpation(body: Body, effects: int, seed: int) -> Palpation:
 
 def make_palpation(folder: Path, palpation: Palpation, seed: int, workers: int = 1, report: Report = silent) -> Truth:
     """Make the dataset `folder` and its truth beside it: both whole or neither. Raises RunError where `folder` exists."""
-    if folder.exists():
-        raise RunError(f"{folder} exists already; choose another name or remove it", path=str(folder))
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-    try:
-        truth = _fill(aside, folder.name, palpation, seed, workers, report)
-        aside.chmod(0o755)
-        truth.save(truth_path(folder))
-        aside.rename(folder)
-    except BaseException:
-        shutil.rmtree(aside, ignore_errors=True)
-        raise
+    truth = whole_or_nothing(folder, lambda aside: _fill(aside, folder.name, palpation, seed, workers, report))
     report(1.0, f"made {folder.name}")
     return truth
 
