@@ -7,6 +7,9 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 PIP := $(VENV)/bin/python -m pip
 ARGS ?=
+# Two workers, a file to each, the longest first. One that dies ends the run at once with the name of its test: replaced, it would
+# leave tests that nobody is given, and the run would wait for ever.
+SPREAD := -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart=0
 
 # Palpate spreads work over processes; threads inside them would fight for the same cores.
 export OMP_NUM_THREADS ?= 1
@@ -21,7 +24,7 @@ demo: install
 	$(VENV)/bin/palpate demo $(ARGS)
 
 test: develop
-	$(VENV)/bin/python -m pytest -m "not slow" -n 2 --dist loadfile $(ARGS)
+	$(VENV)/bin/python -m pytest -m "not slow" $(SPREAD) $(ARGS)
 
 bench: $(VENV)/.peers
 	$(VENV)/bin/python -m benchmarks $(ARGS)

@@ -34,6 +34,8 @@ _FAST = 3.0
 """Of the speed that was usual, where clocks are in question."""
 _ENOUGH = 0.9
 """Half the depth will do where it gives this share of the nats [1]."""
+_TOLD = 200.0
+"""What is this far behind the best [nats] is no longer asked about: what grew so far apart in one visit no push need separate."""
 _IMAGINED = 2
 """Effects that are imagined at their detection limits where no cause was named."""
 _INSTEAD = {
@@ -167,8 +169,9 @@ def pairs_of(bench: Bench, findings: Findings) -> list[Pair]:
 
 
 def _next_best(findings: Findings, best: Trial) -> list[Trial]:
-    """The refitted set that came closest to the best, of other causes."""
-    return [trial for trial in findings.trials if trial.model.names != best.model.names and trial.model.effects][:1]
+    """The refitted set that came closest to the best, of other causes; none where all were told from it long ago."""
+    others = [trial for trial in findings.trials if trial.model.names != best.model.names and trial.model.effects]
+    return [trial for trial in others[:1] if best.gain - trial.gain < _TOLD]
 
 
 def _imagined(bench: Bench, findings: Findings) -> list[Pair]:

@@ -14,6 +14,7 @@ from core.diagnosis.evidence import predictive_gain
 from core.diagnosis.findings import LEAST_GAIN, Findings, Trial
 from core.diagnosis.hypothesis import Model, with_effects
 from core.diagnosis.intervals import stands
+from core.diagnosis.ordered import TRACED
 from core.diagnosis.pairing import mispaired
 from core.diagnosis.prediction import Prediction
 from core.diagnosis.screening import Candidate, linear_gains, null_gains, right_sides
@@ -31,6 +32,9 @@ PROMISING = 0.5
 SECOND_FACTOR, SECOND_SHARE = 2.0, 0.25
 HOPELESS = 60.0
 """A candidate this far behind the best one [nats] after two steps of its fit, or behind the model without it, is given up."""
+DEAR_OPTIMISM = 2.0
+"""What is replayed along the tool's whole way, several times as dear as others, comes last, and not at all where so many times its
+linear gain would leave it that far behind."""
 
 
 def _screen(bench: Bench, model: Model, finite: Sequence[Signature], origin: Model) -> tuple[Model, list[Candidate], np.ndarray]:
@@ -105,10 +109,13 @@ def _forward(
     trials: list[Trial] = []
     settled = beyond_first_order(bench, screened, candidates) if current.model.names == _known(findings) else []
     chosen = shortlist(gains, candidates, PROMISING * _needed(findings, current), settled)
-    # What is refitted whatever its gain comes last, when a better one may show that it is hopeless.
-    for candidate in sorted(chosen, key=lambda one: one in settled):
+    before, linear = bench.objective(current.model), {id(one): gain for one, gain in zip(candidates, gains, strict=True)}
+    # What is dear, or refitted whatever its gain, comes last, when a better one may show that it is hopeless.
+    for candidate in sorted(chosen, key=lambda one: (isinstance(one.start, TRACED), one in settled)):
+        hopeless = max([before, *(bench.objective(trial.model) - HOPELESS for trial in trials)])
+        if isinstance(candidate.start, TRACED) and before + DEAR_OPTIMISM * linear[id(candidate)] < hopeless:
+            continue
         effects = [*current.model.effects, begin(candidate, screened, bench)]
-        hopeless = max([bench.objective(current.model), *(bench.objective(trial.model) - HOPELESS for trial in trials)])
         trials.append(_trial(bench, effects, current.model.predictions, current.model, hopeless))
     trials.sort(key=lambda trial: -trial.gain)
     enough = [trial for trial in trials if trial.gain > _needed(findings, current)]

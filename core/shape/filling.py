@@ -26,7 +26,7 @@ from core.shape.solid import SolidMesh, sides_of
 if TYPE_CHECKING:
     from core.setup import Setup
 
-__all__ = ["TetSpec", "fill"]
+__all__ = ["TetSpec", "check_spacing", "fill"]
 
 _SHARP = np.radians(40.0)
 """Triangles that meet at a sharper angle than this keep an edge between them."""
@@ -35,6 +35,15 @@ _TETRAHEDRA, _TRIANGLES, _LINES = 4, 2, 1
 _FRONTAL, _DELAUNAY = 6, 1
 """Gmsh's numbers of algorithms in the plane and in space."""
 _alone = threading.Lock()
+
+
+def check_spacing(spacing: float, coarsest: float) -> None:
+    """MeshError unless spacings [m] at the tool and far from it are in this order and below a metre."""
+    if not 0 < spacing <= coarsest < 1:
+        raise MeshError(
+            f"spacing {spacing:g} m and coarsest {coarsest:g} m are not in this order between 0 and 1 m",
+            spacing=spacing, coarsest=coarsest,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,11 +63,7 @@ class TetSpec:
     coarsest: float = 4e-3
 
     def __post_init__(self) -> None:
-        if not 0 < self.spacing <= self.coarsest < 1:
-            raise MeshError(
-                f"spacing {self.spacing:g} m and coarsest {self.coarsest:g} m are not in this order between 0 and 1 m",
-                spacing=self.spacing, coarsest=self.coarsest,
-            )  # fmt: skip
+        check_spacing(self.spacing, self.coarsest)
         if not 0 < self.growth <= 2:
             raise MeshError(f"growth {self.growth:g} is not between 0 and 2", growth=self.growth)
 

@@ -16,7 +16,7 @@ from core.errors import MeshError
 from core.frames import FloatArray
 from core.meshing import FINER
 from core.shape.body import Shape
-from core.shape.filling import TetSpec, fill
+from core.shape.filling import TetSpec, check_spacing, fill
 from core.shape.nearest import nearest
 from core.shape.solid import SolidMesh
 
@@ -48,11 +48,7 @@ class PushedSpec:
     coarsest: float = 4e-3
 
     def __post_init__(self) -> None:
-        if not 0 < self.spacing <= self.coarsest < 1:
-            raise MeshError(
-                f"spacing {self.spacing:g} m and coarsest {self.coarsest:g} m are not in this order between 0 and 1 m",
-                spacing=self.spacing, coarsest=self.coarsest,
-            )  # fmt: skip
+        check_spacing(self.spacing, self.coarsest)
 
     def at(self, places: FloatArray) -> PushedSpec:
         """The same for pushes at these places (k, 3) [m]."""
