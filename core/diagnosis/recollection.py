@@ -8,7 +8,8 @@ strain that stays. Either is a load on the frame as it is, and one linear solve.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -30,16 +31,23 @@ class Recollection:
 
     Args:
         block: the plain replay's. frames: its equilibria, one for each group. time: what lies between them.
+
+    Attributes:
+        order: numbers of the groups by time.
     """
 
     def __init__(self, block: Replay, frames: Sequence[Equilibrium], time: Timeline) -> None:
-        self._law, self._time, self._count = Law.of(block.setup.material), time, len(frames)
+        self._law, self._time = Law.of(block.setup.material), time
+        self.order: list[int] = np.argsort(time.instants, kind="stable").tolist()
         self._points = material_points(block.setup, block.grid, block.free.mesh)
         own = [frames[number] for number in time.touched]
         self._strained = [cauchy_green(self._points.tangents(frame.mesh, frame.mesh.nodes + frame.displacement)) for frame in own]
 
-    def lacks(self, effect: Effect) -> list[FloatArray | None]:
-        """For each group the stress (m, 6) over the shear modulus that it takes from the material's points; None of none."""
+    def lacks(self, effect: Effect) -> Iterator[FloatArray | None]:
+        """For each group, in order of time, the stress (m, 6) over the shear modulus that it takes from the material's points.
+
+        None where it takes none. One at a time: those of all groups and effects would fill half a gigabyte.
+        """
         if isinstance(effect, Viscoelasticity):
             return self._relaxed(effect)
         if isinstance(effect, PermanentSet):
@@ -51,38 +59,43 @@ class Recollection:
         at_points = self._points.read(model.mesh, stress) * model.unrelaxed[..., None]
         return ConstantStress.of(model, at_points).force(displacement[model.topology.free])
 
-    def _relaxed(self, effect: Viscoelasticity) -> list[FloatArray | None]:
-        stresses = [shear_stress(self._law, strained) for strained in self._strained]
+    @cached_property
+    def _stresses(self) -> list[FloatArray]:
+        return [shear_stress(self._law, strained) for strained in self._strained]
+
+    def _relaxed(self, effect: Viscoelasticity) -> Iterator[FloatArray | None]:
         rates = np.where(self._time.depths > 0, 1.0, 1.0 - effect.relaxed_fraction) / effect.time_constant
         left = effect.relaxed_fraction * self._time.faded(rates)
-        return [self._mixed(row, stresses) for row in left]
+        return (self._mixed(left[number], self._stresses) for number in self.order)
 
     def _mixed(self, shares: FloatArray, fields: Sequence[FloatArray]) -> FloatArray | None:
-        parts = [share * field for share, field in zip(shares.tolist(), fields, strict=True) if abs(share) > 1e-6]
-        return np.sum(parts, axis=0) if parts else None
+        """Added up in place: a list of the parts would take many times as much memory."""
+        total = None
+        for share, field in zip(shares.tolist(), fields, strict=True):
+            if abs(share) > 1e-6:
+                total = share * field if total is None else np.add(total, share * field, out=total)
+        return total
 
-    def _set(self, effect: PermanentSet) -> list[FloatArray | None]:
+    @cached_property
+    def _strains(self) -> list[FloatArray]:
+        return [log_strain(strained) for strained in self._strained]
+
+    def _set(self, effect: PermanentSet) -> Iterator[FloatArray | None]:
         """Strain is kept along the way as `core.memory` keeps it, from one peak to the next."""
-        strains = [log_strain(strained) for strained in self._strained]
-        found: list[FloatArray | None] = [None] * self._count
-        if not strains:
-            return found
-        largest, kept = np.zeros(len(strains[0])), np.zeros_like(strains[0])
-        peaks = self._time.peaks()
-        at = 0
-        for number in np.argsort(self._time.instants):
+        kept: FloatArray = np.zeros((0, 6))
+        largest, peaks, at = np.zeros(0), self._time.peaks(), 0
+        for number in self.order:
             instant = self._time.instants[number]
-            if not np.isfinite(instant):
-                continue
-            while at < len(peaks) and peaks[at][0] <= instant:
-                strain = self._mixed(peaks[at][1], strains)
+            while np.isfinite(instant) and at < len(peaks) and peaks[at][0] <= instant:
+                strain = self._mixed(peaks[at][1], self._strains)
                 at += 1
                 if strain is None:
                     continue
+                if not len(kept):
+                    largest, kept = np.zeros(len(strain)), np.zeros_like(strain)
                 size = np.sqrt(np.einsum("mc,mc,c->m", strain, strain, [1, 1, 1, 2, 2, 2]))
                 growing = size > largest
                 kept[growing] += ((size - largest)[growing] / size[growing])[:, None] * strain[growing]
                 largest = np.maximum(size, largest)
-            if at:
-                found[number] = shear_stress(self._law, from_log_strain(effect.retained_fraction * kept))
-        return found
+            known = np.isfinite(instant) and len(kept)
+            yield shear_stress(self._law, from_log_strain(effect.retained_fraction * kept)) if known else None

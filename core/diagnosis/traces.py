@@ -79,31 +79,30 @@ def traces_of(
     rough = [effect for effect in effects if isinstance(effect, ToolFriction)]
     lasting = [effect for effect in effects if not isinstance(effect, ToolFriction)]
     past = Recollection(block, frames, time)
-    lacks = [past.lacks(effect) for effect in lasting]
-    spots: list[Spot | None] = []
+    lacks = {id(effect): past.lacks(effect) for effect in lasting}
+    spots: dict[int, Spot | None] = {}
     shape, modulus = (len(frames), surface.patches), setup.material.young_modulus
     found = {id(effect): Trace(np.zeros(shape), np.zeros((len(frames), 3))) for effect in effects}
     kept: dict[int, tuple[_Look, Any]] = {}
-    for number, group in enumerate(data.groups):
-        touched = number in time.touched
-        if touched:
-            spots.append(None)
-        missing = {id(effect): own[number] for effect, own in zip(lasting, lacks, strict=True) if own[number] is not None}
+    for number in past.order:
+        group, touched = data.groups[number], number in time.touched
+        missing = {name: stress for name, own in lacks.items() if (stress := next(own)) is not None}
         look = _look(block, frames, number, time) if touched or missing else None
         if look is None:
             continue
         seen = observe(look.frame, compare(group, setup, look.frame, surface, samples[number]))
-        answers = {}
-        for name, stress in missing.items():
-            assert stress is not None
-            answers[name] = look.model.topology.factor.solve(past.load(look.model, stress, look.frame.displacement))
+        answers = {
+            name: look.model.topology.factor.solve(past.load(look.model, stress, look.frame.displacement))
+            for name, stress in missing.items()
+        }
         if touched and rough:
-            spots[-1] = spot_of(look.model, look.frame)
+            spots[number] = spot_of(look.model, look.frame)
             kept[number] = (look, seen)
         for name, answer in answers.items():
             _state(found[name], number, look, seen, answer, modulus)
+    held = [spots.get(number) for number in time.touched]
     for effect in rough:
-        for pull, spot, number in zip(pulls(effect, time, spots), spots, time.touched, strict=True):
+        for pull, spot, number in zip(pulls(effect, time, held), held, time.touched, strict=True):
             if spot is not None and pull.any():
                 look, seen = kept[number]
                 _state(found[id(effect)], number, look, seen, spot.answer @ pull, modulus, pull)
