@@ -59,8 +59,8 @@ class Case:
 def all_cases(seed: int, controls: int = 10, effects: Sequence[str] | None = None, short: bool = False) -> list[Case]:
     """Each effect once, each disturbance once, and the controls; every case has a seed of its own.
 
-    Effects are those of `core.synthetic.WEIGHED`, or the ones named, of which the virtual bench can hide more (a misread depth,
-    another size, touches of other places); an unknown one is a RunError.
+    Effects are those of `core.synthetic.WEIGHED`, or the ones named, of which the virtual bench can also hide Young's modulus; an
+    unknown one is a RunError.
     """
     from core.synthetic import DISTURBANCES, HIDDEN  # noqa: PLC0415 (heavy)
 

@@ -3,10 +3,10 @@
 from core.synthetic.disturbance import DISTURBANCES, Disturbance, draw_disturbance
 from core.synthetic.making import make_dataset
 from core.synthetic.palpation import Palpation, draw_palpation, make_palpation
-from core.synthetic.scenario import HIDDEN, SHORT_PROTOCOL, WEIGHED, HiddenEffect, Scenario, draw_scenario
+from core.synthetic.scenario import HIDDEN, QUICK, SHORT_PROTOCOL, WEIGHED, HiddenEffect, Scenario, draw_scenario
 from core.synthetic.truth import Truth, truth_path
 
 __all__ = [
-    "DISTURBANCES", "HIDDEN", "SHORT_PROTOCOL", "WEIGHED", "Disturbance", "HiddenEffect", "Palpation", "Scenario",
+    "DISTURBANCES", "HIDDEN", "QUICK", "SHORT_PROTOCOL", "WEIGHED", "Disturbance", "HiddenEffect", "Palpation", "Scenario",
     "Truth", "draw_disturbance", "draw_palpation", "draw_scenario", "make_dataset", "make_palpation", "truth_path",
 ]  # fmt: skip

@@ -18,7 +18,7 @@ from numba import njit
 from core.errors import SolveError
 from core.frames import FloatArray
 from core.synthetic.block import Block, IntArray
-from core.synthetic.law import SOFT_GAP
+from core.synthetic.law import SOFT_GAP, spread
 
 __all__ = ["Dragging", "Rub", "assemble_rub"]
 
@@ -138,7 +138,7 @@ class Dragging:
 
 
 @njit(cache=True, fastmath={"contract", "reassoc", "arcp", "nsz"})
-def assemble_rub(  # noqa: PLR0912
+def assemble_rub(
     u: Any,
     nodes: Any,
     elements: Any,
@@ -159,6 +159,7 @@ def assemble_rub(  # noqa: PLR0912
     """Energy [J] of a `Rub` at displacements u (n, 3) [m]; with `derivative`, adds what `law.assemble_obstacle` adds."""
     energy = 0.0
     way = np.empty(3)
+    pull = np.empty(3)
     t = np.empty((3, 3))
     for s in range(owner.shape[0]):
         element = elements[owner[s]]
@@ -181,22 +182,12 @@ def assemble_rub(  # noqa: PLR0912
             energy += limit * (length - creep)
             if not derivative:
                 continue
-            pull = limit / length
             for i in range(3):
-                push[i] -= pull * way[i]
+                pull[i] = limit / length * way[i]
+                push[i] -= pull[i]
                 for k in range(3):
-                    t[i, k] = pull * ((1.0 if i == k else 0.0) - n[i] * n[k] - way[i] * way[k] / (length * length))
+                    across = (1.0 if i == k else 0.0) - n[i] * n[k] - way[i] * way[k] / (length * length)
+                    t[i, k] = limit / length * across
                     total[i, k] += t[i, k]
-            for a in range(10):
-                va = values[s, q, a]
-                if va == 0.0:
-                    continue
-                for i in range(3):
-                    force[element[a], i] += pull * way[i] * va
-                    for k in range(3):
-                        coupling[element[a], i, k] += va * t[i, k]
-                for b in range(a, 10):
-                    for i in range(3):
-                        for k in range(3):
-                            stiffness[owner[s], a, b, i, k] += va * values[s, q, b] * t[i, k]
+            spread(values[s, q], element, pull, t, stiffness[owner[s]], force, coupling)
     return energy

@@ -16,7 +16,9 @@ from numba import njit
 
 from core.frames import FloatArray
 
-__all__ = ["SECOND_INVARIANT_SHARE", "assemble_obstacle", "assemble_solid", "constants", "deformation_gradient", "solid_energy"]
+__all__ = ["SECOND_INVARIANT_SHARE", "assemble_obstacle", "assemble_solid", "constants", "deformation_gradient", "solid_energy",
+    "spread", "turn_gradients",
+]  # fmt: skip
 
 SECOND_INVARIANT_SHARE = 0.1
 SOFT_GAP = 0.03e-3
@@ -50,6 +52,37 @@ def deformation_gradient(u: Any, nodes: Any, g: Any, f: Any) -> float:
         - f[0, 1] * (f[1, 0] * f[2, 2] - f[1, 2] * f[2, 0])
         + f[0, 2] * (f[1, 0] * f[2, 1] - f[1, 1] * f[2, 0])
     )
+
+
+@njit(cache=True, fastmath=_FAST)
+def turn_gradients(f: Any, along: Any, g: Any, fa: Any, ha: Any) -> None:
+    """Put F `along` into fa and F^-T g into ha, with F = f (3, 3); all others (10, 3), g the shape gradients [1/m]."""
+    inverse = np.linalg.inv(f)
+    for a in range(10):
+        for i in range(3):
+            fa[a, i] = f[i, 0] * along[a, 0] + f[i, 1] * along[a, 1] + f[i, 2] * along[a, 2]
+            ha[a, i] = inverse[0, i] * g[a, 0] + inverse[1, i] * g[a, 1] + inverse[2, i] * g[a, 2]
+
+
+@njit(cache=True, fastmath=_FAST)
+def spread(shares: Any, nodes: Any, pull: Any, t: Any, stiffness: Any, force: Any, coupling: Any) -> None:
+    """Add what holds a surface point to its nodes (10,) by their shares (10,).
+
+    The force on them is `pull` (3,) [N], its slope t (3, 3) [N/m]. Of the element stiffness (10, 10, 3, 3) only upper node pairs
+    are filled; force (n, 3) and coupling (n, 3, 3) are those of all nodes.
+    """
+    for a in range(10):
+        share = shares[a]
+        if share == 0.0:
+            continue
+        for i in range(3):
+            force[nodes[a], i] += pull[i] * share
+            for k in range(3):
+                coupling[nodes[a], i, k] += share * t[i, k]
+        for b in range(a, 10):
+            for i in range(3):
+                for k in range(3):
+                    stiffness[a, b, i, k] += share * shares[b] * t[i, k]
 
 
 @njit(cache=True, fastmath=_FAST)
@@ -105,18 +138,11 @@ def assemble_solid(  # noqa: PLR0912
             a10 = 2 * c10[e, q]
             a01 = 2 * c01[e, q]
             d = a10 + 2 * a01
-            inverse = np.linalg.inv(f)
+            turn_gradients(f, gradients[e, q], gradients[e, q], fa, ha)
             b = f @ f.T
             i1 = b[0, 0] + b[1, 1] + b[2, 2]
             pj = pressure * det
             for a in range(10):
-                for i in range(3):
-                    fa[a, i] = f[i, 0] * gradients[e, q, a, 0] + f[i, 1] * gradients[e, q, a, 1] + f[i, 2] * gradients[e, q, a, 2]
-                    ha[a, i] = (
-                        inverse[0, i] * gradients[e, q, a, 0]
-                        + inverse[1, i] * gradients[e, q, a, 1]
-                        + inverse[2, i] * gradients[e, q, a, 2]
-                    )
                 for i in range(3):
                     bf = b[i, 0] * fa[a, 0] + b[i, 1] * fa[a, 1] + b[i, 2] * fa[a, 2]
                     force[elements[e, a], i] += w * ((a10 + a01 * i1) * fa[a, i] - a01 * bf + (pj - d) * ha[a, i])
@@ -179,6 +205,7 @@ def assemble_obstacle(  # noqa: PLR0912
     deepest = 0.0
     x = np.empty(3)
     n = np.empty(3)
+    pull = np.empty(3)
     t = np.empty((3, 3))
     for s in range(owner.shape[0]):
         element = elements[owner[s]]
@@ -216,20 +243,10 @@ def assemble_obstacle(  # noqa: PLR0912
                 continue
             bend = pressure / distance if radius > 0 and (gap < CAUTIOUS_GAP * radius or not cautious) else 0.0
             for i in range(3):
-                push[i] += pressure * n[i]
+                pull[i] = -pressure * n[i]
+                push[i] -= pull[i]
                 for k in range(3):
                     t[i, k] = (slope + bend) * n[i] * n[k] - (bend if i == k else 0.0)
                     total[i, k] += t[i, k]
-            for a in range(10):
-                va = values[s, q, a]
-                if va == 0.0:
-                    continue
-                for i in range(3):
-                    force[element[a], i] -= pressure * n[i] * va
-                    for k in range(3):
-                        coupling[element[a], i, k] += va * t[i, k]
-                for b in range(a, 10):
-                    for i in range(3):
-                        for k in range(3):
-                            stiffness[owner[s], a, b, i, k] += va * values[s, q, b] * t[i, k]
+            spread(values[s, q], element, pull, t, stiffness[owner[s]], force, coupling)
     return energy, deepest

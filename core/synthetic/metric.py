@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from core.frames import FloatArray
-from core.synthetic.law import deformation_gradient
+from core.synthetic.law import deformation_gradient, turn_gradients
 
 __all__ = ["assemble_metric", "isochoric", "metric_energy"]
 
@@ -46,7 +46,6 @@ def assemble_metric(
 ) -> None:
     """Add to element stiffness (e, 10, 10, 3, 3) [N/m], upper node pairs only, and to force (n, 3) [N]."""
     f = np.empty((3, 3))
-    turned = np.empty(3)
     fa = np.empty((10, 3))
     ga = np.empty((10, 3))
     ha = np.empty((10, 3))
@@ -54,7 +53,6 @@ def assemble_metric(
         for q in range(weights.shape[1]):
             g = gradients[e, q]
             det = deformation_gradient(u, elements[e], g, f)
-            inverse = np.linalg.inv(f)
             scale = 1.0 / np.cbrt(det * det)
             pull = weights[e, q] * shear[e, q] * scale
             first = 0.0
@@ -63,11 +61,10 @@ def assemble_metric(
                     first += metric[e, q, i, k] * (f[0, i] * f[0, k] + f[1, i] * f[1, k] + f[2, i] * f[2, k])
             for a in range(10):
                 for i in range(3):
-                    turned[i] = metric[e, q, i, 0] * g[a, 0] + metric[e, q, i, 1] * g[a, 1] + metric[e, q, i, 2] * g[a, 2]
-                    ga[a, i] = turned[i]
+                    ga[a, i] = metric[e, q, i, 0] * g[a, 0] + metric[e, q, i, 1] * g[a, 1] + metric[e, q, i, 2] * g[a, 2]
+            turn_gradients(f, ga, g, fa, ha)
+            for a in range(10):
                 for i in range(3):
-                    fa[a, i] = f[i, 0] * turned[0] + f[i, 1] * turned[1] + f[i, 2] * turned[2]
-                    ha[a, i] = inverse[0, i] * g[a, 0] + inverse[1, i] * g[a, 1] + inverse[2, i] * g[a, 2]
                     force[elements[e, a], i] += pull * (fa[a, i] - first / 3.0 * ha[a, i])
             for m in range(10):
                 for n in range(m, 10):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from core.synthetic.law import deformation_gradient
+from core.synthetic.law import deformation_gradient, turn_gradients
 
 __all__ = ["assemble_stiffening", "stiffening_energy"]
 
@@ -50,7 +50,7 @@ def assemble_stiffening(
         for q in range(weights.shape[1]):
             g = gradients[e, q]
             det = deformation_gradient(u, elements[e], g, f)
-            inverse = np.linalg.inv(f)
+            turn_gradients(f, g, g, fa, ha)
             scale = 1.0 / np.cbrt(det * det)
             i1 = (f * f).sum()
             share = (scale * i1 - 3.0) / limit
@@ -58,8 +58,6 @@ def assemble_stiffening(
             second = 0.5 * weights[e, q] * shear[e, q] / (limit * (1.0 - share) ** 2)
             for a in range(10):
                 for i in range(3):
-                    fa[a, i] = f[i, 0] * g[a, 0] + f[i, 1] * g[a, 1] + f[i, 2] * g[a, 2]
-                    ha[a, i] = inverse[0, i] * g[a, 0] + inverse[1, i] * g[a, 1] + inverse[2, i] * g[a, 2]
                     xa[a, i] = 2.0 * scale * (fa[a, i] - i1 / 3.0 * ha[a, i])
                     force[elements[e, a], i] += first * xa[a, i]
             for m in range(10):

@@ -6,7 +6,7 @@ import pytest
 
 from core.effects import effect_named, from_json
 from core.errors import EffectError
-from core.synthetic.scenario import HIDDEN, WEIGHED, HiddenEffect, draw_scenario
+from core.synthetic.scenario import HIDDEN, QUICK, WEIGHED, HiddenEffect, draw_scenario
 
 
 def test_unknown_effect_names_the_known_ones() -> None:
@@ -30,7 +30,7 @@ def test_same_seed_draws_the_same_scenario() -> None:
 
 
 def test_scenarios_are_those_drawn_before_there_were_more_effects() -> None:
-    first = WEIGHED[:9]
+    first = QUICK[:9]
     assert draw_scenario(0, among=first).effects == (HiddenEffect("base_slip", {"friction_coefficient": 0.15}),)
     offset = HiddenEffect("tool_offset", {"dx": 0.00219, "dy": -0.00024, "dz": -0.0005})
     assert draw_scenario(3, effects=2, among=first).effects == (
@@ -43,7 +43,7 @@ def test_scenarios_are_those_drawn_before_there_were_more_effects() -> None:
     assert draw_scenario(11, among=first).effects == (HiddenEffect("poisson_ratio", {"nu": 0.328}),)
 
 
-@pytest.mark.parametrize("among", [WEIGHED, tuple(HIDDEN)], ids=["weighed", "all"])
+@pytest.mark.parametrize("among", [QUICK, WEIGHED, tuple(HIDDEN)], ids=["quick", "weighed", "all"])
 def test_every_effect_is_drawn_sooner_or_later(among: tuple[str, ...]) -> None:
     drawn = {hidden.effect for seed in range(120) for hidden in draw_scenario(seed, among=among).effects}
     assert drawn == set(among)
