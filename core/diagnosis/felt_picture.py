@@ -63,7 +63,7 @@ def _from_above(axes: Axes, body: Box | Shape, pushes: Pushes, shown: Footprint 
         axes.plot(
             x + radius * np.cos(turn), y + radius * np.sin(turn), color=FOUND, lw=1.3, ls="--", zorder=4, label="the lump below"
         )
-    axes.set_title("pushes, seen from above", fontsize=11)
+    axes.set_title("pushes, seen from above", fontsize=11, loc="left")
     axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
     _plain(axes)
     return drawn
@@ -105,7 +105,7 @@ def _cut(axes: Axes, body: Box | Shape, cause: dict[str, Any]) -> None:
         line = 1e3 * np.array(ends)[:, shown]
         axes.plot(line[:, 0], line[:, 1], color=FOUND, lw=width, alpha=0.8, solid_capstyle="butt")
     axes.plot(*middle, "o", color=FOUND, ms=4)
-    axes.set_title(f"centre {_between(depth)} deep\n{_between(cover)} of tissue above it", fontsize=11)
+    axes.set_title(f"centre {_between(depth)} deep\n{_between(cover)} of tissue above it", fontsize=11, loc="left")
     axes.set(xlabel=f"{'xy'[across]} [mm]", ylabel="z [mm]", aspect="equal")
     axes.autoscale_view()
     axes.margins(0.06)
