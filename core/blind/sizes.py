@@ -38,7 +38,8 @@ def size_over_limit(
     """Size of the one hidden effect over its detection limit [1].
 
     Of several parameters the root of the squares' sum: each alone gains the bound at its limit, and gains grow with the square.
-    A lump's limit is that of half of the places, not that where it shows best.
+    A lump's limit is that of the nearest place that was screened; of other candidates, such as edges of a base, the one that half
+    of them reach.
 
     Args:
         told: the report's ambiguity map. camera_shift: as the truth has it, phantom frame.
@@ -57,8 +58,8 @@ def size_over_limit(
     true, neutral = _true_values(hidden[0], scenario, camera_shift), effect.neutral(_believed(scenario)).values()
     if any(isinstance(value, str) and value != neutral[name] for name, value in hidden[0].parameters.items()):
         return None
-    limits = [row["typical"], *row["limits"][1:]]
-    parts = [_part(limit, row["at"], effect, true, neutral) for limit in limits]
+    first, at = _nearest(row, hidden[0])
+    parts = [_part(limit, at, effect, true, neutral) for limit in [first, *row["limits"][1:]]]
     known = [part for part in parts if part is not None]
     return round(math.hypot(*known), 3) if len(known) == len(parts) else None
 
@@ -71,6 +72,17 @@ def camera_pose(shift: Transform, size: Sequence[float]) -> dict[str, float]:
     middle = np.array([0.0, 0.0, size[2] / 2])
     step = shift.apply(middle) - middle
     return dict(zip(("tx", "ty", "tz", "rx", "ry", "rz"), [*step.tolist(), *shift.rotation_vector.tolist()], strict=True))
+
+
+def _nearest(row: Mapping[str, Any], hidden: HiddenEffect) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+    """The first limit of the place that is nearest to what is hidden, and the fixed parameters there."""
+
+    def far(at: Mapping[str, Any]) -> float:
+        return math.dist([at[name]["value"] for name in "xyz"], [hidden.value(name) for name in "xyz"])
+
+    each = [one for one in row.get("each", []) if "x" in one["at"]]
+    best = min(each, key=lambda one: far(one["at"]), default={"limit": row["typical"], "at": row["at"]})
+    return best["limit"], best["at"]
 
 
 def _part(

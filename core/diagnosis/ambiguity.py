@@ -15,6 +15,7 @@ import numpy as np
 
 from core.diagnosis.evidence import Block
 from core.diagnosis.screening import Candidate, linear_gains
+from core.effects import Effect
 from core.frames import FloatArray
 
 __all__ = ["Limit", "Told", "ambiguity_map", "detection_limits", "mimicry"]
@@ -49,13 +50,15 @@ class Told:
 
     Attributes:
         candidate: of those of this effect the one that is seen best. limits: of its parameters. typical: size of the first limit
-            that half of the effect's candidates reach (places of a lump, edges of a base). alike: name of every other effect to the
-            share of this one's pattern that it can imitate [1].
+            that half of the effect's candidates reach (places of a lump, edges of a base). each: every candidate's start with its
+            first limit, where there are several. alike: name of every other effect to the share of this one's pattern that it can
+            imitate [1].
     """
 
     candidate: Candidate
     limits: tuple[Limit, ...]
     typical: Limit
+    each: tuple[tuple[Effect, Limit], ...] = ()
     alike: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -66,18 +69,21 @@ class Told:
     def to_json(self) -> dict[str, Any]:
         """As the report has it; what imitates it most comes first."""
         rows = sorted(self.alike.items(), key=lambda row: -row[1])
-        start = self.candidate.start
+        return {
+            "effect": self.effect, "limits": [limit.to_json() for limit in self.limits], "typical": self.typical.to_json(),
+            "at": self._fixed(self.candidate.start),
+            "each": [{"at": self._fixed(start), "limit": limit.to_json()} for start, limit in self.each],
+            "alike": [{"effect": name, "share": round(share, 4)} for name, share in rows],
+        }  # fmt: skip
+
+    def _fixed(self, start: Effect) -> dict[str, Any]:
+        """The parameters that no limit is stated of."""
         moved = {limit.parameter for limit in self.limits}
-        fixed = {
+        return {
             item.name: {"value": getattr(start, item.name), "unit": item.unit}
             for item in start.parameters()
             if item.name not in moved
         }
-        return {
-            "effect": self.effect, "limits": [limit.to_json() for limit in self.limits], "typical": self.typical.to_json(),
-            "at": fixed,
-            "alike": [{"effect": name, "share": round(share, 4)} for name, share in rows],
-        }  # fmt: skip
 
 
 def ambiguity_map(
@@ -91,19 +97,18 @@ def ambiguity_map(
     groups: dict[str, list[Candidate]] = {}
     for candidate in candidates:
         groups.setdefault(candidate.start.name, []).append(candidate)
-    seen: dict[str, tuple[Candidate, tuple[Limit, ...], Limit]] = {}
+    found = []
     for name, group in groups.items():
         limits = [detection_limits(blocks, nuisance, known, candidate, bound) for candidate in group]
         order = np.argsort([own[0].size for own in limits])
-        seen[name] = (group[order[0]], limits[order[0]], limits[order[len(order) // 2]][0])
-    found = []
-    for name, (candidate, own, typical) in seen.items():
+        candidate, typical = group[order[0]], limits[order[len(order) // 2]][0]
+        each = tuple((one.start, own[0]) for one, own in zip(group, limits, strict=True)) if len(group) > 1 else ()
         alike = {
             other: max(mimicry(blocks, nuisance, known, candidate, rival) for rival in group)
             for other, group in groups.items()
             if other != name
         }
-        found.append(Told(candidate, own, typical, alike))
+        found.append(Told(candidate, limits[order[0]], typical, each, alike))
     return tuple(found)
 
 

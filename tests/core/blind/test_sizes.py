@@ -35,6 +35,18 @@ def test_several_parameters_add_up_as_squares_and_what_is_never_seen_adds_nothin
     assert size(offset, row("tool_offset", *limits)) == pytest.approx(5.0)
 
 
+def test_lump_is_measured_by_the_limit_of_the_nearest_place() -> None:
+    def at(limit: dict[str, Any], **fixed: Any) -> dict[str, Any]:
+        return {"at": {name: {"value": value, "unit": "1"} for name, value in fixed.items()}, "limit": limit}
+
+    near, far = ({"parameter": "stiffness_ratio", "unit": "1", "factor": factor} for factor in (2.0, 4.0))
+    lump = HiddenEffect("stiff_inclusion", {"x": 0.01, "y": 0.0, "z": 0.025, "radius": 7e-3, "stiffness_ratio": 8.0})
+    told = row("stiff_inclusion", near) | {"each": [at(far, x=0.0, y=0.0, z=0.01), at(near, x=0.012, y=0.001, z=0.02)]}
+    assert size(lump, told) == pytest.approx(3.0, abs=1e-3)
+    told["each"].reverse()
+    assert size(lump, told) == pytest.approx(3.0, abs=1e-3)
+
+
 def test_lump_is_measured_by_the_limit_of_half_of_the_places_and_by_its_logarithm() -> None:
     best, typical = ({"parameter": "stiffness_ratio", "unit": "1", "factor": factor} for factor in (1.5, 2.0))
     lump = HiddenEffect("stiff_inclusion", {"x": 0.0, "y": 0.0, "z": 0.025, "radius": 7e-3, "stiffness_ratio": 8.0})
