@@ -31,7 +31,7 @@ from core.yielding import GRAVITY, give_way, slide, weight_of
 __all__ = ["GRAVITY", "Equilibrium", "Replay", "replay", "require_converged", "rest"]
 
 _MOST_SLIDES, _DRAG_STEP = 12, 1e-3
-"""Of a base in one frame; longest motion of a tool with friction [m] that is taken as straight."""
+"""Of a base in one frame; of a tool with friction, unless another `drag_step` is asked for [m]."""
 
 
 class Replay:
@@ -39,10 +39,11 @@ class Replay:
 
     Args:
         setup: what is believed. grid: the mesh, unless the setup has one. tolerance: residual of a converged frame, over the push.
+        drag_step: longest motion of a tool with friction [m] that is taken as straight.
     """
 
-    def __init__(self, setup: Setup, grid: Meshing, tolerance: float = RELATIVE_TOLERANCE) -> None:
-        self.setup, self.grid, self.tolerance = setup, meshing_for(setup, grid), tolerance
+    def __init__(self, setup: Setup, grid: Meshing, tolerance: float = RELATIVE_TOLERANCE, drag_step: float = _DRAG_STEP) -> None:
+        self.setup, self.grid, self.tolerance, self._drag_step = setup, meshing_for(setup, grid), tolerance, drag_step
         self._offset, self._follower = np.array(setup.tool.offset), Follower()
         self._model: BlockModel | None = None
         self._mesh: Mesh | None = None
@@ -166,7 +167,7 @@ class Replay:
             return self.held(probe, start)
         slip = np.append(self.slip, 0.0)
         begin = self.from_where(start, Probe(probe.centre - slip, probe.radius)).centre + slip
-        steps = max(1, int(np.ceil(float(np.linalg.norm(probe.centre - begin)) / _DRAG_STEP)))
+        steps = max(1, int(np.ceil(float(np.linalg.norm(probe.centre - begin)) / self._drag_step)))
         way = [start]
         for share in np.arange(1, steps + 1) / steps:
             way.append(self.held(Probe(begin + share * (probe.centre - begin), probe.radius), way[-1]))

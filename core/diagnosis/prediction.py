@@ -12,7 +12,7 @@ from core.diagnosis.comparison import Sample, choose, compare
 from core.diagnosis.force import Felt
 from core.diagnosis.leading import led
 from core.diagnosis.observations import Observations
-from core.diagnosis.ordered import Past, forgetful
+from core.diagnosis.ordered import Past, forgetful, travel
 from core.fem.newton import Outcome
 from core.frames import FloatArray
 from core.measurement import Surface
@@ -116,7 +116,7 @@ def predict(
         starts: equilibria of a similar setup, one per group, to begin from.
         wanted: changes to state; none without it. samples: which points to average; chosen anew without them.
     """
-    surface, block = Surface.of(setup), Replay(setup, grid, tolerance)
+    surface, block = Surface.of(setup), Replay(setup, grid, tolerance, travel(setup))
     way = led(data, setup, grid, wanted)
     true_from_stated, centres, moves, turned, measured = way.correction, way.centres, way.moves, way.turned, way.measured
     columns = Columns(block, wanted, measured is not None) if wanted and not setup.remembers else None
