@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import ctypes
+import os
+import sys
 import weakref
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,9 +29,12 @@ _DOUBLES, _INTEGERS = ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_i
 
 @lru_cache(maxsize=1)
 def _pardiso() -> Any:
-    """MKL's entry point; looking for the library takes most of a second, so it is done once."""
+    """MKL's entry point. pypardiso looks through the whole environment for the library, for a second or three in each process."""
     from pypardiso import PyPardisoSolver  # noqa: PLC0415 (heavy)
 
+    beside = sorted((Path(sys.prefix) / "lib").glob("libmkl_rt.so*"))
+    if beside:
+        os.environ.setdefault("PYPARDISO_MKL_RT", str(beside[0]))
     return PyPardisoSolver()._mkl_pardiso
 
 
