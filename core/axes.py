@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 
 from core.frames import FloatArray
 
-__all__ = ["even_axis", "graded_axis", "sized_axis"]
+__all__ = ["even_axis", "graded_axis", "sized_axis", "split_near"]
 
 
 def even_axis(low: float, high: float, nodes: int) -> FloatArray:
@@ -49,6 +49,14 @@ def sized_axis(low: float, high: float, focus: float, edge: float, growth: float
     """
     below, above = _side(focus - low, edge, growth, longest), _side(high - focus, edge, growth, longest)
     return np.concatenate([focus - below[::-1], focus + above[1:]])
+
+
+def split_near(ends: FloatArray, place: float, edge: float, growth: float) -> FloatArray:
+    """Element ends [m], each element cut in equal parts up to `edge` long at a place [m] and `growth` [1] over the way to it."""
+    apart = np.maximum(np.maximum(ends[:-1] - place, place - ends[1:]), 0.0)
+    parts = np.ceil(np.diff(ends) / (edge + growth * apart) - 1e-9).astype(int)
+    inner = [np.linspace(low, high, number, endpoint=False) for low, high, number in zip(ends[:-1], ends[1:], parts, strict=True)]
+    return np.append(np.concatenate(inner), ends[-1])
 
 
 def _side(length: float, edge: float, growth: float, longest: float) -> FloatArray:

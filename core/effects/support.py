@@ -45,7 +45,7 @@ class BaseDetachment(Effect):
     name, enters = "base_detachment", Slot.SUPPORT
     summary = "a strip of the base is not held"
     edge: str = parameter("", choices=_EDGES)
-    extent: float = parameter("m", low=0.0, high=0.04, scale=2e-3)
+    extent: float = parameter("m", low=0.0, high=0.04, scale=2e-3, accuracy=7e-4)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

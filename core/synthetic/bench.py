@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from core.frames import FloatArray
 from core.synthetic.block import Block, Grading, IntArray, mesh_block
-from core.synthetic.body import levels_of, true_offset, true_radius
+from core.synthetic.body import levels_of, seams_of, true_offset, true_radius
 from core.synthetic.equilibrium import GivesWay
 from core.synthetic.motion import Motion, Probe
 from core.synthetic.scenario import Scenario
@@ -144,7 +144,7 @@ def _grading(scenario: Scenario, probes: Sequence[Probe], fine: float) -> Gradin
         points = np.concatenate([points, [[lump.value(axis) for axis in "xyz"]]])
         reach = np.append(reach, lump.value("radius"))
         edges = np.append(edges, max(fine, 0.7 * lump.value("radius")))
-    return Grading(points, reach, edges, levels=levels_of(scenario))
+    return Grading(points, reach, edges, levels=levels_of(scenario), seams=seams_of(scenario))
 
 
 def _touched(scenario: Scenario, probe: Probe, fine: float) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -16,6 +16,8 @@ from core.frames import FloatArray
 __all__ = ["Block", "Grading", "Sampling", "block_of", "mesh_block", "refined_to", "shape_values"]
 
 IntArray = np.ndarray[Any, np.dtype[np.int64]]
+SEAM = 2.5e-3
+"""Longest edge at a seam [m]."""
 _PAIRS = [(a, b) for a in range(4) for b in range(a)]
 
 
@@ -30,6 +32,7 @@ class Grading:
         coarse: longest edge anywhere [m].
         growth: longest edge per distance [1].
         levels: heights between two materials, which no element crosses [m].
+        seams: axis (0 or 1) and place [m] of lines on the base that no element crosses, and where it is `SEAM` at most.
     """
 
     points: FloatArray
@@ -38,6 +41,7 @@ class Grading:
     coarse: float = 12e-3
     growth: float = 0.6
     levels: tuple[float, ...] = ()
+    seams: tuple[tuple[int, float], ...] = ()
 
     def allowed(self, places: FloatArray) -> FloatArray:
         """The longest edge (n,) [m] allowed at `places` (n, 3)."""
@@ -45,6 +49,8 @@ class Grading:
         for point, reach, fine in zip(self.points, self.reach, self.fine, strict=True):
             distance = np.maximum(np.linalg.norm(places - point, axis=1) - reach, 0.0)
             edge = np.minimum(edge, fine + self.growth * distance)
+        for axis, place in self.seams:
+            edge = np.minimum(edge, SEAM + self.growth * np.hypot(places[:, axis] - place, places[:, 2]))
         return edge
 
 
@@ -130,9 +136,20 @@ def _refined(size: tuple[float, float, float], grading: Grading) -> Any:
     from skfem import MeshTet  # noqa: PLC0415
 
     cells = np.maximum(np.ceil(np.array(size) / grading.coarse).astype(int), 2)
-    x, y = (np.linspace(0.0, length, count + 1) for length, count in zip(size[:2], cells[:2], strict=True))
-    z = _heights(size[2], int(cells[2]), grading)
-    return refined_to(MeshTet.init_tensor(x - size[0] / 2, y - size[1] / 2, z), grading)
+    x, y = (
+        _cells(length, int(count), [place for own, place in grading.seams if own == axis])
+        for axis, (length, count) in enumerate(zip(size[:2], cells[:2], strict=True))
+    )
+    return refined_to(MeshTet.init_tensor(x, y, _heights(size[2], int(cells[2]), grading)), grading)
+
+
+def _cells(length: float, count: int, seams: list[float]) -> FloatArray:
+    """Where cells begin and end before they are refined (k,) [m], symmetric but for the seams."""
+    if not seams:
+        return np.linspace(0.0, length, count + 1) - length / 2
+    ends = [-length / 2, *sorted(seams), length / 2]
+    parts = [np.linspace(low, high, 1 + int(np.ceil((high - low) * count / length))) for low, high in pairwise(ends)]
+    return np.unique(np.concatenate(parts))
 
 
 def refined_to(mesh: Any, grading: Grading) -> Any:

@@ -11,9 +11,9 @@ from core.synthetic.block import Block
 from core.synthetic.equilibrium import Solid
 from core.synthetic.fibres import fibre_modulus
 from core.synthetic.remembering import relaxed_share
-from core.synthetic.scenario import Scenario
+from core.synthetic.scenario import HiddenEffect, Scenario
 
-__all__ = ["levels_of", "solid_of", "true_offset", "true_radius"]
+__all__ = ["levels_of", "seams_of", "solid_of", "true_offset", "true_radius"]
 
 BoolArray = np.ndarray[Any, np.dtype[np.bool_]]
 
@@ -34,6 +34,21 @@ def levels_of(scenario: Scenario) -> tuple[float, ...]:
     """Heights between two materials [m]: under a skin, where there is one."""
     skin = scenario.hidden("surface_layer")
     return (scenario.true_size[2] - skin.value("thickness"),) if skin else ()
+
+
+def seams_of(scenario: Scenario) -> tuple[tuple[int, float], ...]:
+    """Axis and place [m] of the line where a base that is loose begins to be held: between two nodes it would lie anywhere."""
+    strip = scenario.hidden("base_detachment")
+    if strip is None:
+        return ()
+    axis, sign = _edge(strip)
+    return ((axis, sign * (scenario.true_size[axis] / 2 - strip.value("extent"))),)
+
+
+def _edge(strip: HiddenEffect) -> tuple[int, float]:
+    """Axis and side of a strip's edge."""
+    edge = str(strip.parameters["edge"])
+    return "xy".index(edge[1]), -1.0 if edge[0] == "-" else 1.0
 
 
 def solid_of(scenario: Scenario, block: Block) -> Solid:
@@ -83,9 +98,8 @@ def _bonded(scenario: Scenario, places: FloatArray) -> BoolArray:
     strip = scenario.hidden("base_detachment")
     if strip is None:
         return np.ones(places.shape[:-1], dtype=bool)
-    edge = str(strip.parameters["edge"])
-    axis, sign = "xy".index(edge[1]), -1.0 if edge[0] == "-" else 1.0
-    return np.asarray(scenario.true_size[axis] / 2 - sign * places[..., axis] >= strip.value("extent"))
+    axis, sign = _edge(strip)
+    return np.asarray(scenario.true_size[axis] / 2 - sign * places[..., axis] >= strip.value("extent") - 1e-9)
 
 
 def _springs(scenario: Scenario, block: Block, stiffness_over_modulus: float) -> FloatArray:

@@ -1,19 +1,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import pytest
 from pushed_block import SETUP, poke
 
-from core.axes import sized_axis
+from core.axes import sized_axis, split_near
 from core.errors import MeshError
 from core.fem.newton import Outcome
 from core.frames import FloatArray
 from core.grading import REPLAY_GRID, Grading
 from core.mesh import BoxMesh
 from core.replay import replay, rest
-from core.setup import Load, Setup
+from core.setup import Box, Detachment, Load, Setup, Support
 
 GRADING = Grading(spacing=1.5e-3, along=0.7, inward=1.2)
 SIZE = SETUP.box.size
@@ -127,3 +128,28 @@ def test_the_sag_does_not_hang_on_where_the_mesh_is_fine():
         found = [sag(grading, place) for place in PLACES.values()]
         apart = max(float(np.sqrt(((a - b) ** 2).sum(axis=1).mean())) for a in found for b in found)
         assert least <= apart < most
+
+
+def test_elements_are_cut_near_a_place_and_keep_their_ends() -> None:
+    ends = np.array([0.0, 0.01, 0.02, 0.04])
+    cut = split_near(ends, 0.012, 4e-3, 0.5)
+    assert set(ends.tolist()) <= set(cut.tolist())
+    assert np.diff(cut) == pytest.approx([5e-3] * 2 + [10e-3 / 3] * 3 + [20e-3 / 3] * 3)
+    assert split_near(ends, 0.012, 1.0, 0.5) == pytest.approx(ends)
+
+
+@pytest.mark.parametrize(("edge", "axis"), [("-y", 1), ("+x", 0)])
+def test_mesh_is_finer_where_a_loose_base_begins_to_be_held_and_there_alone(edge: Literal["-y", "+x"], axis: int) -> None:
+    stated = replace(SETUP, geometry=Box(size=(0.0687, 0.0393, 0.0358)))
+    loose = replace(stated, support=Support(detached=(Detachment(edge=edge, extent=0.013),)))
+    above = np.array([0.0, 0.0, 0.04])
+    plain, finer = (REPLAY_GRID.mesh(setup, above) for setup in (stated, loose))
+    sign = -1 if edge[0] == "-" else 1
+    line = sign * (stated.box.size[axis] / 2 - 0.013)
+    for number, (ends, more) in enumerate(zip(plain.axes, finer.axes, strict=True)):
+        if number != axis:
+            assert more == pytest.approx(ends)
+            continue
+        here = int(np.searchsorted(more[::2], line))
+        assert more[::2][here] - more[::2][here - 1] < 4.1e-3 < np.diff(ends[::2]).max()
+        assert set(ends[::2].round(9).tolist()) <= set(more[::2].round(9).tolist())

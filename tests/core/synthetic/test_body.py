@@ -10,7 +10,7 @@ from virtual_push import RADIUS, X, Y, Z, hide, push, way
 from core.frames import FloatArray
 from core.synthetic.bench import rest_surface
 from core.synthetic.block import Block, Grading, mesh_block
-from core.synthetic.body import levels_of, solid_of
+from core.synthetic.body import levels_of, seams_of, solid_of
 from core.synthetic.equilibrium import Equilibrium
 from core.synthetic.scenario import HiddenEffect, Scenario
 
@@ -138,3 +138,17 @@ def test_fibres_lie_along_the_stated_direction() -> None:
     along_x, along_y = spread(0.0), spread(np.pi / 2)
     assert along_x[0] < 0.8 * along_y[0]
     assert along_y[1] < 0.8 * along_x[1]
+
+
+@pytest.mark.parametrize(("edge", "axis", "side"), [("-y", 1, -1), ("+x", 0, 1)])
+def test_a_loose_strip_ends_at_a_row_of_nodes_of_its_own(edge: str, axis: int, side: int) -> None:
+    scenario = Scenario(effects=(HiddenEffect("base_detachment", {"edge": edge, "extent": 0.0133}),))
+    line = side * (scenario.size[axis] / 2 - 0.0133)
+    assert seams_of(scenario) == ((axis, pytest.approx(line)),)
+    grading = Grading(np.zeros((1, 3)), np.zeros(1), np.full(1, 8e-3), seams=seams_of(scenario))
+    block = mesh_block(scenario.size, grading)
+    held = solid_of(scenario, block).held
+    base = block.nodes[:, 2] < 1e-9
+    inwards = scenario.size[axis] / 2 - side * block.nodes[:, axis]
+    assert inwards[held].min() == pytest.approx(0.0133)
+    assert (inwards[base & ~held] < 0.0133).all() and inwards[base & ~held].max() > 0.0133 - 2.2e-3
