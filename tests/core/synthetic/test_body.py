@@ -144,7 +144,8 @@ def test_fibres_lie_along_the_stated_direction() -> None:
 def test_a_loose_strip_ends_at_a_row_of_nodes_of_its_own(edge: str, axis: int, side: int) -> None:
     scenario = Scenario(effects=(HiddenEffect("base_detachment", {"edge": edge, "extent": 0.0133}),))
     line = side * (scenario.size[axis] / 2 - 0.0133)
-    assert seams_of(scenario) == ((axis, pytest.approx(line)),)
+    ((across, place),) = seams_of(scenario)
+    assert across == axis and place == pytest.approx(line)
     grading = Grading(np.zeros((1, 3)), np.zeros(1), np.full(1, 8e-3), seams=seams_of(scenario))
     block = mesh_block(scenario.size, grading)
     held = solid_of(scenario, block).held
