@@ -1,7 +1,7 @@
 # Build:  docker build -t palpate .
 # Check:  docker run --rm -v "$PWD/my-block:/data:ro" palpate check /data
 # Page:   docker run --rm --network host -v "$PWD/datasets:/srv/palpate/datasets:ro" -v palpate-runs:/srv/palpate/runs palpate
-# The page has no login, so it listens on the loopback address only: with --network host that is the host's own.
+# It listens on the loopback address only: with --network host that is the host's own.
 FROM python:3.11-slim
 
 RUN apt-get update \

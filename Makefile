@@ -69,5 +69,5 @@ $(VENV)/.peers: pyproject.toml constraints.txt $(VENV)/.system-bench $(VENV)/.in
 	@touch $@
 
 $(VENV)/.developed: pyproject.toml constraints.txt $(VENV)/.installed
-	$(PIP) install --quiet -e ".[test,check,shapes]" -c constraints.txt
+	$(PIP) install --quiet -e ".[test,check,shapes,cluster]" -c constraints.txt
 	@touch $@

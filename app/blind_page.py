@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from html import escape
-from pathlib import Path
 from typing import Any
 
 from app.blind_plots import gain_plot, parameter_plot, reliability_plot
@@ -20,13 +18,11 @@ from app.blind_tables import (
     parameter_table,
     target_table,
 )
+from app.one_file import one_file, section
 from core.blind import Result
 from core.blind.parameters import Said, said_of
-from core.errors import RunError
 
 __all__ = ["blind_page"]
-
-_STYLES = Path(__file__).parent.parent / "static" / "css"
 
 
 def blind_page(summary: dict[str, Any], results: Sequence[Result]) -> str:
@@ -39,41 +35,26 @@ def blind_page(summary: dict[str, Any], results: Sequence[Result]) -> str:
     removed = [one.removed for one in results if one.removed is not None and one.case.kind in ("clear", "subtle", "pair", "twins")]
     parts = [
         _head(summary, results),
-        _section("Targets", _TARGETS_NOTE, target_table(summary["targets"])),
-        _section("Kinds of cases", "Shares with 95 % intervals (Clopper and Pearson).", kind_table(summary["kinds"])),
+        section("Targets", _TARGETS_NOTE, target_table(summary["targets"])),
+        section("Kinds of cases", "Shares with 95 % intervals (Clopper and Pearson).", kind_table(summary["kinds"])),
         '<div class="two half">',
-        _section("Reliability", "Of each report's most probable effect, named or not: is it hidden? With numbers of cases.",
+        section("Reliability", "Of each report's most probable effect, named or not: is it hidden? With numbers of cases.",
                  reliability_plot(summary["calibration"]["first_effect"]["curve"]) + calibration_table(summary["calibration"])),
-        _section("Gain", "On sequences that nothing was fitted on, where something is hidden.",
+        section("Gain", "On sequences that nothing was fitted on, where something is hidden.",
                  gain_plot(removed) + gain_table(summary["gain"])),
         "</div>",
-        _section("What was named for what", "Rows: hidden. Columns: named alone, or the verdict. Pairs are apart.",
+        section("What was named for what", "Rows: hidden. Columns: named alone, or the verdict. Pairs are apart.",
                  confusion_table(summary["confusion"]) + pair_table(summary["pairs"])),
-        _section("Parameters", _PARAMETERS_NOTE, parameter_plot(dict(sorted(groups.items()))) + parameter_table(summary)),
-        _section("Every case", "", case_table(results)),
+        section("Parameters", _PARAMETERS_NOTE, parameter_plot(dict(sorted(groups.items()))) + parameter_table(summary)),
+        section("Every case", "", case_table(results)),
     ]  # fmt: skip
-    title = f"Blind suite, seed {summary['seed']}"
-    head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>'
-    body = "".join(parts)
-    return f'<!doctype html>\n<html lang="en"><head>{head}<style>{_style()}</style></head><body><main>{body}</main></body></html>\n'
+    return one_file(f"Blind suite, seed {summary['seed']}", "".join(parts), "blind")
 
 
 _TARGETS_NOTE = (
     "Parameter errors are medians over clear cases. A verdict in brackets could be chance: the 95 % interval crosses the bound."
 )
 _PARAMETERS_NOTE = "Of rightly named causes. Amber: the interval as reported leaves out the truth."
-
-
-def _style() -> str:
-    """The page's colours, light and dark, from the one place where they stand, and its own style."""
-    text = (_STYLES / "base.css").read_text()
-    light, dark = (
-        re.search(rf"^{re.escape(head)} \{{(.*?)^\}}", text, re.M | re.S) for head in (":root", ':root[data-theme="dark"]')
-    )
-    if light is None or dark is None:
-        raise RunError(f"{_STYLES / 'base.css'} has no colours under :root", file=str(_STYLES / "base.css"))
-    colours = f":root {{{light[1]}}}\n@media (prefers-color-scheme: dark) {{ :root {{{dark[1]}}} }}\n"
-    return colours + (_STYLES / "blind.css").read_text()
 
 
 def _head(summary: dict[str, Any], results: Sequence[Result]) -> str:
@@ -88,7 +69,3 @@ def _head(summary: dict[str, Any], results: Sequence[Result]) -> str:
     if summary["errors"]:
         lines.append(f'<p class="bad">{len(summary["errors"])} cases ended in an error and count as wrong.</p>')
     return "".join(lines)
-
-
-def _section(title: str, note: str, body: str) -> str:
-    return f"<section><h2>{title}</h2><p>{note}</p>{body}</section>"

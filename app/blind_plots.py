@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-import io
 import math
-import re
 from collections.abc import Sequence
 from typing import Any
 
+from app.one_file import INK, figure, themed
 from app.sentences import SHOWN
 from core.blind.parameters import Said
 
 __all__ = ["gain_plot", "parameter_plot", "reliability_plot"]
 
-INK = {"text": "#010101", "text-3": "#020202", "line": "#030303", "extended": "#040404", "measured": "#050505", "raw": "#060606"}
-"""Variables of the page, and the stand-ins that are drawn with."""
 _COLUMNS = 5
 
 
 def reliability_plot(curve: Sequence[dict[str, Any]]) -> str:
     """Stated probability against the share that is true, with binomial intervals; the area of a point grows with its cases."""
-    figure = _figure(4.6, 3.8)
-    axes = figure.subplots()
+    drawn = figure(4.6, 3.8)
+    axes = drawn.subplots()
     axes.plot([0, 1], [0, 1], color=INK["text-3"], linewidth=1, linestyle=(0, (4, 3)))
     for row in curve:
         true = row["true"]
@@ -33,13 +30,13 @@ def reliability_plot(curve: Sequence[dict[str, Any]]) -> str:
             ha="center", va="top" if below else "bottom", color=INK["text-3"], fontsize=9,
         )  # fmt: skip
     axes.set(xlim=(-0.03, 1.03), ylim=(-0.03, 1.03), xlabel="probability stated", ylabel="share that is true")
-    return _themed(figure)
+    return themed(drawn)
 
 
 def gain_plot(removed: Sequence[float]) -> str:
     """How many cases by the share of the reducible error that is removed; below zero counts as zero."""
-    figure = _figure(4.6, 3.8)
-    axes = figure.subplots()
+    drawn = figure(4.6, 3.8)
+    axes = drawn.subplots()
     shares = [100 * min(max(share, 0.0), 1.0) for share in removed]
     axes.hist(shares, bins=list(range(0, 101, 5)), color=INK["extended"], rwidth=0.86)
     axes.axvline(85, color=INK["measured"], linewidth=1.5)
@@ -49,7 +46,7 @@ def gain_plot(removed: Sequence[float]) -> str:
     )  # fmt: skip
     axes.set(xlim=(0, 100), xlabel="reducible error removed [%]", ylabel="cases")
     axes.yaxis.get_major_locator().set_params(integer=True)
-    return _themed(figure)
+    return themed(drawn)
 
 
 def parameter_plot(groups: dict[str, list[Said]]) -> str:
@@ -57,8 +54,8 @@ def parameter_plot(groups: dict[str, list[Said]]) -> str:
     if not groups:
         return ""
     rows = math.ceil(len(groups) / _COLUMNS)
-    figure = _figure(2.5 * _COLUMNS, 2.5 * rows)
-    panels = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
+    drawn = figure(2.5 * _COLUMNS, 2.5 * rows)
+    panels = drawn.subplots(rows, _COLUMNS, squeeze=False).ravel()
     for axes, (key, said) in zip(panels, groups.items(), strict=False):
         factor, unit = SHOWN.get(said[0].unit, (1.0, said[0].unit))
         _panel(axes, said, factor)
@@ -66,9 +63,9 @@ def parameter_plot(groups: dict[str, list[Said]]) -> str:
         axes.set_title(f"{effect}\n{name}{f' [{unit}]' if unit else ''}".replace("_", " "), fontsize=9, color=INK["text"])
     for axes in panels[len(groups) :]:
         axes.set_visible(False)
-    figure.supxlabel("true", fontsize=10, color=INK["text-3"])
-    figure.supylabel("said", fontsize=10, color=INK["text-3"])
-    return _themed(figure)
+    drawn.supxlabel("true", fontsize=10, color=INK["text-3"])
+    drawn.supylabel("said", fontsize=10, color=INK["text-3"])
+    return themed(drawn)
 
 
 def _panel(axes: Any, said: Sequence[Said], factor: float) -> None:
@@ -84,34 +81,3 @@ def _panel(axes: Any, said: Sequence[Said], factor: float) -> None:
         axes.scatter(factor * one.nearest, factor * one.value, s=14, color=colour, zorder=3)
     axes.set(xlim=span, ylim=span)
     axes.locator_params(nbins=4)
-
-
-def _figure(width: float, height: float) -> Any:
-    from matplotlib.backends.backend_svg import FigureCanvasSVG  # noqa: PLC0415 (heavy)
-    from matplotlib.figure import Figure  # noqa: PLC0415 (heavy)
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasSVG(figure)
-    return figure
-
-
-def _themed(figure: Any) -> str:
-    """Inline SVG without a background, with text as text, and with the page's variables for the stand-ins."""
-    from matplotlib import rc_context  # noqa: PLC0415 (heavy)
-
-    for axes in figure.axes:
-        axes.patch.set_visible(False)
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.spines[["left", "bottom"]].set_color(INK["line"])
-        axes.tick_params(colors=INK["text-3"], labelsize=9)
-        axes.xaxis.label.set_color(INK["text-3"])
-        axes.yaxis.label.set_color(INK["text-3"])
-    figure.patch.set_visible(False)
-    text = io.StringIO()
-    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "blind"}):
-        figure.savefig(text, format="svg", metadata={"Date": None})
-    svg = text.getvalue()[text.getvalue().index("<svg") :]
-    for name, colour in INK.items():
-        svg = svg.replace(colour, f"var(--{name})")
-    svg = re.sub(r"font(-family)?: ([\d.]+px) [^;\"]*", r"font: \2 inherit; font-family: inherit", svg)
-    return re.sub(r' (width|height)="[\d.]+pt"', "", svg, count=2)

@@ -8,6 +8,7 @@ from html import escape
 from typing import Any
 
 from app.console import parameters_text
+from app.one_file import table
 from app.sentences import NARROW, quantity
 from core.blind import Result
 
@@ -78,7 +79,7 @@ def target_table(targets: Sequence[dict[str, Any]]) -> str:
         kind = {True: "met", False: "missed", None: "dim"}[one["met"]]
         mark = mark if one["met"] is None or one["sure"] else f"({mark})"
         rows.append((escape(one["text"]), target_text(one), figure, interval, f"<span class='{kind}'>{mark}</span>"))
-    return _table(("", "target", "reached", "95 % interval", ""), rows)
+    return table(("", "target", "reached", "95 % interval", ""), rows)
 
 
 def kind_table(kinds: dict[str, dict[str, Any]]) -> str:
@@ -91,7 +92,7 @@ def kind_table(kinds: dict[str, dict[str, Any]]) -> str:
         )
         rows.append((TITLES[kind], str(counted["n"]), *cells, verdicts))
     columns = ("", "cases", "right", "truth first", "truth among named", "exactly it", "a false name", "error", "verdicts")
-    return _table(columns, rows, (1,))
+    return table(columns, rows, (1,))
 
 
 def _hits(measured: dict[str, Any] | None, counted: bool = False) -> str:
@@ -110,7 +111,7 @@ def calibration_table(calibration: dict[str, Any]) -> str:
     for key, text in (("first_effect", "most probable effect"), ("every_effect", "every effect in every case")):
         own = calibration[key]
         rows.append((text, str(own["n"]), *(_plain(own[name]) for name in ("brier", "calibration_error"))))
-    return _table(("", "n", "Brier score", "calibration error"), rows, (1,))
+    return table(("", "n", "Brier score", "calibration error"), rows, (1,))
 
 
 def _plain(measured: dict[str, Any]) -> str:
@@ -126,7 +127,7 @@ def gain_table(gain: dict[str, Any]) -> str:
         share, interval = figure_text(own["removed"])
         left = own["left_over_noise_floor"]["value"]
         rows.append((TITLES[kind], share, interval, "–" if left is None else f"{left:.2f}"))
-    return _table(("median", "removed", "95 % interval", "left / floor"), rows, (3,))
+    return table(("median", "removed", "95 % interval", "left / floor"), rows, (3,))
 
 
 def confusion_table(confusion: dict[str, dict[str, int]]) -> str:
@@ -162,7 +163,7 @@ def pair_table(pairs: dict[str, int]) -> str:
     if not pairs:
         return ""
     rows = [(text, str(count)) for text, count in sorted(pairs.items(), key=lambda row: -row[1])]
-    return f"<div class='narrow'>{_table(('two effects hidden', 'cases'), rows, (1,))}</div>"
+    return f"<div class='narrow'>{table(('two effects hidden', 'cases'), rows, (1,))}</div>"
 
 
 def parameter_table(summary: dict[str, Any]) -> str:
@@ -182,8 +183,8 @@ def parameter_table(summary: dict[str, Any]) -> str:
     level = f"{100 * summary['coverage']['level_scored']:.0f}{NARROW}%"
     stated = " and ".join(f"{100 * one:.0f}{NARROW}%" for one in summary["coverage"]["level_stated"])
     note = f"<p>The reports state {stated} intervals; they are scored narrowed to {level}, as a normal distribution's would be.</p>"
-    table = _table(("", "median error", "95 % interval", "largest", "mean, signed", f"{level} intervals that hold"), rows)
-    return note + table if stated else table
+    shown = table(("", "median error", "95 % interval", "largest", "mean, signed", f"{level} intervals that hold"), rows)
+    return note + shown if stated else shown
 
 
 def case_table(results: Sequence[Result]) -> str:
@@ -197,16 +198,4 @@ def case_table(results: Sequence[Result]) -> str:
         gain = f"{one.gain:.0f} <span class='dim'>({one.bound:.0f})</span>"
         rows.append((*texts, gain, removed, size, f"{one.seconds:.0f}{NARROW}s", mark))
     columns = ("case", "hidden", "verdict", "named", "gain (bound), nats", "removed", "size / limit", "time", "")
-    return _table(columns, rows, (4, 5, 6, 7), [not one.right for one in results])
-
-
-def _table(columns: Sequence[str], rows: Iterable[Sequence[str]], numbers: Iterable[int] = (), wrong: Sequence[bool] = ()) -> str:
-    """Cells are HTML already; columns of these numbers are to the right."""
-    right = set(numbers)
-    mark = [' class="n"' if place in right else "" for place in range(len(columns))]
-    head = "".join(f"<th{one}>{text}</th>" for one, text in zip(mark, columns, strict=True))
-    lines = []
-    for number, row in enumerate(rows):
-        cells = "".join(f"<td{one}>{text}</td>" for one, text in zip(mark, row, strict=True))
-        lines.append(f"<tr class='wrong'>{cells}</tr>" if wrong and wrong[number] else f"<tr>{cells}</tr>")
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+    return table(columns, rows, (4, 5, 6, 7), [not one.right for one in results])

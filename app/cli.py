@@ -8,7 +8,7 @@ from typing import NoReturn
 
 import typer
 
-from app.commands import blind, data, demo, diagnosis, service
+from app.commands import blind, data, demo, diagnosis, export, service, sweeping
 from app.console import errors, print_problem
 from app.stop import stop
 from core.errors import Cancelled, PalpateError
@@ -30,6 +30,8 @@ app.command()(data.check)
 app.command()(data.register)
 app.command()(data.replay)
 app.command()(diagnosis.diagnose)
+app.command()(sweeping.sweep)
+app.command()(export.export)
 app.command()(blind.blind)
 app.command()(service.serve)
 

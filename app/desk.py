@@ -16,6 +16,7 @@ from app.runs import Runs
 from app.sessions import Sessions
 from app.settings import Settings
 from app.stage import Stage
+from app.whatif import WhatIfs
 
 __all__ = ["Desk", "DeskOf"]
 
@@ -30,6 +31,7 @@ class Desk:
     jobs: Jobs
     sessions: Sessions
     stage: Stage
+    whatifs: WhatIfs
 
     @classmethod
     def open(cls, settings: Settings, targets: dict[str, str]) -> Desk:
@@ -43,6 +45,7 @@ class Desk:
             jobs=Jobs(settings.runs, targets, settings.preload),
             sessions=sessions,
             stage=Stage(sessions.join, sessions.leave),
+            whatifs=WhatIfs(),
         )
 
     def diagnose(self, dataset: Path, name: str, seed: int) -> Job:
@@ -55,6 +58,7 @@ class Desk:
         """Cancel what runs and stop the inner viewer."""
         self.jobs.close()
         self.stage.close()
+        self.whatifs.close()
 
 
 def _desk(connection: HTTPConnection) -> Desk:

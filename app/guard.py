@@ -1,19 +1,23 @@
-"""Who may talk to the server: only pages of its own, by its own loopback names; and the headers that say so to the browser."""
+"""Who may talk to the server: pages of its own, by its own names, logged in where others can reach it; and what they may send."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Collection
 from urllib.parse import urlsplit
 
-from starlette.responses import JSONResponse
+from starlette.exceptions import HTTPException
+from starlette.responses import JSONResponse, RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.login import Login
+from app.settings import Settings
 
 __all__ = ["Guard", "same_origin"]
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
 PAGE_POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; style-src 'self'; script-src 'self'; connect-src 'self'; frame-src 'self'; "
-    "frame-ancestors 'self'; base-uri 'none'; form-action 'none'; object-src 'none'"
+    "frame-ancestors 'self'; base-uri 'none'; form-action 'self'; object-src 'none'"
 )
 VIEWER_POLICY = (
     "default-src 'self' data: blob:; script-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:; "
@@ -22,20 +26,29 @@ VIEWER_POLICY = (
 )
 
 
-class Guard:
-    """Refuses foreign Host names (DNS rebinding) and foreign Origins (other sites' pages), for requests and websockets alike."""
+# Nobody's data: the page's own files, and the way in.
+OPEN = ("/login", "/logout")
+OPEN_BELOW = "/static/"
+WILD = frozenset({"0.0.0.0", "::"})
+TRICKS = (b"%2f", b"%5c", b"%2e", b"%00", b"//", b"\\")
 
-    def __init__(self, app: ASGIApp) -> None:
+
+class Guard:
+    """Refuses foreign Host names (DNS rebinding), foreign Origins (other sites' pages), whoever is not logged in, paths that
+    read as two things, and bodies that are too large; for requests and websockets alike.
+    """
+
+    def __init__(self, app: ASGIApp, settings: Settings, login: Login | None = None) -> None:
         self._app = app
+        self._login = login
+        self._largest = settings.largest_body
+        self._wild = settings.host in WILD
+        self._names = LOOPBACK | {_bracketed(name) for name in (settings.host, *settings.allow_host)}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on what is ours, with the security headers; answer 403 to the rest."""
+        """Pass on what is welcome, with the security headers; answer the rest."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
-            return
-        headers = {key.decode("latin-1"): value.decode("latin-1") for key, value in scope["headers"]}
-        if not same_origin(headers.get("host", ""), headers.get("origin")):
-            await _refuse(scope, receive, send, headers)
             return
         policy = VIEWER_POLICY if scope["path"].startswith("/viser/") else PAGE_POLICY
 
@@ -44,30 +57,87 @@ class Guard:
                 message["headers"] = [*message["headers"], *_headers(policy)]
             await send(message)
 
-        await self._app(scope, receive, send_with_headers)
+        headers = {key.decode("latin-1"): value.decode("latin-1") for key, value in scope["headers"]}
+        refusal = self._misplaced(scope, headers) or await self._unknown(scope, headers)
+        if refusal is None:
+            await self._app(scope, self._limited(receive), send_with_headers)
+        elif scope["type"] == "websocket":
+            await receive()
+            await send({"type": "websocket.close", "code": 1008})
+        else:
+            await refusal(scope, receive, send_with_headers)
+
+    def _misplaced(self, scope: Scope, headers: dict[str, str]) -> JSONResponse | None:
+        names = self._names
+        if self._wild and scope.get("server"):  # bound to every address: the one that was called is a name as well
+            names = names | {_bracketed(scope["server"][0])}
+        if not same_origin(headers.get("host", ""), headers.get("origin"), names):
+            source = headers.get("origin") or headers.get("host")
+            return _answer(
+                403, "Refused", f"requests from {source} are refused; open the page by its own address, or --allow-host it"
+            )
+        if ambiguous(scope):
+            return _answer(404, "RequestError", "the path has an empty, encoded or dotted part; write it plainly")
+        length = headers.get("content-length", "0")  # what is no number is counted as it comes in
+        if scope["type"] == "http" and length.isascii() and length.isdigit() and int(length) > self._largest:
+            return _answer(413, "RequestError", _too_large(self._largest))
+        return None
+
+    async def _unknown(self, scope: Scope, headers: dict[str, str]) -> JSONResponse | RedirectResponse | None:
+        if self._login is None or scope["path"] in OPEN or scope["path"].startswith(OPEN_BELOW):
+            return None
+        if await self._login.welcome(headers, (scope.get("client") or ("",))[0]):
+            return None
+        if scope["path"] == "/" and "authorization" not in headers:
+            return RedirectResponse("/login", status_code=303)
+        return _answer(
+            401, "LoginError", "log in at /login, or send Authorization: Bearer with the token", {"www-authenticate": "Bearer"}
+        )
+
+    def _limited(self, receive: Receive) -> Receive:
+        """The same body; 413 once it is longer than allowed, whatever length it was said to have."""
+        got = 0
+
+        async def limited() -> Message:
+            nonlocal got
+            message = await receive()
+            if message["type"] == "http.request":
+                got += len(message.get("body", b""))
+                if got > self._largest:
+                    raise HTTPException(413, _too_large(self._largest))
+            return message
+
+        return limited
 
 
-def same_origin(host: str, origin: str | None) -> bool:
-    """Whether the Host is a loopback name and the Origin, if a browser sent one, is a page of that same host."""
+def same_origin(host: str, origin: str | None, names: Collection[str] = LOOPBACK) -> bool:
+    """Whether the Host is one of our names and the Origin, if a browser sent one, is a page of that same host."""
     name = host.rsplit(":", 1)[0] if not host.endswith("]") else host
-    return name in LOOPBACK and (origin is None or urlsplit(origin).netloc == host)
+    return name.lower() in names and (origin is None or urlsplit(origin).netloc == host)
+
+
+def ambiguous(scope: Scope) -> bool:
+    """Whether a path could be read as another one: by its dots, its doubled slashes, or what it encodes."""
+    raw = (scope.get("raw_path") or b"").split(b"?")[0].lower()
+    return any(trick in raw for trick in TRICKS) or any(part in (".", "..") for part in scope["path"].split("/"))
+
+
+def _bracketed(name: str) -> str:
+    return f"[{name}]" if ":" in name and not name.startswith("[") else name.lower()
+
+
+def _too_large(largest: int) -> str:
+    return f"the body is longer than {largest} bytes"
+
+
+def _answer(status: int, kind: str, message: str, headers: dict[str, str] | None = None) -> JSONResponse:
+    return JSONResponse({"kind": kind, "message": message, "where": {}}, status_code=status, headers=headers)
 
 
 def _headers(policy: str) -> list[tuple[bytes, bytes]]:
     return [
         (b"content-security-policy", policy.encode()),
         (b"x-content-type-options", b"nosniff"),
-        (b"referrer-policy", b"no-referrer"),
+        (b"referrer-policy", b"same-origin"),  # with no-referrer a form of our own page would send Origin: null
         (b"cross-origin-resource-policy", b"same-origin"),
     ]
-
-
-async def _refuse(scope: Scope, receive: Receive, send: Send, headers: dict[str, Any]) -> None:
-    if scope["type"] == "websocket":
-        await receive()
-        await send({"type": "websocket.close", "code": 1008})
-        return
-    source = headers.get("origin") or headers.get("host")
-    message = f"requests from {source} are refused; open the page by its own address on this machine"
-    body = {"kind": "Refused", "message": message, "where": {}}
-    await JSONResponse(body, status_code=403)(scope, receive, send)

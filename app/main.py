@@ -13,11 +13,14 @@ from fastapi.staticfiles import StaticFiles
 from starlette.exceptions import HTTPException
 
 from app import relay
-from app.api import datasets, diagnoses, effects, jobs, runs, sessions
+from app.api import datasets, diagnoses, effects, jobs, registrations, runs, sessions, sweeps, whatif
 from app.desk import Desk
 from app.guard import Guard
+from app.login import Login
+from app.login import router as login_router
 from app.problems import as_dict, status_code
-from app.settings import Settings, require_loopback
+from app.settings import Settings
+from app.tokens import Token
 from app.work import TARGETS
 from core.errors import PalpateError
 
@@ -26,7 +29,7 @@ __all__ = ["create_app"]
 
 def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> FastAPI:
     """The service for one folder of runs and one of datasets; `targets` names the function of each kind of job."""
-    require_loopback(settings.host)
+    login = Login(Token.load(settings.runs)) if settings.needs_login else None
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -36,10 +39,12 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
 
     app = FastAPI(title="Palpate", lifespan=lifespan, docs_url=None, redoc_url=None)
     app.state.ending = threading.Event()
-    app.add_middleware(Guard)
-    for module in (datasets, diagnoses, jobs, runs, sessions, effects):
+    app.state.settings, app.state.login = settings, login
+    app.add_middleware(Guard, settings=settings, login=login)
+    for module in (datasets, registrations, diagnoses, jobs, runs, sessions, whatif, effects, sweeps):
         app.include_router(module.router, prefix="/api")
     app.include_router(relay.router)
+    app.include_router(login_router)
     _answer_problems(app)
 
     @app.get("/", include_in_schema=False)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from app import colours
 from app.runs import Replay
 from app.surface import FineSurface, IntArray, grid_edges, refine
 from core.frames import FloatArray
+
+if TYPE_CHECKING:
+    from core.whatif import Moment
 
 __all__ = ["Ball", "Colouring", "Layer", "Mesh", "Picture", "PointArray", "Reel"]
 
@@ -94,6 +98,17 @@ class Reel:
         self._edges = grid_edges(replay["rest"], replay["faces"])
         self._points = 0
         self.limit = colours.nice_limit(replay["error_raw"])
+
+    def instead(self, frame: int, moment: Moment) -> Reel:
+        """The same reel with another solution of one frame in place of the extended model's."""
+        changed = {name: self.replay[name].copy() for name in ("extended", "error_extended", "tool_extended")}
+        found = {"extended": moment.surface, "error_extended": moment.error, "tool_extended": moment.tool}
+        for name, values in found.items():
+            changed[name][frame] = values
+        other = copy(self)
+        single = {"tool_radius_extended": moment.radius, "camera_extended": moment.camera}
+        other.replay = Replay(self.replay.name, {**self.replay.arrays, **changed, **single})
+        return other
 
     def picture(self, frame: int, layers: frozenset[Layer], colouring: Colouring, limit: float | None, crop: bool) -> Picture:
         """The moment `frame`: the coloured model (or, plain, the extended one) as a surface, the other one as grid lines."""

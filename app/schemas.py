@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.picture import Colouring, Layer
 from app.records import Job
 
-__all__ = ["DiagnosisRequest", "JobOut", "View"]
+__all__ = ["DiagnosisRequest", "EffectIn", "JobOut", "View", "WhatIfRequest"]
 
 
 class View(BaseModel):
@@ -33,6 +33,29 @@ class DiagnosisRequest(BaseModel):
 
     dataset: str
     seed: int = Field(default=0, ge=0, lt=2**31)
+
+
+class EffectIn(BaseModel):
+    """An effect of the catalogue with all of its parameters, SI."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    effect: str
+    parameters: dict[str, float | str]
+
+
+class WhatIfRequest(BaseModel):
+    """A frame of a recording and the causes to solve it with; `page` shows it there."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid",
+        json_schema_extra={"examples": [{"frame": 35, "effects": [{"effect": "tool_radius", "parameters": {"radius": 0.006}}]}]},
+    )  # fmt: skip
+
+    frame: int = Field(ge=0)
+    effects: tuple[EffectIn, ...] = Field(default=(), max_length=12)
+    tuned: bool = True
+    page: str | None = None
 
 
 class JobOut(BaseModel):

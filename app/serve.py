@@ -11,7 +11,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from app.main import create_app
-from app.settings import Settings, require_loopback
+from app.settings import Settings
 from core.errors import SetupError
 
 __all__ = ["Server", "serve"]
@@ -36,7 +36,7 @@ class Server(uvicorn.Server):
 
 def serve(settings: Settings, started: Callable[[str], None]) -> None:
     """Serve until interrupted; `started(address)` is called once the port is taken. Port 0 takes a free one."""
-    require_loopback(settings.host)
+    app = create_app(settings)
     with socket.socket(socket.AF_INET6 if ":" in settings.host else socket.AF_INET, socket.SOCK_STREAM) as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -51,4 +51,4 @@ def serve(settings: Settings, started: Callable[[str], None]) -> None:
         host = f"[{settings.host}]" if ":" in settings.host else settings.host
         started(f"http://{host}:{listener.getsockname()[1]}")
         with contextlib.suppress(KeyboardInterrupt):  # the ordinary way to end it
-            Server(create_app(settings)).run(sockets=[listener])
+            Server(app).run(sockets=[listener])

@@ -6,8 +6,9 @@ import logging
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from app.picture import Picture, Reel
 from app.problems import Missing
@@ -17,11 +18,28 @@ from app.schemas import View
 from core.errors import PalpateError
 from core.frames import FloatArray
 
-__all__ = ["Session", "Sessions"]
+if TYPE_CHECKING:
+    from core.whatif import Moment
+
+__all__ = ["Session", "Sessions", "Trial"]
 
 log = logging.getLogger(__name__)
 REELS = 6
 SESSIONS = 32
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A frame solved again that a page shows in place of the extended model's."""
+
+    run: str
+    sequence: str
+    frame: int
+    moment: Moment
+
+    def fits(self, view: View, frame: int) -> bool:
+        """Whether it is of what this view shows."""
+        return (self.run, self.sequence, self.frame) == (view.run, view.sequence, frame)
 
 
 class Session:
@@ -31,6 +49,7 @@ class Session:
         self.identity = identity
         self.view: View | None = None
         self.picture: Picture | None = None
+        self._trial: Trial | None = None
         self._reel_of = reel_of
         self._scenes: list[Scene] = []
         self._framed: str | None = None
@@ -41,6 +60,8 @@ class Session:
         with self._lock:
             reel = self._reel_of(view.run, view.sequence)
             frame = min(view.frame, len(reel.replay) - 1)
+            if self._trial is not None and self._trial.fits(view, frame):
+                reel = reel.instead(frame, self._trial.moment)
             picture = reel.picture(frame, frozenset(view.layers), view.colour, view.limit, view.crop)
             self.view, self.picture = view.model_copy(update={"frame": frame}), picture
             for scene in self._scenes:
@@ -49,6 +70,13 @@ class Session:
                 self._look()
             self._framed = view.run
         return self.state()
+
+    def try_out(self, trial: Trial | None) -> None:
+        """Show this in place of the extended model, wherever the page shows that frame; None shows the model again."""
+        with self._lock:
+            self._trial, view = trial, self.view
+        if view is not None:
+            self.show(view)
 
     def look(self) -> None:
         """Turn the cameras of all scenes to the phantom."""

@@ -7,9 +7,7 @@ from pathlib import Path
 
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-from core.errors import SetupError
-
-__all__ = ["Settings", "require_loopback"]
+__all__ = ["Settings"]
 
 
 class Settings(BaseSettings):
@@ -19,7 +17,10 @@ class Settings(BaseSettings):
         runs: folder of finished diagnoses, one folder each; the job records lie beside them.
         datasets: folder below which the datasets lie; nothing outside it is reachable from the page.
         workers: processes that one diagnosis may use.
+        scheduler: address of a dask scheduler whose workers do the replays of sweeps; this machine does them without.
         preload: modules that the worker processes import once, before the first job.
+        allow_host: names besides loopback and `host` by which browsers may call the server, for example behind a proxy.
+        largest_body: bytes that a request may bring.
     """
 
     model_config = SettingsConfigDict(env_prefix="PALPATE_", frozen=True)
@@ -29,20 +30,20 @@ class Settings(BaseSettings):
     runs: Path = Path("runs")
     datasets: Path = Path("datasets")
     workers: int = 2
+    scheduler: str | None = None
     static: Path = Path(__file__).resolve().parent.parent / "static"
     preload: tuple[str, ...] = ("app.work", "core.dataset", "core.diagnosis")
+    allow_host: tuple[str, ...] = ()
+    largest_body: int = 2**20
+
+    @property
+    def needs_login(self) -> bool:
+        """Whether others than this machine's own users can reach the server, by its address or by a name given to it."""
+        return not all(map(_is_loopback, (self.host, *self.allow_host)))
 
 
-def require_loopback(host: str) -> None:
-    """Refuse every address that other machines could reach: the page has no login."""
+def _is_loopback(host: str) -> bool:
     try:
-        loopback = host == "localhost" or ipaddress.ip_address(host).is_loopback
+        return host == "localhost" or ipaddress.ip_address(host.strip("[]")).is_loopback
     except ValueError:
-        loopback = False
-    if not loopback:
-        raise SetupError(
-            f"host {host} can be reached from other machines, and the page has no login yet; "
-            "use 127.0.0.1 and forward the port, for example with ssh -L 8321:127.0.0.1:8321",
-            key="host",
-            value=host,
-        )
+        return False

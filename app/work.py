@@ -13,7 +13,7 @@ from core.progress import Report
 
 __all__ = ["TARGETS", "diagnose", "diagnose_into"]
 
-TARGETS = {"diagnosis": "app.work:diagnose"}
+TARGETS = {"diagnosis": "app.work:diagnose", "sweep": "app.sweeps:sweep"}
 
 
 def diagnose(request: dict[str, Any], report: Report) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from benchmarks import (
     measurement,
     modulus,
     peers,
+    picking,
     replay,
     shapes,
     sweep,
@@ -32,6 +33,7 @@ ALL = {
     "modulus": modulus.run,
     "measurement": measurement.run,
     "cleaning": cleaning.run,
+    "picking": picking.run,
     "dataset": dataset.run,
     "diagnosis": diagnosis.run,
 }

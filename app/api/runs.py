@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from fastapi import APIRouter
-from fastapi.responses import FileResponse
+from fastapi import APIRouter, Query
+from fastapi.responses import FileResponse, HTMLResponse
 
 from app.colours import nice_limit
+from app.comparison import compared
+from app.course import course
 from app.desk import DeskOf
 from app.runs import Replay, Run
 from app.sentences import verdict_sentence
@@ -57,6 +59,21 @@ def report(name: str, desk: DeskOf) -> dict[str, Any]:
     return desk.runs.get(name).report
 
 
+@router.get("/{name}/report.html", response_class=HTMLResponse)
+def page(name: str, desk: DeskOf) -> HTMLResponse:
+    """The report as one HTML file that needs nothing but itself, to keep, print or send."""
+    from app.report_page import report_page  # noqa: PLC0415 (heavy)
+
+    text = report_page(desk.runs.get(name))
+    return HTMLResponse(text, headers={"content-disposition": f'attachment; filename="{name}.html"'})
+
+
+@router.get("/{name}/comparison")
+def comparison(name: str, desk: DeskOf, beside: Annotated[list[str], Query()] = []) -> dict[str, Any]:  # noqa: B006
+    """By sequence the errors [m] of this run's models, and of those `beside` it, which must be of the same dataset."""
+    return compared([desk.runs.get(one) for one in dict.fromkeys([name, *beside])])
+
+
 @router.get("/{name}/model")
 def model(name: str, desk: DeskOf) -> dict[str, Any]:
     """The extended model with its lineage."""
@@ -79,10 +96,11 @@ def picture(name: str, picture: str, desk: DeskOf) -> FileResponse:
 
 @router.get("/{name}/sequences/{sequence}")
 def sequence(name: str, sequence: str, desk: DeskOf) -> dict[str, Any]:
-    """Times [s] and errors [m] of each frame of one sequence, and the automatic end of its error scale [m]."""
+    """Times [s] and errors [m] of each frame, the automatic end of their scale [m], push depth [m], force [N], spells of touch."""
     reel = desk.sessions.reel(name, sequence)
     replay = reel.replay
-    series = ("distance_raw", "distance_extended", "paper_raw", "paper_extended")
+    told = course(desk.runs.get(name), replay)
+    series = [f"{key}_{model}" for key in ("distance", "paper") for model in told["models"] if f"{key}_{model}" in replay.arrays]
     return {
         "name": sequence,
         "time": finite(replay["time"] - replay["time"][0], digits=5),
@@ -90,6 +108,7 @@ def sequence(name: str, sequence: str, desk: DeskOf) -> dict[str, Any]:
         "noise_floor": finite(replay["noise_floor"]),
         "outcome": [int(code) for code in replay["outcome"]],
         "automatic_limit": reel.limit,
+        **told,
     }
 
 

@@ -8,23 +8,32 @@ from typing import Annotated
 import typer
 
 from app.console import out
-from app.settings import Settings, require_loopback
+from app.settings import Settings
+from app.tokens import FILE, Token
 
 __all__ = ["serve"]
 
 
 def serve(
-    host: Annotated[str, typer.Option(help="Loopback address to listen on.")] = "127.0.0.1",
+    host: Annotated[str, typer.Option(help="Address to listen on; any but a loopback one asks for a token.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 takes a free one.")] = 8321,
     runs: Annotated[Path, typer.Option(help="Folder of finished diagnoses.")] = Path("runs"),
     datasets: Annotated[Path, typer.Option(help="Folder below which the datasets lie.")] = Path("datasets"),
     workers: Annotated[int, typer.Option(min=1, help="Processes one diagnosis may use.")] = 2,
+    allow_host: Annotated[
+        list[str] | None, typer.Option(help="Another name by which browsers call this server; asks for a token.")
+    ] = None,
+    new_token: Annotated[
+        bool, typer.Option("--new-token", help="Make a new token; the one before opens nothing any more.")
+    ] = False,
 ) -> None:
-    """Serve the page and the REST service on one port of this machine."""
+    """Serve the page and the REST service on one port."""
     from app.serve import serve as run  # noqa: PLC0415 (heavy)
 
-    require_loopback(host)
-    run(Settings(host=host, port=port, runs=runs, datasets=datasets, workers=workers), announce)
+    settings = Settings(host=host, port=port, runs=runs, datasets=datasets, workers=workers, allow_host=tuple(allow_host or ()))
+    if new_token or (settings.needs_login and not (runs / FILE).exists()):
+        out.print(f"The token, shown only now: [bold]{Token.make(runs)}[/]", highlight=False, soft_wrap=True)
+    run(settings, announce)
 
 
 def announce(address: str, path: str = "/") -> None:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["ALIKE", "KINDS", "MIX", "Case", "all_cases", "draw_cases", "scenario_of"]
 
 KINDS = ("control", "clear", "subtle", "pair", "outside", "twins", "modulus")
-"""Nothing hidden; one effect at a clear size, or at a third of it; two effects; what no effect expresses; one effect of the family
+"""Nothing hidden; one effect at a clear size, or at a share of it; two effects; what no effect expresses; one effect of the family
 that looks alike; another Young's modulus alone, which without a measured force does not show."""
 
 MIX: Mapping[str, float] = {

@@ -11,7 +11,7 @@ from scipy.stats import norm
 
 from core.blind.rates import Measured, median_of, rate, share_of
 from core.blind.results import Result
-from core.effects import effect_named
+from core.effects import Parameter, effect_named
 from core.errors import EffectError
 
 __all__ = ["SCORED_LEVEL", "Said", "coverage", "distances", "parameter_errors", "said_of", "words_right"]
@@ -29,7 +29,7 @@ class Said:
 
     Attributes:
         case, kind: where. effect, name, unit: of the parameter. true, value: hidden and said, SI. low, high: as the report states
-            them, at its `level` [1]; None without. log: whether it is searched by its logarithm.
+            them, at its `level` [1]; None without. searched: how a search moves it; None where its effect is not known here.
     """
 
     case: str
@@ -42,7 +42,7 @@ class Said:
     low: float | None = None
     high: float | None = None
     level: float = 0.95
-    log: bool = False
+    searched: Parameter | None = None
 
     @property
     def key(self) -> str:
@@ -65,13 +65,15 @@ class Said:
         if self.low is None or self.high is None:
             return None
         narrower = 1.0 if level is None else float(norm.ppf(0.5 + level / 2) / norm.ppf(0.5 + self.level / 2))
-        low, value, high, true = (self._searched(one) for one in (self.low, self.value, self.high, self.nearest))
+        low, value, high, true = (self._coordinate(one) for one in (self.low, self.value, self.high, self.nearest))
         # A rounded end must not decide.
         slack = 1e-9 * max(abs(high - low), abs(value))
         return value + narrower * (low - value) - slack <= true <= value + narrower * (high - value) + slack
 
-    def _searched(self, value: float) -> float:
-        return math.log(max(value, 1e-300)) if self.log else value
+    def _coordinate(self, value: float) -> float:
+        if self.searched is None:
+            return value
+        return self.searched.coordinate(max(value, 1e-300) if self.searched.log else value)
 
 
 def said_of(results: Iterable[Result]) -> list[Said]:
@@ -90,15 +92,15 @@ def said_of(results: Iterable[Result]) -> list[Said]:
 def _said(result: Result, effect: str, name: str, true: dict[str, Any], entry: dict[str, Any]) -> Said:
     return Said(
         result.name, result.case.kind, effect, name, true["unit"], float(true["value"]), float(entry["value"]),
-        entry.get("low"), entry.get("high"), result.level, _searched_by_logarithm(effect, name),
+        entry.get("low"), entry.get("high"), result.level, _parameter(effect, name),
     )  # fmt: skip
 
 
-def _searched_by_logarithm(effect: str, name: str) -> bool:
+def _parameter(effect: str, name: str) -> Parameter | None:
     try:
-        return any(item.name == name and item.log for item in effect_named(effect).numbers())
+        return next((item for item in effect_named(effect).numbers() if item.name == name), None)
     except EffectError:  # an effect of a package that is not installed here
-        return False
+        return None
 
 
 def parameter_errors(said: Sequence[Said]) -> dict[str, dict[str, Any]]:

@@ -27,7 +27,7 @@ class Result:
     Attributes:
         hidden: effects with their parameters, as in a truth file. outside: disturbances that no effect expresses, likewise.
         report: as `core.diagnosis` wrote it, its ambiguity map only for what is hidden; empty where the case ended in an error.
-        size: of the one hidden effect over its detection limit [1]; None where the report's map does not give it.
+        size: of what is hidden over its detection limit [1], of two effects the fainter one's; None where no map gives it.
         seconds: of the diagnosis alone. code: digest of the sources that made it. error: what ended the case, if anything.
     """
 

@@ -21,7 +21,7 @@ Measure = Callable[[Sequence[Result]], Measured]
 
 
 def grade(result: Result) -> str:
-    """`clear`, `subtle` or `faint` by the size over the detection limit, of one effect whose limit the report gives; else ``."""
+    """`clear`, `subtle` or `faint` by the size over the detection limit where it is given, of two the fainter's; else ``."""
     if result.size is None:
         return ""
     return "clear" if result.size >= CLEAR else "subtle" if result.size >= SUBTLE else "faint"
@@ -77,6 +77,11 @@ def _graded(wanted: str) -> Callable[[Sequence[Result]], list[Result]]:
     return lambda results: [result for result in results if len(result.truth) == 1 and grade(result) == wanted]
 
 
+def _told_pairs(results: Sequence[Result]) -> list[Result]:
+    """Two effects that each by itself the experiment could tell."""
+    return [result for result in results if result.case.kind == "pair" and grade(result) in ("clear", "subtle")]
+
+
 def _share(chosen: Callable[[Sequence[Result]], list[Result]], holds: Callable[[Result], bool]) -> Measure:
     return lambda results: share_of(chosen(results), holds)
 
@@ -111,6 +116,7 @@ TARGETS = (
     Target("limit_subtle.first", f"One of 2 to 5 detection limits: {_ALONE}", _share(_graded("subtle"), lambda r: r.first), 0.85),
     Target("control.named", "Nothing hidden: a cause is named", _share(_of("control"), lambda r: bool(r.named)), high=0.02),
     Target("pair.exact", "Two effects: both and only both are named", _share(_of("pair"), lambda r: r.exact), 0.80),
+    Target("limit_pair.exact", "Two of 2 detection limits or more: both, only both", _share(_told_pairs, lambda r: r.exact), 0.80),
     Target("outside.right", "Outside the catalogue: unexplained or ambiguous", _share(_of("outside"), lambda r: r.right), 0.90),
     Target("twins.right", _FAMILY, _share(_of("twins"), lambda r: r.right), 0.95),
     Target("modulus.right", "Another modulus alone: said to be untold", _share(_of("modulus"), lambda r: r.right), 0.95),

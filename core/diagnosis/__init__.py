@@ -14,10 +14,9 @@ from core.cleaning import cleaner_for, find_shaft_axis
 from core.dataset import Dataset
 from core.diagnosis.assurance import assured
 from core.diagnosis.bench import Bench
-from core.diagnosis.felt_gain import FeltLadder, felt_ladder
 from core.diagnosis.felt_picture import draw_palpation
 from core.diagnosis.findings import Findings
-from core.diagnosis.gain import Ladder, harm, ladder
+from core.diagnosis.gain import harm
 from core.diagnosis.observations import Observations
 from core.diagnosis.palpation import palpated
 from core.diagnosis.patterns import draw_patterns, patterns
@@ -28,6 +27,7 @@ from core.diagnosis.still import Still
 from core.diagnosis.unseen import observe_each, pushed_places
 from core.diagnosis.verdict import report_of
 from core.diagnosis.workers import Workers
+from core.diagnosis.worth import tuned, worth
 from core.errors import DiagnosisError, RunError
 from core.grading import FINE_GRID, PAGE_GRID, REPLAY_GRID, SCREEN_GRID
 from core.meshing import Meshing
@@ -139,17 +139,18 @@ def _run(
     findings = search(bench, seed)
     model = findings.best.model if findings.best else findings.baseline
     report(0.75, "measuring the gain on test sequences")
-    gain = _gain(unseen, pool, (setup, model.setup), fine, seed, bool(findings.known)) if unseen else None
+    gain = worth(bench, findings, unseen, pool, fine, seed, assurance) if unseen else None
     if gain is not None and findings.best and (why := harm(findings.best.model.names, gain)):
         findings.withdraw(why)
-        model, gain = findings.baseline, _gain(unseen, pool, (setup, setup), fine, seed)
+        model, gain = findings.baseline, worth(bench, findings, unseen, pool, fine, seed)
+    found = tuned(bench, model) if findings.best else setup
     result = report_of(dataset, bench, findings, gain, "test")
     if assurance:
         result = assured(result, bench, fitted, findings)
     (making / "replays").mkdir()
     (making / "pictures").mkdir()
     if replays and seen:
-        _record(dataset, registration, (setup, model.setup), pool, making / "replays", part(report, 0.8, 1.0))
+        _record(dataset, registration, (setup, found), pool, making / "replays", part(report, 0.8, 1.0))
     if seen:
         pictured = patterns(bench, fitted, findings.baseline, model)
         pictured.save(making / "patterns.npz")
@@ -158,7 +159,7 @@ def _run(
         result, pushes, shown = palpated(result, bench, fitted, findings)
         lump = next((cause for cause in result["causes"] if "cover" in cause), None)
         draw_palpation(making / "pictures" / "palpation.png", setup.geometry, pushes, shown, lump)
-    (making / "model.json").write_text(json.dumps(_model(dataset, model.setup, findings, names), indent=1))
+    (making / "model.json").write_text(json.dumps(_model(dataset, found, findings, names), indent=1))
     (making / "report.json").write_text(json.dumps(result, indent=1))
     return result
 
@@ -178,26 +179,6 @@ def _record(
     for number, task in enumerate(tasks):
         report(number / len(tasks), "replaying every sequence for the page")
         task.result()
-
-
-def _gain(
-    unseen: list[Observations], pool: Workers, setups: tuple[Setup, Setup], grid: Meshing, seed: int, lost: bool = False
-) -> Ladder | FeltLadder | None:
-    """Of the stated and the found setup; where the stated one is `lost`, its tool far off, the other says which points count.
-
-    None where the stated setup then finds an equilibrium in no frame in which the tool touches.
-    """
-    names, (stated, found) = [item.name for item in unseen], setups
-    first, second = (found, stated) if lost else (stated, found)
-    one = [future.result() for future in pool.submit(names, first, grid)]
-    other = one if first is second else [future.result() for future in pool.submit(names, second, grid, None, one)]
-    baseline, extended = (other, one) if lost else (one, other)
-    touched = [{n for n, group in enumerate(item.groups) if not group.free} for item in unseen]
-    if lost and all(own <= {*one.failed, *two.failed} for own, one, two in zip(touched, baseline, extended, strict=True)):
-        return None
-    if all(item.unseen for item in unseen):
-        return felt_ladder(unseen, baseline, extended, seed)
-    return ladder(unseen, baseline, extended, stated, found, seed)
 
 
 def _model(dataset: Dataset, setup: Setup, findings: Findings, fitted: list[str]) -> dict[str, Any]:

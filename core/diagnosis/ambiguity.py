@@ -15,7 +15,7 @@ import numpy as np
 
 from core.diagnosis.evidence import Block
 from core.diagnosis.screening import Candidate, linear_gains
-from core.effects import Effect
+from core.effects import Effect, Parameter
 from core.frames import FloatArray
 
 __all__ = ["Limit", "Told", "ambiguity_map", "detection_limits", "mimicry"]
@@ -26,22 +26,21 @@ class Limit:
     """The smallest cause of one kind that would gain the bound.
 
     Attributes:
-        parameter: that is changed; empty where it is a share of what a finite cause does. unit: of the parameter.
-        size: change of the parameter, of its logarithm where `log`, or share [1]; infinite where not even from one of the
-            parameter's bounds to the other would be seen.
+        item: that is changed; None where it is a share of what a finite cause does.
+        size: change of its search coordinate, or share [1]; infinite where not even from one of the parameter's bounds to the
+            other, or to as stiff as a lump can be, would be seen.
     """
 
-    parameter: str
-    unit: str
+    item: Parameter | None
     size: float
-    log: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """`change`, `factor` or `share`; None where no size would be seen."""
-        kind = "factor" if self.log else "change" if self.parameter else "share"
-        size = math.exp(self.size) if self.log else self.size
-        value = float(f"{size:.3g}") if math.isfinite(size) else None
-        return {**({"parameter": self.parameter, "unit": self.unit} if self.parameter else {}), kind: value}
+        if self.item is None:
+            return {"share": _rounded(self.size)}
+        factor = self.item.factor(self.size)
+        told = {"change": _rounded(self.size)} if factor is None else {"factor": _rounded(factor)}
+        return {"parameter": self.item.name, "unit": self.item.unit, **told}
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,12 +77,16 @@ class Told:
 
     def _fixed(self, start: Effect) -> dict[str, Any]:
         """The parameters that no limit is stated of."""
-        moved = {limit.parameter for limit in self.limits}
+        moved = {limit.item.name for limit in self.limits if limit.item is not None}
         return {
             item.name: {"value": getattr(start, item.name), "unit": item.unit}
             for item in start.parameters()
             if item.name not in moved
         }
+
+
+def _rounded(size: float) -> float | None:
+    return float(f"{size:.3g}") if math.isfinite(size) else None
 
 
 def ambiguity_map(
@@ -125,11 +128,11 @@ def detection_limits(
         risen = float(something - nothing)
         size = spread * math.sqrt(max(bound - float(nothing), 0.0) / risen) if risen > 0 else math.inf
         if not candidate.of:
-            found.append(Limit(parameter="", unit="1", size=size))
+            found.append(Limit(item=None, size=size))
             continue
         item = numbers[candidate.of[place]]
-        widest = item.coordinate(item.high) - item.coordinate(item.low)
-        found.append(Limit(parameter=item.name, unit=item.unit, size=size if size <= widest else math.inf, log=item.log))
+        widest = item.coordinate(item.high) - (0.0 if item.contrast else item.coordinate(item.low))
+        found.append(Limit(item=item, size=size if size <= widest else math.inf))
     return tuple(found)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from core.diagnosis.columns import TOOL_COLUMNS, Wanted
 from core.diagnosis.evidence import Block, explained, fit, log_evidence, predictive_score
-from core.diagnosis.hypothesis import Model, Nuisances, nuisance_setups
+from core.diagnosis.hypothesis import Model, Nuisances, nuisance_setups, with_effects
 from core.diagnosis.led import led, with_replays
 from core.diagnosis.noise import Noise, noises
 from core.diagnosis.ordered import ORDERED, TRACED
@@ -97,13 +97,8 @@ class Bench:
         if item.coordinate(item.high) - coordinates[number] < step:
             step = -step
         coordinates[number] += step
-        return self._apply([*effects[:index], effect.at(coordinates), *effects[index + 1 :]]), step
-
-    def _apply(self, effects: Sequence[Effect]) -> Setup:
-        setup = self.setup
-        for effect in effects:
-            setup = effect.apply(setup)
-        return setup
+        changed = [*effects[:index], effect.at(coordinates), *effects[index + 1 :]]
+        return with_effects(self.setup, changed), step
 
     def _wanted(self, effects: Sequence[Effect], setup: Setup, tangents: Sequence[Tangent], lumps: Sequence[Inclusion]) -> Wanted:
         pairs = nuisance_setups(setup, self.nuisances.forces)
@@ -123,7 +118,7 @@ class Bench:
     ) -> list[Pending]:  # fmt: skip
         """Begin the replays of all sequences with these effects."""
         self.evaluations += 1
-        return self.workers.submit(self.names, self._apply(effects), grid or self.grid, wanted, starts, tolerance)
+        return self.workers.submit(self.names, with_effects(self.setup, effects), grid or self.grid, wanted, starts, tolerance)
 
     def evaluate(
         self,
@@ -133,7 +128,7 @@ class Bench:
         lumps: Sequence[Inclusion] = (),
     ) -> Model:
         """The hypothesis with these effects; columns of `tangents` and `lumps` are wanted too."""
-        setup = self._apply(effects)
+        setup = with_effects(self.setup, effects)
         if any(isinstance(effect, TRACED) for effect in effects):
             return self.assemble(tuple(effects), setup, led(self, effects, starts, tangents, lumps), tangents, len(lumps))
         predictions = [f.result() for f in self.predict(effects, self._wanted(effects, setup, tangents, lumps), starts)]
@@ -281,11 +276,15 @@ class Bench:
         """Fit an accepted model's parameters once more, with the mesh's error measured in it and not in the stated setup.
 
         What an effect does and a nuisance as well is now all the effect's.
-        From here on models compare no longer with those scored before.
+        From here on models compare no longer with those scored before. Of what is remembered along the tool's whole way, dear on
+        a fine mesh, the mesh's error is taken to be that of a replay which remembers nothing.
         """
         self.tell("fitting the causes once more on two meshes")
-        fine = [f.result() for f in self.predict(model.effects, None, model.predictions, self.fine)]
-        self.noises = [n.remeshed(m, f) for n, m, f in zip(self.noises, model.predictions, fine, strict=True)]
+        plain = tuple(effect for effect in model.effects if not isinstance(effect, TRACED))
+        if plain:
+            here = model.predictions if plain == model.effects else self.evaluate(plain, model.predictions).predictions
+            fine = [f.result() for f in self.predict(plain, None, here, self.fine)]
+            self.noises = [n.remeshed(m, f) for n, m, f in zip(self.noises, here, fine, strict=True)]
         found = self.assemble(model.effects, model.setup, model.predictions, (), 0)
         return self._fitted(found, self.nuisances.beside(found.effects))
 

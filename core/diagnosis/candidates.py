@@ -49,6 +49,10 @@ _LEAST_SHARE, _MOST_SHARE = 0.2, 4.0
 """Of a finite size's action: what of it a refit may begin with [1]."""
 _FARTHEST = 1.8
 """Change of a logarithm that a refit may begin with [1]."""
+_STARKEST = 0.7
+"""The same of a ratio's contrast: to 6.8 times as stiff."""
+_LUMP = 0.8
+"""Prior deviation of a lump's contrast [1]."""
 
 
 def lump_places(bench: Bench) -> tuple[Inclusion, ...]:
@@ -141,7 +145,7 @@ def candidates_of(model: Model, bench: Bench, finite: Sequence[Signature]) -> li
         found.append(Candidate(start=rows[0][1].effect, of=of, columns=places, spread=tuple(one.spread for _, one in rows)))
     for place, lump in zip(model.extra["lumps"], lump_places(bench), strict=True):
         start = StiffInclusion(x=lump.x, y=lump.y, z=lump.z, radius=lump.radius, stiffness_ratio=1.0)
-        found.append(Candidate(start=start, of=("stiffness_ratio",), columns=(place,), spread=(2.0,)))
+        found.append(Candidate(start=start, of=("stiffness_ratio",), columns=(place,), spread=(_LUMP,)))
     for place, (effect, predictions) in zip(model.extra.get("signatures", ()), finite, strict=True):
         if any(np.isfinite(p.gap).any() or (p.felt is not None and np.isfinite(p.felt.gap).any()) for p in predictions):
             found.append(Candidate(start=effect, columns=(place,), spread=(1.0,)))
@@ -174,8 +178,6 @@ def begin(candidate: Candidate, model: Model, bench: Bench) -> Effect:
     change = float(changes[-1])
     if isinstance(start, (StrainStiffening, BaseCompliance, Viscoelasticity, PermanentSet)):
         return _shared(start, _share(change))
-    if isinstance(start, StiffInclusion):
-        change *= 1.5
     if isinstance(start, Anisotropy) and change < 0:  # softer along is stiffer across
         start, change = replace(start, direction=(start.direction + math.pi / 2) % math.pi), -change
     return _moved(start, candidate.of[0], change)
@@ -210,5 +212,6 @@ def _moved(start: Effect, name: str, change: float) -> Effect:
     coordinates = start.coordinates
     for number, item in enumerate(start.numbers()):
         if item.name == name:
-            coordinates[number] += float(np.clip(change, -_FARTHEST, _FARTHEST)) if item.log else change
+            farthest = _FARTHEST if item.log else _STARKEST if item.contrast else math.inf
+            coordinates[number] += float(np.clip(change, -farthest, farthest))
     return start.at(coordinates)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from core.diagnosis.comparison import Compared, observe
+from core.effects.base import LOG_PER_CONTRAST
 from core.fem.model import rule_of
 from core.fem.newton import Outcome
 from core.fem.stiffness import lump_share
@@ -35,7 +36,7 @@ class Wanted:
 
     Attributes:
         setups: setups that differ a little. steps: by how much, each; the column is the change over the step.
-        lumps: inclusions, whose columns are the change per unit logarithm of their stiffness ratio.
+        lumps: inclusions, whose columns are the change per unit of their stiffness ratio's contrast, where it is one.
         pivot: (3,) [m] about which the robot registration turns.
     """
 
@@ -76,7 +77,7 @@ class Columns:
         arm = frame.probe.centre - wanted.pivot
         turned = [np.tensordot(np.cross(axis, arm), tool, axes=1) for axis in np.eye(3)]
         scaled = changed[3:] / np.array(wanted.steps)[:, None, None] if wanted.steps else changed[3:]
-        factors = np.array([lump_share(lump, rule_of(frame.mesh)) for lump in wanted.lumps])
+        factors = LOG_PER_CONTRAST * np.array([lump_share(lump, rule_of(frame.mesh)) for lump in wanted.lumps])
         still = [(setup, np.zeros(3))] * len(factors)
         lumps = self._with_forces(frame, still, stiffness_changes(self.block, frame, factors)) if still else changed[:0]
         return np.concatenate([tool, np.array(turned), scaled, lumps])

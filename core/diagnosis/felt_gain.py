@@ -1,4 +1,8 @@
-"""The gain of a palpation without clouds: how much nearer the extended model's forces come on pushes that nothing was fitted on."""
+"""The gain of a palpation without clouds: how much nearer the extended model's forces come on pushes that nothing was fitted on.
+
+Where the modulus is no cause each model has the one that its fitted sequences' forces give: a stated modulus that is off is no gain
+of a lump, and would hide what the lump is worth.
+"""
 
 from __future__ import annotations
 
@@ -48,9 +52,17 @@ class FeltLadder:
 
 
 def felt_ladder(
-    data: Sequence[Observations], baseline: Sequence[Prediction], extended: Sequence[Prediction], seed: int
+    data: Sequence[Observations],
+    baseline: Sequence[Prediction],
+    extended: Sequence[Prediction],
+    seed: int,
+    stiffer: tuple[float, float] = (1.0, 1.0),
 ) -> FeltLadder:
-    """Compare two models on the pushes of test sequences, which are resampled whole."""
+    """Compare two models on the pushes of test sequences, which are resampled whole.
+
+    Args:
+        stiffer: modulus of each over the one that was replayed [1].
+    """
     rows: list[tuple[str, float, float, float]] = []
     for item, before, after in zip(data, baseline, extended, strict=True):
         if before.felt is None or after.felt is None:
@@ -58,7 +70,8 @@ def felt_ladder(
         for number, group in enumerate(item.groups):
             if number in before.failed or number in after.failed or not np.isfinite(before.felt.gap[number]).all():
                 continue
-            one, other = (float((side.gap[number] ** 2).sum()) for side in (before.felt, after.felt))
+            felt = [side.stiffer(factor) for side, factor in zip((before.felt, after.felt), stiffer, strict=True)]
+            one, other = (float((side.gap[number] ** 2).sum()) for side in felt)
             rows.append((f"{item.name}/{group.probe}", one, other, 3 * float(before.felt.noise[number]) ** 2))
     if not rows:
         raise DiagnosisError("the test sequences have no push whose force is known; name others in [splits] test")

@@ -146,6 +146,10 @@ class Felt:
         push = None if self.push is None else self.push[index]
         return Felt(self.gap[index], self.noise[index], self.force[index], self.columns[index], push)
 
+    def stiffer(self, factor: float) -> Felt:
+        """Of a body so many times as stiff: a simulated force goes with the modulus."""
+        return replace(self, gap=self.gap + (1 - factor) * self.force, force=factor * self.force, columns=factor * self.columns)
+
     def beside(self, added: FloatArray) -> Felt:
         """With further columns (g, 3, m) last."""
         return replace(self, columns=np.concatenate([self.columns, added], axis=2))

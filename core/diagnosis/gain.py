@@ -45,6 +45,7 @@ class Ladder:
         removed: (value, low, high) of (baseline - extended) / (baseline - noise floor); 95 % interval from resampled probes.
         paper: the paper's metric (baseline, extended) [m]. probes: how many pushes of the tool were resampled.
         force: RMS of measured minus simulated force (baseline, extended, noise floor) [N]; None where none was measured.
+        tuned: as `removed`, of the stated model with what is known only to its accuracy as fitted, and no cause; None if not asked.
     """
 
     baseline: float
@@ -54,6 +55,7 @@ class Ladder:
     paper: tuple[float, float]
     probes: int
     force: tuple[float, float, float] | None = None
+    tuned: tuple[float, float, float] | None = None
 
 
 def harm(names: Sequence[str], gain: Ladder | FeltLadder) -> str:

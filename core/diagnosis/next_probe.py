@@ -194,9 +194,9 @@ def _hidden(told: Told) -> float:
 def _at_limit(told: Told) -> tuple[Effect, float]:
     """The effect as large as it may be unseen, or a finite one and the share of it."""
     start, limit = told.candidate.start, told.limits[0]
-    if not limit.parameter:
+    if limit.item is None:
         return start, min(limit.size, 1.0)
-    number = [item.name for item in start.numbers()].index(limit.parameter)
+    number = [item.name for item in start.numbers()].index(limit.item.name)
     coordinates, item = start.coordinates, start.numbers()[number]
     above, below = item.coordinate(item.high) - coordinates[number], coordinates[number] - item.coordinate(item.low)
     coordinates[number] += min(limit.size, above) if above >= min(limit.size, below) else -min(limit.size, below)

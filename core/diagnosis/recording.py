@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from core.setup import Setup
 from core.sight import sight_of
 from core.touches import touch_correction
 
-__all__ = ["Recorded", "record"]
+__all__ = ["Recorded", "observed", "record"]
 
 MOST_FRAMES = 100
 VERTEX_SPACING = 2.5e-3
@@ -65,7 +66,8 @@ def _rms(errors: FloatArray) -> float:
     return float(np.sqrt(np.mean(seen**2))) if len(seen) else np.nan
 
 
-def _side(setup: Setup, frames: list[Equilibrium], clouds: list[FloatArray]) -> Recorded:
+def observed(setup: Setup, frames: Sequence[Equilibrium], clouds: Sequence[FloatArray]) -> Recorded:
+    """These frames of a setup against cleaned clouds, (n, 3) each, camera frame [m]."""
     surface, sight = Surface.of(setup, VERTEX_SPACING), sight_of(setup)
     moved, errors, distance, paper = [], [], [], []
     for frame, cloud in zip(frames, clouds, strict=True):
@@ -104,7 +106,7 @@ def record(
         # What hangs on the past is replayed in the order of time, and from frame to frame.
         starts = None if setup.remembers else frames or None
         frames = replay(setup, centres, grid, times=times - setup.sensor.time_offset, starts=starts, tolerance=1e-3)
-        sides.append(_side(setup, frames, clouds))
+        sides.append(observed(setup, frames, clouds))
     before, after = sides
     surface = Surface.of(stated, VERTEX_SPACING)
     floor = after.distance[after.free] if after.free.any() else after.distance

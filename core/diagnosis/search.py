@@ -85,6 +85,7 @@ def search(bench: Bench, seed: int) -> Findings:
             break
         current = findings.best = step
         bench.temperature = max(1.0, current.misfit)
+        findings.left = structure_of(bench, current.model, seed)
     if findings.best is not None and len(findings.best.model.effects) > 1 and not known:
         findings.best = _reconsidered(bench, findings, findings.best, finite, origin)
     _rescore(bench, findings)
@@ -107,7 +108,8 @@ def _forward(
 ) -> Trial | None:
     """The best further cause that gains more than the bound and that is no accident of one sequence, else None."""
     trials: list[Trial] = []
-    settled = beyond_first_order(bench, screened, candidates) if current.model.names == _known(findings) else []
+    wrong = current.model.names == _known(findings) or findings.left.significant
+    settled = beyond_first_order(bench, screened, candidates) if wrong else []
     chosen = shortlist(gains, candidates, PROMISING * _needed(findings, current), settled)
     before, linear = bench.objective(current.model), {id(one): gain for one, gain in zip(candidates, gains, strict=True)}
     # What is dear, or refitted whatever its gain, comes last, when a better one may show that it is hopeless.
@@ -132,12 +134,14 @@ def _needed(findings: Findings, current: Trial) -> float:
     """Least gain [nats] of the next cause.
 
     The mesh's error is known for the stated setup only; a found cause changes it, and what changes with it could pass for
-    another cause. So a second one must gain a good deal more than chance, and a fair share of what the first gained. What nothing
-    could be replayed without was there when the noise was measured, and is no first cause in this sense.
+    another cause. So a second one must gain a good deal more than chance, and a fair share of what the first gained unless what is
+    left has a structure that the noise has not: of two causes one may show a tenth as much as the other. What nothing could be
+    replayed without was there when the noise was measured, and is no first cause in this sense.
     """
     if current.model.names == _known(findings):
         return findings.bound
-    return max(SECOND_FACTOR * findings.bound, SECOND_SHARE * current.gain)
+    share = 0.0 if findings.left.significant else SECOND_SHARE
+    return max(SECOND_FACTOR * findings.bound, share * current.gain)
 
 
 def _reconsidered(bench: Bench, findings: Findings, best: Trial, finite: Sequence[Signature], origin: Model) -> Trial:

@@ -172,6 +172,8 @@ def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder |
             "paper_metric": {"baseline": round(gain.paper[0] * 1e3, 4), "extended": round(gain.paper[1] * 1e3, 4)},
             "probes": gain.probes,
         }  # fmt: skip
+        if gain.tuned is not None:
+            report["gain"]["tuned"] = dict(zip(("value", "low", "high"), (round(part, 4) for part in gain.tuned), strict=True))
         if gain.force is not None:
             names = ("baseline", "extended", "noise_floor")
             report["gain"]["force"] = {"unit": "N"} | {n: round(v, 5) for n, v in zip(names, gain.force, strict=True)}

@@ -13,7 +13,11 @@ from typing import Any, ClassVar, Self
 from core.errors import EffectError
 from core.setup import Setup
 
-__all__ = ["Effect", "Parameter", "Slot", "parameter"]
+__all__ = ["LOG_PER_CONTRAST", "Effect", "Parameter", "Slot", "parameter"]
+
+_MATRIX = 1.5
+LOG_PER_CONTRAST = 1.0 + _MATRIX
+"""Change of a stiffness ratio's logarithm per change of its contrast, where the ratio is one."""
 
 
 class Slot(Enum):
@@ -34,8 +38,10 @@ class Parameter:
     Attributes:
         name, unit: as in effects.md, SI. low, high: bounds. scale: a step that matters, for trust regions and differences.
         choices: allowed words, for a parameter that is not a number. log: whether it is searched by its logarithm; then
-            `scale` and `accuracy` are of the logarithm. accuracy: standard deviation that the replay's own error leaves, however
-            good the data. place: whether it says where a cause is and not how strong, and so means nothing at a neutral strength.
+            `scale` and `accuracy` are of the logarithm. contrast: whether a ratio k of stiffness is searched by
+            (k - 1) / (k + 3/2), and `scale` and `accuracy` are of that: in proportion to it a ball in an incompressible matrix
+            moves what surrounds it (Eshelby 1957), so that k = 10 and k = 50 are next to each other, as they are in data.
+            accuracy: standard deviation that the replay's own error leaves, however good the data.
     """
 
     name: str
@@ -45,15 +51,27 @@ class Parameter:
     scale: float = 1.0
     choices: tuple[str, ...] = ()
     log: bool = False
+    contrast: bool = False
     accuracy: float = 0.0
 
     def coordinate(self, value: float) -> float:
         """What a search moves instead of the value."""
+        if self.contrast:
+            return (value - 1.0) / (value + _MATRIX)
         return math.log(value) if self.log else value
 
     def value(self, coordinate: float) -> float:
         """The inverse of `coordinate`, brought back into the bounds."""
-        return min(max(math.exp(min(coordinate, 700.0)) if self.log else coordinate, self.low), self.high)
+        return min(max(self._free(coordinate), self.low), self.high)
+
+    def factor(self, size: float) -> float | None:
+        """That to which one grows with a coordinate's change by `size`; None of a parameter that is searched as it is."""
+        return self._free(self.coordinate(1.0) + size) if self.log or self.contrast else None
+
+    def _free(self, coordinate: float) -> float:
+        if self.contrast:
+            return (1.0 + _MATRIX * coordinate) / (1.0 - coordinate) if coordinate < 1.0 else math.inf
+        return math.exp(min(coordinate, 700.0)) if self.log else coordinate
 
 
 def parameter(
@@ -64,12 +82,14 @@ def parameter(
     scale: float = 1.0,
     choices: tuple[str, ...] = (),
     log: bool = False,
+    contrast: bool = False,
     accuracy: float = 0.0,
 ) -> Any:
     """A dataclass field that carries a Parameter."""
     return dataclasses.field(
         metadata={
-            "unit": unit, "low": low, "high": high, "scale": scale, "choices": choices, "log": log, "accuracy": accuracy,
+            "unit": unit, "low": low, "high": high, "scale": scale, "choices": choices, "log": log, "contrast": contrast,
+            "accuracy": accuracy,
         }
     )  # fmt: skip
 

@@ -27,7 +27,7 @@ class GeometryScale(Effect):
     summary = "the phantom is not the stated size"
     scale_x: float = parameter("1", low=0.7, high=1.4, scale=0.01)
     scale_y: float = parameter("1", low=0.7, high=1.4, scale=0.01)
-    scale_z: float = parameter("1", low=0.7, high=1.4, scale=0.01)
+    scale_z: float = parameter("1", low=0.7, high=1.4, scale=0.01, accuracy=2.5e-3)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

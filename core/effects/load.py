@@ -18,7 +18,7 @@ class Gravity(Effect):
 
     name, enters = "gravity", Slot.LOAD
     summary = "the block sags under its own weight"
-    specific_weight_over_stiffness: float = parameter("1/m", low=0.0, high=8.0, scale=0.5)
+    specific_weight_over_stiffness: float = parameter("1/m", low=0.0, high=8.0, scale=0.5, accuracy=0.15)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

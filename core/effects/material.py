@@ -18,7 +18,7 @@ class PoissonRatio(Effect):
 
     name, enters = "poisson_ratio", Slot.MATERIAL
     summary = "the material is more or less compressible than assumed"
-    nu: float = parameter("1", low=0.0, high=0.495, scale=0.02)
+    nu: float = parameter("1", low=0.0, high=0.495, scale=0.02, accuracy=8e-3)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
@@ -40,9 +40,9 @@ class StiffInclusion(Effect):
     summary = "a lump of other stiffness lies inside"
     x: float = parameter("m", low=-0.5, high=0.5, scale=3e-3)
     y: float = parameter("m", low=-0.5, high=0.5, scale=3e-3)
-    z: float = parameter("m", low=0.0, high=0.5, scale=3e-3)
+    z: float = parameter("m", low=0.0, high=0.5, scale=3e-3, accuracy=5e-4)
     radius: float = parameter("m", low=2e-3, high=2e-2, scale=0.25, log=True)
-    stiffness_ratio: float = parameter("1", low=0.02, high=50.0, scale=0.5, log=True)
+    stiffness_ratio: float = parameter("1", low=0.02, high=50.0, scale=0.15, contrast=True, accuracy=0.04)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

@@ -68,6 +68,9 @@ def _check_number(name: str, item: Parameter) -> None:
         raise EffectError(f"{name}: {item.name} is bounded by {item.low:g} and {item.high:g}", parameter=item.name)
     if item.log and item.low <= 0:
         raise EffectError(f"{name}: {item.name} is searched by its logarithm and may be {item.low:g}", parameter=item.name)
-    span = math.log(item.high / item.low) if item.log else item.high - item.low
+    if item.contrast and (item.log or item.low < 0):
+        what = "by its logarithm, too" if item.log else f"and may be {item.low:g}"
+        raise EffectError(f"{name}: {item.name} is searched as a ratio's contrast {what}", parameter=item.name)
+    span = item.coordinate(item.high) - item.coordinate(item.low)
     if not 0 < item.scale < span:
         raise EffectError(f"{name}: the scale of {item.name} is {item.scale:g}, not between 0 and {span:g}", parameter=item.name)

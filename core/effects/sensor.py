@@ -91,8 +91,8 @@ class DepthBias(Effect):
 
     name, enters = "depth_bias", Slot.SENSOR
     summary = "the camera reads too near or far, or stretches depth"
-    offset: float = parameter("m", low=-0.05, high=0.05, scale=2e-3)
-    scale: float = parameter("1", low=0.85, high=1.15, scale=5e-3)
+    offset: float = parameter("m", low=-0.05, high=0.05, scale=2e-3, accuracy=3e-3)
+    scale: float = parameter("1", low=0.85, high=1.15, scale=5e-3, accuracy=7e-3)
 
     @classmethod
     def at_rest(cls) -> bool:

@@ -22,8 +22,8 @@ class SurfaceLayer(Effect):
 
     name, enters = "surface_layer", Slot.MATERIAL
     summary = "a skin of other stiffness lies on the top"
-    thickness: float = parameter("m", low=3e-4, high=2e-2, scale=5e-4)
-    stiffness_ratio: float = parameter("1", low=0.02, high=50.0, scale=0.5, log=True)
+    thickness: float = parameter("m", low=3e-4, high=2e-2, scale=5e-4, accuracy=3e-4)
+    stiffness_ratio: float = parameter("1", low=0.02, high=50.0, scale=0.5, log=True, accuracy=0.15)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
@@ -47,7 +47,7 @@ class StiffnessGradient(Effect):
 
     name, enters = "stiffness_gradient", Slot.MATERIAL
     summary = "the stiffness changes from the base to the top"
-    log_ratio: float = parameter("1", low=-3.0, high=3.0, scale=0.2)
+    log_ratio: float = parameter("1", low=-3.0, high=3.0, scale=0.2, accuracy=0.04)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

@@ -18,7 +18,7 @@ class ToolRadius(Effect):
 
     name, enters = "tool_radius", Slot.TOOL
     summary = "the tool has another size than stated"
-    radius: float = parameter("m", low=1e-3, high=2e-2, scale=3e-4)
+    radius: float = parameter("m", low=1e-3, high=2e-2, scale=3e-4, accuracy=5e-5)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

@@ -13,7 +13,7 @@ from core.registration.guess import automatic_guess, half_turn
 from core.registration.pose import motion_jacobian, small_motion
 from core.registration.uncertainty import PRIOR, estimate, make_patches, weak_directions
 
-__all__ = ["CameraFit", "fit_camera"]
+__all__ = ["CameraFit", "fit_camera", "refine_camera"]
 
 HUBER, TUKEY = 1.345, 4.685
 EXPLAINED_LEAST = 0.7
@@ -89,6 +89,15 @@ def fit_camera(
     # The given guess decides between equals: it knows the heading and the directions that are open.
     best = 1 if len(poses) == 2 and shares[1] > shares[0] + 0.05 else 0
     return _conclude(cloud, size, poses[best], shares[best], gate, guess, automatic=guess is None or best == 1)
+
+
+def refine_camera(cloud: FloatArray, size: tuple[float, float, float], start: Transform, depth_sigma: float = 0.002) -> CameraFit:
+    """The same from `start` (phantom_from_camera) alone: a person's start is refined, never replaced by a search."""
+    if len(cloud) < LEAST_POINTS:
+        raise RegistrationError(f"the rest cloud has {len(cloud)} points, at least {LEAST_POINTS} are needed", points=len(cloud))
+    gate = max(2.0 * depth_sigma, 3.0e-3)
+    pose = _refine(cloud, size, _coarse(cloud, size, start), start, gate)
+    return _conclude(cloud, size, pose, _explained(cloud, size, pose, depth_sigma), gate, pose, automatic=False)
 
 
 def _preference(pose: Transform, guess: Transform | None) -> float:

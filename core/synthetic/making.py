@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
@@ -12,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from core.frames import FloatArray, Transform
+from core.processes import bound_to
 from core.progress import Report, silent
 from core.synthetic.bench import neutral_displacement, perform, rest_surface
 from core.synthetic.body import true_offset, true_radius
@@ -118,7 +120,7 @@ def _all(jobs: list[_Job], workers: int) -> Iterator[_Record]:
     if workers <= 1:
         yield from (_record(job) for job in jobs)
         return
-    with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=get_context("forkserver")) as pool:
+    with ProcessPoolExecutor(min(workers, len(jobs)), get_context("forkserver"), bound_to, (os.getpid(),)) as pool:
         futures = [pool.submit(_record, job) for job in jobs]
         try:
             for future in as_completed(futures):

@@ -7,6 +7,7 @@ that each depth is a little off; kinematics say where the tool was, not where it
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
@@ -18,6 +19,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from core.frames import FloatArray, Transform
+from core.processes import bound_to
 from core.progress import Report, silent
 from core.synthetic.bench import perform
 from core.synthetic.block import Block, Grading
@@ -103,7 +105,7 @@ def _fill(folder: Path, name: str, palpation: Palpation, seed: int, workers: int
     motions = _motions(palpation, seed)
     jobs = [(palpation, motion, robot_from_phantom, folder / "sequences" / motion.name, seed) for motion in motions]
     shortened: dict[str, list[float]] = {}
-    with ProcessPoolExecutor(workers, mp_context=get_context("forkserver")) as pool:
+    with ProcessPoolExecutor(workers, get_context("forkserver"), bound_to, (os.getpid(),)) as pool:
         for done, record in enumerate(pool.map(_record, *zip(*jobs, strict=True))):
             shortened |= record
             report((done + 1) / len(jobs), f"recorded {done + 1} of {len(jobs)} sequences")

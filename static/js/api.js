@@ -11,6 +11,11 @@ export async function post(path, body) {
   return answer(await reach(path, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body ?? {}) }));
 }
 
+export async function remove(path) {
+  const response = await reach(path, { method: "DELETE" });
+  if (!response.ok) await answer(response);
+}
+
 async function reach(path, options) {
   try { return await fetch(`/api${path}`, options); } catch {
     throw new Problem({ kind: "No answer", message: "The server does not answer. Start it again with: palpate serve", where: {} });
@@ -19,6 +24,7 @@ async function reach(path, options) {
 
 async function answer(response) {
   const body = await response.json().catch(() => ({ kind: "Error", message: `The server answered ${response.status}.`, where: {} }));
+  if (response.status === 401) location.assign("/login");
   if (!response.ok) throw new Problem(body);
   return body;
 }

@@ -2,9 +2,11 @@
 import { get } from "./api.js";
 import { element, fill } from "./dom.js";
 import { capital, mm } from "./format.js";
+import { openPanel } from "./panels.js";
 
 export async function showDataset(name, diagnose) {
   const panel = document.getElementById("panel");
+  openPanel("report");
   fill(panel, element("div", { class: "eyebrow" }, "Dataset"), element("h1", { class: "verdict" }, name), element("p", { class: "gain-note" }, "Reading every file …"));
   let summary;
   try { summary = await get(`/datasets/${encodeURIComponent(name)}/check`); } catch (problem) {

@@ -23,6 +23,7 @@ const SHAPES = {
   last: '<path d="M7 6l6 6-6 6M17 6v12"/>', close: '<path d="M6 6l12 12M18 6L6 18"/>',
   sun: '<circle cx="12" cy="12" r="4"/><path d="M12 3v2M12 19v2M3 12h2M19 12h2M5.6 5.6L7 7M17 17l1.4 1.4M5.6 18.4L7 17M17 7l1.4-1.4"/>',
   moon: '<path d="M20 14.5A8.5 8.5 0 0 1 9.5 4 8.5 8.5 0 1 0 20 14.5z"/>',
+  loop: '<path d="M17 3l3 3-3 3M4 11V9a3 3 0 0 1 3-3h13M7 21l-3-3 3-3M20 13v2a3 3 0 0 1-3 3H4"/>', from: '<path d="M14 4H9v16h5"/>', to: '<path d="M10 4h5v16h-5"/>',
   target: '<path d="M4 9V5h4M20 9V5h-4M4 15v4h4M20 15v4h-4"/><circle cx="12" cy="12" r="2.5"/>',
   cloud: '<g class="full"><circle cx="6" cy="7" r="1.5"/><circle cx="12" cy="5" r="1.5"/><circle cx="18" cy="8" r="1.5"/><circle cx="5" cy="14" r="1.5"/><circle cx="11" cy="12" r="1.5"/><circle cx="18" cy="15" r="1.5"/><circle cx="9" cy="19" r="1.5"/><circle cx="15" cy="20" r="1.5"/></g>',
 };

@@ -1,5 +1,5 @@
 // Numbers as people read them.
-const UNITS = { m: [1e3, "mm"], Pa: [1e-3, "kPa"], s: [1e3, "ms"], rad: [180 / Math.PI, "°"], "1/m": [1, "/m"], 1: [1, ""] };
+export const UNITS = { m: [1e3, "mm"], Pa: [1e-3, "kPa"], s: [1e3, "ms"], rad: [180 / Math.PI, "°"], "1/m": [1, "/m"], 1: [1, ""] };
 
 export const words = (name) => NAMES[name] ?? name.replaceAll("_", " ");
 

@@ -5,7 +5,9 @@ import * as rail from "./rail.js";
 import { showProblem, showReport, showWelcome } from "./report.js";
 import * as scene from "./scene.js";
 import { on, set, state } from "./store.js";
+import { startSweeps } from "./sweep.js";
 import * as timeline from "./timeline.js";
+import * as whatif from "./whatif.js";
 
 const THEMES = { light: "moon", dark: "sun" };
 
@@ -28,7 +30,7 @@ async function openRun(id) {
     const known = heading.sequences.map(({ name }) => name);
     const sequence = state().run === id && known.includes(state().sequence) ? state().sequence : preferred(heading.sequences);
     showReport(heading, report, patterns, state().palette);
-    if (state().run !== id || state().sequence !== sequence) set({ frame: 0, series: null });
+    if (state().run !== id || state().sequence !== sequence) set({ frame: 0, series: null, loop: null });
     set({ run: id, sequence, heading, report });
     await openSequence();
   } catch (problem) { showProblem(problem); }
@@ -59,8 +61,10 @@ async function start() {
   const palette = await get("/palette");
   set({ palette });
   timeline.start();
+  startSweeps();
   scene.start();
-  on(["sequence"], () => { set({ series: null, frame: 0 }); openSequence().catch(toast); });
+  whatif.start();
+  on(["sequence"], () => { set({ series: null, frame: 0, loop: null }); openSequence().catch(toast); });
   const datasets = await rail.start(openRun);
   const wanted = new URLSearchParams(location.search).get("run") ?? state().run;
   const run = rail.newestRun(wanted);

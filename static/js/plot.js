@@ -1,6 +1,10 @@
-// Error of each frame against time: raw, extended and the noise floor, with the shared cursor.
+// Series of each frame against time in lanes with one cursor: errors with the noise floor, push depth, force, solver iterations.
+import { mm } from "./format.js";
+
 const LEFT = 46;
 const RIGHT = 16;
+const FOOT = 18;
+const GAP = 13;
 
 export function frameAt(times, time) {
   let low = 0;
@@ -9,7 +13,25 @@ export function frameAt(times, time) {
   return time - times[low] <= times[high] - time ? low : high;
 }
 
-export function drawPlot(canvas, series, frame) {
+/** What is drawn: title, share of the height, curves with the colour and name of each, and how a number is told. */
+function lanesOf(series) {
+  const lanes = [{
+    title: "RMS error, mm", share: 2.2, factor: 1e3, floor: series.noise_floor, text: (value) => mm(value),
+    curves: series.models.map((name) => ({ name, ink: name, values: series[`distance_${name}`] })),
+  }];
+  if (series.depth) lanes.push({ title: "Push depth, mm", share: 1, factor: 1e3, text: (value) => mm(value), curves: [{ name: "depth", ink: "tool", values: series.depth }] });
+  if (series.force) lanes.push({ title: "Force, N", share: 1, factor: 1, text: (value) => (value === null ? "–" : `${value.toFixed(2)} N`), curves: [{ name: "force", ink: "measured", values: series.force }] });
+  if (series.iterations) {
+    const curves = Object.entries(series.iterations).map(([name, values]) => ({ name: `${name} iterations`, ink: name, values }));
+    lanes.push({ title: "Solver iterations", share: 1, factor: 1, text: (value) => String(value), curves });
+  }
+  return lanes;
+}
+
+/** All numbers of a frame in words. */
+export const told = (series, frame) => lanesOf(series).flatMap(({ curves, text }) => curves.map(({ name, values }) => `${name} ${text(values[frame])}`));
+
+export function drawPlot(canvas, series, frame, [first, last]) {
   const ratio = devicePixelRatio || 1;
   const { clientWidth: width, clientHeight: height } = canvas.parentElement;
   canvas.width = width * ratio; canvas.height = height * ratio;
@@ -25,48 +47,81 @@ export function drawPlot(canvas, series, frame) {
     return;
   }
   const end = series.time[series.time.length - 1] || 1;
-  const seen = [...series.distance_raw, ...series.distance_extended, series.noise_floor].filter(Number.isFinite);
-  const top = niceTop(Math.max(...seen) * 1e3);
   const x = (time) => LEFT + time / end * (width - LEFT - RIGHT);
-  const y = (metres) => height - 18 - metres * 1e3 / top.end * (height - 26);
   canvas.timeAt = (pixel) => Math.max(0, Math.min(end, (pixel - LEFT) / (width - LEFT - RIGHT) * end));
-  drawAxes(pen, { width, height, end, top, x, y, ink });
-  if (Number.isFinite(series.noise_floor)) {
-    pen.fillStyle = ink("floor"); pen.globalAlpha = 0.32;
-    pen.fillRect(LEFT, y(series.noise_floor), width - LEFT - RIGHT, y(0) - y(series.noise_floor));
-    pen.globalAlpha = 1;
-    line(pen, [[LEFT, y(series.noise_floor)], [width - RIGHT, y(series.noise_floor)]], ink("floor"), 1.5);
+  canvas.timeToPixel = x;
+  shade(pen, { series, x, height, ink });
+  const lanes = lanesOf(series);
+  const titles = [];
+  const whole = height - FOOT - 8 - GAP * (lanes.length - 1);
+  const shares = lanes.reduce((sum, { share }) => sum + share, 0);
+  let top = 8;
+  for (const lane of lanes) {
+    const tall = whole * lane.share / shares;
+    drawLane(pen, lane, { series, frame, width, top, tall, x, ink });
+    titles.push([lane.title, top]);
+    top += tall + GAP;
   }
-  for (const [key, name] of [["distance_raw", "raw"], ["distance_extended", "extended"]]) {
-    line(pen, series.time.map((time, i) => [x(time), Number.isFinite(series[key][i]) ? y(series[key][i]) : NaN]), ink(name), 1.8);
-  }
-  drawCursor(pen, { series, frame, height, x, y, ink });
+  drawTimes(pen, { width, height, end, x, ink });
+  drawRange(pen, { series, first, last, x, height, ink });
+  pen.textAlign = "left"; pen.textBaseline = "top"; pen.fillStyle = ink("text-2");
+  for (const [title, at] of titles) pen.fillText(title, LEFT + 5, at + 2);
+  const at = x(series.time[frame]);
+  line(pen, [[at, 4], [at, height - FOOT]], ink("text"), 1.2);
 }
 
-function drawAxes(pen, { width, height, end, top, x, y, ink }) {
-  pen.textBaseline = "middle"; pen.textAlign = "right";
-  for (let value = 0; value <= top.end + 1e-9; value += top.step) {
-    line(pen, [[LEFT, y(value / 1e3)], [width - RIGHT, y(value / 1e3)]], ink("line"), 1);
-    pen.fillStyle = ink("text-3");
-    pen.fillText(+value.toFixed(3), LEFT - 8, y(value / 1e3));
+/** Where the tool touches: the frames of a spell and half way to those beside it. */
+function shade(pen, { series, x, height, ink }) {
+  const between = (one, other) => (series.time[one] + (series.time[other] ?? series.time[one])) / 2;
+  pen.fillStyle = ink("sunken");
+  for (const [first, last] of series.touching) {
+    const [from, to] = [x(between(first, Math.max(0, first - 1))), x(between(last, Math.min(series.time.length - 1, last + 1)))];
+    pen.fillRect(from, 4, Math.max(1, to - from), height - FOOT - 4);
   }
-  pen.save(); pen.translate(11, (height - 18) / 2); pen.rotate(-Math.PI / 2); pen.textAlign = "center";
-  pen.fillText("RMS, mm", 0, 0); pen.restore();
-  pen.textAlign = "center"; pen.textBaseline = "alphabetic";
+}
+
+function drawLane(pen, { factor, floor, curves }, { series, frame, width, top, tall, x, ink }) {
+  const seen = [...curves.flatMap(({ values }) => values), floor].filter(Number.isFinite);
+  const scale = niceTop(Math.max(0, ...seen) * factor, tall);
+  const y = (value) => top + tall - value * factor / scale.end * tall;
+  pen.textBaseline = "middle"; pen.textAlign = "right";
+  for (let value = 0; value <= scale.end * 1.0001; value += scale.step) {
+    line(pen, [[LEFT, y(value / factor)], [width - RIGHT, y(value / factor)]], ink("line"), 1);
+    pen.fillStyle = ink("text-3");
+    pen.fillText(+value.toFixed(3), LEFT - 8, y(value / factor));
+  }
+  if (Number.isFinite(floor)) {
+    pen.fillStyle = ink("floor"); pen.globalAlpha = 0.32;
+    pen.fillRect(LEFT, y(floor), width - LEFT - RIGHT, y(0) - y(floor));
+    pen.globalAlpha = 1;
+    line(pen, [[LEFT, y(floor)], [width - RIGHT, y(floor)]], ink("floor"), 1.5);
+  }
+  const pixels = (values) => series.time.map((time, i) => [x(time), Number.isFinite(values[i]) ? y(values[i]) : NaN]);
+  for (const { values, ink: name } of curves) line(pen, pixels(values), ink(name), 1.8);
+  for (const { values, ink: name } of curves) {
+    if (!Number.isFinite(values[frame])) continue;
+    pen.beginPath(); pen.arc(x(series.time[frame]), y(values[frame]), 3.5, 0, 2 * Math.PI);
+    pen.fillStyle = ink(name); pen.fill(); pen.strokeStyle = ink("surface"); pen.lineWidth = 1.5; pen.stroke();
+  }
+}
+
+function drawTimes(pen, { height, end, x, ink }) {
+  pen.textAlign = "center"; pen.textBaseline = "alphabetic"; pen.fillStyle = ink("text-3");
   const step = niceStep(end / 8);
   for (let time = 0; time <= end + 1e-9; time += step) {
     pen.fillText(`${+time.toFixed(2)}${time + step > end ? " s" : ""}`, x(time), height - 4);
   }
 }
 
-function drawCursor(pen, { series, frame, height, x, y, ink }) {
-  const at = x(series.time[frame]);
-  line(pen, [[at, 4], [at, height - 18]], ink("text"), 1.2);
-  for (const [key, name] of [["distance_raw", "raw"], ["distance_extended", "extended"]]) {
-    if (!Number.isFinite(series[key][frame])) continue;
-    pen.beginPath(); pen.arc(at, y(series[key][frame]), 4, 0, 2 * Math.PI);
-    pen.fillStyle = ink(name); pen.fill(); pen.strokeStyle = ink("surface"); pen.lineWidth = 1.5; pen.stroke();
-  }
+/** What is outside the loop is dimmed; its ends are lines. */
+function drawRange(pen, { series, first, last, x, height, ink }) {
+  if (first === 0 && last === series.time.length - 1) return;
+  const [from, to] = [x(series.time[first]), x(series.time[last])];
+  pen.fillStyle = ink("surface"); pen.globalAlpha = 0.62;
+  pen.fillRect(LEFT - 3, 4, from - LEFT + 3, height - FOOT - 4);
+  pen.fillRect(to, 4, x(series.time.at(-1)) + 3 - to, height - FOOT - 4);
+  pen.globalAlpha = 1;
+  for (const at of [from, to]) line(pen, [[at, 4], [at, height - FOOT]], ink("accent"), 2);
 }
 
 function line(pen, points, colour, width) {
@@ -85,7 +140,8 @@ function niceStep(wanted) {
   return decade * [1, 2, 5, 10].find((part) => part * decade >= wanted * 0.999);
 }
 
-function niceTop(value) {
-  const step = niceStep((value || 0.1) / 3);
-  return { step, end: step * Math.ceil(value * 1.04 / step) };
+/** End and step of an axis that is `tall` pixels high. */
+function niceTop(value, tall) {
+  const step = niceStep((value || 0.1) / Math.max(1, Math.min(3, tall / 24)));
+  return { step, end: step * Math.max(1, Math.ceil(value * 1.04 / step)) };
 }

@@ -1,17 +1,21 @@
 // The right panel on a diagnosis: the verdict first, then cause, gain, patterns, rivals, and what cannot be told.
+import { comparisonSection } from "./comparison.js";
 import { element, fill } from "./dom.js";
 import { capital, parameter, percent, when, words } from "./format.js";
+import { openPanel } from "./panels.js";
 import { patternSection } from "./patterns.js";
 
-const panel = () => document.getElementById("panel");
+const panel = () => { openPanel("report"); return document.getElementById("panel"); };
 
 export function showReport(heading, report, patterns, palette) {
   const causes = report.causes ?? [];
   fill(panel(),
     element("div", { class: "eyebrow" }, element("span", { class: `verdict-tag ${report.verdict}` }, report.verdict), `${heading.folder ?? heading.dataset} · ${when(heading.created)}`),
     element("h1", { class: "verdict" }, heading.sentence),
+    element("p", {}, element("a", { class: "button", href: `/api/runs/${encodeURIComponent(heading.id)}/report.html`, download: `${heading.id}.html` }, "Save as one file")),
     causes.length ? section(causes.length > 1 ? "Causes" : "Cause", "interval", causes.map(cause)) : null,
     report.gain ? section("Error on sequences not fitted on", report.gain.unit ?? "mm", gain(report.gain, causes.length > 0)) : null,
+    heading.sequences?.length ? section("Every sequence", "RMS distance, mm", comparisonSection(heading)) : null,
     patterns ? section(causes.length ? "The error and its explanation" : "The error that is left", "", patternSection(patterns, heading.size, palette, causes.length > 0)) : null,
     report.palpation ? section("Palpation", `${report.palpation.pushes} pushes`, palpation(heading.id, report.palpation, causes)) : null,
     report.ranking?.length ? section("Ranking", "", ranking(report.ranking, causes.map(({ effect }) => effect))) : null,
@@ -21,7 +25,7 @@ export function showReport(heading, report, patterns, palette) {
     report.unexplained ? section("Unexplained", "", unexplained(report.unexplained)) : null,
     report.identified?.length ? section("Told by the forces", "interval", report.identified.map(known)) : null,
     report.not_identifiable?.length ? section("Cannot be told from this data", "", report.not_identifiable.map(blind)) : null);
-  panel().scrollTop = 0;
+  document.getElementById("panel").scrollTop = 0;
 }
 
 export function showProblem(problem) {
@@ -84,6 +88,7 @@ function gain({ baseline, extended, noise_floor: floor, unit = "mm", reducible_r
       element("span", { class: "bar-value" }, `${number(value)}`)])),
     element("p", { class: "gain-note" },
       !added ? "No cause was named, so the model stays as it was. " : removed && typeof removed.value === "number" ? [element("b", {}, percent(removed.value)), `${range} of the error above the noise floor is gone on the ${split} sequences. `] : null,
+      added && typeof others.tuned?.value === "number" ? `The robot's pose, the tool's radius and Poisson's ratio were fitted within their accuracies along with it; that alone, with no cause, ${others.tuned.value > 0.005 ? `removes ${percent(others.tuned.value)}` : "removes nothing"}. ` : null,
       typeof paper?.baseline === "number" && typeof paper?.extended === "number" ? `Mean distance as in the literature: ${number(paper.baseline)}${added ? ` → ${number(paper.extended)}` : ""} ${unit}.` : null));
 }
 

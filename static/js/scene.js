@@ -21,7 +21,7 @@ export function start() {
   fill("crop", icon("cloud")).addEventListener("click", () => set({ crop: !state().crop }));
   on(["layers", "colour", "crop", "heading"], drawSwitches);
   on(["run", "sequence", "frame", "layers", "colour", "limit", "crop"], () => send());
-  on(["colour", "limit", "held", "palette"], drawLegend);
+  on(["colour", "limit", "held", "palette", "trial"], drawLegend);
   on(["theme"], dress);
   on(["heading"], note);
   const frame = document.getElementById("viewer");
@@ -99,14 +99,14 @@ function choose(colour) {
 }
 
 function drawLegend() {
-  const { held, palette, limit, colour } = state();
+  const { held, palette, limit, colour, trial } = state();
   const box = document.getElementById("legend");
   const shown = held?.drawn?.limit ?? null;
   box.hidden = !palette || shown === null || colour === "plain";
   if (box.hidden || box.contains(document.activeElement) && document.activeElement.type === "number") return;
   const fixed = limit !== null;
   fill(box,
-    element("div", { class: "title" }, "Measured −", element("br"), `${colour} model, mm`),
+    element("div", { class: "title" }, "Measured −", element("br"), `${trial && colour === "extended" ? "what if" : `${colour} model`}, mm`),
     element("div", { class: "ends" }, "measured higher"),
     scaleTower(palette.signed, shown),
     element("div", { class: "ends" }, "measured deeper"),

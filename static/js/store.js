@@ -7,8 +7,8 @@ const kept = () => {
 
 const values = {
   run: null, sequence: null, frame: 0, playing: false,
-  layers: ["measured", "raw", "tool"], colour: "raw", limit: null, crop: true, speed: 1,
-  report: null, heading: null, series: null, palette: null, held: null, theme: document.documentElement.dataset.theme,
+  layers: ["measured", "raw", "tool"], colour: "raw", limit: null, crop: true, speed: 1, loop: null,
+  report: null, heading: null, series: null, palette: null, held: null, trial: false, theme: document.documentElement.dataset.theme,
   ...kept(),
 };
 const listeners = [];

@@ -1,10 +1,12 @@
 // Time: play by the wall clock, step, scrub; one cursor for scene and plot.
 import { element, fill, icon, swatch } from "./dom.js";
 import { mm } from "./format.js";
-import { drawPlot, frameAt } from "./plot.js";
+import * as loop from "./loop.js";
+import { drawPlot, frameAt, told } from "./plot.js";
 import { on, set, state } from "./store.js";
 
-const SPEEDS = [0.25, 0.5, 1, 2, 4];
+const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
+const SHOWN = { raw: "Raw", extended: "Extended", corrected: "Corrected" };
 let clock = 0;
 let last = 0;
 
@@ -17,9 +19,11 @@ export function start() {
   scrub.addEventListener("input", () => { set({ playing: false }); go(+scrub.value); });
   window.addEventListener("keydown", onKey);
   watchPlot();
+  loop.start(count);
   on(["playing"], ({ playing }) => { fill("play", icon(playing ? "pause" : "play")); if (playing) begin(); });
-  on(["frame", "series", "theme", "palette"], draw);
-  new ResizeObserver(draw).observe(document.getElementById("plot").parentElement);
+  on(["frame", "series", "theme", "palette", "loop"], draw);
+  on(["series", "frame"], drawWorst);
+  new ResizeObserver(() => { draw(); drawWorst(); }).observe(document.getElementById("plot").parentElement);
   draw();
 }
 
@@ -31,20 +35,21 @@ function step(by) { set({ playing: false }); go(state().frame + by); }
 
 function toggle() {
   if (!count()) return;
-  if (!state().playing && state().frame >= count() - 1) go(0);
+  const [from, to] = loop.range(count());
+  if (!state().playing && (state().frame >= to || state().frame < from)) go(from);
   set({ playing: !state().playing });
 }
 
 export function onKey(event) {
   if (event.ctrlKey || event.metaKey || event.altKey) return;
-  const typing = event.target?.matches?.("input:not([type=range]), select, textarea");
+  const typing = event.target?.matches?.("input:not(#scrub), select, textarea");
   const pressing = event.key === " " && event.target?.matches?.("button");
   if (typing || pressing || document.getElementById("enlarged").open) return;
   const far = event.shiftKey ? 10 : 1;
-  const actions = { " ": toggle, ArrowLeft: () => step(-far), ArrowRight: () => step(far), Home: () => step(-1e9), End: () => step(1e9) };
+  const actions = { " ": toggle, ArrowLeft: () => step(-far), ArrowRight: () => step(far), Home: () => step(-1e9), End: () => step(1e9), ...loop.KEYS };
   if (!(event.key in actions)) return;
   event.preventDefault(); event.stopPropagation();
-  actions[event.key]();
+  actions[event.key](count());
 }
 
 function begin() {
@@ -58,33 +63,48 @@ function tick(now) {
   if (!playing || !series) return;
   clock += (now - last) / 1e3 * speed;
   last = now;
-  const end = series.time[series.time.length - 1];
-  set({ frame: frameAt(series.time, Math.min(clock, end)) });
-  if (clock >= end) set({ playing: false }); else requestAnimationFrame(tick);
+  const [from, to] = loop.range(count()).map((frame) => series.time[frame]);
+  if (clock >= to && state().loop && to > from) clock = from + (clock - from) % (to - from);
+  set({ frame: frameAt(series.time, Math.min(clock, to)) });
+  if (clock >= to) set({ playing: false }); else requestAnimationFrame(tick);
 }
 
 function watchPlot() {
   const canvas = document.getElementById("plot");
   const tip = document.getElementById("plot-tip");
   let dragging = false;
+  let marked = null;
   const frameOf = (event) => frameAt(state().series.time, canvas.timeAt(event.offsetX));
   canvas.addEventListener("pointerdown", (event) => {
     if (!count()) return;
-    dragging = true; canvas.setPointerCapture(event.pointerId); set({ playing: false }); go(frameOf(event));
+    dragging = true; canvas.setPointerCapture(event.pointerId); set({ playing: false });
+    if (event.shiftKey) marked = frameOf(event); else go(frameOf(event));
   });
   canvas.addEventListener("pointermove", (event) => {
     if (!count()) return;
     const frame = frameOf(event);
-    if (dragging) go(frame);
+    if (dragging && marked === null) go(frame);
+    if (dragging && marked !== null) loop.mark(marked, frame, count());
     const { series } = state();
     tip.hidden = false;
-    tip.textContent = `${series.time[frame].toFixed(2)} s   raw ${mm(series.distance_raw[frame])}   extended ${mm(series.distance_extended[frame])}`;
+    tip.textContent = [`${series.time[frame].toFixed(2)} s`, ...told(series, frame)].join("   ");
     const half = tip.offsetWidth / 2 + 4;
     tip.style.left = `${Math.max(half, Math.min(canvas.clientWidth - half, event.offsetX))}px`;
     tip.style.top = "2px";
   });
-  canvas.addEventListener("pointerup", () => { dragging = false; });
+  canvas.addEventListener("pointerup", () => { dragging = false; marked = null; });
   canvas.addEventListener("pointerleave", () => { tip.hidden = true; });
+}
+
+/** A button over each of the worst frames. */
+function drawWorst() {
+  const { series, frame } = state();
+  const canvas = document.getElementById("plot");
+  fill("worst", series && canvas.timeToPixel ? series.worst.map((at, place) => element("button", {
+    type: "button", style: { left: `${canvas.timeToPixel(series.time[at])}px` }, "aria-pressed": String(frame === at), "data-frame": at,
+    title: `${["Worst", "Second worst", "Third worst"][place]} frame, ${at + 1}: raw ${mm(series.distance_raw[at])}`,
+    onclick: (event) => { set({ playing: false }); go(at); event.currentTarget?.blur(); },
+  }, String(place + 1))) : []);
 }
 
 function draw() {
@@ -96,8 +116,7 @@ function draw() {
   const at = Math.min(frame, count() - 1);
   fill("clock", series ? [element("strong", {}, `${series.time[at].toFixed(2)} s`), element("span", { class: "frames" }, ` · frame ${at + 1} of ${count()}`)] : [sequence ? "…" : ""]);
   fill("readout", series ? [
-    element("span", {}, swatch("raw", true), "Raw", element("b", {}, mm(series.distance_raw[at], false))),
-    element("span", {}, swatch("extended", true), "Extended", element("b", {}, mm(series.distance_extended[at], false))),
+    ...series.models.map((name) => element("span", {}, swatch(name, true), SHOWN[name], element("b", {}, mm(series[`distance_${name}`][at], false)))),
     element("span", {}, swatch("floor", true), "Floor", element("b", {}, mm(series.noise_floor)))] : []);
-  drawPlot(document.getElementById("plot"), series, at);
+  drawPlot(document.getElementById("plot"), series, at, loop.range(count()));
 }

@@ -16,6 +16,7 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
+from browsing import CHROMIUM, FLAGS, Page
 from scipy.spatial.transform import Rotation
 from small_dataset import SIZE, write_valid_dataset
 
@@ -129,7 +130,25 @@ def client(shared_place: Place) -> Iterator[httpx.Client]:
         yield found
 
 
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as started:
+        chromium = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield chromium
+        chromium.close()
+
+
 @pytest.fixture
+def page(browser: Any, client: httpx.Client) -> Iterator[Page]:
+    context = browser.new_context(viewport={"width": 1440, "height": 900}, color_scheme="light")
+    page = Page(context.new_page(), client)
+    yield page
+    context.close()
+    assert page.trouble == []
+
+
+@pytest.fixture(scope="session")
 def serve() -> Any:
     """Start a server of one's own: `with serve(settings, targets) as client`."""
     return running

@@ -103,10 +103,12 @@ def test_run_folder_that_exists_is_not_overwritten(palpate: Palpate, dataset: Pa
     assert list((tmp_path / "run").iterdir()) == []
 
 
-def test_serving_to_other_machines_is_refused(palpate: Palpate) -> None:
-    code, _, err = palpate("serve", "--host", "0.0.0.0")
-    assert code == 2
-    assert "no login yet" in err
+def test_serve_refuses_a_token_that_others_may_read(palpate: Any, tmp_path: Path) -> None:
+    (tmp_path / "login.json").write_text('{"salt": "00", "scrypt": "00"}')
+    (tmp_path / "login.json").chmod(0o644)
+    code, _, err = palpate("serve", "--host", "0.0.0.0", "--port", "0", "--runs", str(tmp_path))
+    assert code != 0
+    assert "others may read it" in err.replace("\n", " ")
 
 
 @pytest.mark.parametrize(("grid", "told"), [(["--grid", "7x5x4"], "7x5x4 nodes"), ([], "follows the tool")], ids=["even", "graded"])

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import httpx
 import pytest
 from websockets.exceptions import InvalidStatus
@@ -59,9 +61,14 @@ def test_every_answer_carries_its_policy(client: httpx.Client, path: str) -> Non
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.4", "example.org", ""])
-def test_addresses_that_others_can_reach_are_refused(host: str) -> None:
-    with pytest.raises(SetupError, match="no login yet; use 127"):
-        create_app(Settings(host=host))
+def test_addresses_that_others_can_reach_are_refused_without_a_token(tmp_path: Path, host: str) -> None:
+    with pytest.raises(SetupError, match="there is no token"):
+        create_app(Settings(host=host, runs=tmp_path))
+
+
+def test_another_name_asks_for_a_token_as_well(tmp_path: Path) -> None:
+    with pytest.raises(SetupError, match="there is no token"):
+        create_app(Settings(allow_host=("lab.example",), runs=tmp_path))
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.5", "::1", "localhost"])

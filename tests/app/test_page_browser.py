@@ -3,28 +3,13 @@
 from __future__ import annotations
 
 import shutil
-import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import httpx
-import pytest
+from browsing import NEEDS_CHROMIUM, Page
 
 from app.settings import Settings
 
-playwright = pytest.importorskip("playwright.sync_api")
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-FLAGS = [
-    *("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"),
-    *("--disable-background-timer-throttling", "--disable-renderer-backgrounding", "--disable-backgrounding-occluded-windows"),
-]
-NODES = "() => Object.keys((window.__viserMutable || {}).nodeRefFromName || {})"
-VISIBLE = """() => Object.entries(window.__viserMutable.nodeRefFromName).filter(([name, node]) => {
-  for (let at = node; at; at = at.parent) if (!at.visible) return false;
-  return true;
-}).map(([name]) => name)"""
 OVERFLOWING = """names => names.filter(name => {
   const box = document.querySelector(name);
   return box.scrollWidth > box.clientWidth + 1;
@@ -35,71 +20,7 @@ POINTS = """() => {
   return count;
 }"""
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine: install the package chromium"),
-]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as started:
-        chromium = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield chromium
-        chromium.close()
-
-
-class Page:
-    """The page with what a person does on it, and the server's side of it."""
-
-    def __init__(self, page: Any, client: httpx.Client) -> None:
-        self.page, self.client = page, client
-        self.trouble: list[str] = []
-        page.on("pageerror", lambda error: self.trouble.append(str(error)))
-        page.on("console", lambda message: self.trouble.append(message.text) if message.type == "error" else None)
-
-    def until(self, true: Callable[[], bool], seconds: float = 60.0) -> None:
-        end = time.monotonic() + seconds
-        while not true():
-            assert time.monotonic() < end, f"waited in vain; trouble: {self.trouble}"
-            self.page.wait_for_timeout(50)
-
-    def open(self, path: str = "/") -> None:
-        self.page.goto(f"{self.client.base_url}{path.lstrip('/')}")
-        self.until(lambda: self.viewer is not None and any(name.startswith("/mesh/") for name in self.viewer.evaluate(NODES)))
-        self.settled()
-
-    @property
-    def viewer(self) -> Any:
-        return next((frame for frame in self.page.frames if "/viser/" in frame.url), None)
-
-    @property
-    def held(self) -> dict[str, Any]:
-        """What the server holds for this page."""
-        identity = self.page.evaluate("sessionStorage.getItem('palpate.page')")
-        answer = self.client.get(f"/api/sessions/{identity}/state")
-        return answer.json() if answer.status_code == 200 else {"view": {}, "drawn": {}}
-
-    @property
-    def frame(self) -> int:
-        return int(self.page.input_value("#scrub"))
-
-    def settled(self) -> dict[str, Any]:
-        """Wait until the server holds the frame that the page shows."""
-        self.until(lambda: self.held["view"].get("frame") == self.frame)
-        return self.held
-
-    def visible(self) -> set[str]:
-        return {name for name in self.viewer.evaluate(VISIBLE) if name}
-
-
-@pytest.fixture
-def page(browser: Any, client: httpx.Client) -> Iterator[Page]:
-    context = browser.new_context(viewport={"width": 1440, "height": 900}, color_scheme="light")
-    page = Page(context.new_page(), client)
-    yield page
-    context.close()
-    assert page.trouble == []
+pytestmark = NEEDS_CHROMIUM
 
 
 def test_page_opens_on_the_verdict_and_the_worst_frame(page: Page, tmp_path: Path) -> None:
@@ -126,6 +47,32 @@ def test_panel_says_what_the_controls_gave_and_what_to_push_next(page: Page) -> 
     assert "Stiff inclusion: it may not come of the pushes" in shown
     assert "Press 6 mm deep on the top at (12, -8) mm" in shown and "94 % likely to decide" in shown
     assert "Measure the block with a calliper" in shown
+
+
+def test_report_is_saved_as_one_file_and_shows_every_sequence(page: Page, run_name: str, tmp_path: Path) -> None:
+    page.open()
+    rows = page.page.locator(".comparison tbody tr")
+    page.until(lambda: rows.count() == 2)
+    assert rows.nth(1).inner_text().split()[:2] == ["drag-01", "test"]
+    with page.page.expect_download() as download:
+        page.page.get_by_role("link", name="Save as one file").click()
+    assert download.value.suggested_filename == f"{run_name}.html"
+    download.value.save_as(tmp_path / "report.html")
+    page.page.goto((tmp_path / "report.html").as_uri())
+    assert page.page.locator("h1").inner_text().startswith("The simulation misses a stiff lump")
+    assert page.page.locator("svg").first.bounding_box()["width"] > 300
+    assert page.trouble == []
+
+
+def test_another_diagnosis_of_the_same_data_is_put_beside_it(browser: Any, serve: Any, place: Any, run_name: str) -> None:
+    shutil.copytree(place.runs / run_name, place.runs / "another")
+    with serve(place.settings) as client, browser.new_context() as context:
+        page = Page(context.new_page(), client)
+        page.open()
+        page.page.get_by_label("Compare with another diagnosis").select_option(index=1)
+        heads = page.page.locator(".comparison thead th")
+        page.until(lambda: heads.all_inner_texts()[2:] == ["this: stiff inclusion", "the other: stiff inclusion", "floor"])
+        assert page.trouble == []
 
 
 def test_scrubbing_stepping_and_playing_move_the_scene(page: Page) -> None:
@@ -192,7 +139,7 @@ def test_nothing_lies_over_anything_and_nothing_is_cut_off(page: Page) -> None:
     for width, height in ((1440, 900), (1280, 720), (1920, 1080)):
         page.page.set_viewport_size({"width": width, "height": height})
         page.page.wait_for_timeout(150)
-        boxes = [page.page.locator(name).bounding_box() for name in (".rail", ".toolbar", ".scene", ".timeline", ".panel")]
+        boxes = [page.page.locator(name).bounding_box() for name in (".rail", ".toolbar", ".scene", ".timeline", "#panel")]
         for i, a in enumerate(boxes):
             for b in boxes[i + 1 :]:
                 apart = a["x"] + a["width"] <= b["x"] + 0.5 or b["x"] + b["width"] <= a["x"] + 0.5

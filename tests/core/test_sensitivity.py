@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from dataclasses import fields, replace
 from functools import partial
 
@@ -48,7 +49,7 @@ def test_stiffness_changes_are_those_of_full_solves(pushed):
     rule = rule_of(frame.mesh)
     alone = np.zeros(rule.weights.shape)
     alone.flat[np.argmin(np.linalg.norm(rule.places - poke(14e-3), axis=2))] = 1.0
-    lump = lump_share(Inclusion(x=8e-3, y=0.0, z=0.022, radius=7e-3, stiffness_ratio=np.e), rule)
+    lump = lump_share(Inclusion(x=8e-3, y=0.0, z=0.022, radius=7e-3, stiffness_ratio=math.e), rule)
     field = np.asarray(np.random.default_rng(0).standard_normal(rule.weights.shape))
     found = stiffness_changes(block, frame, np.array([alone, lump, field]))
     for factor, change in zip((alone, lump, field), found, strict=True):
@@ -68,7 +69,7 @@ def test_lump_of_the_setup_is_what_its_column_says(compliance):
     stated = replace(SETUP, tool=replace(SETUP.tool, compliance_times_stiffness=compliance))
     block = Replay(stated, GRID, TIGHT)
     frame = block.step(poke(4e-3), block.step(poke(2e-3)))
-    lump = Inclusion(x=8e-3, y=0.0, z=0.022, radius=7e-3, stiffness_ratio=np.e)
+    lump = Inclusion(x=8e-3, y=0.0, z=0.022, radius=7e-3, stiffness_ratio=math.e)
     found = stiffness_changes(block, frame, lump_share(lump, rule_of(frame.mesh))[None])[0]
     setups = [
         replace(stated, material=replace(SETUP.material, inclusions=(replace(lump, stiffness_ratio=np.exp(step)),)))

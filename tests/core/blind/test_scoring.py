@@ -14,7 +14,7 @@ from core.blind.calibration import brier, calibration_error, first_effect, relia
 from core.blind.parameters import Said, coverage, distances, parameter_errors, said_of
 from core.blind.rates import median_of, rate
 from core.blind.targets import TARGETS, grade, judged
-from core.effects import DIAGNOSED
+from core.effects import DIAGNOSED, Parameter, effect_named
 from core.synthetic import HIDDEN
 
 
@@ -36,8 +36,8 @@ def test_median_has_an_interval_between_order_statistics() -> None:
     assert median_of([3.0, 1.0]).low is None and median_of([]).value is None
 
 
-def said(effect: str, name: str, true: float, value: float, low: float, high: float, log: bool = False) -> Said:
-    return Said("case", "clear", effect, name, "1", true, value, low, high, 0.95, log)
+def said(effect: str, name: str, true: float, value: float, low: float, high: float, item: Parameter | None = None) -> Said:
+    return Said("case", "clear", effect, name, "1", true, value, low, high, 0.95, item)
 
 
 def test_interval_is_narrowed_as_a_normal_distribution_has_it() -> None:
@@ -49,7 +49,7 @@ def test_interval_is_narrowed_as_a_normal_distribution_has_it() -> None:
 
 
 def test_interval_of_a_parameter_that_is_searched_by_its_logarithm_is_narrowed_there() -> None:
-    wide = said("stiff_inclusion", "stiffness_ratio", 4.0, 4.0, 1.0, 16.0, log=True)
+    wide = said("surface_layer", "stiffness_ratio", 4.0, 4.0, 1.0, 16.0, effect_named("surface_layer").numbers()[1])
     narrowed = 4.0 ** (1.6449 / 1.96)
     assert replace(wide, true=4.0 * narrowed * 0.99).covers(0.9) and not replace(wide, true=4.0 * narrowed * 1.01).covers(0.9)
     assert replace(wide, true=4.0 / narrowed * 1.01).covers(0.9) and not replace(wide, true=4.0 / narrowed * 0.99).covers(0.9)

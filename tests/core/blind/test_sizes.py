@@ -29,6 +29,18 @@ def test_change_is_counted_from_what_is_believed() -> None:
     assert size(HiddenEffect("tool_radius", {"radius": 3.5e-3}), told) == pytest.approx(3.0)
 
 
+def test_two_effects_are_as_clear_as_the_fainter_one() -> None:
+    radius, ratio = HiddenEffect("tool_radius", {"radius": 3.5e-3}), HiddenEffect("poisson_ratio", {"nu": 0.25})
+    told = [
+        row("tool_radius", {"parameter": "radius", "unit": "m", "change": 0.5e-3}),
+        row("poisson_ratio", {"parameter": "nu", "unit": "1", "change": 0.1}),
+    ]
+    assert size_over_limit([radius, ratio], told, Scenario(), Transform()) == pytest.approx(2.0)
+    assert size_over_limit([radius, ratio], told[:1], Scenario(), Transform()) is None
+    assert size_over_limit([radius], told[1:], Scenario(), Transform()) is None
+    assert size_over_limit([], told, Scenario(), Transform()) is None
+
+
 def test_several_parameters_add_up_as_squares_and_what_is_never_seen_adds_nothing() -> None:
     limits = [{"parameter": name, "unit": "m", "change": change} for name, change in (("dx", 1e-3), ("dy", None), ("dz", 0.5e-3))]
     offset = HiddenEffect("tool_offset", {"dx": 3e-3, "dy": 9e-3, "dz": -2e-3})
@@ -42,15 +54,26 @@ def test_lump_is_measured_by_the_limit_of_the_nearest_place() -> None:
     near, far = ({"parameter": "stiffness_ratio", "unit": "1", "factor": factor} for factor in (2.0, 4.0))
     lump = HiddenEffect("stiff_inclusion", {"x": 0.01, "y": 0.0, "z": 0.025, "radius": 7e-3, "stiffness_ratio": 8.0})
     told = row("stiff_inclusion", near) | {"each": [at(far, x=0.0, y=0.0, z=0.01), at(near, x=0.012, y=0.001, z=0.02)]}
-    assert size(lump, told) == pytest.approx(3.0, abs=1e-3)
+    assert size(lump, told) == pytest.approx((7 / 9.5) / (1 / 3.5), abs=1e-3)
     told["each"].reverse()
-    assert size(lump, told) == pytest.approx(3.0, abs=1e-3)
+    assert size(lump, told) == pytest.approx((7 / 9.5) / (1 / 3.5), abs=1e-3)
 
 
-def test_lump_is_measured_by_the_limit_of_half_of_the_places_and_by_its_logarithm() -> None:
+def test_lump_is_measured_by_the_limit_of_half_of_the_places_and_by_its_contrast() -> None:
     best, typical = ({"parameter": "stiffness_ratio", "unit": "1", "factor": factor} for factor in (1.5, 2.0))
     lump = HiddenEffect("stiff_inclusion", {"x": 0.0, "y": 0.0, "z": 0.025, "radius": 7e-3, "stiffness_ratio": 8.0})
-    assert size(lump, row("stiff_inclusion", best, typical=typical)) == pytest.approx(3.0, abs=1e-3)
+    assert size(lump, row("stiff_inclusion", best, typical=typical)) == pytest.approx((7 / 9.5) / (1 / 3.5), abs=1e-3)
+
+
+def test_lump_acts_in_proportion_to_its_volume() -> None:
+    limit = {"parameter": "stiffness_ratio", "unit": "1", "factor": 2.0}
+    told = row("stiff_inclusion", limit, at={"x": 0.0, "y": 0.0, "z": 0.025, "radius": 7e-3})
+    small, large = (
+        size(HiddenEffect("stiff_inclusion", {"x": 0.0, "y": 0.0, "z": 0.025, "radius": radius, "stiffness_ratio": 8.0}), told)
+        for radius in (7e-3, 8.4e-3)
+    )
+    assert small is not None and small == pytest.approx((7 / 9.5) / (1 / 3.5), abs=1e-3)
+    assert large is not None and large / small == pytest.approx(1.2**3, abs=1e-3)
 
 
 def test_share_gives_a_size_only_where_the_surface_moves_in_proportion() -> None:
@@ -64,12 +87,14 @@ def test_share_gives_a_size_only_where_the_surface_moves_in_proportion() -> None
     assert size(HiddenEffect("base_slip", {"friction_coefficient": 0.1}), slip) is None
 
 
-def test_nothing_and_two_effects_have_no_size() -> None:
-    told = [row("tool_radius", {"parameter": "radius", "unit": "m", "change": 0.5e-3})]
-    one = HiddenEffect("tool_radius", {"radius": 3.5e-3})
-    assert size_over_limit([], told, Scenario(), Transform()) is None
-    assert size_over_limit([one, one], told, Scenario(), Transform()) is None
-    assert size_over_limit([one], [], Scenario(), Transform()) is None
+def test_detached_strip_is_measured_by_its_own_edge_and_by_the_power_that_replays_follow() -> None:
+    def at(edge: str, extent: float, share: float | None) -> dict[str, Any]:
+        return {"at": {"edge": {"value": edge, "unit": ""}, "extent": {"value": extent, "unit": "m"}}, "limit": {"share": share}}
+
+    told = row("base_detachment", {"share": 0.1}) | {"each": [at("-x", 0.024, 0.1), at("+y", 0.014, 0.5), at("-y", 0.014, None)]}
+    assert size(HiddenEffect("base_detachment", {"edge": "+y", "extent": 0.014}), told) == pytest.approx(2.0)
+    assert size(HiddenEffect("base_detachment", {"edge": "+y", "extent": 0.007}), told) == pytest.approx(2 ** (-2 / 3), abs=1e-3)
+    assert size(HiddenEffect("base_detachment", {"edge": "-y", "extent": 0.014}), told) is None
 
 
 def test_camera_pose_is_the_motion_that_a_diagnosis_fits() -> None:

@@ -21,7 +21,7 @@ from core.diagnosis.prediction import predict
 from core.diagnosis.smoothing import SMOOTHING
 from core.diagnosis.verdict import report_of
 from core.diagnosis.workers import Workers
-from core.effects.material import YoungModulus
+from core.effects.material import StiffInclusion, YoungModulus
 from core.frames import FloatArray, Transform
 from core.grading import REPLAY_GRID
 from core.mesh import IntArray
@@ -97,6 +97,7 @@ def item() -> Observations:
 STEP, TIGHT = 1e-5, 1e-9
 PIVOT = np.array([0.0, 0.0, TOP])
 LUMP = Inclusion(x=5e-3, y=0.0, z=0.024, radius=7e-3, stiffness_ratio=5.0)
+(RATIO,) = (item for item in StiffInclusion.parameters() if item.name == "stiffness_ratio")
 STIFFER, LATER = YoungModulus(E=5.005e3).apply(SETUP), replace(SETUP, sensor=replace(SETUP.sensor, time_offset=1e-4))
 WANTED = Wanted(
     setups=(replace(SETUP, tool=Tool(radius=5.0003e-3)), STIFFER, LATER), steps=(3e-7, float(np.log(1.001)), 1e-4), lumps=(LUMP,),
@@ -119,7 +120,7 @@ CHANGED = {
     "modulus": (TOOL_COLUMNS + 1, YoungModulus(E=5e3 * float(np.exp(1e-3))).apply(SETUP), 1e-3),
     "lump": (
         TOOL_COLUMNS + 3,
-        replace(SETUP, material=replace(SETUP.material, inclusions=(replace(LUMP, stiffness_ratio=float(np.exp(0.01))),))),
+        replace(SETUP, material=replace(SETUP.material, inclusions=(replace(LUMP, stiffness_ratio=RATIO.value(0.01)),))),
         0.01,
     ),
 }  # fmt: skip

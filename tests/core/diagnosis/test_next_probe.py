@@ -151,8 +151,8 @@ def test_cause_found_alone_is_weighed_against_what_came_next_or_against_nothing(
 
 def test_where_nothing_was_found_what_hides_best_is_asked_for_at_its_limit(bench):
     findings, neutral = _findings(bench), replace(HARD, stiffness_ratio=1.0)
-    faint = Limit(parameter="radius", unit="m", size=4e-4)
-    clear = Limit(parameter="stiffness_ratio", unit="1", size=0.2, log=True)
+    faint = Limit(item=RADIUS.numbers()[0], size=4e-4)
+    clear = Limit(item=HARD.numbers()[4], size=0.08)
     findings.told = (
         Told(
             Candidate(start=neutral, of=("stiffness_ratio",), columns=(15,), spread=(2.0,)),
@@ -163,7 +163,7 @@ def test_where_nothing_was_found_what_hides_best_is_asked_for_at_its_limit(bench
     )
     first, second = pairs_of(bench, findings)
     assert first.names == ("none", "tool_radius") and first.models[1].setup.tool.radius == pytest.approx(5.4e-3)
-    assert second.models[1].setup.material.inclusions[0].stiffness_ratio == pytest.approx(np.exp(0.2))
+    assert second.models[1].setup.material.inclusions[0].stiffness_ratio == pytest.approx(HARD.numbers()[4].value(0.08))
     findings.structure = Structure(50.0, 20.0, 30.0)
     assert pairs_of(bench, findings) == []
 

@@ -39,9 +39,9 @@ def _felt_dataset(root: Path, lumps: tuple[Inclusion, ...]) -> Path:
             (np.array([x + random.uniform(-2e-3, 2e-3), y, SIZE[2]]), up)
             for x, y in zip((-0.015, -0.002, 0.006, 0.018), random.permutation([-8e-3, -3e-3, 2e-3, 8e-3]), strict=True)
         ]
-        for number in range(4)
+        for number in range(5)
     }
-    splits = {"train": ["felt-0", "felt-1", "felt-2"], "validation": [], "test": ["felt-3"]}
+    splits = {"train": ["felt-0", "felt-1", "felt-2"], "validation": [], "test": ["felt-3", "felt-4"]}
     return write_palpation(root, true, TRUTH, places, splits, f'geometry = "box"\nsize = {list(SIZE)}')
 
 

@@ -12,6 +12,7 @@ from core.diagnosis.noise import Noise
 from core.diagnosis.observations import Group, Observations
 from core.diagnosis.prediction import Prediction, predict
 from core.effects.geometry import GeometryScale
+from core.effects.material import StiffInclusion
 from core.effects.sensor import CameraRegistration, DepthBias
 from core.effects.tool import LandmarkMismatch
 from core.frames import FloatArray
@@ -40,6 +41,7 @@ def _camera_lifted(step: float) -> Setup:
     return replace(CameraRegistration.neutral(SETUP), tz=step).apply(SETUP)
 
 
+(RATIO,) = (item for item in StiffInclusion.parameters() if item.name == "stiffness_ratio")
 WANTED = Wanted(
     setups=(_wider(RADIUS_STEP), _camera_lifted(CAMERA_STEP)), steps=(RADIUS_STEP, CAMERA_STEP), lumps=(LUMP,), pivot=PIVOT
 )
@@ -62,7 +64,7 @@ CHANGES: dict[str, tuple[int, Setup, float]] = {
     "camera": (TOOL_COLUMNS + 1, _camera_lifted(1e-4), 1e-4),
     "lump": (
         TOOL_COLUMNS + 2,
-        replace(SETUP, material=replace(SETUP.material, inclusions=(replace(LUMP, stiffness_ratio=np.exp(0.02)),))),
+        replace(SETUP, material=replace(SETUP.material, inclusions=(replace(LUMP, stiffness_ratio=RATIO.value(0.02)),))),
         0.02,
     ),
 }

@@ -142,9 +142,10 @@ def _measured_by(bench: Bench, sizes: FloatArray) -> Model:
 
 def test_interval_is_the_fits_deviation_where_sequences_agree(bench):
     model = _measured_by(bench, np.zeros(20))
-    deviation = RADIUS.numbers()[0].scale / np.sqrt(0.1**2 * sum(block.values for block in model.blocks))
+    (radius,) = RADIUS.numbers()
+    deviation = radius.scale / np.sqrt(0.1**2 * sum(block.values for block in model.blocks))
     entry = intervals(bench, model)[0]["radius"]
-    assert 0.95 < (entry["high"] - entry["low"]) / (2 * 1.96 * deviation) < 1.5
+    assert 0.95 < (entry["high"] - entry["low"]) / (2 * 1.96 * np.hypot(deviation, radius.accuracy)) < 1.5
 
 
 def test_interval_holds_what_sequences_disagree_about(bench):

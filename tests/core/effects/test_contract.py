@@ -10,7 +10,7 @@ import pytest
 from pushed_block import looking_at
 
 from core.effects import CATALOGUE, Effect, Slot, effect_named, from_json
-from core.effects.material import YoungModulus
+from core.effects.material import StiffInclusion, YoungModulus
 from core.effects.sensor import CameraRegistration, TimeOffset
 from core.effects.tool import ToolOffset
 from core.errors import EffectError
@@ -121,7 +121,25 @@ def test_parameters_have_unit_bounds_and_a_scale_within_them(effect):
             continue
         assert item.unit
         assert item.low < item.high and np.isfinite([item.low, item.high]).all()
-        assert 0 < item.scale < (np.log(item.high / item.low) if item.log else item.high - item.low)
+        assert 0 < item.scale < item.coordinate(item.high) - item.coordinate(item.low)
+
+
+@EACH
+def test_search_coordinates_lead_back_to_the_values_and_grow_with_them(effect):
+    for item in effect.numbers():
+        values = np.linspace(item.low, item.high, 7)[1:-1]
+        coordinates = [item.coordinate(value) for value in values]
+        assert np.all(np.diff(coordinates) > 0)
+        assert [item.value(coordinate) for coordinate in coordinates] == pytest.approx(values.tolist())
+
+
+def test_contrast_of_a_lump_says_how_strongly_it_acts_in_a_matrix():
+    ratio = StiffInclusion.numbers()[4]
+    # Eshelby: a rigid ball acts 2.5 times as strongly as a small difference in stiffness suggests, a hole 5/3 of that less.
+    assert ratio.coordinate(1.0) == 0.0 and ratio.coordinate(1.001) == pytest.approx(1e-3 / 2.5, rel=1e-3)
+    assert ratio.coordinate(50.0) == pytest.approx(1.0, abs=0.05) and ratio.coordinate(0.02) == pytest.approx(-2 / 3, abs=0.03)
+    assert ratio.value(2.0) == ratio.high and ratio.value(-5.0) == ratio.low
+    assert ratio.factor(0.4) == pytest.approx(1.6 / 0.6) and ratio.factor(1.0) == np.inf
 
 
 @EACH

@@ -121,6 +121,8 @@ WRONG = {
     "no bounds": (_sized(high=float("inf")), "bounded by 0 and inf"),
     "turned bounds": (_sized(low=2.0), "bounded by 2 and 1"),
     "logarithm of zero": (_sized(log=True), "may be 0"),
+    "contrast of what is no ratio": (_sized(contrast=True, low=-0.5), "contrast and may be -0.5"),
+    "logarithm and contrast": (_sized(contrast=True, log=True, low=0.5), "contrast by its logarithm, too"),
     "no scale": (_sized(scale=0.0), "scale of size is 0"),
 }
 

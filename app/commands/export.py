@@ -1,0 +1,34 @@
+"""`palpate export`: a finished diagnosis as one file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.console import out
+from core.errors import RunError
+
+__all__ = ["export"]
+
+
+def export(
+    run: Annotated[Path, typer.Argument(help="Folder of a run, as `palpate diagnose --run` keeps it.", show_default=False)],
+    file: Annotated[Path | None, typer.Option("--out", help="The page; RUN.html where you are without it.")] = None,
+) -> None:
+    """Write the report of a run as one HTML page that needs nothing but itself: to keep, print or send."""
+    from app.report_page import report_page  # noqa: PLC0415 (heavy)
+    from app.runs import Run  # noqa: PLC0415 (heavy)
+
+    if not (run / "report.json").is_file():
+        raise RunError(f"{run} is no run: it has no report.json; keep one by palpate diagnose DATASET --run {run}", file=str(run))
+    path = file or Path(f"{run.resolve().name}.html")
+    if path.suffix != ".html":
+        raise RunError(f"{path}: the page is written as .html; name such a file", file=str(path))
+    text = report_page(Run(run.resolve()))
+    try:
+        path.write_text(text)
+    except OSError as error:
+        raise RunError(f"{path} cannot be written ({error.strerror})", file=str(path)) from error
+    out.print(f"wrote {path}", highlight=False)

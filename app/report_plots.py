@@ -1,0 +1,39 @@
+"""Plots of a report that is one file: the error of each frame, sequence by sequence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from app.one_file import INK, figure, themed
+from app.runs import Replay
+
+__all__ = ["error_plots"]
+
+_COLUMNS = 3
+
+
+def error_plots(replays: Sequence[Replay], splits: dict[str, str]) -> str:
+    """RMS distance [mm] over time [s], one panel for each sequence on a common scale: stated and extended model, noise floor."""
+    if not replays:
+        return ""
+    columns = min(_COLUMNS, len(replays))
+    rows = math.ceil(len(replays) / columns)
+    drawn = figure(3.0 * columns, 1.9 * rows)
+    panels = drawn.subplots(rows, columns, squeeze=False, sharey=True).ravel()
+    for axes, replay in zip(panels, replays, strict=False):
+        time = np.asarray(replay["time"]) - replay["time"][0]
+        axes.axhline(1e3 * float(replay["noise_floor"]), color=INK["floor"], linewidth=2)
+        for model in ("raw", "extended"):
+            axes.plot(time, 1e3 * np.asarray(replay[f"distance_{model}"]), color=INK[model], linewidth=1.3)
+        split = splits.get(replay.name)
+        axes.set_title(f"{replay.name}{f' ({split})' if split else ''}", fontsize=9, color=INK["text"], loc="left")
+        axes.set_ylim(bottom=0.0)
+        axes.locator_params(nbins=4)
+    for axes in panels[len(replays) :]:
+        axes.set_visible(False)
+    drawn.supxlabel("time [s]", fontsize=9, color=INK["text-3"])
+    drawn.supylabel("error [mm]", fontsize=9, color=INK["text-3"])
+    return themed(drawn)

@@ -1,0 +1,93 @@
+"""What a found model is worth on sequences that nothing was fitted on.
+
+A fit weighs its causes together with all that is known only to its stated accuracy: where the robot stands, the tool's radius,
+Poisson's ratio. The extended model has these as the fit left them, for a cause that shows by less than the registration is off
+would else be of no use. What that tuning is worth by itself, without a cause, is told beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from core.diagnosis.bench import Bench
+from core.diagnosis.columns import TOOL_COLUMNS
+from core.diagnosis.evidence import fit
+from core.diagnosis.felt_gain import FeltLadder, felt_ladder
+from core.diagnosis.findings import Findings
+from core.diagnosis.gain import Ladder, ladder
+from core.diagnosis.hypothesis import Model
+from core.diagnosis.intervals import modulus_interval
+from core.diagnosis.observations import Observations
+from core.diagnosis.prediction import Prediction
+from core.diagnosis.workers import Workers
+from core.effects.material import PoissonRatio, YoungModulus
+from core.effects.tool import ToolRadius
+from core.meshing import Meshing
+from core.registration.pose import small_motion
+from core.setup import Setup
+
+__all__ = ["tuned", "worth"]
+
+
+def tuned(bench: Bench, model: Model) -> Setup:
+    """The model's setup with the robot's pose, the tool's radius and Poisson's ratio as the fit left them.
+
+    Not the camera's pose: the fixed pattern of each sequence holds what it is off. Not the modulus: no surface shows it.
+    """
+    change = fit(bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model)).change
+    moved, radius, nu = change[:TOOL_COLUMNS], float(change[TOOL_COLUMNS]), float(change[TOOL_COLUMNS + 1])
+    setup = model.setup
+    pose = small_motion(np.asarray(moved), bench.registration.robot_pivot) @ setup.phantom_from_robot
+    bounds = {item.name: item for kind in (ToolRadius, PoissonRatio) for item in kind.numbers()}
+    radius = float(np.clip(setup.tool.radius + radius, bounds["radius"].low, bounds["radius"].high))
+    nu = float(np.clip(setup.material.poisson_ratio + nu, bounds["nu"].low, bounds["nu"].high))
+    return replace(
+        setup, phantom_from_robot=pose, tool=replace(setup.tool, radius=radius), material=replace(setup.material, poisson_ratio=nu)
+    )
+
+
+def worth(
+    bench: Bench, findings: Findings, unseen: list[Observations], pool: Workers, grid: Meshing, seed: int, alone: bool = False
+) -> Ladder | FeltLadder | None:
+    """Of the stated and the found model on test sequences; `alone` adds what tuning without a cause would give.
+
+    Where touches were surely of other landmarks the stated tool is far off, and the found model says which points count. None where
+    the stated setup then finds an equilibrium in no frame in which the tool touches.
+    """
+    names, stated = [item.name for item in unseen], bench.setup
+    found = tuned(bench, findings.best.model) if findings.best else stated
+    first, second = (found, stated) if findings.known else (stated, found)
+    one = _replayed(pool, names, first, grid)
+    other = one if first is second else _replayed(pool, names, second, grid, one)
+    baseline, extended = (other, one) if findings.known else (one, other)
+    touched = [{n for n, group in enumerate(item.groups) if not group.free} for item in unseen]
+    rows = zip(touched, baseline, extended, strict=True)
+    if findings.known and all(own <= {*before.failed, *after.failed} for own, before, after in rows):
+        return None
+    if all(item.unseen for item in unseen):
+        return felt_ladder(unseen, baseline, extended, seed, _stiffer(bench, findings))
+    gain = ladder(unseen, baseline, extended, stated, found, seed)
+    if alone and findings.best and not findings.known:
+        without = tuned(bench, findings.baseline)
+        by_itself = ladder(unseen, baseline, _replayed(pool, names, without, grid, one), stated, without, seed)
+        gain = replace(gain, tuned=by_itself.removed)
+    return gain
+
+
+def _replayed(
+    pool: Workers, names: Sequence[str], setup: Setup, grid: Meshing, starts: Sequence[Prediction] | None = None
+) -> list[Prediction]:
+    return [future.result() for future in pool.submit(names, setup, grid, None, starts)]
+
+
+def _stiffer(bench: Bench, findings: Findings) -> tuple[float, float]:
+    """The modulus that fitted forces give for both models over the stated one; as stated where it is a cause, or without forces."""
+    found = findings.best.model if findings.best else findings.baseline
+    if YoungModulus.name in found.names:
+        return 1.0, 1.0
+    known = [modulus_interval(bench, model) for model in (findings.baseline, found)]
+    first, second = (1.0 if one is None else one[0] / bench.setup.material.young_modulus for one in known)
+    return first, second

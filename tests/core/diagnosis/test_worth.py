@@ -1,0 +1,61 @@
+"""What the extended model takes along: what is known only to its accuracy, as a fit leaves it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from pushed_block import SETUP, registration
+
+from core.diagnosis.bench import Bench
+from core.diagnosis.columns import TOOL_COLUMNS
+from core.diagnosis.evidence import Block, gram
+from core.diagnosis.hypothesis import Model
+from core.diagnosis.workers import Workers
+from core.diagnosis.worth import tuned
+from core.effects.material import YoungModulus
+from core.mesh import GridSpec
+from core.registration.pose import small_motion
+
+NUISANCES = TOOL_COLUMNS + 9
+OFF = np.array([2e-4, -1e-4, 1.5e-4, 2e-3, -1e-3, 3e-3])
+"""How far the robot is off, and below its tool's radius [m] and the material's nu."""
+RADIUS, NU = 4e-5, -6e-3
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Bench]:
+    """The stated setup with its priors; nothing is replayed here."""
+    with Workers([], 1) as workers:
+        yield Bench(SETUP, registration(), workers, ["poke-01"], None, GridSpec(), GridSpec())
+
+
+def _shown(bench: Bench, *true: float) -> Model:
+    """A model without causes, and clean data of which the first nuisances are true by so much."""
+    random, shape = np.random.default_rng(3), (4, bench.surface.patches)
+    columns = random.standard_normal((*shape, NUISANCES))
+    gap = -columns[..., : len(true)] @ np.array(true)
+    block = Block("poke-01", *gram(gap, columns, np.full(shape, 1e14)))
+    return Model((), SETUP, (), (block,), (), {}, tuple(range(NUISANCES)))
+
+
+def test_robot_radius_and_nu_are_where_the_data_have_them(bench: Bench) -> None:
+    found = tuned(bench, _shown(bench, *OFF, RADIUS, NU))
+    true = small_motion(OFF, bench.registration.robot_pivot) @ SETUP.phantom_from_robot
+    assert found.phantom_from_robot.matrix == pytest.approx(true.matrix, abs=1e-6)
+    assert found.tool.radius == pytest.approx(SETUP.tool.radius + RADIUS, abs=1e-7)
+    assert found.material.poisson_ratio == pytest.approx(SETUP.material.poisson_ratio + NU, abs=1e-5)
+    assert found.phantom_from_camera.matrix == pytest.approx(SETUP.phantom_from_camera.matrix)
+
+
+def test_what_no_material_has_is_not_taken_along(bench: Bench) -> None:
+    found = tuned(bench, _shown(bench, *np.zeros(6), 0.0, 0.2))
+    assert found.material.poisson_ratio == 0.495
+    assert found.material.young_modulus == YoungModulus.neutral(SETUP).E
+
+
+def test_data_that_show_nothing_leave_the_setup_as_it_is(bench: Bench) -> None:
+    found = tuned(bench, _shown(bench, 0.0))
+    assert found.phantom_from_robot.matrix == pytest.approx(SETUP.phantom_from_robot.matrix, abs=1e-12)
+    assert found.tool.radius == pytest.approx(SETUP.tool.radius)
