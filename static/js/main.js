@@ -1,6 +1,7 @@
 // Starts the parts and follows what is chosen.
 import { get, toast } from "./api.js";
 import { fill, icon } from "./dom.js";
+import { openPanel } from "./panels.js";
 import * as rail from "./rail.js";
 import { showProblem, showReport, showWelcome } from "./report.js";
 import * as scene from "./scene.js";
@@ -65,7 +66,8 @@ async function start() {
   scene.start();
   whatif.start();
   on(["sequence"], () => { set({ series: null, frame: 0, loop: null }); openSequence().catch(toast); });
-  const datasets = await rail.start(openRun);
+  // What a person chooses comes to the front at once, what merely loads never does: they may have gone elsewhere meanwhile.
+  const datasets = await rail.start((id) => { openPanel("report"); return openRun(id); });
   const wanted = new URLSearchParams(location.search).get("run") ?? state().run;
   const run = rail.newestRun(wanted);
   if (run) await openRun(run); else { set({ run: null, sequence: null }); showWelcome(datasets); }

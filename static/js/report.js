@@ -2,10 +2,9 @@
 import { comparisonSection } from "./comparison.js";
 import { element, fill } from "./dom.js";
 import { capital, parameter, percent, when, words } from "./format.js";
-import { openPanel } from "./panels.js";
 import { patternSection } from "./patterns.js";
 
-const panel = () => { openPanel("report"); return document.getElementById("panel"); };
+const panel = () => document.getElementById("panel");
 
 export function showReport(heading, report, patterns, palette) {
   const causes = report.causes ?? [];

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -105,3 +106,15 @@ def test_a_long_one_is_stopped_and_its_points_are_there_after_a_reload(page: Any
     page.click(f"[data-sweep='{identity}']")
     page.wait_for_selector("#panel-sweep circle[data-point]")
     assert page.locator("#panel-sweep circle[data-point]").count() == shown < 400
+
+
+def test_what_loads_late_does_not_take_the_front(page: Any) -> None:
+    def answer_late(route: Any) -> None:
+        time.sleep(0.5)
+        route.continue_()
+
+    page.route("**/api/runs", answer_late)
+    page.reload()
+    page.click("#tab-sweep")
+    page.wait_for_selector("#panel .empty-panel", state="attached")
+    assert page.locator("text=Start the sweep").is_visible()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -15,9 +16,10 @@ import blind_processes
 import pytest
 from blind_results import result
 
+import core
 from core.blind import Case, run_suite
 from core.blind.results import add_result
-from core.blind.running import code_digest
+from core.blind.running import _USERS, code_digest
 from core.errors import Cancelled, RunError
 
 TESTS = Path(blind_processes.__file__).parent
@@ -126,3 +128,11 @@ def _gone(pid: int) -> bool:
             return True
         time.sleep(0.02)
     return False
+
+
+def test_what_a_result_follows_from_uses_nothing_that_its_version_leaves_out() -> None:
+    names = "|".join(name.removesuffix(".py") for name in _USERS)
+    using = re.compile(rf"^\s*(from|import) core\.({names})\b", re.MULTILINE)
+    root = Path(core.__file__).parent
+    parts = [path for path in root.rglob("*.py") if path.relative_to(root).parts[0] not in _USERS]
+    assert len(parts) > 100 and [path for path in parts if using.search(path.read_text())] == []
