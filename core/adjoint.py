@@ -33,6 +33,7 @@ from core.replay import Equilibrium, Replay
 from core.sensitivity import GivingTool, gives, local_probe, mesh_in, refuse_other_grid, same_body, tool_slopes
 from core.setup import Setup
 from core.slide_adjoint import SlideStep
+from core.threads import on_one_thread
 
 __all__ = ["replay_loss_changes"]
 
@@ -256,6 +257,7 @@ class _Backwards:
             self.total[number] += parts.agreement(found, other.setup) - float(adjoint @ (found.residual - base.residual))
 
 
+@on_one_thread
 def replay_loss_changes(
     block: Replay,
     frames: Sequence[Equilibrium],

@@ -26,6 +26,7 @@ from core.mesh import meshing_for
 from core.meshing import Mesh, Meshing
 from core.progress import Report, silent
 from core.setup import Setup
+from core.threads import on_one_thread
 from core.yielding import GRAVITY, give_way, slide, weight_of
 
 __all__ = ["GRAVITY", "Equilibrium", "Replay", "replay", "require_converged", "rest"]
@@ -197,6 +198,7 @@ class Replay:
         guess = positions + min(max(share, -1.0), 1.5) * (start.displacement - earlier.displacement)
         return guess if model.energy(guess, probe) < model.energy(positions, probe) else positions
 
+    @on_one_thread
     def step(self, stated_centre: FloatArray, start: Equilibrium | None = None, time: float | None = None) -> Equilibrium:
         """Equilibrium with the tool at a stated centre (3,) [m], phantom frame; tool and base give way if they can.
 
@@ -261,6 +263,7 @@ def rest(setup: Setup, grid: Meshing) -> Equilibrium:
     return Replay(setup, grid).free
 
 
+@on_one_thread
 def replay(
     setup: Setup,
     centres: FloatArray,

@@ -22,6 +22,7 @@ from core.mesh import BoxMesh
 from core.meshing import Mesh
 from core.replay import Equilibrium, Replay
 from core.setup import Setup
+from core.threads import on_one_thread
 
 __all__ = [
     "TOOL_STEP", "Change", "GivingTool", "displacement_changes", "factorise_at", "force_changes", "gives", "local_probe",
@@ -198,6 +199,7 @@ class GivingTool:
         return np.asarray(-state.push - self._force)
 
 
+@on_one_thread
 def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[Change]) -> FloatArray:
     """Displacements that small changes bring about, to first order.
 

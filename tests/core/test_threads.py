@@ -1,0 +1,27 @@
+"""A replay takes one thread, whatever it was told it may take, and gives the others back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from threadpoolctl import ThreadpoolController
+
+from core.mesh import GridSpec
+from core.replay import replay
+from core.setup import Box, Setup, Tool
+
+SETUP = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3), mass=0.104)
+
+
+def _threads(pools: ThreadpoolController) -> set[int]:
+    return {pool["num_threads"] for pool in pools.info() if pool["user_api"] == "blas"}
+
+
+def test_replay_takes_one_thread_and_gives_the_others_back() -> None:
+    pools, seen = ThreadpoolController(), []
+    with pools.limit(limits=2, user_api="blas"):
+        if _threads(pools) != {2}:
+            pytest.skip("BLAS of this machine takes no second thread")
+        replay(SETUP, np.array([[0, 0, 0.1]]), GridSpec(nodes=(5, 3, 3)), report=lambda *_: seen.append(_threads(pools)))
+        assert seen == [{1}]
+        assert _threads(pools) == {2}
