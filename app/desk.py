@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import Depends
+from fastapi import Depends, Header
 from starlette.requests import HTTPConnection
 
 from app.jobs import Jobs
@@ -18,7 +18,7 @@ from app.settings import Settings
 from app.stage import Stage
 from app.whatif import WhatIfs
 
-__all__ = ["Desk", "DeskOf"]
+__all__ = ["Desk", "DeskOf", "KeyOf"]
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,11 @@ class Desk:
             whatifs=WhatIfs(),
         )
 
-    def diagnose(self, dataset: Path, name: str, seed: int) -> Job:
+    def diagnose(self, dataset: Path, name: str, seed: int, key: str | None = None) -> Job:
         """Queue the diagnosis of a dataset folder; the job's id will be the run's."""
         places = {"dataset": str(dataset), "runs": str(self.settings.runs)}
         request = {**places, "name": name, "workers": self.settings.workers, "seed": seed}
-        return self.jobs.submit("diagnosis", request, label=name)
+        return self.jobs.submit("diagnosis", request, name, key)
 
     def close(self) -> None:
         """Cancel what runs and stop the inner viewer."""
@@ -67,3 +67,11 @@ def _desk(connection: HTTPConnection) -> Desk:
 
 
 DeskOf = Annotated[Desk, Depends(_desk)]
+
+KeyOf = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key", min_length=1, max_length=200,
+        description="A name for this request: the same one again, with the same body, answers with the job that is there.",
+    ),
+]  # fmt: skip

@@ -1,11 +1,18 @@
-"""Long verbs as jobs: one queue, one worker process each, progress through a pipe, cancel = terminate."""
+"""Long verbs as jobs: one queue, one worker process each, progress through a pipe, cancel = terminate.
+
+The queue is the table of records, so that what waits outlives the server, and what ran when the server or its worker was killed
+is known to have been interrupted.
+"""
 
 from __future__ import annotations
 
+import fcntl
 import logging
 import queue
+import re
 import secrets
 import shutil
+import signal
 import threading
 import time
 from collections.abc import Iterable, Mapping
@@ -14,13 +21,19 @@ from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 from typing import Any
 
-from app.problems import Conflict
-from app.records import Job, JobState, Records
+from app.problems import Conflict, Missing
+from app.records import Job, JobState, Note, Records
 from app.worker import context, stop_group, work
+from core.errors import SetupError
 
 __all__ = ["Jobs"]
 
 log = logging.getLogger(__name__)
+PAUSE = 0.1
+"""Seconds between two entries of a job's progress: more often than anyone looks would only wear the disk."""
+_ENDING = 10.0
+"""Seconds that a cancelled job's processes may take to end."""
+_NUMBERS = re.compile(r"\d+(\.\d+)?")
 
 
 class Jobs:
@@ -33,10 +46,13 @@ class Jobs:
     def __init__(self, folder: Path, targets: Mapping[str, str], preload: Iterable[str] = ()) -> None:
         self._targets = dict(targets)
         self._scratch = folder / ".making"
+        self._alone = _take(folder)
         shutil.rmtree(self._scratch, ignore_errors=True)
         self._records = Records(folder / "jobs.sqlite")
-        self._records.fail_unfinished("the server ended while this job was open; start it again")
+        self._records.interrupt_running("the server ended while this job ran; retry it")
         self._waiting: queue.Queue[str | None] = queue.Queue()
+        for job in self._records.waiting():
+            self._waiting.put(job.id)
         self._running: dict[str, ForkServerProcess] = {}
         self._lock = threading.Lock()
         self._closing = False
@@ -49,11 +65,15 @@ class Jobs:
         """A number that grows with every change of any record."""
         return self._records.version
 
-    def submit(self, kind: str, request: dict[str, Any], label: str = "job") -> Job:
-        """Queue a job; its id is the label, the time and four random characters."""
+    def submit(self, kind: str, request: dict[str, Any], label: str = "job", key: str | None = None) -> Job:
+        """Queue a job; its id is the label, the time and four random characters.
+
+        Asked again under the same `key` it is the same job, and a Conflict if something else is asked.
+        """
         identity = f"{label}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(2)}"
-        job = Job(id=identity, kind=kind, request={**request, "scratch": str(self._scratch / identity)})
-        self._records.add(job)
+        job = Job(id=identity, kind=kind, request={**request, "scratch": str(self._scratch / identity)}, key=key)
+        if not self._records.add(job):
+            return self._same(job)
         self._waiting.put(identity)
         return self.get(identity)
 
@@ -61,9 +81,17 @@ class Jobs:
         """One job."""
         return self._records.get(identity)
 
-    def all(self) -> list[Job]:
-        """All jobs, the newest first."""
-        return self._records.all()
+    def all(self, most: int = -1, after: int = 0) -> list[Job]:
+        """Jobs, the newest first: at most so many from the `after`-th on, or all."""
+        return self._records.all(most, after)
+
+    def count(self) -> int:
+        """Number of jobs."""
+        return self._records.count()
+
+    def notes(self, identity: str, after: int = 0) -> list[Note]:
+        """Lines of a job's log from the `after`-th on."""
+        return self._records.notes(identity, after)
 
     def cancel(self, identity: str) -> Job:
         """Stop a job that waits or runs."""
@@ -74,23 +102,51 @@ class Jobs:
         self._stop(identity)
         return self.get(identity)
 
+    def retry(self, identity: str) -> Job:
+        """Have a job that ended without its result done once more, under its name: a sweep goes on where it ended."""
+        job = self.get(identity)
+        if job.kind not in self._targets:
+            raise Missing(f"job {identity} is a {job.kind}, which this version cannot do", job=identity)
+        end = time.monotonic() + _ENDING
+        while identity in self._running and job.state.is_finished and time.monotonic() < end:
+            time.sleep(0.02)  # its processes are still ending
+        if identity in self._running or not self._records.reopen(identity):
+            state = job.state.value
+            raise Conflict(f"job {identity} is {state}: there is nothing to retry", job=identity, state=state)
+        self._waiting.put(identity)
+        return self.get(identity)
+
     def close(self) -> None:
-        """End the server's jobs: the running one is cancelled, those that wait are failed at the next start."""
+        """End the server's jobs: the running one is interrupted, those that wait do so until the next start."""
         self._closing = True
         self._waiting.put(None)
         for identity in list(self._running):
-            self._finish(identity, JobState.CANCELLED, text="the server was stopped")
+            error = {"kind": "Interrupted", "message": "the server was stopped while this job ran; retry it", "where": {}}
+            self._finish(identity, JobState.INTERRUPTED, error=error, text="interrupted")
             self._stop(identity)
         self._thread.join(timeout=10.0)
         self._records.close()
+        self._alone.close()
+
+    def _same(self, job: Job) -> Job:
+        known = self._records.by_key(job.key or "")
+        if known is None:
+            raise Conflict(f"there is a job {job.id} already", job=job.id)
+        if (known.kind, _asked(known)) != (job.kind, _asked(job)):
+            raise Conflict(f"the key {job.key} was another request's: job {known.id}", key=job.key, job=known.id)
+        return known
 
     def _serve(self) -> None:
         while (identity := self._waiting.get()) is not None and not self._closing:
-            if not self.get(identity).state.is_finished:
+            if self.get(identity).state is JobState.QUEUED:
                 self._run(identity)
 
     def _run(self, identity: str) -> None:
         job = self.get(identity)
+        if job.kind not in self._targets:
+            message = f"this version cannot do a {job.kind}"
+            self._finish(identity, JobState.FAILED, error={"kind": "Missing", "message": message, "where": {}})
+            return
         scratch = Path(job.request["scratch"])
         scratch.mkdir(parents=True, exist_ok=True)
         here, there = self._context.Pipe()
@@ -101,29 +157,45 @@ class Jobs:
                 self._running[identity] = process
             there.close()
             self._records.update(identity, state=JobState.RUNNING, started=time.time(), text="starting")
+            self._records.note(identity, "info", f"started, attempt {job.attempt}")
             if self.get(identity).state.is_finished:
                 self._stop(identity)
             self._follow(identity, here)
             process.join()
         finally:
             self._stop(identity)
-            self._running.pop(identity, None)
             here.close()
             shutil.rmtree(scratch, ignore_errors=True)
-        self._finish(
-            identity,
-            JobState.FAILED,
-            error={"kind": "WorkerDied", "message": f"the worker process ended with code {process.exitcode}", "where": {}},
-        )
+            self._died(identity, process.exitcode)
+            self._running.pop(identity, None)
+
+    def _died(self, identity: str, code: int | None) -> None:
+        """Close the record of a worker that ended without a word; killed from outside, its job was interrupted."""
+        if code is not None and code < 0:
+            message = f"the worker process was ended from outside ({signal.Signals(-code).name}); retry it"
+            self._finish(identity, JobState.INTERRUPTED, error={"kind": "WorkerDied", "message": message, "where": {}})
+        else:
+            message = f"the worker process ended with code {code}"
+            self._finish(identity, JobState.FAILED, error={"kind": "WorkerDied", "message": message, "where": {}})
 
     def _follow(self, identity: str, pipe: Connection) -> None:
+        written, stage = 0.0, ""
         while True:
             try:
                 message = pipe.recv()
             except (EOFError, OSError):
                 return
             if message[0] == "progress":
-                self._records.update(identity, fraction=message[1], text=message[2])
+                _, fraction, text = message
+                if _NUMBERS.sub("#", text) != stage:
+                    stage = _NUMBERS.sub("#", text)
+                    self._records.note(identity, "info", text)
+                elif time.monotonic() - written < PAUSE:
+                    continue
+                written = time.monotonic()
+                self._records.update(identity, fraction=fraction, text=text)
+            elif message[0] == "note":
+                self._records.note(identity, message[1], message[2])
             elif message[0] == "failed":
                 self._finish(identity, JobState.FAILED, error=message[1])
             elif message[0] == "cancelled":
@@ -132,7 +204,9 @@ class Jobs:
                 self._finish(identity, JobState.DONE, result=message[1], fraction=1.0, text="done")
 
     def _finish(self, identity: str, state: JobState, **values: Any) -> None:
-        self._records.update(identity, state=state, finished=time.time(), **values)
+        if self._records.update(identity, state=state, finished=time.time(), **values):
+            told = values.get("error") or {}
+            self._records.note(identity, "error" if told else "info", told.get("message", state.value))
 
     def _stop(self, identity: str) -> None:
         with self._lock:
@@ -141,3 +215,19 @@ class Jobs:
                 if process.is_alive():
                     process.terminate()
                 stop_group(process.pid)
+
+
+def _asked(job: Job) -> dict[str, Any]:
+    return {name: value for name, value in job.request.items() if name != "scratch"}
+
+
+def _take(folder: Path) -> Any:
+    """A file that is locked as long as this server lives: two of them would take each other's jobs for left behind."""
+    folder.mkdir(parents=True, exist_ok=True)
+    file = (folder / ".server").open("w")
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        file.close()
+        raise SetupError(f"another server works in {folder}: stop it, or choose another folder with --runs", key="runs") from error
+    return file

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.picture import Colouring, Layer
 from app.records import Job
 
-__all__ = ["DiagnosisRequest", "EffectIn", "JobOut", "View", "WhatIfRequest"]
+__all__ = ["DiagnosisRequest", "EffectIn", "JobOut", "NoteOut", "Notes", "View", "WhatIfRequest"]
 
 
 class View(BaseModel):
@@ -59,7 +59,11 @@ class WhatIfRequest(BaseModel):
 
 
 class JobOut(BaseModel):
-    """A job as the page sees it: without folders of this machine."""
+    """A job as the page sees it: without folders of this machine.
+
+    Times are seconds since 1970; `remaining` is in seconds, if it goes on as until now; `can_retry` says whether
+    POST /api/jobs/{id}/retry would have it done once more.
+    """
 
     id: str
     kind: str
@@ -72,9 +76,27 @@ class JobOut(BaseModel):
     finished: float | None
     error: dict[str, Any] | None
     result: dict[str, Any] | None
+    attempt: int
+    remaining: float | None
+    can_retry: bool
 
     @classmethod
     def of(cls, job: Job) -> JobOut:
         """The public part of a record."""
-        shown = {name: getattr(job, name) for name in cls.model_fields if name != "dataset"}
-        return cls(dataset=job.request.get("name"), **shown)
+        shown = {name: getattr(job, name) for name in cls.model_fields if name not in ("dataset", "can_retry")}
+        return cls(dataset=job.request.get("name"), can_retry=job.state.can_be_retried, **shown)
+
+
+class NoteOut(BaseModel):
+    """A line of a job's log: when [s since 1970], how grave (info, warning or error), what."""
+
+    at: float
+    level: str
+    text: str
+
+
+class Notes(BaseModel):
+    """Lines of a log in the order of time, and where to go on next time."""
+
+    notes: list[NoteOut]
+    next: int

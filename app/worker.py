@@ -43,10 +43,39 @@ def work(target: str, request: dict[str, Any], pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, args=(pipe,), daemon=True).start()
 
-    def report(fraction: float, text: str) -> None:
-        pipe.send(("progress", float(fraction), text))
+    tell = _voice(pipe)
 
-    pipe.send(_outcome(target, request, report))
+    def report(fraction: float, text: str) -> None:
+        tell("progress", float(fraction), text)
+
+    logging.captureWarnings(True)
+    logging.getLogger().addHandler(_ToLog(tell))
+    tell(*_outcome(target, request, report))
+
+
+class _ToLog(logging.Handler):
+    """What libraries and our own code warn of goes into the job's log."""
+
+    def __init__(self, tell: Callable[..., None]) -> None:
+        super().__init__(logging.WARNING)
+        self._tell = tell
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Send one line."""
+        level = "error" if record.levelno >= logging.ERROR else "warning"
+        with contextlib.suppress(OSError):
+            self._tell("note", level, self.format(record))
+
+
+def _voice(pipe: Connection) -> Callable[..., None]:
+    """Sends messages from any thread, one at a time."""
+    one = threading.Lock()
+
+    def tell(*message: Any) -> None:
+        with one:
+            pipe.send(message)
+
+    return tell
 
 
 def _outcome(target: str, request: dict[str, Any], report: Report) -> tuple[str, dict[str, Any]]:

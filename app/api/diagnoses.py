@@ -6,7 +6,7 @@ from typing import Any
 
 from fastapi import APIRouter
 
-from app.desk import DeskOf
+from app.desk import DeskOf, KeyOf
 from app.problems import Conflict
 from app.records import JobState
 from app.schemas import DiagnosisRequest, JobOut
@@ -17,11 +17,11 @@ router = APIRouter(prefix="/diagnoses", tags=["diagnoses"])
 
 
 @router.post("", status_code=202)
-def start(request: DiagnosisRequest, desk: DeskOf) -> JobOut:
+def start(request: DiagnosisRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
     """Check the dataset completely, then queue its diagnosis; the answer's id names the job now and the run later."""
     dataset = desk.library.open(request.dataset)
     dataset.validate()
-    return JobOut.of(desk.diagnose(dataset.path, request.dataset, request.seed))
+    return JobOut.of(desk.diagnose(dataset.path, request.dataset, request.seed, key))
 
 
 @router.get("")

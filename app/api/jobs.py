@@ -1,33 +1,37 @@
-"""Jobs: how far they are, live, and how to stop them."""
+"""Jobs: how far they are, live, what they did, and how to stop and retry them."""
 
 from __future__ import annotations
 
 import asyncio
 import json
 from collections.abc import AsyncIterator
+from typing import Annotated
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
 from app.desk import Desk, DeskOf
-from app.schemas import JobOut
+from app.pages import TOTAL, PageOf
+from app.schemas import JobOut, NoteOut, Notes
 
 __all__ = ["router"]
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 PAUSE = 0.25
 KEEP_ALIVE = 15.0
+SHOWN = 50
 
 
 @router.get("")
-def listed(desk: DeskOf) -> list[JobOut]:
-    """All jobs, the newest first."""
-    return [JobOut.of(job) for job in desk.jobs.all()]
+def listed(desk: DeskOf, response: Response, page: PageOf) -> list[JobOut]:
+    """Jobs, the newest first; the header X-Total-Count says how many there are."""
+    response.headers[TOTAL] = str(desk.jobs.count())
+    return [JobOut.of(job) for job in desk.jobs.all(page.most, page.after)]
 
 
 @router.get("/events")
 def events(request: Request, desk: DeskOf) -> StreamingResponse:
-    """The list of jobs as server-sent events: at once, and after each change."""
+    """The newest jobs, at most 50, as server-sent events: at once, and after each change."""
     return StreamingResponse(_changes(request, desk), media_type="text/event-stream", headers={"cache-control": "no-cache"})
 
 
@@ -43,12 +47,25 @@ def cancel(identity: str, desk: DeskOf) -> JobOut:
     return JobOut.of(desk.jobs.cancel(identity))
 
 
+@router.post("/{identity}/retry", status_code=202)
+def retry(identity: str, desk: DeskOf) -> JobOut:
+    """Have a job that failed, was cancelled or interrupted done once more, under its name; 409 if it runs, waits or is done."""
+    return JobOut.of(desk.jobs.retry(identity))
+
+
+@router.get("/{identity}/log")
+def notes(identity: str, desk: DeskOf, after: Annotated[int, Query(ge=0, le=10**9)] = 0) -> Notes:
+    """What a job did, and of what it was warned, from the `after`-th line on: at most 1000 lines."""
+    found = [NoteOut(at=note.at, level=note.level, text=note.text) for note in desk.jobs.notes(identity, after)]
+    return Notes(notes=found, next=after + len(found))
+
+
 async def _changes(request: Request, desk: Desk) -> AsyncIterator[str]:
     seen, quiet = -1, 0.0
     while not request.app.state.ending.is_set() and not await request.is_disconnected():
         version = desk.jobs.version
         if version != seen:
-            jobs = await asyncio.to_thread(desk.jobs.all)
+            jobs = await asyncio.to_thread(desk.jobs.all, SHOWN)
             yield f"data: {json.dumps([JobOut.of(job).model_dump() for job in jobs])}\n\n"
             seen, quiet = version, 0.0
         elif quiet >= KEEP_ALIVE:

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 from pydantic.config import JsonDict
 
-from app.desk import Desk, DeskOf
+from app.desk import Desk, DeskOf, KeyOf
 from app.problems import Missing
 from app.schemas import JobOut
 from app.sweeps import Sweeps
@@ -49,7 +49,7 @@ class SweepRequest(BaseModel):
 
 
 @router.post("", status_code=202)
-def start(request: SweepRequest, desk: DeskOf) -> JobOut:
+def start(request: SweepRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
     """Check what is asked, then queue it; the answer's id names job and sweep."""
     asked = Request.from_json(request.model_dump(exclude={"dataset"}))
     dataset = desk.library.open(request.dataset)
@@ -60,7 +60,7 @@ def start(request: SweepRequest, desk: DeskOf) -> JobOut:
         "dataset": str(dataset.path), "name": request.dataset, "runs": str(settings.runs), "workers": settings.workers,
         "scheduler": settings.scheduler, "sweep": asked.to_json(),
     }  # fmt: skip
-    return JobOut.of(desk.jobs.submit("sweep", said, label=f"sweep-{request.dataset}"))
+    return JobOut.of(desk.jobs.submit("sweep", said, f"sweep-{request.dataset}", key))
 
 
 @router.get("")
@@ -105,7 +105,8 @@ def cancel(identity: str, desk: DeskOf) -> JobOut:
 
 def _job(identity: str, desk: Desk) -> dict[str, Any] | None:
     """The job of a sweep, if its record is there."""
-    for job in desk.jobs.all():
-        if job.id == identity and job.kind == "sweep":
-            return JobOut.of(job).model_dump()
-    return None
+    try:
+        job = desk.jobs.get(identity)
+    except Missing:
+        return None
+    return JobOut.of(job).model_dump() if job.kind == "sweep" else None

@@ -2,7 +2,8 @@
 import { get, post, title } from "./api.js";
 import { element, fill, icon } from "./dom.js";
 import { capital, words } from "./format.js";
-import { addPanel } from "./panels.js";
+import { opens } from "./jobs.js";
+import { addPanel, openPanel } from "./panels.js";
 import { change as changed, mm4, plotOf } from "./sweep-plots.js";
 
 const METHODS = [["grid", "Grid, coarse to fine"], ["random", "Random"], ["tpe", "TPE"], ["cmaes", "CMA-ES"]];
@@ -13,7 +14,10 @@ let axes = [];
 let box = null;
 let watched = null;
 
-export function startSweeps() { box = addPanel("sweep", "Sweep", opened, () => { watched = null; }); }
+export function startSweeps() {
+  box = addPanel("sweep", "Sweep", () => (watched ? null : opened()), () => { watched = null; });
+  opens("sweep", "Open the sweep", (id) => { watched = id; openPanel("sweep"); watch(id); });
+}
 
 async function opened() {
   try {

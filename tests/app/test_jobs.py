@@ -1,58 +1,22 @@
 from __future__ import annotations
 
 import os
-import sqlite3
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
+from job_working import TARGETS, alive, ended, reached, scratch_is_clean
 
 from app.jobs import Jobs
 from app.problems import Conflict, Missing
-from app.records import Job, JobState
-
-WORK = """
-import os, pathlib, subprocess, sys, time
-from core.errors import Cancelled, DatasetError
-
-def count(request, report):
-    for step in range(request["steps"]):
-        report(step / request["steps"], f"step {step}")
-        pathlib.Path(request["scratch"], f"{step}.part").write_text("half")
-        time.sleep(request.get("pause", 0))
-    os.rename(request["scratch"], request["result"])
-    return {"steps": request["steps"]}
-
-def sleep_with_child(request, report):
-    child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
-    pathlib.Path(request["result"]).write_text(f"{os.getpid()} {child.pid}")
-    report(0.5, "sleeping")
-    time.sleep(60)
-
-def refuse(request, report):
-    raise DatasetError("touches.csv, row 3: nan", file="touches.csv", row=3)
-
-def stumble(request, report):
-    raise ZeroDivisionError("a bug")
-
-def give_up(request, report):
-    raise Cancelled
-
-def die(request, report):
-    os._exit(7)
-"""
-TARGETS = {name: f"job_work:{name}" for name in ("count", "sleep_with_child", "refuse", "stumble", "give_up", "die")}
-
-Started = Callable[..., Job]
+from app.records import JobState
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    (tmp_path / "job_work.py").write_text(WORK)
-    monkeypatch.syspath_prepend(str(tmp_path))
+def folder(tmp_path: Path) -> Path:
     return tmp_path / "runs"
 
 
@@ -60,30 +24,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def jobs(folder: Path) -> Iterator[Jobs]:
     with closing(Jobs(folder, TARGETS)) as jobs:
         yield jobs
-
-
-def ended(jobs: Jobs, job: Job) -> Job:
-    return reached(jobs, job, lambda now: now.state.is_finished)
-
-
-def reached(jobs: Jobs, job: Job, true: Callable[[Job], bool]) -> Job:
-    end = time.monotonic() + 30
-    while not true(now := jobs.get(job.id)):
-        assert time.monotonic() < end, f"still {now}"
-        time.sleep(0.02)
-    return now
-
-
-def alive(pid: int) -> bool:
-    try:
-        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
-    except OSError:
-        return False
-    return state != "Z"
-
-
-def scratch_is_clean(folder: Path) -> bool:
-    return not any((folder / ".making").glob("*"))
 
 
 def test_job_runs_in_another_process_and_leaves_its_result(jobs: Jobs, tmp_path: Path, folder: Path) -> None:
@@ -154,23 +94,7 @@ def test_work_that_gives_up_is_cancelled(jobs: Jobs) -> None:
     assert ended(jobs, jobs.submit("give_up", {})).state is JobState.CANCELLED
 
 
-def test_after_a_restart_open_jobs_are_failed_and_half_results_gone(folder: Path) -> None:
-    with closing(Jobs(folder, TARGETS)):
-        pass
-    (folder / ".making" / "old").mkdir(parents=True)
-    with closing(sqlite3.connect(folder / "jobs.sqlite")) as database, database:
-        for identity, state in (("ran", "running"), ("waited", "queued"), ("ended", "done")):
-            row = (identity, "count", "{}", state, 0.5, "half way", 1.0)
-            database.execute(
-                "insert into jobs (id, kind, request, state, fraction, text, created) values (?, ?, ?, ?, ?, ?, ?)", row
-            )
-    with closing(Jobs(folder, TARGETS)) as jobs:
-        assert [jobs.get(name).state.value for name in ("ran", "waited", "ended")] == ["failed", "failed", "done"]
-        assert "start it again" in (jobs.get("ran").error or {})["message"]
-        assert scratch_is_clean(folder)
-
-
-def test_closing_ends_what_runs(folder: Path, tmp_path: Path) -> None:
+def test_closing_interrupts_what_runs(folder: Path, tmp_path: Path) -> None:
     with closing(Jobs(folder, TARGETS)) as jobs:
         job = jobs.submit("sleep_with_child", {"result": str(tmp_path / "pids")})
         reached(jobs, job, lambda now: now.fraction == 0.5)

@@ -1,0 +1,120 @@
+"""Work for the job queue that ends, waits, warns, fails or dies as a test wants, and what to wait for."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+from app.jobs import Jobs
+from app.records import Job
+from core.errors import Cancelled, DatasetError
+from core.progress import Report
+
+__all__ = ["TARGETS", "alive", "ended", "gone", "reached", "scratch_is_clean"]
+
+Request = dict[str, Any]
+
+
+def count(request: Request, report: Report) -> Request:
+    """So many steps; tells its process in RESULT.pid, and makes a folder in one go at the end."""
+    pathlib.Path(request["result"] + ".pid").write_text(str(os.getpid()))
+    for step in range(request["steps"]):
+        report(step / request["steps"], f"step {step}")
+        pathlib.Path(request["scratch"], f"{step}.part").write_text("half")
+        time.sleep(request.get("pause", 0))
+    os.rename(request["scratch"], request["result"])
+    return {"steps": request["steps"]}
+
+
+def sleep_with_child(request: Request, report: Report) -> Request:
+    """A minute with a process of its own."""
+    with subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"]) as child:
+        pathlib.Path(request["result"]).write_text(f"{os.getpid()} {child.pid}")
+        report(0.5, "sleeping")
+        time.sleep(60)
+    return {}
+
+
+def refuse(request: Request, report: Report) -> Request:
+    """Data that are off."""
+    raise DatasetError("touches.csv, row 3: nan", file="touches.csv", row=3)
+
+
+def stumble(request: Request, report: Report) -> Request:
+    """A fault of ours."""
+    raise ZeroDivisionError("a bug")
+
+
+def give_up(request: Request, report: Report) -> Request:
+    """Work that notices that it was stopped."""
+    raise Cancelled
+
+
+def warn(request: Request, report: Report) -> Request:
+    """Frames, a warning, and a stage of another name."""
+    for step in range(30):
+        report(step / 30, f"frame {step} of 30")
+    warnings.warn("cloud 7 is dark", stacklevel=1)
+    report(0.9, "writing")
+    return {}
+
+
+def linger(request: Request, report: Report) -> Request:
+    """Until the runs folder has a file called go."""
+    warnings.warn("cloud 7 is dark", stacklevel=1)
+    for step in range(10_000):
+        report(min(0.05 + step / 1000, 0.9), f"frame {step}")
+        if pathlib.Path(request["runs"], "go").exists():
+            break
+        time.sleep(0.05)
+    return {}
+
+
+def die(request: Request, report: Report) -> Request:
+    """An end without a word."""
+    os._exit(7)
+
+
+TARGETS = {work.__name__: f"job_working:{work.__name__}" for work in (count, sleep_with_child, refuse, stumble, give_up, warn, die)}
+
+
+def ended(jobs: Jobs, job: Job) -> Job:
+    """The job once it has ended."""
+    return reached(jobs, job, lambda now: now.state.is_finished)
+
+
+def reached(jobs: Jobs, job: Job, true: Callable[[Job], bool]) -> Job:
+    """The job once something holds of it."""
+    end = time.monotonic() + 120
+    while not true(now := jobs.get(job.id)):
+        assert time.monotonic() < end, f"still {now}"
+        time.sleep(0.02)
+    return now
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs."""
+    try:
+        state = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+def gone(pids: list[int], seconds: float = 30.0) -> bool:
+    """Whether all these processes end in time."""
+    end = time.monotonic() + seconds
+    while any(alive(pid) for pid in pids) and time.monotonic() < end:
+        time.sleep(0.02)
+    return not any(alive(pid) for pid in pids)
+
+
+def scratch_is_clean(folder: pathlib.Path) -> bool:
+    """Whether no job has left anything half made."""
+    return not any((folder / ".making").glob("*"))
