@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
+from importlib.metadata import version
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -19,12 +20,19 @@ from app.guard import Guard
 from app.login import Login
 from app.login import router as login_router
 from app.problems import as_dict, status_code
+from app.schemas import PROBLEMS
 from app.settings import Settings
 from app.tokens import Token
 from app.work import TARGETS
 from core.errors import PalpateError
 
 __all__ = ["create_app"]
+
+ABOUT = """Replay palpations, find what a simulation gets wrong, and measure the gain.
+
+Lengths are in m, pressures in Pa, times in s. Every problem is answered as `{kind, message, where}`. What takes long is a job: it
+is answered with 202 and the job, and followed by GET /api/jobs/{id} or by the server-sent events of GET /api/jobs/events.
+"""
 
 
 def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> FastAPI:
@@ -37,12 +45,12 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
         yield
         app.state.desk.close()
 
-    app = FastAPI(title="Palpate", lifespan=lifespan, docs_url=None, redoc_url=None)
+    app = FastAPI(title="Palpate", version=version("palpate"), description=ABOUT, lifespan=lifespan, docs_url=None, redoc_url=None)
     app.state.ending = threading.Event()
     app.state.settings, app.state.login = settings, login
     app.add_middleware(Guard, settings=settings, login=login)
     for module in (datasets, registrations, diagnoses, jobs, runs, sessions, whatif, effects, sweeps):
-        app.include_router(module.router, prefix="/api")
+        app.include_router(module.router, prefix="/api", responses=PROBLEMS)
     app.include_router(relay.router)
     app.include_router(login_router)
     _answer_problems(app)
@@ -66,6 +74,11 @@ def _answer_problems(app: FastAPI) -> None:
         place = ".".join(str(part) for part in first["loc"])
         body = {"kind": "RequestError", "message": f"{place}: {first['msg']}", "where": {"key": place}}
         return JSONResponse(body, status_code=422)
+
+    @app.exception_handler(Exception)
+    def fault(request: Request, error: Exception) -> JSONResponse:
+        message = f"{request.method} {request.url.path} stopped: {type(error).__name__}: {error}; the server's log has more"
+        return JSONResponse({"kind": "InternalError", "message": message, "where": {}}, status_code=500)
 
     @app.exception_handler(HTTPException)
     def http(request: Request, error: HTTPException) -> JSONResponse:

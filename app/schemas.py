@@ -9,7 +9,30 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.picture import Colouring, Layer
 from app.records import Job
 
-__all__ = ["DiagnosisRequest", "EffectIn", "JobOut", "NoteOut", "Notes", "View", "WhatIfRequest"]
+__all__ = ["PROBLEMS", "DiagnosisRequest", "EffectIn", "JobOut", "NoteOut", "Notes", "Problem", "View", "WhatIfRequest"]
+
+
+class Problem(BaseModel):
+    """What every problem looks like: its kind, a sentence that says what to do, and where it is (file, row, key, value ...)."""
+
+    kind: str
+    message: str
+    where: dict[str, int | float | str | bool]
+
+
+PROBLEMS: dict[int | str, dict[str, Any]] = {
+    status: {"model": Problem, "description": text}
+    for status, text in {
+        400: "the body cannot be read",
+        401: "not logged in: send Authorization: Bearer with the token",
+        403: "asked by a page of another site, or by a name that is not the server's",
+        404: "nothing has this name",
+        409: "does not fit the state of what it names",
+        413: "the body is too large",
+        422: "data or values that are off",
+    }.items()
+}
+"""What any operation may answer besides its result."""
 
 
 class View(BaseModel):

@@ -75,6 +75,8 @@ def _key(run: Run, sequence: str) -> tuple[str, str, tuple[int, ...], str]:
     folder = run.origin.get("dataset")
     if folder is None:
         raise RunError(f"run {run.name} does not say where its dataset is; make the run again", run=run.name)
+    if "setup" not in run.model:
+        raise RunError(f"run {run.name}: model.json states no setup; make the run again", run=run.name, file="model.json")
     clouds = tuple(int(index) for index in run.replay(sequence)["cloud_index"])
     return str(folder), sequence, clouds, json.dumps(run.model)
 

@@ -37,7 +37,7 @@ def events(request: Request, desk: DeskOf) -> StreamingResponse:
 
 @router.get("/{identity}")
 def one(identity: str, desk: DeskOf) -> JobOut:
-    """One job."""
+    """One job: how far it is, or how it ended."""
     return JobOut.of(desk.jobs.get(identity))
 
 

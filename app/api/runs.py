@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse, HTMLResponse
 
 from app.colours import nice_limit
@@ -59,7 +59,9 @@ def report(name: str, desk: DeskOf) -> dict[str, Any]:
     return desk.runs.get(name).report
 
 
-@router.get("/{name}/report.html", response_class=HTMLResponse)
+@router.get(
+    "/{name}/report.html", response_class=Response, responses={200: {"content": {"text/html": {"schema": {"type": "string"}}}}}
+)
 def page(name: str, desk: DeskOf) -> HTMLResponse:
     """The report as one HTML file that needs nothing but itself, to keep, print or send."""
     from app.report_page import report_page  # noqa: PLC0415 (heavy)
@@ -88,7 +90,7 @@ def patterns(name: str, desk: DeskOf) -> dict[str, Any]:
     return {**values, "limit": nice_limit(np.concatenate([arrays["measured"], arrays["predicted"]]))}
 
 
-@router.get("/{name}/pictures/{picture}")
+@router.get("/{name}/pictures/{picture}", response_class=Response, responses={200: {"content": {"image/png": {}}}})
 def picture(name: str, picture: str, desk: DeskOf) -> FileResponse:
     """A picture of the run."""
     return FileResponse(desk.runs.get(name).picture(picture))
