@@ -1,0 +1,151 @@
+"""The REST service from Python: diagnoses and sweeps asked for, followed, and their results fetched.
+
+with Client("http://127.0.0.1:8321") as palpate:
+    job = palpate.sweep("block-01", {"poisson_ratio.nu": (0.3, 0.49)}, steps=7)
+    palpate.wait(job["id"], print)
+    print(palpate.sweep_result(job["id"])["summary"]["best"])
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from types import TracebackType
+from typing import Any, Self
+from uuid import uuid4
+
+import httpx
+
+from core.errors import PalpateError
+
+__all__ = ["ApiError", "Client", "JobError"]
+
+PATIENCE = 120.0
+"""Seconds that one answer may take: a registration is made while one waits."""
+PAUSE = 0.3
+
+
+class ApiError(PalpateError):
+    """What the service refused, in its own words; `kind` and `status` say of which sort it is."""
+
+    def __init__(self, status: int, kind: str, message: str, where: Mapping[str, Any]) -> None:
+        super().__init__(message, **{key: value for key, value in where.items() if key != "message"})
+        self.status, self.kind = status, kind
+
+
+class JobError(PalpateError):
+    """A job that ended without its result; `job` is its last record."""
+
+    def __init__(self, job: dict[str, Any]) -> None:
+        said = (job["error"] or {}).get("message", job["text"])
+        super().__init__(f"{job['kind']} {job['id']} is {job['state']}: {said}", job=job["id"])
+        self.job = job
+
+
+class Client:
+    """One server. `token` is what `palpate serve` printed, where it asks for one.
+
+    All methods raise ApiError for what the service refuses, and httpx.TransportError where nothing answers.
+    """
+
+    def __init__(self, address: str, token: str | None = None, timeout: float = PATIENCE) -> None:
+        headers = {"authorization": f"Bearer {token}"} if token else {}
+        self._http = httpx.Client(base_url=f"{address.rstrip('/')}/api", headers=headers, timeout=timeout)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._http.close()
+
+    def datasets(self) -> list[str]:
+        """Names of the datasets that the server has."""
+        return list(self._get("/datasets")["datasets"])
+
+    def check(self, dataset: str) -> dict[str, Any]:
+        """What a dataset holds, after every file was read."""
+        return dict(self._get(f"/datasets/{dataset}/check"))
+
+    def effects(self) -> list[dict[str, Any]]:
+        """The catalogue, with parameters, units and bounds (SI)."""
+        return list(self._get("/effects"))
+
+    def diagnose(self, dataset: str, seed: int = 0, key: str | None = None) -> dict[str, Any]:
+        """Queue a diagnosis; the job's id will be its run's."""
+        return self._ask("/diagnoses", {"dataset": dataset, "seed": seed}, key)
+
+    def sweep(
+        self, dataset: str, parameters: Mapping[str, tuple[float, float]], key: str | None = None, **further: Any
+    ) -> dict[str, Any]:
+        """Queue a sweep of `effect.parameter` between two values each (SI); `further` as POST /api/sweeps takes it."""
+        axes = [{"parameter": name, "low": low, "high": high} for name, (low, high) in parameters.items()]
+        return self._ask("/sweeps", {"dataset": dataset, "parameters": axes, **further}, key)
+
+    def sweep_result(self, identity: str) -> dict[str, Any]:
+        """A sweep: what was asked, and its summary once it has ended."""
+        return dict(self._get(f"/sweeps/{identity}"))
+
+    def points(self, identity: str) -> list[dict[str, Any]]:
+        """The points of a sweep that have ended by now, in that order."""
+        found: list[dict[str, Any]] = []
+        while more := self._get(f"/sweeps/{identity}/points", after=len(found))["points"]:
+            found += more
+        return found
+
+    def report(self, run: str) -> dict[str, Any]:
+        """The report of a finished diagnosis."""
+        return dict(self._get(f"/runs/{run}/report"))
+
+    def jobs(self) -> Iterator[dict[str, Any]]:
+        """All jobs, the newest first."""
+        after = 0
+        while page := self._get("/jobs", after=after):
+            yield from page
+            after += len(page)
+
+    def job(self, identity: str) -> dict[str, Any]:
+        """One job as it is now."""
+        return dict(self._get(f"/jobs/{identity}"))
+
+    def wait(self, identity: str, report: Callable[[float, str], object] = lambda *_: None) -> dict[str, Any]:
+        """The job once it is done, with `report(fraction, text)` on the way; JobError where it ends otherwise."""
+        while (job := self.job(identity))["state"] in ("queued", "running"):
+            report(job["fraction"], job["text"])
+            time.sleep(PAUSE)
+        if job["state"] != "done":
+            raise JobError(job)
+        report(1.0, job["text"])
+        return job
+
+    def cancel(self, identity: str) -> dict[str, Any]:
+        """Stop a job."""
+        return dict(self._answer(self._http.post(f"/jobs/{identity}/cancel")))
+
+    def retry(self, identity: str) -> dict[str, Any]:
+        """Have a job that ended without its result done once more."""
+        return dict(self._answer(self._http.post(f"/jobs/{identity}/retry")))
+
+    def _get(self, path: str, **query: Any) -> Any:
+        return self._answer(self._http.get(path, params=query))
+
+    def _ask(self, path: str, body: dict[str, Any], key: str | None) -> dict[str, Any]:
+        """Ask for a job; once more where the connection broke, which the key makes harmless."""
+        headers = {"idempotency-key": key or uuid4().hex}
+        try:
+            answer = self._http.post(path, json=body, headers=headers)
+        except httpx.TransportError:
+            answer = self._http.post(path, json=body, headers=headers)
+        return dict(self._answer(answer))
+
+    def _answer(self, answer: httpx.Response) -> Any:
+        if answer.is_success:
+            return answer.json()
+        try:
+            said = answer.json()
+            raise ApiError(answer.status_code, said["kind"], said["message"], said["where"])
+        except (ValueError, KeyError, TypeError):
+            raise ApiError(answer.status_code, "HttpError", f"{answer.url} answered {answer.status_code}", {}) from None
