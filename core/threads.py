@@ -7,6 +7,7 @@ what runs side by side, in processes.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from functools import cache, wraps
 from typing import ParamSpec, TypeVar
@@ -18,8 +19,8 @@ _R = TypeVar("_R")
 
 
 @cache
-def _pools() -> ThreadpoolController:
-    """Of the libraries loaded by now; NumPy's and SciPy's are."""
+def _pools(with_mkl: bool) -> ThreadpoolController:
+    """Of the libraries loaded by now: NumPy's and SciPy's always, MKL once a matrix was factorised with it."""
     return ThreadpoolController()
 
 
@@ -28,7 +29,7 @@ def on_one_thread(solve: Callable[_P, _R]) -> Callable[_P, _R]:
 
     @wraps(solve)
     def bounded(*args: _P.args, **kwargs: _P.kwargs) -> _R:
-        with _pools().limit(limits=1, user_api="blas"):
+        with _pools("pypardiso" in sys.modules).limit(limits=1, user_api="blas"):
             return solve(*args, **kwargs)
 
     return bounded

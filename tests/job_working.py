@@ -16,7 +16,7 @@ from app.records import Job
 from core.errors import Cancelled, DatasetError
 from core.progress import Report
 
-__all__ = ["TARGETS", "alive", "ended", "gone", "reached", "scratch_is_clean"]
+__all__ = ["TARGETS", "alive", "ended", "family", "gone", "reached", "scratch_is_clean"]
 
 Request = dict[str, Any]
 
@@ -105,6 +105,15 @@ def alive(pid: int) -> bool:
     except OSError:
         return False
     return state != "Z"
+
+
+def family(pid: int) -> list[int]:
+    """The processes that a process has started, and those that they have."""
+    found: list[int] = []
+    for task in pathlib.Path(f"/proc/{pid}/task").glob("*/children"):
+        for child in map(int, task.read_text().split()):
+            found += [child, *family(child)]
+    return found
 
 
 def gone(pids: list[int], seconds: float = 30.0) -> bool:
