@@ -194,7 +194,7 @@ class CorrectionNetwork(nn.Module):
 
 
 def build(spec: NetworkSpec, body: Body, seed: int = 0) -> CorrectionNetwork:
-    """A network whose first weights are drawn by this seed, whatever was drawn before; CorrectionError where the kind does not fit."""
+    """A network, its first weights by this seed whatever was drawn before; CorrectionError where the kind does not fit the body."""
     axes = {"unet2d": 2, "unet3d": 3}.get(spec.kind)
     if axes is not None and (body.grid is None or len(body.grid) != axes):
         shape = "no grid" if body.grid is None else f"a grid of {len(body.grid)} axes"
