@@ -20,8 +20,8 @@ class Kept:
     """Folders of one kind of job.
 
     Args:
-        runs: the runs folder. kind: of the jobs. folder: below it. asked: file that is there from the beginning on. found: file that
-            is there at the end.
+        runs: the runs folder. kind: of the jobs. folder: below it. asked: file that is there from the beginning on.
+        found: file that is there at the end.
     """
 
     def __init__(self, runs: Path, kind: str, folder: str, asked: str, found: str) -> None:

@@ -1,4 +1,4 @@
-"""Trainings on disk, below the runs folder, and the job that makes one; with a run it also puts the corrected model into its scene."""
+"""Trainings on disk, below the runs folder, and the job that makes one; with a run the corrected model gets into its scene, too."""
 
 from __future__ import annotations
 

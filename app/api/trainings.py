@@ -22,8 +22,8 @@ EXAMPLE: JsonDict = {"dataset": "block-01", "kind": "unet2d", "epochs": 20}
 class TrainingRequest(BaseModel):
     """What is trained on which dataset, on the stated model or on the extended one of a run; see `core.correction.request`.
 
-    `trust` is how far the simulation may be corrected along each axis [voxels], `hold` the weight that keeps hidden vertices near it
-    [1/mm], `every` each how many clouds one is learned from.
+    `trust` is how far the simulation may be corrected along each axis [voxels], `hold` the weight that keeps hidden vertices near
+    it [1/mm], `every` each how many clouds one is learned from.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra={"examples": [EXAMPLE]})

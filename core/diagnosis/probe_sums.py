@@ -19,6 +19,7 @@ from core.diagnosis.prediction import Prediction
 from core.errors import DiagnosisError
 from core.frames import FloatArray
 from core.measurement import Surface
+from core.meshing import IntArray
 from core.metrics import paper_distance
 from core.setup import Setup
 from core.sight import sight_of
@@ -55,17 +56,20 @@ class ProbeSums:
         arrays = (values[own] for values in (self.squares, self.along, self.size, self.floor, self.points))
         return ProbeSums(tuple(self.names[row] for row in own), *arrays)
 
-    def rms(self, chosen: FloatArray | None = None) -> FloatArray:
-        """RMS of every model, the noise floor last (d, m + 1) [m]; of pushes drawn with repetition (d, n), or of all (1, m + 1)."""
+    def rms(self, chosen: IntArray | None = None, still: bool = True) -> FloatArray:
+        """RMS of every model, the noise floor last (d, m + 1) [m]; of pushes drawn with repetition (d, n), or of all (1, m + 1).
+
+        Without what is `still`, what a model is wrong about in the untouched block, too, does not count: sag, for one.
+        """
         rows = np.arange(len(self.names))[None] if chosen is None else chosen
         size, points = self.size[rows].sum(axis=1), np.maximum(self.points[rows].sum(axis=1), 1)
         differ = size > _SAME_PATTERN**2 * points
         share = self.along[rows].sum(axis=1) / np.where(differ, size, 1.0)[:, None]
-        still = np.where(differ, size, 0.0)[:, None] * share**2
-        mean = np.column_stack([self.squares[rows].sum(axis=1) + still, self.floor[rows].sum(axis=1)]) / points[:, None]
+        lasting = np.where(differ & still, size, 0.0)[:, None] * share**2
+        mean = np.column_stack([self.squares[rows].sum(axis=1) + lasting, self.floor[rows].sum(axis=1)]) / points[:, None]
         return np.asarray(np.sqrt(mean))
 
-    def draws(self, seed: int, draws: int = DRAWS) -> FloatArray:
+    def draws(self, seed: int, draws: int = DRAWS) -> IntArray:
         """Pushes drawn with repetition (draws, k)."""
         return np.random.default_rng(seed).integers(0, len(self.names), size=(draws, len(self.names)))
 

@@ -13,6 +13,7 @@ from core.diagnosis.prediction import Prediction
 from core.diagnosis.probe_sums import ProbeSums, paper_sums, probe_sums, removed_share
 from core.errors import DiagnosisError
 from core.frames import FloatArray
+from core.meshing import IntArray
 from core.setup import Setup
 
 __all__ = ["Rung", "ladder"]
@@ -44,7 +45,7 @@ class _Paper:
     sums: FloatArray
     frames: FloatArray
 
-    def means(self, rows: FloatArray) -> FloatArray:
+    def means(self, rows: IntArray) -> FloatArray:
         """(d, m) [m] of pushes drawn with repetition (d, n)."""
         frames = np.maximum(self.frames[rows].sum(axis=1), 1)
         return np.asarray(self.sums[rows].sum(axis=1) / frames[:, None])
@@ -63,10 +64,13 @@ def ladder(
 
     Args:
         rungs: the baseline first. kinds: of each push. trained: kinds that networks and causes were fitted on.
-        ends: the two physical models along whose difference the camera's fixed pattern is an error, see `core.diagnosis.probe_sums`:
+        ends: the two physical models along whose difference the camera's fixed pattern is an error (`core.diagnosis.probe_sums`):
             what a network learns of the camera's own pattern counts for nothing there.
 
-    Shares and intervals (95 %) are of resampled pushes. Raises DiagnosisError where no push was seen.
+    Of each model: its error and the share of the reducible error that it removes; the same of the part that is `moving`, which
+    leaves out what is as wrong in the untouched block; and the paper's metric. Intervals (95 %) are of resampled pushes.
+
+    Raises DiagnosisError where no push was seen.
     """
     models = [rung.predictions for rung in rungs]
     lasting = any(rung.setup.material.remembers for rung in rungs)
@@ -101,28 +105,33 @@ def _parts(names: Sequence[str], kinds: Mapping[str, str], trained: Collection[s
 
 
 def _judged(names: Sequence[str], sums: ProbeSums, paper: _Paper, seed: int) -> dict[str, Any]:
-    """Errors, removed shares and the paper's metric of one part, and what each rung removes beyond the baseline's network."""
+    """Errors, removed shares and the paper's metric of one part, and what each later rung removes beyond the second."""
     draws = sums.draws(seed)
     whole, drawn = sums.rms()[0], sums.rms(draws)
+    moving, drawn_moving = sums.rms(still=False)[0], sums.rms(draws, still=False)
     mean, drawn_mean = paper.means(np.arange(len(sums.names))[None])[0], paper.means(draws)
-    share = np.array([removed_share(whole[0], value, whole[-1]) for value in whole[:-1]])
-    drawn_share = np.stack([removed_share(drawn[:, 0], drawn[:, one], drawn[:, -1]) for one in range(len(names))], axis=1)
+    (share, drawn_share), (share_moving, drawn_moving_share) = _shares(whole, drawn), _shares(moving, drawn_moving)
     errors = {}
     for number, name in enumerate(names):
         nearer, drawn_nearer = 1 - mean[number] / mean[0], 1 - drawn_mean[:, number] / drawn_mean[:, 0]
         errors[name] = {
             "error": _mm(whole[number]), "removed": _interval(float(share[number]), drawn_share[:, number]),
+            "moving": {
+                "error": _mm(moving[number]), "removed": _interval(float(share_moving[number]), drawn_moving_share[:, number]),
+            },
             "paper": {"error": _mm(mean[number]), "improvement": _interval(float(nearer), drawn_nearer)},
         }  # fmt: skip
-    found: dict[str, Any] = {"noise_floor": _mm(whole[-1]), "errors": errors}
-    if "baseline_network" in names:
-        own = names.index("baseline_network")
-        found["beyond_network"] = {
-            name: _interval(float(share[number] - share[own]), drawn_share[:, number] - drawn_share[:, own])
-            for number, name in enumerate(names)
-            if number not in (0, own)
-        }
-    return found
+    beyond = {
+        name: _interval(float(share[number] - share[1]), drawn_share[:, number] - drawn_share[:, 1])
+        for number, name in enumerate(names[2:], 2)
+    }
+    return {"noise_floor": _mm(whole[-1]), "errors": errors, "beyond_second": beyond}
+
+
+def _shares(whole: FloatArray, drawn: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Of the reducible error what each model removes (m,), and of each draw (d, m); the last column is the noise floor's."""
+    share = removed_share(whole[0], whole[:-1], whole[-1])
+    return share, removed_share(drawn[:, :1], drawn[:, :-1], drawn[:, -1:])
 
 
 def _paper(data: Sequence[Observations], rungs: Sequence[Rung], names: Sequence[str]) -> _Paper:

@@ -67,7 +67,7 @@ class Network:
         return box_mesh(setup.box.size, GridSpec(nodes=self.nodes))
 
     def change(self, points: FloatArray, tool: FloatArray) -> FloatArray:
-        """How far (n, v, 3) [m] each point of the grid (n, v, 3) [m] is moved, with the tool (n, 13) there; zero where it has none."""
+        """How far (n, v, 3) [m] each point of the grid (n, v, 3) [m] is moved with the tool (n, 13) there; 0 where none is."""
         import torch
 
         index, found = self.trained.body.index, np.zeros_like(points)

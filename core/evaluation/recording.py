@@ -33,7 +33,12 @@ _TOLERANCE = 1e-3
 
 
 def record_corrections(
-    dataset: Dataset, model: Mapping[str, Any], network: Network, frames: Mapping[str, FloatArray], out: Path, report: Report = silent
+    dataset: Dataset,
+    model: Mapping[str, Any],
+    network: Network,
+    frames: Mapping[str, FloatArray],
+    out: Path,
+    report: Report = silent,
 ) -> None:
     """Replay a run's recorded frames under its extended model, correct them, and write one file for each sequence to `out`.
 

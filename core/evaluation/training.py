@@ -79,7 +79,8 @@ def train_network(
     """Train on the stated model of a dataset, or on another one; returns what training.json says.
 
     Args:
-        store: folder of samples for all trainings. model: model.json of a diagnosis, of the `run` of this name. setup: instead of both.
+        store: folder of samples for all trainings. model: model.json of a diagnosis, of the `run` of this name.
+        setup: instead of both.
 
     What was begun in `folder` goes on, and what is finished there is returned. RunError where another training is in it,
     CorrectionError for values or data that cannot be trained with.
