@@ -25,8 +25,8 @@ FLAT = 2.0e-4
 def course(run: Run, replay: Replay) -> dict[str, Any]:
     """All series of a sequence for the timeline; null where the data or the run do not hold them.
 
-    `depth` [m], `force` as measured [N], and by model `forces` [N] and `iterations` have one number for each frame; `touching` holds
-    first and last frames, `worst` frames in the order of their raw error, `failed` by model those that found no equilibrium.
+    `depth` [m], `force` as measured [N], and by model `forces` [N] and `iterations` have one number for each frame; `touching`
+    holds first and last frames, `worst` frames in the order of their raw error, `failed` by model those that found no equilibrium.
     """
     depth, force = push_depth(replay), contact_force(run, replay)
     iterations, forces = by_model(replay, "iterations"), by_model(replay, "force")

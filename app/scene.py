@@ -105,7 +105,8 @@ class ViserScene:
             node.vertices, node.faces = figure.vertices, figure.faces.astype(np.uint32)
         elif isinstance(figure, Lines):
             node.points = figure.segments
-            node.colors = figure.colour
+            if isinstance(figure.colour, np.ndarray):
+                node.colors = figure.colour
 
     def _make(self, name: str, figure: Figure) -> Any:
         scene = self._client.scene
@@ -143,7 +144,7 @@ def _mould(figure: Figure) -> tuple[Any, ...]:
     if isinstance(figure, Mesh):
         return (Mesh, figure.colour, figure.opacity)
     if isinstance(figure, Lines):
-        return (Lines, figure.segments.shape, figure.width)
+        return (Lines, figure.segments.shape, figure.width, figure.colour if isinstance(figure.colour, tuple) else None)
     if isinstance(figure, Label):
         return (Label, figure.text)
     return (Tool, figure.radius, figure.opacity)
