@@ -14,6 +14,7 @@ import numpy as np
 from core.cleaning import cleaner_for, find_shaft_axis, tool_poses
 from core.dataset import open_dataset
 from core.diagnosis.hypothesis import with_effects
+from core.diagnosis.inside import Inside
 from core.diagnosis.kept import tuned_as
 from core.diagnosis.recording import Recorded, observed
 from core.diagnosis.smoothing import smooth_centres
@@ -42,6 +43,7 @@ class Moment:
         surface: (v, 3) moved material vertices, in the order of the recording. error: (v,) mean gap of the measured points around
             each, NaN where unseen. distance: RMS of `error`. tool: (3,) centre. radius: of the tool. outcome: how the solve ended.
         converged: whether that is an equilibrium. camera: (4, 4) phantom_from_camera.
+        inside: its nodes, as a recording of one frame.
     """
 
     surface: FloatArray
@@ -52,6 +54,7 @@ class Moment:
     outcome: str
     converged: bool
     camera: FloatArray
+    inside: Inside
 
 
 class WhatIf:
@@ -106,7 +109,7 @@ class WhatIf:
         side: Recorded = observed(setup, [solved], [self._cloud(frame)])
         return Moment(
             side.surface[0], side.error[0], float(side.distance[0]), side.tool[0], setup.tool.radius,
-            solved.outcome.value, not side.outcome[0], np.asarray(sight_of(setup).pose.matrix),
+            solved.outcome.value, not side.outcome[0], np.asarray(sight_of(setup).pose.matrix), side.inside,
         )  # fmt: skip
 
     def _solved(self, setup: Setup, frame: int) -> Equilibrium:
