@@ -6,10 +6,9 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.picture import Colouring, Layer
 from app.records import Job
 
-__all__ = ["PROBLEMS", "DiagnosisRequest", "EffectIn", "JobOut", "NoteOut", "Notes", "Problem", "View", "WhatIfRequest"]
+__all__ = ["PROBLEMS", "DiagnosisRequest", "EffectIn", "JobOut", "NoteOut", "Notes", "Problem", "WhatIfRequest"]
 
 
 class Problem(BaseModel):
@@ -33,20 +32,6 @@ PROBLEMS: dict[int | str, dict[str, Any]] = {
     }.items()
 }
 """What any operation may answer besides its result."""
-
-
-class View(BaseModel):
-    """What a page wants to see; `limit` is the end of the error scale [m], None for automatic."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    run: str
-    sequence: str
-    frame: int = Field(default=0, ge=0)
-    layers: tuple[Layer, ...] = ("measured", "raw", "extended", "tool")
-    colour: Colouring = "plain"
-    limit: float | None = Field(default=None, gt=0.0, le=1.0)
-    crop: bool = True
 
 
 class DiagnosisRequest(BaseModel):

@@ -7,7 +7,8 @@ import io
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from app.scene import FIELD_OF_VIEW, ViserScene
+from app.lookout import FIELD_OF_VIEW
+from app.scene import ViserScene
 
 if TYPE_CHECKING:
     from viser import ClientHandle, ViserServer

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["body_for", "errors_of", "train"]
 
-CHECKPOINT = "checkpoint.pt"
+CHECKPOINT, HISTORY = "checkpoint.pt", "history.json"
 _CHUNK = 256
 _LOG_EVERY = 50
 
@@ -247,6 +247,7 @@ class _Run:
                 "optimizer": self.optimizer.state_dict(), "random": checkpoint.random_state(),
             },
         )  # fmt: skip
+        checkpoint.note(self.folder / HISTORY, self.place.history)
 
     def _resume(self) -> None:
         kept = checkpoint.load(self.folder / CHECKPOINT, self.device)
