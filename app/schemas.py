@@ -50,12 +50,13 @@ class View(BaseModel):
 
 
 class DiagnosisRequest(BaseModel):
-    """Which dataset to diagnose, named by its folder."""
+    """Which dataset to diagnose, named by its folder; with which accepted registration of the camera, if not the automatic one."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra={"examples": [{"dataset": "block-01", "seed": 0}]})
 
     dataset: str
     seed: int = Field(default=0, ge=0, lt=2**31)
+    registration: str | None = None
 
 
 class EffectIn(BaseModel):
