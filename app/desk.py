@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from fastapi import Depends, Header
 from starlette.requests import HTTPConnection
 
+from app.clicking import Clickings
 from app.jobs import Jobs
 from app.library import Library
 from app.records import Job
@@ -16,7 +17,7 @@ from app.registrations import Registrations
 from app.runs import Runs
 from app.sessions import Sessions
 from app.settings import Settings
-from app.stage import Stage
+from app.stage import Audience, Stage
 from app.whatif import WhatIfs
 
 __all__ = ["Desk", "DeskOf", "KeyOf"]
@@ -32,20 +33,23 @@ class Desk:
     jobs: Jobs
     sessions: Sessions
     stage: Stage
+    clickings: Clickings
     whatifs: WhatIfs
 
     @classmethod
     def open(cls, settings: Settings, targets: dict[str, str]) -> Desk:
         """Start the job queue and the inner viewer."""
         runs = Runs(settings.runs)
-        sessions = Sessions(runs)
+        sessions, library = Sessions(runs), Library(settings.datasets)
+        clickings = Clickings(library.phantom)
         return cls(
             settings=settings,
-            library=Library(settings.datasets),
+            library=library,
             runs=runs,
             jobs=Jobs(settings.runs, targets, settings.preload),
             sessions=sessions,
-            stage=Stage(sessions.join, sessions.leave),
+            stage=Stage(Audience(sessions.join, sessions.leave), Audience(clickings.join, clickings.leave), clickings.click),
+            clickings=clickings,
             whatifs=WhatIfs(),
         )
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from app.picture import Colouring, Layer
 from app.records import Job
 
-__all__ = ["PROBLEMS", "DiagnosisRequest", "EffectIn", "JobOut", "NoteOut", "Notes", "Problem", "View", "WhatIfRequest"]
+__all__ = [
+    "PROBLEMS", "DiagnosisRequest", "EffectIn", "HalfPair", "JobOut", "NoteOut", "Notes", "Point", "Problem", "Shown", "View",
+    "WeakDirection", "WhatIfRequest",
+]  # fmt: skip
 
 
 class Problem(BaseModel):
@@ -47,6 +50,53 @@ class View(BaseModel):
     colour: Colouring = "plain"
     limit: float | None = Field(default=None, gt=0.0, le=1.0)
     crop: bool = True
+
+
+Point = Annotated[list[Annotated[FiniteFloat, Field(ge=-10.0, le=10.0)]], Field(min_length=3, max_length=3)]
+"""A place [m]."""
+Row = Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)]
+
+
+class HalfPair(BaseModel):
+    """A pair as it is being clicked: a point [m] on the cloud, camera frame, and one on the mesh, phantom frame, or not yet."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    cloud: Point | None = None
+    mesh: Point | None = None
+
+
+class WeakDirection(BaseModel):
+    """A motion that the cloud determines weakly: parts of translation and rotation along the phantom's axes, and its text."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    translation: Point
+    rotation: Point
+    text: str = Field(max_length=80)
+
+
+class Shown(BaseModel):
+    """What a page shows while a person registers by hand.
+
+    `mode` is the side that clicks are for; `pose` (phantom_from_camera) is where the cloud was fitted to, if it was, `start` how it
+    is shown before: as stated in dataset.toml, levelled by its table, or as the camera sees it; `over` the phantom, or beside it.
+    """
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", json_schema_extra={"examples": [{"dataset": "block-01", "mode": "cloud"}]}
+    )
+
+    dataset: str
+    pairs: tuple[HalfPair, ...] = Field(default=(), max_length=100)
+    mode: Literal["cloud", "mesh"] = "cloud"
+    chosen: tuple[Annotated[int, Field(ge=0, lt=100)], Literal["cloud", "mesh"]] | None = None
+    pose: (
+        Annotated[list[Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)]], Field(min_length=4, max_length=4)] | None
+    ) = None
+    start: Literal["stated", "levelled", "camera"] = "stated"
+    over: bool = False
+    weak: tuple[WeakDirection, ...] = Field(default=(), max_length=6)
 
 
 class DiagnosisRequest(BaseModel):

@@ -51,8 +51,8 @@ def pick_mesh(vertices: FloatArray, faces: IndexArray, origin: FloatArray, direc
     with np.errstate(divide="ignore", invalid="ignore"):
         u, v = (arm * side).sum(axis=1) / determinant, turned @ direction / determinant
         along = (second * turned).sum(axis=1) / determinant
-    edge = 1.0e-9
-    hit = (np.abs(determinant) > 1e-18) & (u >= -edge) & (v >= -edge) & (u + v <= 1 + edge) & (along > 0.0)
+        edge = 1.0e-9
+        hit = (np.abs(determinant) > 1e-18) & (u >= -edge) & (v >= -edge) & (u + v <= 1 + edge) & (along > 0.0)
     return np.asarray(origin + along[hit].min() * direction) if hit.any() else None
 
 
