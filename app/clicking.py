@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from app.pair_picture import Arrow, Mark, PairPicture
+from app.pair_picture import Arrow, Mark, PairPicture, middle_of
 from app.pair_scene import PairScene, Ray
 from app.problems import Missing
 from app.schemas import Shown, WeakDirection
@@ -181,9 +181,8 @@ class Clicking:
         pose = self._start[1] if shown.pose is None else Transform.from_matrix(shown.pose)
         if shown.over:
             return pose
-        low = np.percentile(pose.apply(phantom.cloud), 2, axis=0)
-        middle = np.median(pose.apply(phantom.cloud), axis=0)
-        aside = np.array([phantom.size[0] / 2 + APART - low[0], -middle[1], 0.0])
+        low, high = middle_of(pose.apply(phantom.cloud), 0.8 * max(phantom.size))
+        aside = np.array([phantom.size[0] / 2 + APART - low[0], -(low[1] + high[1]) / 2, 0.0])
         return Transform(np.eye(3), aside) @ pose
 
     def _picture(self, phantom: Phantom, shown: Shown) -> PairPicture:
@@ -221,7 +220,14 @@ class Clicking:
     def _on_cloud(self, phantom: Phantom, shown: Shown, ray: Ray) -> tuple[FloatArray, None] | None:
         back = self._pose(phantom, shown).inverse()
         row = pick_cloud(phantom.cloud, back.apply(ray.origin), back.rotation @ ray.direction, ray.pixel)
-        return None if row is None else (phantom.cloud[row], None)
+        if row is None or (not shown.over and self._behind(phantom, ray, self._pose(phantom, shown).apply(phantom.cloud[row]))):
+            return None
+        return phantom.cloud[row], None
+
+    def _behind(self, phantom: Phantom, ray: Ray, place: FloatArray) -> bool:
+        """Whether the phantom, beside which the cloud is shown, hides a place."""
+        hit = pick_mesh(phantom.vertices, phantom.faces, ray.origin, ray.direction)
+        return hit is not None and float(np.linalg.norm(hit - ray.origin)) < float(np.linalg.norm(place - ray.origin))
 
     def _on_mesh(self, phantom: Phantom, ray: Ray) -> tuple[FloatArray, str | None] | None:
         hit = pick_mesh(phantom.vertices, phantom.faces, ray.origin, ray.direction)

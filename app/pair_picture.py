@@ -10,7 +10,7 @@ import numpy as np
 from core.frames import FloatArray
 from core.registration.faces import IndexArray
 
-__all__ = ["Arrow", "Mark", "PairPicture", "pair_colour"]
+__all__ = ["Arrow", "Mark", "PairPicture", "middle_of", "pair_colour"]
 
 Rgb = tuple[int, int, int]
 
@@ -62,9 +62,17 @@ class PairPicture:
 
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Corners (3,), (3,) [m] of the box around phantom and nearly all of the cloud."""
-        low, high = np.percentile(self.cloud, [3, 97], axis=0)
+        """Corners (3,), (3,) [m] of the box around the phantom and the middle of the cloud."""
+        low, high = middle_of(self.cloud, float(np.ptp(self.vertices, axis=0).max()))
         return np.minimum(low, self.vertices.min(axis=0)), np.maximum(high, self.vertices.max(axis=0))
+
+
+def middle_of(points: FloatArray, reach: float) -> tuple[FloatArray, FloatArray]:
+    """Corners (3,), (3,) [m] of the box around nearly all points (n, 3) within `reach` [m] of their median."""
+    centre = np.median(points, axis=0)
+    near = points[np.linalg.norm(points - centre, axis=1) < reach]
+    low, high = np.percentile(near if len(near) else points, [4, 96], axis=0)
+    return low, high
 
 
 def pair_colour(number: int) -> Rgb:

@@ -98,7 +98,7 @@ class ViserPairScene:
             camera.fov = FIELD_OF_VIEW
             camera.near = 0.001
             camera.up_direction = (0.0, 0.0, 1.0)
-            camera.position = centre + direction * reach / np.sin(FIELD_OF_VIEW / 2) * 0.82
+            camera.position = centre + direction * reach / np.sin(FIELD_OF_VIEW / 2) * 1.05 / min(1.0, camera.aspect)
             camera.look_at = centre
 
     def eye(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -144,7 +144,7 @@ class ViserPairScene:
         ball = scene.add_icosphere(
             f"{name}/ball", CHOSEN if mark.chosen else BALL, pair_colour(mark.pair), subdivisions=3, cast_shadow=False
         )
-        scene.add_label(f"{name}/number", str(mark.pair + 1), anchor="bottom-left")
+        scene.add_label(f"{name}/number", str(mark.pair + 1), anchor="top-left" if mark.side == "cloud" else "top-right")
 
         @ball.on_drag
         def _(event: Any) -> None:

@@ -42,5 +42,5 @@ def test_a_pick_slides_on_the_surface_by_less_than_the_points_are_apart():
     slanted = np.column_stack([x.ravel(), y.ravel(), 0.3 + 0.5 * y.ravel()])
     aim = np.array([0.0103, 0.0057, 0.3 + 0.5 * 0.0057])
     moved = slide_on_cloud(slanted, slanted[1300], np.zeros(3), aim)
-    assert np.allclose(moved, aim, atol=1e-9)
+    assert moved is not None and np.allclose(moved, aim, atol=1e-9)
     assert slide_on_cloud(slanted, slanted[1300], np.zeros(3), np.array([0.0, 2.0, 1.0])) is None
