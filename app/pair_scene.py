@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from app import colours
+from app.lookout import FIELD_OF_VIEW
 from app.pair_picture import Arrow, Mark, PairPicture, pair_colour
-from app.scene import FIELD_OF_VIEW
 from core.frames import FloatArray
 
 if TYPE_CHECKING:

@@ -6,11 +6,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-from app.picture import Colouring, Layer
 from app.records import Job
 
 __all__ = [
-    "PROBLEMS", "DiagnosisRequest", "EffectIn", "HalfPair", "JobOut", "NoteOut", "Notes", "Point", "Problem", "Shown", "View",
+    "PROBLEMS", "DiagnosisRequest", "EffectIn", "HalfPair", "JobOut", "NoteOut", "Notes", "Point", "Problem", "Shown",
     "WeakDirection", "WhatIfRequest",
 ]  # fmt: skip
 
@@ -36,20 +35,6 @@ PROBLEMS: dict[int | str, dict[str, Any]] = {
     }.items()
 }
 """What any operation may answer besides its result."""
-
-
-class View(BaseModel):
-    """What a page wants to see; `limit` is the end of the error scale [m], None for automatic."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    run: str
-    sequence: str
-    frame: int = Field(default=0, ge=0)
-    layers: tuple[Layer, ...] = ("measured", "raw", "extended", "tool")
-    colour: Colouring = "plain"
-    limit: float | None = Field(default=None, gt=0.0, le=1.0)
-    crop: bool = True
 
 
 Point = Annotated[list[Annotated[FiniteFloat, Field(ge=-10.0, le=10.0)]], Field(min_length=3, max_length=3)]

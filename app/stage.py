@@ -8,8 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, TypeVar
 
+from app.lookout import FIELD_OF_VIEW
 from app.pair_scene import PairScene, Ray, ViserPairScene
-from app.scene import FIELD_OF_VIEW, Scene, ViserScene
+from app.scene import Scene, ViserScene
 
 if TYPE_CHECKING:
     from viser import ClientHandle, ViserServer

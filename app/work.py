@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 
 __all__ = ["TARGETS", "diagnose", "diagnose_into"]
 
-TARGETS = {"diagnosis": "app.work:diagnose", "sweep": "app.sweeps:sweep"}
+TARGETS = {
+    "diagnosis": "app.work:diagnose", "sweep": "app.sweeps:sweep", "training": "app.trainings:train",
+    "evaluation": "app.evaluations:evaluate",
+}  # fmt: skip
 
 
 def diagnose(request: dict[str, Any], report: Report) -> dict[str, Any]:
