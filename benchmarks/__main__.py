@@ -9,6 +9,7 @@ from rich.console import Console
 from benchmarks import (
     cleaning,
     convergence,
+    correction,
     dataset,
     diagnosis,
     effects,
@@ -35,6 +36,7 @@ ALL = {
     "cleaning": cleaning.run,
     "picking": picking.run,
     "dataset": dataset.run,
+    "correction": correction.run,
     "diagnosis": diagnosis.run,
 }
 WIDTH = 140
