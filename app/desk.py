@@ -16,7 +16,7 @@ from app.runs import Runs
 from app.sessions import Sessions
 from app.settings import Settings
 from app.stage import Stage
-from app.whatif import WhatIfs
+from app.whatif import Lives, WhatIfs
 
 __all__ = ["Desk", "DeskOf", "KeyOf"]
 
@@ -32,6 +32,7 @@ class Desk:
     sessions: Sessions
     stage: Stage
     whatifs: WhatIfs
+    lives: Lives
 
     @classmethod
     def open(cls, settings: Settings, targets: dict[str, str]) -> Desk:
@@ -46,6 +47,7 @@ class Desk:
             sessions=sessions,
             stage=Stage(sessions.join, sessions.leave),
             whatifs=WhatIfs(),
+            lives=Lives(),
         )
 
     def diagnose(self, dataset: Path, name: str, seed: int, key: str | None = None) -> Job:
@@ -59,6 +61,7 @@ class Desk:
         self.jobs.close()
         self.stage.close()
         self.whatifs.close()
+        self.lives.close()
 
 
 def _desk(connection: HTTPConnection) -> Desk:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from app.records import Job
 
-__all__ = ["PROBLEMS", "DiagnosisRequest", "EffectIn", "JobOut", "NoteOut", "Notes", "Problem", "WhatIfRequest"]
+__all__ = ["PROBLEMS", "DiagnosisRequest", "EffectIn", "JobOut", "LiveRequest", "NoteOut", "Notes", "Problem", "WhatIfRequest"]
 
 
 class Problem(BaseModel):
@@ -63,6 +63,23 @@ class WhatIfRequest(BaseModel):
     frame: int = Field(ge=0)
     effects: tuple[EffectIn, ...] = Field(default=(), max_length=12)
     tuned: bool = True
+    page: str | None = None
+
+
+class LiveRequest(BaseModel):
+    """Where a hand leads the tool's centre to [m], phantom frame, and the model that answers; `page` shows it there.
+
+    `shown` is the run's model in whose place it is drawn.
+    """
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", json_schema_extra={"examples": [{"at": [0.0, 0.0, 0.038], "effects": [], "tuned": False}]}
+    )
+
+    at: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+    effects: tuple[EffectIn, ...] = Field(default=(), max_length=12)
+    tuned: bool = True
+    shown: Literal["raw", "extended"] = "extended"
     page: str | None = None
 
 
