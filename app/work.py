@@ -13,7 +13,10 @@ from core.progress import Report
 
 __all__ = ["TARGETS", "diagnose", "diagnose_into"]
 
-TARGETS = {"diagnosis": "app.work:diagnose", "sweep": "app.sweeps:sweep"}
+TARGETS = {
+    "diagnosis": "app.work:diagnose", "sweep": "app.sweeps:sweep", "training": "app.trainings:train",
+    "evaluation": "app.evaluations:evaluate",
+}  # fmt: skip
 
 
 def diagnose(request: dict[str, Any], report: Report) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import torch
 
 from core.errors import RunError
 
-__all__ = ["load", "random_state", "restore_random_state", "save"]
+__all__ = ["load", "note", "random_state", "restore_random_state", "save"]
 
 
 def save(path: Path, content: dict[str, Any]) -> None:
@@ -25,6 +26,13 @@ def save(path: Path, content: dict[str, Any]) -> None:
         os.replace(aside, path)
     finally:
         aside.unlink(missing_ok=True)
+
+
+def note(path: Path, value: Any) -> None:
+    """Write plain values for readers without torch, whole at any moment."""
+    aside = path.with_name(f".{path.name}-{uuid4().hex}")
+    aside.write_text(json.dumps(value))
+    os.replace(aside, path)
 
 
 def load(path: Path, device: torch.device | str = "cpu") -> dict[str, Any]:

@@ -11,8 +11,9 @@ import pytest
 from recorded_run import RADIUS, SEQUENCE, write_recorded_run
 
 from core.diagnosis.inside import Inside
+from core.diagnosis.kept import effects_from
 from core.errors import EffectError, RunError
-from core.whatif import WhatIf, effects_from
+from core.whatif import WhatIf
 
 LARGER = {"effect": "tool_radius", "parameters": {"radius": RADIUS}}
 
