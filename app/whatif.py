@@ -87,7 +87,8 @@ _hands: OrderedDict[str, Live] = OrderedDict()
 def _felt(hand: Hand, centre: tuple[float, float, float], within: bool) -> Felt:
     import numpy as np  # noqa: PLC0415
 
-    from core.whatif import effects_from, opened  # noqa: PLC0415 (heavy)
+    from core.diagnosis.kept import effects_from  # noqa: PLC0415 (heavy)
+    from core.whatif import opened  # noqa: PLC0415 (heavy)
 
     key = json.dumps([hand.name, hand.key, hand.effects, hand.tuned])
     live = _hands.pop(key, None)

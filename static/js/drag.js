@@ -2,9 +2,13 @@
 const NEAR = 14; // pixels within which the tool is caught
 const STEEP = 0.85; // a camera that looks down more than this sees no upright plane
 
-/** three.js has y upwards, the phantom z. */
-const toThree = ([x, y, z]) => [x, z, -y];
-const fromThree = ([x, y, z]) => [x, -z, y];
+/** Axes of the phantom frame, as the viewer's own frame has them: a rotation. */
+const axes = (viewer) => {
+  const turn = viewer.__viserMutable.nodeRefFromName[""].matrixWorld.elements;
+  return [0, 4, 8].map((column) => [turn[column], turn[column + 1], turn[column + 2]]);
+};
+const fromViewer = (viewer, place) => axes(viewer).map((axis) => dot(axis, place));
+const toViewer = (viewer, place) => axes(viewer).reduce((sum, axis, i) => plus(sum, axis, place[i]), [0, 0, 0]);
 const dot = (a, b) => a.reduce((sum, value, i) => sum + value * b[i], 0);
 const plus = (a, b, times = 1) => a.map((value, i) => value + times * b[i]);
 const unit = (a) => a.map((value) => value / Math.hypot(...a));
@@ -18,7 +22,7 @@ export function sight(viewer, event) {
   const world = camera.matrixWorld.elements;
   const own = [x * lens[0], y * lens[5], -1];
   const direction = [0, 1, 2].map((row) => dot(own, [world[row], world[row + 4], world[row + 8]]));
-  return { from: fromThree([world[12], world[13], world[14]]), along: unit(fromThree(direction)) };
+  return { from: fromViewer(viewer, [world[12], world[13], world[14]]), along: unit(fromViewer(viewer, direction)) };
 }
 
 /** Where a place is in the viewer's window, in pixels. */
@@ -26,7 +30,7 @@ export function onScreen(viewer, place) {
   const { camera, canvas } = viewer.__viserMutable;
   const box = canvas.getBoundingClientRect();
   const apply = (matrix, [x, y, z, w]) => [0, 1, 2, 3].map((row) => matrix[row] * x + matrix[row + 4] * y + matrix[row + 8] * z + matrix[row + 12] * w);
-  const [x, y, , w] = apply(camera.projectionMatrix.elements, apply(camera.matrixWorldInverse.elements, [...toThree(place), 1]));
+  const [x, y, , w] = apply(camera.projectionMatrix.elements, apply(camera.matrixWorldInverse.elements, [...toViewer(viewer, place), 1]));
   return [(x / w + 1) / 2 * box.width + box.left, (1 - y / w) / 2 * box.height + box.top];
 }
 

@@ -237,13 +237,16 @@ def test_a_person_pushes_the_block_with_the_mouse(there: httpx.Client, browser: 
         page.until(lambda: page.page.inner_text("#live-push").startswith("2.00"))
         assert page.page.inner_text("#live-force") != "0.000 N"
         assert "Displacement" in page.page.inner_text("#legend")
+        page.page.locator("#live-pad").click(position={"x": 90, "y": 70})
+        page.until(lambda: page.held["drawn"]["tool"][0] < -0.01)
         x, y = tool_on_screen(page)
         page.page.mouse.move(x, y)
         page.page.mouse.down()
         for step in range(1, 9):
-            page.page.mouse.move(x, y + 2 * step)
+            page.page.mouse.move(x + 3 * step, y + 2 * step)
         page.until(lambda: float(page.page.inner_text("#live-push").split()[0]) > 2.5)
         page.page.mouse.up()
+        page.until(lambda: tool_on_screen(page) == pytest.approx((x + 24, y + 16), abs=1.0))
         page.page.screenshot(path=tmp_path / "live.png")
         page.page.select_option("[aria-label='Model that answers']", "raw")
         page.until(lambda: any(name.startswith("/mesh/raw") for name in page.visible()))
