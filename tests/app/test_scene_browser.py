@@ -77,7 +77,7 @@ def test_views_stills_and_clips(page: Page, tmp_path: Path) -> None:
     box = page.page.locator("#viewer").bounding_box()
     with Image.open(tmp_path / "still.png") as still:
         assert still.size == (round(box["width"]), round(box["height"]))
-        assert len(still.convert("RGB").getcolors(2**20)) > 50
+        assert len(still.convert("RGB").getcolors(2**20) or ()) > 50
 
     page.page.keyboard.press("i")
     page.page.keyboard.press("End")
@@ -87,7 +87,7 @@ def test_views_stills_and_clips(page: Page, tmp_path: Path) -> None:
         page.page.click("#clip")
     download.value.save_as(tmp_path / "clip.gif")
     with Image.open(tmp_path / "clip.gif") as clip:
-        assert (clip.n_frames, clip.info["duration"]) == (3, 200)
+        assert (getattr(clip, "n_frames", 1), clip.info["duration"]) == (3, 200)
     page.until(lambda: page.frame == 0)
     page.page.click("#clip")
     page.page.get_by_role("button", name="Cancel").click()
