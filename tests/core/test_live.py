@@ -63,10 +63,10 @@ def test_tool_is_led_no_further_than_it_may_go(live: Live, wanted: tuple[float, 
 def test_frame_without_equilibrium_says_so_and_shows_the_last_one() -> None:
     """A tool whose tip is lower than stated runs into the held edge of the base."""
     live = Live(Setup(geometry=Box(size=SIZE), tool=Tool(radius=RADIUS, offset=(0.0, 0.0, -2e-3))), PAGE_GRID)
-    side = np.array([SIZE[0] / 2, 0.0, 0.0])
-    before = live.at(side + [RADIUS - 1e-3, 0.0, 0.02])
-    felt = live.at(side + [2e-3, 0.0, RADIUS])
+    beside = np.array([SIZE[0] / 2 + RADIUS - 1e-3, 0.0, 0.02])
+    before = live.at(beside)
+    felt = live.at(np.array([SIZE[0] / 2 + 2e-3, 0.0, RADIUS]))
     assert before.converged and not felt.converged
     assert "base" in felt.outcome
     assert np.array_equal(felt.surface, before.surface)
-    assert live.at(side + [RADIUS - 1e-3, 0.0, 0.02]).converged
+    assert live.at(beside).converged
