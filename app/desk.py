@@ -20,7 +20,7 @@ from app.runs import Runs
 from app.sessions import Sessions
 from app.settings import Settings
 from app.stage import Audience, Stage
-from app.whatif import WhatIfs
+from app.whatif import Lives, WhatIfs
 
 __all__ = ["Desk", "DeskOf", "KeyOf"]
 
@@ -38,6 +38,7 @@ class Desk:
     stage: Stage
     clickings: Clickings
     whatifs: WhatIfs
+    lives: Lives
 
     @classmethod
     def open(cls, settings: Settings, targets: dict[str, str]) -> Desk:
@@ -55,6 +56,7 @@ class Desk:
             stage=Stage(Audience(sessions.join, sessions.leave), Audience(clickings.join, clickings.leave), clickings.click),
             clickings=clickings,
             whatifs=WhatIfs(),
+            lives=Lives(),
         )
 
     def diagnose(self, dataset: Path, name: str, seed: int, key: str | None = None, registration: str | None = None) -> Job:
@@ -81,6 +83,7 @@ class Desk:
         self.jobs.close()
         self.stage.close()
         self.whatifs.close()
+        self.lives.close()
 
 
 def _tidied(disk: Disk) -> str:
