@@ -45,7 +45,7 @@ def test_a_replay_becomes_a_run_of_its_own(palpate: Client, client: httpx.Client
     job = palpate.replay("small", sequences=["poke-01"], effects=effects, registration="for-replay")
     run = palpate.wait(job["id"])["result"]["run"]
     heading = client.get(f"/api/runs/{run}").json()
-    assert heading["verdict"] == "replay" and heading["sentence"].startswith("Replayed with a tool")
+    assert heading["verdict"] == "replay" and heading["sentence"].startswith("Replayed with the size of the tool")
     assert [one["name"] for one in heading["sequences"]] == ["poke-01"] and "for-replay" in heading["notes"][0]
     course = client.get(f"/api/runs/{run}/sequences/poke-01").json()
     assert len(course["time"]) == 5
