@@ -14,11 +14,13 @@ from benchmarks import (
     diagnosis,
     effects,
     gradings,
+    live,
     measurement,
     modulus,
     peers,
     picking,
     replay,
+    scrub,
     shapes,
     sweep,
 )
@@ -38,6 +40,8 @@ ALL = {
     "dataset": dataset.run,
     "correction": correction.run,
     "diagnosis": diagnosis.run,
+    "live": live.run,
+    "scrub": scrub.run,
 }
 WIDTH = 140
 """Characters of a line where there is no terminal to ask."""
