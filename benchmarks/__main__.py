@@ -9,6 +9,7 @@ from rich.console import Console
 from benchmarks import (
     cleaning,
     convergence,
+    correcting,
     correction,
     dataset,
     diagnosis,
@@ -39,6 +40,7 @@ ALL = {
     "picking": picking.run,
     "dataset": dataset.run,
     "correction": correction.run,
+    "correcting": correcting.run,
     "diagnosis": diagnosis.run,
     "live": live.run,
     "scrub": scrub.run,
