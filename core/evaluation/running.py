@@ -137,7 +137,7 @@ def evaluate(
         for name, setup in _setups(bench.stated, asked).items()
     ]
     climbed = bench.climb(steps, workers=workers, seed=seed, report=part(report, 0.2, 0.95))
-    found = {"format": 1, "dataset": dataset.name, "split": "test", **climbed}
+    found = {"format": 1, "dataset": dataset.name, "folder": dataset.path.resolve().name, "split": "test", **climbed}
     found["sentence"] = meaning(found)
     _write(out, found)
     report(1.0, "done")

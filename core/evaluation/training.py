@@ -88,18 +88,17 @@ def train_network(
     from core.correction import Split, TrainingSpec, train  # noqa: PLC0415 (heavy)
 
     spec = TrainingSpec.from_json(wanted.spec)
-    _claim(
-        folder, {**wanted.to_json(), "dataset": str(dataset.path.resolve()), "model": None if model is None else model["effects"]}
-    )
+    effects = None if model is None else model["effects"]
+    _claim(folder, {**wanted.to_json(), "dataset": str(dataset.path.resolve()), "run": run, "model": effects})
     if (folder / SUMMARY).is_file():
         return dict(json.loads((folder / SUMMARY).read_text()))
     samples = _samples(dataset, wanted, store, model, setup, workers, part(report, 0.0, _SAMPLING))
     trained = train(samples, Split.of(samples), spec, folder, part(report, _SAMPLING, 1.0))
     about = trained.about
     summary = {
-        "format": 1, "dataset": dataset.name, "kind": spec.network.kind, "samples": len(samples), "sequences": about["split"],
-        "epochs": len(about["history"]), "best_epoch": about["epoch"], "validation_error_mm": about["error"],
-        "validation_error_without_mm": about["raw_error"], "history": about["history"],
+        "format": 1, "dataset": dataset.name, "folder": dataset.path.resolve().name, "kind": spec.network.kind,
+        "samples": len(samples), "sequences": about["split"], "epochs": len(about["history"]), "best_epoch": about["epoch"],
+        "validation_error_mm": about["error"], "validation_error_without_mm": about["raw_error"], "history": about["history"],
     }  # fmt: skip
     _write(folder / SUMMARY, summary)
     return summary

@@ -1,5 +1,6 @@
 // Starts the parts and follows what is chosen.
 import { get, toast } from "./api.js";
+import * as correction from "./correction.js";
 import { fill, icon } from "./dom.js";
 import { openPanel } from "./panels.js";
 import * as rail from "./rail.js";
@@ -63,6 +64,7 @@ async function start() {
   set({ palette });
   timeline.start();
   startSweeps();
+  correction.start(() => openSequence().catch(toast));
   scene.start();
   whatif.start();
   on(["sequence"], () => { set({ series: null, frame: 0, loop: null }); openSequence().catch(toast); });
