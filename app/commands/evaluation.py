@@ -10,10 +10,9 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from app.commands.diagnosis import truth_beside
+from app.commands.diagnosis import true_effects
 from app.console import out, progress, write_json
 from app.sentences import quantity
-from core.errors import RunError
 
 __all__ = ["evaluate"]
 
@@ -62,7 +61,7 @@ def _ladder(
     name = f"{dataset.resolve().name}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(2)}"
     request = {
         "dataset": str(dataset), "runs": str(runs), "workers": workers, "run": run, "trainings": trainings, "seed": seed,
-        "truth": _hidden(dataset) if truth else None, "folder": name,
+        "truth": true_effects(dataset) if truth else None, "folder": name,
     }  # fmt: skip
     with progress(f"evaluate {dataset.name}") as report:
         climb(request, report)
@@ -74,18 +73,6 @@ def _ladder(
             out.print(_rungs(found["rungs"], one))
     out.print(f"{kept.folder / name}", highlight=False, soft_wrap=True)
     return found
-
-
-def _hidden(dataset: Path) -> list[dict[str, Any]]:
-    """The effects of a truth file as plain values."""
-    truth = truth_beside(dataset)
-    if truth is None:
-        file = f"{dataset.name}.truth.json"
-        raise RunError(f"{dataset.name} has no {file} beside it; leave --truth out", file=file)
-    return [
-        {"effect": one["effect"], "parameters": {key: entry["value"] for key, entry in one["parameters"].items()}}
-        for one in truth["effects"]
-    ]
 
 
 def _rungs(rungs: list[dict[str, Any]], one: dict[str, Any]) -> Table:
