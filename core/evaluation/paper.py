@@ -23,7 +23,7 @@ from core.setup import Setup
 from core.sweeping import Axis, Request, Space
 from core.sweeping.running import run_sweep
 
-__all__ = ["MODULI", "PaperRequest", "run_paper"]
+__all__ = ["MODULI", "PaperRequest", "run_paper", "what_it_shows"]
 
 MODULI = (5e3, 1e4, 1e1)
 """Young's moduli at which the paper corrects the simulation [Pa]."""
@@ -75,7 +75,7 @@ def run_paper(
         rows.append(_corrected(bench, modulus, folder, samples, request.training, workers, seed, part(report, low, low + width)))
     found = {
         "format": 1, "dataset": dataset.name, "unit": "mm", "coarse": _table(coarse), "fine": _table(fine),
-        "what_the_search_shows": _said(coarse, fine), "correction": rows,
+        "what_the_search_shows": what_it_shows(coarse, fine), "correction": rows,
     }  # fmt: skip
     aside = folder / ".paper.json.part"
     aside.write_text(json.dumps(found, indent=1) + "\n")
@@ -113,7 +113,7 @@ def _table(search: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _said(coarse: Mapping[str, Any], fine: Mapping[str, Any]) -> str:
+def what_it_shows(coarse: Mapping[str, Any], fine: Mapping[str, Any]) -> str:
     """What the two searches mean."""
     changes = [one["change"] * 1e3 for search in (coarse, fine) for one in search["directions"]]
     flat = all(one["flat"] for search in (coarse, fine) for one in search["directions"])

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 from browsing import NEEDS_CHROMIUM, Page
 from typer.testing import CliRunner
@@ -54,6 +55,8 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     }  # fmt: skip
     for name, value in values.items():
         (run / f"{name}.json").write_text(json.dumps(value))
+    seen = np.zeros((0, 3))
+    np.savez(run / "patterns.npz", centres=seen, normals=seen, measured=np.zeros(0), predicted=np.zeros(0))
     return folder
 
 
