@@ -54,7 +54,12 @@ def evaluate(request: Mapping[str, Any], report: Report) -> dict[str, Any]:
     networks = networks_for(
         Trainings(runs), dataset, request.get("run"), list(request.get("trainings", ())), request.get("truth") is not None
     )
-    asked = Asked(model=None if run is None else run.model, truth=request.get("truth"), networks=networks)
+    asked = Asked(
+        model=None if run is None else run.model,
+        truth=request.get("truth"),
+        networks=networks,
+        feedback=request.get("feedback", "none"),
+    )
     out = Evaluations(runs).folder / name
     found = climb(open_dataset(dataset), asked, out, workers=int(request["workers"]), seed=int(request["seed"]), report=report)
     return {"evaluation": name, "sentence": found["sentence"]}

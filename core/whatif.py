@@ -13,6 +13,7 @@ import numpy as np
 
 from core.cleaning import cleaner_for, find_shaft_axis, tool_poses
 from core.dataset import open_dataset
+from core.dataset.accepted import Accepted
 from core.diagnosis.hypothesis import with_effects
 from core.diagnosis.inside import Inside
 from core.diagnosis.kept import tuned_as
@@ -66,7 +67,8 @@ class WhatIf:
     """
 
     def __init__(self, folder: Path, sequence: str, clouds: Sequence[int], extended: dict[str, Any]) -> None:
-        dataset = open_dataset(folder)
+        registered = extended.get("registration")
+        dataset = open_dataset(folder).registered(Accepted.from_json(registered) if registered else None)
         if isinstance(dataset.geometry, Shape) or not len(dataset.sequence(sequence)):
             raise RunError(f"{sequence} has no clouds of a block, so that there is nothing to compare with", sequence=sequence)
         registration = register(dataset)

@@ -14,7 +14,7 @@ from app.comparison import compared
 from app.course import course
 from app.desk import DeskOf
 from app.runs import Replay, Run
-from app.sentences import verdict_sentence
+from app.sentences import registration_sentences, verdict_sentence
 from app.side import NO_INSIDE
 from app.summaries import finite
 from app.view import Quantity
@@ -40,6 +40,7 @@ def one(name: str, desk: DeskOf) -> dict[str, Any]:
     return {
         **_heading(run),
         "sentence": verdict_sentence(run.report, size),
+        "notes": registration_sentences(run.report),
         "size": size,
         "has_clouds": Path(run.origin.get("dataset", "")).is_dir() and "dataset" in run.origin,
         "sequences": [

@@ -24,6 +24,9 @@ def evaluate(
     dataset: Annotated[Path, typer.Argument(help="A dataset folder; --paper makes it if it is not there.", show_default=False)],
     run: Annotated[str | None, typer.Option(help="A diagnosis below RUNS whose extended model stands on the ladder.")] = None,
     training: Annotated[list[str] | None, typer.Option(help="Trainings below RUNS/trainings; the newest ones without.")] = None,
+    feedback: Annotated[
+        str, typer.Option(help="none, or follow: the simulation answers for what a network does not see.")
+    ] = "none",
     truth: Annotated[
         bool, typer.Option("--truth", help="Also the true effects of a virtual dataset, from DATASET.truth.json.")
     ] = False,
@@ -43,26 +46,26 @@ def evaluate(
 
     With --paper: the paper's searches for the modulus, and its corrections at 5e3, 1e4 and 1e1 Pa, in 2D and 3D.
     """
+    if feedback not in ("none", "follow"):
+        raise typer.BadParameter(f"--feedback is none or follow, not {feedback!r}")
     if paper:
         _make(dataset, size, seed, workers)
         found = _paper(dataset, [int(one) for one in features.split(",")], epochs, every, seed, workers, runs)
     else:
-        found = _ladder(dataset, run, training or [], truth, seed, workers, runs)
+        found = _ladder(
+            dataset, {"run": run, "trainings": training or [], "feedback": feedback, "seed": seed}, truth, workers, runs
+        )
     if file is not None:
         write_json(file, found)
 
 
-def _ladder(
-    dataset: Path, run: str | None, trainings: list[str], truth: bool, seed: int, workers: int, runs: Path
-) -> dict[str, Any]:
+def _ladder(dataset: Path, asked: dict[str, Any], truth: bool, workers: int, runs: Path) -> dict[str, Any]:
     from app.evaluations import Evaluations  # noqa: PLC0415 (heavy)
     from app.evaluations import evaluate as climb  # noqa: PLC0415 (heavy)
 
     name = f"{dataset.resolve().name}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(2)}"
-    request = {
-        "dataset": str(dataset), "runs": str(runs), "workers": workers, "run": run, "trainings": trainings, "seed": seed,
-        "truth": true_effects(dataset) if truth else None, "folder": name,
-    }  # fmt: skip
+    hidden = true_effects(dataset) if truth else None
+    request = {**asked, "dataset": str(dataset), "runs": str(runs), "workers": workers, "truth": hidden, "folder": name}
     with progress(f"evaluate {dataset.name}") as report:
         climb(request, report)
     kept = Evaluations(runs)

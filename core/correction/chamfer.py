@@ -49,7 +49,7 @@ class Loss:
 def held_weights(seen: FloatArray) -> FloatArray:
     """How much each material point (v,) is to stay where the simulation has it [0..1], by the measured points near it (v,)."""
     best = float(seen.max(initial=0.0))
-    return np.ones_like(seen) if best == 0.0 else np.asarray(1.0 / (1.0 + (seen / (_SCARCE * best)) ** 2))
+    return np.ones_like(seen) if best == 0.0 else np.asarray(1.0 / (1.0 + (seen / (_SCARCE * best)) ** 4))
 
 
 class SurfaceLoss:
@@ -62,7 +62,7 @@ class SurfaceLoss:
     """
 
     def __init__(
-        self, body: Body, seen: FloatArray, *, distance: Distance = "chamfer", hold: float = 1.0, device: torch.device | str = "cpu"
+        self, body: Body, seen: FloatArray, *, distance: Distance = "chamfer", hold: float = 0.1, device: torch.device | str = "cpu"
     ) -> None:
         if distance not in get_args(Distance):
             known = ", ".join(get_args(Distance))
@@ -90,7 +90,7 @@ class SurfaceLoss:
         """Of corrected and simulated vertices (b, v, 3) [m]."""
         distance = self._distance(corrected, batch) * 1e3
         moved = ((corrected - raw) * 1e3).square().sum(dim=2)
-        hidden = (moved @ self._held).mean() / self._held.sum().clamp_min(1e-9)
+        hidden = (moved @ self._held).mean() / len(self._held)
         return Loss(distance + self.hold * hidden, distance, hidden)
 
     def _distance(self, vertices: Tensor, batch: Batch) -> Tensor:
@@ -142,6 +142,10 @@ def nearest(points: Tensor, others: Tensor, valid: Tensor) -> Tensor:
     """
     if points.device.type == "cpu":
         return _by_tree(points, others, valid)
+    return torch.where(valid, _by_all(points, others), 0)
+
+
+def _by_all(points: Tensor, others: Tensor) -> Tensor:
     index = torch.zeros(points.shape[:2], dtype=torch.long, device=points.device)
     step = max(1, _ROOM // (points.shape[1] * others.shape[1]))
     for start in range(0, len(points), step):
@@ -149,7 +153,7 @@ def nearest(points: Tensor, others: Tensor, valid: Tensor) -> Tensor:
         # Through a matrix product distances below a tenth of a millimetre would be lost.
         apart = torch.cdist(points[part], others[part], compute_mode="donot_use_mm_for_euclid_dist")
         index[part] = apart.argmin(dim=2)
-    return torch.where(valid, index, 0)
+    return index
 
 
 def _by_tree(points: Tensor, others: Tensor, valid: Tensor) -> Tensor:
@@ -169,7 +173,9 @@ def _by_tree(points: Tensor, others: Tensor, valid: Tensor) -> Tensor:
 
 
 def _query(others: Any, points: Any) -> Any:
-    usable = np.isfinite(others[:, 0])
+    usable = np.isfinite(others).all(axis=1)
+    if not usable.any():
+        return np.zeros(len(points), dtype=np.int64)
     found = cKDTree(others[usable]).query(points)[1]
     return found if usable.all() else np.flatnonzero(usable)[found]
 

@@ -66,8 +66,9 @@ class NetworkSpec:
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> Self:
-        """The inverse."""
-        return cls(**{**data, "features": tuple(data["features"]), "inputs": tuple(data["inputs"])})
+        """The inverse; what is left out has its default."""
+        plain: dict[str, Any] = {**data, **{key: tuple(data[key]) for key in ("features", "inputs") if key in data}}
+        return cls(**plain)
 
 
 class GraphNet(nn.Module):
@@ -111,13 +112,14 @@ class _Round(nn.Module):
 class CorrectionNetwork(nn.Module):
     """Vertices and tool in, corrected vertices out, for one body.
 
-    What the inside sees is standardised by `tool_mean`, `tool_scale` (t,) and `spread` [m], which `standardise` sets once from the
-    samples that are trained on, and which are kept with the weights.
+    The tool's place is seen as a share of the body's extent, and displacements, velocity and force by what is usual in the samples
+    (`measure_by`), which is kept with the weights. The place is not: pushes in one spot have next to no spread, and any other spot
+    would lie a hundred deviations away.
     """
 
     rest: Tensor
     bound: Tensor
-    tool_mean: Tensor
+    tool_middle: Tensor
     tool_scale: Tensor
     spread: Tensor
     place: Tensor
@@ -135,8 +137,8 @@ class CorrectionNetwork(nn.Module):
         self._keep("bound", spec.trust * body.voxel)
         self._keep("place", (body.rest - middle) / half)
         self._keep("extent", half)
-        self._keep("tool_mean", np.zeros(count))
-        self._keep("tool_scale", np.ones(count))
+        self._keep("tool_middle", np.concatenate([middle, np.zeros(10)])[spec.columns])
+        self._keep("tool_scale", np.concatenate([half, np.ones(4), np.full(3, 0.01), np.ones(3)])[spec.columns])
         self._keep("spread", np.array(float(body.voxel.mean()) / 4))
         self.inside: UNet | GraphNet
         if spec.kind == "graph":
@@ -148,26 +150,25 @@ class CorrectionNetwork(nn.Module):
             # Displacement, place at rest, the way to the tool, and the tool itself.
             self.inside = GraphNet(3 + 3 + 3 + count, 4, spec.features[-1], len(spec.features))
         else:
-            self.inside = UNet(2 if spec.kind == "unet2d" else 3, 3, count, spec.features)
+            self.inside = UNet(body.grid or (), 3, count, spec.features)
         for parameter in self.inside.last.parameters():
             nn.init.zeros_(parameter)
 
     def _keep(self, name: str, values: Any) -> None:
         self.register_buffer(name, torch.as_tensor(np.asarray(values, dtype=np.float32)))
 
-    def standardise(self, tool_mean: Tensor, tool_deviation: Tensor, spread: float) -> None:
-        """Set what inputs are measured by: mean and deviation (13,) of the tool's numbers, RMS displacement [m]."""
-        columns = self._columns
-        # Of what hardly moves (a quaternion held still) nothing would be left but noise.
-        least = torch.tensor([1e-3] * 3 + [1e-2] * 4 + [1e-3] * 3 + [1e-9] * 3)
-        self.tool_mean.copy_(tool_mean[columns])
-        self.tool_scale.copy_(torch.maximum(tool_deviation, least)[columns])
-        self.spread.fill_(max(spread, 1e-5))
+    def measure_by(self, velocity: float, force: float, displacement: float) -> None:
+        """What is usual, RMS along an axis: the tool's velocity [m/s], its force [N], displacements of the points [m]."""
+        scale = self.tool_scale.new_ones(13)
+        scale[self._columns] = self.tool_scale
+        scale[7:10], scale[10:] = max(velocity, 1e-4), max(force, 1e-9)
+        self.tool_scale.copy_(scale[self._columns])
+        self.spread.fill_(max(displacement, 1e-5))
 
     def forward(self, vertices: Tensor, tool: Tensor) -> Tensor:
         """Corrected vertices (b, v, 3) [m] of simulated ones (b, v, 3) [m], and the tool (b, 13) of TOOL_INPUTS."""
         moved = (vertices - self.rest) / self.spread
-        known = (tool[:, self._columns] - self.tool_mean) / self.tool_scale
+        known = (tool[:, self._columns] - self.tool_middle) / self.tool_scale
         said = (
             self._graph(vertices, moved, tool, known)
             if self.grid is None or self.spec.kind == "graph"

@@ -32,7 +32,7 @@ class TrainingSpec:
 
     network: NetworkSpec = field(default_factory=NetworkSpec)
     distance: Distance = "chamfer"
-    hold: float = 1.0
+    hold: float = 0.1
     rate: float = 5e-4
     batch: int = 64
     epochs: int = 40

@@ -159,11 +159,11 @@ class _Run:
     def result(self) -> Trained:
         """The best network."""
         self.network.load_state_dict(self.best)
+        known = {key: self.samples.about[key] for key in ("dataset", "setup", "mesh", "force", "seen")}
         about = {
-            "dataset": self.samples.about["dataset"], "setup": self.samples.about["setup"], "mesh": self.samples.about["mesh"],
-            "force": self.samples.about["force"], "split": {key: list(names) for key, names in asdict(self.split).items()},
-            "training": self.spec.to_json(), "error": self.place.best, "raw_error": self.place.raw_error,
-            "epoch": self.place.best_epoch + 1, "history": self.place.history,
+            **known, "split": {key: list(names) for key, names in asdict(self.split).items()}, "training": self.spec.to_json(),
+            "error": self.place.best, "raw_error": self.place.raw_error, "epoch": self.place.best_epoch + 1,
+            "history": self.place.history,
         }  # fmt: skip
         return Trained(self.network.eval(), self.body, about)
 
@@ -223,12 +223,13 @@ class _Run:
     # -- what is kept -----------------------------------------------------------------------------------------------------------
 
     def _begin(self) -> None:
-        self.network.standardise(*_statistics(self.samples, self.rows, self.body))
+        self.network.measure_by(*_usual(self.samples, self.rows, self.body))
         raw = errors_of(None, self.loss, self.body, self.samples, self.held_out, self.device)
         if not len(raw):
             names = ", ".join(self.split.validation)
             raise CorrectionError(f"no measured point in {names} to validate by; name other sequences", key="validation")
-        self.place.raw_error = float(raw.mean())
+        # What is worse than no network at all is not kept.
+        self.place.raw_error = self.place.best = float(raw.mean())
         self.best = {name: value.detach().clone() for name, value in self.network.state_dict().items()}
 
     def _asked(self) -> dict[str, Any]:
@@ -279,14 +280,12 @@ class _Run:
             self._writer.add_scalar(name, value, self.place.total)
 
 
-def _statistics(samples: Samples, rows: IntArray, body: Body) -> tuple[Tensor, Tensor, float]:
-    """Mean and deviation (13,) of what is known of the tool, and RMS displacement [m], in one pass over the samples."""
-    count, total, square, moved = 0, torch.zeros(13, dtype=torch.float64), torch.zeros(13, dtype=torch.float64), 0.0
-    rest = torch.as_tensor(body.rest)
+def _usual(samples: Samples, rows: IntArray, body: Body) -> tuple[float, float, float]:
+    """RMS along an axis of the tool's velocity [m/s], its force [N] and of displacements [m], in one pass over the samples."""
+    squares, counts, rest = torch.zeros(3, dtype=torch.float64), torch.zeros(3, dtype=torch.float64), torch.as_tensor(body.rest)
     for batch in samples.batches(rows, _CHUNK):
-        tool = batch.tool.double()
-        count, total, square = count + len(tool), total + tool.sum(dim=0), square + tool.square().sum(dim=0)
-        moved += float((batch.positions[:, body.index].double() - rest).square().sum())
-    mean = total / count
-    deviation = (square / count - mean.square()).clamp_min(0).sqrt()
-    return mean.float(), deviation.float(), (moved / (count * body.rest.size)) ** 0.5
+        parts = (batch.tool[:, 7:10].double(), batch.tool[:, 10:].double(), batch.positions[:, body.index].double() - rest)
+        squares += torch.stack([part.square().sum() for part in parts])
+        counts += torch.tensor([part.numel() for part in parts])
+    velocity, force, displacement = (squares / counts).sqrt().tolist()
+    return velocity, force, displacement

@@ -10,6 +10,7 @@ of it. `Padded` leaves the taps out that never meet a voxel, which changes no re
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -20,6 +21,8 @@ from torch.nn import functional
 __all__ = ["Padded", "UNet"]
 
 KERNEL, BOTTOM = 3, 4
+_TOOL = 0.1
+"""Size of the first weights on what is known of the tool, over that of all others [1]."""
 
 
 class Padded(nn.Module):
@@ -28,7 +31,8 @@ class Padded(nn.Module):
     def __init__(self, axes: int, inputs: int, outputs: int) -> None:
         super().__init__()
         made = (nn.Conv2d if axes == 2 else nn.Conv3d)(inputs, outputs, KERNEL, padding=1)
-        self.weight, self.bias, self._axes = made.weight, made.bias, axes
+        self.weight, self._axes = made.weight, axes
+        self.bias = nn.Parameter(torch.zeros(outputs))
 
     def forward(self, values: Tensor) -> Tensor:
         """(b, outputs, ...) of (b, inputs, ...)."""
@@ -48,12 +52,14 @@ class UNet(nn.Module):
     """Values on a grid, and numbers that hold for all of it, to values on the same grid.
 
     Args:
-        axes: 2 or 3. channels: in and out. known: numbers concatenated at the bottom. features: of the blocks, from fine to coarse.
+        grid: points along two or three axes that its first weights are made for; it takes any other, too.
+        channels: in and out. known: numbers concatenated at the bottom. features: of the blocks, from fine to coarse.
     """
 
-    def __init__(self, axes: int, channels: int, known: int, features: Sequence[int] = (64, 128, 256)) -> None:
+    def __init__(self, grid: Sequence[int], channels: int, known: int, features: Sequence[int] = (64, 128, 256)) -> None:
         super().__init__()
-        self._axes = axes
+        self._axes, self._known = len(grid), known
+        axes = self._axes
         ahead = [channels, *features[:-1]]
         self.down = nn.ModuleList(_two(axes, a, b) for a, b in zip(ahead, features, strict=True))
         deep = features[-1]
@@ -65,6 +71,31 @@ class UNet(nn.Module):
         self.doubled = nn.ModuleList(transposed(a, b, 2, stride=2) for a, b in pairwise(widths))
         self.up = nn.ModuleList(_two(axes, 2 * width, width) for width in reversed(features))
         self.last = (nn.Conv2d if axes == 2 else nn.Conv3d)(features[0], channels, 1)
+        self._draw(grid)
+
+    @torch.no_grad()
+    def _draw(self, grid: Sequence[int]) -> None:
+        """First weights that keep the size of what goes through (He et al. 2015), counting only the taps that meet a voxel.
+
+        With torch's own, what the tool says at the bottom arrives at the output as 1e-8 of what it was.
+        """
+        lengths = [list(grid)]
+        for _ in self.down:
+            lengths.append([-(-length // 2) for length in lengths[-1]])
+        parts = [*self.down, self.bottom, *self.up]
+        for part, shape in zip(parts, [*lengths[:-1], lengths[-1], *lengths[-2::-1]], strict=True):
+            met = math.prod((3 * length - 2) / length for length in shape)
+            for layer in part.modules():
+                if isinstance(layer, Padded):
+                    layer.weight.normal_(0.0, math.sqrt(2.0 / (met * layer.weight.shape[1])))
+                    layer.bias.zero_()
+        # Trained on few places, a network that heeds the tool from the start says anything of all others.
+        first = self.bottom[0].get_parameter("weight")
+        first[:, first.shape[1] - self._known :] *= _TOOL
+        for layer in self.doubled:
+            weight = layer.get_parameter("weight")
+            weight.normal_(0.0, math.sqrt(1.0 / weight.shape[0]))
+            layer.get_parameter("bias").zero_()
 
     def forward(self, values: Tensor, known: Tensor) -> Tensor:
         """(b, channels, nx, ny[, nz]) of the same shape and what is known (b, k)."""

@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -46,12 +46,13 @@ class Asked:
 
     Attributes:
         model: model.json of a diagnosis, the extended model. truth: effects as `Effect.to_json` has them. networks: folders of
-            trainings by the model they were trained on, "baseline", "extended" or "true".
+            trainings by the model they were trained on, "baseline", "extended" or "true". feedback: see `Network`.
     """
 
     model: Mapping[str, Any] | None = None
     truth: Sequence[Mapping[str, Any]] | None = None
     networks: Mapping[str, Path] = field(default_factory=dict)
+    feedback: Literal["none", "follow"] = "none"
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,11 +102,10 @@ class Bench:
         return ladder(self.data, rungs, self.kinds, self.trained, ends=ends, seed=seed)
 
     def _corrected(self, rung: Rung, name: str, network: Network) -> Rung:
-        predictions = []
+        correct, predictions = network.corrector(rung.setup), []
         for item, model in zip(self.data, rung.predictions, strict=True):
             columns = network.columns(self.dataset.sequence(item.name), np.asarray(item.times), rung.setup, self.grid)
-            tool = tools_of(model, item, columns, network.measured)
-            predictions.append(corrected_prediction(model, item, rung.setup, network.sampled(rung.setup), network.change, tool))
+            predictions.append(corrected_prediction(model, item, rung.setup, correct, tools_of(item, columns)))
         label = f"{rung.label} + network"
         return Rung(name=name, label=label, setup=rung.setup, predictions=predictions, network=network.about)
 
@@ -130,7 +130,7 @@ def evaluate(
     out = Path(out)
     if out.exists():
         raise RunError(f"{out} exists already; name another folder or move it away", file=str(out))
-    networks = {name: Network.load(folder) for name, folder in asked.networks.items()}
+    networks = {name: Network.load(folder, asked.feedback) for name, folder in asked.networks.items()}
     bench = Bench.of(dataset, part(report, 0.0, 0.2))
     steps = [
         Step(name, MODELS[name], setup, {f"{name}_network": networks[name]} if name in networks else {})
