@@ -28,8 +28,8 @@ class Network:
     """One trained network of a block.
 
     Attributes:
-        trained: as it was kept. about: what a reader wants to know of it, plain values. feedback: whether the simulation answers for
-            the points that the network does not see ("follow") or not ("none"), see `core.correction.inference`.
+        trained: as it was kept. about: what a reader wants to know of it, plain values. feedback: whether the simulation answers
+            for the points that the network does not see ("follow") or not ("none"), see `core.correction.inference`.
     """
 
     trained: Trained

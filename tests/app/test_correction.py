@@ -24,11 +24,11 @@ from core.grading import PAGE_GRID
 from core.registration import register, setup_from
 from core.synthetic import HiddenEffect, Scenario, make_dataset
 
-RADIUS, RUN = 7.5e-3, "large-tool-1"
+RADIUS, RUN, LONG = 7.5e-3, "large-tool-1", 120_000
 SPLITS = {"train": ("poke-top-01",), "validation": ("poke-top-02",), "test": ("poke-top-03",)}
 SCENARIO = Scenario(
     effects=(HiddenEffect("tool_radius", {"radius": RADIUS}),), sequences=("poke-top-01", "poke-top-02", "poke-top-03"),
-    splits=SPLITS, fine=6e-3, density=1500, rate=2.0, robot_rate=200.0, noise=0.3e-3,
+    splits=SPLITS, fine=6e-3, density=1500, rate=1.5, robot_rate=200.0, noise=0.3e-3,
 )  # fmt: skip
 TRAINING: dict[str, Any] = {"dataset": "large-tool", "features": [8, 16], "epochs": 12, "batch": 8, "rate": 3e-3, "trust": 1.0}
 
@@ -165,8 +165,8 @@ class TestPage:
         page.page.click("#tab-correction")
         page.page.click("#panel-correction summary")
         page.page.fill("input[name=epochs]", "100000")
-        page.page.click("text=Train")
-        page.page.wait_for_selector("#panel-correction [data-state=running]")
+        page.page.click("#panel-correction button[type=submit]")
+        page.page.wait_for_selector("#panel-correction [data-state=running]", timeout=LONG)
         page.page.click("#panel-correction >> text=Stop")
-        page.page.wait_for_selector("#panel-correction [data-state=cancelled]")
+        page.page.wait_for_selector("#panel-correction [data-state=cancelled]", timeout=LONG)
         assert page.page.locator("#panel-correction >> text=Go on").is_visible()
