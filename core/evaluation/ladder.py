@@ -123,7 +123,10 @@ def _judged(names: Sequence[str], sums: ProbeSums, paper: _Paper, seed: int) -> 
             "paper": {"error": _mm(mean[number]), "improvement": _interval(float(nearer), drawn_nearer)},
         }  # fmt: skip
     beyond = {
-        name: _interval(float(share[number] - share[1]), drawn_share[:, number] - drawn_share[:, 1])
+        name: {
+            "removed": _interval(float(share[number] - share[1]), drawn_share[:, number] - drawn_share[:, 1]),
+            "paper": _interval((mean[1] - mean[number]) / mean[0], (drawn_mean[:, 1] - drawn_mean[:, number]) / drawn_mean[:, 0]),
+        }
         for number, name in enumerate(names[2:], 2)
     }
     return {"noise_floor": _mm(whole[-1]), "errors": errors, "beyond_second": beyond}
@@ -150,6 +153,6 @@ def _ends(drawn: FloatArray) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _interval(value: float, drawn: FloatArray) -> dict[str, float]:
+def _interval(value: float | FloatArray, drawn: FloatArray) -> dict[str, float]:
     low, high = _ends(drawn)
-    return {"value": round(value, _DIGITS), "low": round(low, _DIGITS), "high": round(high, _DIGITS)}
+    return {"value": round(float(value), _DIGITS), "low": round(low, _DIGITS), "high": round(high, _DIGITS)}

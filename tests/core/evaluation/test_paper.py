@@ -18,7 +18,7 @@ def _search(change: float, flat: bool) -> dict[str, object]:
 
 def test_flat_search_is_explained_by_the_modulus_that_cancels():
     text = what_it_shows(_search(2e-9, True), _search(4e-9, True))
-    assert "Both searches are flat" in text and "no more than 4e-06 mm" in text and "the modulus cancels" in text
+    assert "Both searches are flat" in text and "less than 0.001 mm" in text and "the modulus cancels" in text
 
 
 def test_search_that_changes_something_is_not_called_flat():
