@@ -18,7 +18,7 @@ from app.runs import Runs
 from app.sessions import Sessions
 from app.settings import Settings
 from app.stage import Audience, Stage
-from app.whatif import WhatIfs
+from app.whatif import Lives, WhatIfs
 
 __all__ = ["Desk", "DeskOf", "KeyOf"]
 
@@ -35,6 +35,7 @@ class Desk:
     stage: Stage
     clickings: Clickings
     whatifs: WhatIfs
+    lives: Lives
 
     @classmethod
     def open(cls, settings: Settings, targets: dict[str, str]) -> Desk:
@@ -51,6 +52,7 @@ class Desk:
             stage=Stage(Audience(sessions.join, sessions.leave), Audience(clickings.join, clickings.leave), clickings.click),
             clickings=clickings,
             whatifs=WhatIfs(),
+            lives=Lives(),
         )
 
     def diagnose(self, dataset: Path, name: str, seed: int, key: str | None = None, registration: str | None = None) -> Job:
@@ -72,6 +74,7 @@ class Desk:
         self.jobs.close()
         self.stage.close()
         self.whatifs.close()
+        self.lives.close()
 
 
 def _desk(connection: HTTPConnection) -> Desk:

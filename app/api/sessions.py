@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
 from io import BytesIO
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Response, WebSocket, WebSocketDisconnect
+from fastapi import APIRouter, Query, Response, WebSocket
 from pydantic import ValidationError
 
 from app.colours import palette
@@ -15,6 +13,7 @@ from app.desk import DeskOf
 from app.lookout import Standpoint
 from app.problems import as_dict
 from app.relay import PageId
+from app.talk import newest_wins
 from app.view import View
 from core.errors import PalpateError
 
@@ -61,27 +60,7 @@ def state(page: PageId, desk: DeskOf) -> dict[str, Any]:
 @router.websocket("/sessions/{page}/socket")
 async def socket(websocket: WebSocket, page: PageId, desk: DeskOf) -> None:
     """Views in, states out; views that come while one is being drawn replace each other, so the newest wins."""
-    await websocket.accept()
-    newest: list[str] = []
-    arrived = asyncio.Event()
-
-    async def listen() -> None:
-        async for text in websocket.iter_text():
-            newest[:] = [text]
-            arrived.set()
-
-    async def draw() -> None:
-        while True:
-            await arrived.wait()
-            arrived.clear()
-            await websocket.send_json(await asyncio.to_thread(_answer, desk, page, newest.pop()))
-
-    tasks = [asyncio.create_task(listen()), asyncio.create_task(draw())]
-    await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-    for task in tasks:
-        task.cancel()
-    with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
-        await asyncio.gather(*tasks)
+    await newest_wins(websocket, lambda text: _answer(desk, page, text))
 
 
 def _answer(desk: DeskOf, page: str, text: str) -> dict[str, Any]:

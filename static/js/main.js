@@ -2,6 +2,7 @@
 import { get, toast } from "./api.js";
 import * as correction from "./correction.js";
 import { fill, icon } from "./dom.js";
+import * as live from "./live.js";
 import { openPanel } from "./panels.js";
 import * as rail from "./rail.js";
 import { showProblem, showReport, showWelcome } from "./report.js";
@@ -69,6 +70,7 @@ async function start() {
   startRegister(rail.openDataset);
   scene.start();
   whatif.start();
+  live.start();
   on(["sequence"], () => { set({ series: null, frame: 0, loop: null }); openSequence().catch(toast); });
   // What a person chooses comes to the front at once, what merely loads never does: they may have gone elsewhere meanwhile.
   const datasets = await rail.start((id) => { openPanel("report"); return openRun(id); });

@@ -27,12 +27,17 @@ export function start() {
   on(["theme"], dress);
   on(["heading"], note);
   const frame = document.getElementById("viewer");
-  frame.addEventListener("load", () => { dress(); frame.contentWindow.addEventListener("keydown", onKey, true); });
+  frame.addEventListener("load", () => { dress(); frame.contentWindow.addEventListener("keydown", onKey, true); for (const watch of watchers) watch(frame.contentWindow); });
   openFrame();
   connect();
 }
 
 export const pageId = () => page;
+
+const watchers = [];
+
+/** Call with the viewer's window each time it is opened. */
+export function onViewer(watch) { watchers.push(watch); }
 
 function openFrame() { document.getElementById("viewer").src = `/viser/${page}`; }
 
@@ -56,6 +61,9 @@ function connect() {
     setTimeout(connect, wait);
   };
 }
+
+/** Ask again for what is shown, where it has changed on the server. */
+export const refresh = () => send();
 
 /** Ask for what is wanted now; while an answer is awaited only the newest wish is kept. */
 function send() {

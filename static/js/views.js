@@ -55,7 +55,7 @@ function drawSection() {
   const [low, high] = series.box.map((corner) => corner[at] * 1e3);
   const number = element("output", {}, `${(section.at * 1e3).toFixed(1)} mm`);
   const bar = element("input", {
-    type: "range", min: low, max: high, step: 0.1, value: section.at * 1e3, "aria-label": `Section at ${section.axis} in mm`,
+    type: "range", min: Math.ceil(low * 10) / 10, max: Math.floor(high * 10) / 10, step: 0.1, value: section.at * 1e3, "aria-label": `Section at ${section.axis} in mm`,
     oninput: (event) => { set({ section: { ...state().section, at: +event.target.value / 1e3 } }); number.textContent = `${(+event.target.value).toFixed(1)} mm`; },
   });
   bar.addEventListener("change", () => bar.blur());
