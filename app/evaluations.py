@@ -38,7 +38,8 @@ def networks_for(trainings: Trainings, dataset: Path, run: str | None, named: li
             raise Missing(f"training {name} is not finished; wait for it, or have it go on", training=name)
         if asked.get("dataset") != str(dataset.resolve()) or asked.get("run") not in (None, run):
             raise Missing(f"training {name} is of another dataset or run; name one of this", training=name)
-        networks[str(asked["model"])] = trainings.folder / name
+        model = str(asked["model"])
+        networks[f"{model}:{name}" if model in networks else model] = trainings.folder / name
     return networks
 
 

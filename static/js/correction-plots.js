@@ -7,7 +7,10 @@ const CURVE = 170;
 const BOX = { left: 44, right: 12, top: 10, bottom: 30 };
 const KINDS = { top: "pushes from above", side: "pushes into a side", drag: "drags" };
 const PARTS = { seen: "Kinds of motion that training has", unseen: "Kinds of motion that training never saw" };
-const LABELS = { baseline: "Raw", baseline_network: "Raw + network", extended: "Extended", extended_network: "Extended + network", true: "True effects", true_network: "True + network" };
+const MODELS = { baseline: "Raw", extended: "Extended", true: "True" };
+const NETWORKS = { unet2d: "2D", unet3d: "3D", graph: "graph" };
+
+const short = ({ name, network }) => `${MODELS[name.split("_")[0]] ?? name}${network ? ` + ${NETWORKS[network.kind]} network` : ""}`;
 
 function svg(name, attributes = {}, ...children) {
   const node = document.createElementNS("http://www.w3.org/2000/svg", name);
@@ -44,17 +47,17 @@ export function ladderPicture({ rungs, parts }) {
   const most = Math.max(...groups.flatMap(({ errors }) => Object.values(errors).map(({ high }) => high)));
   return element("div", { class: "rungs" }, groups.map((one) => element("section", { "data-part": one.part },
     element("h3", {}, PARTS[one.part] ?? "All pushes", element("small", {}, `${one.kinds.map((kind) => KINDS[kind] ?? kind).join(", ")}; ${one.probes} pushes`)),
-    rungs.map(({ name, label }) => bar(name, label, one, most)))),
+    rungs.map((rung) => bar(rung, one, most)))),
   element("p", { class: "rungs-key" }, element("i", {}), "below the grey edge lies the sensor's noise; whiskers: 95 % interval from drawing pushes anew"));
 }
 
-function bar(name, label, { errors, noise_floor: floor }, most) {
+function bar({ name, label, network }, { errors, noise_floor: floor }, most) {
   const { error, low, high, removed } = errors[name];
   const at = (value) => `${Math.min(100, 100 * value / most)}%`;
-  const colour = name.endsWith("_network") ? "corrected" : name === "baseline" ? "raw" : "extended";
+  const colour = network ? "corrected" : name === "baseline" ? "raw" : "extended";
   const said = name === "baseline" ? "" : `${percent(removed.value)} (${Math.round(100 * removed.low)}–${Math.round(100 * removed.high)})`;
   return element("div", { class: "rung", "data-rung": name, title: `${label}: ${error.toFixed(3)} mm (${low.toFixed(3)} to ${high.toFixed(3)} mm)` },
-    element("span", {}, LABELS[name] ?? label),
+    element("span", {}, short({ name, network })),
     element("div", { class: "bar" }, element("i", { style: { width: at(error), background: `var(--${colour})` } }), element("i", { class: "noise", style: { width: at(floor) } }),
       element("i", { class: "whisker", style: { left: at(low), width: `calc(${at(high)} - ${at(low)})` } })),
     element("b", {}, `${error.toFixed(2)} mm`), element("small", {}, said));

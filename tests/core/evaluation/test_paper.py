@@ -35,8 +35,8 @@ def test_tables_on_a_small_phantom(tmp_path: Path):
     make_dataset(tmp_path / "block", scenario, 3)
     training = Wanted(spec={"network": {"features": [8, 16]}, "epochs": 4, "batch": 8, "rate": 3e-3})
     request = PaperRequest(frames=3, training=training, moduli=(5e3, 1e1))
-    dataset, places = open_dataset(tmp_path / "block"), {"store": tmp_path / "store", "samples": tmp_path / "samples"}
-    found = run_paper(dataset, tmp_path / "paper", **places, request=request)
+    dataset, store, samples = open_dataset(tmp_path / "block"), tmp_path / "store", tmp_path / "samples"
+    found = run_paper(dataset, tmp_path / "paper", store=store, samples=samples, request=request)
     for table, moduli in (("coarse", 5), ("fine", 7)):
         distances = [row["mean_distance"] for row in found[table]]
         assert len(distances) == moduli and max(distances) - min(distances) < 2e-3
