@@ -13,11 +13,13 @@ from benchmarks import (
     diagnosis,
     effects,
     gradings,
+    live,
     measurement,
     modulus,
     peers,
     picking,
     replay,
+    scrub,
     shapes,
     sweep,
 )
@@ -36,6 +38,8 @@ ALL = {
     "picking": picking.run,
     "dataset": dataset.run,
     "diagnosis": diagnosis.run,
+    "live": live.run,
+    "scrub": scrub.run,
 }
 WIDTH = 140
 """Characters of a line where there is no terminal to ask."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -121,19 +122,40 @@ def _samples(
     dataset: Dataset, wanted: Wanted, store: Path, registration: Registration, setup: Setup, workers: int, report: Report
 ) -> Samples:
     """Made once for each model, motion and density of a dataset."""
-    from core.correction import make_samples, open_samples, recorder_for  # noqa: PLC0415 (heavy)
+    from core.correction import make_samples, recorder_for  # noqa: PLC0415 (heavy)
 
     recorder = recorder_for(dataset, setup=setup, nodes=wanted.nodes, points=wanted.points, registration=registration)
     names = [name for name in (*dataset.config.train, *dataset.config.validation) if len(dataset.sequence(name))]
     said = [str(dataset.path.resolve()), setup.as_dict(), repr(recorder.grid), wanted.nodes, wanted.every, wanted.points, names]
     folder = store / hashlib.sha256(json.dumps(said, sort_keys=True, default=repr).encode()).hexdigest()[:16]
+    known = _whole(folder)
+    if known is not None:
+        return known
+    try:
+        return make_samples(folder, recorder, sequences=names, every=wanted.every, workers=workers, report=report)
+    except RunError:
+        known = _whole(folder)  # another training may have made the same in the meantime
+        if known is None:
+            raise
+        return known
+
+
+def _whole(folder: Path) -> Samples | None:
+    """Samples that are all there; what is left of others, of which files were dropped for want of room, is taken away."""
+    from core.correction import open_samples
+    from core.correction.samples import ARRAYS
+
     if not folder.is_dir():
-        try:
-            return make_samples(folder, recorder, sequences=names, every=wanted.every, workers=workers, report=report)
-        except RunError:
-            if not folder.is_dir():  # another training may have made the same in the meantime
-                raise
-    return open_samples(folder)
+        return None
+    try:
+        samples = open_samples(folder)
+        for sequence in samples.sequences:
+            for name in ARRAYS:
+                samples.array(sequence, name)
+    except RunError:
+        shutil.rmtree(folder, ignore_errors=True)
+        return None
+    return samples
 
 
 def _claim(folder: Path, said: dict[str, Any]) -> None:

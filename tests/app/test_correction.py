@@ -15,6 +15,7 @@ from browsing import NEEDS_CHROMIUM, Page
 from typer.testing import CliRunner
 
 from app.cli import app
+from app.client import Client
 from app.settings import Settings
 from core.cleaning import cleaner_for, find_shaft_axis
 from core.dataset import open_dataset
@@ -113,6 +114,15 @@ def test_corrected_model_stands_beside_the_others_of_the_run(client: httpx.Clien
     series = client.get(f"/api/runs/{RUN}/sequences/{SPLITS['test'][0]}").json()
     assert series["models"] == ["raw", "extended", "corrected"]
     assert len(series["distance_corrected"]) == len(series["time"])
+
+
+def test_client_asks_for_both_once_and_reads_what_came_of_them(client: httpx.Client, ladder: dict[str, Any]) -> None:
+    with Client(str(client.base_url)) as mine:
+        assert mine.evaluation(ladder["id"])["summary"]["sentence"] == ladder["summary"]["sentence"]
+        asked = mine.train("large-tool", epochs=100_000, key="once")
+        assert mine.train("large-tool", epochs=100_000, key="once")["id"] == asked["id"]
+        mine.cancel(asked["id"])
+        assert mine.training(asked["id"])["job"]["state"] == "cancelled"
 
 
 @pytest.mark.parametrize(
