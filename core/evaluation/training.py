@@ -142,8 +142,8 @@ def _samples(
 
 def _whole(folder: Path) -> Samples | None:
     """Samples that are all there; what is left of others, of which files were dropped for want of room, is taken away."""
-    from core.correction import open_samples
-    from core.correction.samples import ARRAYS
+    from core.correction import open_samples  # noqa: PLC0415 (heavy)
+    from core.correction.arrays import ARRAYS  # noqa: PLC0415 (heavy)
 
     if not folder.is_dir():
         return None
