@@ -2,6 +2,7 @@
 import { get, toast } from "./api.js";
 import * as correction from "./correction.js";
 import { fill, icon } from "./dom.js";
+import { startHelp } from "./help.js";
 import * as live from "./live.js";
 import { openPanel } from "./panels.js";
 import * as rail from "./rail.js";
@@ -68,6 +69,7 @@ async function start() {
   startSweeps();
   correction.start(() => openSequence().catch(toast));
   startRegister(rail.openDataset);
+  startHelp();
   scene.start();
   whatif.start();
   live.start();
