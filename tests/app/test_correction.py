@@ -166,7 +166,7 @@ class TestPage:
         assert page.page.inner_text("#panel-correction h1") == ladder["summary"]["sentence"]
         assert page.page.locator("[data-part=seen] .rung").count() == 4
         assert page.page.locator("[data-part=seen] .noise").count() == 4
-        page.page.click("[data-trainings] >> nth=0")
+        page.page.locator("[data-trainings]", has_text=" mm").first.click()
         page.page.wait_for_selector(".correction-plot polyline")
         assert "with the network" in page.page.inner_text("#panel-correction h1")
 
