@@ -9,6 +9,7 @@ from rich.console import Console
 from benchmarks import (
     cleaning,
     convergence,
+    correction,
     dataset,
     diagnosis,
     effects,
@@ -37,6 +38,7 @@ ALL = {
     "cleaning": cleaning.run,
     "picking": picking.run,
     "dataset": dataset.run,
+    "correction": correction.run,
     "diagnosis": diagnosis.run,
     "live": live.run,
     "scrub": scrub.run,

@@ -1,6 +1,7 @@
 // Starts the parts and follows what is chosen.
 import { get, toast } from "./api.js";
 import { fill, icon } from "./dom.js";
+import { startHelp } from "./help.js";
 import * as live from "./live.js";
 import { openPanel } from "./panels.js";
 import * as rail from "./rail.js";
@@ -66,6 +67,7 @@ async function start() {
   timeline.start();
   startSweeps();
   startRegister(rail.openDataset);
+  startHelp();
   scene.start();
   whatif.start();
   live.start();
