@@ -82,6 +82,7 @@ def test_pool_for_cuda_is_that_of_torch_and_so_is_its_gradient(shape):
     (pooled(one) * weights).sum().backward()
     (by_halves(other) * weights).sum().backward()
     assert torch.equal(pooled(one), by_halves(other))
+    assert one.grad is not None and other.grad is not None
     assert torch.equal(one.grad, other.grad)
 
 
