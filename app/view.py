@@ -50,7 +50,10 @@ class View(BaseModel):
     sequences of the run.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(
+        frozen=True, extra="forbid",
+        json_schema_extra={"examples": [{"run": "block-01-20260101-120000-abcd", "sequence": "poke-top-01", "frame": 35}]},
+    )  # fmt: skip
 
     run: str
     sequence: str

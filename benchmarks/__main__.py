@@ -20,6 +20,7 @@ from benchmarks import (
     picking,
     replay,
     scrub,
+    service,
     shapes,
     sweep,
 )
@@ -36,6 +37,7 @@ ALL = {
     "measurement": measurement.run,
     "cleaning": cleaning.run,
     "picking": picking.run,
+    "service": service.run,
     "dataset": dataset.run,
     "diagnosis": diagnosis.run,
     "live": live.run,
