@@ -141,6 +141,22 @@ class Client:
             found += more
         return found
 
+    def train(self, dataset: str, run: str | None = None, key: str | None = None, **further: Any) -> dict[str, Any]:
+        """Queue a training on the stated model, or on a run's extended one; `further` as POST /api/trainings takes it."""
+        return self._ask("/trainings", {"dataset": dataset, "run": run, **further}, key)
+
+    def training(self, identity: str) -> dict[str, Any]:
+        """A training: what was asked, its history by epoch, and its summary once it has ended."""
+        return dict(self._get(f"/trainings/{identity}"))
+
+    def evaluate(self, dataset: str, run: str | None = None, key: str | None = None, **further: Any) -> dict[str, Any]:
+        """Queue a ladder of a dataset's test sequences; `further` as POST /api/evaluations takes it."""
+        return self._ask("/evaluations", {"dataset": dataset, "run": run, **further}, key)
+
+    def evaluation(self, identity: str) -> dict[str, Any]:
+        """A ladder: its summary once it has ended."""
+        return dict(self._get(f"/evaluations/{identity}"))
+
     def report(self, run: str) -> dict[str, Any]:
         """The report of a finished diagnosis."""
         return dict(self._get(f"/runs/{run}/report"))

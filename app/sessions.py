@@ -76,6 +76,7 @@ class Session:
         self.picture: Picture | None = None
         self._trial: Trial | None = None
         self._touch: Touch | None = None
+        self._stand: tuple[str, Lookout] | None = None
         self._reel_of, self._end_of = reel_of, end_of
         self._scenes: list[Scene] = []
         self._framed: tuple[str, tuple[tuple[float, float, float], ...]] | None = None
@@ -100,6 +101,8 @@ class Session:
             for scene in self._scenes:
                 scene.draw(picture)
             if self._framed != (view.run, picture.columns):
+                if self._framed is not None:
+                    self._stand = None
                 self._look()
             self._framed = (view.run, picture.columns)
 
@@ -120,19 +123,33 @@ class Session:
     def wants_inside(self) -> bool:
         """Whether what is shown cannot be drawn without the inside of the block."""
         view = self.view
-        return view is not None and (view.section is not None or view.quantity == "energy" or "lump" in view.layers)
+        if view is None:
+            return False
+        lumps = "lump" in view.layers and self._reel_of(view.run, view.sequence).lumps
+        return view.section is not None or view.quantity == "energy" or bool(lumps)
 
     def look(self, where: Standpoint = "reset") -> None:
         """Turn the cameras of all scenes to the phantom."""
         with self._lock:
+            self._stand = None
             self._look(where)
 
+    def stand(self, run: str, lookout: Lookout) -> None:
+        """Look from there while this run is shown, as often as a scene opens, until told otherwise."""
+        with self._lock:
+            self._stand = (run, lookout)
+            if self.view is not None and self.view.run == run:
+                self._look()
+
     def _look(self, where: Standpoint = "reset") -> None:
-        if self.view is not None and self.picture is not None:
-            replay = self._reel_of(self.view.run, self.view.sequence).replay
-            found: Lookout = lookout(replay.size, replay.camera("raw").translation, self.picture.columns, where)
-            for scene in self._scenes:
-                scene.look(found)
+        if self.view is None or self.picture is None:
+            return
+        replay = self._reel_of(self.view.run, self.view.sequence).replay
+        found = lookout(replay.size, replay.camera("raw").translation, self.picture.columns, where)
+        if self._stand is not None and self._stand[0] == self.view.run:
+            found = self._stand[1]
+        for scene in self._scenes:
+            scene.look(found)
 
     def still(self, width: int, height: int) -> np.ndarray[Any, Any]:
         """What the page's scene shows (height, width, 4); Missing where no browser shows it."""

@@ -9,6 +9,7 @@ from rich.console import Console
 from benchmarks import (
     cleaning,
     convergence,
+    correction,
     dataset,
     diagnosis,
     effects,
@@ -39,6 +40,7 @@ ALL = {
     "picking": picking.run,
     "service": service.run,
     "dataset": dataset.run,
+    "correction": correction.run,
     "diagnosis": diagnosis.run,
     "live": live.run,
     "scrub": scrub.run,

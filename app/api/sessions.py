@@ -5,16 +5,17 @@ from __future__ import annotations
 from io import BytesIO
 from typing import Annotated, Any
 
+import numpy as np
 from fastapi import APIRouter, Query, Response, WebSocket
 from pydantic import ValidationError
 
 from app.colours import palette
 from app.desk import DeskOf
-from app.lookout import Standpoint
+from app.lookout import Lookout, Standpoint
 from app.problems import as_dict
 from app.relay import PageId
 from app.talk import newest_wins
-from app.view import View
+from app.view import Camera, View
 from core.errors import PalpateError
 
 __all__ = ["router"]
@@ -39,6 +40,13 @@ def show(page: PageId, view: View, desk: DeskOf) -> dict[str, Any]:
 def look(page: PageId, desk: DeskOf, where: Standpoint = "reset") -> None:
     """Turn the camera to the phantom: the depth camera's view, or from the top, the front (along +y), the side (along -x)."""
     desk.sessions.get(page).look(where)
+
+
+@router.put("/sessions/{page}/camera", status_code=204)
+def stand(page: PageId, camera: Camera, desk: DeskOf) -> None:
+    """Look at a run from a place of one's own, also in scenes of the page that open later."""
+    place, target = np.array(camera.position), np.array(camera.target)
+    desk.sessions.open(page).stand(camera.run, Lookout(place, target, np.array([0.0, 0.0, 1.0])))
 
 
 @router.get("/sessions/{page}/still.png", response_class=Response, responses={200: {"content": {"image/png": {}}}})

@@ -7,7 +7,7 @@ const axes = (viewer) => {
   const turn = viewer.__viserMutable.nodeRefFromName[""].matrixWorld.elements;
   return [0, 4, 8].map((column) => [turn[column], turn[column + 1], turn[column + 2]]);
 };
-const fromViewer = (viewer, place) => axes(viewer).map((axis) => dot(axis, place));
+export const fromViewer = (viewer, place) => axes(viewer).map((axis) => dot(axis, place));
 const toViewer = (viewer, place) => axes(viewer).reduce((sum, axis, i) => plus(sum, axis, place[i]), [0, 0, 0]);
 const dot = (a, b) => a.reduce((sum, value, i) => sum + value * b[i], 0);
 const plus = (a, b, times = 1) => a.map((value, i) => value + times * b[i]);

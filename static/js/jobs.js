@@ -6,7 +6,7 @@ import { capital, duration, when } from "./format.js";
 import { addPanel, openedPanel, openPanel } from "./panels.js";
 
 const JUST_ENDED = 15 * 60;
-const RETRY = { sweep: "Resume" };
+const RETRY = { sweep: "Resume", training: "Resume" };
 const LEVELS = { warning: "⚠ ", error: "✕ " };
 const listeners = [];
 const openers = {};

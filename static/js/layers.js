@@ -29,6 +29,7 @@ const has = (model) => !MODELS.includes(model) || !state().series || state().ser
 
 function drawToolbar() {
   const { layers, colour, quantity, series } = state();
+  document.querySelector(".toolbar").classList.toggle("full", Boolean(series?.models.includes("corrected")));
   fill("layers", Object.entries(CHIPS).filter(([name]) => name !== "corrected" || series?.models.includes(name)).map(([name, label]) => element("button", {
     class: "chip", type: "button", disabled: absent(name) !== null, title: absent(name) ?? LAYERS[name],
     "aria-pressed": String(layers.includes(name)), "data-layer": name, onclick: () => toggle(name),

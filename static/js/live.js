@@ -24,6 +24,8 @@ let grip = null; // while the tool is dragged in the scene: from where its centr
 export function start() {
   box = addPanel("live", "Live", open, leave);
   onViewer(watch);
+  // What is seen inside is sent only where it is shown.
+  on(["section", "quantity", "layers"], () => { if (state().live && answer) send(); });
   on(["run", "sequence"], () => { if (openedPanel() === "live") { leave(); open(); } });
 }
 
@@ -197,6 +199,6 @@ function drawAnswer() {
   const fact = (label, value, id) => element("div", { class: "live-fact" }, element("span", {}, label), element("b", { id }, value));
   fill("live-answer", element("div", { class: "live-facts" },
     fact("Push depth", mm(answer.depth), "live-push"), fact("Force", `${force.toFixed(force < 1 ? 3 : 2)} N`, "live-force"),
-    fact("Answers a second", rate ? rate.toFixed(0) : "–", "live-rate"), fact("Solved in", `${(1e3 * answer.seconds).toFixed(0)} ms`, "live-solve")),
+    fact("Answers/s", rate ? rate.toFixed(0) : "–", "live-rate"), fact("Solved in", `${(1e3 * answer.seconds).toFixed(0)} ms`, "live-solve")),
     answer.converged ? null : element("div", { class: "note-card bad" }, element("strong", {}, "No equilibrium"), `${capital(answer.outcome)}. The last one is shown.`));
 }

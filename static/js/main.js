@@ -1,5 +1,6 @@
 // Starts the parts and follows what is chosen.
 import { get, toast } from "./api.js";
+import * as correction from "./correction.js";
 import { fill, icon } from "./dom.js";
 import { startHelp } from "./help.js";
 import * as live from "./live.js";
@@ -66,6 +67,7 @@ async function start() {
   set({ palette });
   timeline.start();
   startSweeps();
+  correction.start(() => openSequence().catch(toast));
   startRegister(rail.openDataset);
   startHelp();
   scene.start();

@@ -1,4 +1,5 @@
 // The 3D: the viewer in its frame, and the socket that says what to show.
+import * as camera from "./camera.js";
 import * as capture from "./capture.js";
 import { onKey } from "./keys.js";
 import * as layers from "./layers.js";
@@ -28,7 +29,8 @@ export function start() {
   on(["heading"], note);
   const frame = document.getElementById("viewer");
   frame.addEventListener("load", () => { dress(); frame.contentWindow.addEventListener("keydown", onKey, true); for (const watch of watchers) watch(frame.contentWindow); });
-  openFrame();
+  onViewer(camera.keep);
+  camera.restore(page).finally(openFrame);
   connect();
 }
 
@@ -46,7 +48,7 @@ function connect() {
   let opened = false;
   socket = new WebSocket(address);
   socket.onopen = () => {
-    if (wait > 500) openFrame();
+    if (wait > 500) camera.restore(page).finally(openFrame);
     opened = true; wait = 500; busy = false; note(); send();
   };
   socket.onmessage = ({ data }) => {

@@ -1,5 +1,6 @@
 // Looking at the scene: standard views, models side by side, and the section through the block.
 import { post, toast } from "./api.js";
+import { forget } from "./camera.js";
 import { element, fill, icon } from "./dom.js";
 import { bind } from "./keys.js";
 import { order } from "./looks.js";
@@ -10,7 +11,7 @@ const AXES = ["x", "y", "z"];
 let look = () => {};
 
 export function start(page) {
-  look = (where) => post(`/sessions/${page}/look?where=${where}`).catch(toast);
+  look = (where) => { forget(); post(`/sessions/${page}/look?where=${where}`).catch(toast); };
   for (const [where, shape, title] of VIEWS) button(`${where}-view`, shape, title, () => look(where));
   button("aside", "columns", "Models side by side (B)", aside);
   button("section", "section", "Cut the block open (X)", cut);

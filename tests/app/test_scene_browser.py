@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import pytest
 from browsing import NEEDS_CHROMIUM, Page
 from PIL import Image
 
@@ -51,8 +52,17 @@ def test_a_person_looks_at_everything_and_finds_it_so_on_the_next_visit(page: Pa
     page.until(lambda: page.held["view"]["section"] == {"axis": "x", "at": -0.02, "flip": False})
     assert sum(page.held["drawn"]["triangles"].values()) < before
 
+    box = page.page.locator("#viewer").bounding_box()
+    middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.page.mouse.move(*middle)
+    page.page.mouse.down()
+    page.page.mouse.move(middle[0] + 120, middle[1] - 30, steps=5)
+    page.page.mouse.up()
+    page.until(lambda: page.page.evaluate("localStorage.getItem('palpate.camera')") is not None)
+    turned = page.viewer.evaluate(CAMERA)
     page.open()
     page.until(lambda: "/cloud-raw" in page.visible())
+    page.until(lambda: page.viewer.evaluate(CAMERA) == pytest.approx(turned, abs=2e-3))
     assert page.held["view"]["section"]["at"] == -0.02 and page.held["view"]["looks"]["extended"]["opacity"] == 0.4
     page.page.click("#layers-button")
     page.page.get_by_role("button", name="As at first").click()
