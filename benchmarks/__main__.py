@@ -22,6 +22,7 @@ from benchmarks import (
     picking,
     replay,
     scrub,
+    service,
     shapes,
     sweep,
 )
@@ -38,6 +39,7 @@ ALL = {
     "measurement": measurement.run,
     "cleaning": cleaning.run,
     "picking": picking.run,
+    "service": service.run,
     "dataset": dataset.run,
     "correction": correction.run,
     "correcting": correcting.run,
