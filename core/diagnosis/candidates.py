@@ -26,6 +26,7 @@ from core.effects.sensor import DepthBias, TimeOffset
 from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
 from core.effects.support import BaseCompliance, BaseDetachment, BaseSlip
 from core.effects.tool import LandmarkMismatch, ToolCompliance, ToolFriction
+from core.frames import FloatArray
 from core.meshing import Meshing
 from core.setup import Inclusion, Setup
 
@@ -164,15 +165,21 @@ def _same_effect(model: Model) -> list[list[tuple[int, Tangent]]]:
     return found
 
 
-def begin(candidate: Candidate, model: Model, bench: Bench) -> Effect:
-    """Where to begin the refit: at the size that the linear fit asks for, where the column tells of a size."""
-    start = candidate.start
+def begin(candidate: Candidate, model: Model, bench: Bench, beside: Candidate | None = None) -> Effect:
+    """Where to begin the refit: at the size that the linear fit asks for, where the column tells of a size.
+
+    With another candidate `beside` it, what both ask for together; where one may not go all the way, neither does.
+    """
+    start, together = candidate.start, candidate if beside is None else candidate.beside(beside)
+    columns, precision = together.precision(list(model.nuisance), bench.nuisances.precision)
+    asked = fit(bench.tempered(model), columns, precision).change
+    pulls = [(one.start, asked[[columns.index(own) for own in one.widened]]) for one in (candidate, beside) if one and one.widened]
+    reach = min((_reach(effect, pull) for effect, pull in pulls), default=1.0)
     if candidate.widened:
-        return _asked_for(candidate, model, bench)
+        return start.at((np.array(start.coordinates) + reach * pulls[0][1]).tolist())
     if start == OWN_GRID or isinstance(start, (TimeOffset, BaseSlip, BaseDetachment, Gravity, ToolFriction, *OUTSIDE)):
         return start
-    columns, precision = candidate.precision(list(model.nuisance), bench.nuisances.precision)
-    changes = fit(bench.tempered(model), columns, precision).change[len(model.nuisance) :]
+    changes = reach * asked[len(model.nuisance) :][: len(candidate.columns)]
     if isinstance(start, _TOGETHER):
         return start.at([here + float(change) for here, change in zip(start.coordinates, changes, strict=True)])
     change = float(changes[-1])
@@ -194,13 +201,10 @@ def _shared(start: StrainStiffening | BaseCompliance | Viscoelasticity | Permane
     return start.moved([start.retained_fraction * share])
 
 
-def _asked_for(candidate: Candidate, model: Model, bench: Bench) -> Effect:
-    """What a stated accuracy that is left open pulls to, no farther than a fit's first step."""
-    columns, precision = candidate.precision(list(model.nuisance), bench.nuisances.precision)
-    change = fit(bench.tempered(model), columns, precision).change[[columns.index(column) for column in candidate.widened]]
-    scales = np.array([item.scale for item in candidate.start.numbers()])
-    step = change * min(1.0, TRUST / max(float(np.abs(change / scales).max()), 1e-12))
-    return candidate.start.at((np.array(candidate.start.coordinates) + step).tolist())
+def _reach(effect: Effect, change: FloatArray) -> float:
+    """How much [1] of what a stated accuracy that is left open pulls to lies no farther than a fit's first step."""
+    scales = np.array([item.scale for item in effect.numbers()])
+    return min(1.0, TRUST / max(float(np.abs(change / scales).max()), 1e-12))
 
 
 def _share(change: float) -> float:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.diagnosis.felt_gain import FeltLadder
 from core.diagnosis.force import rms_force
 from core.diagnosis.noise import patch_variance
 from core.diagnosis.observations import Observations
@@ -25,13 +24,11 @@ from core.metrics import paper_distance
 from core.setup import Setup
 from core.sight import sight_of
 
-__all__ = ["Ladder", "fixed_pattern", "harm", "ladder"]
+__all__ = ["Ladder", "fixed_pattern", "ladder"]
 
 _DRAWS = 2000
 _PAPER_POINTS = 4000
 _LEAST_POINTS = 5
-_WORSE = 0.1
-"""Share of the reducible error that a cause surely adds on test sequences before it is withdrawn [1]: less may be the mesh's."""
 _SAME_PATTERN = 1e-5
 """Patterns that differ by less than this [m] are one: the models agree about the untouched block."""
 
@@ -56,17 +53,6 @@ class Ladder:
     probes: int
     force: tuple[float, float, float] | None = None
     tuned: tuple[float, float, float] | None = None
-
-
-def harm(names: Sequence[str], gain: Ladder | FeltLadder) -> str:
-    """Why causes that make the test sequences worse are not named; empty where they do not (step 10 of the method: no transfer)."""
-    value, low, high = gain.removed
-    if high > -_WORSE:
-        return ""
-    return (
-        f"{' and '.join(names)} would explain the sequences that were fitted on, but makes the test sequences worse: it adds "
-        f"{-100 * value:.0f} % ({-100 * high:.0f} to {-100 * low:.0f} %) of the reducible error there, and is not named"
-    )
 
 
 def fixed_pattern(item: Observations, model: Prediction, before: bool = False) -> tuple[FloatArray, FloatArray]:

@@ -122,7 +122,7 @@ def _length(a: Any) -> float:
 
 @njit(cache=True, inline="always")
 def _near_one(a: Any, upper: Any, lower: Any, work: Any, found: Any) -> None:
-    """A quotient of two polynomials of third degree of a symmetric tensor (6,), coefficients (4,) from the constant on, into `found`."""
+    """A quotient of two polynomials (4,), from the constant on, of a symmetric tensor (6,), into `found`."""
     square, cube, below, inverse = work[0], work[1], work[2], work[3]
     _times(a, a, square)
     _times(square, a, cube)
