@@ -8,7 +8,7 @@ from typing import NoReturn
 
 import typer
 
-from app.commands import blind, data, demo, diagnosis, export, service, sweeping
+from app.commands import blind, data, demo, diagnosis, evaluation, export, service, sweeping, training
 from app.console import errors, print_problem
 from app.stop import stop
 from core.errors import Cancelled, PalpateError
@@ -31,6 +31,8 @@ app.command()(data.register)
 app.command()(data.replay)
 app.command()(diagnosis.diagnose)
 app.command()(sweeping.sweep)
+app.command()(training.train)
+app.command()(evaluation.evaluate)
 app.command()(export.export)
 app.command()(blind.blind)
 app.command()(service.serve)

@@ -7,8 +7,9 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import typer
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.markup import escape
@@ -20,7 +21,15 @@ from app.stop import stop
 from core.errors import Cancelled, PalpateError
 from core.progress import Report
 
-__all__ = ["errors", "out", "parameters_text", "print_problem", "progress", "verdict_cells", "verdict_table", "write_json"]
+__all__ = [
+    "Registration", "errors", "out", "parameters_text", "print_problem", "progress", "verdict_cells", "verdict_table", "write_json",
+]  # fmt: skip
+
+Registration = Annotated[
+    str | None,
+    typer.Option(help="Camera as accepted by hand: a name kept by the page for this dataset, or a file; automatic without."),
+]
+"""The option by which verbs take an accepted registration."""
 
 out = Console()
 errors = Console(stderr=True)

@@ -13,7 +13,7 @@ from app.summaries import finite
 from core.errors import PalpateError
 from core.frames import FloatArray
 
-__all__ = ["contact_force", "course", "models_of", "push_depth", "touching", "worst_frames"]
+__all__ = ["by_model", "contact_force", "course", "models_of", "push_depth", "touching", "worst_frames"]
 
 log = logging.getLogger(__name__)
 MODELS = ("raw", "extended", "corrected")
@@ -25,19 +25,26 @@ FLAT = 2.0e-4
 def course(run: Run, replay: Replay) -> dict[str, Any]:
     """All series of a sequence for the timeline; null where the data or the run do not hold them.
 
-    `depth` [m], `force` [N] and `iterations` (by model) have one number for each frame; `touching` holds first and last frames,
-    `worst` frames in the order of their raw error.
+    `depth` [m], `force` as measured [N], and by model `forces` [N] and `iterations` have one number for each frame; `touching`
+    holds first and last frames, `worst` frames in the order of their raw error, `failed` by model those that found no equilibrium.
     """
     depth, force = push_depth(replay), contact_force(run, replay)
-    iterations = {name: replay.arrays[f"iterations_{name}"] for name in MODELS if f"iterations_{name}" in replay.arrays}
+    iterations, forces = by_model(replay, "iterations"), by_model(replay, "force")
     return {
         "models": list(models_of(replay)),
         "depth": None if depth is None else finite(depth, digits=7),
         "touching": [] if depth is None else touching(depth),
         "force": None if force is None else finite(force, digits=5),
+        "forces": {name: finite(values, digits=5) for name, values in forces.items()} or None,
         "iterations": {name: [int(count) for count in counts] for name, counts in iterations.items()} or None,
+        "failed": {name: [int(at) for at in np.flatnonzero(codes)] for name, codes in by_model(replay, "outcome").items()},
         "worst": worst_frames(replay["distance_raw"]),
     }
+
+
+def by_model(replay: Replay, key: str) -> dict[str, Any]:
+    """A series (f,) of each model that has it in the run."""
+    return {name: replay.arrays[f"{key}_{name}"] for name in MODELS if f"{key}_{name}" in replay.arrays}
 
 
 def models_of(replay: Replay) -> tuple[str, ...]:

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import Depends, Header
 from starlette.requests import HTTPConnection
 
+from app.clicking import Clickings
 from app.jobs import Jobs
 from app.library import Library
 from app.records import Job
+from app.registrations import Registrations
 from app.runs import Runs
 from app.sessions import Sessions
 from app.settings import Settings
-from app.stage import Stage
+from app.stage import Audience, Stage
 from app.whatif import WhatIfs
 
 __all__ = ["Desk", "DeskOf", "KeyOf"]
@@ -31,28 +33,39 @@ class Desk:
     jobs: Jobs
     sessions: Sessions
     stage: Stage
+    clickings: Clickings
     whatifs: WhatIfs
 
     @classmethod
     def open(cls, settings: Settings, targets: dict[str, str]) -> Desk:
         """Start the job queue and the inner viewer."""
         runs = Runs(settings.runs)
-        sessions = Sessions(runs)
+        sessions, library = Sessions(runs), Library(settings.datasets)
+        clickings = Clickings(library.phantom)
         return cls(
             settings=settings,
-            library=Library(settings.datasets),
+            library=library,
             runs=runs,
             jobs=Jobs(settings.runs, targets, settings.preload),
             sessions=sessions,
-            stage=Stage(sessions.join, sessions.leave),
+            stage=Stage(Audience(sessions.join, sessions.leave), Audience(clickings.join, clickings.leave), clickings.click),
+            clickings=clickings,
             whatifs=WhatIfs(),
         )
 
-    def diagnose(self, dataset: Path, name: str, seed: int, key: str | None = None) -> Job:
-        """Queue the diagnosis of a dataset folder; the job's id will be the run's."""
+    def diagnose(self, dataset: Path, name: str, seed: int, key: str | None = None, registration: str | None = None) -> Job:
+        """Queue the diagnosis of a dataset folder, with an accepted registration if named; the job's id will be the run's."""
         places = {"dataset": str(dataset), "runs": str(self.settings.runs)}
-        request = {**places, "name": name, "workers": self.settings.workers, "seed": seed}
+        request = {**places, "name": name, "workers": self.settings.workers, "seed": seed, **self.registered(name, registration)}
         return self.jobs.submit("diagnosis", request, name, key)
+
+    def registered(self, dataset: str, registration: str | None) -> dict[str, Any]:
+        """What a job's request says of an accepted registration: all of it, so that the job means the same whenever it is done."""
+        if registration is None:
+            return {}
+        accepted = Registrations(self.settings.runs).accepted(dataset, registration)
+        accepted.check(self.library.path(dataset))
+        return {"registration": accepted.to_json()}
 
     def close(self) -> None:
         """Cancel what runs and stop the inner viewer."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.clicking import Phantom
 from app.problems import Missing
 from app.runs import NAME
-from core.errors import DatasetError
+from core.errors import DatasetError, RegistrationError
 
 if TYPE_CHECKING:
     from core.dataset import Dataset
@@ -35,6 +36,18 @@ class Library:
         if not path.is_dir():
             raise Missing(f"there is no dataset {name}; GET /api/datasets lists those there are", dataset=name)
         return path
+
+    def phantom(self, name: str) -> Phantom:
+        """Rest cloud and block of one dataset, to be registered by hand."""
+        from core.setup import Shape  # noqa: PLC0415 (heavy)
+
+        dataset = self.open(name)
+        if isinstance(dataset.geometry, Shape):
+            raise RegistrationError("clouds are registered to a block only, not to other shapes yet")
+        if not dataset.has_rest:
+            raise RegistrationError("the dataset has no rest.ply: record one cloud of the untouched phantom", file="rest.ply")
+        config = dataset.config
+        return Phantom(dataset.rest_cloud(), config.size, dict(config.landmarks), config.to_phantom)
 
     def open(self, name: str) -> Dataset:
         """One dataset, validated as far as opening does."""

@@ -14,7 +14,20 @@ from fastapi.staticfiles import StaticFiles
 from starlette.exceptions import HTTPException
 
 from app import relay
-from app.api import datasets, diagnoses, effects, jobs, registrations, runs, sessions, sweeps, whatif
+from app.api import (
+    clicking,
+    datasets,
+    diagnoses,
+    effects,
+    evaluations,
+    jobs,
+    registrations,
+    runs,
+    sessions,
+    sweeps,
+    trainings,
+    whatif,
+)
 from app.desk import Desk
 from app.guard import Guard
 from app.login import Login
@@ -49,7 +62,8 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
     app.state.ending = threading.Event()
     app.state.settings, app.state.login = settings, login
     app.add_middleware(Guard, settings=settings, login=login)
-    for module in (datasets, registrations, diagnoses, jobs, runs, sessions, whatif, effects, sweeps):
+    modules = (datasets, registrations, clicking, diagnoses, jobs, runs, sessions, whatif, effects, sweeps, trainings, evaluations)
+    for module in modules:
         app.include_router(module.router, prefix="/api", responses=PROBLEMS)
     app.include_router(relay.router)
     app.include_router(login_router)

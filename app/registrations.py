@@ -15,9 +15,10 @@ import numpy as np
 
 from app.problems import Conflict, Missing
 from app.runs import NAME
+from core.dataset.accepted import Accepted, rest_digest
 from core.errors import RegistrationError, RunError
 
-__all__ = ["Registrations", "register"]
+__all__ = ["Registrations", "accepted_for", "register"]
 
 FOLDER = "registrations"
 
@@ -43,6 +44,10 @@ class Registrations:
             raise RunError(f"registration {name} of {dataset} cannot be read ({error}); make it again", file=path.name) from error
         return stored
 
+    def accepted(self, dataset: str, name: str) -> Accepted:
+        """One registration, to be used in place of the automatic one."""
+        return Accepted.from_json(self.get(dataset, name))
+
     def save(self, dataset: str, name: str, found: dict[str, Any]) -> dict[str, Any]:
         """Keep a registration under a new name; Conflict where the name is taken."""
         path = self._path(dataset, name)
@@ -65,6 +70,18 @@ class Registrations:
         return self._folder / dataset / f"{name}.json"
 
 
+def accepted_for(dataset: Path, said: str | None, runs: Path) -> Accepted | None:
+    """What the terminal calls a registration: a file of one, or the name of one that is kept below `runs` for this dataset."""
+    if said is None:
+        return None
+    if not Path(said).is_file():
+        return Registrations(runs).accepted(dataset.resolve().name, said)
+    try:
+        return Accepted.from_json(json.loads(Path(said).read_text()))
+    except (OSError, ValueError) as error:
+        raise RegistrationError(f"{said} cannot be read ({error}); name a registration that was accepted", file=said) from error
+
+
 def register(dataset: Path, cloud: list[list[float]], mesh: list[list[float]]) -> dict[str, Any]:
     """Fit pairs and run ICP from there in a process of its own, since the server itself loads no Open3D."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
@@ -84,4 +101,4 @@ def _register(dataset: Path, cloud: list[list[float]], mesh: list[list[float]]) 
     config = opened.config
     found = register_pairs(opened.rest_cloud(), config.size, np.array(cloud), np.array(mesh), config.depth_sigma)
     points = [{"cloud": one, "mesh": other} for one, other in zip(cloud, mesh, strict=True)]
-    return {"points": points, "registration": found.to_json()}
+    return {"points": points, "registration": found.to_json(), "rest": rest_digest(dataset)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,6 +25,12 @@ FIELDS = (
     *("tool_radius_extended", "error_raw", "error_extended", "distance_raw", "distance_extended", "paper_raw"),
     *("paper_extended", "noise_floor", "camera_raw", "camera_extended", "outcome"),
 )
+CORRECTIONS = "corrections"
+"""Folder beside the runs: of each run its recorded frames under a trained network."""
+CORRECTED = (
+    "corrected", "error_corrected", "distance_corrected", "paper_corrected", "tool_corrected", "tool_radius_corrected",
+    "camera_corrected",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +93,12 @@ class Run:
         if name not in self.sequences:
             known = ", ".join(self.sequences)
             raise Missing(f"run {self.name} has no sequence {name}; it has {known}", run=self.name, sequence=name)
-        return Replay(name, self._arrays(f"replays/{name}.npz", FIELDS))
+        return Replay(name, self._arrays(f"replays/{name}.npz", FIELDS) | self._corrected(name))
+
+    def _corrected(self, name: str) -> dict[str, Any]:
+        """What a training on this run's model has left of a sequence; nothing where there was none, or one of other frames."""
+        file = self.path.parent / CORRECTIONS / self.name / f"{name}.npz"
+        return self._arrays(os.path.relpath(file, self.path), CORRECTED) if file.is_file() else {}
 
     def patterns(self) -> dict[str, Any]:
         """Patch centres and normals (P, 3) and the measured and predicted error (P,) [m], phantom frame."""

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from app import colours
-from app.picture import Ball, Mesh, Picture, PointArray
-from core.frames import FloatArray
+from app.figures import Cloud, Figure, Label, Lines, Mesh, Tool
+from app.lookout import FIELD_OF_VIEW, Lookout
+from app.picture import Picture
 
 if TYPE_CHECKING:
     from viser import ClientHandle
@@ -16,10 +17,8 @@ if TYPE_CHECKING:
 __all__ = ["NullScene", "Scene", "ViserScene"]
 
 POINT_SIZE = 0.00026
-FIELD_OF_VIEW = 0.6
 SHAFT = 0.022
-NOWHERE = np.zeros((3, 3), dtype=np.float32)
-NOTHING = np.zeros((0, 3), dtype=np.uint32)
+PLACES = {Cloud: "/{}", Mesh: "/mesh/{}", Lines: "/lines/{}", Tool: "/{}", Label: "/names/{}"}
 
 
 class Scene(Protocol):
@@ -28,8 +27,11 @@ class Scene(Protocol):
     def draw(self, picture: Picture) -> None:
         """Show this picture and nothing else."""
 
-    def frame(self, size: FloatArray, eye: FloatArray) -> None:
-        """Look at a phantom of edge lengths (3,) [m] from the side where the depth camera stands, (3,) [m]."""
+    def look(self, lookout: Lookout) -> None:
+        """Look from there."""
+
+    def still(self, width: int, height: int) -> np.ndarray[Any, Any] | None:
+        """What is seen now, (height, width, 4) with the background transparent; None where no browser answers."""
 
 
 class NullScene:
@@ -37,15 +39,19 @@ class NullScene:
 
     def __init__(self) -> None:
         self.pictures: list[Picture] = []
-        self.looked_at: list[FloatArray] = []
+        self.looked_from: list[Lookout] = []
 
     def draw(self, picture: Picture) -> None:
         """Keep the picture."""
         self.pictures.append(picture)
 
-    def frame(self, size: FloatArray, eye: FloatArray) -> None:
-        """Keep the size."""
-        self.looked_at.append(size)
+    def look(self, lookout: Lookout) -> None:
+        """Keep the place."""
+        self.looked_from.append(lookout)
+
+    def still(self, width: int, height: int) -> np.ndarray[Any, Any] | None:
+        """Nothing is to be seen."""
+        return np.zeros((height, width, 4), dtype=np.uint8)
 
 
 class ViserScene:
@@ -54,97 +60,91 @@ class ViserScene:
     def __init__(self, client: ClientHandle) -> None:
         self._client = client
         self._nodes: dict[str, Any] = {}
-        self._ball: tuple[float, Any] | None = None
+        self._made: dict[str, tuple[Any, ...]] = {}
 
     def draw(self, picture: Picture) -> None:
         """Show this picture: all changes reach the browser at once."""
+        shown = {PLACES[type(figure)].format(name): figure for name, figure in picture.figures.items()}
         with self._client.atomic():
-            self._cloud(picture.cloud)
-            shown = {f"/mesh/{name}": mesh for name, mesh in picture.meshes.items()}
-            for name, mesh in shown.items():
-                self._mesh(name, mesh)
+            for name, figure in shown.items():
+                self._put(name, figure)
             for name, node in self._nodes.items():
-                if name.startswith("/mesh/"):
-                    node.visible = name in shown
-            self._wire(picture.wire)
-            self._tool(picture.tool)
+                node.visible = name in shown
 
-    def frame(self, size: FloatArray, eye: FloatArray) -> None:
-        """Turn the camera to the phantom, from the depth camera's side, raised to a comfortable height."""
-        reach = float(np.linalg.norm(size)) / 2
-        around = np.arctan2(eye[1], eye[0])
-        up = np.deg2rad(36.0)
-        direction = np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
-        centre = np.array([0.0, 0.0, 0.52 * size[2]])
+    def look(self, lookout: Lookout) -> None:
+        """Turn the camera."""
         camera = self._client.camera
         with self._client.atomic():
             camera.fov = FIELD_OF_VIEW
             camera.near = 0.001
-            camera.up_direction = (0.0, 0.0, 1.0)
-            camera.position = centre + direction * reach / np.sin(FIELD_OF_VIEW / 2) * 1.2
-            camera.look_at = centre
+            camera.up_direction = lookout.up
+            camera.position = lookout.position
+            camera.look_at = lookout.target
 
-    def _cloud(self, points: PointArray | None) -> None:
-        node = self._nodes.get("/cloud")
-        if points is None:
-            if node is not None:
-                node.visible = False
-            return
-        if node is None or node.points.shape != points.shape:
-            self._nodes["/cloud"] = self._client.scene.add_point_cloud(
-                "/cloud",
-                points,
-                colours.MEASURED,
-                point_size=POINT_SIZE,
-                point_shape="circle",
-                precision="float32",
-                point_shading="flat",
-            )
-            return
-        node.points = points
-        node.visible = True
+    def still(self, width: int, height: int) -> np.ndarray[Any, Any] | None:
+        """Rendered by the browser, which may take a second; None where it does not answer in time."""
+        try:
+            return np.asarray(self._client.get_render(height, width, transport_format="png", timeout=20.0))
+        except TimeoutError:
+            return None
 
-    def _mesh(self, name: str, mesh: Mesh) -> None:
-        vertices, faces = mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32)
-        node = self._nodes.get(name)
-        if node is None:
-            self._nodes[name] = self._client.scene.add_mesh_simple(
-                name, vertices, faces, color=mesh.colour, side="double", cast_shadow=False, receive_shadow=False
-            )
+    def _put(self, name: str, figure: Figure) -> None:
+        """Make the node, or give it what is new; another kind or size of arrays takes a new one."""
+        made = _mould(figure)
+        if self._made.get(name) != made:
+            self._nodes[name] = self._make(name, figure)
+            self._made[name] = made
+        node = self._nodes[name]
+        if isinstance(figure, Tool):
+            node.position = figure.centre + figure.at
             return
-        node.vertices, node.faces = vertices, faces
+        node.position = figure.place + figure.at if isinstance(figure, Label) else figure.at
+        if isinstance(figure, Cloud):
+            node.points = figure.points
+        elif isinstance(figure, Mesh):
+            node.vertices, node.faces = figure.vertices, figure.faces.astype(np.uint32)
+        elif isinstance(figure, Lines):
+            node.points = figure.segments
+            if isinstance(figure.colour, np.ndarray):
+                node.colors = figure.colour
 
-    def _wire(self, wire: tuple[FloatArray, tuple[int, int, int]] | None) -> None:
-        for name, node in self._nodes.items():
-            if name.startswith("/wire/"):
-                node.visible = False
-        if wire is None:
-            return
-        points, colour = wire
-        name = f"/wire/{colour[0]}"
-        node = self._nodes.get(name)
-        if node is None or node.points.shape != points.shape:
-            self._nodes[name] = self._client.scene.add_line_segments(
-                name, points.astype(np.float32), colour, thickness=1.2, thickness_units="screen"
-            )
-            return
-        node.points, node.visible = points.astype(np.float32), True
-
-    def _tool(self, tool: Ball | None) -> None:
-        if tool is None:
-            if self._ball is not None:
-                self._ball[1].visible = False
-            return
-        if self._ball is None or self._ball[0] != tool.radius:
-            self._ball = (tool.radius, self._make_tool(tool.radius))
-        self._ball[1].position = tool.centre
-        self._ball[1].visible = True
-
-    def _make_tool(self, radius: float) -> Any:
+    def _make(self, name: str, figure: Figure) -> Any:
         scene = self._client.scene
-        root = scene.add_frame("/tool", show_axes=False)
-        scene.add_icosphere("/tool/ball", radius, colours.TOOL, subdivisions=4, cast_shadow=False)
+        if isinstance(figure, Cloud):
+            return scene.add_point_cloud(
+                name, figure.points, figure.colour, point_size=POINT_SIZE, point_shape="circle", precision="float32",
+                point_shading="flat",
+            )  # fmt: skip
+        if isinstance(figure, Mesh):
+            return scene.add_mesh_simple(
+                name, figure.vertices, figure.faces.astype(np.uint32), color=figure.colour, side="double", cast_shadow=False,
+                receive_shadow=False, opacity=None if figure.opacity >= 1 else figure.opacity,
+            )  # fmt: skip
+        if isinstance(figure, Lines):
+            return scene.add_line_segments(name, figure.segments, figure.colour, thickness=figure.width, thickness_units="screen")
+        if isinstance(figure, Label):
+            return scene.add_label(name, figure.text, anchor="bottom-center", font_screen_scale=0.9)
+        return self._make_tool(name, figure)
+
+    def _make_tool(self, name: str, tool: Tool) -> Any:
+        scene, opacity = self._client.scene, None if tool.opacity >= 1 else tool.opacity
+        root = scene.add_frame(name, show_axes=False)
+        scene.add_icosphere(f"{name}/ball", tool.radius, colours.TOOL, subdivisions=4, cast_shadow=False, opacity=opacity)
         scene.add_cylinder(
-            "/tool/shaft", 0.36 * radius, SHAFT, colours.TOOL, radial_segments=24, cast_shadow=False, position=(0.0, 0.0, SHAFT / 2)
-        )
+            f"{name}/shaft", 0.36 * tool.radius, SHAFT, colours.TOOL, radial_segments=24, cast_shadow=False, opacity=opacity,
+            position=(0.0, 0.0, SHAFT / 2),
+        )  # fmt: skip
         return root
+
+
+def _mould(figure: Figure) -> tuple[Any, ...]:
+    """What cannot be changed in a node that is there: where it differs, the node is made anew."""
+    if isinstance(figure, Cloud):
+        return (Cloud, figure.points.shape, figure.colour)
+    if isinstance(figure, Mesh):
+        return (Mesh, figure.colour, figure.opacity)
+    if isinstance(figure, Lines):
+        return (Lines, figure.segments.shape, figure.width, figure.colour if isinstance(figure.colour, tuple) else None)
+    if isinstance(figure, Label):
+        return (Label, figure.text)
+    return (Tool, figure.radius, figure.opacity)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-from app.picture import Colouring, Layer
 from app.records import Job
 
-__all__ = ["PROBLEMS", "DiagnosisRequest", "EffectIn", "JobOut", "NoteOut", "Notes", "Problem", "View", "WhatIfRequest"]
+__all__ = [
+    "PROBLEMS", "DiagnosisRequest", "EffectIn", "HalfPair", "JobOut", "NoteOut", "Notes", "Point", "Problem", "Shown",
+    "WeakDirection", "WhatIfRequest",
+]  # fmt: skip
 
 
 class Problem(BaseModel):
@@ -35,27 +37,61 @@ PROBLEMS: dict[int | str, dict[str, Any]] = {
 """What any operation may answer besides its result."""
 
 
-class View(BaseModel):
-    """What a page wants to see; `limit` is the end of the error scale [m], None for automatic."""
+Point = Annotated[list[Annotated[FiniteFloat, Field(ge=-10.0, le=10.0)]], Field(min_length=3, max_length=3)]
+"""A place [m]."""
+Row = Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)]
+
+
+class HalfPair(BaseModel):
+    """A pair as it is being clicked: a point [m] on the cloud, camera frame, and one on the mesh, phantom frame, or not yet."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    run: str
-    sequence: str
-    frame: int = Field(default=0, ge=0)
-    layers: tuple[Layer, ...] = ("measured", "raw", "extended", "tool")
-    colour: Colouring = "plain"
-    limit: float | None = Field(default=None, gt=0.0, le=1.0)
-    crop: bool = True
+    cloud: Point | None = None
+    mesh: Point | None = None
+
+
+class WeakDirection(BaseModel):
+    """A motion that the cloud determines weakly: parts of translation and rotation along the phantom's axes, and its text."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    translation: Point
+    rotation: Point
+    text: str = Field(max_length=80)
+
+
+class Shown(BaseModel):
+    """What a page shows while a person registers by hand.
+
+    `mode` is the side that clicks are for; `pose` (phantom_from_camera) is where the cloud was fitted to, if it was, `start` how it
+    is shown before: as stated in dataset.toml, levelled by its table, or as the camera sees it; `over` the phantom, or beside it.
+    """
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", json_schema_extra={"examples": [{"dataset": "block-01", "mode": "cloud"}]}
+    )
+
+    dataset: str
+    pairs: tuple[HalfPair, ...] = Field(default=(), max_length=100)
+    mode: Literal["cloud", "mesh"] = "cloud"
+    chosen: tuple[Annotated[int, Field(ge=0, lt=100)], Literal["cloud", "mesh"]] | None = None
+    pose: (
+        Annotated[list[Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)]], Field(min_length=4, max_length=4)] | None
+    ) = None
+    start: Literal["stated", "levelled", "camera"] = "stated"
+    over: bool = False
+    weak: tuple[WeakDirection, ...] = Field(default=(), max_length=6)
 
 
 class DiagnosisRequest(BaseModel):
-    """Which dataset to diagnose, named by its folder."""
+    """Which dataset to diagnose, named by its folder; with which accepted registration of the camera, if not the automatic one."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra={"examples": [{"dataset": "block-01", "seed": 0}]})
 
     dataset: str
     seed: int = Field(default=0, ge=0, lt=2**31)
+    registration: str | None = None
 
 
 class EffectIn(BaseModel):

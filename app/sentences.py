@@ -15,6 +15,7 @@ __all__ = [
     "palpation_sentences",
     "probe_sentence",
     "quantity",
+    "registration_sentences",
     "verdict_sentence",
 ]
 
@@ -257,3 +258,14 @@ PHRASES: dict[str, Callable[[Any, Sequence[float] | None], str]] = {
     "mesh_resolution": lambda v, _: f"a finer grid: the stated one is too coarse, {quantity(v['element_size'], 'm')} would do",
     "young_modulus": lambda v, _: f"another stiffness: Young's modulus is {quantity(v['E'], 'Pa')}",
 }
+
+
+def registration_sentences(report: dict[str, Any]) -> list[str]:
+    """Where the camera's registration comes from, if it is not the automatic one."""
+    found = report.get("registration")
+    if not found:
+        return []
+    how = f"by hand from {found['pairs']} pairs of points" if found["pairs"] else "automatically"
+    left = f", {1e3 * found['residual']:.2f} mm RMS left" if isinstance(found.get("residual"), (int, float)) else ""
+    weak = f"; weak: {', '.join(found['weak_directions'])}" if found["weak_directions"] else ""
+    return [f"Camera registered as {found['name']}, {how}{left}{weak}."]

@@ -10,11 +10,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from app.furniture import furniture_of
+from app.lookout import Lookout, Standpoint, lookout
 from app.picture import Picture, Reel
 from app.problems import Missing
 from app.runs import Run, Runs
 from app.scene import Scene
-from app.schemas import View
+from app.side import end_of_scale
+from app.view import Quantity, View
 from core.errors import PalpateError
 from core.frames import FloatArray
 
@@ -45,14 +50,14 @@ class Trial:
 class Session:
     """One page: its view, the picture of it, and the browsers' scenes that show it."""
 
-    def __init__(self, identity: str, reel_of: Callable[[str, str], Reel]) -> None:
+    def __init__(self, identity: str, reel_of: Callable[[str, str], Reel], end_of: Callable[[str, Quantity], float | None]) -> None:
         self.identity = identity
         self.view: View | None = None
         self.picture: Picture | None = None
         self._trial: Trial | None = None
-        self._reel_of = reel_of
+        self._reel_of, self._end_of = reel_of, end_of
         self._scenes: list[Scene] = []
-        self._framed: str | None = None
+        self._framed: tuple[str, tuple[tuple[float, float, float], ...]] | None = None
         self._lock = threading.Lock()
 
     def show(self, view: View) -> dict[str, Any]:
@@ -62,13 +67,14 @@ class Session:
             frame = min(view.frame, len(reel.replay) - 1)
             if self._trial is not None and self._trial.fits(view, frame):
                 reel = reel.instead(frame, self._trial.moment)
-            picture = reel.picture(frame, frozenset(view.layers), view.colour, view.limit, view.crop)
-            self.view, self.picture = view.model_copy(update={"frame": frame}), picture
+            view = view.model_copy(update={"frame": frame})
+            picture = reel.picture(view, self._end_of(view.run, view.quantity) if view.scale == "fixed" else None)
+            self.view, self.picture = view, picture
             for scene in self._scenes:
                 scene.draw(picture)
-            if self._framed != view.run:
+            if self._framed != (view.run, picture.columns):
                 self._look()
-            self._framed = view.run
+            self._framed = (view.run, picture.columns)
         return self.state()
 
     def try_out(self, trial: Trial | None) -> None:
@@ -78,16 +84,27 @@ class Session:
         if view is not None:
             self.show(view)
 
-    def look(self) -> None:
+    def look(self, where: Standpoint = "reset") -> None:
         """Turn the cameras of all scenes to the phantom."""
         with self._lock:
-            self._look()
+            self._look(where)
 
-    def _look(self) -> None:
-        if self.view is not None:
+    def _look(self, where: Standpoint = "reset") -> None:
+        if self.view is not None and self.picture is not None:
             replay = self._reel_of(self.view.run, self.view.sequence).replay
+            found: Lookout = lookout(replay.size, replay.camera("raw").translation, self.picture.columns, where)
             for scene in self._scenes:
-                scene.frame(replay.size, replay.camera("raw").translation)
+                scene.look(found)
+
+    def still(self, width: int, height: int) -> np.ndarray[Any, Any]:
+        """What the page's scene shows (height, width, 4); Missing where no browser shows it."""
+        with self._lock:
+            scenes = list(self._scenes)
+        for scene in reversed(scenes):
+            found = scene.still(width, height)
+            if found is not None:
+                return found
+        raise Missing("no browser shows this page, so that there is nothing to take a picture of", session=self.identity)
 
     def join(self, scene: Scene) -> None:
         """A browser's scene was opened: show it what the page shows."""
@@ -119,6 +136,7 @@ class Sessions:
         self._clouds_of = clouds_of or measured_clouds
         self._sessions: OrderedDict[str, Session] = OrderedDict()
         self._reels: OrderedDict[tuple[str, str], Reel] = OrderedDict()
+        self._ends: dict[tuple[str, Quantity], float | None] = {}
         self._lock = threading.Lock()
 
     def get(self, identity: str) -> Session:
@@ -131,7 +149,7 @@ class Sessions:
     def open(self, identity: str) -> Session:
         """The session of a page, made if need be."""
         with self._lock:
-            session = self._sessions.pop(identity, None) or Session(identity, self.reel)
+            session = self._sessions.pop(identity, None) or Session(identity, self.reel, self.end)
             self._sessions[identity] = session
             while len(self._sessions) > SESSIONS:
                 self._sessions.popitem(last=False)
@@ -152,11 +170,20 @@ class Sessions:
             reel = self._reels.pop(key, None)
             if reel is None:
                 found = self._runs.get(run)
-                reel = Reel(found.replay(sequence), self._clouds_of(found, sequence))
+                reel = Reel(found.replay(sequence), self._clouds_of(found, sequence), furniture_of(found))
             self._reels[key] = reel
             while len(self._reels) > REELS:
                 self._reels.popitem(last=False)
             return reel
+
+    def end(self, run: str, quantity: Quantity) -> float | None:
+        """The end of a scale that serves all sequences of a run: the largest of their own; None where none holds the quantity."""
+        key = (run, quantity)
+        if key not in self._ends:
+            found = self._runs.get(run)
+            ends = [end_of_scale(found.replay(sequence), quantity) for sequence in found.sequences]
+            self._ends[key] = max((end for end in ends if end is not None), default=None)
+        return self._ends[key]
 
 
 def measured_clouds(run: Run, sequence: str) -> Callable[[int], FloatArray] | None:

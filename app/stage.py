@@ -5,39 +5,62 @@ from __future__ import annotations
 import contextlib
 import io
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Generic, TypeVar
 
-from app.scene import FIELD_OF_VIEW, ViserScene
+from app.lookout import FIELD_OF_VIEW
+from app.pair_scene import PairScene, Ray, ViserPairScene
+from app.scene import Scene, ViserScene
 
 if TYPE_CHECKING:
     from viser import ClientHandle, ViserServer
 
-__all__ = ["Stage"]
+__all__ = ["BY_HAND", "Audience", "Stage"]
+
+BY_HAND = "-register"
+"""Ends the name under which a page's scene of manual registration connects."""
+S = TypeVar("S")
+
+
+@dataclass(frozen=True)
+class Audience(Generic[S]):
+    """Whom to tell of a scene of a page that opened, and that closed; from the viewer's threads."""
+
+    joined: Callable[[str, S], None]
+    gone: Callable[[str, S], None]
+
+    def join(self, page: str, scene: S) -> Callable[[], None]:
+        """Tell of a scene; what is returned tells of its end."""
+        self.joined(page, scene)
+        return lambda: self.gone(page, scene)
 
 
 class Stage:
-    """Owns the viser server. `joined(page, scene)` and `left(page, scene)` are called from its threads."""
+    """Owns the viser server: tells `show` of scenes of a page's replays, and `pairs` of those in which it registers by hand."""
 
-    def __init__(self, joined: Callable[[str, ViserScene], None], left: Callable[[str, ViserScene], None]) -> None:
+    def __init__(self, show: Audience[Scene], pairs: Audience[PairScene], clicked: Callable[[str, Ray], None]) -> None:
         import viser  # noqa: PLC0415 (heavy)
 
         with contextlib.redirect_stdout(io.StringIO()):  # it prints its inner address, which is of no use to anybody
             self._server: ViserServer = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         self._server.request_share_url = lambda *_, **__: None  # type: ignore[method-assign]
-        self._scenes: dict[int, tuple[str, ViserScene]] = {}
+        self._left: dict[int, Callable[[], None]] = {}
         self._furnish()
 
         @self._server.on_client_connect
         def _(client: ClientHandle) -> None:
-            page, scene = self._page_of(client.client_id), ViserScene(client)
-            self._scenes[client.client_id] = (page, scene)
-            joined(page, scene)
+            page = self._page_of(client.client_id)
+            if page.endswith(BY_HAND):
+                page = page.removesuffix(BY_HAND)
+                self._left[client.client_id] = pairs.join(page, ViserPairScene(client, lambda ray: clicked(page, ray)))
+            else:
+                self._left[client.client_id] = show.join(page, ViserScene(client))
 
         @self._server.on_client_disconnect
         def _(client: ClientHandle) -> None:
-            entry = self._scenes.pop(client.client_id, None)
-            if entry is not None:
-                left(*entry)
+            left = self._left.pop(client.client_id, None)
+            if left is not None:
+                left()
 
     @property
     def port(self) -> int:

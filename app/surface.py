@@ -9,7 +9,7 @@ import numpy as np
 
 from core.frames import FloatArray
 
-__all__ = ["FineSurface", "grid_edges", "refine"]
+__all__ = ["FineSurface", "IntArray", "grid_edges", "lattice", "refine"]
 
 IntArray = np.ndarray[Any, np.dtype[np.int64]]
 
@@ -19,8 +19,8 @@ class FineSurface:
     """A surface whose points are weighted means of the coarse vertices, split along the edges of the box.
 
     Attributes:
-        corners: (n, 3) coarse vertices of each fine point.
-        weights: (n, 3) their weights, rows sum to one.
+        corners: (n, k) coarse vertices of each fine point, three or more.
+        weights: (n, k) their weights, rows sum to one.
         faces: (m, 3) fine triangles, turned as the coarse ones.
     """
 
@@ -68,6 +68,13 @@ def grid_edges(rest: Any, faces: Any) -> IntArray:
     count = np.bincount(inverse.reshape(-1))
     hypotenuses = np.bincount(inverse.reshape(-1), weights=longest.reshape(-1))
     return np.asarray(unique[~((count == 2) & (hypotenuses == 2))])
+
+
+def lattice(rows: int, columns: int) -> IntArray:
+    """(m, 3) triangles between points that lie in rows, row after row."""
+    index = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
 def _side(rest: FloatArray, faces: IntArray) -> IntArray:

@@ -62,12 +62,15 @@ class Sweeps:
 def sweep(request: dict[str, Any], report: Report) -> dict[str, Any]:
     """The job: sweep `request["dataset"]` as `request["sweep"]` asks; the folder has the name of the job."""
     from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
+    from core.dataset.accepted import Accepted  # noqa: PLC0415 (heavy)
     from core.sweeping.request import Request  # noqa: PLC0415 (heavy)
     from core.sweeping.running import run_sweep  # noqa: PLC0415 (heavy)
 
+    registered = request.get("registration")
+    dataset = open_dataset(Path(request["dataset"])).registered(Accepted.from_json(registered) if registered else None)
     sweeps, name = Sweeps(Path(request["runs"])), Path(request["scratch"]).name
     found = run_sweep(
-        open_dataset(Path(request["dataset"])), Request.from_json(request["sweep"]), sweeps.folder / name, store=sweeps.store,
+        dataset, Request.from_json(request["sweep"]), sweeps.folder / name, store=sweeps.store,
         workers=int(request["workers"]), scheduler=request["scheduler"], report=report,
     )  # fmt: skip
     return {"sweep": name, "points": found["points"], "failed": found["failed"]}

@@ -90,6 +90,7 @@ def _beginnings(folder: str, sequence: str, clouds: tuple[int, ...], model: str)
 def _solve(
     folder: str, sequence: str, clouds: tuple[int, ...], model: str, frame: int, effects: list[dict[str, Any]], tuned: bool
 ) -> Moment:
-    from core.whatif import effects_from, opened  # noqa: PLC0415 (heavy)
+    from core.diagnosis.kept import effects_from  # noqa: PLC0415 (heavy)
+    from core.whatif import opened  # noqa: PLC0415 (heavy)
 
     return opened(folder, sequence, clouds, model).solve(frame, effects_from(effects), tuned)

@@ -8,6 +8,7 @@ PalpateError                 a problem a user can act on; the message says what 
 ├── SolveError               a frame without equilibrium: names frame, residual and cause
 ├── EffectError              an unknown effect, or a parameter out of bounds: names parameter, value and bounds
 ├── DiagnosisError           data that cannot carry a diagnosis
+├── CorrectionError          samples, networks and trainings that do not fit together: names key and value
 └── RunError                 a result on disk that is missing or not whole
 Cancelled                    the user stopped a long verb (not an error)
 """
@@ -18,6 +19,7 @@ from typing import Any
 
 __all__ = [
     "Cancelled",
+    "CorrectionError",
     "DatasetError",
     "DiagnosisError",
     "EffectError",
@@ -65,6 +67,10 @@ class EffectError(PalpateError):
 
 class DiagnosisError(PalpateError):
     """Data that cannot carry a diagnosis, with what is lacking."""
+
+
+class CorrectionError(PalpateError):
+    """Samples, networks or a training that do not fit together; `where` has key and value."""
 
 
 class RunError(PalpateError):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -13,13 +13,16 @@ import numpy as np
 
 from core.cleaning import cleaner_for, find_shaft_axis, tool_poses
 from core.dataset import open_dataset
+from core.dataset.accepted import Accepted
 from core.diagnosis.hypothesis import with_effects
+from core.diagnosis.inside import Inside
+from core.diagnosis.kept import tuned_as
 from core.diagnosis.recording import Recorded, observed
 from core.diagnosis.smoothing import smooth_centres
-from core.effects import DIAGNOSED, Effect, effect_named
+from core.effects import DIAGNOSED, Effect
 from core.equilibrium import Equilibrium
-from core.errors import EffectError, RunError
-from core.frames import FloatArray, Transform
+from core.errors import RunError
+from core.frames import FloatArray
 from core.grading import PAGE_GRID
 from core.registration import register, setup_from
 from core.replay import replay
@@ -27,7 +30,7 @@ from core.setup import Setup, Shape
 from core.sight import sight_of
 from core.touches import touch_correction
 
-__all__ = ["Moment", "WhatIf", "effects_from", "opened"]
+__all__ = ["Moment", "WhatIf", "opened"]
 
 _TOLERANCE = 1e-3
 """Residual over the push at which a frame counts as converged; that of the recording."""
@@ -41,6 +44,7 @@ class Moment:
         surface: (v, 3) moved material vertices, in the order of the recording. error: (v,) mean gap of the measured points around
             each, NaN where unseen. distance: RMS of `error`. tool: (3,) centre. radius: of the tool. outcome: how the solve ended.
         converged: whether that is an equilibrium. camera: (4, 4) phantom_from_camera.
+        inside: its nodes, as a recording of one frame.
     """
 
     surface: FloatArray
@@ -51,6 +55,7 @@ class Moment:
     outcome: str
     converged: bool
     camera: FloatArray
+    inside: Inside
 
 
 class WhatIf:
@@ -62,12 +67,13 @@ class WhatIf:
     """
 
     def __init__(self, folder: Path, sequence: str, clouds: Sequence[int], extended: dict[str, Any]) -> None:
-        dataset = open_dataset(folder)
+        registered = extended.get("registration")
+        dataset = open_dataset(folder).registered(Accepted.from_json(registered) if registered else None)
         if isinstance(dataset.geometry, Shape) or not len(dataset.sequence(sequence)):
             raise RunError(f"{sequence} has no clouds of a block, so that there is nothing to compare with", sequence=sequence)
         registration = register(dataset)
         self.stated = setup_from(dataset, registration)
-        self.tuned = _tuned(self.stated, extended)
+        self.tuned = tuned_as(self.stated, extended)
         self._sequence = dataset.sequence(sequence)
         self._clouds = np.asarray(clouds, dtype=int)
         self._times = np.asarray(self._sequence.cloud_times)[self._clouds]
@@ -105,7 +111,7 @@ class WhatIf:
         side: Recorded = observed(setup, [solved], [self._cloud(frame)])
         return Moment(
             side.surface[0], side.error[0], float(side.distance[0]), side.tool[0], setup.tool.radius,
-            solved.outcome.value, not side.outcome[0], np.asarray(sight_of(setup).pose.matrix),
+            solved.outcome.value, not side.outcome[0], np.asarray(sight_of(setup).pose.matrix), side.inside,
         )  # fmt: skip
 
     def _solved(self, setup: Setup, frame: int) -> Equilibrium:
@@ -126,37 +132,7 @@ class WhatIf:
         return self._cleaned[frame]
 
 
-def _tuned(stated: Setup, extended: dict[str, Any]) -> Setup:
-    """The stated setup with the robot's pose, the tool's radius and Poisson's ratio of a model, where no cause of it sets them."""
-    pose = Transform.from_matrix(np.array(extended["setup"]["phantom_from_robot"]))
-    named = {one["effect"] for one in extended["effects"]}
-    radius = stated.tool.radius if "tool_radius" in named else float(extended["setup"]["tool"]["radius"])
-    nu = stated.material.poisson_ratio if "poisson_ratio" in named else float(extended["setup"]["material"]["poisson_ratio"])
-    return replace(
-        stated,
-        phantom_from_robot=pose,
-        tool=replace(stated.tool, radius=radius),
-        material=replace(stated.material, poisson_ratio=nu),
-    )
-
-
 @lru_cache(maxsize=4)
 def opened(folder: str, sequence: str, clouds: tuple[int, ...], extended: str) -> WhatIf:
     """The same, kept for the next question; `extended` is the text of model.json."""
     return WhatIf(Path(folder), sequence, clouds, json.loads(extended))
-
-
-def effects_from(rows: Sequence[dict[str, Any]]) -> list[Effect]:
-    """Effects from plain values as `Effect.to_json` gives them; EffectError for names and values that are none."""
-    found = []
-    for row in rows:
-        kind, given = effect_named(str(row["effect"])), dict(row["parameters"])
-        wanted = {item.name: item for item in kind.parameters()}
-        if set(given) != set(wanted):
-            told = f"{kind.name} has the parameters {', '.join(wanted)}; given are {', '.join(map(str, given)) or 'none'}"
-            raise EffectError(told, parameter=kind.name)
-        for name, value in given.items():
-            if not wanted[name].choices and (isinstance(value, bool) or not isinstance(value, (int, float))):
-                raise EffectError(f"{kind.name}: {name} = {value!r} is no number", parameter=name, value=str(value))
-        found.append(kind(**given))
-    return found

@@ -21,7 +21,7 @@ def start(request: DiagnosisRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
     """Check the dataset completely, then queue its diagnosis; the answer's id names the job now and the run later."""
     dataset = desk.library.open(request.dataset)
     dataset.validate()
-    return JobOut.of(desk.diagnose(dataset.path, request.dataset, request.seed, key))
+    return JobOut.of(desk.diagnose(dataset.path, request.dataset, request.seed, key, request.registration))
 
 
 @router.get("")

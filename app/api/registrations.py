@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from fastapi import APIRouter
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import BaseModel, ConfigDict, Field
 
 from app.desk import DeskOf
 from app.problems import Conflict
 from app.registrations import Registrations, register
+from app.schemas import Point
 from core.registration.pairs import fit_pairs
 
 __all__ = ["router"]
 
 router = APIRouter(prefix="/datasets/{name}/registrations", tags=["registrations"])
-Point = Annotated[list[Annotated[FiniteFloat, Field(ge=-10.0, le=10.0)]], Field(min_length=3, max_length=3)]
 
 
 class Pair(BaseModel):

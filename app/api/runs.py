@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import numpy as np
 from fastapi import APIRouter, Query, Response
@@ -14,8 +14,10 @@ from app.comparison import compared
 from app.course import course
 from app.desk import DeskOf
 from app.runs import Replay, Run
-from app.sentences import verdict_sentence
+from app.sentences import registration_sentences, verdict_sentence
+from app.side import NO_INSIDE
 from app.summaries import finite
+from app.view import Quantity
 from core.errors import RunError
 
 __all__ = ["router"]
@@ -38,6 +40,7 @@ def one(name: str, desk: DeskOf) -> dict[str, Any]:
     return {
         **_heading(run),
         "sentence": verdict_sentence(run.report, size),
+        "notes": registration_sentences(run.report),
         "size": size,
         "has_clouds": Path(run.origin.get("dataset", "")).is_dir() and "dataset" in run.origin,
         "sequences": [
@@ -98,7 +101,10 @@ def picture(name: str, picture: str, desk: DeskOf) -> FileResponse:
 
 @router.get("/{name}/sequences/{sequence}")
 def sequence(name: str, sequence: str, desk: DeskOf) -> dict[str, Any]:
-    """Times [s] and errors [m] of each frame, the automatic end of their scale [m], push depth [m], force [N], spells of touch."""
+    """Times [s] and errors [m] of each frame, push depth [m], force [N], spells of touch, and what the scene can show.
+
+    `limits` are the robust ends of the scales, null where the run does not hold a quantity; `inside` says why it has no inside.
+    """
     reel = desk.sessions.reel(name, sequence)
     replay = reel.replay
     told = course(desk.runs.get(name), replay)
@@ -109,7 +115,11 @@ def sequence(name: str, sequence: str, desk: DeskOf) -> dict[str, Any]:
         **{key: finite(replay[key], digits=8) for key in series},
         "noise_floor": finite(replay["noise_floor"]),
         "outcome": [int(code) for code in replay["outcome"]],
-        "automatic_limit": reel.limit,
+        "limits": {quantity: reel.end(quantity) for quantity in get_args(Quantity)},
+        "inside": NO_INSIDE if reel.end("energy") is None else None,
+        "lumps": reel.lumps,
+        "landmarks": reel.landmarks,
+        "box": [[round(float(x), 6) for x in corner] for corner in reel.corners],
         **told,
     }
 

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from typing import Any
+from io import BytesIO
+from typing import Annotated, Any
 
-from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+from fastapi import APIRouter, Query, Response, WebSocket, WebSocketDisconnect
 from pydantic import ValidationError
 
 from app.colours import palette
 from app.desk import DeskOf
+from app.lookout import Standpoint
 from app.problems import as_dict
 from app.relay import PageId
-from app.schemas import View
+from app.view import View
 from core.errors import PalpateError
 
 __all__ = ["router"]
 
 router = APIRouter(tags=["scene"])
+Pixels = Annotated[int, Query(ge=16, le=4096)]
 
 
 @router.get("/palette")
@@ -34,9 +37,19 @@ def show(page: PageId, view: View, desk: DeskOf) -> dict[str, Any]:
 
 
 @router.post("/sessions/{page}/look", status_code=204)
-def look(page: PageId, desk: DeskOf) -> None:
-    """Turn the camera to the phantom."""
-    desk.sessions.get(page).look()
+def look(page: PageId, desk: DeskOf, where: Standpoint = "reset") -> None:
+    """Turn the camera to the phantom: the depth camera's view, or from the top, the front (along +y), the side (along -x)."""
+    desk.sessions.get(page).look(where)
+
+
+@router.get("/sessions/{page}/still.png", response_class=Response, responses={200: {"content": {"image/png": {}}}})
+def still(page: PageId, desk: DeskOf, width: Pixels = 1280, height: Pixels = 720) -> Response:
+    """What the page's scene shows now, as its browser renders it; the background is transparent. 404 where no browser shows it."""
+    from PIL import Image  # noqa: PLC0415 (heavy)
+
+    stream = BytesIO()
+    Image.fromarray(desk.sessions.get(page).still(width, height)).save(stream, "PNG", compress_level=1)
+    return Response(stream.getvalue(), media_type="image/png", headers={"cache-control": "no-store"})
 
 
 @router.get("/sessions/{page}/state")

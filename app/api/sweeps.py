@@ -46,19 +46,20 @@ class SweepRequest(BaseModel):
     frames: int = Field(default=8, ge=1, le=1000)
     measure: Measure = "distance"
     seed: int = Field(default=0, ge=0, lt=2**31)
+    registration: str | None = None
 
 
 @router.post("", status_code=202)
 def start(request: SweepRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
     """Check what is asked, then queue it; the answer's id names job and sweep."""
-    asked = Request.from_json(request.model_dump(exclude={"dataset"}))
+    asked = Request.from_json(request.model_dump(exclude={"dataset", "registration"}))
     dataset = desk.library.open(request.dataset)
     for name in asked.sequences:
         dataset.sequence(name)
     settings = desk.settings
     said = {
         "dataset": str(dataset.path), "name": request.dataset, "runs": str(settings.runs), "workers": settings.workers,
-        "scheduler": settings.scheduler, "sweep": asked.to_json(),
+        "scheduler": settings.scheduler, "sweep": asked.to_json(), **desk.registered(request.dataset, request.registration),
     }  # fmt: skip
     return JobOut.of(desk.jobs.submit("sweep", said, f"sweep-{request.dataset}", key))
 

@@ -12,6 +12,7 @@ from rich.box import SIMPLE
 from rich.markup import escape
 from rich.table import Table
 
+from app.console import Registration as Registered
 from app.console import out, print_problem, progress
 from core.errors import DatasetError, PalpateError, RegistrationError
 from core.progress import part
@@ -70,13 +71,16 @@ def replay(
     sequence: Annotated[str, typer.Option(help="Which sequence.", show_default=False)],
     file: Annotated[Path, typer.Option("--out", help="Where the frames go (.npz).", show_default=False)],
     grid: Annotated[str, typer.Option(help="Even nodes along x, y, z, as in 13x5x5; or finest at the tool.")] = "graded",
+    registration: Registered = None,
+    runs: Annotated[Path, typer.Option(help="Accepted registrations are looked for below this folder.")] = Path("runs"),
 ) -> None:
     """Simulate one sequence as the setup states it: one equilibrium per cloud, written to an .npz file.
 
     Frames without equilibrium are named, marked in the file, and make the exit code 1.
     """
-    import core.registration as registration  # noqa: PLC0415, PLR0402 (heavy)
+    import core.registration as relating  # noqa: PLC0415 (heavy)
     import core.replay as simulation  # noqa: PLC0415 (heavy)
+    from app.registrations import accepted_for  # noqa: PLC0415 (heavy)
     from core.accuracy import hardest_frames, mesh_errors  # noqa: PLC0415 (heavy)
     from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
     from core.fem.newton import Outcome  # noqa: PLC0415 (heavy)
@@ -85,12 +89,12 @@ def replay(
     from core.meshing import Meshing  # noqa: PLC0415 (heavy)
 
     even = None if grid == "graded" else GridSpec.parse(grid)
-    opened = open_dataset(dataset)
+    opened = open_dataset(dataset).registered(accepted_for(dataset, registration, runs))
     kinematics = opened.sequence(sequence).kinematics
     times = opened.sequence(sequence).cloud_times
     times = times if len(times) else kinematics.time
     with progress(f"replay {sequence}") as report:
-        setup = registration.setup_from(opened, registration.register(opened, part(report, 0.0, 0.1)))
+        setup = relating.setup_from(opened, relating.register(opened, part(report, 0.0, 0.1)))
         spec: Meshing = even or REPLAY_GRID.for_tool(setup.tool.radius)
         centres = setup.phantom_from_robot.apply(kinematics.position_at(times))
         frames = simulation.replay(setup, centres, spec, times=times, report=part(report, 0.1, 0.8))

@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Group
@@ -17,7 +17,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from app.console import out, progress, verdict_cells, verdict_table, write_json
+from app.console import Registration, out, progress, verdict_cells, verdict_table, write_json
 from app.sentences import (
     between,
     control_sentences,
@@ -25,9 +25,13 @@ from app.sentences import (
     limit_phrase,
     palpation_sentences,
     probe_sentence,
+    registration_sentences,
     verdict_sentence,
 )
 from core.errors import DatasetError, RunError
+
+if TYPE_CHECKING:
+    from core.dataset.accepted import Accepted
 
 __all__ = ["diagnose", "print_report", "run_diagnosis", "truth_beside"]
 
@@ -41,16 +45,21 @@ def diagnose(
     run: Annotated[Path | None, typer.Option(help="Keep the run folder here; of several datasets a folder of them.")] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
     seed: Annotated[int, typer.Option(min=0, help="Seed of all random draws.")] = 0,
+    registration: Registration = None,
+    runs: Annotated[Path, typer.Option(help="Accepted registrations are looked for below this folder.")] = Path("runs"),
 ) -> None:
     """Name what the simulation of each dataset misses, and what naming it gains on sequences nothing was fitted on."""
+    from app.registrations import accepted_for  # noqa: PLC0415 (heavy)
+
     several = len(datasets) > 1
     _refuse_broken(datasets)
+    registered = {path: accepted_for(path, registration, runs) for path in datasets}
     truths = {path: truth_beside(path) for path in datasets}
     with_truth = any(truths.values())
     table = verdict_table(with_truth)
     for path in datasets:
         with _kept(run / path.name if run and several else run, path.name) as place:
-            report, seconds = run_diagnosis(path, place, workers, seed)
+            report, seconds = run_diagnosis(path, place, workers, seed, registered[path])
         table.add_row(*verdict_cells(path.name, report, seconds, truths[path], with_truth))
         if file is not None:
             write_json(file / f"{path.name}.json" if several else file, report)
@@ -61,7 +70,9 @@ def diagnose(
     out.print(table)
 
 
-def run_diagnosis(dataset: Path, run: Path, workers: int, seed: int) -> tuple[dict[str, Any], float]:
+def run_diagnosis(
+    dataset: Path, run: Path, workers: int, seed: int, accepted: Accepted | None = None
+) -> tuple[dict[str, Any], float]:
     """Diagnose with a progress bar; the run folder is whole at `run`, or not there at all. Returns report and seconds."""
     from app.work import diagnose_into  # noqa: PLC0415 (heavy)
 
@@ -70,7 +81,7 @@ def run_diagnosis(dataset: Path, run: Path, workers: int, seed: int) -> tuple[di
     scratch = Path(tempfile.mkdtemp(prefix=".making-", dir=run.parent))
     try:
         with progress(f"diagnose {dataset.name}") as report:
-            result = diagnose_into(dataset, run, scratch, workers=workers, seed=seed, report=report)
+            result = diagnose_into(dataset, run, scratch, workers=workers, seed=seed, report=report, accepted=accepted)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
     return result, time.monotonic() - began
@@ -101,6 +112,7 @@ def print_report(report: dict[str, Any]) -> None:
         lines.append(Text(f"identified: {one['effect']}: {shown}; {one.get('why', '')}", style="dim"))
     for one in report.get("not_identifiable", []):
         lines.append(Text(f"not identifiable: {one['effect']}: {one.get('why', '')}", style="dim"))
+    lines += [Text(said, style="dim") for said in registration_sentences(report)]
     lines += [Text(said) for said in palpation_sentences(report)]
     lines += [Text(said, style="dim") for said in determined_sentences(report.get("causes", []))]
     lines += [Text(f"control: {said}", style="dim") for said in control_sentences(report.get("controls") or [])]

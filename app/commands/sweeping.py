@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from app.console import out, progress
+from app.console import Registration, out, progress
 from app.sentences import quantity
 from core.errors import EffectError
 
@@ -34,12 +34,14 @@ def sweep(
     seed: Annotated[int, typer.Option(min=0, help="Of all draws.")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
     scheduler: Annotated[str | None, typer.Option(help="Address of a dask scheduler whose workers replay instead.")] = None,
+    registration: Registration = None,
     runs: Annotated[Path, typer.Option(help="Points go to RUNS/sweeps; what is known there is not done again.")] = Path("runs"),
 ) -> None:
     """Replay a dataset over a range of parameters, and say where the error is least and along which parameters it says nothing.
 
     Can be stopped at any time: the same command goes on where it was.
     """
+    from app.registrations import accepted_for  # noqa: PLC0415 (heavy)
     from app.sweeps import Sweeps  # noqa: PLC0415 (heavy)
     from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
     from core.sweeping.request import Request  # noqa: PLC0415 (heavy)
@@ -52,8 +54,10 @@ def sweep(
         "frames": frames, "measure": measure, "seed": seed,
     }  # fmt: skip
     request = Request.from_json(asked)
-    opened, sweeps = open_dataset(dataset), Sweeps(runs)
-    digest = hashlib.sha256(json.dumps([str(dataset.resolve()), request.to_json()], sort_keys=True).encode()).hexdigest()[:8]
+    accepted = accepted_for(dataset, registration, runs)
+    opened, sweeps = open_dataset(dataset).registered(accepted), Sweeps(runs)
+    said = [str(dataset.resolve()), request.to_json(), *([accepted.to_json()] if accepted else [])]
+    digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()[:8]
     folder = sweeps.folder / f"{dataset.resolve().name}-{digest}"
     with progress(f"sweep {dataset.name}") as report:
         found = run_sweep(opened, request, folder, store=sweeps.store, workers=workers, scheduler=scheduler, report=report)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from core.dataset.accepted import Accepted
 from core.dataset.cloud import read_cloud, read_header
 from core.dataset.files import problem
 from core.dataset.schema import FILE, DatasetConfig, nearest, read_config
@@ -35,7 +36,10 @@ class Touches:
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
-    """One phantom in one setup with its sequences; `sequences` are their names, sorted. `geometry` is as stated."""
+    """One phantom in one setup with its sequences; `sequences` are their names, sorted. `geometry` is as stated.
+
+    `accepted` is a registration of the camera that is used in place of the automatic one; None for that.
+    """
 
     path: Path
     config: DatasetConfig
@@ -43,6 +47,7 @@ class Dataset:
     has_rest: bool
     loaded: tuple[Sequence, ...]
     geometry: Box | Shape
+    accepted: Accepted | None = None
 
     @property
     def name(self) -> str:
@@ -65,6 +70,12 @@ class Dataset:
             if sequence.name == name:
                 return sequence
         raise problem(f"sequences/{name}", f"there is no such sequence; {nearest(name, self.sequences)}", value=name)
+
+    def registered(self, accepted: Accepted | None) -> Dataset:
+        """The same with an accepted registration of the camera; RegistrationError where it is of another rest cloud."""
+        if accepted is not None:
+            accepted.check(self.path)
+        return replace(self, accepted=accepted)
 
     def rest_cloud(self) -> FloatArray:
         """The raw cloud (n, 3) [m] of the untouched phantom, camera frame."""

@@ -145,6 +145,8 @@ def _run(
         model, gain = findings.baseline, worth(bench, findings, unseen, pool, fine, seed) if unseen else None
     found = tuned(bench, model) if findings.best else setup
     result = report_of(dataset, bench, findings, gain, "test")
+    if dataset.accepted is not None:
+        result["registration"] = dataset.accepted.to_json()
     if assurance:
         result = assured(result, bench, fitted, findings)
     (making / "replays").mkdir()
@@ -184,9 +186,10 @@ def _record(
 def _model(dataset: Dataset, setup: Setup, findings: Findings, fitted: list[str]) -> dict[str, Any]:
     """The extended model and where it comes from."""
     effects = [effect.to_json() for effect in findings.best.model.effects] if findings.best else []
+    registered = {"registration": dataset.accepted.to_json()} if dataset.accepted else {}
     return {
         "format": 1, "version": 1, "dataset": dataset.name, "parent": None, "fitted_on": fitted, "effects": effects,
-        "setup": setup.as_dict(), "grid": _described(setup),
+        "setup": setup.as_dict(), "grid": _described(setup), **registered,
     }  # fmt: skip
 
 

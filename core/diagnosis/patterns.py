@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from core.diagnosis.bench import Bench
-from core.diagnosis.gain import fixed_pattern
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.observations import Observations
 from core.diagnosis.prediction import Prediction
+from core.diagnosis.probe_sums import fixed_pattern
 from core.errors import DiagnosisError
 from core.frames import FloatArray
 from core.measurement import SIDES, Surface

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from core.cleaning import Cleaner, tool_poses
 from core.dataset import open_dataset
+from core.diagnosis.inside import Inside
 from core.diagnosis.smoothing import smooth_centres
 from core.fem.newton import Outcome
 from core.frames import FloatArray
@@ -32,7 +33,10 @@ _LEAST = 3
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """One model's side of a recording; arrays over frames (f, ...), SI, phantom frame; `distance` is the RMS of `error`."""
+    """One model's side of a recording; arrays over frames (f, ...), SI, phantom frame.
+
+    `distance` is the RMS of `error`, `force` the size of the block's force on the tool.
+    """
 
     surface: FloatArray
     tool: FloatArray
@@ -41,6 +45,9 @@ class Recorded:
     paper: FloatArray
     outcome: FloatArray
     free: FloatArray
+    force: FloatArray
+    iterations: FloatArray
+    inside: Inside
 
 
 def _vertex_errors(seen: Gaps, surface: Surface) -> FloatArray:
@@ -80,7 +87,8 @@ def observed(setup: Setup, frames: Sequence[Equilibrium], clouds: Sequence[Float
     return Recorded(
         np.array(moved), np.array([frame.probe.centre for frame in frames]), np.array(errors), np.array(distance), np.array(paper),
         np.array([0 if frame.outcome is Outcome.CONVERGED else 1 for frame in frames], dtype=np.int8),
-        np.array([not frame.in_contact for frame in frames]),
+        np.array([not frame.in_contact for frame in frames]), np.array([np.linalg.norm(frame.force) for frame in frames]),
+        np.array([frame.iterations for frame in frames], dtype=np.int32), Inside.of(setup, frames),
     )  # fmt: skip
 
 
@@ -95,19 +103,19 @@ def record(
     poses = tool_poses(sequence.kinematics, times, stated.phantom_from_robot, shaft)
     raw = [sequence.cloud(int(i)) for i in index]
     clouds = [cloud[cleaner.clean(cloud, pose).indices] for cloud, pose in zip(raw, poses, strict=True)]
-    sides: list[Recorded] = []
+    sides: dict[str, Recorded] = {}
     frames: list[Equilibrium] = []
-    for setup in (stated, found):
+    for model, setup in (("raw", stated), ("extended", found)):
         if sides and found is stated:
-            sides.append(sides[0])
+            sides[model] = sides["raw"]
             continue
         robot = touch_correction(setup, grid) @ setup.phantom_from_robot
         centres = robot.apply(smooth_centres(sequence.kinematics, times - setup.sensor.time_offset))
         # What hangs on the past is replayed in the order of time, and from frame to frame.
         starts = None if setup.remembers else frames or None
         frames = replay(setup, centres, grid, times=times - setup.sensor.time_offset, starts=starts, tolerance=1e-3)
-        sides.append(observed(setup, frames, clouds))
-    before, after = sides
+        sides[model] = observed(setup, frames, clouds)
+    before, after = sides["raw"], sides["extended"]
     surface = Surface.of(stated, VERTEX_SPACING)
     floor = after.distance[after.free] if after.free.any() else after.distance
     np.savez_compressed(
@@ -119,5 +127,7 @@ def record(
         distance_raw=before.distance, distance_extended=after.distance, paper_raw=before.paper, paper_extended=after.paper,
         noise_floor=np.array(float(np.nanmean(floor))), camera_raw=sight_of(stated).pose.matrix,
         camera_extended=sight_of(found).pose.matrix, outcome=np.maximum(before.outcome, after.outcome),
+        **{f"{key}_{model}": getattr(side, key) for model, side in sides.items() for key in ("outcome", "force", "iterations")},
+        **before.inside.arrays("raw"), **after.inside.arrays("extended"),
     )  # fmt: skip
     return name

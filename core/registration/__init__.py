@@ -10,6 +10,7 @@ from core.dataset import Dataset
 from core.errors import RegistrationError
 from core.frames import FloatArray, Transform
 from core.progress import Report, silent
+from core.registration.accepted import camera_as_accepted
 from core.registration.camera import CameraFit, fit_camera
 from core.registration.heading import tool_misfit, turned_fit
 from core.registration.pairing import TouchProposal, propose
@@ -82,7 +83,10 @@ class Registration:
 
 
 def register(dataset: Dataset, report: Report = silent) -> Registration:
-    """Relate robot, camera and phantom; raises RegistrationError where that is impossible, warns where it is doubtful."""
+    """Relate robot, camera and phantom; raises RegistrationError where that is impossible, warns where it is doubtful.
+
+    Where the dataset has an accepted registration, camera to phantom is as that says.
+    """
     report(0.0, "robot to phantom from touches")
     robot, proposal = _register_robot(dataset)
     warnings = _touch_warnings(robot, proposal)
@@ -96,7 +100,10 @@ def register(dataset: Dataset, report: Report = silent) -> Registration:
                 f"{config.surface}: clouds are registered to a block only, not to other shapes yet; leave the clouds of this "
                 "dataset out, so that its forces are compared"
             )
-        camera = fit_camera(dataset.rest_cloud(), config.size, config.depth_sigma, config.to_phantom)
+        if dataset.accepted is not None:
+            camera = camera_as_accepted(dataset.rest_cloud(), config.size, config.depth_sigma, dataset.accepted)
+        else:
+            camera = fit_camera(dataset.rest_cloud(), config.size, config.depth_sigma, config.to_phantom)
         report(0.7, "which way round the block lies")
         # A heading that was found by itself follows the tool; one that was given tells it which way round it came.
         repair = repair if camera.automatic else settled(dataset, found, camera.phantom_from_camera)

@@ -193,17 +193,36 @@ def _refuse_mirrored(cloud: FloatArray, mesh: FloatArray, pose: Transform, rms: 
     """Points in a plane fit a motion as well as a reflection, but mirrored ones put the camera under the table."""
     _, _, reflected = rigid_fits(cloud * np.array([1.0, 1.0, -1.0]), mesh[None])
     if rms > 2.0e-3 and reflected[0] < MIRRORED * rms:
+        told, swap = _exchanged(cloud, mesh)
         raise RegistrationError(
             f"the pairs are mirrored: a reflection leaves {reflected[0] * 1e3:.1f} mm RMS, the best motion {rms * 1e3:.1f} mm: "
-            "left and right are exchanged between cloud and mesh",
+            f"left and right are exchanged between cloud and mesh{told}",
             rms=rms,
+            pairs=swap,
         )
     if pose.translation[2] < 0.0:
+        told, swap = _exchanged(cloud, mesh)
         raise RegistrationError(
             f"the pairs are mirrored: they put the camera {-pose.translation[2] * 1e3:.0f} mm under the table: the points go round "
-            "the other way on cloud and mesh",
+            f"the other way on cloud and mesh{told}",
             height=float(pose.translation[2]),
+            pairs=swap,
         )
+
+
+def _exchanged(cloud: FloatArray, mesh: FloatArray) -> tuple[str, str | None]:
+    """Which two mesh points, exchanged, make the pairs fit with the camera over the table: in words, and by number."""
+    found: list[tuple[float, str]] = []
+    for i, j in combinations(range(len(mesh)), 2):
+        order = list(range(len(mesh)))
+        order[i], order[j] = j, i
+        _, translation, rms = rigid_fits(cloud, mesh[order][None])
+        if rms[0] < DOUBTFUL and translation[0][2] > 0.0:
+            found.append((float(rms[0]), f"{i + 1}, {j + 1}"))
+    if not found:
+        return "", None
+    pairs = min(found)[1]
+    return f"; exchanging the mesh points of pairs {pairs.replace(', ', ' and ')} would fit", pairs
 
 
 def _distance(points: FloatArray, size: tuple[float, float, float]) -> FloatArray:

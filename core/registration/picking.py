@@ -7,10 +7,12 @@ import numpy as np
 from core.frames import FloatArray
 from core.registration.faces import IndexArray
 
-__all__ = ["pick_cloud", "pick_mesh"]
+__all__ = ["pick_cloud", "pick_mesh", "slide_on_cloud"]
 
 NEAR, WIDEST = 1.5, 6.0
 """Points within so many pixels of the ray are candidates; the reach doubles up to the second where there are none."""
+AROUND = 12
+"""Points that tell how the surface lies at one of them."""
 GAP = 5.0e-3
 """Candidates further apart along the ray than this [m] belong to different surfaces."""
 
@@ -49,6 +51,21 @@ def pick_mesh(vertices: FloatArray, faces: IndexArray, origin: FloatArray, direc
     with np.errstate(divide="ignore", invalid="ignore"):
         u, v = (arm * side).sum(axis=1) / determinant, turned @ direction / determinant
         along = (second * turned).sum(axis=1) / determinant
-    edge = 1.0e-9
-    hit = (np.abs(determinant) > 1e-18) & (u >= -edge) & (v >= -edge) & (u + v <= 1 + edge) & (along > 0.0)
+        edge = 1.0e-9
+        hit = (np.abs(determinant) > 1e-18) & (u >= -edge) & (v >= -edge) & (u + v <= 1 + edge) & (along > 0.0)
     return np.asarray(origin + along[hit].min() * direction) if hit.any() else None
+
+
+def slide_on_cloud(points: FloatArray, start: FloatArray, origin: FloatArray, direction: FloatArray) -> FloatArray | None:
+    """Where a ray meets the plane through the points (n, 3) [m] around `start` (3,): (3,) [m].
+
+    So a pick is moved by less than the points are apart. None where the ray runs along that plane. All in one frame.
+    """
+    apart = np.linalg.norm(points - start, axis=1)
+    around = points[np.argsort(apart)[:AROUND]]
+    centre = around.mean(axis=0)
+    normal = np.linalg.svd(around - centre)[2][2]
+    slope = float(normal @ direction)
+    if abs(slope) < 0.05 * float(np.linalg.norm(direction)):
+        return None
+    return np.asarray(origin + direction * float(normal @ (centre - origin)) / slope)

@@ -52,7 +52,8 @@ def run_sweep(
 
     RunError where the folder has another sweep.
     """
-    _claim(folder, {**request.to_json(), "dataset": str(dataset.path.name)})
+    registered = {"registration": dataset.accepted.name} if dataset.accepted else {}
+    _claim(folder, {**request.to_json(), "dataset": str(dataset.path.name), **registered})
     stated, data = watch(dataset, request.sequences, request.frames, part(report, 0.0, 0.05))
     grid = grid or REPLAY_GRID.for_tool(stated.tool.radius)
     crew = crew_of(workers, scheduler, data, grid)

@@ -109,9 +109,9 @@ def _misread(scenario: Scenario) -> tuple[float, float]:
 
 def _motions(scenario: Scenario, seen: FloatArray, seed: int) -> list[Motion]:
     """Planned by who sees the block as it is, whatever its stated size."""
-    kinds = [name.rpartition("-")[0] for name in scenario.sequences]
+    kinds, size, radius = [name.rpartition("-")[0] for name in scenario.sequences], scenario.true_size, scenario.tool_radius
     return [
-        draw_motion(name, kinds[:place].count(kinds[place]), scenario.true_size, scenario.tool_radius, seen, seed)
+        draw_motion(name, kinds[:place].count(kinds[place]), size, radius, seen, seed, scenario.rounds.get(name, 1))
         for place, name in enumerate(scenario.sequences)
     ]
 

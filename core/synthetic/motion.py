@@ -96,7 +96,7 @@ def _eased(times: FloatArray, knots: FloatArray, values: FloatArray) -> FloatArr
 
 
 def draw_motion(
-    name: str, number: int, size: tuple[float, float, float], tool_radius: float, seen: FloatArray, seed: int
+    name: str, number: int, size: tuple[float, float, float], tool_radius: float, seen: FloatArray, seed: int, rounds: int = 1
 ) -> Motion:
     """The motion of one sequence.
 
@@ -107,18 +107,24 @@ def draw_motion(
         tool_radius: stated [m].
         seen: (2,) signs of the x and y sides that the camera sees.
         seed: of this sequence.
+        rounds: of touches; each further one is at the next place. Pushes into sides are into one side in all of them.
     """
     rng = np.random.default_rng([seed, *name.encode()])
     kind = name.rpartition("-")[0]
-    if kind == "poke-top":
-        paths, axis = _top(rng, number, size, tool_radius)
-    elif kind == "poke-side":
-        paths, axis = _side(rng, number, size, tool_radius, seen)
-    elif kind == "drag":
-        paths, axis = _drag(rng, number, size, tool_radius)
-    else:
-        raise SetupError(f"sequence {name!r} is of no known kind; known are poke-top, poke-side and drag, with -01 and so on")
-    return _timed(name, paths, axis, rng)
+    paths: list[FloatArray] = []
+    axes: list[FloatArray] = []
+    for turn in range(rounds):
+        if kind == "poke-top":
+            touched, own = _top(rng, number + turn, size, tool_radius)
+        elif kind == "poke-side":
+            touched, own = _side(rng, number, size, tool_radius, seen)
+        elif kind == "drag":
+            touched, own = _drag(rng, number + turn, size, tool_radius)
+        else:
+            raise SetupError(f"sequence {name!r} is of no known kind; known are poke-top, poke-side and drag, with -01 and so on")
+        paths += touched
+        axes.append(own)
+    return _timed(name, paths, axes[0], rng)
 
 
 def _top(

@@ -76,6 +76,8 @@ class Scenario:
         effects: what is really there and believed by nobody.
         disturbances: what is wrong and no effect of the catalogue.
         sequences: names; what stands before the number is the kind of motion: poke-top, poke-side or drag.
+        rounds: of touches in each of these sequences (three pushes, or one drag); one round where it is not named.
+        splits: names of the sequences of train, validation and test; by their kinds if empty.
         size: of the block, believed [m].
         mass: [kg].
         young_modulus: believed, and true unless another one is hidden [Pa].
@@ -93,6 +95,8 @@ class Scenario:
     effects: tuple[HiddenEffect, ...] = ()
     disturbances: tuple[Disturbance, ...] = ()
     sequences: tuple[str, ...] = ("poke-top-01", "poke-top-02", "poke-top-03", "poke-side-01", "poke-side-02", "drag-01", "drag-02")
+    rounds: Mapping[str, int] = field(default_factory=dict)
+    splits: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     size: tuple[float, float, float] = (0.0687, 0.0393, 0.0358)
     mass: float = 0.10401
     young_modulus: float = 5.0e3

@@ -55,7 +55,7 @@ def write_config(path: Path, name: str, scenario: Scenario, landmarks: dict[str,
         "depth_sigma = 0.002",
         f"to_phantom = [{matrix}]",
         "",
-        *_listed(_splits(scenario.sequences)),
+        *_listed({split: list(names) for split, names in scenario.splits.items()} or _splits(scenario.sequences)),
     ]
     path.write_text("\n".join(lines) + "\n")
 

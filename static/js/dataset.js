@@ -3,6 +3,7 @@ import { get } from "./api.js";
 import { element, fill } from "./dom.js";
 import { capital, mm } from "./format.js";
 import { openPanel } from "./panels.js";
+import { cameraChoice, registerByHand } from "./register.js";
 
 export async function showDataset(name, diagnose) {
   const panel = document.getElementById("panel");
@@ -13,15 +14,17 @@ export async function showDataset(name, diagnose) {
     fill(panel, element("div", { class: "eyebrow" }, "Dataset"), element("h1", { class: "verdict" }, name), broken(problem));
     return;
   }
+  const camera = await cameraChoice(name);
   const start = element("button", { class: "button strong", type: "button", onclick: async () => {
     start.disabled = true;
     start.textContent = "Started: see the jobs on the left";
-    await diagnose(name).catch(() => { start.disabled = false; start.textContent = "Diagnose"; });
+    await diagnose(name, camera.value || null).catch(() => { start.disabled = false; start.textContent = "Diagnose"; });
   } }, "Diagnose");
   const size = summary.size.map((edge) => mm(edge, false)).join(" × ");
   fill(panel, element("div", { class: "eyebrow" }, "Dataset"), element("h1", { class: "verdict" }, name),
     element("p", { class: "gain-note" }, "Every file was read and is in order."),
-    element("div", { class: "actions" }, start),
+    element("div", { class: "actions" }, start, summary.has_rest ? element("button", { class: "button", type: "button", onclick: () => registerByHand(name) }, "Register by hand") : null),
+    camera.hidden ? null : element("label", { class: "register-dataset" }, "Camera", camera),
     notes("Doubtful", summary.warnings), notes("Missing for some causes", summary.lacks),
     element("section", {}, element("h2", {}, "Setup as stated"), element("table", {}, element("tbody", {},
       fact("Name", summary.name), fact("Phantom", `${size} mm`), fact("Mass", `${(summary.mass * 1e3).toFixed(1)} g`),

@@ -24,6 +24,10 @@ const SHAPES = {
   sun: '<circle cx="12" cy="12" r="4"/><path d="M12 3v2M12 19v2M3 12h2M19 12h2M5.6 5.6L7 7M17 17l1.4 1.4M5.6 18.4L7 17M17 7l1.4-1.4"/>',
   moon: '<path d="M20 14.5A8.5 8.5 0 0 1 9.5 4 8.5 8.5 0 1 0 20 14.5z"/>',
   loop: '<path d="M17 3l3 3-3 3M4 11V9a3 3 0 0 1 3-3h13M7 21l-3-3 3-3M20 13v2a3 3 0 0 1-3 3H4"/>', from: '<path d="M14 4H9v16h5"/>', to: '<path d="M10 4h5v16h-5"/>',
+  top: '<path d="M4 8l8-4 8 4-8 4z" class="full"/><path d="M4 8v8l8 4 8-4V8M12 12v8"/>', front: '<path d="M4 8v8l8 4v-8z" class="full"/><path d="M4 8l8-4 8 4-8 4zM20 8v8l-8 4M12 12v8"/>',
+  side: '<path d="M20 8v8l-8 4v-8z" class="full"/><path d="M4 8l8-4 8 4-8 4zM4 8v8l8 4M12 12v8"/>', columns: '<path d="M3 7h7v11H3zM14 7h7v11h-7z"/>',
+  section: '<path d="M5 19V5h9v14zM14 5l5 3v11h-5"/><path d="M12 2v20" stroke-dasharray="2.5 2.5"/>', camera: '<path d="M4 8h3l2-3h6l2 3h3v11H4z"/><circle cx="12" cy="13" r="3.4"/>',
+  film: '<path d="M4 5h16v14H4zM8 5v14M16 5v14M4 9.7h4M4 14.3h4M16 9.7h4M16 14.3h4"/>', layers: '<path d="M12 4l9 5-9 5-9-5zM3 14l9 5 9-5"/>', down: '<path d="M7 10l5 5 5-5"/>',
   target: '<path d="M4 9V5h4M20 9V5h-4M4 15v4h4M20 15v4h-4"/><circle cx="12" cy="12" r="2.5"/>',
   cloud: '<g class="full"><circle cx="6" cy="7" r="1.5"/><circle cx="12" cy="5" r="1.5"/><circle cx="18" cy="8" r="1.5"/><circle cx="5" cy="14" r="1.5"/><circle cx="11" cy="12" r="1.5"/><circle cx="18" cy="15" r="1.5"/><circle cx="9" cy="19" r="1.5"/><circle cx="15" cy="20" r="1.5"/></g>',
 };

@@ -6,6 +6,7 @@ import * as rail from "./rail.js";
 import { showProblem, showReport, showWelcome } from "./report.js";
 import * as scene from "./scene.js";
 import { on, set, state } from "./store.js";
+import { startRegister } from "./register.js";
 import { startSweeps } from "./sweep.js";
 import * as timeline from "./timeline.js";
 import * as whatif from "./whatif.js";
@@ -63,6 +64,7 @@ async function start() {
   set({ palette });
   timeline.start();
   startSweeps();
+  startRegister(rail.openDataset);
   scene.start();
   whatif.start();
   on(["sequence"], () => { set({ series: null, frame: 0, loop: null }); openSequence().catch(toast); });

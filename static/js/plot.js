@@ -20,7 +20,9 @@ function lanesOf(series) {
     curves: series.models.map((name) => ({ name, ink: name, values: series[`distance_${name}`] })),
   }];
   if (series.depth) lanes.push({ title: "Push depth, mm", share: 1, factor: 1e3, text: (value) => mm(value), curves: [{ name: "depth", ink: "tool", values: series.depth }] });
-  if (series.force) lanes.push({ title: "Force, N", share: 1, factor: 1, text: (value) => (value === null ? "–" : `${value.toFixed(2)} N`), curves: [{ name: "force", ink: "measured", values: series.force }] });
+  const forces = Object.entries(series.forces ?? {}).map(([name, values]) => ({ name: `${name} force`, ink: name, values }));
+  if (series.force) forces.push({ name: "force", ink: "measured", values: series.force });
+  if (forces.length) lanes.push({ title: "Contact force, N", share: 1, factor: 1, text: (value) => (Number.isFinite(value) ? `${value.toFixed(2)} N` : "–"), curves: forces });
   if (series.iterations) {
     const curves = Object.entries(series.iterations).map(([name, values]) => ({ name: `${name} iterations`, ink: name, values }));
     lanes.push({ title: "Solver iterations", share: 1, factor: 1, text: (value) => String(value), curves });
@@ -28,8 +30,12 @@ function lanesOf(series) {
   return lanes;
 }
 
-/** All numbers of a frame in words. */
-export const told = (series, frame) => lanesOf(series).flatMap(({ curves, text }) => curves.map(({ name, values }) => `${name} ${text(values[frame])}`));
+/** All numbers of a frame in words, a line for each lane; models that found no equilibrium are named. */
+export function told(series, frame) {
+  const lines = lanesOf(series).map(({ curves, text }) => curves.map(({ name, values }) => `${name} ${text(values[frame])}`).join("   "));
+  const failed = Object.entries(series.failed ?? {}).filter(([, frames]) => frames.includes(frame)).map(([name]) => name);
+  return failed.length ? [...lines, `no equilibrium: ${failed.join(", ")}`] : lines;
+}
 
 export function drawPlot(canvas, series, frame, [first, last]) {
   const ratio = devicePixelRatio || 1;
@@ -63,6 +69,7 @@ export function drawPlot(canvas, series, frame, [first, last]) {
     top += tall + GAP;
   }
   drawTimes(pen, { width, height, end, x, ink });
+  drawFailed(pen, { series, x, height, ink });
   drawRange(pen, { series, first, last, x, height, ink });
   pen.textAlign = "left"; pen.textBaseline = "top"; pen.fillStyle = ink("text-2");
   for (const [title, at] of titles) pen.fillText(title, LEFT + 5, at + 2);
@@ -110,6 +117,15 @@ function drawTimes(pen, { height, end, x, ink }) {
   const step = niceStep(end / 8);
   for (let time = 0; time <= end + 1e-9; time += step) {
     pen.fillText(`${+time.toFixed(2)}${time + step > end ? " s" : ""}`, x(time), height - 4);
+  }
+}
+
+/** A mark on the foot of each frame in which a model found no equilibrium. */
+function drawFailed(pen, { series, x, height, ink }) {
+  pen.fillStyle = ink("danger");
+  for (const at of new Set(Object.values(series.failed ?? {}).flat())) {
+    const px = x(series.time[at]);
+    pen.beginPath(); pen.moveTo(px - 4, height - FOOT + 5); pen.lineTo(px + 4, height - FOOT + 5); pen.lineTo(px, height - FOOT - 3); pen.fill();
   }
 }
 

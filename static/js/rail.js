@@ -16,6 +16,7 @@ export async function start(open) {
   on(["run", "sequence", "heading"], drawSequences);
   on(["run"], () => drawRuns());
   opens("run", "Open the report", open);
+  opens("dataset", "Open the dataset", (name) => openDataset(name));
   onDone(async (done) => {
     await refreshRuns();
     // Who has gone elsewhere meanwhile finds it among the jobs and the diagnoses.
@@ -27,6 +28,9 @@ export async function start(open) {
     : element("p", { class: "empty" }, `None in ${folder}. Put a dataset folder there and reload.`));
   return datasets.length;
 }
+
+/** A dataset in the right panel. */
+export const openDataset = (name) => showDataset(name, diagnose);
 
 let runs = [];
 
@@ -53,8 +57,8 @@ function drawSequences() {
     element("span", { class: "value" }, `${mm(entry.distance_raw, false)} → ${mm(entry.distance_extended, false)}`))));
 }
 
-export async function diagnose(dataset) {
+export async function diagnose(dataset, registration = null) {
   try {
-    asked = (await post("/diagnoses", { dataset })).id;
+    asked = (await post("/diagnoses", { dataset, registration })).id;
   } catch (problem) { toast(problem); throw problem; }
 }

@@ -12,6 +12,7 @@ export function showReport(heading, report, patterns, palette) {
     element("div", { class: "eyebrow" }, element("span", { class: `verdict-tag ${report.verdict}` }, report.verdict), `${heading.folder ?? heading.dataset} · ${when(heading.created)}`),
     element("h1", { class: "verdict" }, heading.sentence),
     element("p", {}, element("a", { class: "button", href: `/api/runs/${encodeURIComponent(heading.id)}/report.html`, download: `${heading.id}.html` }, "Save as one file")),
+    (heading.notes ?? []).map((text) => element("p", { class: "gain-note" }, text)),
     causes.length ? section(causes.length > 1 ? "Causes" : "Cause", "interval", causes.map(cause)) : null,
     report.gain ? section("Error on sequences not fitted on", report.gain.unit ?? "mm", gain(report.gain, causes.length > 0)) : null,
     heading.sequences?.length ? section("Every sequence", "RMS distance, mm", comparisonSection(heading)) : null,

@@ -3,23 +3,27 @@ import { element } from "./dom.js";
 
 export const css = (rgb) => `rgb(${rgb.join(" ")})`;
 
-export function scaleBar(bands, limit) {
-  const ticks = [-1, -0.5, 0, 0.5, 1].map((part) => {
-    const value = part * limit * 1e3;
-    return (value > 0 ? "+" : "") + (part ? +value.toPrecision(3) : 0).toString().replace("-", "−");
+/** Of errors from -limit to limit [m], in mm. */
+export const scaleBar = (bands, limit) => bar(bands, -limit * 1e3, limit * 1e3);
+
+function bar(bands, low, high) {
+  const ticks = [0, 0.25, 0.5, 0.75, 1].map((part) => {
+    const value = low + (high - low) * part;
+    const near = Math.abs(value) < 1e-9 * (high - low) ? 0 : value;
+    return (near > 0 && low < 0 ? "+" : "") + (+near.toPrecision(3)).toString().replace("-", "−");
   });
   return element("div", {},
     element("div", { class: "scale" }, bands.map((rgb) => element("i", { style: { background: css(rgb) } }))),
     element("div", { class: "ticks" }, ticks.map((text) => element("span", {}, text))));
 }
 
-/** The same scale upright, positive above. */
-export function scaleTower(bands, limit) {
-  const bar = scaleBar([...bands].reverse(), limit);
-  const ticks = bar.querySelector(".ticks");
+/** A scale upright between two numbers, the higher above. */
+export function scaleTower(bands, low, high) {
+  const tower = bar([...bands].reverse(), low, high);
+  const ticks = tower.querySelector(".ticks");
   ticks.replaceChildren(...[...ticks.children].reverse());
-  bar.className = "tower";
-  return bar;
+  tower.className = "tower";
+  return tower;
 }
 
 export function bandOf(value, limit, count) {

@@ -1,5 +1,5 @@
 // What the page shows, in one place; parts subscribe to the keys they draw. Some keys outlive the page.
-const KEPT = ["run", "sequence", "layers", "colour", "speed", "limit", "crop"];
+const KEPT = ["run", "sequence", "layers", "colour", "quantity", "ranges", "limits", "looks", "side_by_side", "section", "speed", "crop"];
 
 const kept = () => {
   try { return JSON.parse(localStorage.getItem("palpate.view")) ?? {}; } catch { return {}; }
@@ -7,8 +7,9 @@ const kept = () => {
 
 const values = {
   run: null, sequence: null, frame: 0, playing: false,
-  layers: ["measured", "raw", "tool"], colour: "raw", limit: null, crop: true, speed: 1, loop: null,
-  report: null, heading: null, series: null, palette: null, held: null, trial: false, theme: document.documentElement.dataset.theme,
+  layers: ["measured", "raw", "tool", "base"], colour: "raw", quantity: "error", ranges: {}, limits: {}, looks: {},
+  side_by_side: false, section: null, crop: true, speed: 1, loop: null,
+  report: null, heading: null, series: null, palette: null, held: null, trial: false, live: false, theme: document.documentElement.dataset.theme,
   ...kept(),
 };
 const listeners = [];

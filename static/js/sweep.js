@@ -4,6 +4,7 @@ import { element, fill, icon } from "./dom.js";
 import { capital, words } from "./format.js";
 import { opens } from "./jobs.js";
 import { addPanel, openPanel } from "./panels.js";
+import { cameraChoice } from "./register.js";
 import { change as changed, mm4, plotOf } from "./sweep-plots.js";
 
 const METHODS = [["grid", "Grid, coarse to fine"], ["random", "Random"], ["tpe", "TPE"], ["cmaes", "CMA-ES"]];
@@ -44,6 +45,9 @@ async function showForm(datasets, folder, problem = null) {
   const number = (name, value, low, high) => element("input", { name, type: "number", value, min: low, max: high, step: 1, required: true });
   const dataset = select("dataset", datasets.map((name) => [name, name]));
   const sequences = element("select", { name: "sequences", multiple: true, size: 3, "aria-label": "Sequences; all with clouds where none is chosen" });
+  const cameras = element("div");
+  const listCameras = async () => { const choice = await cameraChoice(dataset.value); fill(cameras, choice.hidden ? null : element("label", {}, "Camera", choice)); };
+  dataset.addEventListener("change", listCameras);
   const listSequences = async () => {
     const summary = await get(`/datasets/${encodeURIComponent(dataset.value)}`).catch(() => ({ sequences: [] }));
     fill(sequences, summary.sequences.filter(({ clouds }) => clouds).map(({ name }) => element("option", { value: name }, name)));
@@ -61,12 +65,12 @@ async function showForm(datasets, folder, problem = null) {
     event.preventDefault();
     start.disabled = true;
     const values = new FormData(form);
-    const asked = { dataset: dataset.value, parameters: axes.map(({ name, low, high }) => ({ parameter: name, low, high })), method: method.value, measure: values.get("measure"),
+    const asked = { dataset: dataset.value, registration: values.get("registration") || null, parameters: axes.map(({ name, low, high }) => ({ parameter: name, low, high })), method: method.value, measure: values.get("measure"),
       frames: +values.get("frames"), sequences: [...sequences.selectedOptions].map(({ value }) => value), ...(method.value === "grid" ? { steps: +values.get("steps"), levels: +values.get("levels") } : { points: +values.get("points") }) };
     try { watch((await post("/sweeps", asked)).id); } catch (refused) { start.disabled = false; form.querySelector(".note-card")?.remove(); form.append(broken(refused)); }
   } },
   element("label", {}, "Dataset", dataset),
-  element("label", {}, "Sequences (none chosen: all)", sequences),
+  element("label", {}, "Sequences (none chosen: all)", sequences), cameras,
   element("h2", {}, "Parameters"), rows,
   element("button", { class: "button", type: "button", onclick: () => {
     const next = known().find(({ key }) => !axes.some(({ name }) => name === key));
@@ -79,7 +83,7 @@ async function showForm(datasets, folder, problem = null) {
   fill(box, element("div", { class: "eyebrow" }, "Sweep"), element("h1", { class: "verdict" }, "How does the error depend on what is assumed?"), form,
     old.length ? element("section", {}, element("h2", {}, "Sweeps so far"), element("div", { class: "sweep-list" }, old.slice(0, 12).map(({ id, job }) => element("button", { type: "button", "data-sweep": id, onclick: () => watch(id) },
       element("span", {}, id), element("span", { class: "muted" }, job?.state ?? "on disk"))))) : null);
-  await listSequences();
+  await Promise.all([listSequences(), listCameras()]);
 }
 
 function axisRow(axis, redraw) {

@@ -1,6 +1,7 @@
 // Time: play by the wall clock, step, scrub; one cursor for scene and plot.
 import { element, fill, icon, swatch } from "./dom.js";
 import { mm } from "./format.js";
+import { bind } from "./keys.js";
 import * as loop from "./loop.js";
 import { drawPlot, frameAt, told } from "./plot.js";
 import { on, set, state } from "./store.js";
@@ -17,7 +18,9 @@ export function start() {
   for (const [name, action] of Object.entries(buttons)) fill(name, icon(name)).addEventListener("click", action);
   const scrub = document.getElementById("scrub");
   scrub.addEventListener("input", () => { set({ playing: false }); go(+scrub.value); });
-  window.addEventListener("keydown", onKey);
+  const far = (event) => (event.shiftKey ? 10 : 1);
+  bind({ " ": toggle, ArrowLeft: (event) => step(-far(event)), ArrowRight: (event) => step(far(event)), Home: () => step(-1e9), End: () => step(1e9) });
+  bind(Object.fromEntries(Object.entries(loop.KEYS).map(([key, action]) => [key, () => action(count())])));
   watchPlot();
   loop.start(count);
   on(["playing"], ({ playing }) => { fill("play", icon(playing ? "pause" : "play")); if (playing) begin(); });
@@ -38,18 +41,6 @@ function toggle() {
   const [from, to] = loop.range(count());
   if (!state().playing && (state().frame >= to || state().frame < from)) go(from);
   set({ playing: !state().playing });
-}
-
-export function onKey(event) {
-  if (event.ctrlKey || event.metaKey || event.altKey) return;
-  const typing = event.target?.matches?.("input:not(#scrub), select, textarea");
-  const pressing = event.key === " " && event.target?.matches?.("button");
-  if (typing || pressing || document.getElementById("enlarged").open) return;
-  const far = event.shiftKey ? 10 : 1;
-  const actions = { " ": toggle, ArrowLeft: () => step(-far), ArrowRight: () => step(far), Home: () => step(-1e9), End: () => step(1e9), ...loop.KEYS };
-  if (!(event.key in actions)) return;
-  event.preventDefault(); event.stopPropagation();
-  actions[event.key](count());
 }
 
 function begin() {
@@ -87,7 +78,7 @@ function watchPlot() {
     if (dragging && marked !== null) loop.mark(marked, frame, count());
     const { series } = state();
     tip.hidden = false;
-    tip.textContent = [`${series.time[frame].toFixed(2)} s`, ...told(series, frame)].join("   ");
+    tip.textContent = [`${series.time[frame].toFixed(2)} s`, ...told(series, frame)].join("\n");
     const half = tip.offsetWidth / 2 + 4;
     tip.style.left = `${Math.max(half, Math.min(canvas.clientWidth - half, event.offsetX))}px`;
     tip.style.top = "2px";

@@ -7,8 +7,8 @@ import pytest
 from app.problems import Missing
 from app.runs import Runs
 from app.scene import NullScene
-from app.schemas import View
 from app.sessions import Sessions
+from app.view import View
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def test_a_scene_that_joins_late_sees_what_the_page_shows(sessions: Sessions, ru
     scene = NullScene()
     sessions.join("page-one", scene)
     assert scene.pictures[0].frame == 3
-    assert len(scene.looked_at) == 1
+    assert len(scene.looked_from) == 1
 
 
 def test_camera_is_turned_to_the_phantom_once_per_run_and_on_request(sessions: Sessions, run_name: str) -> None:
@@ -43,9 +43,9 @@ def test_camera_is_turned_to_the_phantom_once_per_run_and_on_request(sessions: S
     session = sessions.open("page-one")
     for frame in range(3):
         session.show(view(run_name, frame=frame))
-    assert len(scene.looked_at) == 1
+    assert len(scene.looked_from) == 1
     session.look()
-    assert len(scene.looked_at) == 2
+    assert len(scene.looked_from) == 2
 
 
 def test_a_scene_that_left_gets_nothing_more(sessions: Sessions, run_name: str) -> None:

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from recorded_run import RADIUS, SEQUENCE, write_recorded_run
 
+from core.diagnosis.inside import Inside
+from core.diagnosis.kept import effects_from
 from core.errors import EffectError, RunError
-from core.whatif import WhatIf, effects_from
+from core.whatif import WhatIf
 
 LARGER = {"effect": "tool_radius", "parameters": {"radius": RADIUS}}
 
@@ -103,3 +105,28 @@ def test_what_is_no_effect_is_refused(row: dict[str, Any], message: str) -> None
 
 def _radius(value: float) -> dict[str, Any]:
     return {"effect": "tool_radius", "parameters": {"radius": value}}
+
+
+@pytest.mark.parametrize("model", ["raw", "extended"])
+def test_recorded_inside_meets_the_recorded_surface(replay: dict[str, Any], model: str, deepest: int) -> None:
+    inside = Inside.read(replay, model)
+    assert inside is not None
+    push = replay[model][deepest] - replay["rest"]
+    off = np.linalg.norm(inside.displacement(deepest, replay["rest"]) - push, axis=1)
+    most = np.linalg.norm(push, axis=1).max()
+    assert most > 2e-3 and off.mean() < 0.01 * most and off.max() < 0.1 * most
+    assert np.abs(inside.displacement(deepest, replay["rest"] * [1.0, 1.0, 0.0])).max() < 1e-9
+
+
+def test_recorded_energy_is_highest_below_the_tool_and_none_is_negative(replay: dict[str, Any], deepest: int) -> None:
+    inside = Inside.read(replay, "raw")
+    assert inside is not None
+    energy = inside.energy_density(deepest, replay["rest"])
+    assert energy.min() >= 0.0 and energy.max() > 10 * np.median(energy)
+    assert np.linalg.norm(replay["rest"][energy.argmax()][:2] - replay["tool_raw"][deepest][:2]) < 0.01
+
+
+def test_force_and_iterations_are_recorded_with_each_model(replay: dict[str, Any], deepest: int) -> None:
+    for model in ("raw", "extended"):
+        assert replay[f"force_{model}"][deepest] > 0.1 and replay[f"force_{model}"][0] == 0.0
+        assert replay[f"iterations_{model}"][deepest] > 0 and not replay[f"outcome_{model}"].any()

@@ -66,5 +66,5 @@ def test_page_that_never_showed_anything_is_404(client: httpx.Client, page: str)
 
 def test_palette_is_complete(client: httpx.Client) -> None:
     palette = client.get("/api/palette").json()
-    assert {"measured", "raw", "extended", "corrected", "tool", "floor", "unseen"} == set(palette["things"])
+    assert {"measured", "raw", "extended", "corrected", "tool", "floor", "unseen", "landmark"} == set(palette["things"])
     assert len(palette["signed"]) == 15

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from pushed_block import POSE, SETUP, dwelling, poke, prediction, seen_points
 
-from core.diagnosis.gain import Ladder, fixed_pattern, ladder
+from core.diagnosis.gain import Ladder, ladder
 from core.diagnosis.observations import Group, Observations
 from core.diagnosis.prediction import Prediction
+from core.diagnosis.probe_sums import fixed_pattern
 from core.effects.memory import PermanentSet
 from core.errors import DiagnosisError
 from core.frames import FloatArray

@@ -48,6 +48,12 @@ def test_pairs_that_cannot_tell_are_refused():
     assert "one line" in refusal(POSE.inverse().apply(line), line)
 
 
+def test_pairs_that_were_exchanged_are_named():
+    with pytest.raises(RegistrationError, match="exchanging the mesh points of pairs 1 and 2 would fit") as caught:
+        fit_pairs(CLOUD[:3], MESH[[1, 0, 2]])
+    assert caught.value.where["pairs"] == "1, 2"
+
+
 def test_nearly_collinear_pairs_are_warned_of():
     mesh = np.array([[-X, 0.0, Z], [X, 0.0, Z], [0.0, 0.1 * X * np.sqrt(3), Z]])
     fit = fit_pairs(POSE.inverse().apply(mesh), mesh)

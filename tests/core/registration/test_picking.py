@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.picking import aimed_and_picked
-from core.registration.picking import pick_cloud, pick_mesh
+from core.registration.picking import pick_cloud, pick_mesh, slide_on_cloud
 
 
 def test_on_a_noisy_slanted_cloud_the_median_pick_is_within_three_tenths_of_a_millimetre():
@@ -35,3 +35,12 @@ def test_a_ray_meets_the_nearest_triangle_and_its_edges():
         assert met is not None and np.allclose(met, [start[0], start[1], place])
     assert pick_mesh(vertices, faces, np.array([0.8, 0.8, 0.0]), up) is None
     assert pick_mesh(vertices, faces, np.array([0.2, 0.3, 3.0]), up) is None
+
+
+def test_a_pick_slides_on_the_surface_by_less_than_the_points_are_apart():
+    x, y = np.meshgrid(np.linspace(-0.05, 0.05, 51), np.linspace(-0.05, 0.05, 51))
+    slanted = np.column_stack([x.ravel(), y.ravel(), 0.3 + 0.5 * y.ravel()])
+    aim = np.array([0.0103, 0.0057, 0.3 + 0.5 * 0.0057])
+    moved = slide_on_cloud(slanted, slanted[1300], np.zeros(3), aim)
+    assert moved is not None and np.allclose(moved, aim, atol=1e-9)
+    assert slide_on_cloud(slanted, slanted[1300], np.zeros(3), np.array([0.0, 2.0, 1.0])) is None

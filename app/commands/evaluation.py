@@ -1,0 +1,166 @@
+"""`palpate evaluate`: the ladder of a dataset's test sequences, and the tables of the paper."""
+
+from __future__ import annotations
+
+import secrets
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from app.commands.diagnosis import truth_beside
+from app.console import out, progress, write_json
+from app.sentences import quantity
+from core.errors import RunError
+
+__all__ = ["evaluate"]
+
+SHOWN = {"all": "all pushes", "seen": "kinds trained on", "unseen": "kinds never trained on"}
+NETWORKS = {"simulation": "simulation", "unet2d": "2D network", "unet3d": "3D network"}
+
+
+def evaluate(
+    dataset: Annotated[Path, typer.Argument(help="A dataset folder; --paper makes it if it is not there.", show_default=False)],
+    run: Annotated[str | None, typer.Option(help="A diagnosis below RUNS whose extended model stands on the ladder.")] = None,
+    training: Annotated[list[str] | None, typer.Option(help="Trainings below RUNS/trainings; the newest ones without.")] = None,
+    truth: Annotated[
+        bool, typer.Option("--truth", help="Also the true effects of a virtual dataset, from DATASET.truth.json.")
+    ] = False,
+    paper: Annotated[bool, typer.Option("--paper", help="The three tables of Wu, Kazanzides and Unberath (2020) instead.")] = False,
+    size: Annotated[
+        str, typer.Option(help="Of the virtual dataset that --paper makes: short, medium or full (14 minutes).")
+    ] = "full",
+    epochs: Annotated[int, typer.Option(help="At most, of each network that --paper trains.")] = 40,
+    features: Annotated[str, typer.Option(help="Of the blocks of these networks.")] = "64,128,256",
+    every: Annotated[int, typer.Option(help="Each how many clouds these networks learn from one.")] = 1,
+    file: Annotated[Path | None, typer.Option("--out", help="The result (JSON).")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of all draws.")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
+    runs: Annotated[Path, typer.Option(help="Results go to RUNS/evaluations.")] = Path("runs"),
+) -> None:
+    """Say what a network, a named cause and both are worth on the test sequences: from the stated model to the noise floor.
+
+    With --paper: the paper's searches for the modulus, and its corrections at 5e3, 1e4 and 1e1 Pa, in 2D and 3D.
+    """
+    if paper:
+        _make(dataset, size, seed, workers)
+        found = _paper(dataset, [int(one) for one in features.split(",")], epochs, every, seed, workers, runs)
+    else:
+        found = _ladder(dataset, run, training or [], truth, seed, workers, runs)
+    if file is not None:
+        write_json(file, found)
+
+
+def _ladder(
+    dataset: Path, run: str | None, trainings: list[str], truth: bool, seed: int, workers: int, runs: Path
+) -> dict[str, Any]:
+    from app.evaluations import Evaluations  # noqa: PLC0415 (heavy)
+    from app.evaluations import evaluate as climb  # noqa: PLC0415 (heavy)
+
+    name = f"{dataset.resolve().name}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(2)}"
+    request = {
+        "dataset": str(dataset), "runs": str(runs), "workers": workers, "run": run, "trainings": trainings, "seed": seed,
+        "truth": _hidden(dataset) if truth else None, "folder": name,
+    }  # fmt: skip
+    with progress(f"evaluate {dataset.name}") as report:
+        climb(request, report)
+    kept = Evaluations(runs)
+    found = kept.found(name) or {}
+    out.print(f"[bold]{found['sentence']}[/]", highlight=False)
+    for one in found["parts"]:
+        if one["part"] != "kind":
+            out.print(_rungs(found["rungs"], one))
+    out.print(f"{kept.folder / name}", highlight=False, soft_wrap=True)
+    return found
+
+
+def _hidden(dataset: Path) -> list[dict[str, Any]]:
+    """The effects of a truth file as plain values."""
+    truth = truth_beside(dataset)
+    if truth is None:
+        file = f"{dataset.name}.truth.json"
+        raise RunError(f"{dataset.name} has no {file} beside it; leave --truth out", file=file)
+    return [
+        {"effect": one["effect"], "parameters": {key: entry["value"] for key, entry in one["parameters"].items()}}
+        for one in truth["effects"]
+    ]
+
+
+def _rungs(rungs: list[dict[str, Any]], one: dict[str, Any]) -> Table:
+    title = f"{SHOWN.get(one['part'], one['name'])}: {', '.join(one['kinds'])}; {one['probes']} pushes"
+    table = Table(title=title, title_justify="left", header_style="bold")
+    table.add_column("model")
+    for name in ("error", "removed", "of the moving part", "mean distance", "nearer"):
+        table.add_column(name, justify="right")
+    for rung in rungs:
+        own = one["errors"][rung["name"]]
+        shares = (own["removed"], own["moving"]["removed"], own["paper"]["improvement"])
+        removed, moving, nearer = ("–" if rung["name"] == "baseline" else _share(share) for share in shares)
+        table.add_row(rung["label"], f"{own['error']:.3f} mm", removed, moving, f"{own['paper']['error']:.3f} mm", nearer)
+    table.add_row("noise floor", f"{one['noise_floor']:.3f} mm", "", "", "", "")
+    return table
+
+
+def _share(share: dict[str, float]) -> str:
+    return f"{100 * share['value']:.0f} % ({100 * share['low']:.0f} to {100 * share['high']:.0f})"
+
+
+def _make(dataset: Path, size: str, seed: int, workers: int) -> None:
+    """The virtual dataset of the paper's protocol, unless it is there."""
+    from core.synthetic import PAPER_SIZES, make_dataset, paper_scenario  # noqa: PLC0415 (heavy)
+
+    wanted = next((one for one in PAPER_SIZES if one == size), None)
+    if wanted is None:
+        raise typer.BadParameter(f"--size is one of {', '.join(PAPER_SIZES)}, not {size!r}")
+    if not dataset.is_dir():
+        with progress(f"make {dataset.name}") as report:
+            make_dataset(dataset, paper_scenario(wanted), seed, workers, report)
+
+
+def _paper(dataset: Path, features: list[int], epochs: int, every: int, seed: int, workers: int, runs: Path) -> dict[str, Any]:
+    from app.sweeps import Sweeps  # noqa: PLC0415 (heavy)
+    from app.trainings import Trainings  # noqa: PLC0415 (heavy)
+    from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
+    from core.evaluation.paper import PaperRequest, run_paper  # noqa: PLC0415 (heavy)
+    from core.evaluation.training import Wanted  # noqa: PLC0415 (heavy)
+
+    training = Wanted(spec={"network": {"features": features}, "epochs": epochs, "seed": seed}, every=every)
+    folder = runs / "paper" / dataset.resolve().name
+    with progress(f"the paper's tables on {dataset.name}") as report:
+        found = run_paper(
+            open_dataset(dataset), folder, store=Sweeps(runs).store, samples=Trainings(runs).store,
+            request=PaperRequest(training=training), workers=workers, seed=seed, report=report,
+        )  # fmt: skip
+    for title, key in (("Table 1: coarse search", "coarse"), ("Table 2: fine search", "fine")):
+        out.print(_moduli(title, found[key]))
+    out.print(found["what_the_search_shows"], highlight=False)
+    out.print(_corrections(found["correction"]))
+    out.print(f"{folder / 'paper.json'}", highlight=False, soft_wrap=True)
+    return found
+
+
+def _moduli(title: str, rows: list[dict[str, Any]]) -> Table:
+    table = Table(title=title, title_justify="left", header_style="bold")
+    table.add_column("Young's modulus", justify="right")
+    table.add_column("mean distance", justify="right")
+    for row in rows:
+        shown = "–" if row["mean_distance"] is None else f"{row['mean_distance']:.4f} mm"
+        table.add_row(quantity(row["young_modulus"], "Pa", 3), shown)
+    return table
+
+
+def _corrections(rows: list[dict[str, Any]]) -> Table:
+    table = Table(title="Table 3: correction on test sequences, mean distance", title_justify="left", header_style="bold")
+    table.add_column("Young's modulus", justify="right")
+    table.add_column("motion")
+    for name in (*NETWORKS.values(), "3D beyond 2D"):
+        table.add_column(name, justify="right")
+    for row in rows:
+        for one in row["parts"]:
+            cells = [f"{one['simulation']['error']:.3f} mm"]
+            for key in list(NETWORKS)[1:]:
+                cells.append(f"{one[key]['error']:.3f} mm, {_share(one[key]['improvement'])} nearer")
+            table.add_row(quantity(row["young_modulus"], "Pa", 3), one["name"], *cells, _share(one["unet3d_beyond_unet2d"]))
+    return table

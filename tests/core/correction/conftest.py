@@ -1,0 +1,44 @@
+"""A virtual block that sags under its weight, which nobody states; pushed from above in three places. One that sags less."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from core.correction import Recorder, Samples, make_samples, recorder_for
+from core.dataset import Dataset, open_dataset
+from core.mesh import GridSpec
+from core.synthetic import HiddenEffect, Scenario, make_dataset
+
+PUSHES = ("poke-top-01", "poke-top-02", "poke-top-03")
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A dataset, and the samples of the stated model along it."""
+
+    dataset: Dataset
+    recorder: Recorder
+    samples: Samples
+
+
+def _bench(folder: Path, weight: float, sequences: tuple[str, ...]) -> Bench:
+    hidden = HiddenEffect("gravity", {"specific_weight_over_stiffness": weight})
+    scenario = Scenario(effects=(hidden,), sequences=sequences, density=900, rate=2.0, robot_rate=200.0, fine=6e-3)
+    make_dataset(folder / "block", scenario, seed=7)
+    dataset = open_dataset(folder / "block")
+    recorder = recorder_for(dataset, grid=GridSpec(nodes=(13, 5, 5)), points=400)
+    return Bench(dataset, recorder, make_samples(folder / "samples", recorder))
+
+
+@pytest.fixture(scope="session")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    return _bench(tmp_path_factory.mktemp("correction"), 2.4, PUSHES)
+
+
+@pytest.fixture(scope="session")
+def stiffer(tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    """The same block of another material: four times as stiff, it sags a quarter as much."""
+    return _bench(tmp_path_factory.mktemp("stiffer"), 0.6, PUSHES[:1])
