@@ -9,7 +9,8 @@ with Client("http://127.0.0.1:8321") as palpate:
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 from uuid import uuid4
@@ -70,13 +71,57 @@ class Client:
         """What a dataset holds, after every file was read."""
         return dict(self._get(f"/datasets/{dataset}/check"))
 
+    def import_archive(self, file: Path, name: str, key: str | None = None) -> dict[str, Any]:
+        """Queue the import of a dataset's folder packed as .zip or .tar, under this name."""
+        headers = {"idempotency-key": key or uuid4().hex, "content-type": "application/octet-stream"}
+        with Path(file).open("rb") as content:
+            return dict(self._answer(self._http.post("/imports", params={"name": name}, content=content, headers=headers)))
+
+    def import_folder(self, folder: str, name: str, key: str | None = None) -> dict[str, Any]:
+        """Queue the import of a folder on the server's own disk."""
+        return self._ask("/imports/folder", {"folder": folder, "name": name}, key)
+
+    def registrations(self, dataset: str) -> list[str]:
+        """Names of the registrations that were accepted for a dataset."""
+        return list(self._get(f"/datasets/{dataset}/registrations")["registrations"])
+
+    def registration(self, dataset: str, name: str) -> dict[str, Any]:
+        """One of them."""
+        return dict(self._get(f"/datasets/{dataset}/registrations/{name}"))
+
+    def register(self, dataset: str, accept: str | None = None, key: str | None = None) -> dict[str, Any]:
+        """Queue the automatic registration of a dataset, to be kept under a name."""
+        return self._ask(f"/datasets/{dataset}/registrations/automatic", {"accept": accept}, key)
+
+    def register_pairs(self, dataset: str, pairs: Sequence[Mapping[str, Any]], accept: str | None = None) -> dict[str, Any]:
+        """Register by pairs of points `{"cloud": [x, y, z], "mesh": [x, y, z]}` [m], then ICP; kept under a name if given."""
+        body = {"pairs": [dict(pair) for pair in pairs], "accept": accept}
+        return dict(self._answer(self._http.post(f"/datasets/{dataset}/registrations", json=body)))
+
+    def replay(
+        self, dataset: str, sequences: Sequence[str] = (), effects: Sequence[Mapping[str, Any]] = (), key: str | None = None,
+        registration: str | None = None,
+    ) -> dict[str, Any]:  # fmt: skip
+        """Queue a replay of sequences (all without) with effects of one's own; the job's id will be its run's."""
+        body = {"dataset": dataset, "sequences": list(sequences), "effects": list(effects), "registration": registration}
+        return self._ask("/replays", body, key)
+
+    def export(self, run: str, what: Sequence[str] = ("report", "model"), key: str | None = None) -> dict[str, Any]:
+        """Queue the writing of parts of a run as files."""
+        return self._ask("/exports", {"run": run, "what": list(what)}, key)
+
+    def download(self, export: str, file: str) -> bytes:
+        """One file of a finished export."""
+        answer = self._http.get(f"/exports/{export}/{file}")
+        return answer.content if answer.is_success else bytes(self._answer(answer))
+
     def effects(self) -> list[dict[str, Any]]:
         """The catalogue, with parameters, units and bounds (SI)."""
         return list(self._get("/effects"))
 
-    def diagnose(self, dataset: str, seed: int = 0, key: str | None = None) -> dict[str, Any]:
-        """Queue a diagnosis; the job's id will be its run's."""
-        return self._ask("/diagnoses", {"dataset": dataset, "seed": seed}, key)
+    def diagnose(self, dataset: str, seed: int = 0, key: str | None = None, registration: str | None = None) -> dict[str, Any]:
+        """Queue a diagnosis, with an accepted registration if one is named; the job's id will be its run's."""
+        return self._ask("/diagnoses", {"dataset": dataset, "seed": seed, "registration": registration}, key)
 
     def sweep(
         self, dataset: str, parameters: Mapping[str, tuple[float, float]], key: str | None = None, **further: Any
@@ -95,6 +140,22 @@ class Client:
         while more := self._get(f"/sweeps/{identity}/points", after=len(found))["points"]:
             found += more
         return found
+
+    def train(self, dataset: str, run: str | None = None, key: str | None = None, **further: Any) -> dict[str, Any]:
+        """Queue a training on the stated model, or on a run's extended one; `further` as POST /api/trainings takes it."""
+        return self._ask("/trainings", {"dataset": dataset, "run": run, **further}, key)
+
+    def training(self, identity: str) -> dict[str, Any]:
+        """A training: what was asked, its history by epoch, and its summary once it has ended."""
+        return dict(self._get(f"/trainings/{identity}"))
+
+    def evaluate(self, dataset: str, run: str | None = None, key: str | None = None, **further: Any) -> dict[str, Any]:
+        """Queue a ladder of a dataset's test sequences; `further` as POST /api/evaluations takes it."""
+        return self._ask("/evaluations", {"dataset": dataset, "run": run, **further}, key)
+
+    def evaluation(self, identity: str) -> dict[str, Any]:
+        """A ladder: its summary once it has ended."""
+        return dict(self._get(f"/evaluations/{identity}"))
 
     def report(self, run: str) -> dict[str, Any]:
         """The report of a finished diagnosis."""

@@ -10,6 +10,8 @@ from fastapi import Depends, Header
 from starlette.requests import HTTPConnection
 
 from app.clicking import Clickings
+from app.disk import Disk
+from app.imports import STAGING
 from app.jobs import Jobs
 from app.library import Library
 from app.records import Job
@@ -18,7 +20,7 @@ from app.runs import Runs
 from app.sessions import Sessions
 from app.settings import Settings
 from app.stage import Audience, Stage
-from app.whatif import WhatIfs
+from app.whatif import Lives, WhatIfs
 
 __all__ = ["Desk", "DeskOf", "KeyOf"]
 
@@ -31,26 +33,30 @@ class Desk:
     library: Library
     runs: Runs
     jobs: Jobs
+    disk: Disk
     sessions: Sessions
     stage: Stage
     clickings: Clickings
     whatifs: WhatIfs
+    lives: Lives
 
     @classmethod
     def open(cls, settings: Settings, targets: dict[str, str]) -> Desk:
         """Start the job queue and the inner viewer."""
         runs = Runs(settings.runs)
         sessions, library = Sessions(runs), Library(settings.datasets)
-        clickings = Clickings(library.phantom)
+        clickings, disk = Clickings(library.phantom), Disk(settings.runs, settings.disk_limit)
         return cls(
             settings=settings,
             library=library,
             runs=runs,
-            jobs=Jobs(settings.runs, targets, settings.preload),
+            jobs=Jobs(settings.runs, targets, settings.preload, [settings.datasets / STAGING], lambda: _tidied(disk)),
+            disk=disk,
             sessions=sessions,
             stage=Stage(Audience(sessions.join, sessions.leave), Audience(clickings.join, clickings.leave), clickings.click),
             clickings=clickings,
             whatifs=WhatIfs(),
+            lives=Lives(),
         )
 
     def diagnose(self, dataset: Path, name: str, seed: int, key: str | None = None, registration: str | None = None) -> Job:
@@ -67,11 +73,25 @@ class Desk:
         accepted.check(self.library.path(dataset))
         return {"registration": accepted.to_json()}
 
+    def awaited(self) -> frozenset[str]:
+        """Archives that imports may still need."""
+        jobs = [job for job in self.jobs.all() if job.kind == "import" and (job.state.can_be_retried or not job.state.is_finished)]
+        return frozenset(str(job.request.get("archive")) for job in jobs)
+
     def close(self) -> None:
         """Cancel what runs and stop the inner viewer."""
         self.jobs.close()
         self.stage.close()
         self.whatifs.close()
+        self.lives.close()
+
+
+def _tidied(disk: Disk) -> str:
+    """Make room if need be, and say so."""
+    now = disk.trim()
+    if now.used > now.limit:
+        return f"the results take {now.used / 2**30:.1f} GiB of {now.limit / 2**30:.1f} GiB: delete some of them"
+    return f"dropped {now.dropped / 2**20:.0f} MiB of the oldest caches" if now.dropped else ""
 
 
 def _desk(connection: HTTPConnection) -> Desk:

@@ -29,6 +29,7 @@ VIEWER_POLICY = (
 # Nobody's data: the page's own files, and the way in.
 OPEN = ("/login", "/logout")
 OPEN_BELOW = "/static/"
+UPLOAD = "/api/imports"
 WILD = frozenset({"0.0.0.0", "::"})
 TRICKS = (b"%2f", b"%5c", b"%2e", b"%00", b"//", b"\\")
 
@@ -41,7 +42,7 @@ class Guard:
     def __init__(self, app: ASGIApp, settings: Settings, login: Login | None = None) -> None:
         self._app = app
         self._login = login
-        self._largest = settings.largest_body
+        self._largest, self._largest_upload = settings.largest_body, settings.largest_upload
         self._wild = settings.host in WILD
         self._names = LOOPBACK | {_bracketed(name) for name in (settings.host, *settings.allow_host)}
 
@@ -60,7 +61,7 @@ class Guard:
         headers = {key.decode("latin-1"): value.decode("latin-1") for key, value in scope["headers"]}
         refusal = self._misplaced(scope, headers) or await self._unknown(scope, headers)
         if refusal is None:
-            await self._app(scope, self._limited(receive), send_with_headers)
+            await self._app(scope, self._limited(receive, self._most(scope)), send_with_headers)
         elif scope["type"] == "websocket":
             await receive()
             await send({"type": "websocket.close", "code": 1008})
@@ -79,8 +80,8 @@ class Guard:
         if ambiguous(scope):
             return _answer(404, "RequestError", "the path has an empty, encoded or dotted part; write it plainly")
         length = headers.get("content-length", "0")  # what is no number is counted as it comes in
-        if scope["type"] == "http" and length.isascii() and length.isdigit() and int(length) > self._largest:
-            return _answer(413, "RequestError", _too_large(self._largest))
+        if scope["type"] == "http" and length.isascii() and length.isdigit() and int(length) > self._most(scope):
+            return _answer(413, "RequestError", _too_large(self._most(scope)))
         return None
 
     async def _unknown(self, scope: Scope, headers: dict[str, str]) -> JSONResponse | RedirectResponse | None:
@@ -94,7 +95,11 @@ class Guard:
             401, "LoginError", "log in at /login, or send Authorization: Bearer with the token", {"www-authenticate": "Bearer"}
         )
 
-    def _limited(self, receive: Receive) -> Receive:
+    def _most(self, scope: Scope) -> int:
+        """Bytes that a request may bring to this path."""
+        return self._largest_upload if scope["path"] == UPLOAD else self._largest
+
+    def _limited(self, receive: Receive, most: int) -> Receive:
         """The same body; 413 once it is longer than allowed, whatever length it was said to have."""
         got = 0
 
@@ -103,8 +108,8 @@ class Guard:
             message = await receive()
             if message["type"] == "http.request":
                 got += len(message.get("body", b""))
-                if got > self._largest:
-                    raise HTTPException(413, _too_large(self._largest))
+                if got > most:
+                    raise HTTPException(413, _too_large(most))
             return message
 
         return limited

@@ -15,7 +15,7 @@ import shutil
 import signal
 import threading
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerProcess
 from pathlib import Path
@@ -40,14 +40,19 @@ class Jobs:
     """Runs jobs one after another and keeps their records.
 
     Each job has a scratch folder, named in its request, that is gone when the job has ended, however it ended: a result
-    is what the work renamed out of it.
+    is what the work renamed out of it. In the folders `beside` it may have another one of its id, which goes the same way.
+    `tidy` is called before each job; what it says stands in the job's log.
     """
 
-    def __init__(self, folder: Path, targets: Mapping[str, str], preload: Iterable[str] = ()) -> None:
-        self._targets = dict(targets)
+    def __init__(
+        self, folder: Path, targets: Mapping[str, str], preload: Iterable[str] = (), beside: Iterable[Path] = (),
+        tidy: Callable[[], str] = str,
+    ) -> None:  # fmt: skip
+        self._targets, self._beside, self._tidy = dict(targets), tuple(beside), tidy
         self._scratch = folder / ".making"
         self._alone = _take(folder)
-        shutil.rmtree(self._scratch, ignore_errors=True)
+        for place in (self._scratch, *self._beside):
+            shutil.rmtree(place, ignore_errors=True)
         self._records = Records(folder / "jobs.sqlite")
         self._records.interrupt_running("the server ended while this job ran; retry it")
         self._waiting: queue.Queue[str | None] = queue.Queue()
@@ -147,6 +152,8 @@ class Jobs:
             message = f"this version cannot do a {job.kind}"
             self._finish(identity, JobState.FAILED, error={"kind": "Missing", "message": message, "where": {}})
             return
+        if said := self._tidy():
+            self._records.note(identity, "info", said)
         scratch = Path(job.request["scratch"])
         scratch.mkdir(parents=True, exist_ok=True)
         here, there = self._context.Pipe()
@@ -165,7 +172,8 @@ class Jobs:
         finally:
             self._stop(identity)
             here.close()
-            shutil.rmtree(scratch, ignore_errors=True)
+            for place in (scratch, *(folder / identity for folder in self._beside)):
+                shutil.rmtree(place, ignore_errors=True)
             self._died(identity, process.exitcode)
             self._running.pop(identity, None)
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from app.desk import Desk
 from app.problems import Missing
 from app.runs import NAME
 from app.schemas import JobOut
 from core.errors import RunError
+
+if TYPE_CHECKING:
+    from app.desk import Desk
 
 __all__ = ["Kept"]
 

@@ -18,14 +18,17 @@ from app.api import (
     clicking,
     datasets,
     diagnoses,
+    disk,
     effects,
     evaluations,
+    imports,
     jobs,
     registrations,
     runs,
     sessions,
     sweeps,
     trainings,
+    verbs,
     whatif,
 )
 from app.desk import Desk
@@ -47,6 +50,11 @@ Lengths are in m, pressures in Pa, times in s. Every problem is answered as `{ki
 is answered with 202 and the job, and followed by GET /api/jobs/{id} or by the server-sent events of GET /api/jobs/events.
 """
 
+MODULES = (
+    datasets, imports, disk, verbs, registrations, clicking, diagnoses, jobs, runs, sessions, whatif, effects, sweeps, trainings,
+    evaluations,
+)  # fmt: skip
+
 
 def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> FastAPI:
     """The service for one folder of runs and one of datasets; `targets` names the function of each kind of job."""
@@ -62,8 +70,7 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
     app.state.ending = threading.Event()
     app.state.settings, app.state.login = settings, login
     app.add_middleware(Guard, settings=settings, login=login)
-    modules = (datasets, registrations, clicking, diagnoses, jobs, runs, sessions, whatif, effects, sweeps, trainings, evaluations)
-    for module in modules:
+    for module in MODULES:
         app.include_router(module.router, prefix="/api", responses=PROBLEMS)
     app.include_router(relay.router)
     app.include_router(login_router)

@@ -51,6 +51,10 @@ class Picture:
         """The figures of one kind."""
         return {name: figure for name, figure in self.figures.items() if isinstance(figure, kind)}
 
+    def scale(self) -> dict[str, Any]:
+        """What the colours mean."""
+        return {"quantity": self.quantity, "limit": self.limit}
+
     def checksum(self) -> str:
         """A short digest of all arrays, for comparing what two places hold."""
         return checksum(self.frame, self.figures)
@@ -64,8 +68,7 @@ class Picture:
             "lines": sum(len(lines.segments) for name, lines in self.of(Lines).items() if name.endswith("-lines")),
             "figures": sorted(self.figures),
             "tool": None if tool is None else [round(float(x), 6) for x in tool.centre],
-            "quantity": self.quantity,
-            "limit": self.limit,
+            **self.scale(),
             "checksum": self.checksum(),
         }
 

@@ -48,6 +48,11 @@ class Registrations:
         """One registration, to be used in place of the automatic one."""
         return Accepted.from_json(self.get(dataset, name))
 
+    def check_name(self, dataset: str, name: str) -> None:
+        """Refuse what is no name, and one that is taken."""
+        if self._path(dataset, name).exists():
+            raise Conflict(f"{dataset} has a registration {name} already: choose another name", registration=name)
+
     def save(self, dataset: str, name: str, found: dict[str, Any]) -> dict[str, Any]:
         """Keep a registration under a new name; Conflict where the name is taken."""
         path = self._path(dataset, name)

@@ -9,7 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 from app.records import Job
 
 __all__ = [
-    "PROBLEMS", "DiagnosisRequest", "EffectIn", "HalfPair", "JobOut", "NoteOut", "Notes", "Point", "Problem", "Shown",
+    "PROBLEMS", "DiagnosisRequest", "EffectIn", "HalfPair", "JobOut", "LiveRequest", "NoteOut", "Notes", "Point", "Problem",
+    "Shown",
     "WeakDirection", "WhatIfRequest",
 ]  # fmt: skip
 
@@ -114,6 +115,23 @@ class WhatIfRequest(BaseModel):
     frame: int = Field(ge=0)
     effects: tuple[EffectIn, ...] = Field(default=(), max_length=12)
     tuned: bool = True
+    page: str | None = None
+
+
+class LiveRequest(BaseModel):
+    """Where a hand leads the tool's centre to [m], phantom frame, and the model that answers; `page` shows it there.
+
+    `shown` is the run's model in whose place it is drawn.
+    """
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", json_schema_extra={"examples": [{"at": [0.0, 0.0, 0.038], "effects": [], "tuned": False}]}
+    )
+
+    at: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+    effects: tuple[EffectIn, ...] = Field(default=(), max_length=12)
+    tuned: bool = True
+    shown: Literal["raw", "extended"] = "extended"
     page: str | None = None
 
 

@@ -46,6 +46,8 @@ def verdict_sentence(report: dict[str, Any], size: Sequence[float] | None = None
     """What a diagnosis says; `size` (x, y, z) [m] of the phantom places things below its top."""
     verdict = report.get("verdict")
     phrases = [cause_phrase(cause, size) for cause in report.get("causes", [])]
+    if verdict == "replay":
+        return f"Replayed with {_listed(phrases, 'and')}." if phrases else "Replayed as stated."
     if verdict == "none":
         return "The simulation misses nothing that this data could show: what is left is noise and the stated accuracies."
     if verdict == "unexplained":

@@ -19,14 +19,15 @@ from app.problems import Missing
 from app.runs import Run, Runs
 from app.scene import Scene
 from app.side import end_of_scale
-from app.view import Quantity, View
+from app.view import MODELS, Model, Quantity, View
 from core.errors import PalpateError
 from core.frames import FloatArray
 
 if TYPE_CHECKING:
+    from core.live import Felt
     from core.whatif import Moment
 
-__all__ = ["Session", "Sessions", "Trial"]
+__all__ = ["Session", "Sessions", "Touch", "Trial"]
 
 log = logging.getLogger(__name__)
 REELS = 6
@@ -47,6 +48,25 @@ class Trial:
         return (self.run, self.sequence, self.frame) == (view.run, view.sequence, frame)
 
 
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """What a page shows while a hand leads the tool: the model's answer, in place of one of the run's models."""
+
+    run: str
+    sequence: str
+    model: Model
+    felt: Felt
+
+    def seen(self, view: View) -> View:
+        """The view as it is shown: nobody measured this push, so that there is no cloud and no error, and no other model."""
+        layers = (*(layer for layer in view.layers if layer not in ("measured", *MODELS)), self.model)
+        looks = {layer: look for layer, look in view.looks.items() if layer != self.model}
+        quantity = "displacement" if view.quantity == "error" else view.quantity
+        limit = view.limit if quantity == view.quantity else None
+        changes = {"layers": layers, "looks": looks, "quantity": quantity, "limit": limit, "side_by_side": False}
+        return view.model_copy(update={**changes, "colour": "plain" if view.colour == "plain" else self.model})
+
+
 class Session:
     """One page: its view, the picture of it, and the browsers' scenes that show it."""
 
@@ -55,6 +75,8 @@ class Session:
         self.view: View | None = None
         self.picture: Picture | None = None
         self._trial: Trial | None = None
+        self._touch: Touch | None = None
+        self._stand: tuple[str, Lookout] | None = None
         self._reel_of, self._end_of = reel_of, end_of
         self._scenes: list[Scene] = []
         self._framed: tuple[str, tuple[tuple[float, float, float], ...]] | None = None
@@ -62,39 +84,72 @@ class Session:
 
     def show(self, view: View) -> dict[str, Any]:
         """Draw this view in all scenes of the page and return what is held now."""
+        self._draw(view)
+        return self.state()
+
+    def _draw(self, view: View) -> None:
         with self._lock:
             reel = self._reel_of(view.run, view.sequence)
             frame = min(view.frame, len(reel.replay) - 1)
             if self._trial is not None and self._trial.fits(view, frame):
                 reel = reel.instead(frame, self._trial.moment)
-            view = view.model_copy(update={"frame": frame})
-            picture = reel.picture(view, self._end_of(view.run, view.quantity) if view.scale == "fixed" else None)
-            self.view, self.picture = view, picture
+            self.view = seen = view.model_copy(update={"frame": frame})
+            if self._touch is not None and (self._touch.run, self._touch.sequence) == (view.run, view.sequence):
+                reel, seen = reel.instead(frame, self._touch.felt, self._touch.model), self._touch.seen(seen)
+            picture = reel.picture(seen, self._end_of(seen.run, seen.quantity) if seen.scale == "fixed" else None)
+            self.picture = picture
             for scene in self._scenes:
                 scene.draw(picture)
             if self._framed != (view.run, picture.columns):
+                if self._framed is not None:
+                    self._stand = None
                 self._look()
             self._framed = (view.run, picture.columns)
-        return self.state()
 
     def try_out(self, trial: Trial | None) -> None:
         """Show this in place of the extended model, wherever the page shows that frame; None shows the model again."""
         with self._lock:
             self._trial, view = trial, self.view
         if view is not None:
-            self.show(view)
+            self._draw(view)
+
+    def touch(self, touch: Touch | None) -> None:
+        """Show what a hand feels, until None lets go."""
+        with self._lock:
+            self._touch, view = touch, self.view
+        if view is not None:
+            self._draw(view)
+
+    def wants_inside(self) -> bool:
+        """Whether what is shown cannot be drawn without the inside of the block."""
+        view = self.view
+        if view is None:
+            return False
+        lumps = "lump" in view.layers and self._reel_of(view.run, view.sequence).lumps
+        return view.section is not None or view.quantity == "energy" or bool(lumps)
 
     def look(self, where: Standpoint = "reset") -> None:
         """Turn the cameras of all scenes to the phantom."""
         with self._lock:
+            self._stand = None
             self._look(where)
 
+    def stand(self, run: str, lookout: Lookout) -> None:
+        """Look from there while this run is shown, as often as a scene opens, until told otherwise."""
+        with self._lock:
+            self._stand = (run, lookout)
+            if self.view is not None and self.view.run == run:
+                self._look()
+
     def _look(self, where: Standpoint = "reset") -> None:
-        if self.view is not None and self.picture is not None:
-            replay = self._reel_of(self.view.run, self.view.sequence).replay
-            found: Lookout = lookout(replay.size, replay.camera("raw").translation, self.picture.columns, where)
-            for scene in self._scenes:
-                scene.look(found)
+        if self.view is None or self.picture is None:
+            return
+        replay = self._reel_of(self.view.run, self.view.sequence).replay
+        found = lookout(replay.size, replay.camera("raw").translation, self.picture.columns, where)
+        if self._stand is not None and self._stand[0] == self.view.run:
+            found = self._stand[1]
+        for scene in self._scenes:
+            scene.look(found)
 
     def still(self, width: int, height: int) -> np.ndarray[Any, Any]:
         """What the page's scene shows (height, width, 4); Missing where no browser shows it."""

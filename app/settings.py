@@ -20,7 +20,11 @@ class Settings(BaseSettings):
         scheduler: address of a dask scheduler whose workers do the replays of sweeps; this machine does them without.
         preload: modules that the worker processes import once, before the first job.
         allow_host: names besides loopback and `host` by which browsers may call the server, for example behind a proxy.
-        largest_body: bytes that a request may bring.
+        import_from: folders below which those lie that may be imported by their path; without any, every folder where only this
+            machine's own users reach the server, and none where others do.
+        largest_body: bytes that a request may bring. largest_upload: the same for an archive that is imported.
+        largest_dataset: bytes that a dataset may have, unpacked.
+        disk_limit: bytes of the runs folder beyond which the oldest caches are dropped.
     """
 
     model_config = SettingsConfigDict(env_prefix="PALPATE_", frozen=True)
@@ -34,12 +38,21 @@ class Settings(BaseSettings):
     static: Path = Path(__file__).resolve().parent.parent / "static"
     preload: tuple[str, ...] = ("app.work", "core.dataset", "core.diagnosis")
     allow_host: tuple[str, ...] = ()
+    import_from: tuple[Path, ...] = ()
     largest_body: int = 2**20
+    largest_upload: int = 4 * 2**30
+    largest_dataset: int = 16 * 2**30
+    disk_limit: int = 20 * 2**30
 
     @property
     def needs_login(self) -> bool:
         """Whether others than this machine's own users can reach the server, by its address or by a name given to it."""
         return not all(map(_is_loopback, (self.host, *self.allow_host)))
+
+    @property
+    def import_roots(self) -> tuple[Path, ...] | None:
+        """Folders below which imports by path may lie; None for any."""
+        return self.import_from if self.import_from or self.needs_login else None
 
 
 def _is_loopback(host: str) -> bool:

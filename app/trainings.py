@@ -31,11 +31,11 @@ class Trainings(Kept):
         found = self.read(name, "history.json")
         return list(found) if found is not None else (self.found(name) or {}).get("history", [])
 
-    def newest(self, dataset: Path, run: str | None) -> Path | None:
-        """The folder of the newest finished training on a dataset's stated model, or on the model of a run."""
+    def newest(self, dataset: Path, model: str, run: str | None = None) -> Path | None:
+        """The folder of the newest finished training on a dataset's model: baseline, true, or extended of a run."""
         for name in self.finished():
             asked = self.asked(name)
-            if asked.get("dataset") == str(dataset.resolve()) and asked.get("run") == run:
+            if (asked.get("dataset"), asked.get("model"), asked.get("run")) == (str(dataset.resolve()), model, run):
                 return self.folder / name
         return None
 
@@ -53,7 +53,8 @@ def train(request: dict[str, Any], report: Report) -> dict[str, Any]:
     run = Runs(runs).get(request["run"]) if request.get("run") else None
     summary = train_network(
         dataset, Wanted.from_json(request["training"]), trainings.folder / name, store=trainings.store,
-        model=None if run is None else run.model, run=None if run is None else run.name, workers=int(request["workers"]),
+        model=None if run is None else run.model, run=None if run is None else run.name, truth=request.get("truth"),
+        workers=int(request["workers"]),
         report=part(report, 0.0, 1.0 if run is None else 0.85),
     )  # fmt: skip
     if run is not None:

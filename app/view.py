@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-__all__ = ["MODELS", "Colouring", "Layer", "Look", "Model", "Quantity", "Section", "View"]
+__all__ = ["MODELS", "Camera", "Colouring", "Layer", "Look", "Model", "Quantity", "Section", "View"]
 
 Model = Literal["raw", "extended", "corrected"]
 Layer = Literal["measured", "raw", "extended", "corrected", "tool", "path", "landmarks", "base", "lump"]
 Colouring = Literal["plain", "raw", "extended", "corrected"]
 Quantity = Literal["error", "displacement", "energy"]
+Far = Annotated[float, Field(ge=-100.0, le=100.0)]
 MODELS: tuple[Model, ...] = ("raw", "extended", "corrected")
 
 
@@ -39,6 +40,16 @@ class Section(BaseModel):
     axis: Literal["x", "y", "z"] = "y"
     at: FiniteFloat = Field(default=0.0, ge=-1.0, le=1.0)
     flip: bool = False
+
+
+class Camera(BaseModel):
+    """Where a person looks at a run from, and at what [m], phantom frame; z is upwards."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    run: str
+    position: tuple[Far, Far, Far]
+    target: tuple[Far, Far, Far]
 
 
 class View(BaseModel):

@@ -1,74 +1,59 @@
-"""What-if over the wire: one process that solves single frames again, kept warm, started when first asked for."""
+"""What-if over the wire: single frames of runs solved again, and a tool led by hand."""
 
 from __future__ import annotations
 
 import json
-import threading
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures import TimeoutError as TooLong
-from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self
 
 from app.runs import Run
+from app.solver import Solver
 from core.errors import RunError
-from core.processes import bound_to_parent
 
 if TYPE_CHECKING:
+    from core.live import Felt, Live
     from core.whatif import Moment
 
-__all__ = ["WhatIfs"]
+__all__ = ["Hand", "Lives", "WhatIfs"]
 
-T = TypeVar("T")
-_PATIENCE = 60.0
-"""A frame that finds no equilibrium, or a long past, may take so long [s] before it is given up."""
+MOST_HANDS = 8
+"""Blocks under hands that a process keeps; the one longest untouched goes first, and begins anew when touched again."""
 
 
-class WhatIfs:
+class WhatIfs(Solver):
     """Solves frames of runs again, one at a time, in a process of its own."""
-
-    def __init__(self, patience: float = _PATIENCE) -> None:
-        self._patience = patience
-        self._pool: ProcessPoolExecutor | None = None
-        self._lock = threading.Lock()
 
     def beginnings(self, run: Run, sequence: str) -> list[dict[str, Any]]:
         """A finite size of each effect, from which to go on by hand."""
-        return self._ask(_beginnings, *_key(run, sequence))
+        return self.ask(_beginnings, *_key(run, sequence))
 
     def solve(self, run: Run, sequence: str, frame: int, effects: list[dict[str, Any]], tuned: bool) -> Moment:
         """The frame with these effects; RunError where the solve takes too long or its process ends."""
-        return self._ask(_solve, *_key(run, sequence), frame, effects, tuned)
+        return self.ask(_solve, *_key(run, sequence), frame, effects, tuned)
 
-    def close(self) -> None:
-        """End the process."""
-        with self._lock:
-            self._end()
 
-    def _ask(self, task: Callable[..., T], *args: Any) -> T:
-        with self._lock:  # one question at a time: the newest answer is what a page waits for
-            if self._pool is None:
-                self._pool = ProcessPoolExecutor(1, get_context("spawn"), bound_to_parent)
-            try:
-                return self._pool.submit(task, *args).result(self._patience)
-            except TooLong:
-                self._end()
-                raise RunError(
-                    f"this frame found no answer within {self._patience:.0f} s and was given up; take values nearer to the model's"
-                ) from None
-            except BrokenProcessPool:
-                self._end()
-                raise RunError("the process that solves ended, most likely for want of memory; try again") from None
+@dataclass(frozen=True)
+class Hand:
+    """One who leads the tool: `name` tells hands apart, whose blocks each remember their own way; `key` says of which sequence."""
 
-    def _end(self) -> None:
-        if self._pool is None:
-            return
-        processes = list((self._pool._processes or {}).values())
-        self._pool.shutdown(wait=False, cancel_futures=True)
-        for process in processes:
-            process.terminate()
-        self._pool = None
+    name: str
+    key: tuple[str, str, tuple[int, ...], str]
+    effects: list[dict[str, Any]]
+    tuned: bool
+
+    @classmethod
+    def of(cls, name: str, run: Run, sequence: str, effects: list[dict[str, Any]], tuned: bool) -> Self:
+        """Of a run's sequence; RunError where it does not say where its data are."""
+        return cls(name, _key(run, sequence), effects, tuned)
+
+
+class Lives(Solver):
+    """Blocks under tools that hands lead, all in one process of their own."""
+
+    def at(self, hand: Hand, centre: tuple[float, float, float], within: bool = False) -> Felt:
+        """What the block answers with the tool there [m]; RunError where it takes too long or the process ends."""
+        return self.ask(_felt, hand, centre, within)
 
 
 def _key(run: Run, sequence: str) -> tuple[str, str, tuple[int, ...], str]:
@@ -94,3 +79,22 @@ def _solve(
     from core.whatif import opened  # noqa: PLC0415 (heavy)
 
     return opened(folder, sequence, clouds, model).solve(frame, effects_from(effects), tuned)
+
+
+_hands: OrderedDict[str, Live] = OrderedDict()
+
+
+def _felt(hand: Hand, centre: tuple[float, float, float], within: bool) -> Felt:
+    import numpy as np  # noqa: PLC0415
+
+    from core.diagnosis.kept import effects_from  # noqa: PLC0415 (heavy)
+    from core.whatif import opened  # noqa: PLC0415 (heavy)
+
+    key = json.dumps([hand.name, hand.key, hand.effects, hand.tuned])
+    live = _hands.pop(key, None)
+    if live is None:
+        live = opened(*hand.key).live(effects_from(hand.effects), hand.tuned)
+    _hands[key] = live
+    while len(_hands) > MOST_HANDS:
+        _hands.popitem(last=False)
+    return live.at(np.array(centre), within=within)

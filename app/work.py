@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 __all__ = ["TARGETS", "diagnose", "diagnose_into"]
 
 TARGETS = {
-    "diagnosis": "app.work:diagnose", "sweep": "app.sweeps:sweep", "training": "app.trainings:train",
+    "diagnosis": "app.work:diagnose", "sweep": "app.sweeps:sweep", "training": "app.trainings:train", "import": "app.imports:bring",
+    "registration": "app.verbs:register", "replay": "app.verbs:replay", "export": "app.verbs:export",
     "evaluation": "app.evaluations:evaluate",
 }  # fmt: skip
 

@@ -9,15 +9,18 @@ from rich.console import Console
 from benchmarks import (
     cleaning,
     convergence,
+    correction,
     dataset,
     diagnosis,
     effects,
     gradings,
+    live,
     measurement,
     modulus,
     peers,
     picking,
     replay,
+    scrub,
     shapes,
     sweep,
 )
@@ -35,7 +38,10 @@ ALL = {
     "cleaning": cleaning.run,
     "picking": picking.run,
     "dataset": dataset.run,
+    "correction": correction.run,
     "diagnosis": diagnosis.run,
+    "live": live.run,
+    "scrub": scrub.run,
 }
 WIDTH = 140
 """Characters of a line where there is no terminal to ask."""

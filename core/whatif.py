@@ -24,6 +24,7 @@ from core.equilibrium import Equilibrium
 from core.errors import RunError
 from core.frames import FloatArray
 from core.grading import PAGE_GRID
+from core.live import Live
 from core.registration import register, setup_from
 from core.replay import replay
 from core.setup import Setup, Shape
@@ -94,6 +95,14 @@ class WhatIf:
                 found.append(starts[len(starts) // 2].to_json())
         return found
 
+    def setup(self, effects: Sequence[Effect], tuned: bool = True) -> Setup:
+        """The stated setup with these causes; `tuned` as in `solve`."""
+        return with_effects(self.tuned if tuned else self.stated, effects)
+
+    def live(self, effects: Sequence[Effect], tuned: bool = True) -> Live:
+        """The same block under a tool that a hand leads."""
+        return Live(self.setup(effects, tuned), self._grid)
+
     def solve(self, frame: int, effects: Sequence[Effect], tuned: bool = True) -> Moment:
         """The frame with these causes added to the stated setup.
 
@@ -106,7 +115,7 @@ class WhatIf:
         """
         if not 0 <= frame < len(self):
             raise RunError(f"there is no frame {frame}; the recording has 0 to {len(self) - 1}", frame=frame)
-        setup = with_effects(self.tuned if tuned else self.stated, effects)
+        setup = self.setup(effects, tuned)
         solved = self._solved(setup, frame)
         side: Recorded = observed(setup, [solved], [self._cloud(frame)])
         return Moment(

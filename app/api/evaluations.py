@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
@@ -20,13 +20,17 @@ EXAMPLE: JsonDict = {"dataset": "block-01"}
 
 
 class EvaluationRequest(BaseModel):
-    """Which dataset, beside which run's extended model, with which trainings; the newest ones where none is named."""
+    """Which dataset, beside which run's extended model, with which trainings; the newest ones where none is named.
+
+    With the feedback `follow` the simulation answers for the points that a network does not see.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra={"examples": [EXAMPLE]})
 
     dataset: str
     run: str | None = None
     trainings: list[str] = Field(default_factory=list, max_length=4)
+    feedback: Literal["none", "follow"] = "none"
     seed: int = Field(default=0, ge=0, lt=2**31)
 
 
@@ -39,7 +43,7 @@ def start(request: EvaluationRequest, desk: DeskOf, key: KeyOf = None) -> JobOut
     networks_for(Trainings(settings.runs), dataset.path, request.run, request.trainings)
     said = {
         "dataset": str(dataset.path), "name": request.dataset, "runs": str(settings.runs), "workers": settings.workers,
-        **request.model_dump(include={"run", "trainings", "seed"}),
+        **request.model_dump(include={"run", "trainings", "feedback", "seed"}),
     }  # fmt: skip
     return JobOut.of(desk.jobs.submit("evaluation", said, f"evaluation-{request.dataset}", key))
 

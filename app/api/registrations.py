@@ -8,10 +8,9 @@ import numpy as np
 from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.desk import DeskOf
-from app.problems import Conflict
+from app.desk import DeskOf, KeyOf
 from app.registrations import Registrations, register
-from app.schemas import Point
+from app.schemas import JobOut, Point
 from core.registration.pairs import fit_pairs
 
 __all__ = ["router"]
@@ -64,11 +63,29 @@ def fitted(name: str, request: FitRequest, desk: DeskOf) -> dict[str, Any]:
     return fit_pairs(np.array([pair.cloud for pair in pairs]), np.array([pair.mesh for pair in pairs])).to_json()
 
 
+class AutomaticRequest(BaseModel):
+    """The name to keep it under; a free one without."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra={"examples": [{"accept": "automatic-1"}]})
+
+    accept: str | None = None
+
+
+@router.post("/automatic", status_code=202)
+def automatic(name: str, request: AutomaticRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
+    """Queue the automatic registration of a dataset; what it finds is kept under a name like one made by hand."""
+    folder, kept = desk.library.path(name), Registrations(desk.settings.runs)
+    if request.accept is not None:
+        kept.check_name(name, request.accept)
+    said = {"dataset": str(folder), "name": name, "runs": str(desk.settings.runs), "accept": request.accept}
+    return JobOut.of(desk.jobs.submit("registration", said, f"register-{name}", key))
+
+
 @router.post("")
 def made(name: str, request: RegistrationRequest, desk: DeskOf) -> dict[str, Any]:
     """Fit the pairs, lay the rest cloud against the block from there, and keep it if a name is given; a taken name is refused."""
     folder, kept = desk.library.path(name), Registrations(desk.settings.runs)
-    if request.accept is not None and request.accept in kept.names(name):
-        raise Conflict(f"{name} has a registration {request.accept} already: choose another name", registration=request.accept)
+    if request.accept is not None:
+        kept.check_name(name, request.accept)
     found = register(folder, [pair.cloud for pair in request.pairs], [pair.mesh for pair in request.pairs])
     return found if request.accept is None else kept.save(name, request.accept, found)

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
 from io import BytesIO
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Response, WebSocket, WebSocketDisconnect
+import numpy as np
+from fastapi import APIRouter, Query, Response, WebSocket
 from pydantic import ValidationError
 
 from app.colours import palette
 from app.desk import DeskOf
-from app.lookout import Standpoint
+from app.lookout import Lookout, Standpoint
 from app.problems import as_dict
 from app.relay import PageId
-from app.view import View
+from app.talk import newest_wins
+from app.view import Camera, View
 from core.errors import PalpateError
 
 __all__ = ["router"]
@@ -42,6 +42,13 @@ def look(page: PageId, desk: DeskOf, where: Standpoint = "reset") -> None:
     desk.sessions.get(page).look(where)
 
 
+@router.put("/sessions/{page}/camera", status_code=204)
+def stand(page: PageId, camera: Camera, desk: DeskOf) -> None:
+    """Look at a run from a place of one's own, also in scenes of the page that open later."""
+    place, target = np.array(camera.position), np.array(camera.target)
+    desk.sessions.open(page).stand(camera.run, Lookout(place, target, np.array([0.0, 0.0, 1.0])))
+
+
 @router.get("/sessions/{page}/still.png", response_class=Response, responses={200: {"content": {"image/png": {}}}})
 def still(page: PageId, desk: DeskOf, width: Pixels = 1280, height: Pixels = 720) -> Response:
     """What the page's scene shows now, as its browser renders it; the background is transparent. 404 where no browser shows it."""
@@ -61,27 +68,7 @@ def state(page: PageId, desk: DeskOf) -> dict[str, Any]:
 @router.websocket("/sessions/{page}/socket")
 async def socket(websocket: WebSocket, page: PageId, desk: DeskOf) -> None:
     """Views in, states out; views that come while one is being drawn replace each other, so the newest wins."""
-    await websocket.accept()
-    newest: list[str] = []
-    arrived = asyncio.Event()
-
-    async def listen() -> None:
-        async for text in websocket.iter_text():
-            newest[:] = [text]
-            arrived.set()
-
-    async def draw() -> None:
-        while True:
-            await arrived.wait()
-            arrived.clear()
-            await websocket.send_json(await asyncio.to_thread(_answer, desk, page, newest.pop()))
-
-    tasks = [asyncio.create_task(listen()), asyncio.create_task(draw())]
-    await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-    for task in tasks:
-        task.cancel()
-    with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
-        await asyncio.gather(*tasks)
+    await newest_wins(websocket, lambda text: _answer(desk, page, text))
 
 
 def _answer(desk: DeskOf, page: str, text: str) -> dict[str, Any]:

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Any
+import asyncio
+import contextlib
+from typing import TYPE_CHECKING, Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, WebSocket
+from pydantic import ValidationError
 
-from app.desk import DeskOf
-from app.problems import Missing
+from app.desk import Desk, DeskOf
+from app.problems import Missing, as_dict
 from app.relay import PageId
-from app.schemas import WhatIfRequest
-from app.sessions import Trial
+from app.schemas import LiveRequest, WhatIfRequest
+from app.sessions import Touch, Trial
 from app.summaries import finite
+from app.talk import newest_wins
+from app.whatif import Hand
+from core.errors import PalpateError
+
+if TYPE_CHECKING:
+    from core.live import Felt
 
 __all__ = ["router"]
 
@@ -46,6 +55,79 @@ def solve(name: str, sequence: str, request: WhatIfRequest, desk: DeskOf) -> dic
         "noise_floor": finite(replay["noise_floor"]),
         "converged": moment.converged,
         "outcome": moment.outcome,
+    }
+
+
+@router.post("/runs/{name}/sequences/{sequence}/live")
+def lead(name: str, sequence: str, request: LiveRequest, desk: DeskOf) -> dict[str, Any]:
+    """Lead the tool somewhere: push depth [m] and force [N] that it feels there, from wherever it was; drawn in `page` if given."""
+    session = desk.sessions.get(request.page) if request.page else None
+    effects = [one.model_dump() for one in request.effects]
+    hand = Hand.of(request.page or "nobody", desk.runs.get(name), sequence, effects, request.tuned)
+    felt = desk.lives.at(hand, request.at, session is not None and session.wants_inside())
+    if session is not None:
+        session.touch(Touch(name, sequence, request.shown, felt))
+    return told(felt)
+
+
+@router.delete("/sessions/{page}/live", status_code=204)
+def let_go(page: PageId, desk: DeskOf) -> None:
+    """Show the recording again."""
+    desk.sessions.get(page).touch(None)
+
+
+@router.websocket("/sessions/{page}/live")
+async def led(websocket: WebSocket, page: PageId, desk: DeskOf) -> None:
+    """Places in, answers out, drawn in the page: each message is a `LiveRequest` with `run` and `sequence`.
+
+    While one is being solved only the newest is kept. The recording is shown again when the connection ends.
+    """
+    hands: dict[str, Hand] = {}
+
+    def answer(text: str) -> dict[str, Any]:
+        try:
+            return _led(desk, page, hands, LedRequest.model_validate_json(text))
+        except ValidationError as error:
+            return {"problem": {"kind": "RequestError", "message": error.errors()[0]["msg"], "where": {}}}
+        except PalpateError as error:
+            return {"problem": as_dict(error)}
+
+    try:
+        await newest_wins(websocket, answer)
+    finally:
+        with contextlib.suppress(Missing):
+            await asyncio.to_thread(desk.sessions.get(page).touch, None)
+
+
+class LedRequest(LiveRequest):
+    """A `LiveRequest` that says of what."""
+
+    run: str
+    sequence: str
+
+
+def _led(desk: Desk, page: str, hands: dict[str, Hand], request: LedRequest) -> dict[str, Any]:
+    """Solve, draw and tell; `hands` keeps what was looked up for the connection's last request of the same kind."""
+    key = request.model_dump_json(exclude={"at"})
+    if key not in hands:
+        hands.clear()
+        effects = [one.model_dump() for one in request.effects]
+        hands[key] = Hand.of(page, desk.runs.get(request.run), request.sequence, effects, request.tuned)
+    session = desk.sessions.open(page)
+    felt = desk.lives.at(hands[key], request.at, session.wants_inside())
+    session.touch(Touch(request.run, request.sequence, request.shown, felt))
+    return {**told(felt), "at": list(request.at), "drawn": None if session.picture is None else session.picture.scale()}
+
+
+def told(felt: Felt) -> dict[str, Any]:
+    """What was felt, plain values, SI."""
+    return {
+        "depth": finite(felt.depth),
+        "force": finite(felt.force, digits=6),
+        "tool": finite(felt.tool),
+        "converged": felt.converged,
+        "outcome": felt.outcome,
+        "seconds": round(felt.seconds, 5),
     }
 
 

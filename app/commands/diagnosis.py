@@ -33,7 +33,7 @@ from core.errors import DatasetError, RunError
 if TYPE_CHECKING:
     from core.dataset.accepted import Accepted
 
-__all__ = ["diagnose", "print_report", "run_diagnosis", "truth_beside"]
+__all__ = ["diagnose", "print_report", "run_diagnosis", "true_effects", "truth_beside"]
 
 ALIKE = 0.3
 """Share of a pattern from which on a rival that imitates so much of it is mentioned [1]; the page has the same."""
@@ -95,6 +95,17 @@ def truth_beside(dataset: Path) -> dict[str, Any] | None:
         return truth if "verdict" in truth and "effects" in truth else None
     except (OSError, ValueError, TypeError):
         return None
+
+
+def true_effects(dataset: Path) -> list[dict[str, Any]]:
+    """What is hidden in a virtual dataset, as `Effect.to_json` has it; RunError where nothing is known of it."""
+    truth, file = truth_beside(dataset), f"{dataset.resolve().name}.truth.json"
+    if truth is None:
+        raise RunError(f"{dataset} has no {file} beside it; leave --truth out", file=file)
+    return [
+        {"effect": one["effect"], "parameters": {key: entry["value"] for key, entry in one["parameters"].items()}}
+        for one in truth["effects"]
+    ]
 
 
 def print_report(report: dict[str, Any]) -> None:

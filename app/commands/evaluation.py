@@ -10,21 +10,22 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from app.commands.diagnosis import truth_beside
+from app.commands.diagnosis import true_effects
 from app.console import out, progress, write_json
 from app.sentences import quantity
-from core.errors import RunError
 
 __all__ = ["evaluate"]
 
 SHOWN = {"all": "all pushes", "seen": "kinds trained on", "unseen": "kinds never trained on"}
-NETWORKS = {"simulation": "simulation", "unet2d": "2D network", "unet3d": "3D network"}
 
 
 def evaluate(
     dataset: Annotated[Path, typer.Argument(help="A dataset folder; --paper makes it if it is not there.", show_default=False)],
     run: Annotated[str | None, typer.Option(help="A diagnosis below RUNS whose extended model stands on the ladder.")] = None,
     training: Annotated[list[str] | None, typer.Option(help="Trainings below RUNS/trainings; the newest ones without.")] = None,
+    feedback: Annotated[
+        str, typer.Option(help="none, or follow: the simulation answers for what a network does not see.")
+    ] = "none",
     truth: Annotated[
         bool, typer.Option("--truth", help="Also the true effects of a virtual dataset, from DATASET.truth.json.")
     ] = False,
@@ -44,26 +45,26 @@ def evaluate(
 
     With --paper: the paper's searches for the modulus, and its corrections at 5e3, 1e4 and 1e1 Pa, in 2D and 3D.
     """
+    if feedback not in ("none", "follow"):
+        raise typer.BadParameter(f"--feedback is none or follow, not {feedback!r}")
     if paper:
         _make(dataset, size, seed, workers)
         found = _paper(dataset, [int(one) for one in features.split(",")], epochs, every, seed, workers, runs)
     else:
-        found = _ladder(dataset, run, training or [], truth, seed, workers, runs)
+        found = _ladder(
+            dataset, {"run": run, "trainings": training or [], "feedback": feedback, "seed": seed}, truth, workers, runs
+        )
     if file is not None:
         write_json(file, found)
 
 
-def _ladder(
-    dataset: Path, run: str | None, trainings: list[str], truth: bool, seed: int, workers: int, runs: Path
-) -> dict[str, Any]:
+def _ladder(dataset: Path, asked: dict[str, Any], truth: bool, workers: int, runs: Path) -> dict[str, Any]:
     from app.evaluations import Evaluations  # noqa: PLC0415 (heavy)
     from app.evaluations import evaluate as climb  # noqa: PLC0415 (heavy)
 
     name = f"{dataset.resolve().name}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(2)}"
-    request = {
-        "dataset": str(dataset), "runs": str(runs), "workers": workers, "run": run, "trainings": trainings, "seed": seed,
-        "truth": _hidden(dataset) if truth else None, "folder": name,
-    }  # fmt: skip
+    hidden = true_effects(dataset) if truth else None
+    request = {**asked, "dataset": str(dataset), "runs": str(runs), "workers": workers, "truth": hidden, "folder": name}
     with progress(f"evaluate {dataset.name}") as report:
         climb(request, report)
     kept = Evaluations(runs)
@@ -74,18 +75,6 @@ def _ladder(
             out.print(_rungs(found["rungs"], one))
     out.print(f"{kept.folder / name}", highlight=False, soft_wrap=True)
     return found
-
-
-def _hidden(dataset: Path) -> list[dict[str, Any]]:
-    """The effects of a truth file as plain values."""
-    truth = truth_beside(dataset)
-    if truth is None:
-        file = f"{dataset.name}.truth.json"
-        raise RunError(f"{dataset.name} has no {file} beside it; leave --truth out", file=file)
-    return [
-        {"effect": one["effect"], "parameters": {key: entry["value"] for key, entry in one["parameters"].items()}}
-        for one in truth["effects"]
-    ]
 
 
 def _rungs(rungs: list[dict[str, Any]], one: dict[str, Any]) -> Table:
@@ -152,15 +141,15 @@ def _moduli(title: str, rows: list[dict[str, Any]]) -> Table:
 
 
 def _corrections(rows: list[dict[str, Any]]) -> Table:
-    table = Table(title="Table 3: correction on test sequences, mean distance", title_justify="left", header_style="bold")
+    table = Table(title="Table 3: correction on test sequences, mean distance in mm", title_justify="left", header_style="bold")
     table.add_column("Young's modulus", justify="right")
     table.add_column("motion")
-    for name in (*NETWORKS.values(), "3D beyond 2D"):
+    for name in ("simulation", "2D network", "nearer by", "3D network", "nearer by", "3D over 2D"):
         table.add_column(name, justify="right")
     for row in rows:
         for one in row["parts"]:
-            cells = [f"{one['simulation']['error']:.3f} mm"]
-            for key in list(NETWORKS)[1:]:
-                cells.append(f"{one[key]['error']:.3f} mm, {_share(one[key]['improvement'])} nearer")
+            cells = [f"{one['simulation']['error']:.3f}"]
+            for kind in ("unet2d", "unet3d"):
+                cells += [f"{one[kind]['error']:.3f}", _share(one[kind]["improvement"])]
             table.add_row(quantity(row["young_modulus"], "Pa", 3), one["name"], *cells, _share(one["unet3d_beyond_unet2d"]))
     return table

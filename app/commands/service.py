@@ -23,6 +23,10 @@ def serve(
     allow_host: Annotated[
         list[str] | None, typer.Option(help="Another name by which browsers call this server; asks for a token.")
     ] = None,
+    import_from: Annotated[
+        list[Path] | None, typer.Option(help="Folder below which datasets may be imported by path; any, where there is no login.")
+    ] = None,
+    disk_limit: Annotated[float, typer.Option(min=0.1, help="GiB of RUNS beyond which the oldest caches are dropped.")] = 20.0,
     new_token: Annotated[
         bool, typer.Option("--new-token", help="Make a new token; the one before opens nothing any more.")
     ] = False,
@@ -30,7 +34,10 @@ def serve(
     """Serve the page and the REST service on one port."""
     from app.serve import serve as run  # noqa: PLC0415 (heavy)
 
-    settings = Settings(host=host, port=port, runs=runs, datasets=datasets, workers=workers, allow_host=tuple(allow_host or ()))
+    settings = Settings(
+        host=host, port=port, runs=runs, datasets=datasets, workers=workers, allow_host=tuple(allow_host or ()),
+        import_from=tuple(import_from or ()), disk_limit=int(disk_limit * 2**30),
+    )  # fmt: skip
     if new_token or (settings.needs_login and not (runs / FILE).exists()):
         out.print(f"The token, shown only now: [bold]{Token.make(runs)}[/]", highlight=False, soft_wrap=True)
     run(settings, announce)

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from app.commands.diagnosis import true_effects
 from app.console import out, progress
 
 __all__ = ["train"]
@@ -19,6 +20,7 @@ def train(
     run: Annotated[
         str | None, typer.Option(help="Train on the extended model of this run below RUNS, not on the stated one.")
     ] = None,
+    truth: Annotated[bool, typer.Option("--truth", help="Train on a virtual dataset's true effects instead.")] = False,
     kind: Annotated[str, typer.Option(help="unet2d (top layer), unet3d (volume) or graph (any mesh).")] = "unet2d",
     features: Annotated[str, typer.Option(help="Of the blocks, from fine to coarse.")] = "64,128,256",
     trust: Annotated[float, typer.Option(help="How far the simulation may be corrected along each axis, in voxels.")] = 0.5,
@@ -47,9 +49,11 @@ def train(
         "patience": patience, "device": device, "seed": seed,
     }  # fmt: skip
     asked = {"spec": spec, "every": every}
-    digest = hashlib.sha256(json.dumps([str(dataset.resolve()), run, asked], sort_keys=True).encode()).hexdigest()[:8]
+    hidden = true_effects(dataset) if truth else None
+    said = json.dumps([str(dataset.resolve()), run, hidden, asked], sort_keys=True)
+    digest = hashlib.sha256(said.encode()).hexdigest()[:8]
     request = {
-        "dataset": str(dataset), "runs": str(runs), "workers": workers, "run": run, "training": asked,
+        "dataset": str(dataset), "runs": str(runs), "workers": workers, "run": run, "truth": hidden, "training": asked,
         "folder": f"{dataset.resolve().name}-{kind}-{digest}",
     }  # fmt: skip
     with progress(f"train {dataset.name}") as report:

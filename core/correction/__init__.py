@@ -7,7 +7,9 @@ trained = train(samples, Split.of(samples), TrainingSpec(network=NetworkSpec(kin
 
 from core.correction.body import Body
 from core.correction.chamfer import SurfaceLoss
+from core.correction.inference import CorrectedFrame, Corrector, replay_corrected
 from core.correction.networks import CorrectionNetwork, NetworkSpec, build
+from core.correction.online import Learner, OnlineSpec, learn_along
 from core.correction.request import TrainingSpec
 from core.correction.samples import Batch, Samples, open_samples
 from core.correction.sampling import Recorder, make_samples, recorder_for
@@ -18,8 +20,12 @@ from core.correction.training import body_for, errors_of, train
 __all__ = [
     "Batch",
     "Body",
+    "CorrectedFrame",
     "CorrectionNetwork",
+    "Corrector",
+    "Learner",
     "NetworkSpec",
+    "OnlineSpec",
     "Recorder",
     "Samples",
     "Split",
@@ -29,8 +35,10 @@ __all__ = [
     "body_for",
     "build",
     "errors_of",
+    "learn_along",
     "make_samples",
     "open_samples",
     "recorder_for",
+    "replay_corrected",
     "train",
 ]

@@ -34,7 +34,7 @@ from core.meshing import IntArray, Meshing
 from core.replay import Replay
 from core.setup import Setup
 
-__all__ = ["FEEDBACKS", "Corrector", "Feedback", "replay_corrected"]
+__all__ = ["FEEDBACKS", "CorrectedFrame", "Corrector", "Feedback", "replay_corrected"]
 
 Feedback = Literal["none", "follow", "start"]
 FEEDBACKS: tuple[str, ...] = get_args(Feedback)

@@ -66,8 +66,9 @@ class NetworkSpec:
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> Self:
-        """The inverse."""
-        return cls(**{**data, "features": tuple(data["features"]), "inputs": tuple(data["inputs"])})
+        """The inverse; what is left out has its default."""
+        plain: dict[str, Any] = {**data, **{key: tuple(data[key]) for key in ("features", "inputs") if key in data}}
+        return cls(**plain)
 
 
 class GraphNet(nn.Module):

@@ -63,7 +63,7 @@ class Learner:
         self.network = deepcopy(trained.network).to(self._device)
         seen = np.asarray(trained.about["seen"], dtype=float)[self.body.index]
         self._loss = SurfaceLoss(self.body, seen, distance=spec.distance, hold=spec.hold, device=self._device)
-        self._optimizer = torch.optim.Adam(self.network.parameters(), lr=spec.rate)
+        self._optimizer = torch.optim.Adam(self.network.parameters(), lr=spec.rate, fused=True)
         self._random = np.random.default_rng(spec.seed)
         self._kept: list[Batch] = []
         self._next = 0

@@ -93,7 +93,7 @@ class Samples:
         path = self.folder / sequence / f"{name}.npy"
         try:
             return np.load(path, mmap_mode="r")
-        except (OSError, ValueError) as error:
+        except (OSError, EOFError, ValueError) as error:
             raise RunError(f"{path} cannot be read ({error}); make the samples again", file=str(path)) from None
 
     @cached_property

@@ -57,5 +57,8 @@ class Trained:
         }
         body = Body.from_arrays(arrays)
         network = build(NetworkSpec.from_json(content["spec"]), body).to(device)
-        network.load_state_dict(content["weights"])
+        try:
+            network.load_state_dict(content["weights"])
+        except RuntimeError as error:
+            raise RunError(f"{path} was trained by another version ({error}); train again", path=str(path)) from None
         return cls(network.eval(), body, content["about"])

@@ -117,7 +117,7 @@ class _Run:
         self.body = body_for(samples, spec.network.kind)
         self.network = build(spec.network, self.body, spec.seed).to(device)
         self.loss = SurfaceLoss(self.body, samples.seen[self.body.index], distance=spec.distance, hold=spec.hold, device=device)
-        self.optimizer = torch.optim.Adam(self.network.parameters(), lr=spec.rate)
+        self.optimizer = torch.optim.Adam(self.network.parameters(), lr=spec.rate, fused=True)
         self.place, self.best = _Place(rate=spec.rate), dict[str, Tensor]()
         self._writer: SummaryWriter | None = None
         folder.mkdir(parents=True, exist_ok=True)

@@ -20,7 +20,17 @@ from core.frames import FloatArray
 from core.progress import Report, silent
 from core.setup import Box, Shape
 
-__all__ = ["Dataset", "Touches", "open_dataset"]
+__all__ = [
+    "Dataset",
+    "Touches",
+    "check_folder",
+    "check_span",
+    "check_splits",
+    "open_dataset",
+    "read_touches",
+    "sequence_names",
+    "stated",
+]
 
 FEWEST_TOUCHES = 4
 _BAGS = (".bag", ".db3", ".mcap")
@@ -97,20 +107,25 @@ class Dataset:
         report(1.0, f"read {total} clouds")
 
     def _check_span(self, file: str, points: FloatArray) -> None:
-        span, edge = float(np.ptp(points, axis=0).max()), max(self.config.size)
-        if len(points) > 1 and span < 0.01 * edge:
-            text = f"the cloud spans {span:.3g} m; expected about the phantom, {edge:g} m, or more: is its unit the metre?"
-            raise problem(file, text, value=f"{span:.3g}")
+        check_span(file, points, self.config.size)
+
+
+def check_span(file: str, points: FloatArray, size: tuple[float, float, float]) -> None:
+    """Refuse a cloud (n, 3) [m] that is far smaller than the phantom of `size` [m]."""
+    span, edge = float(np.ptp(points, axis=0).max()), max(size)
+    if len(points) > 1 and span < 0.01 * edge:
+        text = f"the cloud spans {span:.3g} m; expected about the phantom, {edge:g} m, or more: is its unit the metre?"
+        raise problem(file, text, value=f"{span:.3g}")
 
 
 def open_dataset(path: Path | str) -> Dataset:
     """Open a dataset folder and check all but the points of its clouds; those are checked when read, or by `validate`."""
     root = Path(path)
-    _check_folder(root)
-    config, geometry = _stated(root)
-    touches = _read_touches(root, config)
-    sequences = tuple(read_sequence(root, name) for name in _sequence_names(root))
-    _check_splits(config, [sequence.name for sequence in sequences])
+    check_folder(root)
+    config, geometry = stated(root)
+    touches = read_touches(root, config)
+    sequences = tuple(read_sequence(root, name) for name in sequence_names(root))
+    check_splits(config, [sequence.name for sequence in sequences])
     observed = any(len(sequence) for sequence in sequences)
     if observed and not config.has_camera:
         raise problem(FILE, "camera is missing, yet there are clouds; expected this table: add it", key="camera")
@@ -120,7 +135,7 @@ def open_dataset(path: Path | str) -> Dataset:
     return Dataset(root, config, touches, has_rest, sequences, geometry)
 
 
-def _stated(root: Path) -> tuple[DatasetConfig, Box | Shape]:
+def stated(root: Path) -> tuple[DatasetConfig, Box | Shape]:
     """What dataset.toml states, and the phantom's geometry."""
     config = read_config(root)
     if not config.surface:
@@ -129,7 +144,8 @@ def _stated(root: Path) -> tuple[DatasetConfig, Box | Shape]:
     return replace(config, size=shape.size), shape
 
 
-def _check_folder(root: Path) -> None:
+def check_folder(root: Path) -> None:
+    """Refuse what is no folder that can be looked into."""
     try:
         if root.is_dir():
             list(root.iterdir())
@@ -140,7 +156,8 @@ def _check_folder(root: Path) -> None:
     raise DatasetError(f"{root} {found}; expected the folder of a dataset, with dataset.toml in it", file=str(root))
 
 
-def _read_touches(root: Path, config: DatasetConfig) -> Touches:
+def read_touches(root: Path, config: DatasetConfig) -> Touches:
+    """The touches of the landmarks, checked."""
     file = "touches.csv"
     names, positions = read_labelled(root, file, "landmark,x,y,z", label=0)
     for row, name in enumerate(names, FIRST_ROW):
@@ -171,7 +188,8 @@ def _check_touch_scale(file: str, positions: FloatArray, landmarks: FloatArray) 
         raise problem(file, text + ": convert one of them", row=FIRST_ROW, value=f"{touched:.3g}")
 
 
-def _sequence_names(root: Path) -> list[str]:
+def sequence_names(root: Path) -> list[str]:
+    """The names of the sequences' folders, sorted."""
     try:
         entries = sorted((entry.name, entry.is_dir()) for entry in (root / "sequences").iterdir() if not entry.name.startswith("."))
     except OSError as error:
@@ -188,7 +206,8 @@ def _sequence_names(root: Path) -> list[str]:
     return names
 
 
-def _check_splits(config: DatasetConfig, names: list[str]) -> None:
+def check_splits(config: DatasetConfig, names: list[str]) -> None:
+    """Refuse splits that name what is no sequence."""
     for split in ("train", "validation", "test"):
         for name in getattr(config, split):
             if name not in names:

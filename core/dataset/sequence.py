@@ -13,7 +13,21 @@ from core.dataset.table import FIRST_ROW, check_coordinates, check_increasing, r
 from core.errors import DatasetError
 from core.frames import FloatArray
 
-__all__ = ["Forces", "Kinematics", "Sequence", "read_sequence"]
+__all__ = [
+    "CLOUDS",
+    "FORCES",
+    "KINEMATICS",
+    "Forces",
+    "Kinematics",
+    "Sequence",
+    "read_cloud_list",
+    "read_forces",
+    "read_kinematics",
+    "read_sequence",
+]
+
+KINEMATICS, CLOUDS, FORCES = "t,x,y,z,qx,qy,qz,qw", "t,file", "t,fx,fy,fz"
+"""The headers of a sequence's tables."""
 
 LARGEST_FORCE = 1000.0  # N; beyond any bench for soft tissue, so another unit
 SLOWEST_STEP = 0.5  # s between rows of the kinematics; slower is another unit
@@ -71,19 +85,20 @@ class Sequence:
 def read_sequence(root: Path, name: str) -> Sequence:
     """The sequence `name`, all but the points of its clouds read and checked."""
     home = f"sequences/{name}"
-    kinematics = _read_kinematics(root, f"{home}/kinematics.csv")
+    kinematics = read_kinematics(root, f"{home}/kinematics.csv")
     times, files = np.empty(0), tuple[str, ...]()
     clouds, forces = f"{home}/clouds.csv", f"{home}/forces.csv"
     has_forces = (root / forces).exists()
     if (root / clouds).exists() or (root / home / "clouds").exists():
-        times, files = _read_cloud_list(root, home, clouds, kinematics.time)
+        times, files = read_cloud_list(root, home, clouds, kinematics.time)
     elif not has_forces:
         raise problem(home, "has neither clouds.csv nor forces.csv; expected at least one: add what was measured")
-    return Sequence(root, name, kinematics, times, files, _read_forces(root, forces) if has_forces else None)
+    return Sequence(root, name, kinematics, times, files, read_forces(root, forces) if has_forces else None)
 
 
-def _read_kinematics(root: Path, file: str) -> Kinematics:
-    table = read_numbers(root, file, "t,x,y,z,qx,qy,qz,qw")
+def read_kinematics(root: Path, file: str) -> Kinematics:
+    """The tool's path from a table below the dataset `root`."""
+    table = read_numbers(root, file, KINEMATICS)
     if len(table) < 2:
         raise problem(file, "has one row; expected a motion of at least two: export this sequence again", row=FIRST_ROW + 1)
     time, position, quaternion = table[:, 0].copy(), table[:, 1:4], table[:, 4:]
@@ -103,8 +118,9 @@ def _read_kinematics(root: Path, file: str) -> Kinematics:
     return Kinematics(time, position, quaternion)
 
 
-def _read_cloud_list(root: Path, home: str, file: str, clock: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
-    names, numbers = read_labelled(root, file, "t,file", label=1)
+def read_cloud_list(root: Path, home: str, file: str, clock: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
+    """Stamps (m,) [s] and files of the clouds of the sequence at `home`; `clock` (n,) [s] is that of its kinematics."""
+    names, numbers = read_labelled(root, file, CLOUDS, label=1)
     times = numbers[:, 0]
     check_increasing(file, times)
     seen: dict[str, int] = {}
@@ -138,8 +154,9 @@ def _check_cloud(root: Path, home: str, file: str, row: int, name: str) -> None:
         raise DatasetError(f"{error.message} (asked for by {file}, row {row})", **where) from None
 
 
-def _read_forces(root: Path, file: str) -> Forces:
-    table = read_numbers(root, file, "t,fx,fy,fz")
+def read_forces(root: Path, file: str) -> Forces:
+    """The forces from a table below the dataset `root`."""
+    table = read_numbers(root, file, FORCES)
     time, force = table[:, 0], table[:, 1:]
     check_increasing(file, time)
     if len(bad := np.argwhere(np.abs(force) > LARGEST_FORCE)):

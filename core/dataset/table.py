@@ -13,9 +13,18 @@ from pathlib import Path
 import numpy as np
 
 from core.dataset.files import problem, read_text
+from core.errors import DatasetError
 from core.frames import FloatArray
 
-__all__ = ["FIRST_ROW", "LARGEST_COORDINATE", "check_coordinates", "check_increasing", "read_labelled", "read_numbers"]
+__all__ = [
+    "FIRST_ROW",
+    "LARGEST_COORDINATE",
+    "check_coordinates",
+    "check_increasing",
+    "read_labelled",
+    "read_numbers",
+    "row_problems",
+]
 
 FIRST_ROW = 2
 LARGEST_COORDINATE = 10.0  # m; a bench is a metre across, so more is another unit
@@ -51,6 +60,26 @@ def read_labelled(root: Path, file: str, header: str, label: int) -> tuple[list[
     array = np.array(numbers)
     array.setflags(write=False)
     return words, array
+
+
+def row_problems(root: Path, file: str, header: str, label: int | None = None, most: int = 20) -> list[DatasetError]:
+    """What is wrong with the rows of a table by themselves, one problem a row, at most so many; `label` is a column of words."""
+    found: list[DatasetError] = []
+    names = header.split(",")
+    try:
+        lines = _body(root, file, header)
+    except DatasetError as error:
+        return [error]
+    for row, line in enumerate(lines, FIRST_ROW):
+        try:
+            for place, cell in enumerate(_cells(file, line, header, row)):
+                if place != label:
+                    _number(file, cell, row, names[place])
+        except DatasetError as error:
+            found.append(error)
+        if len(found) == most:
+            break
+    return found
 
 
 def check_increasing(file: str, time: FloatArray) -> None:

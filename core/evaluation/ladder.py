@@ -67,7 +67,7 @@ def ladder(
         ends: the two physical models along whose difference the camera's fixed pattern is an error (`core.diagnosis.probe_sums`):
             what a network learns of the camera's own pattern counts for nothing there.
 
-    Of each model: its error and the share of the reducible error that it removes; the same of the part that is `moving`, which
+    Of each model: its error, and the share of the reducible error that it removes; the same of the part that is `moving`, which
     leaves out what is as wrong in the untouched block; and the paper's metric. Intervals (95 %) are of resampled pushes.
 
     Raises DiagnosisError where no push was seen.
@@ -115,14 +115,18 @@ def _judged(names: Sequence[str], sums: ProbeSums, paper: _Paper, seed: int) -> 
     for number, name in enumerate(names):
         nearer, drawn_nearer = 1 - mean[number] / mean[0], 1 - drawn_mean[:, number] / drawn_mean[:, 0]
         errors[name] = {
-            "error": _mm(whole[number]), "removed": _interval(float(share[number]), drawn_share[:, number]),
+            "error": _mm(whole[number]), **dict(zip(("low", "high"), map(_mm, _ends(drawn[:, number])), strict=True)),
+            "removed": _interval(float(share[number]), drawn_share[:, number]),
             "moving": {
                 "error": _mm(moving[number]), "removed": _interval(float(share_moving[number]), drawn_moving_share[:, number]),
             },
             "paper": {"error": _mm(mean[number]), "improvement": _interval(float(nearer), drawn_nearer)},
         }  # fmt: skip
     beyond = {
-        name: _interval(float(share[number] - share[1]), drawn_share[:, number] - drawn_share[:, 1])
+        name: {
+            "removed": _interval(float(share[number] - share[1]), drawn_share[:, number] - drawn_share[:, 1]),
+            "paper": _interval((mean[1] - mean[number]) / mean[0], (drawn_mean[:, 1] - drawn_mean[:, number]) / drawn_mean[:, 0]),
+        }
         for number, name in enumerate(names[2:], 2)
     }
     return {"noise_floor": _mm(whole[-1]), "errors": errors, "beyond_second": beyond}
@@ -144,6 +148,11 @@ def _mm(value: float) -> float:
     return round(float(value) * 1e3, _DIGITS)
 
 
-def _interval(value: float, drawn: FloatArray) -> dict[str, float]:
-    low, high = (float(edge) for edge in np.quantile(drawn, [0.025, 0.975]))
-    return {"value": round(value, _DIGITS), "low": round(low, _DIGITS), "high": round(high, _DIGITS)}
+def _ends(drawn: FloatArray) -> tuple[float, float]:
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    return float(low), float(high)
+
+
+def _interval(value: float | FloatArray, drawn: FloatArray) -> dict[str, float]:
+    low, high = _ends(drawn)
+    return {"value": round(float(value), _DIGITS), "low": round(low, _DIGITS), "high": round(high, _DIGITS)}

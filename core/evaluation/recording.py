@@ -16,7 +16,6 @@ from core.dataset import Dataset
 from core.diagnosis.kept import kept_setup
 from core.diagnosis.recording import observed
 from core.diagnosis.smoothing import smooth_centres
-from core.evaluation.corrected import corrected_frame
 from core.evaluation.networks import Network
 from core.frames import FloatArray
 from core.grading import PAGE_GRID
@@ -51,7 +50,7 @@ def record_corrections(
     stated = setup_from(dataset, registration)
     setup, grid = kept_setup(stated, model), PAGE_GRID.for_tool(stated.tool.radius)
     cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration.mended)
-    robot, sampled = touch_correction(setup, grid) @ setup.phantom_from_robot, network.sampled(setup)
+    robot, correct = touch_correction(setup, grid) @ setup.phantom_from_robot, network.corrector(setup)
     out.parent.mkdir(parents=True, exist_ok=True)
     aside = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
     try:
@@ -62,17 +61,15 @@ def record_corrections(
             times = stamps - setup.sensor.time_offset
             solved = replay(setup, robot.apply(smooth_centres(sequence.kinematics, times)), grid, times=times, tolerance=_TOLERANCE)
             tool = network.columns(sequence, stamps, setup, grid)
-            if not network.measured:
-                tool[:, 10:] = [frame.force for frame in solved]
-            change = network.change(np.stack([frame.move(sampled.nodes) for frame in solved]), tool)
             poses = tool_poses(sequence.kinematics, stamps, stated.phantom_from_robot, shaft)
             raw = [sequence.cloud(int(one)) for one in index]
             clouds = [cloud[cleaner.clean(cloud, pose).indices] for cloud, pose in zip(raw, poses, strict=True)]
-            side = observed(setup, [corrected_frame(one, sampled, own) for one, own in zip(solved, change, strict=True)], clouds)
+            side = observed(setup, [correct(frame, one) for frame, one in zip(solved, tool, strict=True)], clouds)
             np.savez_compressed(
                 aside / f"{name}.npz", cloud_index=index, corrected=side.surface.astype(np.float32), tool_corrected=side.tool,
                 tool_radius_corrected=np.array(setup.tool.radius), error_corrected=side.error.astype(np.float32),
                 distance_corrected=side.distance, paper_corrected=side.paper, camera_corrected=sight_of(setup).pose.matrix,
+                **side.inside.arrays("corrected"),
             )  # fmt: skip
         aside.chmod(0o755)
         _replace(aside, out)

@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -36,6 +36,7 @@ __all__ = ["FILE", "MODELS", "Asked", "Bench", "Step", "evaluate"]
 
 FILE = "evaluation.json"
 MODELS = {"baseline": "stated model", "extended": "extended model", "true": "true effects, known to nobody"}
+KINDS = {"unet2d": "2D network", "unet3d": "3D network", "graph": "graph network"}
 TEST_GROUPS, TEST_FELT = 24, 32
 """Groups of a sequence at most."""
 
@@ -46,12 +47,14 @@ class Asked:
 
     Attributes:
         model: model.json of a diagnosis, the extended model. truth: effects as `Effect.to_json` has them. networks: folders of
-            trainings by the model they were trained on, "baseline", "extended" or "true".
+            trainings by the model they were trained on, "baseline", "extended" or "true", and further ones on the same model as
+            "baseline:name". feedback: see `Network`.
     """
 
     model: Mapping[str, Any] | None = None
     truth: Sequence[Mapping[str, Any]] | None = None
     networks: Mapping[str, Path] = field(default_factory=dict)
+    feedback: Literal["none", "follow"] = "none"
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,12 +104,11 @@ class Bench:
         return ladder(self.data, rungs, self.kinds, self.trained, ends=ends, seed=seed)
 
     def _corrected(self, rung: Rung, name: str, network: Network) -> Rung:
-        predictions = []
+        correct, predictions = network.corrector(rung.setup), []
         for item, model in zip(self.data, rung.predictions, strict=True):
             columns = network.columns(self.dataset.sequence(item.name), np.asarray(item.times), rung.setup, self.grid)
-            tool = tools_of(model, item, columns, network.measured)
-            predictions.append(corrected_prediction(model, item, rung.setup, network.sampled(rung.setup), network.change, tool))
-        label = f"{rung.label} + network"
+            predictions.append(corrected_prediction(model, item, rung.setup, correct, tools_of(item, columns)))
+        label = f"{rung.label} + {KINDS[network.about['kind']]}"
         return Rung(name=name, label=label, setup=rung.setup, predictions=predictions, network=network.about)
 
 
@@ -130,17 +132,24 @@ def evaluate(
     out = Path(out)
     if out.exists():
         raise RunError(f"{out} exists already; name another folder or move it away", file=str(out))
-    networks = {name: Network.load(folder) for name, folder in asked.networks.items()}
+    networks = {name: Network.load(folder, asked.feedback) for name, folder in asked.networks.items()}
     bench = Bench.of(dataset, part(report, 0.0, 0.2))
-    steps = [
-        Step(name, MODELS[name], setup, {f"{name}_network": networks[name]} if name in networks else {})
-        for name, setup in _setups(bench.stated, asked).items()
-    ]
+    steps = [Step(name, MODELS[name], setup, _own(name, networks)) for name, setup in _setups(bench.stated, asked).items()]
     climbed = bench.climb(steps, workers=workers, seed=seed, report=part(report, 0.2, 0.95))
-    found = {"format": 1, "dataset": dataset.name, "split": "test", **climbed}
+    found = {"format": 1, "dataset": dataset.name, "folder": dataset.path.resolve().name, "split": "test", **climbed}
     found["sentence"] = meaning(found)
     _write(out, found)
     report(1.0, "done")
+    return found
+
+
+def _own(model: str, networks: Mapping[str, Network]) -> dict[str, Network]:
+    """Those of one model by the names of their rungs; the first is called "network", others by what they are."""
+    found: dict[str, Network] = {}
+    for key, network in networks.items():
+        if key.partition(":")[0] == model:
+            rung = f"{model}_network" if not found else f"{model}_{network.about['kind']}"
+            found[rung if rung not in found else f"{model}_{key.partition(':')[2]}"] = network
     return found
 
 

@@ -12,16 +12,18 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+import shutil
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from core.dataset import Dataset
-from core.diagnosis.kept import kept_setup
+from core.diagnosis.hypothesis import with_effects
+from core.diagnosis.kept import effects_from, kept_setup
 from core.errors import CorrectionError, RunError
 from core.progress import Report, part, silent
-from core.registration import register, setup_from
+from core.registration import Registration, register, setup_from
 from core.setup import Setup
 
 if TYPE_CHECKING:
@@ -72,6 +74,7 @@ def train_network(
     store: Path,
     model: Mapping[str, Any] | None = None,
     run: str | None = None,
+    truth: Sequence[Mapping[str, Any]] | None = None,
     setup: Setup | None = None,
     workers: int = 2,
     report: Report = silent,
@@ -80,7 +83,7 @@ def train_network(
 
     Args:
         store: folder of samples for all trainings. model: model.json of a diagnosis, of the `run` of this name.
-        setup: instead of both.
+        truth: effects of a virtual dataset's truth file instead, as plain values. setup: instead of all these.
 
     What was begun in `folder` goes on, and what is finished there is returned. RunError where another training is in it,
     CorrectionError for values or data that cannot be trained with.
@@ -88,50 +91,71 @@ def train_network(
     from core.correction import Split, TrainingSpec, train  # noqa: PLC0415 (heavy)
 
     spec = TrainingSpec.from_json(wanted.spec)
-    _claim(
-        folder, {**wanted.to_json(), "dataset": str(dataset.path.resolve()), "model": None if model is None else model["effects"]}
-    )
+    effects = truth if model is None else model["effects"]
+    on = "extended" if model is not None else "baseline" if truth is None else "true"
+    said = {"dataset": str(dataset.path.resolve()), "run": run, "model": on, "effects": None if effects is None else list(effects)}
+    _claim(folder, {**wanted.to_json(), **said})
     if (folder / SUMMARY).is_file():
         return dict(json.loads((folder / SUMMARY).read_text()))
-    samples = _samples(dataset, wanted, store, model, setup, workers, part(report, 0.0, _SAMPLING))
+    registration = register(dataset)
+    if setup is None:
+        setup = _setup(setup_from(dataset, registration), model, truth)
+    samples = _samples(dataset, wanted, store, registration, setup, workers, part(report, 0.0, _SAMPLING))
     trained = train(samples, Split.of(samples), spec, folder, part(report, _SAMPLING, 1.0))
     about = trained.about
     summary = {
-        "format": 1, "dataset": dataset.name, "kind": spec.network.kind, "samples": len(samples), "sequences": about["split"],
-        "epochs": len(about["history"]), "best_epoch": about["epoch"], "validation_error_mm": about["error"],
-        "validation_error_without_mm": about["raw_error"], "history": about["history"],
+        "format": 1, "dataset": dataset.name, "folder": dataset.path.resolve().name, "kind": spec.network.kind,
+        "samples": len(samples), "sequences": about["split"], "epochs": len(about["history"]), "best_epoch": about["epoch"],
+        "validation_error_mm": about["error"], "validation_error_without_mm": about["raw_error"], "history": about["history"],
     }  # fmt: skip
     _write(folder / SUMMARY, summary)
     return summary
 
 
+def _setup(stated: Setup, model: Mapping[str, Any] | None, truth: Sequence[Mapping[str, Any]] | None) -> Setup:
+    if model is not None:
+        return kept_setup(stated, model)
+    return stated if truth is None else with_effects(stated, effects_from(truth))
+
+
 def _samples(
-    dataset: Dataset,
-    wanted: Wanted,
-    store: Path,
-    model: Mapping[str, Any] | None,
-    setup: Setup | None,
-    workers: int,
-    report: Report,
+    dataset: Dataset, wanted: Wanted, store: Path, registration: Registration, setup: Setup, workers: int, report: Report
 ) -> Samples:
     """Made once for each model, motion and density of a dataset."""
-    from core.correction import make_samples, open_samples, recorder_for  # noqa: PLC0415 (heavy)
+    from core.correction import make_samples, recorder_for  # noqa: PLC0415 (heavy)
 
-    report(0.0, "relating robot, camera and phantom")
-    registration = register(dataset)
-    stated = setup_from(dataset, registration)
-    own = setup or (stated if model is None else kept_setup(stated, model))
-    recorder = recorder_for(dataset, setup=own, nodes=wanted.nodes, points=wanted.points, registration=registration)
+    recorder = recorder_for(dataset, setup=setup, nodes=wanted.nodes, points=wanted.points, registration=registration)
     names = [name for name in (*dataset.config.train, *dataset.config.validation) if len(dataset.sequence(name))]
-    said = [str(dataset.path.resolve()), own.as_dict(), repr(recorder.grid), wanted.nodes, wanted.every, wanted.points, names]
+    said = [str(dataset.path.resolve()), setup.as_dict(), repr(recorder.grid), wanted.nodes, wanted.every, wanted.points, names]
     folder = store / hashlib.sha256(json.dumps(said, sort_keys=True, default=repr).encode()).hexdigest()[:16]
+    known = _whole(folder)
+    if known is not None:
+        return known
+    try:
+        return make_samples(folder, recorder, sequences=names, every=wanted.every, workers=workers, report=report)
+    except RunError:
+        known = _whole(folder)  # another training may have made the same in the meantime
+        if known is None:
+            raise
+        return known
+
+
+def _whole(folder: Path) -> Samples | None:
+    """Samples that are all there; what is left of others, of which files were dropped for want of room, is taken away."""
+    from core.correction import open_samples  # noqa: PLC0415 (heavy)
+    from core.correction.arrays import ARRAYS  # noqa: PLC0415 (heavy)
+
     if not folder.is_dir():
-        try:
-            return make_samples(folder, recorder, sequences=names, every=wanted.every, workers=workers, report=report)
-        except RunError:
-            if not folder.is_dir():  # another training may have made the same in the meantime
-                raise
-    return open_samples(folder)
+        return None
+    try:
+        samples = open_samples(folder)
+        for sequence in samples.sequences:
+            for name in ARRAYS:
+                samples.array(sequence, name)
+    except RunError:
+        shutil.rmtree(folder, ignore_errors=True)
+        return None
+    return samples
 
 
 def _claim(folder: Path, said: dict[str, Any]) -> None:

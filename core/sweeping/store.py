@@ -43,8 +43,11 @@ class Store:
 
     def get(self, key: str) -> Outcomes | None:
         """What is known; a file that cannot be read is as good as none."""
+        path = self._path(key)
         try:
-            return Outcomes.from_json(json.loads(self._path(key).read_text()))
+            found = Outcomes.from_json(json.loads(path.read_text()))
+            os.utime(path)  # what is used last is dropped last
+            return found
         except (OSError, ValueError, KeyError, TypeError):
             return None
 

@@ -11,6 +11,11 @@ export async function post(path, body) {
   return answer(await reach(path, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body ?? {}) }));
 }
 
+export async function put(path, body) {
+  const response = await reach(path, { method: "PUT", headers: { "content-type": "application/json" }, body: JSON.stringify(body) });
+  if (!response.ok) await answer(response);
+}
+
 export async function remove(path) {
   const response = await reach(path, { method: "DELETE" });
   if (!response.ok) await answer(response);

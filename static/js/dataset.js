@@ -1,5 +1,5 @@
 // The right panel on a dataset: what it holds, whether it is in order, and the way to its diagnosis.
-import { get } from "./api.js";
+import { get, post, toast } from "./api.js";
 import { element, fill } from "./dom.js";
 import { capital, mm } from "./format.js";
 import { openPanel } from "./panels.js";
@@ -23,7 +23,8 @@ export async function showDataset(name, diagnose) {
   const size = summary.size.map((edge) => mm(edge, false)).join(" × ");
   fill(panel, element("div", { class: "eyebrow" }, "Dataset"), element("h1", { class: "verdict" }, name),
     element("p", { class: "gain-note" }, "Every file was read and is in order."),
-    element("div", { class: "actions" }, start, summary.has_rest ? element("button", { class: "button", type: "button", onclick: () => registerByHand(name) }, "Register by hand") : null),
+    element("div", { class: "actions" }, start, summary.has_rest ? element("button", { class: "button", type: "button", onclick: () => registerByHand(name) }, "Register by hand") : null, summary.has_rest ? asJob("Register automatically", "Keeps the automatic registration under a name", () => post(`/datasets/${encodeURIComponent(name)}/registrations/automatic`)) : null,
+      asJob("Replay", "All sequences as the setup is stated, seen like a diagnosis", () => post("/replays", { dataset: name, registration: camera.value || null }))),
     camera.hidden ? null : element("label", { class: "register-dataset" }, "Camera", camera),
     notes("Doubtful", summary.warnings), notes("Missing for some causes", summary.lacks),
     element("section", {}, element("h2", {}, "Setup as stated"), element("table", {}, element("tbody", {},
@@ -31,6 +32,15 @@ export async function showDataset(name, diagnose) {
       fact("Tool radius", mm(summary.tool_radius)), fact("Touches", summary.touches), fact("Rest cloud", summary.has_rest ? "yes" : "no")))),
     element("section", {}, element("h2", {}, "Sequences"), element("table", {}, element("tbody", {},
       summary.sequences.map(({ name: sequence, clouds, split }) => element("tr", {}, element("th", {}, sequence), element("td", {}, split ?? "no split"), element("td", { class: "number" }, `${clouds} clouds`)))))));
+}
+
+/** A button that asks for a job. */
+function asJob(label, title, ask) {
+  const button = element("button", { class: "button", type: "button", title, onclick: async () => {
+    button.disabled = true;
+    try { await ask(); button.textContent = "Started"; } catch (problem) { toast(problem); button.disabled = false; }
+  } }, label);
+  return button;
 }
 
 const fact = (label, value) => element("tr", {}, element("th", {}, label), element("td", { class: "number" }, String(value)));

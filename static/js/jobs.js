@@ -1,11 +1,12 @@
 // Jobs as they go: the newest few on the left, all of them with log and retry in a panel of their own.
 import { get, post, toast } from "./api.js";
+import { diskLine } from "./disk.js";
 import { element, fill, icon } from "./dom.js";
 import { capital, duration, when } from "./format.js";
 import { addPanel, openedPanel, openPanel } from "./panels.js";
 
 const JUST_ENDED = 15 * 60;
-const RETRY = { sweep: "Resume" };
+const RETRY = { sweep: "Resume", training: "Resume" };
 const LEVELS = { warning: "⚠ ", error: "✕ " };
 const listeners = [];
 const openers = {};
@@ -28,6 +29,7 @@ export function startJobs() {
     jobs = JSON.parse(data);
     draw();
     const done = jobs.filter(({ id, state }) => state === "done" && before.has(id) && before.get(id) !== "done");
+    if (done.length && panel.firstChild) document.getElementById("disk")?.replaceWith(diskLine());
     if (done.length) for (const listener of listeners) listener(done);
   };
   setInterval(draw, 1000);
@@ -43,7 +45,7 @@ function draw() {
 }
 
 function drawPanel() {
-  if (!panel.firstChild) fill(panel, element("div", { class: "eyebrow" }, "Jobs"), element("h1", { class: "verdict" }, "What was asked for, and what became of it"), element("div", { class: "jobs-list" }));
+  if (!panel.firstChild) fill(panel, element("div", { class: "eyebrow" }, "Jobs"), element("h1", { class: "verdict" }, "What was asked for, and what became of it"), element("div", { class: "jobs-list" }), diskLine());
   place(panel.querySelector(".jobs-list"), jobs, "panel", "Nothing has been asked for yet: diagnose a dataset, or start a sweep.");
 }
 
@@ -90,7 +92,8 @@ function build(job, wide) {
 
 /** A way to each thing that the job made. */
 function made({ id, result }) {
-  return Object.entries(openers).filter(([key]) => result?.[key] !== undefined).map(([key, { label, open }]) => element("button", { class: "button small", type: "button", "data-open": key, onclick: () => open(result[key], id) }, label));
+  return Object.entries(openers).filter(([key]) => result?.[key] !== undefined).map(([key, { label, open }]) => element("button", { class: "button small", type: "button", "data-open": key, onclick: () => open(result[key], id, result) }, label))
+    .concat((result?.files ?? []).map((file) => element("a", { class: "button small", href: `/api/exports/${encodeURIComponent(result.export)}/${encodeURIComponent(file)}`, download: file }, file)));
 }
 
 /** The job's log, read when it is opened and followed while it is. */

@@ -11,7 +11,7 @@ export function start() {
   button.addEventListener("click", () => open(box().hidden));
   document.addEventListener("pointerdown", (event) => { if (!box().hidden && !box().contains(event.target) && !button.contains(event.target)) open(false); });
   window.addEventListener("blur", () => { if (document.activeElement?.id === "viewer") open(false); });
-  box().addEventListener("keydown", (event) => { if (event.key === "Escape") { open(false); button.focus(); } });
+  document.addEventListener("keydown", (event) => { if (event.key === "Escape" && !box().hidden) { open(false); button.focus(); } });
   on(["layers", "colour", "quantity", "series", "heading"], drawToolbar);
   on(["layers", "colour", "quantity", "looks", "series", "side_by_side", "heading"], drawRows);
   drawToolbar();
@@ -29,6 +29,7 @@ const has = (model) => !MODELS.includes(model) || !state().series || state().ser
 
 function drawToolbar() {
   const { layers, colour, quantity, series } = state();
+  document.querySelector(".toolbar").classList.toggle("full", Boolean(series?.models.includes("corrected")));
   fill("layers", Object.entries(CHIPS).filter(([name]) => name !== "corrected" || series?.models.includes(name)).map(([name, label]) => element("button", {
     class: "chip", type: "button", disabled: absent(name) !== null, title: absent(name) ?? LAYERS[name],
     "aria-pressed": String(layers.includes(name)), "data-layer": name, onclick: () => toggle(name),

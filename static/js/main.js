@@ -1,6 +1,9 @@
 // Starts the parts and follows what is chosen.
 import { get, toast } from "./api.js";
+import * as correction from "./correction.js";
 import { fill, icon } from "./dom.js";
+import { startHelp } from "./help.js";
+import * as live from "./live.js";
 import { openPanel } from "./panels.js";
 import * as rail from "./rail.js";
 import { showProblem, showReport, showWelcome } from "./report.js";
@@ -64,9 +67,12 @@ async function start() {
   set({ palette });
   timeline.start();
   startSweeps();
+  correction.start(() => openSequence().catch(toast));
   startRegister(rail.openDataset);
+  startHelp();
   scene.start();
   whatif.start();
+  live.start();
   on(["sequence"], () => { set({ series: null, frame: 0, loop: null }); openSequence().catch(toast); });
   // What a person chooses comes to the front at once, what merely loads never does: they may have gone elsewhere meanwhile.
   const datasets = await rail.start((id) => { openPanel("report"); return openRun(id); });

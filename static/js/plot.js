@@ -59,9 +59,10 @@ export function drawPlot(canvas, series, frame, [first, last]) {
   shade(pen, { series, x, height, ink });
   const lanes = lanesOf(series);
   const titles = [];
-  const whole = height - FOOT - 8 - GAP * (lanes.length - 1);
+  const head = series.worst.length ? 21 : 8; // room for the marks of the worst frames
+  const whole = height - FOOT - head - GAP * (lanes.length - 1);
   const shares = lanes.reduce((sum, { share }) => sum + share, 0);
-  let top = 8;
+  let top = head;
   for (const lane of lanes) {
     const tall = whole * lane.share / shares;
     drawLane(pen, lane, { series, frame, width, top, tall, x, ink });

@@ -1,10 +1,12 @@
 // The left rail: diagnoses, the sequences of the open one, datasets.
 import { get, post, toast } from "./api.js";
+import { askForDataset, watchDrops } from "./bring.js";
 import { showDataset } from "./dataset.js";
 import { element, fill } from "./dom.js";
 import { mm, when, words } from "./format.js";
 import { onDone, opens, startJobs } from "./jobs.js";
 import { openedPanel } from "./panels.js";
+import { registerByHand } from "./register.js";
 import { on, set, state } from "./store.js";
 
 const TAGS = { train: "fit", validation: "val", test: "test" };
@@ -18,15 +20,23 @@ export async function start(open) {
   opens("run", "Open the report", open);
   opens("dataset", "Open the dataset", (name) => openDataset(name));
   onDone(async (done) => {
-    await refreshRuns();
+    await Promise.all([refreshRuns(), done.some(({ result }) => result?.dataset) ? refreshDatasets() : null]);
     // Who has gone elsewhere meanwhile finds it among the jobs and the diagnoses.
     if (openedPanel() === "report" && done.some(({ id }) => id === asked)) openRun(asked);
   });
+  opens("registration", "See the registration", (_, __, { dataset }) => registerByHand(dataset));
+  document.getElementById("import").addEventListener("click", () => askForDataset());
+  watchDrops();
   startJobs();
-  const [{ datasets, folder }] = await Promise.all([get("/datasets"), refreshRuns()]);
-  fill("datasets", datasets.length ? datasets.map((name) => element("button", { class: "row", type: "button", onclick: () => showDataset(name, diagnose) }, element("span", { class: "name" }, name)))
-    : element("p", { class: "empty" }, `None in ${folder}. Put a dataset folder there and reload.`));
+  const [datasets] = await Promise.all([refreshDatasets(), refreshRuns()]);
   return datasets.length;
+}
+
+async function refreshDatasets() {
+  const { datasets, folder } = await get("/datasets");
+  fill("datasets", datasets.length ? datasets.map((name) => element("button", { class: "row", type: "button", onclick: () => showDataset(name, diagnose) }, element("span", { class: "name" }, name)))
+    : element("p", { class: "empty" }, `None in ${folder}. Import one, or put its folder there and reload.`));
+  return datasets;
 }
 
 /** A dataset in the right panel. */
@@ -41,8 +51,8 @@ export const newestRun = (wanted) => (runs.find(({ id }) => id === wanted) ?? ru
 function drawRuns() {
   fill("runs", runs.length ? runs.map(({ id, verdict, causes, created, dataset, folder }) => element("button", {
     class: "row", type: "button", "aria-current": String(id === state().run), "data-run": id, title: id, onclick: () => openRun(id),
-  }, element("span", { class: "stack" }, element("span", { class: "name" }, causes.length ? causes.map(words).join(" + ") : verdict === "none" ? "nothing wrong" : verdict),
-    element("span", { class: "sub" }, `${folder ?? dataset} · ${when(created)}`))))
+  }, element("span", { class: "stack" }, element("span", { class: "name" }, causes.length ? causes.map(words).join(" + ") : verdict === "none" ? "nothing wrong" : verdict === "replay" ? "as stated" : verdict),
+    element("span", { class: "sub" }, `${verdict === "replay" ? "replay · " : ""}${folder ?? dataset} · ${when(created)}`))))
     : element("p", { class: "empty" }, "None yet. Choose a dataset below and start one."));
 }
 

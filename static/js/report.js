@@ -1,7 +1,9 @@
 // The right panel on a diagnosis: the verdict first, then cause, gain, patterns, rivals, and what cannot be told.
+import { post, toast } from "./api.js";
 import { comparisonSection } from "./comparison.js";
 import { element, fill } from "./dom.js";
 import { capital, parameter, percent, when, words } from "./format.js";
+import { openPanel } from "./panels.js";
 import { patternSection } from "./patterns.js";
 
 const panel = () => document.getElementById("panel");
@@ -11,7 +13,7 @@ export function showReport(heading, report, patterns, palette) {
   fill(panel(),
     element("div", { class: "eyebrow" }, element("span", { class: `verdict-tag ${report.verdict}` }, report.verdict), `${heading.folder ?? heading.dataset} · ${when(heading.created)}`),
     element("h1", { class: "verdict" }, heading.sentence),
-    element("p", {}, element("a", { class: "button", href: `/api/runs/${encodeURIComponent(heading.id)}/report.html`, download: `${heading.id}.html` }, "Save as one file")),
+    element("p", {}, element("a", { class: "button", href: `/api/runs/${encodeURIComponent(heading.id)}/report.html`, download: `${heading.id}.html` }, "Save as one file"), " ", exportButton(heading.id)),
     (heading.notes ?? []).map((text) => element("p", { class: "gain-note" }, text)),
     causes.length ? section(causes.length > 1 ? "Causes" : "Cause", "interval", causes.map(cause)) : null,
     report.gain ? section("Error on sequences not fitted on", report.gain.unit ?? "mm", gain(report.gain, causes.length > 0)) : null,
@@ -28,6 +30,16 @@ export function showReport(heading, report, patterns, palette) {
   document.getElementById("panel").scrollTop = 0;
 }
 
+/** Model, reports and replays as files: a job, whose files stand among the jobs when it is done. */
+function exportButton(run) {
+  const button = element("button", { class: "button", type: "button", title: "Reports, model and replays as files", onclick: async () => {
+    button.disabled = true;
+    try { await post("/exports", { run, what: ["report", "model", "replays"] }); openPanel("jobs"); } catch (problem) { toast(problem); }
+    button.disabled = false;
+  } }, "Export");
+  return button;
+}
+
 export function showProblem(problem) {
   fill(panel(), element("div", { class: "note-card bad" }, element("strong", {}, "This run cannot be shown"), problem.message));
 }
@@ -37,8 +49,9 @@ export function showWelcome(hasDatasets) {
     element("h1", {}, "No diagnosis yet"),
     hasDatasets ? "Choose a dataset on the left, check it, and start its diagnosis. It takes a few minutes; the page shows how far it is."
       : element("ol", {},
-        element("li", {}, "Put a dataset folder into the datasets folder, or start with ", element("code", {}, "palpate serve --datasets DIR"), "."),
-        element("li", {}, "No data at hand? ", element("code", {}, "palpate demo"), " makes a phantom with a hidden effect and finds it."))));
+        element("li", {}, "Import a dataset (left, under Datasets), or start with ", element("code", {}, "palpate serve --datasets DIR"), "."),
+        element("li", {}, "No data at hand? ", element("code", {}, "palpate demo"), " makes a phantom with a hidden effect and finds it."),
+        element("li", {}, "The button “?” above leads from nothing to a sweep and a registration in ten minutes."))));
 }
 
 const section = (title, aside, ...children) => element("section", {}, element("h2", {}, title, aside ? element("small", {}, aside) : null), ...children);

@@ -1,4 +1,5 @@
 // The 3D: the viewer in its frame, and the socket that says what to show.
+import * as camera from "./camera.js";
 import * as capture from "./capture.js";
 import { onKey } from "./keys.js";
 import * as layers from "./layers.js";
@@ -27,12 +28,18 @@ export function start() {
   on(["theme"], dress);
   on(["heading"], note);
   const frame = document.getElementById("viewer");
-  frame.addEventListener("load", () => { dress(); frame.contentWindow.addEventListener("keydown", onKey, true); });
-  openFrame();
+  frame.addEventListener("load", () => { dress(); frame.contentWindow.addEventListener("keydown", onKey, true); for (const watch of watchers) watch(frame.contentWindow); });
+  onViewer(camera.keep);
+  camera.restore(page).finally(openFrame);
   connect();
 }
 
 export const pageId = () => page;
+
+const watchers = [];
+
+/** Call with the viewer's window each time it is opened. */
+export function onViewer(watch) { watchers.push(watch); }
 
 function openFrame() { document.getElementById("viewer").src = `/viser/${page}`; }
 
@@ -41,7 +48,7 @@ function connect() {
   let opened = false;
   socket = new WebSocket(address);
   socket.onopen = () => {
-    if (wait > 500) openFrame();
+    if (wait > 500) camera.restore(page).finally(openFrame);
     opened = true; wait = 500; busy = false; note(); send();
   };
   socket.onmessage = ({ data }) => {
@@ -56,6 +63,9 @@ function connect() {
     setTimeout(connect, wait);
   };
 }
+
+/** Ask again for what is shown, where it has changed on the server. */
+export const refresh = () => send();
 
 /** Ask for what is wanted now; while an answer is awaited only the newest wish is kept. */
 function send() {

@@ -98,6 +98,8 @@ function drawWorst() {
   }, String(place + 1))) : []);
 }
 
+const number = (thing, label, value) => element("span", { title: label }, swatch(thing, true), element("span", { class: "word" }, label), element("b", {}, value));
+
 function draw() {
   const { series, frame, sequence } = state();
   const scrub = document.getElementById("scrub");
@@ -107,7 +109,7 @@ function draw() {
   const at = Math.min(frame, count() - 1);
   fill("clock", series ? [element("strong", {}, `${series.time[at].toFixed(2)} s`), element("span", { class: "frames" }, ` · frame ${at + 1} of ${count()}`)] : [sequence ? "…" : ""]);
   fill("readout", series ? [
-    ...series.models.map((name) => element("span", {}, swatch(name, true), SHOWN[name], element("b", {}, mm(series[`distance_${name}`][at], false)))),
-    element("span", {}, swatch("floor", true), "Floor", element("b", {}, mm(series.noise_floor)))] : []);
+    ...series.models.map((name) => number(name, SHOWN[name], mm(series[`distance_${name}`][at], false))), number("floor", "Floor", mm(series.noise_floor))] : [])
+    .classList.toggle("full", (series?.models.length ?? 0) > 2);
   drawPlot(document.getElementById("plot"), series, at, loop.range(count()));
 }

@@ -1,5 +1,6 @@
 // Looking at the scene: standard views, models side by side, and the section through the block.
 import { post, toast } from "./api.js";
+import { forget } from "./camera.js";
 import { element, fill, icon } from "./dom.js";
 import { bind } from "./keys.js";
 import { order } from "./looks.js";
@@ -10,7 +11,7 @@ const AXES = ["x", "y", "z"];
 let look = () => {};
 
 export function start(page) {
-  look = (where) => post(`/sessions/${page}/look?where=${where}`).catch(toast);
+  look = (where) => { forget(); post(`/sessions/${page}/look?where=${where}`).catch(toast); };
   for (const [where, shape, title] of VIEWS) button(`${where}-view`, shape, title, () => look(where));
   button("aside", "columns", "Models side by side (B)", aside);
   button("section", "section", "Cut the block open (X)", cut);
@@ -55,7 +56,7 @@ function drawSection() {
   const [low, high] = series.box.map((corner) => corner[at] * 1e3);
   const number = element("output", {}, `${(section.at * 1e3).toFixed(1)} mm`);
   const bar = element("input", {
-    type: "range", min: low, max: high, step: 0.1, value: section.at * 1e3, "aria-label": `Section at ${section.axis} in mm`,
+    type: "range", min: Math.ceil(low * 10) / 10, max: Math.floor(high * 10) / 10, step: 0.1, value: section.at * 1e3, "aria-label": `Section at ${section.axis} in mm`,
     oninput: (event) => { set({ section: { ...state().section, at: +event.target.value / 1e3 } }); number.textContent = `${(+event.target.value).toFixed(1)} mm`; },
   });
   bar.addEventListener("change", () => bar.blur());

@@ -1,9 +1,9 @@
 // What if: causes switched on and off and moved by sliders; the shown frame is solved again at once.
-import { get, post, remove } from "./api.js";
+import { get, post, remove, toast } from "./api.js";
 import { ends, position, valueAt } from "./coordinate.js";
 import { element, fill } from "./dom.js";
 import { capital, mm, UNITS, words } from "./format.js";
-import { addPanel, openedPanel } from "./panels.js";
+import { addPanel, openedPanel, openPanel } from "./panels.js";
 import { pageId } from "./scene.js";
 import { on, set, state } from "./store.js";
 
@@ -121,8 +121,18 @@ function draw() {
       element("select", { "aria-label": "Add a cause", onchange: (event) => add(event.target.value) },
         element("option", { value: "" }, "Add a cause …"), absent.map(({ name, summary }) => element("option", { value: name, title: summary }, capital(words(name))))),
       element("button", { class: "button", type: "button", disabled: !past.length, title: "Ctrl+Z", onclick: undo }, "Undo"),
+      element("button", { class: "button", type: "button", title: "Every frame of this sequence with these causes in the stated setup, as a job", onclick: replayAll }, "Replay the sequence"),
       element("button", { class: "button", type: "button", disabled: !changed, onclick: () => change(() => { rows = asDiagnosed(); tuned = true; }) }, "As diagnosed")));
   drawAnswer();
+}
+
+/** The shown sequence, all of it, with these causes: a run of its own among the diagnoses when it is done. */
+async function replayAll({ currentTarget }) {
+  currentTarget.disabled = true;
+  const { heading, sequence } = state();
+  const effects = rows.filter((row) => row.on).map(({ effect, parameters }) => ({ effect, parameters }));
+  try { await post("/replays", { dataset: heading.folder, sequences: [sequence], effects }); openPanel("jobs"); } catch (problem) { toast(problem); }
+  currentTarget.disabled = false;
 }
 
 const toggle = (checked, act) => element("input", { type: "checkbox", role: "switch", checked, onchange: act });

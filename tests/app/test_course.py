@@ -75,6 +75,14 @@ def test_a_peak_beside_a_higher_one_is_not_told_twice() -> None:
     assert worst_frames(errors)[:2] == [20, 30]
 
 
+def test_forces_and_failures_of_each_model_are_told_where_recorded(run: Run, replay: Replay) -> None:
+    plain = course(run, replay)
+    assert (plain["forces"], plain["failed"]) == (None, {})
+    kept = moved(replay, force_raw=np.arange(5) / 10, outcome_raw=np.array([0, 0, 1, 0, 2]), outcome_extended=np.zeros(5))
+    assert course(run, kept)["forces"] == {"raw": [0.0, 0.1, 0.2, 0.3, 0.4]}
+    assert course(run, kept)["failed"] == {"raw": [2, 4], "extended": []}
+
+
 def test_series_of_a_third_model_and_iterations_are_told_where_recorded(run: Run, replay: Replay) -> None:
     assert models_of(replay) == ("raw", "extended")
     assert course(run, replay)["iterations"] is None

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from browsing import NEEDS_CHROMIUM, Page
+from registering import CORNERS, NODES, Bench, X, Y, Z, off
 from small_dataset import SIZE, ply_bytes, write_valid_dataset
 
 from app.clicking import Phantom
@@ -18,71 +18,6 @@ from core.frames import Transform
 from core.synthetic.camera import Scene, place_camera
 
 pytestmark = NEEDS_CHROMIUM
-
-X, Y, Z = SIZE[0] / 2, SIZE[1] / 2, SIZE[2]
-CORNERS = [np.array([X, Y, Z]), np.array([-X, Y, Z]), np.array([-X, -Y, Z])]
-READY = "() => ['/cloud', '/block'].every(name => window.__viserMutable?.nodeRefFromName?.[name])"
-PIXEL = """([x, y, z]) => {
-  const { nodeRefFromName, camera, canvas } = window.__viserMutable, block = nodeRefFromName['/block'];
-  const place = block.localToWorld(new block.position.constructor(x, y, z)).project(camera);
-  return [(place.x + 1) / 2 * canvas.clientWidth, (1 - place.y) / 2 * canvas.clientHeight];
-}"""
-NODES = "() => Object.keys(window.__viserMutable.nodeRefFromName)"
-
-
-@dataclass
-class Bench:
-    """The panel of one page, with what a person does there; `true` is phantom_from_camera."""
-
-    page: Page
-    true: Transform
-
-    @property
-    def values(self) -> dict[str, Any]:
-        """What the page keeps."""
-        found = self.page.page.evaluate(
-            "() => { const k = JSON.parse(localStorage.getItem('palpate.register')); return k.of[k.dataset]; }"
-        )
-        return dict(found)
-
-    @property
-    def text(self) -> str:
-        return str(self.page.page.inner_text("#panel-register")).replace("\N{NO-BREAK SPACE}", " ")
-
-    def open(self) -> None:
-        self.page.page.goto(str(self.page.client.base_url))
-        self.page.page.click("#tab-register")
-        self.page.until(lambda: self.frame is not None and self.frame.evaluate(READY))
-
-    @property
-    def frame(self) -> Any:
-        return next((frame for frame in self.page.page.frames if frame.url.endswith("-register")), None)
-
-    def shown(self) -> Transform:
-        """By which pose the cloud is drawn, as the server says it."""
-        values = self.values
-        asked = {"dataset": "small", "mode": values["mode"], "start": values["start"], "over": values["over"]}
-        asked["pairs"] = [{"cloud": pair["cloud"], "mesh": pair["mesh"]} for pair in values["pairs"]]
-        identity = self.page.page.evaluate("sessionStorage.getItem('palpate.page')")
-        return Transform.from_matrix(self.page.client.post(f"/api/sessions/{identity}/registering", json=asked).json()["pose"])
-
-    def click(self, place: Any) -> None:
-        """A real click on a place [m] of the scene, once the camera stands still."""
-        seen: list[tuple[float, float]] = []
-        while len(seen) < 3 or np.ptp(seen[-3:], axis=0).max() > 0.2:
-            seen.append(self.frame.evaluate(PIXEL, [float(x) for x in place]))
-            self.page.page.wait_for_timeout(150)
-        left, top = seen[-1]
-        box = self.page.page.locator("#register-viewer").bounding_box()
-        self.page.page.mouse.click(box["x"] + left, box["y"] + top)
-
-    def pair(self, corner: Any, mesh: Any = None) -> None:
-        """Click a corner on the cloud, a little inside of it, and then on the phantom."""
-        count = len(self.values["pairs"])
-        self.click(self.shown().apply(self.true.inverse().apply(corner * np.array([0.97, 0.97, 1.0]))))
-        self.page.until(lambda: len(self.values["pairs"]) == count + 1 and self.values["mode"] == "mesh")
-        self.click(corner if mesh is None else mesh)
-        self.page.until(lambda: self.values["pairs"][-1]["mesh"] is not None)
 
 
 @pytest.fixture(scope="module")
@@ -107,13 +42,6 @@ def bench(browser: Any, serve: Any, home: tuple[Path, Transform]) -> Iterator[Be
         found.open()
         yield found
         assert [text for text in found.page.trouble if "422" not in text and "409" not in text] == []
-
-
-def off(found: Any, true: Transform) -> tuple[float, float]:
-    """How far a pose puts the middle of the top from where it is [m], and by how much it is turned [degrees]."""
-    motion = true @ Transform.from_matrix(found).inverse()
-    top = np.array([0.0, 0.0, Z])
-    return float(np.linalg.norm(motion.apply(top) - top)), float(np.degrees(np.linalg.norm(motion.rotation_vector)))
 
 
 def test_three_clicked_pairs_lead_from_a_bad_start_to_half_a_millimetre_and_the_result_is_kept_and_offered(bench: Bench) -> None:

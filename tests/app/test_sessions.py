@@ -2,8 +2,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
+from app.lookout import Lookout, lookout
 from app.problems import Missing
 from app.runs import Runs
 from app.scene import NullScene
@@ -46,6 +48,27 @@ def test_camera_is_turned_to_the_phantom_once_per_run_and_on_request(sessions: S
     assert len(scene.looked_from) == 1
     session.look()
     assert len(scene.looked_from) == 2
+
+
+def test_a_place_of_ones_own_is_looked_from_in_scenes_that_open_later(sessions: Sessions, run_name: str) -> None:
+    session = sessions.open("page-one")
+    own = Lookout(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.0, 0.02]), np.array([0.0, 0.0, 1.0]))
+    session.stand(run_name, own)
+    session.show(view(run_name))
+    scene = NullScene()
+    sessions.join("page-one", scene)
+    assert scene.looked_from == [own]
+    session.look("top")
+    assert scene.looked_from[-1].position[2] > 0.1
+    session.show(view(run_name, side_by_side=True))
+    assert scene.looked_from[-1] is not own
+
+
+@pytest.mark.parametrize(("where", "axis", "sign"), [("top", 2, 1), ("front", 1, -1), ("side", 0, 1)])
+def test_standard_views_look_along_an_axis(where: Any, axis: int, sign: int) -> None:
+    found = lookout(np.array([0.07, 0.04, 0.036]), np.array([0.2, -0.1, 0.2]), ((0.0, 0.0, 0.0),), where)
+    away = found.position - found.target
+    assert sign * away[axis] > 0.99 * np.linalg.norm(away)
 
 
 def test_a_scene_that_left_gets_nothing_more(sessions: Sessions, run_name: str) -> None:

@@ -13,7 +13,9 @@ from typing import Any
 
 import httpx
 import pytest
+from browsing import Page
 from recorded_run import RADIUS, SEQUENCE, write_recorded_run
+from websockets.sync.client import connect
 
 from app.runs import Run
 from app.settings import Settings
@@ -122,6 +124,55 @@ def test_run_that_does_not_say_where_its_data_are_is_told(run: Path, tmp_path: P
         WhatIfs().solve(Run(other), SEQUENCE, 0, [], True)
 
 
+LIVE = f"/api/runs/large-tool-1/sequences/{SEQUENCE}/live"
+
+
+def test_a_hand_leads_the_tool_and_the_page_shows_what_it_feels(there: httpx.Client, run: Path) -> None:
+    view = {
+        "run": "large-tool-1",
+        "sequence": SEQUENCE,
+        "frame": deepest(run),
+        "colour": "extended",
+        "layers": ["measured", "extended", "tool"],
+    }
+    recorded = there.post("/api/sessions/led-page/view", json=view).json()["drawn"]
+    shallow, deep = (
+        there.post(LIVE, json={"at": [0.0, 0.0, 0.0358 + 0.0075 - depth], "effects": [LARGER], "page": "led-page"}).json()
+        for depth in (1e-3, 4e-3)
+    )
+    assert (shallow["depth"], deep["depth"]) == (pytest.approx(1e-3, abs=1e-6), pytest.approx(4e-3, abs=1e-6))
+    assert 0 < shallow["force"][2] < deep["force"][2] and deep["converged"]
+    drawn = there.get("/api/sessions/led-page/state").json()["drawn"]
+    assert drawn["quantity"] == "displacement" and drawn["points"] == 0
+    assert drawn["tool"] == pytest.approx(deep["tool"], abs=1e-6)
+    there.delete("/api/sessions/led-page/live")
+    assert there.get("/api/sessions/led-page/state").json()["drawn"] == recorded
+
+
+def test_over_a_socket_the_newest_place_wins_and_what_is_wrong_is_told(there: httpx.Client, run: Path) -> None:
+    address = f"ws://{there.base_url.netloc.decode()}/api/sessions/held-page/live"
+    wish = {"run": "large-tool-1", "sequence": SEQUENCE, "effects": [], "tuned": False, "shown": "raw"}
+    view = {"run": "large-tool-1", "sequence": SEQUENCE, "frame": 0, "layers": ["raw"], "colour": "raw"}
+    there.post("/api/sessions/held-page/view", json=view)
+    with connect(address) as socket:
+        for depth in range(40):
+            socket.send(json.dumps({**wish, "at": [0.0, 0.0, 0.0408 - 1e-4 * depth]}))
+        answers = [json.loads(socket.recv(timeout=60))]
+        while answers[-1]["depth"] < 3.89e-3:
+            answers.append(json.loads(socket.recv(timeout=60)))
+        assert len(answers) < 40
+        assert answers[-1]["drawn"]["quantity"] == "displacement"
+        for bad in ({"at": [0, 0, 0], "run": "nobody", "sequence": SEQUENCE}, {"at": [0, 0]}, {**wish, "at": [0, 0, "deep"]}):
+            socket.send(json.dumps(bad))
+            assert json.loads(socket.recv(timeout=60))["problem"]["message"]
+
+
+@pytest.mark.parametrize("body", [{}, {"at": [0.0, 0.0]}, {"at": [0, 0, 0], "effects": [{"effect": "magic", "parameters": {}}]}])
+def test_what_cannot_be_led_is_refused(there: httpx.Client, body: dict[str, Any]) -> None:
+    answer = there.post(LIVE, json=body)
+    assert answer.status_code == 422 and set(answer.json()) == {"kind", "message", "where"}
+
+
 @pytest.mark.browser
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine: install the package chromium")
 def test_error_changes_as_a_slider_is_moved(there: httpx.Client) -> None:
@@ -164,3 +215,48 @@ def test_error_changes_as_a_slider_is_moved(there: httpx.Client) -> None:
         page.get_by_role("tab", name="Report").click()
         assert trouble == []
         chromium.close()
+
+
+APART = """async place => {
+  const { onScreen } = await import('/static/js/drag.js');
+  return onScreen(document.getElementById('viewer').contentWindow, place);
+}"""
+
+
+@pytest.mark.browser
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine: install the package chromium")
+def test_a_person_pushes_the_block_with_the_mouse(there: httpx.Client, browser: Any, tmp_path: Path) -> None:
+    with browser.new_context(viewport={"width": 1440, "height": 900}) as context:
+        page = Page(context.new_page(), there)
+        page.open("?run=large-tool-1")
+        page.page.get_by_role("tab", name="Live").click()
+        page.page.locator("#live-push").wait_for(timeout=60_000)
+        page.page.get_by_role("button", name="Above the middle").click()
+        page.until(lambda: page.page.inner_text("#live-push").startswith("0.00"))
+        page.page.locator("#live-depth").fill("2")
+        page.until(lambda: page.page.inner_text("#live-push").startswith("2.00"))
+        assert page.page.inner_text("#live-force") != "0.000 N"
+        assert "Displacement" in page.page.inner_text("#legend")
+        page.page.locator("#live-pad").click(position={"x": 90, "y": 70})
+        page.until(lambda: page.held["drawn"]["tool"][0] < -0.01)
+        x, y = tool_on_screen(page)
+        page.page.mouse.move(x, y)
+        page.page.mouse.down()
+        for step in range(1, 9):
+            page.page.mouse.move(x + 3 * step, y + 2 * step)
+        page.until(lambda: float(page.page.inner_text("#live-push").split()[0]) > 2.5)
+        page.page.mouse.up()
+        page.until(lambda: tool_on_screen(page) == pytest.approx((x + 24, y + 16), abs=1.0))
+        page.page.screenshot(path=tmp_path / "live.png")
+        page.page.select_option("[aria-label='Model that answers']", "raw")
+        page.until(lambda: any(name.startswith("/mesh/raw") for name in page.visible()))
+        page.page.get_by_role("tab", name="Report").click()
+        page.until(lambda: "Measured" in page.page.inner_text("#legend"))
+        assert page.trouble == []
+
+
+def tool_on_screen(page: Page) -> tuple[float, float]:
+    """Where the middle of the tool is in the window."""
+    apart = page.page.evaluate(APART, page.held["drawn"]["tool"])
+    frame = page.page.locator("#viewer").bounding_box()
+    return frame["x"] + apart[0], frame["y"] + apart[1]

@@ -1,0 +1,175 @@
+"""Training samples per second and milliseconds per corrected frame, beside the same networks and loss in plain torch.
+
+The plain network is made of `nn.Conv2d` and `nn.Conv3d` with the very same weights, the plain loss takes all distances between
+points and vertices and lets autograd find its way back through the smallest. Both must agree before any time is told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import torch
+from rich.table import Table
+from torch import Tensor, nn
+
+from benchmarks.stopwatch import timed
+from core.correction import Batch, Body, CorrectionNetwork, NetworkSpec, SurfaceLoss, build
+from core.correction.chamfer import Loss
+from core.correction.compact import Compact, has_half
+from core.correction.unet import Padded
+
+__all__ = ["plain_loss", "plain_network", "run", "samples_of"]
+
+SIZE, NODES = (0.0687, 0.0393, 0.0358), (13, 5, 5)
+BATCH, POINTS, STEPS, FRAMES = 64, 1024, 4, 30
+_AGREE = 2e-3
+"""Relative, between gradients in single precision; where two vertices are equally near either may be taken."""
+
+
+def samples_of(body: Body, count: int, points: int = POINTS, seed: int = 0) -> Batch:
+    """Dented shapes and noisy points on a surface a millimetre lower, nothing of which was simulated."""
+    rng = np.random.default_rng(seed)
+    places = np.column_stack([rng.uniform(-0.03, 0.03, count), rng.uniform(-0.015, 0.015, count), np.full(count, 0.037)])
+    away = ((body.rest[None, :, :2] - places[:, None, :2]) ** 2).sum(axis=2)
+    dent = np.exp(-away / 0.008**2) * body.rest[:, 2] / SIZE[2]
+    down = np.array([0.0, 0.0, -1.0])
+    positions = body.rest + 4e-3 * dent[:, :, None] * down
+    surface = body.surface(positions + 1e-3 * (body.rest[:, 2:] / SIZE[2]) * down)
+    chosen = rng.integers(surface.shape[1], size=(count, points))
+    cloud = np.take_along_axis(surface, chosen[:, :, None], axis=1) + rng.normal(0, 1e-3, (count, points, 3))
+    tool = np.concatenate([places, np.tile([1.0, *[0.0] * 9], (count, 1))], axis=1)
+    numbers = torch.full((count, 2), points, dtype=torch.int32)
+    shapes, known, measured = (torch.as_tensor(part, dtype=torch.float32) for part in (positions, tool, cloud))
+    return Batch(shapes, known, measured, numbers)
+
+
+class _Plain(nn.Module):
+    """A U-Net as it is commonly written, with the weights of another."""
+
+    def __init__(self, network: CorrectionNetwork) -> None:
+        super().__init__()
+        self.outer, inside = network, network.inside
+        two = len(network.grid or ()) == 2
+        self.pool = (nn.MaxPool2d if two else nn.MaxPool3d)(2, ceil_mode=True)
+        convolution = nn.Conv2d if two else nn.Conv3d
+
+        def block(parts: nn.Module) -> nn.Sequential:
+            layers: list[nn.Module] = []
+            for part in parts.children():
+                if isinstance(part, Padded):
+                    made = convolution(part.weight.shape[1], part.weight.shape[0], 3, padding=1)
+                    made.weight, made.bias = part.weight, part.bias
+                    layers += [made, nn.ReLU()]
+            return nn.Sequential(*layers)
+
+        self.down = nn.ModuleList(block(part) for part in inside.get_submodule("down").children())
+        self.bottom, self.doubled = block(inside.get_submodule("bottom")), inside.get_submodule("doubled")
+        self.up = nn.ModuleList(block(part) for part in inside.get_submodule("up").children())
+        self.last = inside.get_submodule("last")
+
+    def forward(self, values: Tensor, known: Tensor) -> Tensor:
+        skips = []
+        for part in self.down:
+            values = part(values)
+            skips.append(values)
+            values = self.pool(values)
+        spread = known.reshape(*known.shape, *[1] * (values.dim() - 2)).expand(-1, -1, *values.shape[2:])
+        values = self.bottom(torch.cat([values, spread], dim=1))
+        for double, part in zip(self.doubled.children(), self.up, strict=True):
+            skip = skips.pop()
+            grown = double(values)[tuple(slice(length) for length in (*skip.shape[:1], None, *skip.shape[2:]))]
+            values = part(torch.cat([grown, skip], dim=1))
+        return torch.as_tensor(self.last(values))
+
+
+def plain_network(network: CorrectionNetwork) -> Callable[[Tensor, Tensor], Tensor]:
+    """The same function of vertices and tool, by `_Plain`."""
+    plain = _Plain(network)
+
+    def corrected(vertices: Tensor, tool: Tensor) -> Tensor:
+        inside, network.inside = network.inside, plain  # type: ignore[assignment]
+        try:
+            return torch.as_tensor(network(vertices, tool))
+        finally:
+            network.inside = inside
+
+    return corrected
+
+
+def plain_loss(loss: SurfaceLoss, vertices: Tensor, batch: Batch) -> Tensor:
+    """One-directional Chamfer distance [mm] by all distances."""
+    return torch.cdist(batch.points, loss.surface(vertices)).amin(dim=2).mean() * 1e3
+
+
+def _gradient(network: CorrectionNetwork, total: Tensor) -> Tensor:
+    network.zero_grad(set_to_none=True)
+    total.backward()
+    return torch.cat([part.grad.flatten() for part in network.parameters() if part.grad is not None])
+
+
+def _row(kind: str) -> tuple[str, ...]:
+    body = Body.top(SIZE, NODES) if kind == "unet2d" else Body.block(SIZE, NODES)
+    network, batch = build(NetworkSpec(kind=kind), body), samples_of(body, BATCH)  # type: ignore[arg-type]
+    nn.init.normal_(network.inside.last.weight, std=0.02)
+    loss, raw = SurfaceLoss(body, np.ones(len(body.rest)), hold=0.0), batch.positions
+    plain = plain_network(network)
+
+    def ours() -> Loss:
+        return loss(network(raw, batch.tool), batch, raw)
+
+    def common() -> Tensor:
+        return plain_loss(loss, plain(raw, batch.tool), batch)
+
+    here, there = _gradient(network, ours().total), _gradient(network, common())
+    apart = float((here - there).norm() / there.norm())
+    if not apart < _AGREE:
+        raise RuntimeError(f"{kind}: gradients of both implementations differ by {apart:.2g}, under {_AGREE:g} is wanted")
+    fused, slow = (torch.optim.Adam(network.parameters(), 1e-6, fused=kept) for kept in (True, None))
+    fast = _rate(fused, lambda: ours().total)
+    return (kind, f"{apart:.1e}", f"{fast:.0f}", f"{_rate(slow, common):.0f}", *_frame(network, plain, batch, kind))
+
+
+def _rate(optimizer: torch.optim.Optimizer, total: Callable[[], Tensor]) -> float:
+    """Samples per CPU second, the fastest of several steps: other work on the machine only ever takes time."""
+
+    def step() -> None:
+        optimizer.zero_grad(set_to_none=True)
+        total().backward()
+        optimizer.step()
+
+    step()
+    return BATCH / min(timed(step)[1] for _ in range(STEPS))
+
+
+def _frame(network: CorrectionNetwork, plain: Callable[[Tensor, Tensor], Tensor], batch: Batch, kind: str) -> tuple[str, ...]:
+    """Milliseconds of one frame: compact in bfloat16 where there is any, compact in single precision, and plain."""
+    vertices, tool = batch.positions[:1], batch.tool[:1]
+    with torch.inference_mode():
+        wanted = plain(vertices, tool)[0]
+        found = Compact(network, half=False)(vertices[0], tool[0])
+        apart = float((found - wanted).abs().max())
+        if not apart < 1e-7:
+            raise RuntimeError(f"{kind}: the compact network is {apart * 1e3:.2g} mm off, under 1e-4 mm is wanted")
+        kinds: list[Callable[[], object]] = [lambda: plain(vertices, tool)]
+        for half in (False, True):
+            compact = Compact(network, half=half)
+            kinds.append(lambda compact=compact: compact(vertices[0], tool[0]))  # type: ignore[misc]
+        times = [min(timed(work)[1] for _ in range(FRAMES)) * 1e3 for work in kinds]
+    return (f"{times[2]:.2f}" if has_half() else "-", f"{times[1]:.2f}", f"{times[0]:.2f}")
+
+
+def run() -> list[Table]:
+    """One thread; RuntimeError where a result is wrong."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        table = Table(
+            "network", "gradients differ", "samples/s", "plain", "ms a frame, bfloat16", "ms a frame", "plain",
+            title=f"correction, {'x'.join(map(str, NODES))}, {POINTS} points, one thread, CPU seconds",
+        )  # fmt: skip
+        for kind in ("unet2d", "unet3d"):
+            table.add_row(*_row(kind))
+        return [table]
+    finally:
+        torch.set_num_threads(threads)
