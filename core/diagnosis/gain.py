@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.diagnosis.felt_gain import FeltLadder
 from core.diagnosis.force import rms_force
 from core.diagnosis.observations import Observations
 from core.diagnosis.prediction import Prediction
@@ -18,7 +17,6 @@ from core.diagnosis.probe_sums import paper_sums, probe_sums, removed_share
 from core.setup import Setup
 
 __all__ = ["Ladder", "ladder"]
-
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

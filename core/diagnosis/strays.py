@@ -22,7 +22,7 @@ _AROUND = 9e-3
 _APART = 1e-3
 """So far from its neighbours' median [m] it cannot lie: a model's error is as smooth as the surface."""
 _NEVER = 6e-3
-"""The same of a patch that is seen well: a dent at another time or place may be a step of some millimetres, but no floating points."""
+"""The same of a patch that is seen well: a dent at another time or place is a step of some millimetres, and no more."""
 
 
 def among_neighbours(gap: FloatArray, patch: IntArray, surface: Surface) -> MaskArray:
