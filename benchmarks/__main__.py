@@ -9,6 +9,7 @@ from rich.console import Console
 from benchmarks import (
     cleaning,
     convergence,
+    correcting,
     correction,
     dataset,
     diagnosis,
@@ -21,6 +22,7 @@ from benchmarks import (
     picking,
     replay,
     scrub,
+    service,
     shapes,
     sweep,
 )
@@ -37,8 +39,10 @@ ALL = {
     "measurement": measurement.run,
     "cleaning": cleaning.run,
     "picking": picking.run,
+    "service": service.run,
     "dataset": dataset.run,
     "correction": correction.run,
+    "correcting": correcting.run,
     "diagnosis": diagnosis.run,
     "live": live.run,
     "scrub": scrub.run,
