@@ -65,7 +65,7 @@ $(VENV)/.installed: pyproject.toml constraints.txt $(VENV)/.torch
 	@touch $@
 
 $(VENV)/.peers: pyproject.toml constraints.txt $(VENV)/.system-bench $(VENV)/.installed
-	$(PIP) install --quiet -e ".[peers,shapes]" -c constraints.txt
+	$(PIP) install --quiet -e ".[peers,shapes,cluster]" -c constraints.txt
 	@touch $@
 
 $(VENV)/.developed: pyproject.toml constraints.txt $(VENV)/.installed

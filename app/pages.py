@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, TypeVar
 
-from fastapi import Depends, Query
+from fastapi import Depends, Query, Response
 
-__all__ = ["TOTAL", "Page", "PageOf"]
+__all__ = ["TOTAL", "Page", "PageOf", "part_of"]
 
 TOTAL = "X-Total-Count"
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -25,3 +27,9 @@ def _page(after: Annotated[int, Query(ge=0, le=10**9)] = 0, most: Annotated[int,
 
 
 PageOf = Annotated[Page, Depends(_page)]
+
+
+def part_of(rows: Sequence[T], page: Page, response: Response) -> Sequence[T]:
+    """The wanted part of a list, and in the answer's header of how many."""
+    response.headers[TOTAL] = str(len(rows))
+    return rows[page.after : page.after + page.most]

@@ -95,9 +95,17 @@ class Run:
             raise Missing(f"run {self.name} has no sequence {name}; it has {known}", run=self.name, sequence=name)
         return Replay(name, self._arrays(f"replays/{name}.npz", FIELDS) | self._corrected(name))
 
+    def stamp(self, name: str) -> tuple[int, ...]:
+        """Of the files of a sequence's replay: changes when one of them is written anew."""
+        files = (self.path / "replays" / f"{name}.npz", self._correction(name))
+        return tuple(file.stat().st_mtime_ns if file.is_file() else 0 for file in files)
+
+    def _correction(self, name: str) -> Path:
+        return self.path.parent / CORRECTIONS / self.name / f"{name}.npz"
+
     def _corrected(self, name: str) -> dict[str, Any]:
         """What a training on this run's model has left of a sequence; nothing where there was none, or one of other frames."""
-        file = self.path.parent / CORRECTIONS / self.name / f"{name}.npz"
+        file = self._correction(name)
         return self._arrays(os.path.relpath(file, self.path), CORRECTED) if file.is_file() else {}
 
     def patterns(self) -> dict[str, Any]:

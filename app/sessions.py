@@ -190,7 +190,7 @@ class Sessions:
         self._runs = runs
         self._clouds_of = clouds_of or measured_clouds
         self._sessions: OrderedDict[str, Session] = OrderedDict()
-        self._reels: OrderedDict[tuple[str, str], Reel] = OrderedDict()
+        self._reels: OrderedDict[tuple[str, str, tuple[int, ...]], Reel] = OrderedDict()
         self._ends: dict[tuple[str, Quantity], float | None] = {}
         self._lock = threading.Lock()
 
@@ -221,10 +221,10 @@ class Sessions:
     def reel(self, run: str, sequence: str) -> Reel:
         """The sequence of a run, ready to be drawn."""
         with self._lock:
-            key = (run, sequence)
+            found = self._runs.get(run)
+            key = (run, sequence, found.stamp(sequence))
             reel = self._reels.pop(key, None)
             if reel is None:
-                found = self._runs.get(run)
                 reel = Reel(found.replay(sequence), self._clouds_of(found, sequence), furniture_of(found))
             self._reels[key] = reel
             while len(self._reels) > REELS:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, TypeVar
@@ -43,6 +44,8 @@ class Stage:
 
         with contextlib.redirect_stdout(io.StringIO()):  # it prints its inner address, which is of no use to anybody
             self._server: ViserServer = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        # A browser may close while its scene is drawn: nothing is lost, and nobody need read of it.
+        warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
         self._server.request_share_url = lambda *_, **__: None  # type: ignore[method-assign]
         self._left: dict[int, Callable[[], None]] = {}
         self._furnish()

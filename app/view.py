@@ -45,7 +45,10 @@ class Section(BaseModel):
 class Camera(BaseModel):
     """Where a person looks at a run from, and at what [m], phantom frame; z is upwards."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(
+        frozen=True, extra="forbid",
+        json_schema_extra={"examples": [{"run": "block-01-1", "position": [0.09, -0.17, 0.15], "target": [0.0, 0.0, 0.02]}]},
+    )  # fmt: skip
 
     run: str
     position: tuple[Far, Far, Far]
@@ -61,7 +64,10 @@ class View(BaseModel):
     sequences of the run.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(
+        frozen=True, extra="forbid",
+        json_schema_extra={"examples": [{"run": "block-01-20260101-120000-abcd", "sequence": "poke-top-01", "frame": 35}]},
+    )  # fmt: skip
 
     run: str
     sequence: str

@@ -21,6 +21,7 @@ from benchmarks import (
     picking,
     replay,
     scrub,
+    service,
     shapes,
     sweep,
 )
@@ -37,6 +38,7 @@ ALL = {
     "measurement": measurement.run,
     "cleaning": cleaning.run,
     "picking": picking.run,
+    "service": service.run,
     "dataset": dataset.run,
     "correction": correction.run,
     "diagnosis": diagnosis.run,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pathlib
+import signal
 import subprocess
 import sys
 import time
@@ -76,12 +77,25 @@ def linger(request: Request, report: Report) -> Request:
     return {}
 
 
+def litter(request: Request, report: Report) -> Request:
+    """A folder beside the others, and an end from outside the first time."""
+    place = pathlib.Path(request["beside"], pathlib.Path(request["scratch"]).name)
+    place.mkdir(parents=True)
+    (place / "half").write_text("half")
+    if not pathlib.Path(request["again"]).exists():
+        pathlib.Path(request["again"]).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return {}
+
+
 def die(request: Request, report: Report) -> Request:
     """An end without a word."""
     os._exit(7)
 
 
-TARGETS = {work.__name__: f"job_working:{work.__name__}" for work in (count, sleep_with_child, refuse, stumble, give_up, warn, die)}
+TARGETS = {
+    work.__name__: f"job_working:{work.__name__}" for work in (count, sleep_with_child, refuse, stumble, give_up, warn, litter, die)
+}
 
 
 def ended(jobs: Jobs, job: Job) -> Job:

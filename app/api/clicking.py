@@ -24,7 +24,9 @@ Step = Annotated[FiniteFloat, Field(ge=-0.1, le=0.1)]
 class Nudge(BaseModel):
     """A point of one side, and how far it is to go [m], to the right and upwards as the person sees it."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", json_schema_extra={"examples": [{"side": "mesh", "point": [0.01, 0.0, 0.0358], "right": 2e-4}]}
+    )
 
     side: Literal["cloud", "mesh"]
     point: Point
@@ -35,7 +37,9 @@ class Nudge(BaseModel):
 class Aim(BaseModel):
     """A ray in the frame of the scene [m], as a click makes it; `pixel` is the angle of a pixel [rad]."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", json_schema_extra={"examples": [{"origin": [0.0, 0.0, 0.3], "direction": [0.0, 0.0, -1.0]}]}
+    )
 
     origin: Point
     direction: Point

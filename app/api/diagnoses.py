@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Response
 
 from app.desk import DeskOf, KeyOf
+from app.pages import PageOf, part_of
 from app.problems import Conflict
 from app.records import JobState
 from app.schemas import DiagnosisRequest, JobOut
@@ -25,9 +26,10 @@ def start(request: DiagnosisRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
 
 
 @router.get("")
-def listed(desk: DeskOf) -> list[JobOut]:
-    """All diagnoses that were asked for here, the newest first."""
-    return [JobOut.of(job) for job in desk.jobs.all() if job.kind == "diagnosis"]
+def listed(desk: DeskOf, response: Response, page: PageOf) -> list[JobOut]:
+    """Diagnoses that were asked for here, the newest first; the header X-Total-Count says how many there are."""
+    found = [job for job in desk.jobs.all() if job.kind == "diagnosis"]
+    return [JobOut.of(job) for job in part_of(found, page, response)]
 
 
 @router.get("/{identity}")

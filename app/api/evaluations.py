@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.config import JsonDict
 
 from app.desk import DeskOf, KeyOf
 from app.evaluations import Evaluations, networks_for
+from app.pages import PageOf, part_of
 from app.schemas import JobOut
 from app.trainings import Trainings
 
@@ -49,9 +50,9 @@ def start(request: EvaluationRequest, desk: DeskOf, key: KeyOf = None) -> JobOut
 
 
 @router.get("")
-def listed(desk: DeskOf) -> list[dict[str, Any]]:
-    """All evaluations, the newest first, each with its job where that is still known."""
-    return Evaluations(desk.settings.runs).listed(desk)
+def listed(desk: DeskOf, response: Response, page: PageOf) -> list[dict[str, Any]]:
+    """Evaluations, the newest first, each with its job where that is still known; X-Total-Count says how many there are."""
+    return list(part_of(Evaluations(desk.settings.runs).listed(desk), page, response))
 
 
 @router.get("/{identity}")

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
+from pydantic.config import JsonValue
 
 from app.desk import DeskOf, KeyOf
 from app.registrations import Registrations, register
@@ -16,6 +17,13 @@ from core.registration.pairs import fit_pairs
 __all__ = ["router"]
 
 router = APIRouter(prefix="/datasets/{name}/registrations", tags=["registrations"])
+
+
+PAIRS: list[JsonValue] = [
+    {"cloud": [-0.034, 0.012, 0.342], "mesh": [0.0344, 0.0197, 0.0358]},
+    {"cloud": [0.021, -0.008, 0.351], "mesh": [-0.0344, 0.0197, 0.0358]},
+    {"cloud": [0.03, 0.02, 0.322], "mesh": [-0.0344, -0.0197, 0.0358]},
+]
 
 
 class Pair(BaseModel):
@@ -30,13 +38,17 @@ class Pair(BaseModel):
 class FitRequest(BaseModel):
     """Pairs to be fitted."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra={"examples": [{"pairs": PAIRS}]})
 
     pairs: list[Pair] = Field(max_length=100)
 
 
 class RegistrationRequest(FitRequest):
     """Pairs, and the name to accept the result under; without one nothing is kept."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", json_schema_extra={"examples": [{"pairs": PAIRS, "accept": "by-hand-1"}]}
+    )
 
     accept: str | None = None
 

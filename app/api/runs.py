@@ -13,6 +13,7 @@ from app.colours import nice_limit
 from app.comparison import compared
 from app.course import course
 from app.desk import DeskOf
+from app.pages import PageOf, part_of
 from app.runs import Replay, Run
 from app.sentences import registration_sentences, verdict_sentence
 from app.side import NO_INSIDE
@@ -26,9 +27,9 @@ router = APIRouter(prefix="/runs", tags=["runs"])
 
 
 @router.get("")
-def listed(desk: DeskOf) -> list[dict[str, Any]]:
-    """All runs, the newest first, each with its verdict; one whose report cannot be read says so."""
-    return [_listed(run) for run in desk.runs.all()]
+def listed(desk: DeskOf, response: Response, page: PageOf) -> list[dict[str, Any]]:
+    """Runs, the newest first, each with its verdict; one whose report cannot be read says so. X-Total-Count: how many there are."""
+    return [_listed(run) for run in part_of(desk.runs.all(), page, response)]
 
 
 @router.get("/{name}")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 from pydantic.config import JsonDict
 
 from app.desk import Desk, DeskOf, KeyOf
+from app.pages import PageOf, part_of
 from app.problems import Missing
 from app.schemas import JobOut
 from app.sweeps import Sweeps
@@ -65,12 +66,12 @@ def start(request: SweepRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
 
 
 @router.get("")
-def listed(desk: DeskOf) -> list[dict[str, Any]]:
-    """All sweeps, the newest first, each with its job where that is still known."""
+def listed(desk: DeskOf, response: Response, page: PageOf) -> list[dict[str, Any]]:
+    """Sweeps, the newest first, each with its job where that is still known; X-Total-Count says how many there are."""
     kept = Sweeps(desk.settings.runs)
     jobs = {job.id: JobOut.of(job).model_dump() for job in desk.jobs.all() if job.kind == "sweep"}
     names = [*(name for name in jobs if not kept.begun(name)), *kept.names()]
-    return [{"id": name, "job": jobs.get(name), "begun": kept.begun(name)} for name in names]
+    return [{"id": name, "job": jobs.get(name), "begun": kept.begun(name)} for name in part_of(names, page, response)]
 
 
 @router.get("/{identity}")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.config import JsonDict
 
 from app.desk import DeskOf, KeyOf
+from app.pages import PageOf, part_of
 from app.schemas import JobOut
 from app.trainings import Trainings
 from core.errors import CorrectionError
@@ -66,9 +67,9 @@ def start(request: TrainingRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
 
 
 @router.get("")
-def listed(desk: DeskOf) -> list[dict[str, Any]]:
-    """All trainings, the newest first, each with its job where that is still known."""
-    return Trainings(desk.settings.runs).listed(desk)
+def listed(desk: DeskOf, response: Response, page: PageOf) -> list[dict[str, Any]]:
+    """Trainings, the newest first, each with its job where that is still known; X-Total-Count says how many there are."""
+    return list(part_of(Trainings(desk.settings.runs).listed(desk), page, response))
 
 
 @router.get("/{identity}")

@@ -55,9 +55,10 @@ class Inside:
                 raise TypeError("only a block's frames have axes")
             counts.append(mesh.shape)
             axes.extend(axis / part for axis, part in zip(mesh.axes, longer, strict=True))
-            moved.append(frame.displacement + np.append(frame.slip, 0.0) + mesh.nodes * (1 - 1 / longer))
+            places = frame.move(mesh.nodes)  # a correction that stands on the equilibrium counts, too
+            moved.append(places - mesh.nodes / longer)
             with np.errstate(invalid="ignore", divide="ignore"):
-                energy.append(nodal_density(BlockModel(setup, mesh), mesh.nodes + frame.displacement))
+                energy.append(nodal_density(BlockModel(setup, mesh), places))
         with np.errstate(over="ignore"):
             return cls(
                 np.array(counts, dtype=np.int32),

@@ -69,6 +69,7 @@ def record_corrections(
                 aside / f"{name}.npz", cloud_index=index, corrected=side.surface.astype(np.float32), tool_corrected=side.tool,
                 tool_radius_corrected=np.array(setup.tool.radius), error_corrected=side.error.astype(np.float32),
                 distance_corrected=side.distance, paper_corrected=side.paper, camera_corrected=sight_of(setup).pose.matrix,
+                **side.inside.arrays("corrected"),
             )  # fmt: skip
         aside.chmod(0o755)
         _replace(aside, out)

@@ -26,6 +26,7 @@ export function start() {
   onViewer(watch);
   // What is seen inside is sent only where it is shown.
   on(["section", "quantity", "layers"], () => { if (state().live && answer) send(); });
+  on(["live"], drawBar);
   on(["run", "sequence"], () => { if (openedPanel() === "live") { leave(); open(); } });
 }
 
@@ -190,15 +191,27 @@ function drawPad() {
   document.getElementById("live-below").textContent = `${below.toFixed(1)} mm`;
 }
 
+/** The same numbers over the scene, where one looks while dragging. */
+function drawBar() {
+  const bar = document.getElementById("live-bar");
+  bar.hidden = !state().live || !answer || Boolean(answer.problem);
+  if (bar.hidden) return;
+  bar.classList.toggle("bad", !answer.converged);
+  fill(bar, answer.converged ? [element("b", {}, mm(answer.depth)), element("b", {}, newtons()), element("span", { class: "muted" }, rate() ? `${rate().toFixed(0)}/s` : "")] : [element("b", {}, "No equilibrium")]);
+}
+
+const newtons = () => { const force = Math.hypot(...answer.force); return `${force.toFixed(force < 1 ? 3 : 2)} N`; };
+
+const rate = () => (times.length > 1 ? (times.length - 1) / ((times.at(-1) - times[0]) / 1e3) : null);
+
 function drawAnswer() {
+  drawBar();
   if (!document.getElementById("live-answer")) return;
   if (answer?.problem) { fill("live-answer", element("div", { class: "note-card bad" }, element("strong", {}, "No answer"), answer.problem.message)); return; }
   if (!answer) { fill("live-answer", says("Setting the model up …")); return; }
-  const force = Math.hypot(...answer.force);
-  const rate = times.length > 1 ? (times.length - 1) / ((times.at(-1) - times[0]) / 1e3) : null;
   const fact = (label, value, id) => element("div", { class: "live-fact" }, element("span", {}, label), element("b", { id }, value));
   fill("live-answer", element("div", { class: "live-facts" },
-    fact("Push depth", mm(answer.depth), "live-push"), fact("Force", `${force.toFixed(force < 1 ? 3 : 2)} N`, "live-force"),
-    fact("Answers/s", rate ? rate.toFixed(0) : "–", "live-rate"), fact("Solved in", `${(1e3 * answer.seconds).toFixed(0)} ms`, "live-solve")),
+    fact("Push depth", mm(answer.depth), "live-push"), fact("Force", newtons(), "live-force"),
+    fact("Answers/s", rate() ? rate().toFixed(0) : "–", "live-rate"), fact("Solved in", `${(1e3 * answer.seconds).toFixed(0)} ms`, "live-solve")),
     answer.converged ? null : element("div", { class: "note-card bad" }, element("strong", {}, "No equilibrium"), `${capital(answer.outcome)}. The last one is shown.`));
 }

@@ -54,5 +54,17 @@ def test_every_operation_says_what_it_does_and_what_may_go_wrong() -> None:
                 assert problem.endswith("/Problem") == (int(status) >= 400), (path, method, status)
 
 
+def test_every_body_has_an_example_every_job_takes_a_key_and_every_list_has_pages() -> None:
+    schemas = create_app(Settings(), {}).openapi()["components"]["schemas"]
+    for path, methods in DESCRIBED.items():
+        for method, said in methods.items():
+            parameters = {one["name"] for one in said.get("parameters", [])}
+            body = said.get("requestBody", {}).get("content", {}).get("application/json", {}).get("schema", {}).get("$ref", "")
+            assert not body or schemas[body.split("/")[-1]].get("examples"), (path, method)
+            assert "202" not in said["responses"] or path.endswith("/retry") or "Idempotency-Key" in parameters, (path, method)
+            answer = said["responses"].get("200", {}).get("content", {}).get("application/json", {}).get("schema", {})
+            assert answer.get("type") != "array" or path == "/api/effects" or {"after", "most"} <= parameters, (path, method)
+
+
 def test_the_page_says_where_the_description_is(api: tuple[Any, httpx.Client]) -> None:
     assert api[1].get("/openapi.json").json()["info"]["title"] == "Palpate"

@@ -118,3 +118,17 @@ def test_every_change_is_noticed(jobs: Jobs, tmp_path: Path) -> None:
     ended(jobs, job)
     seen.append(jobs.version)
     assert seen[0] < seen[1] < seen[2]
+
+
+def test_what_a_killed_job_made_beside_the_others_is_gone_and_it_is_done_once_more(tmp_path: Path) -> None:
+    beside = tmp_path / "datasets" / ".importing"
+    (beside / "of-an-earlier-server").mkdir(parents=True)
+    with closing(Jobs(tmp_path / "runs", TARGETS, beside=[beside], tidy=lambda: "made room")) as jobs:
+        assert not beside.exists()
+        job = ended(jobs, jobs.submit("litter", {"beside": str(beside), "again": str(tmp_path / "again")}))
+        assert job.state is JobState.INTERRUPTED
+        assert not list(beside.iterdir()) and scratch_is_clean(tmp_path / "runs")
+        jobs.retry(job.id)
+        assert ended(jobs, job).state is JobState.DONE
+        assert not list(beside.iterdir())
+        assert [note.text for note in jobs.notes(job.id)].count("made room") == 2

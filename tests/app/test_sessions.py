@@ -95,6 +95,18 @@ def test_run_without_its_dataset_is_shown_without_the_cloud(sessions: Sessions, 
     assert state["drawn"]["triangles"]
 
 
+def test_what_a_training_adds_to_a_run_is_shown_without_a_new_start(sessions: Sessions, place: Any, run_name: str) -> None:
+    wish = view(run_name, layers=("raw", "corrected"), colour="corrected")
+    assert "raw" in sessions.open("page-one").show(wish)["drawn"]["figures"]
+    arrays = Runs(place.runs).get(run_name).replay("poke-01").arrays
+    made = {f"{key}corrected": arrays[f"{key}extended"] for key in ("", "error_", "distance_", "paper_", "tool_", "tool_radius_")}
+    folder = place.runs / "corrections" / run_name
+    folder.mkdir(parents=True)
+    np.savez(folder / "poke-01.npz", **made, camera_corrected=arrays["camera_extended"], cloud_index=arrays["cloud_index"])
+    figures = sessions.open("page-one").show(wish)["drawn"]["figures"]
+    assert "raw-lines" in figures and any(name.startswith("corrected-error-") for name in figures)
+
+
 def test_unknown_sequence_is_named_with_those_there_are(sessions: Sessions, run_name: str) -> None:
     with pytest.raises(Missing, match="no sequence poke-99; it has drag-01, poke-01"):
         sessions.open("page-one").show(View(run=run_name, sequence="poke-99"))

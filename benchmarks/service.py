@@ -1,0 +1,111 @@
+"""Points of a sweep over REST, by two processes and by a dask cluster of two workers, against a plain loop in one process.
+
+python -m benchmarks.service [POINTS]
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from app.client import Client
+from core.dataset import open_dataset
+from core.frames import FloatArray
+from core.grading import REPLAY_GRID
+from core.sweeping import Axis, Request, Space
+from core.sweeping.measure import error_of, measure
+from core.sweeping.methods import batches
+from core.sweeping.watched import watch
+from core.synthetic import HiddenEffect, Scenario, make_dataset
+
+__all__ = ["run"]
+
+POINTS, WORKERS, FRAMES = 200, 2, 2
+LOW, HIGH = 4e-3, 8e-3
+SAME = 1e-9
+"""Errors [m] that differ by less are the same: a registration's last digits differ from process to process."""
+
+
+def run(points: int = POINTS) -> list[Table]:
+    """Seconds and points a minute of all three; RuntimeError where an error of a point differs between them."""
+    with tempfile.TemporaryDirectory() as place:
+        home = Path(place)
+        hidden = HiddenEffect("tool_radius", {"radius": 6e-3})
+        make_dataset(home / "datasets" / "phantom", Scenario(effects=(hidden,), sequences=("poke-top-01",)), 3)
+        load = os.getloadavg()[0]
+        alone, plain = _loop(home, points)
+        rows = [("plain loop, one process", alone, plain)]
+        with _served(home / "a", home, {}) as palpate:
+            rows.append(("over REST, two processes", *_swept(palpate, points)))
+        with _cluster() as address, _served(home / "b", home, {"PALPATE_SCHEDULER": address}) as palpate:
+            rows.append(("over REST, dask of two workers", *_swept(palpate, points)))
+    table = Table(
+        "how", "s", "points a minute", "times the loop", title=f"{points} points of a sweep; load {load:.1f} at the start"
+    )
+    for name, seconds, errors in rows:
+        apart = float(np.abs(errors - plain).max())
+        if not apart < SAME:
+            raise RuntimeError(f"{name}: errors differ by {apart:g} m from those of the loop")
+        table.add_row(name, f"{seconds:.1f}", f"{60 * points / seconds:.0f}", f"{alone / seconds:.2f}")
+    return [table]
+
+
+def _loop(home: Path, points: int) -> tuple[float, FloatArray]:
+    began = time.monotonic()
+    space = Space((Axis("tool_radius.radius", LOW, HIGH),))
+    stated, data = watch(open_dataset(home / "datasets" / "phantom"), (), FRAMES)
+    grid = REPLAY_GRID.for_tool(stated.tool.radius)
+    errors = []
+    for values in next(batches(Request(space=space, steps=points, frames=FRAMES))):
+        sums = np.array(measure(space.setup(stated, values), data[0], grid).sums)
+        errors.append(float(error_of(sums.sum(axis=0), "distance")))
+    return time.monotonic() - began, np.array(errors)
+
+
+def _swept(palpate: Client, points: int) -> tuple[float, FloatArray]:
+    """From the request to the end of the job, all that starts on the way counted."""
+    began = time.monotonic()
+    job = palpate.sweep("phantom", {"tool_radius.radius": (LOW, HIGH)}, steps=points, frames=FRAMES)
+    palpate.wait(job["id"])
+    seconds = time.monotonic() - began
+    found = sorted((row for row in palpate.points(job["id"]) if row["kind"] == "search"), key=lambda row: int(row["number"]))
+    return seconds, np.array([row["error"] for row in found], dtype=float)
+
+
+@contextmanager
+def _served(runs: Path, home: Path, further: dict[str, str]) -> Iterator[Client]:
+    command = [sys.executable, "-m", "app.cli", "serve", "--port", "0", "--workers", str(WORKERS), "--runs", str(runs)]
+    command += ["--datasets", str(home / "datasets")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "COLUMNS": "200", **further}) as server:
+        assert server.stdout is not None
+        address = re.search(r"http://[\d.:]+", server.stdout.readline())
+        try:
+            if address is None:
+                raise RuntimeError("the server did not say where it is")
+            with Client(address[0]) as client:
+                yield client
+        finally:
+            server.terminate()
+
+
+@contextmanager
+def _cluster() -> Iterator[str]:
+    from distributed import LocalCluster  # noqa: PLC0415 (optional)
+
+    with LocalCluster(n_workers=WORKERS, threads_per_worker=1, dashboard_address=None) as cluster:  # type: ignore[no-untyped-call]
+        yield str(cluster.scheduler_address)
+
+
+if __name__ == "__main__":
+    Console().print(*run(int(sys.argv[1]) if len(sys.argv) > 1 else POINTS))
