@@ -9,6 +9,7 @@ from rich.console import Console
 from benchmarks import (
     cleaning,
     convergence,
+    correcting,
     correction,
     dataset,
     diagnosis,
@@ -41,6 +42,7 @@ ALL = {
     "service": service.run,
     "dataset": dataset.run,
     "correction": correction.run,
+    "correcting": correcting.run,
     "diagnosis": diagnosis.run,
     "live": live.run,
     "scrub": scrub.run,

@@ -125,7 +125,9 @@ def _surface_of(body: Body, device: torch.device | str) -> Callable[[Tensor], Te
 
 def _apart(points: Tensor, others: Tensor, index: Tensor) -> Tensor:
     """Distance (b, p) [m] of points (b, p, 3) to those of others (b, s, 3) with this number (b, p)."""
-    found = others.gather(1, index[:, :, None].expand(-1, -1, 3))
+    # By one flat index: its gradient is added up in one order on CUDA, too, if that is asked for.
+    flat = index + others.shape[1] * torch.arange(len(others), device=index.device)[:, None]
+    found = others.reshape(-1, 3).index_select(0, flat.flatten()).reshape(points.shape)
     return ((found - points).square().sum(dim=2) + _LEAST**2).sqrt()
 
 

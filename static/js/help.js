@@ -5,6 +5,7 @@ import { KEYS as REGISTER } from "./register-keys.js";
 
 const PAGE = [
   ["?", "this help"], ["Space", "play or pause"], ["← →", "one frame back or on; with Shift ten"], ["Home, End", "first, last frame"], ["I, O", "loop from, to this frame"], ["L", "loop on or off"],
+  ["0 1 2 3", "look from the side of the camera, the top, the front, the side"], ["B", "models side by side"], ["X", "cut the block open"],
   ["Ctrl Z", "undo, in What if and in Register"], ["Tab, Enter", "reach and press every control"],
 ];
 

@@ -91,9 +91,9 @@ function build(job, wide) {
 }
 
 /** A way to each thing that the job made. */
-function made({ id, result }) {
+function made({ id, dataset, result }) {
   return Object.entries(openers).filter(([key]) => result?.[key] !== undefined).map(([key, { label, open }]) => element("button", { class: "button small", type: "button", "data-open": key, onclick: () => open(result[key], id, result) }, label))
-    .concat((result?.files ?? []).map((file) => element("a", { class: "button small", href: `/api/exports/${encodeURIComponent(result.export)}/${encodeURIComponent(file)}`, download: file }, file)));
+    .concat((result?.files ?? []).map((file) => element("a", { class: "button small", href: `/api/exports/${encodeURIComponent(result.export)}/${encodeURIComponent(file)}`, download: file }, dataset ? file.replace(`${dataset}-`, "").replace(`${dataset}.`, "report.") : file)));
 }
 
 /** The job's log, read when it is opened and followed while it is. */

@@ -24,7 +24,13 @@ export function patternSection(patterns, size, palette, explained = true) {
   const maps = () => element("div", { class: "maps" }, map("Measured error", "measured"), explained ? map("Predicted by the cause", "predicted") : null);
   const map = (caption, key) => {
     const canvas = element("canvas", { "data-pattern": key });
-    requestAnimationFrame(() => paint(canvas, box, patterns[key], patterns.limit, palette));
+    // Once it has a width: the panel may be behind another one while the report comes.
+    const seen = new ResizeObserver(() => {
+      if (!canvas.clientWidth) return;
+      seen.disconnect();
+      paint(canvas, box, patterns[key], patterns.limit, palette);
+    });
+    seen.observe(canvas);
     return element("button", { class: "map", type: "button", title: "Enlarge", onclick: enlarge }, element("span", { class: "caption" }, caption), canvas);
   };
   const legend = () => element("div", { class: "map-legend" }, scaleBar(palette.signed, patterns.limit),

@@ -124,10 +124,13 @@ const TURNS = ["rotation about x", "rotation about y", "rotation about z"];
 
 /** The directions that the cloud determines weakly, as arrows. */
 function weak(found) {
-  return (found?.registration.directions ?? []).slice(0, found?.registration.weak_directions.length ?? 0).slice(0, 6).map(({ sigma, parts }) => ({
-    translation: MOTIONS.map((name) => parts[name]), rotation: TURNS.map((name) => parts[name]), text: `± ${(sigma * 1e3).toFixed(1)} mm`,
+  return (found?.registration.directions ?? []).slice(0, found?.registration.weak_directions.length ?? 0).slice(0, 6).map(({ parts }, at) => ({
+    translation: MOTIONS.map((name) => parts[name]), rotation: TURNS.map((name) => parts[name]), text: amount(found.registration.weak_directions[at]),
   }));
 }
+
+/** "± 1.2 mm" of the words for a weak direction, or that it is open. */
+const amount = (text) => (/\+- ([\d.]+ \w+)/.test(text) ? `± ${text.match(/\+- ([\d.]+ \w+)/)[1]}` : "open");
 
 /** The rigid fit of the whole pairs, or why there is none yet. */
 async function fit() {

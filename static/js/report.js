@@ -15,7 +15,7 @@ export function showReport(heading, report, patterns, palette) {
     element("h1", { class: "verdict" }, heading.sentence),
     element("p", {}, element("a", { class: "button", href: `/api/runs/${encodeURIComponent(heading.id)}/report.html`, download: `${heading.id}.html` }, "Save as one file"), " ", exportButton(heading.id)),
     (heading.notes ?? []).map((text) => element("p", { class: "gain-note" }, text)),
-    causes.length ? section(causes.length > 1 ? "Causes" : "Cause", "interval", causes.map(cause)) : null,
+    causes.length ? section(report.verdict === "replay" ? "Added to the stated setup" : causes.length > 1 ? "Causes" : "Cause", report.verdict === "replay" ? "" : "interval", causes.map(cause)) : null,
     report.gain ? section("Error on sequences not fitted on", report.gain.unit ?? "mm", gain(report.gain, causes.length > 0)) : null,
     heading.sequences?.length ? section("Every sequence", "RMS distance, mm", comparisonSection(heading)) : null,
     patterns ? section(causes.length ? "The error and its explanation" : "The error that is left", "", patternSection(patterns, heading.size, palette, causes.length > 0)) : null,
@@ -64,7 +64,7 @@ function cause({ effect, probability, parameters }) {
       element("td", { class: "number interval" }, determined(entry) ?? shown.interval));
   });
   return element("div", { class: "cause" },
-    element("div", { class: "cause-head" }, element("strong", {}, capital(words(effect))), element("span", {}, `probability ${percent(probability)}`)),
+    element("div", { class: "cause-head" }, element("strong", {}, capital(words(effect))), typeof probability === "number" ? element("span", {}, `probability ${percent(probability)}`) : null),
     element("table", {}, element("tbody", {}, rows)));
 }
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from browsing import NEEDS_CHROMIUM, Page
 from registering import CORNERS, NODES, Bench, X, Y, Z, off
+from scipy.spatial.transform import Rotation
 from small_dataset import SIZE, ply_bytes, write_valid_dataset
 
 from app.clicking import Phantom
@@ -114,3 +115,20 @@ def test_what_is_wrong_with_pairs_is_said_at_the_pair_and_mended_there(bench: Be
     bench.page.until(lambda: len(bench.values["pairs"]) == 4)
     bench.click(np.array([0.0, 0.0, Z]))
     bench.page.until(lambda: "There is nothing of the cloud under this click" in bench.text)
+
+
+def test_directions_that_the_cloud_leaves_open_are_told_in_words_and_by_arrows(page: Page) -> None:
+    true = Transform(Rotation.from_euler("xyz", [2.5, 0.1, 0.2]).as_matrix(), np.array([0.01, 0.02, 0.35])).inverse()
+    clicked = true.inverse().apply(np.array(CORNERS))  # the dataset's own cloud shows no side of the block
+    pairs = [{"cloud": one.tolist(), "mesh": other.tolist(), "landmark": None} for one, other in zip(clicked, CORNERS, strict=True)]
+    kept = {"dataset": "small", "of": {"small": {"pairs": pairs}}}
+    bench = Bench(page, true)
+    page.page.goto(str(page.client.base_url))
+    page.page.evaluate("kept => localStorage.setItem('palpate.register', JSON.stringify(kept))", kept)
+    bench.open()
+    page.until(lambda: "3 pairs fit to" in bench.text)
+    page.page.keyboard.press("Enter")
+    page.page.wait_for_selector("[data-weak]", timeout=120_000)
+    told = page.page.locator("[data-weak]").all_inner_texts()
+    assert len(told) >= 3 and any("Rotation about z" in text and "no points on -x" in text for text in told)
+    page.until(lambda: {f"/weak/{number}" for number in range(len(told))} <= set(bench.frame.evaluate(NODES)))

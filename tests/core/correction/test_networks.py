@@ -7,7 +7,7 @@ from torch import nn
 
 from core.correction import Body, NetworkSpec, build
 from core.correction.compact import Compact
-from core.correction.unet import Padded, UNet
+from core.correction.unet import Padded, UNet, by_halves, pooled
 from core.errors import CorrectionError
 
 SIZE = (0.0687, 0.0393, 0.0358)
@@ -72,6 +72,18 @@ def test_taps_left_out_change_nothing(shape):
     values = torch.randn(2, 3, *shape)
     plain = (nn.functional.conv2d if len(shape) == 2 else nn.functional.conv3d)(values, part.weight, part.bias, padding=1)
     assert torch.allclose(part(values), plain, atol=1e-6)
+
+
+@pytest.mark.parametrize("shape", [(13, 5), (13, 5, 5), (2, 1, 3)])
+def test_pool_for_cuda_is_that_of_torch_and_so_is_its_gradient(shape):
+    torch.manual_seed(0)
+    one, other = (torch.rand(2, 3, *shape, generator=torch.Generator().manual_seed(1)).requires_grad_() for _ in range(2))
+    weights = torch.rand_like(pooled(one))
+    (pooled(one) * weights).sum().backward()
+    (by_halves(other) * weights).sum().backward()
+    assert torch.equal(pooled(one), by_halves(other))
+    assert one.grad is not None and other.grad is not None
+    assert torch.equal(one.grad, other.grad)
 
 
 def test_every_voxel_feels_the_tool_and_every_other_voxel():
