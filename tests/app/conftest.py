@@ -210,13 +210,21 @@ def write_run(folder: Path, dataset: Path) -> None:
         "splits": {"poke-01": "train", "drag-01": "test"},
     }
     (folder / "origin.json").write_text(json.dumps(origin))
-    for name in ("poke-01", "drag-01"):
-        np.savez(folder / "replays" / f"{name}.npz", **replay_arrays())
+    np.savez(folder / "replays" / "poke-01.npz", **replay_arrays())
+    np.savez(folder / "replays" / "drag-01.npz", **replay_arrays(), **solver_arrays())
     centres = np.array([[x, y, SIZE[2]] for x in np.linspace(-0.03, 0.03, 9) for y in np.linspace(-0.015, 0.015, 5)])
     measured = 5e-4 * np.exp(-((centres[:, 0] / 0.01) ** 2))
     measured[0] = np.nan
     normals = np.tile([0.0, 0.0, 1.0], (len(centres), 1))
     np.savez(folder / "patterns.npz", centres=centres, normals=normals, measured=measured, predicted=0.9 * measured)
+
+
+def solver_arrays() -> dict[str, Any]:
+    """What newer recordings say of the solver: forces, iterations, and a frame in which the stated model found no equilibrium."""
+    count = np.arange(FRAMES)
+    forces = {"force_raw": 0.1 * count, "force_extended": 0.2 * count}
+    failed = {"outcome_raw": (count == 3).astype(np.int8), "outcome_extended": np.zeros(FRAMES, np.int8)}
+    return {**forces, **failed, "iterations_raw": 3 + count, "iterations_extended": 5 + count}
 
 
 def replay_arrays() -> dict[str, Any]:

@@ -66,3 +66,14 @@ def test_a_part_dragged_with_shift_is_looped_and_the_cursor_stays(page: Page) ->
     page.page.keyboard.press("End")
     page.page.keyboard.press("Space")
     page.until(lambda: page.frame in (2, 3), 20)
+
+
+def test_lanes_tell_forces_iterations_and_frames_without_equilibrium(page: Page) -> None:
+    page.open()
+    plot = page.page.locator("#plot").bounding_box()
+    page.page.mouse.move(plot["x"] + 46 + (plot["width"] - 62) * 0.75, plot["y"] + plot["height"] / 2)
+    tip = page.page.inner_text("#plot-tip").replace("\N{NO-BREAK SPACE}", " ")
+    for text in ("raw force 0.30 N", "extended force 0.60 N", "raw iterations 6", "extended iterations 8", "no equilibrium: raw"):
+        assert text in tip
+    page.page.mouse.move(plot["x"] + 46, plot["y"] + plot["height"] / 2)
+    page.until(lambda: "no equilibrium" not in page.page.inner_text("#plot-tip"))
