@@ -153,7 +153,7 @@ class Memory:
         past = self.history
         if not self.fraction:
             return past
-        strain = log_strain(strained)
+        strain = log_strain(strained, past.largest)
         size = np.sqrt(np.einsum("mc,mc,c->m", strain, strain, [1, 1, 1, 2, 2, 2]))
         growing = size > past.largest
         longer, kept, free = size[growing], past.kept.copy(), past.free.copy()

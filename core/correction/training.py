@@ -236,7 +236,8 @@ class _Run:
         """What a checkpoint must agree with; more epochs, another device or interval may be asked of it."""
         free = ("device", "epochs", "keep_every")
         spec = {key: value for key, value in self.spec.to_json().items() if key not in free}
-        about = {key: self.samples.about[key] for key in ("dataset", "sequences", "points", "every", "seed", "mesh", "grid")}
+        names = ("dataset", "sequences", "points", "every", "seed", "mesh", "grid", "setup")
+        about = {name: self.samples.about[name] for name in names}
         return {"spec": spec, "split": {key: list(names) for key, names in asdict(self.split).items()}, "samples": about}
 
     def _keep(self) -> None:

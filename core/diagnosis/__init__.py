@@ -16,7 +16,6 @@ from core.diagnosis.assurance import assured
 from core.diagnosis.bench import Bench
 from core.diagnosis.felt_picture import draw_palpation
 from core.diagnosis.findings import Findings
-from core.diagnosis.gain import harm
 from core.diagnosis.observations import Observations
 from core.diagnosis.palpation import palpated
 from core.diagnosis.patterns import draw_patterns, patterns
@@ -26,6 +25,7 @@ from core.diagnosis.static import StaticChannel
 from core.diagnosis.still import Still
 from core.diagnosis.unseen import observe_each, pushed_places
 from core.diagnosis.verdict import report_of
+from core.diagnosis.withdrawal import objection
 from core.diagnosis.workers import Workers
 from core.diagnosis.worth import tuned, worth
 from core.errors import DiagnosisError, RunError
@@ -140,9 +140,9 @@ def _run(
     model = findings.best.model if findings.best else findings.baseline
     report(0.75, "measuring the gain on test sequences")
     gain = worth(bench, findings, unseen, pool, fine, seed, assurance) if unseen else None
-    if gain is not None and findings.best and (why := harm(findings.best.model.names, gain)):
+    if why := objection(findings, gain):
         findings.withdraw(why)
-        model, gain = findings.baseline, worth(bench, findings, unseen, pool, fine, seed)
+        model, gain = findings.baseline, worth(bench, findings, unseen, pool, fine, seed) if unseen else None
     found = tuned(bench, model) if findings.best else setup
     result = report_of(dataset, bench, findings, gain, "test")
     if dataset.accepted is not None:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from core.diagnosis.columns import TOOL_COLUMNS, Wanted
-from core.diagnosis.evidence import Block, explained, fit, log_evidence, predictive_score
+from core.diagnosis.evidence import Block, explained, fit, log_evidence, predictive_score, within_reach
 from core.diagnosis.hypothesis import Model, Nuisances, nuisance_setups, with_effects
 from core.diagnosis.led import led, with_replays
 from core.diagnosis.noise import Noise, noises
@@ -35,7 +35,7 @@ PRIOR_STEPS = 4.0
 """Prior standard deviation of a search coordinate, in its scales."""
 TRUST = 2.5
 """Longest step of a fit at once, in the scales of what it moves."""
-_ITERATIONS = 4
+_ITERATIONS = 6
 _WORTH = 0.5
 """A step that promises less [nats] is not made."""
 _OPTIMISM = (10.0, 3.0)
@@ -250,11 +250,9 @@ class Bench:
             lost = best + _OPTIMISM[min(iteration, 1)] * promised < hopeless or (iteration == 2 and best < hopeless)
             if lost or promised < _WORTH:
                 break
-            solution = fit(self.tempered(model), [*model.nuisance, *model.columns], self.precision(model, nuisances))
-            change = solution.change[len(model.nuisance) :]
-            if np.abs(change / model.scales).max() < 0.05:
+            step = self._step(model, nuisances, radius)
+            if np.abs(step / model.scales).max() < 0.05:
                 break
-            step = change * min(1.0, radius / np.abs(change / model.scales).max())
             trial = self.evaluate(self._shift(model, step), model.predictions)
             value = self.objective(trial, nuisances)
             if value > best:
@@ -266,6 +264,13 @@ class Bench:
                 if radius < 0.1:
                     break
         return model
+
+    def _step(self, model: Model, nuisances: FloatArray, reach: float) -> FloatArray:
+        """Most probable change of the search coordinates, none by more than `reach` of its scales."""
+        columns = [*model.nuisance, *model.columns]
+        own = range(len(model.nuisance), len(columns))
+        change = within_reach(self.tempered(model), columns, self.precision(model, nuisances), own, model.scales, reach)
+        return change[len(model.nuisance) :]
 
     def _promised(self, model: Model, nuisances: FloatArray) -> float:
         """What the best values of the model's search coordinates would gain to first order [nats]."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from core.diagnosis.bench import PRIOR_STEPS, TRUST, Bench
 from core.diagnosis.beneath import lumps_under
-from core.diagnosis.evidence import fit
+from core.diagnosis.evidence import within_reach
 from core.diagnosis.hypothesis import TWINS, Model
 from core.diagnosis.ordered import TRACED
 from core.diagnosis.prediction import Prediction
@@ -164,18 +164,22 @@ def _same_effect(model: Model) -> list[list[tuple[int, Tangent]]]:
     return found
 
 
-def begin(candidate: Candidate, model: Model, bench: Bench) -> Effect:
-    """Where to begin the refit: at the size that the linear fit asks for, where the column tells of a size."""
-    start = candidate.start
-    if candidate.widened:
-        return _asked_for(candidate, model, bench)
+def begin(candidate: Candidate, model: Model, bench: Bench, beside: Candidate | None = None) -> Effect:
+    """Where to begin the refit: at the size that the linear fit asks for, where the column tells of a size.
+
+    With another candidate `beside` it, what both ask for together.
+    """
+    start, together = candidate.start, candidate if beside is None else candidate.beside(beside)
+    columns, precision = together.precision(list(model.nuisance), bench.nuisances.precision)
+    limits = {place: scale for one in (candidate, beside) if one for place, scale in _limited(one).items()}
+    own, scales = [columns.index(place) for place in limits], np.array(list(limits.values()))
+    asked = within_reach(bench.tempered(model), columns, precision, own, scales, TRUST)
+    if limited := _limited(candidate):
+        changes = asked[[columns.index(place) for place in limited]]
+        return start.at((np.array(start.coordinates) + changes).tolist())
     if start == OWN_GRID or isinstance(start, (TimeOffset, BaseSlip, BaseDetachment, Gravity, ToolFriction, *OUTSIDE)):
         return start
-    columns, precision = candidate.precision(list(model.nuisance), bench.nuisances.precision)
-    changes = fit(bench.tempered(model), columns, precision).change[len(model.nuisance) :]
-    if isinstance(start, _TOGETHER):
-        return start.at([here + float(change) for here, change in zip(start.coordinates, changes, strict=True)])
-    change = float(changes[-1])
+    change = float(asked[columns.index(candidate.columns[-1])])
     if isinstance(start, (StrainStiffening, BaseCompliance, Viscoelasticity, PermanentSet)):
         return _shared(start, _share(change))
     if isinstance(start, Anisotropy) and change < 0:  # softer along is stiffer across
@@ -194,13 +198,10 @@ def _shared(start: StrainStiffening | BaseCompliance | Viscoelasticity | Permane
     return start.moved([start.retained_fraction * share])
 
 
-def _asked_for(candidate: Candidate, model: Model, bench: Bench) -> Effect:
-    """What a stated accuracy that is left open pulls to, no farther than a fit's first step."""
-    columns, precision = candidate.precision(list(model.nuisance), bench.nuisances.precision)
-    change = fit(bench.tempered(model), columns, precision).change[[columns.index(column) for column in candidate.widened]]
-    scales = np.array([item.scale for item in candidate.start.numbers()])
-    step = change * min(1.0, TRUST / max(float(np.abs(change / scales).max()), 1e-12))
-    return candidate.start.at((np.array(candidate.start.coordinates) + step).tolist())
+def _limited(candidate: Candidate) -> dict[int, float]:
+    """Columns that a refit begins no farther along than a fit's first step, with their scales: of effects whose numbers are one."""
+    places = candidate.widened or (candidate.columns if isinstance(candidate.start, _TOGETHER) else ())
+    return dict(zip(places, (item.scale for item in candidate.start.numbers()), strict=bool(places)))
 
 
 def _share(change: float) -> float:

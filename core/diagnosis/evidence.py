@@ -14,7 +14,10 @@ import numpy as np
 
 from core.frames import FloatArray
 
-__all__ = ["FLAT", "Block", "Fit", "draw_rights", "explained", "fit", "gram", "log_evidence", "predictive_gain", "predictive_score"]
+__all__ = [
+    "FLAT", "Block", "Fit", "draw_rights", "explained", "fit", "gram", "log_evidence", "predictive_gain", "predictive_score",
+    "within_reach",
+]  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +75,32 @@ def fit(blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray, 
     change = covariance @ (precision @ mean - right)
     misfit = square + 2 * right @ change + change @ matrix @ change
     return Fit(np.asarray(change, dtype=float), np.asarray(covariance, dtype=float), float(misfit))
+
+
+_DAMPINGS = np.geomspace(1e-3, 1e12, 61)
+
+
+def within_reach(
+    blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray, own: Sequence[int], scales: FloatArray, reach: float
+) -> FloatArray:
+    """Least squares (k,) in which some columns change by no more than `reach` of their scales (Levenberg 1944, Marquardt 1963).
+
+    What the data hardly tell is held back first, what they tell surely goes nearly all the way; a whole step made shorter would
+    keep its direction, which the doubtful ones rule.
+
+    Args:
+        columns, precision: as for `fit`. own: places among the columns of those with a limit. scales: (len(own),) their scales.
+    """
+    change = fit(blocks, columns, precision).change
+    if not len(own) or np.abs(change[own] / scales).max() <= reach:
+        return change
+    index, damped = np.asarray(own), precision.copy()
+    for damping in _DAMPINGS:
+        damped[index, index] = precision[index, index] + damping * scales**-2.0
+        change = fit(blocks, columns, damped).change
+        if np.abs(change[index] / scales).max() <= reach:
+            break
+    return change
 
 
 def log_evidence(blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray) -> float:

@@ -10,17 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.diagnosis.felt_gain import FeltLadder
 from core.diagnosis.force import rms_force
 from core.diagnosis.observations import Observations
 from core.diagnosis.prediction import Prediction
 from core.diagnosis.probe_sums import paper_sums, probe_sums, removed_share
 from core.setup import Setup
 
-__all__ = ["Ladder", "harm", "ladder"]
-
-_WORSE = 0.1
-"""Share of the reducible error that a cause surely adds on test sequences before it is withdrawn [1]: less may be the mesh's."""
+__all__ = ["Ladder", "ladder"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -43,17 +39,6 @@ class Ladder:
     probes: int
     force: tuple[float, float, float] | None = None
     tuned: tuple[float, float, float] | None = None
-
-
-def harm(names: Sequence[str], gain: Ladder | FeltLadder) -> str:
-    """Why causes that make the test sequences worse are not named; empty where they do not (step 10 of the method: no transfer)."""
-    value, low, high = gain.removed
-    if high > -_WORSE:
-        return ""
-    return (
-        f"{' and '.join(names)} would explain the sequences that were fitted on, but makes the test sequences worse: it adds "
-        f"{-100 * value:.0f} % ({-100 * high:.0f} to {-100 * low:.0f} %) of the reducible error there, and is not named"
-    )
 
 
 def ladder(

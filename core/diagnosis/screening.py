@@ -8,7 +8,8 @@ the same gains on data drawn from the noise model alone give the bound that a ca
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from core.diagnosis.evidence import FLAT, Block, draw_rights
 from core.effects import Effect
 from core.frames import FloatArray
 
-__all__ = ["Candidate", "linear_gains", "null_gains", "right_sides"]
+__all__ = ["Candidate", "linear_gains", "null_gains", "pair_gains", "right_sides"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -43,6 +44,11 @@ class Candidate:
         own = np.arange(len(nuisance), size)
         precision[own, own] = np.array(self.spread) ** -2.0
         return [*nuisance, *self.columns], precision
+
+    def beside(self, other: Candidate) -> Candidate:
+        """The same effect with the columns of another one fitted at once; its own come first."""
+        columns, spread = (*self.columns, *other.columns), (*self.spread, *other.spread)
+        return replace(self, columns=columns, spread=spread, widened={**self.widened, **other.widened})
 
 
 def right_sides(blocks: Sequence[Block]) -> FloatArray:
@@ -87,3 +93,13 @@ def null_gains(
     """Best-of-catalogue gains (d,) [nats] on draws from the noise model: white noise, discrepancy and nuisances, no cause."""
     rights = draw_rights(blocks, nuisance, known, draws, np.random.default_rng(seed))
     return np.asarray(linear_gains(blocks, rights, nuisance, known, candidates).max(axis=1))
+
+
+def pair_gains(
+    blocks: Sequence[Block], rights: FloatArray, nuisance: Sequence[int], known: FloatArray, candidates: Sequence[Candidate]
+) -> list[tuple[float, Candidate, Candidate]]:
+    """Gain [nats] of every two candidates of different effects together on one set of right sides (1, b, k), best first."""
+    pairs = [(one, other) for one, other in combinations(candidates, 2) if one.start.name != other.start.name]
+    gains = linear_gains(blocks, rights, nuisance, known, [one.beside(other) for one, other in pairs])[0].tolist()
+    found = [(gain, one, other) for gain, (one, other) in zip(gains, pairs, strict=True)]
+    return sorted(found, key=lambda row: -row[0])

@@ -17,7 +17,7 @@ from core.diagnosis.intervals import stands
 from core.diagnosis.ordered import TRACED
 from core.diagnosis.pairing import mispaired
 from core.diagnosis.prediction import Prediction
-from core.diagnosis.screening import Candidate, linear_gains, null_gains, right_sides
+from core.diagnosis.screening import Candidate, linear_gains, null_gains, pair_gains, right_sides
 from core.diagnosis.shortlist import beyond_first_order, shortlist
 from core.diagnosis.structure import structure_of
 from core.effects import Effect
@@ -36,8 +36,15 @@ DEAR_OPTIMISM = 2.0
 """What is replayed along the tool's whole way, several times as dear as others, comes last, and not at all where so many times its
 linear gain would leave it that far behind."""
 
+PAIRS = 2
+"""Pairs that are fitted at once, at most, where causes one after another leave structure."""
 
-def _screen(bench: Bench, model: Model, finite: Sequence[Signature], origin: Model) -> tuple[Model, list[Candidate], np.ndarray]:
+
+Screening = tuple[Model, list[Candidate], np.ndarray]
+"""A model with the catalogue as columns, the candidates, and the linear gain of each [nats]."""
+
+
+def _screen(bench: Bench, model: Model, finite: Sequence[Signature], origin: Model) -> Screening:
     with_columns = bench.block_with(model, finite, origin)
     candidates = candidates_of(with_columns, bench, finite)
     blocks = bench.tempered(with_columns)
@@ -64,7 +71,7 @@ def search(bench: Bench, seed: int) -> Findings:
     findings = Findings(baseline, misfit=bench.misfit(baseline), known=known)
     findings.structure = findings.left = structure_of(bench, origin, seed)
     finite = signatures(bench, origin)
-    screened, candidates, gains = _screen(bench, origin, finite, origin)
+    first = screened, candidates, gains = _screen(bench, origin, finite, origin)
     blocks, nuisance = bench.tempered(screened), (*screened.nuisance, *screened.columns)
     chance = null_gains(blocks, nuisance, bench.precision(screened), candidates, NULL_DRAWS, seed)
     findings.bound = max(float(np.quantile(chance, NULL_QUANTILE)), LEAST_GAIN)
@@ -86,6 +93,8 @@ def search(bench: Bench, seed: int) -> Findings:
         current = findings.best = step
         bench.temperature = max(1.0, current.misfit)
         findings.left = structure_of(bench, current.model, seed)
+    if findings.left.significant and not known:
+        _paired(bench, findings, current, first, seed)
     if findings.best is not None and len(findings.best.model.effects) > 1 and not known:
         findings.best = _reconsidered(bench, findings, findings.best, finite, origin)
     _rescore(bench, findings)
@@ -96,7 +105,7 @@ def search(bench: Bench, seed: int) -> Findings:
     return findings
 
 
-def _again(bench: Bench, model: Model, finite: Sequence[Signature], origin: Model) -> tuple[Model, list[Candidate], np.ndarray]:
+def _again(bench: Bench, model: Model, finite: Sequence[Signature], origin: Model) -> Screening:
     """Screen the catalogue on top of a model that has causes already."""
     wanted = tangents(model.setup, model.names, bench.weighed)
     extended = bench.evaluate(model.effects, model.predictions, wanted, lump_places(bench))
@@ -124,6 +133,39 @@ def _forward(
     best = next((trial for trial in enough if stands(bench, trial.model, current.model)), None)
     findings.trials.extend(trial if trial is best else trial.scored() for trial in trials)
     return best
+
+
+def _paired(bench: Bench, findings: Findings, current: Trial, screening: Screening, seed: int) -> None:
+    """Take two causes at once that leave no structure where one after another did: each alone may look like a third.
+
+    A stated setup of which two things are wrong can be nearer to a third cause than to either of them (Tropp 2004, on greedy
+    pursuit), so that every step forward is a wrong one.
+    """
+    screened, candidates, _ = screening
+    nuisance = (*screened.nuisance, *screened.columns)
+    blocks = bench.tempered(screened)
+    ranked = pair_gains(blocks, right_sides(blocks), nuisance, bench.precision(screened), candidates)
+    for _, one, other in _apart(ranked, PAIRS):
+        bench.tell(f"trying {one.start.name} and {other.start.name} at once")
+        effects = [begin(one, screened, bench, other), begin(other, screened, bench, one)]
+        hopeless = bench.objective(current.model) - HOPELESS
+        trial = _trial(bench, effects, findings.baseline.predictions, findings.baseline, hopeless)
+        gain = predictive_gain(bench.score(trial.model), bench.score(current.model))[0]
+        left = structure_of(bench, trial.model, seed)
+        if gain > SECOND_FACTOR * findings.bound and not left.significant:
+            findings.trials.append(trial)
+            findings.best, findings.left = trial, left
+            bench.temperature = max(1.0, trial.misfit)
+            return
+        findings.trials.append(trial.scored())
+
+
+def _apart(ranked: Sequence[tuple[float, Candidate, Candidate]], most: int) -> list[tuple[float, Candidate, Candidate]]:
+    """The best of each pair of effects, so many of them at most."""
+    found: dict[frozenset[str], tuple[float, Candidate, Candidate]] = {}
+    for row in ranked:
+        found.setdefault(frozenset((row[1].start.name, row[2].start.name)), row)
+    return list(found.values())[:most]
 
 
 def _known(findings: Findings) -> tuple[str, ...]:
@@ -160,9 +202,7 @@ def _reconsidered(bench: Bench, findings: Findings, best: Trial, finite: Sequenc
     return best
 
 
-def _exchanged(
-    bench: Bench, findings: Findings, trials: tuple[Trial, Trial], lost: float, screening: tuple[Model, list[Candidate], np.ndarray]
-) -> Trial:
+def _exchanged(bench: Bench, findings: Findings, trials: tuple[Trial, Trial], lost: float, screening: Screening) -> Trial:
     """The best of two trials, or one with another cause beside the second's, should that be better still.
 
     Args:

@@ -21,23 +21,24 @@ _AROUND = 9e-3
 """Patches this near [m] say where a nearly hidden one should lie."""
 _APART = 1e-3
 """So far from its neighbours' median [m] it cannot lie: a model's error is as smooth as the surface."""
+_NEVER = 6e-3
+"""The same of a patch that is seen well: a dent at another time or place is a step of some millimetres, and no more."""
 
 
 def among_neighbours(gap: FloatArray, patch: IntArray, surface: Surface) -> MaskArray:
-    """Which points (m,) with these gaps (m,) [m] to keep: not those of nearly hidden patches (m,) far off all around."""
+    """Which points (m,) with these gaps (m,) [m] to keep: not those of patches (m,) far off all around.
+
+    A nearly hidden patch is far off sooner than one that is seen well.
+    """
     count = np.bincount(patch, minlength=surface.patches)
     seen = np.flatnonzero(count)
     if not len(seen):
         return np.ones(0, dtype=bool)
-    few = seen[count[seen] < max(_FEW * float(np.median(count[seen])), _FEWEST)]
-    well = np.setdiff1d(seen, few)
-    centres, normals = surface.patch_centres, surface.patch_normals
-    middle = {number: float(np.median(gap[patch == number])) for number in few}
-    lost = []
-    for number, value in middle.items():
-        near = np.linalg.norm(centres[well] - centres[number], axis=1) < _AROUND
-        around = well[near & (normals[well] @ normals[number] > 0.5)]
-        expected = np.median([np.median(gap[patch == other]) for other in around]) if len(around) else 0.0
-        if abs(value - expected) > _APART:
-            lost.append(number)
-    return ~np.isin(patch, lost)
+    well = count[seen] >= max(_FEW * float(np.median(count[seen])), _FEWEST)
+    middle = np.array([float(np.median(gap[patch == number])) for number in seen])
+    centres, normals = surface.patch_centres[seen], surface.patch_normals[seen]
+    near = (np.linalg.norm(centres[:, None] - centres, axis=2) < _AROUND) & (normals @ normals.T > 0.5) & well
+    np.fill_diagonal(near, False)
+    expected = np.array([np.median(middle[around]) if around.any() else 0.0 for around in near])
+    far = np.where(well, np.where(near.any(axis=1), _NEVER, np.inf), _APART)
+    return ~np.isin(patch, seen[np.abs(middle - expected) > far])

@@ -26,6 +26,11 @@ __all__ = ["ConstantStress", "cauchy_green", "from_log_strain", "log_strain", "s
 
 _LEAST_DETERMINANT, _MOST_HARDENING = 1e-3, 50.0
 """Between quadrature points an element may be inverted or past Gent's limit where these are not: there the stress ends growing."""
+_NEAR = 0.03
+"""Distance from no strain up to which logarithm and exponential are quotients of polynomials (Pade of order 3 over 3): their next
+terms, x^7 / 2800 and less, are below 1e-14 there, and no eigenvalues are sought. Most of a body is strained by less."""
+_LOG_ABOVE, _LOG_BELOW = (0.0, 0.5, 0.5, 11 / 120), (1.0, 1.5, 0.6, 0.05)
+_EXP_ABOVE, _EXP_BELOW = (1.0, 0.5, 0.1, 1 / 120), (1.0, -0.5, 0.1, -1 / 120)
 
 
 @njit(cache=True)
@@ -98,34 +103,106 @@ def _eigen(a: Any, axes: Any) -> None:
                 a[p, k], a[q, k] = c * a[p, k] - s * a[q, k], s * a[p, k] + c * a[q, k]
 
 
-@njit(cache=True)
-def _spectral(tensors: Any, logarithm: bool) -> Any:
-    """Half the logarithm without its trace, or the exponential of twice, of symmetric tensors (m, 6)."""
-    found, full, axes, values = np.empty(tensors.shape), np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
-    for m in range(tensors.shape[0]):
-        t = tensors[m]
-        full[0, 0], full[1, 1], full[2, 2] = t[0], t[1], t[2]
-        full[1, 2], full[0, 2], full[0, 1] = t[3], t[4], t[5]
-        full[2, 1], full[2, 0], full[1, 0] = t[3], t[4], t[5]
-        _eigen(full, axes)
-        for k in range(3):
-            values[k] = 0.5 * np.log(max(full[k, k], _LEAST_DETERMINANT)) if logarithm else np.exp(2.0 * full[k, k])
-        if logarithm:
-            values -= values.mean()
+@njit(cache=True, inline="always")
+def _times(a: Any, b: Any, found: Any) -> None:
+    """The product (6,) of two symmetric tensors (6,) that have their axes in common."""
+    found[0] = a[0] * b[0] + a[5] * b[5] + a[4] * b[4]
+    found[1] = a[5] * b[5] + a[1] * b[1] + a[3] * b[3]
+    found[2] = a[4] * b[4] + a[3] * b[3] + a[2] * b[2]
+    found[3] = a[5] * b[4] + a[1] * b[3] + a[3] * b[2]
+    found[4] = a[0] * b[4] + a[5] * b[3] + a[4] * b[2]
+    found[5] = a[0] * b[5] + a[5] * b[1] + a[4] * b[3]
+
+
+@njit(cache=True, inline="always")
+def _length(a: Any) -> float:
+    """Frobenius norm of a symmetric tensor (6,)."""
+    return float(np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2 + 2.0 * (a[3] ** 2 + a[4] ** 2 + a[5] ** 2)))
+
+
+@njit(cache=True, inline="always")
+def _near_one(a: Any, upper: Any, lower: Any, work: Any, found: Any) -> None:
+    """A quotient of two polynomials (4,), from the constant on, of a symmetric tensor (6,), into `found`."""
+    square, cube, below, inverse = work[0], work[1], work[2], work[3]
+    _times(a, a, square)
+    _times(square, a, cube)
+    for k in range(6):
+        one = 1.0 if k < 3 else 0.0
+        below[k] = lower[0] * one + lower[1] * a[k] + lower[2] * square[k] + lower[3] * cube[k]
+        cube[k] = upper[0] * one + upper[1] * a[k] + upper[2] * square[k] + upper[3] * cube[k]
+    _invert(below, inverse)
+    _times(cube, inverse, found)
+
+
+@njit(cache=True, inline="always")
+def _by_axes(t: Any, logarithm: bool, full: Any, axes: Any, found: Any) -> None:
+    """Half the logarithm, or the exponential of twice, of a symmetric tensor (6,) by its eigenvalues, into `found`."""
+    full[0, 0], full[1, 1], full[2, 2] = t[0], t[1], t[2]
+    full[1, 2], full[0, 2], full[0, 1] = t[3], t[4], t[5]
+    full[2, 1], full[2, 0], full[1, 0] = t[3], t[4], t[5]
+    _eigen(full, axes)
+    for n in range(6):
+        found[n] = 0.0
+    for k in range(3):
+        value = 0.5 * np.log(max(full[k, k], _LEAST_DETERMINANT)) if logarithm else np.exp(2.0 * full[k, k])
         for n, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))):
-            found[m, n] = axes[i, 0] * axes[j, 0] * values[0]
-            found[m, n] += axes[i, 1] * axes[j, 1] * values[1] + axes[i, 2] * axes[j, 2] * values[2]
+            found[n] += axes[i, k] * axes[j, k] * value
+
+
+@njit(cache=True)
+def _logarithms(c: Any, larger_than: Any, near: float) -> Any:
+    """Half the logarithm (m, 6) without its trace of tensors (m, 6), zero where it is surely no longer than `larger_than` (m,).
+
+    |ln C| is at most that of C - 1 and of C^-1 - 1 together, which no eigenvalue is needed for.
+    """
+    found, full, axes, work = np.zeros(c.shape), np.empty((3, 3)), np.empty((3, 3)), np.empty((4, 6))
+    upper, lower, away, inverse = np.array(_LOG_ABOVE), np.array(_LOG_BELOW), np.empty(6), np.empty(6)
+    for m in range(c.shape[0]):
+        for k in range(6):
+            away[k] = c[m, k] - (1.0 if k < 3 else 0.0)
+        size = _length(away)
+        if larger_than[m] > 0.0:
+            _invert(c[m], inverse)
+            for k in range(3):
+                inverse[k] -= 1.0
+            if 0.5 * np.sqrt(size**2 + _length(inverse) ** 2) < larger_than[m]:
+                continue
+        if size < near:
+            _near_one(away, upper, lower, work, found[m])
+        else:
+            _by_axes(c[m], True, full, axes, found[m])
+        mean = (found[m, 0] + found[m, 1] + found[m, 2]) / 3.0
+        for k in range(3):
+            found[m, k] -= mean
     return found
 
 
-def log_strain(c: FloatArray) -> FloatArray:
-    """Logarithmic strain ln(C) / 2 (m, 6) without the part in the volume [1]."""
-    return np.asarray(_spectral(c, True))
+@njit(cache=True)
+def _exponentials(strain: Any, near: float) -> Any:
+    """The exponential of twice the tensors (m, 6)."""
+    found, full, axes, work = np.empty(strain.shape), np.empty((3, 3)), np.empty((3, 3)), np.empty((4, 6))
+    upper, lower, twice = np.array(_EXP_ABOVE), np.array(_EXP_BELOW), np.empty(6)
+    for m in range(strain.shape[0]):
+        for k in range(6):
+            twice[k] = 2.0 * strain[m, k]
+        if _length(twice) < near:
+            _near_one(twice, upper, lower, work, found[m])
+        else:
+            _by_axes(strain[m], False, full, axes, found[m])
+    return found
+
+
+def log_strain(c: FloatArray, larger_than: FloatArray | None = None) -> FloatArray:
+    """Logarithmic strain ln(C) / 2 (m, 6) without the part in the volume [1].
+
+    With sizes `larger_than` (m,) [1] given, strains that are surely no longer than that are zero instead.
+    """
+    return np.asarray(_logarithms(c, np.zeros(len(c)) if larger_than is None else larger_than, _NEAR))
 
 
 def from_log_strain(strain: FloatArray) -> FloatArray:
     """The C (m, 6) of a logarithmic strain."""
-    return np.asarray(_spectral(strain, False))
+    return np.asarray(_exponentials(strain, _NEAR))
 
 
 @njit(cache=True)

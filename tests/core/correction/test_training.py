@@ -144,6 +144,13 @@ def test_other_training_in_the_folder_is_not_overwritten(samples, tmp_path):
         train(samples, Split.of(samples), replace(TINY, rate=1e-4), tmp_path)
 
 
+def test_training_on_another_model_is_another_training(samples, tmp_path):
+    train(samples, Split.of(samples), replace(TINY, epochs=1), tmp_path)
+    extended = replace(samples, about={**samples.about, "setup": {"tool": {"radius": 6e-3}}})
+    with pytest.raises(CorrectionError, match="samples differ"):
+        train(extended, Split.of(extended), replace(TINY, epochs=1), tmp_path)
+
+
 def test_more_epochs_can_be_asked_of_a_finished_training(samples, tmp_path):
     train(samples, Split.of(samples), replace(TINY, epochs=2), tmp_path / "more")
     more = train(samples, Split.of(samples), TINY, tmp_path / "more")

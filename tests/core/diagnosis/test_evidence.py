@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import null_space
 from scipy.stats import multivariate_normal
 
-from core.diagnosis.evidence import FLAT, Block, fit, gram, log_evidence, predictive_gain, predictive_score
+from core.diagnosis.evidence import FLAT, Block, fit, gram, log_evidence, predictive_gain, predictive_score, within_reach
 from core.frames import FloatArray
 
 GROUPS, PATCHES, COLUMNS = 4, 5, 3
@@ -113,3 +113,24 @@ def test_predictive_gain_adds_the_blocks_and_states_their_scatter():
     gain, error = predictive_gain(np.array([4.0, 6.0, 8.0]), np.array([1.0, 1.0, 1.0]))
     assert gain == 15.0
     assert error == pytest.approx(2.0 * np.sqrt(3))
+
+
+def test_step_within_reach_is_the_best_of_all_that_are_as_short_and_holds_back_what_is_doubtful():
+    matrix = np.diag([9.0, 400.0, 0.01])
+    right = np.array([0.0, 800.0, 0.5])
+    block = Block("a", np.block([[np.array([[3000.0]]), right[None]], [right[:, None], matrix]]), 100.0)
+    precision, scales = 1e-6 * np.eye(3), np.array([1.0, 1.0])
+    whole = fit([block], [0, 1, 2], precision).change
+    assert whole[1:] == pytest.approx([-2.0, -50.0], rel=1e-3)
+    found = within_reach([block], [0, 1, 2], precision, [1, 2], scales, 2.5)
+    assert np.abs(found[1:]).max() <= 2.5
+    assert found[1] == pytest.approx(-2.0, rel=2e-3) and -2.5 <= found[2] < -1.5
+    assert np.array_equal(within_reach([block], [0, 1, 2], precision, [1, 2], scales, 60.0), whole)
+
+    def left(change: FloatArray) -> float:
+        return float(2 * right @ change + change @ (matrix + precision) @ change)
+
+    length = np.linalg.norm(found[1:])
+    others = np.random.default_rng(0).standard_normal((200, 2))
+    for one in length * others / np.linalg.norm(others, axis=1, keepdims=True):
+        assert left(found) <= left(np.array([found[0], *one])) + 1e-9

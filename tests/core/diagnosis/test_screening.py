@@ -7,7 +7,8 @@ from pushed_block import SETUP
 from scipy.stats import ks_2samp
 
 from core.diagnosis.evidence import FLAT, Block, log_evidence, predictive_score
-from core.diagnosis.screening import Candidate, linear_gains, null_gains, right_sides
+from core.diagnosis.screening import Candidate, linear_gains, null_gains, pair_gains, right_sides
+from core.effects.load import Gravity
 from core.effects.material import StiffInclusion
 from core.effects.tool import ToolOffset, ToolRadius
 from core.frames import FloatArray
@@ -92,6 +93,22 @@ def test_planted_column_is_found_far_above_chance():
     bound = np.quantile(null_gains(blocks, NUISANCE, KNOWN, CATALOGUE, 200, seed=6), 0.99)
     assert np.argmax(gains) == 9 - LUMPS[0]
     assert gains.max() > 3 * bound
+
+
+def test_two_causes_that_a_third_looks_like_are_found_as_a_pair():
+    roughly = [own[..., [5]] + own[..., [9]] + 0.5 * own[..., [12]] for own in COLUMNS]
+    blocks = linear_blocks(
+        [np.concatenate(both, axis=2) for both in zip(COLUMNS, roughly, strict=True)], NUISANCE, KNOWN, {5: 0.3, 9: 0.3}, 10
+    )
+    kinds = {5: ToolOffset, 9: ToolRadius, 15: StiffInclusion, 7: Gravity}
+    catalogue = [Candidate(start=kind.neutral(SETUP), columns=(c,), spread=(2.0,)) for c, kind in kinds.items()]
+    alone = linear_gains(blocks, right_sides(blocks), NUISANCE, KNOWN, catalogue)[0]
+    assert catalogue[int(np.argmax(alone))].columns == (15,)
+    gain, one, other = pair_gains(blocks, right_sides(blocks), NUISANCE, KNOWN, catalogue)[0]
+    assert {one.columns, other.columns} == {(5,), (9,)}
+    together, precision = one.beside(other).precision(list(NUISANCE), KNOWN)
+    without = predictive_score(blocks, NUISANCE, KNOWN, stated=3).sum()
+    assert gain == pytest.approx(predictive_score(blocks, together, precision, stated=3).sum() - without, abs=1e-8)
 
 
 def test_null_draws_repeat_with_their_seed():

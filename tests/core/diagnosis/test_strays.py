@@ -34,6 +34,13 @@ def test_a_patch_with_its_usual_points_speaks_for_itself():
     assert among_neighbours(gap, patch, SURFACE).all()
 
 
+def test_a_patch_that_floats_where_no_dent_could_bring_it_is_set_aside_however_well_it_is_seen():
+    gap, patch, hidden = _cloud(1.1e-2, 20)
+    kept = among_neighbours(gap, patch, SURFACE)
+    assert not kept[patch == hidden].any()
+    assert kept[patch != hidden].all()
+
+
 def test_what_lies_where_its_neighbours_lie_is_kept_however_wrong_the_model():
     gap, patch, _ = _cloud(0.0, 2, slope=0.1)
     assert np.abs(gap).max() > 2e-3
