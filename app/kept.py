@@ -89,4 +89,5 @@ class Kept:
         return JobOut.of(desk.jobs.cancel(name))
 
     def _told(self, name: str, begun: bool) -> Mapping[str, Any]:
-        return {"request": self.asked(name) if begun else None, "summary": self.found(name) if begun else None}
+        asked = self.asked(name) if begun and self._asked != self._found else None
+        return {"request": asked, "summary": self.found(name) if begun else None}

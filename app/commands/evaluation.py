@@ -48,7 +48,7 @@ def evaluate(
     if feedback not in ("none", "follow"):
         raise typer.BadParameter(f"--feedback is none or follow, not {feedback!r}")
     if paper:
-        _make(dataset, size, seed, workers)
+        _make(dataset, size, workers)
         found = _paper(dataset, [int(one) for one in features.split(",")], epochs, every, seed, workers, runs)
     else:
         found = _ladder(
@@ -96,16 +96,16 @@ def _share(share: dict[str, float]) -> str:
     return f"{100 * share['value']:.0f} % ({100 * share['low']:.0f} to {100 * share['high']:.0f})"
 
 
-def _make(dataset: Path, size: str, seed: int, workers: int) -> None:
+def _make(dataset: Path, size: str, workers: int) -> None:
     """The virtual dataset of the paper's protocol, unless it is there."""
-    from core.synthetic import PAPER_SIZES, make_dataset, paper_scenario  # noqa: PLC0415 (heavy)
+    from core.synthetic import PAPER_SEED, PAPER_SIZES, make_dataset, paper_scenario  # noqa: PLC0415 (heavy)
 
     wanted = next((one for one in PAPER_SIZES if one == size), None)
     if wanted is None:
         raise typer.BadParameter(f"--size is one of {', '.join(PAPER_SIZES)}, not {size!r}")
     if not dataset.is_dir():
         with progress(f"make {dataset.name}") as report:
-            make_dataset(dataset, paper_scenario(wanted), seed, workers, report)
+            make_dataset(dataset, paper_scenario(wanted), PAPER_SEED, workers, report)
 
 
 def _paper(dataset: Path, features: list[int], epochs: int, every: int, seed: int, workers: int, runs: Path) -> dict[str, Any]:

@@ -18,9 +18,11 @@ from typing import Literal
 
 from core.synthetic.scenario import HiddenEffect, Scenario
 
-__all__ = ["PAPER_EFFECTS", "PAPER_SIZES", "PaperSize", "paper_scenario"]
+__all__ = ["PAPER_EFFECTS", "PAPER_SEED", "PAPER_SIZES", "PaperSize", "paper_scenario"]
 
 PaperSize = Literal["short", "medium", "full"]
+PAPER_SEED = 2020
+"""Of everything random in these datasets, so that there is one of each size."""
 
 PAPER_EFFECTS = (
     HiddenEffect("tool_radius", {"radius": 0.0065}),

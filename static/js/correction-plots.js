@@ -10,7 +10,7 @@ const PARTS = { seen: "Kinds of motion that training has", unseen: "Kinds of mot
 const MODELS = { baseline: "Raw", extended: "Extended", true: "True" };
 const NETWORKS = { unet2d: "2D", unet3d: "3D", graph: "graph" };
 
-const short = ({ name, network }) => `${MODELS[name.split("_")[0]] ?? name}${network ? ` + ${NETWORKS[network.kind]} network` : ""}`;
+const short = ({ name, network }) => `${MODELS[name.split("_")[0]] ?? name}${network ? ` + ${NETWORKS[network.kind]} net` : ""}`;
 
 function svg(name, attributes = {}, ...children) {
   const node = document.createElementNS("http://www.w3.org/2000/svg", name);

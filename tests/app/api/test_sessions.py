@@ -68,3 +68,53 @@ def test_palette_is_complete(client: httpx.Client) -> None:
     palette = client.get("/api/palette").json()
     assert {"measured", "raw", "extended", "corrected", "tool", "floor", "unseen", "landmark"} == set(palette["things"])
     assert len(palette["signed"]) == 15
+
+
+def test_a_page_without_a_browser_has_no_still_and_unknown_views_are_refused(
+    client: httpx.Client, page: str, run_name: str
+) -> None:
+    page = f"/api/sessions/{page}"
+    client.post(f"{page}/view", json={"run": run_name, "sequence": "poke-01"})
+    answer = client.get(f"{page}/still.png")
+    assert answer.status_code == 404 and "no browser shows this page" in answer.json()["message"]
+    for size in (0, 5000, "wide"):
+        assert client.get(f"{page}/still.png", params={"width": size}).status_code == 422
+    assert [client.post(f"{page}/look", params={"where": where}).status_code for where in ("top", "front", "side", "reset")] == [
+        204
+    ] * 4
+    assert client.post(f"{page}/look", params={"where": "below"}).status_code == 422
+
+
+def test_a_camera_is_a_place_and_a_target(client: httpx.Client, page: str, run_name: str) -> None:
+    page = f"/api/sessions/{page}"
+    camera = {"run": run_name, "position": [0.1, 0.1, 0.2], "target": [0, 0, 0.02]}
+    assert client.put(f"{page}/camera", json=camera).status_code == 204
+    for wrong in ({"position": [0, 0]}, {"target": "here"}, {"position": [1e9, 0, 0]}, {"lens": 3}):
+        assert client.put(f"{page}/camera", json={**camera, **wrong}).status_code == 422
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"layers": ["magic"]},
+        {"quantity": "colour"},
+        {"section": {"axis": "w"}},
+        {"section": {"at": 2}},
+        {"looks": {"raw": {"opacity": 0}}},
+    ],
+)
+def test_views_that_cannot_be_drawn_are_refused_by_name(
+    client: httpx.Client, page: str, run_name: str, wrong: dict[str, Any]
+) -> None:
+    answer = client.post(f"/api/sessions/{page}/view", json={"run": run_name, "sequence": "poke-01", **wrong})
+    assert answer.status_code == 422
+    assert next(iter(wrong)) in answer.json()["where"]["key"]
+
+
+def test_one_scale_serves_all_sequences_of_a_run(client: httpx.Client, page: str, run_name: str) -> None:
+    view = {"run": run_name, "layers": ["raw"], "colour": "raw", "quantity": "displacement", "scale": "fixed"}
+    limits = {
+        client.post(f"/api/sessions/{page}/view", json={**view, "sequence": name}).json()["drawn"]["limit"]
+        for name in ("poke-01", "drag-01")
+    }
+    assert len(limits) == 1 and limits.pop() > 1e-3
