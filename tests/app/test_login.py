@@ -71,6 +71,21 @@ def test_bearer_opens_rest_and_a_wrong_one_does_not(locked: Locked) -> None:
     assert locked.client.get("/api/runs", headers={"authorization": locked.token}).status_code == 401
 
 
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({}, 401),
+        ({"authorization": "Bearer wrong"}, 401),
+        ({"origin": "http://evil.example"}, 403),
+        ({"host": "evil.example"}, 403),
+    ],
+)
+def test_an_upload_of_a_stranger_is_refused_and_leaves_nothing(locked: Locked, place: Any, headers: Any, status: int) -> None:
+    answer = locked.client.post("/api/imports?name=theirs", content=b"PK" * 50_000, headers=headers)
+    assert answer.status_code == status and set(answer.json()) == {"kind", "message", "where"}
+    assert not (place.runs / "uploads").exists() and not (place.datasets / "theirs").exists()
+
+
 def test_wrong_tokens_are_throttled_but_those_inside_stay_inside(locked: Locked) -> None:
     inside = {"authorization": f"Bearer {locked.token}"}
     assert locked.client.get("/api/runs", headers=inside).status_code == 200
