@@ -99,6 +99,14 @@ def test_views_stills_and_clips(page: Page, tmp_path: Path) -> None:
     with Image.open(tmp_path / "clip.gif") as clip:
         assert (getattr(clip, "n_frames", 1), clip.info["duration"]) == (3, 200)
     page.until(lambda: page.frame == 0)
+    held: list[Any] = []
+
+    def hold(route: Any) -> None:
+        """A picture that takes long."""
+        held.append(route)
+
+    page.page.route("**/still.png*", hold)
     page.page.click("#clip")
     page.page.get_by_role("button", name="Cancel").click()
     page.until(lambda: page.page.is_hidden("#clip-bar") and page.frame == 0)
+    assert held
