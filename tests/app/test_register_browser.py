@@ -96,7 +96,8 @@ def test_pairs_are_moved_by_keys_undone_left_out_and_there_after_a_reload(bench:
     page.keyboard.press("Escape")
     start = np.array(bench.values["pairs"][1]["mesh"])
     bench.drag(start, start + np.array([0.01, -0.005, 0.0]))
-    bench.page.until(lambda: np.linalg.norm(np.array(bench.values["pairs"][1]["mesh"]) - start - [0.01, -0.005, 0.0]) < 2e-3)
+    aimed = start + np.array([0.01, -0.005, 0.0])
+    bench.page.until(lambda: bool(np.linalg.norm(np.array(bench.values["pairs"][1]["mesh"]) - aimed) < 2e-3))
     pairs = bench.values["pairs"]
     bench.open()
     assert bench.values["pairs"] == pairs and "1 more pair" in bench.text
