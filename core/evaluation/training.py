@@ -29,7 +29,7 @@ from core.setup import Setup
 if TYPE_CHECKING:
     from core.correction import Samples
 
-__all__ = ["REQUEST", "SUMMARY", "Wanted", "train_network"]
+__all__ = ["REQUEST", "SUMMARY", "Wanted", "train_network", "whole_samples"]
 
 REQUEST, SUMMARY = "request.json", "training.json"
 _SAMPLING = 0.4
@@ -128,19 +128,19 @@ def _samples(
     names = [name for name in (*dataset.config.train, *dataset.config.validation) if len(dataset.sequence(name))]
     said = [str(dataset.path.resolve()), setup.as_dict(), repr(recorder.grid), wanted.nodes, wanted.every, wanted.points, names]
     folder = store / hashlib.sha256(json.dumps(said, sort_keys=True, default=repr).encode()).hexdigest()[:16]
-    known = _whole(folder)
+    known = whole_samples(folder)
     if known is not None:
         return known
     try:
         return make_samples(folder, recorder, sequences=names, every=wanted.every, workers=workers, report=report)
     except RunError:
-        known = _whole(folder)  # another training may have made the same in the meantime
+        known = whole_samples(folder)  # another training may have made the same in the meantime
         if known is None:
             raise
         return known
 
 
-def _whole(folder: Path) -> Samples | None:
+def whole_samples(folder: Path) -> Samples | None:
     """Samples that are all there; what is left of others, of which files were dropped for want of room, is taken away."""
     from core.correction import open_samples  # noqa: PLC0415 (heavy)
     from core.correction.arrays import ARRAYS  # noqa: PLC0415 (heavy)

@@ -8,6 +8,7 @@ from scipy.stats import ks_2samp
 
 from core.diagnosis.evidence import FLAT, Block, log_evidence, predictive_score
 from core.diagnosis.screening import Candidate, linear_gains, null_gains, pair_gains, right_sides
+from core.effects import Effect
 from core.effects.load import Gravity
 from core.effects.material import StiffInclusion
 from core.effects.tool import ToolOffset, ToolRadius
@@ -100,7 +101,7 @@ def test_two_causes_that_a_third_looks_like_are_found_as_a_pair():
     blocks = linear_blocks(
         [np.concatenate(both, axis=2) for both in zip(COLUMNS, roughly, strict=True)], NUISANCE, KNOWN, {5: 0.3, 9: 0.3}, 10
     )
-    kinds = {5: ToolOffset, 9: ToolRadius, 15: StiffInclusion, 7: Gravity}
+    kinds: dict[int, type[Effect]] = {5: ToolOffset, 9: ToolRadius, 15: StiffInclusion, 7: Gravity}
     catalogue = [Candidate(start=kind.neutral(SETUP), columns=(c,), spread=(2.0,)) for c, kind in kinds.items()]
     alone = linear_gains(blocks, right_sides(blocks), NUISANCE, KNOWN, catalogue)[0]
     assert catalogue[int(np.argmax(alone))].columns == (15,)

@@ -1,0 +1,32 @@
+"""What is asked of a training, and samples on disk that are whole or not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from learned_samples import write_samples
+
+from core.errors import CorrectionError
+from core.evaluation.training import Wanted, whole_samples
+
+
+def test_whole_samples_are_taken_and_what_is_left_of_others_is_removed(tmp_path: Path):
+    folder = tmp_path / "samples"
+    assert whole_samples(folder) is None
+    write_samples(folder, rows=4)
+    found = whole_samples(folder)
+    assert found is not None and len(found) == 12
+    (folder / "two" / "points.npy").unlink()  # as when caches are dropped for want of room
+    assert whole_samples(folder) is None and not folder.exists()
+
+
+def test_request_goes_to_json_and_back():
+    wanted = Wanted(spec={"epochs": 3}, nodes=(9, 5, 5), every=2, points=500)
+    assert Wanted.from_json(wanted.to_json()) == wanted
+
+
+@pytest.mark.parametrize(("asked", "said"), [({"every": 0}, "every = 0"), ({"points": 3}, "points = 3")])
+def test_values_out_of_bounds_are_named(asked: dict[str, int], said: str):
+    with pytest.raises(CorrectionError, match=said):
+        Wanted(**asked)  # type: ignore[arg-type]
