@@ -67,13 +67,29 @@ class Bench:
 
     def click(self, place: Any) -> None:
         """A real click on a place [m] of the scene, once the camera stands still."""
+        self.page.page.mouse.click(*self.pixel(place))
+
+    def drag(self, start: Any, end: Any) -> None:
+        """A real drag from a place [m] of the scene to another."""
+        mouse = self.page.page.mouse
+        (x, y), (to_x, to_y) = self.pixel(start), self.pixel(end)
+        mouse.move(x, y)
+        self.page.page.wait_for_timeout(300)
+        mouse.down()
+        for share in np.linspace(0.1, 1.0, 10):
+            mouse.move(x + share * (to_x - x), y + share * (to_y - y))
+            self.page.page.wait_for_timeout(60)
+        mouse.up()
+
+    def pixel(self, place: Any) -> tuple[float, float]:
+        """Where on the page a place [m] of the scene is seen, once the camera stands still."""
         seen: list[tuple[float, float]] = []
         while len(seen) < 3 or np.ptp(seen[-3:], axis=0).max() > 0.2:
             seen.append(self.frame.evaluate(PIXEL, [float(x) for x in place]))
             self.page.page.wait_for_timeout(150)
         left, top = seen[-1]
         box = self.page.page.locator("#register-viewer").bounding_box()
-        self.page.page.mouse.click(box["x"] + left, box["y"] + top)
+        return float(box["x"] + left), float(box["y"] + top)
 
     def pair(self, corner: Any, mesh: Any = None) -> None:
         """Click a corner on the cloud, a little inside of it, and then on the phantom."""

@@ -7,6 +7,9 @@ import { KEYS } from "./register-keys.js";
 
 const DEGREES = 180 / Math.PI;
 
+/** The colour that the scene gives a pair. */
+const colourOf = (number) => `hsl(${((0.58 + number * 0.381966) % 1) * 360} 75% 45%)`;
+
 export function drawPanel(box, work, view, actions) {
   const typing = document.activeElement?.id === "register-name" ? document.activeElement : null;
   const name = typing?.value ?? box.querySelector("#register-name")?.value;
@@ -63,7 +66,7 @@ function row(pair, number, work, view) {
   const bad = view.problem?.at.includes(number);
   const swap = bad && view.problem.at.length === 2 && view.problem.at[0] === number && /exchanging/.test(view.problem.message);
   return [element("tr", { "data-pair": number, class: bad ? "bad" : "" },
-    element("th", {}, element("b", { class: "pair-number" }, String(number + 1))),
+    element("th", {}, element("b", { class: "pair-number", style: { background: colourOf(number) } }, String(number + 1))),
     element("td", {}, end("cloud", "cloud")), element("td", {}, end("mesh", pair.landmark ?? "phantom")),
     element("td", { class: "number", "data-residual": number }, at >= 0 ? mm(view.fit.residuals[at], false) : pair.cloud && pair.mesh ? "…" : ""),
     element("td", {}, element("button", { class: "icon-button", type: "button", title: `Leave pair ${number + 1} out`, onclick: () => work.leaveOut(number) }, icon("close")))),
