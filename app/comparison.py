@@ -14,6 +14,9 @@ from core.frames import FloatArray
 
 __all__ = ["SequenceErrors", "compared", "sequence_errors"]
 
+LEAST_REDUCIBLE = 0.02
+"""Of the noise floor [1]: of less error above it no share can be said, since the floor itself is known no better."""
+
 
 @dataclass(frozen=True)
 class SequenceErrors:
@@ -33,8 +36,10 @@ class SequenceErrors:
 
     @property
     def removed(self) -> float | None:
-        """Share of the error above the noise floor that the extended model removes [1]; None where nothing lies above it."""
-        if self.raw is None or self.extended is None or self.noise_floor is None or self.raw <= self.noise_floor:
+        """Share of the error above the noise floor that the extended model removes [1]; None where next to nothing lies above it."""
+        if self.raw is None or self.extended is None or self.noise_floor is None:
+            return None
+        if self.raw <= (1 + LEAST_REDUCIBLE) * self.noise_floor:
             return None
         return (self.raw - self.extended) / (self.raw - self.noise_floor)
 

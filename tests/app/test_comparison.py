@@ -52,6 +52,12 @@ def test_sequence_that_was_never_seen_has_no_error(run: Run) -> None:
 def test_model_at_its_noise_floor_has_nothing_to_remove(run: Run) -> None:
     rewrite(run, "poke-01", noise_floor=1.0)
     assert sequence_errors(run)[0].removed is None
+    raw = sequence_errors(run)[0].raw
+    assert raw is not None
+    rewrite(run, "poke-01", noise_floor=raw / 1.01)
+    assert sequence_errors(run)[0].removed is None
+    rewrite(run, "poke-01", noise_floor=raw / 1.05)
+    assert sequence_errors(run)[0].removed is not None
 
 
 def test_runs_of_one_dataset_stand_beside_each_other(run: Run) -> None:
