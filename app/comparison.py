@@ -36,7 +36,7 @@ class SequenceErrors:
 
     @property
     def removed(self) -> float | None:
-        """Share of the error above the noise floor that the extended model removes [1]; None where next to nothing lies above it."""
+        """Share of the error above the noise floor that the extended model removes [1]; None where hardly any lies above it."""
         if self.raw is None or self.extended is None or self.noise_floor is None:
             return None
         if self.raw <= (1 + LEAST_REDUCIBLE) * self.noise_floor:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import signal
+import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +109,46 @@ def test_a_long_one_is_stopped_and_its_points_are_there_after_a_reload(page: Any
     page.click(f"[data-sweep='{identity}']")
     page.wait_for_selector("#panel-sweep circle[data-point]")
     assert page.locator("#panel-sweep circle[data-point]").count() == shown < 400
+
+
+def wait_for(true: Callable[[], bool], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.1)
+
+
+def test_a_browser_that_is_killed_in_the_middle_of_a_sweep_loses_no_point(page: Any, tmp_path: Path) -> None:
+    other = subprocess.Popen(
+        [str(CHROMIUM), *FLAGS, "--remote-debugging-port=0", f"--user-data-dir={tmp_path}", "about:blank"],
+        start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    try:
+        port = tmp_path / "DevToolsActivePort"
+        wait_for(lambda: port.exists() and len(port.read_text().split()) == 2)
+        # The same playwright: only one may run in a thread.
+        doomed = page.context.browser.browser_type.connect_over_cdp(f"http://127.0.0.1:{port.read_text().split()[0]}").new_page()
+        doomed.goto(str(page.client.base_url))
+        doomed.click("#tab-sweep")
+        ask(doomed, "tool_radius.radius", "4", "8")
+        doomed.select_option("select[name=method]", "random")
+        doomed.fill("input[name=points]", "24")
+        doomed.fill("input[name=frames]", "2")
+        doomed.click("text=Start the sweep")
+        doomed.wait_for_selector("#panel-sweep circle[data-point]", timeout=LONG)
+        identity = newest(page.client)
+    finally:
+        os.killpg(other.pid, signal.SIGKILL)
+        other.wait()
+    wait_for(lambda: page.client.get(f"/api/jobs/{identity}").json()["state"] == "done", 240.0)
+    page.reload()
+    page.click("#tab-sweep")
+    page.click(f"[data-sweep='{identity}']")
+    page.wait_for_selector("[data-state=done]")
+    kept = page.client.get(f"/api/sweeps/{identity}/points").json()["points"]
+    assert sum(point["kind"] == "search" for point in kept) == 24
+    shown = page.locator("#panel-sweep circle[data-point]").evaluate_all("all => all.map((one) => +one.dataset.point)")
+    assert sorted(shown) == sorted(point["number"] for point in kept if point["values"])
 
 
 def test_what_loads_late_does_not_take_the_front(page: Any) -> None:
