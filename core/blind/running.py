@@ -122,7 +122,7 @@ def run_case(case: Case, folder: Path) -> Result:
     return Result(case, hidden, said, outside, size, seconds, code_digest())
 
 
-_USERS = ("blind", "sweeping", "correction", "whatif.py", "live.py")
+_USERS = ("blind", "sweeping", "correction", "evaluation", "whatif.py", "live.py")
 """Parts of `core` that a diagnosis and the making of data do without."""
 
 
