@@ -9,6 +9,7 @@ import { on, set, state } from "./store.js";
 
 const MODELS = { raw: "Raw model", extended: "Extended model", whatif: "As set under What if" };
 const PAD = 300;
+let repeated = false;
 let box = null;
 let socket = null;
 let model = "extended";
@@ -74,7 +75,12 @@ function connect() {
 function received(found) {
   busy = false;
   answer = found;
-  if (found.problem) { drawAnswer(); return; }
+  if (found.problem) {
+    drawAnswer();
+    if (!repeated) { repeated = true; setTimeout(send, 1000); } // a solver that ended is started anew when it is asked again
+    return;
+  }
+  repeated = false;
   const now = performance.now();
   times = [...times.filter((at) => now - at < 1000), now];
   const { held } = state();
