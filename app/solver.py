@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
@@ -11,7 +12,7 @@ from multiprocessing import get_context
 from typing import Any, TypeVar
 
 from core.errors import RunError
-from core.processes import bound_to_parent
+from core.processes import bound_to_process
 
 __all__ = ["Solver"]
 
@@ -32,7 +33,7 @@ class Solver:
         """The task's answer; RunError where it takes too long or its process ends."""
         with self._lock:
             if self._pool is None:
-                self._pool = ProcessPoolExecutor(1, get_context("spawn"), bound_to_parent)
+                self._pool = ProcessPoolExecutor(1, get_context("spawn"), bound_to_process, (os.getpid(),))
             try:
                 return self._pool.submit(task, *args).result(self._patience)
             except TooLong:

@@ -8,7 +8,7 @@ import signal
 import threading
 import time
 
-__all__ = ["bound_to", "bound_to_parent"]
+__all__ = ["bound_to", "bound_to_parent", "bound_to_process"]
 
 _DIE_WITH_PARENT = 1
 _EVERY = 2.0
@@ -25,6 +25,12 @@ def bound_to_parent() -> None:
 def bound_to(pid: int) -> None:
     """The same where a fork server stands between: end soon after the process of that number has, even if it was killed."""
     bound_to_parent()
+    threading.Thread(target=_end_after, args=(pid,), daemon=True).start()
+
+
+def bound_to_process(pid: int) -> None:
+    """The same for what a thread starts that may end before its process: Linux takes the end of that thread for the parent's."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_after, args=(pid,), daemon=True).start()
 
 
