@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 from core.errors import SetupError
 from core.meshing import Meshing
-from core.processes import bound_to
+from core.processes import bound_to, keeping_memory
 from core.setup import Setup
 from core.sweeping.measure import Outcomes, measure
 from core.sweeping.watched import Watched
@@ -28,12 +28,18 @@ _HELD: tuple[tuple[Watched, ...], Meshing] | None = None
 def _begin(pid: int, data: tuple[Watched, ...], grid: Meshing) -> None:
     global _HELD  # noqa: PLW0603 (what a process is given once)
     bound_to(pid)
+    keeping_memory()
     _HELD = (data, grid)
 
 
 def _measured(setup: Setup, number: int) -> Outcomes:
     assert _HELD is not None
     return measure(setup, _HELD[0][number], _HELD[1])
+
+
+def _on_worker(setup: Setup, seen: Watched, grid: Meshing) -> Outcomes:
+    keeping_memory()
+    return measure(setup, seen, grid)
 
 
 class Crew(Protocol):
@@ -108,7 +114,7 @@ class Cluster:
     def submit(self, task: Task) -> Future[Outcomes]:
         """Begin one on some worker."""
         setup, number = task
-        future: Future[Outcomes] = self._executor.submit(measure, setup, self._data[number], self._grid)
+        future: Future[Outcomes] = self._executor.submit(_on_worker, setup, self._data[number], self._grid)
         return future
 
     def close(self) -> None:

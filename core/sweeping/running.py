@@ -109,12 +109,12 @@ class _Run:
 
     def whole(self) -> dict[str, Any]:
         """All points, then the lines through the best one, then the summary."""
-        self._batch([None], "stated")
         asked = batches(self.request)
-        errors: list[float | None] | None = None
+        # Along with the first batch, so that no process waits for the stated setup alone.
+        errors = self._batch([None, *next(asked)], "search")[1:]
         while True:
             try:
-                points = next(asked) if errors is None else asked.send(errors)
+                points = asked.send(errors)
             except StopIteration:
                 break
             errors = self._batch(points, "search")
@@ -150,7 +150,7 @@ class _Run:
         return direction(axis.name, values, sums, self.request.measure, self.request.seed).to_json()
 
     def _batch(self, points: Sequence[Values | None], kind: str) -> list[float | None]:
-        """Errors [m] of these points, in their order; None is the stated setup."""
+        """Errors [m] of these points, in their order; None is the stated setup, and a kind of its own."""
         begin = len(self.points)
         setups = [self._setup(point) for point in points]
         keys = [[] if isinstance(one, str) else [key_of(one, digest, self.grid) for digest in self.digests] for one in setups]
@@ -194,7 +194,8 @@ class _Run:
             setup, keys = setups[place], waiting.pop(place)
             failure = setup if isinstance(setup, str) else " ".join(filter(None, (known[key].failure for key in keys)))
             values = dict(points[place] or {})
-            row: dict[str, Any] = {"number": begin + place, "kind": kind, "values": values, "error": None, "paper": None}
+            own = "stated" if points[place] is None else kind
+            row: dict[str, Any] = {"number": begin + place, "kind": own, "values": values, "error": None, "paper": None}
             row["failure"] = failure
             if not failure:
                 sums = np.array([probe for key in keys for probe in known[key].sums])
