@@ -35,6 +35,13 @@ __all__ = ["run"]
 
 POINTS, WORKERS, FRAMES = 200, 2, 2
 LOW, HIGH = 4e-3, 8e-3
+QUIET = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "5s",
+    "distributed.worker.memory.monitor-interval": "2s",
+}
+"""What a worker does beside its work, seldom: by default it looks at itself 160 times a second, and the solve waits each time."""
 SAME = 1e-9
 """Errors [m] that differ by less are the same: a registration's last digits differ from process to process."""
 
@@ -106,9 +113,10 @@ def _served(runs: Path, home: Path, further: dict[str, str]) -> Iterator[Client]
 
 @contextmanager
 def _cluster() -> Iterator[str]:
+    import dask.config  # noqa: PLC0415 (optional)
     from distributed import LocalCluster  # noqa: PLC0415 (optional)
 
-    with LocalCluster(n_workers=WORKERS, threads_per_worker=1, dashboard_address=None) as cluster:  # type: ignore[no-untyped-call]
+    with dask.config.set(QUIET), LocalCluster(n_workers=WORKERS, threads_per_worker=1, dashboard_address=None) as cluster:  # type: ignore[no-untyped-call]
         yield str(cluster.scheduler_address)
 
 
