@@ -9,6 +9,7 @@ import { on, set, state } from "./store.js";
 
 const MODELS = { raw: "Raw model", extended: "Extended model", whatif: "As set under What if" };
 const PAD = 300;
+const PAUSE = 8; // ms
 let repeated = false;
 let box = null;
 let socket = null;
@@ -16,8 +17,7 @@ let model = "extended";
 let known = null; // the extended model's effects
 let place = null; // of the tool's centre, as wished for [m]
 let radius = 0.005;
-let busy = false;
-let stale = false;
+let waiting = null;
 let answer = null;
 let times = [];
 let grip = null; // while the tool is dragged in the scene: from where its centre was held
@@ -52,7 +52,7 @@ async function open() {
 async function leave() {
   if (!socket) return;
   socket.close();
-  socket = null; grip = null; busy = false;
+  socket = null; grip = null;
   set({ live: false });
   await remove(`/sessions/${pageId()}/live`).catch(() => {}); // it goes with the connection, too, but somewhat later
   refresh();
@@ -67,13 +67,12 @@ const middle = () => { const [low, high] = corners(); return [(low[0] + high[0])
 function connect() {
   const mine = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/sessions/${pageId()}/live`);
   socket = mine;
-  mine.onopen = () => { busy = false; send(); };
+  mine.onopen = send;
   mine.onmessage = ({ data }) => { if (socket === mine) received(JSON.parse(data)); };
-  mine.onclose = () => { if (socket === mine) { socket = null; busy = false; setTimeout(() => { if (openedPanel() === "live" && !socket) connect(); }, 1500); } };
+  mine.onclose = () => { if (socket === mine) { socket = null; setTimeout(() => { if (openedPanel() === "live" && !socket) connect(); }, 1500); } };
 }
 
 function received(found) {
-  busy = false;
   answer = found;
   if (found.problem) {
     drawAnswer();
@@ -86,15 +85,17 @@ function received(found) {
   const { held } = state();
   if (held?.drawn && found.drawn) set({ held: { ...held, drawn: { ...held.drawn, ...found.drawn, tool: found.tool } } });
   drawAnswer();
-  if (stale) send();
 }
 
-/** Ask for the newest place; while an answer is awaited only that one is kept. */
+/** Ask for the newest place, at most once in `PAUSE`. No answer is awaited: the server solves the newest, and is not idle on the way. */
 function send() {
-  if (busy || socket?.readyState !== WebSocket.OPEN) { stale = true; return; }
-  busy = true; stale = false;
-  const { run, sequence } = state();
-  socket.send(JSON.stringify({ run, sequence, at: place, ...chosen() }));
+  if (waiting || socket?.readyState !== WebSocket.OPEN) return;
+  waiting = setTimeout(() => {
+    waiting = null;
+    if (socket?.readyState !== WebSocket.OPEN) return; // it is asked when the connection opens
+    const { run, sequence } = state();
+    socket.send(JSON.stringify({ run, sequence, at: place, ...chosen() }));
+  }, PAUSE);
 }
 
 function chosen() {

@@ -40,14 +40,6 @@ def there(run: Path, serve: Any) -> Iterator[httpx.Client]:
         yield client
 
 
-@pytest.fixture
-def alone(run: Path, tmp_path: Path, serve: Any) -> Iterator[httpx.Client]:
-    """A server on which nothing was led or tried before."""
-    runs = Path(shutil.copytree(run, tmp_path / "runs" / run.name)).parent
-    with serve(Settings(runs=runs, datasets=run.parent.parent / "datasets", preload=())) as client:
-        yield client
-
-
 def deepest(run: Path) -> int:
     return int(Run(run).replay(SEQUENCE)["tool_raw"][:, 2].argmin())
 
@@ -233,9 +225,9 @@ APART = """async place => {
 
 @pytest.mark.browser
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine: install the package chromium")
-def test_a_person_pushes_the_block_with_the_mouse(alone: httpx.Client, browser: Any, tmp_path: Path) -> None:
+def test_a_person_pushes_the_block_with_the_mouse(there: httpx.Client, browser: Any, tmp_path: Path) -> None:
     with browser.new_context(viewport={"width": 1440, "height": 900}) as context:
-        page = Page(context.new_page(), alone)
+        page = Page(context.new_page(), there)
         page.open("?run=large-tool-1")
         page.page.get_by_role("tab", name="Live").click()
         page.page.locator("#live-push").wait_for(timeout=60_000)
