@@ -149,7 +149,7 @@ def _rate(optimizer: torch.optim.Optimizer, total: Callable[[], Tensor]) -> floa
 
 
 def _frame(network: CorrectionNetwork, plain: Callable[[Tensor, Tensor], Tensor], batch: Batch, kind: str) -> tuple[str, ...]:
-    """Milliseconds of one frame: by all cores (median, wall), and by one in bfloat16 if there is any, in single precision, plain."""
+    """Milliseconds of one frame: by all cores (median, wall), and by one in bfloat16 if there is any, single precision, plain."""
     vertices, tool = batch.positions[:1], batch.tool[:1]
     with torch.inference_mode():
         wanted = plain(vertices, tool)[0]
