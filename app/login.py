@@ -19,6 +19,7 @@ from app.tokens import Token
 __all__ = ["Login", "router"]
 
 COOKIE = "palpate_session"
+INSIDE = "palpate_inside"  # tells the page that there is something to log out of; opens nothing
 LASTS = 12 * 3600.0  # [s] that a session is good for
 TRIES, WINDOW = 5, 60.0  # so many wrong tokens from one address within so many seconds
 router = APIRouter(include_in_schema=False)
@@ -106,6 +107,7 @@ async def enter(request: Request) -> Response:
     answer = RedirectResponse("/", status_code=303)
     secure = request.url.scheme == "https"
     answer.set_cookie(COOKIE, login.begin(), max_age=int(LASTS), httponly=True, samesite="strict", secure=secure)
+    answer.set_cookie(INSIDE, "1", max_age=int(LASTS), samesite="strict", secure=secure)
     return answer
 
 
@@ -116,6 +118,7 @@ def leave(request: Request) -> Response:
         request.app.state.login.end(session_of(request.headers))
     answer = RedirectResponse("/login", status_code=303)
     answer.delete_cookie(COOKIE, httponly=True, samesite="strict")
+    answer.delete_cookie(INSIDE, samesite="strict")
     return answer
 
 

@@ -29,6 +29,7 @@ const SHAPES = {
   section: '<path d="M5 19V5h9v14zM14 5l5 3v11h-5"/><path d="M12 2v20" stroke-dasharray="2.5 2.5"/>', camera: '<path d="M4 8h3l2-3h6l2 3h3v11H4z"/><circle cx="12" cy="13" r="3.4"/>',
   film: '<path d="M4 5h16v14H4zM8 5v14M16 5v14M4 9.7h4M4 14.3h4M16 9.7h4M16 14.3h4"/>', layers: '<path d="M12 4l9 5-9 5-9-5zM3 14l9 5 9-5"/>', down: '<path d="M7 10l5 5 5-5"/>',
   target: '<path d="M4 9V5h4M20 9V5h-4M4 15v4h4M20 15v4h-4"/><circle cx="12" cy="12" r="2.5"/>',
+  leave: '<path d="M10 4H5v16h5M14 8l4 4-4 4M18 12H9"/>',
   cloud: '<g class="full"><circle cx="6" cy="7" r="1.5"/><circle cx="12" cy="5" r="1.5"/><circle cx="18" cy="8" r="1.5"/><circle cx="5" cy="14" r="1.5"/><circle cx="11" cy="12" r="1.5"/><circle cx="18" cy="15" r="1.5"/><circle cx="9" cy="19" r="1.5"/><circle cx="15" cy="20" r="1.5"/></g>',
 };
 

@@ -28,6 +28,13 @@ function startTheme() {
   draw();
 }
 
+/** Shown to those who came in with a token. */
+function startLogOut() {
+  const form = document.getElementById("log-out");
+  form.hidden = !/(^|; )palpate_inside=1/.test(document.cookie);
+  fill(form.firstElementChild, icon("leave"));
+}
+
 async function openRun(id) {
   set({ playing: false });
   try {
@@ -63,6 +70,7 @@ const worst = (errors) => errors.reduce((best, value, index) => ((value ?? 0) > 
 
 async function start() {
   startTheme();
+  startLogOut();
   const palette = await get("/palette");
   set({ palette });
   timeline.start();

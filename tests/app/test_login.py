@@ -53,7 +53,10 @@ def test_token_is_changed_for_a_cookie_that_scripts_and_other_sites_do_not_get(l
     answer = locked.client.post("/login?next=//evil.example", data={"token": locked.token})
     assert (answer.status_code, answer.headers["location"]) == (303, "/")  # never elsewhere
     cookie = answer.headers["set-cookie"]
-    assert "HttpOnly" in cookie and "samesite=strict" in cookie.lower() and "secure" not in cookie.lower()
+    assert cookie.startswith("palpate_session=") and cookie.count("palpate_session") == 1
+    assert (
+        "HttpOnly" in cookie.split("palpate_inside")[0] and "samesite=strict" in cookie.lower() and "secure" not in cookie.lower()
+    )
     assert locked.client.get("/api/runs").status_code == 200
     kept = {"cookie": cookie.split(";")[0]}
     assert locked.client.post("/logout").headers["location"] == "/login"
