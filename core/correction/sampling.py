@@ -102,7 +102,7 @@ def make_samples(
     """Replay the sequences and write their samples to `folder`: whole or not at all.
 
     Args:
-        folder: does not exist yet, or RunError. sequences: all with clouds when left out. every: each how many clouds one is taken.
+        folder: does not exist yet, also not by the time all is made, or RunError. sequences: all with clouds when left out. every: each how many clouds one is taken.
         workers: processes.
 
     A frame without equilibrium, or of which fewer than 20 points are left, is no sample; samples.json says how many there were.
@@ -122,12 +122,21 @@ def make_samples(
         made = dict(_all(recorder, aside, names, every, workers, report))
         _write_about(aside, dataset, recorder, [made[name] for name in names], every)
         aside.chmod(0o755)
-        aside.rename(folder)
+        _take_place(aside, folder)
     except BaseException:
         shutil.rmtree(aside, ignore_errors=True)
         raise
     report(1.0, f"{sum(one.count for one in made.values())} samples")
     return open_samples(folder)
+
+
+def _take_place(aside: Path, folder: Path) -> None:
+    try:
+        aside.rename(folder)
+    except OSError as error:
+        if folder.exists():
+            raise RunError(f"{folder} was made by another in the meantime", path=str(folder)) from error
+        raise
 
 
 @dataclass(frozen=True, eq=False)

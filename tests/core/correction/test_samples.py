@@ -91,6 +91,18 @@ def test_cancelled_samples_leave_nothing_behind(bench, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_of_two_who_make_the_same_samples_one_is_told_that_they_are_there(bench, tmp_path):
+    folder = tmp_path / "samples"
+
+    def other(done, text):
+        folder.mkdir(exist_ok=True)
+        (folder / "samples.json").touch()
+
+    with pytest.raises(RunError, match="made by another"):
+        make_samples(folder, bench.recorder, sequences=["poke-top-01"], every=10, report=other)
+    assert [path.name for path in tmp_path.iterdir()] == ["samples"]
+
+
 def test_samples_of_an_arbitrary_mesh_are_its_nodes(bench, tmp_path):
     setup = bench.recorder.setup
     body = Body.of_mesh(GridSpec(nodes=(5, 4, 3)).mesh(setup, np.zeros(3)))
