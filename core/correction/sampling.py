@@ -102,7 +102,8 @@ def make_samples(
     """Replay the sequences and write their samples to `folder`: whole or not at all.
 
     Args:
-        folder: does not exist yet, also not by the time all is made, or RunError. sequences: all with clouds when left out. every: each how many clouds one is taken.
+        folder: does not exist yet, nor by the time all is made, or RunError. sequences: all with clouds when left out.
+        every: each how many clouds one is taken.
         workers: processes.
 
     A frame without equilibrium, or of which fewer than 20 points are left, is no sample; samples.json says how many there were.
