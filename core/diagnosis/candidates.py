@@ -29,7 +29,7 @@ from core.effects.tool import LandmarkMismatch, ToolCompliance, ToolFriction
 from core.meshing import Meshing
 from core.setup import Inclusion, Setup
 
-__all__ = ["FINITE", "Signature", "begin", "candidates_of", "lump_places", "signatures", "tangents"]
+__all__ = ["FINITE", "Signature", "begin", "candidates_of", "lump_places", "renewed", "signatures", "tangents"]
 
 Signature = tuple[Effect, list[Prediction]]
 """An effect of a finite size, and every sequence replayed with it."""
@@ -39,6 +39,8 @@ FINITE: tuple[type[Effect], ...] = (
 )  # fmt: skip
 """Effects without a derivative where they are nothing: a base that is held and one that may move have other unknowns, and sag moves
 the registration, too."""
+_SUPPORTS: tuple[type[Effect], ...] = (BaseSlip, BaseDetachment, BaseCompliance)
+"""What lets the base move: how it does hangs on the block's weight, and how the block sags on it."""
 _LIMITED = 6.0
 """J_m [1] whose whole action, to first order, is the column of a material that stiffens."""
 _TOGETHER: tuple[type[Effect], ...] = (DepthBias, GeometryScale, LandmarkMismatch)
@@ -97,19 +99,43 @@ def signatures(bench: Bench, baseline: Model) -> list[Signature]:
     be, the others' 0.99.
     """
     starts = [effect for kind in FINITE if kind in bench.weighed for effect in kind.starts(bench.setup)]
-    rough = [future.result() for future in bench.predict(baseline.effects, None, baseline.predictions, bench.rough)]
-    known = [baseline.predictions if _mesh_for(effect, bench) is bench.grid else rough for effect in starts]
-    pending = [
-        bench.predict([*baseline.effects, effect], None, without, _mesh_for(effect, bench), _TOLERANCE)
-        for effect, without in zip(starts, known, strict=True)
-    ]
     found: list[Signature] = [(OWN_GRID, [one.alone() for one in bench.on_own_grid])] if bench.on_own_grid else []
+    return [*found, *_replayed(bench, baseline, starts, baseline), *_traced(bench, baseline)]
+
+
+def renewed(bench: Bench, model: Model, finite: Sequence[Signature], origin: Model) -> list[Signature]:
+    """Signatures over `origin` for use on top of a model: where it is another support, what weight and support do is made anew.
+
+    A block that may slide sags another way than one that is held, and its weight is what presses it on the table. With the
+    signature of a held base, weight had a linear gain of 350 nats on top of a base that slides, and 1255 with its own.
+    """
+    heavy = any(isinstance(effect, Gravity) for effect in model.effects)
+    loose = any(isinstance(effect, _SUPPORTS) for effect in model.effects)
+    kinds = (*(_SUPPORTS if heavy else ()), *((Gravity,) if loose else ()))
+    starts = [effect for effect, _ in finite if isinstance(effect, kinds) and effect.name not in model.names]
+    if not starts:
+        return list(finite)
+    anew = dict(_replayed(bench, model, starts, origin))
+    return [(effect, anew.get(effect, predictions)) for effect, predictions in finite]
+
+
+def _replayed(bench: Bench, model: Model, starts: Sequence[Effect], origin: Model) -> list[Signature]:
+    """What these effects change in a model, put upon the predictions of `origin`."""
+    meshes, rough = [_mesh_for(effect, bench) for effect in starts], list[Prediction]()
+    if any(mesh is not bench.grid for mesh in meshes):
+        rough = [future.result() for future in bench.predict(model.effects, None, model.predictions, bench.rough)]
+    known = [model.predictions if mesh is bench.grid else rough for mesh in meshes]
+    pending = [
+        bench.predict([*model.effects, effect], None, without, mesh, _TOLERANCE)
+        for effect, without, mesh in zip(starts, known, meshes, strict=True)
+    ]
+    found: list[Signature] = []
     for number, (effect, without, futures) in enumerate(zip(starts, known, pending, strict=True)):
         bench.tell(f"what {effect.name} would do", 0.15 + 0.25 * number / len(pending))
         changed = [future.result() for future in futures]
-        rows = zip(baseline.predictions, changed, without, strict=True)
+        rows = zip(origin.predictions, changed, without, strict=True)
         found.append((effect, [other.upon(here, zero).alone() for here, other, zero in rows]))
-    return [*found, *_traced(bench, baseline)]
+    return found
 
 
 def _traced(bench: Bench, baseline: Model) -> list[Signature]:

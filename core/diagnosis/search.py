@@ -9,7 +9,7 @@ import numpy as np
 
 from core.diagnosis.ambiguity import ambiguity_map
 from core.diagnosis.bench import Bench
-from core.diagnosis.candidates import Signature, begin, candidates_of, lump_places, signatures, tangents
+from core.diagnosis.candidates import Signature, begin, candidates_of, lump_places, renewed, signatures, tangents
 from core.diagnosis.evidence import predictive_gain
 from core.diagnosis.findings import LEAST_GAIN, Findings, Trial
 from core.diagnosis.hypothesis import Model, with_effects
@@ -109,7 +109,7 @@ def _again(bench: Bench, model: Model, finite: Sequence[Signature], origin: Mode
     """Screen the catalogue on top of a model that has causes already."""
     wanted = tangents(model.setup, model.names, bench.weighed)
     extended = bench.evaluate(model.effects, model.predictions, wanted, lump_places(bench))
-    return _screen(bench, extended, finite, origin)
+    return _screen(bench, extended, renewed(bench, extended, finite, origin), origin)
 
 
 def _forward(
