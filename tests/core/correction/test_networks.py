@@ -138,7 +138,8 @@ def test_compact_network_says_the_same(kind, nodes):
     vertices, tool = _inputs(body, 1)
     with torch.no_grad():
         wanted = network(vertices, tool)[0]
-    assert torch.allclose(Compact(network, half=False)(vertices[0], tool[0]), wanted, atol=1e-8)
+    # Single precision, whose sums are rounded in another order: of corrections of millimetres a ten-thousandth of one.
+    assert (Compact(network, half=False)(vertices[0], tool[0]) - wanted).abs().max() < 1e-7
     rough = Compact(network, half=True)(vertices[0], tool[0])
     assert (rough - wanted).square().mean() < 0.05**2 * (wanted - vertices[0]).square().mean()
 
