@@ -27,7 +27,7 @@ def bound_to_parent() -> None:
 def bound_to(pid: int) -> None:
     """The same where a fork server stands between: end soon after the process of that number has, even if it was killed."""
     bound_to_parent()
-    threading.Thread(target=_end_after, args=(pid,), daemon=True).start()
+    bound_to_process(pid)
 
 
 def bound_to_process(pid: int) -> None:

@@ -36,14 +36,14 @@ class Compact:
     """Vertices (v, 3) [m] and tool (13,) to corrected vertices, as `CorrectionNetwork` of a U-Net does with a batch of one.
 
     Args:
-        network: trained, over a grid. half: bfloat16 inside; where the processor has it, when left out.
+        network: trained, over a grid. half: bfloat16 inside, or the network's own type; where the processor has it, when left out.
     """
 
     def __init__(self, network: CorrectionNetwork, half: bool | None = None) -> None:
         inside, grid = network.inside, network.grid
         if not isinstance(inside, UNet) or grid is None:
             raise TypeError(f"only a U-Net can be made compact, this is a {type(inside).__name__}")
-        self._type = torch.bfloat16 if (has_half() if half is None else half) else torch.float32
+        self._type = torch.bfloat16 if (has_half() if half is None else half) else network.bound.dtype
         self._network, self._columns = network.cpu(), network.spec.columns
         shapes = [grid[::-1]]
         for _ in inside.down:
@@ -69,7 +69,7 @@ class Compact:
         values = self._bottom(torch.cat([values, known.expand(len(values), -1)], dim=1))
         for double, block in zip(self._doubled, self._up, strict=True):
             values = block(torch.cat([double(values), skips.pop()], dim=1))
-        return vertices + torch.tanh(self._last(values).float()) * net.bound
+        return vertices + torch.tanh(self._last(values).to(vertices.dtype)) * net.bound
 
     def _linear(self, weight: Tensor, bias: Tensor | None) -> Step:
         ready = weight.detach().to(self._type).contiguous()

@@ -174,7 +174,7 @@ class CorrectionNetwork(nn.Module):
             if self.grid is None or self.spec.kind == "graph"
             else self._grid(moved, known)
         )
-        return vertices + torch.tanh(said.float()) * self.bound
+        return vertices + torch.tanh(said.to(vertices.dtype)) * self.bound
 
     def _grid(self, moved: Tensor, known: Tensor) -> Tensor:
         axes = len(self.grid or ())

@@ -62,6 +62,16 @@ def ask(page: Any, name: str, low: str, high: str, row: int = 0) -> None:
     page.fill(f"input[aria-label='to of {name}']", high)
 
 
+def begin_random(page: Any, points: int) -> None:
+    """A random sweep over the tool's radius, until its first point is drawn."""
+    ask(page, "tool_radius.radius", "4", "8")
+    page.select_option("select[name=method]", "random")
+    page.fill("input[name=points]", str(points))
+    page.fill("input[name=frames]", "2")
+    page.click("text=Start the sweep")
+    page.wait_for_selector("#panel-sweep circle[data-point]", timeout=LONG)
+
+
 def newest(client: httpx.Client) -> str:
     return str(client.get("/api/sweeps").json()[0]["id"])
 
@@ -93,12 +103,7 @@ def test_two_parameters_are_a_map_and_a_flat_one_is_called_flat(page: Any) -> No
 
 
 def test_a_long_one_is_stopped_and_its_points_are_there_after_a_reload(page: Any) -> None:
-    ask(page, "tool_radius.radius", "4", "8")
-    page.select_option("select[name=method]", "random")
-    page.fill("input[name=points]", "400")
-    page.fill("input[name=frames]", "2")
-    page.click("text=Start the sweep")
-    page.wait_for_selector("#panel-sweep circle[data-point]", timeout=LONG)
+    begin_random(page, 400)
     page.click("#panel-sweep >> text=Stop")
     page.wait_for_selector("[data-state=cancelled]")
     page.wait_for_timeout(1500)
@@ -130,12 +135,7 @@ def test_a_browser_that_is_killed_in_the_middle_of_a_sweep_loses_no_point(page: 
         doomed = page.context.browser.browser_type.connect_over_cdp(f"http://127.0.0.1:{port.read_text().split()[0]}").new_page()
         doomed.goto(str(page.client.base_url))
         doomed.click("#tab-sweep")
-        ask(doomed, "tool_radius.radius", "4", "8")
-        doomed.select_option("select[name=method]", "random")
-        doomed.fill("input[name=points]", "24")
-        doomed.fill("input[name=frames]", "2")
-        doomed.click("text=Start the sweep")
-        doomed.wait_for_selector("#panel-sweep circle[data-point]", timeout=LONG)
+        begin_random(doomed, 24)
         identity = newest(page.client)
     finally:
         os.killpg(other.pid, signal.SIGKILL)
