@@ -51,6 +51,9 @@ def demo(
 
         settings = Settings(port=port, runs=folder / "runs", datasets=folder / "datasets", workers=workers)
         serve(settings, lambda address: announce(address, f"/?run={run.name}"))
+    else:
+        look = f"palpate serve --runs {folder / 'runs'} --datasets {folder / 'datasets'}"
+        out.print(f"to look at it: [bold]{look}[/]", highlight=False, soft_wrap=True)
 
 
 def _make(dataset: Path, seed: int, effects: int, workers: int, palpation: str | None) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 import sys
 import weakref
@@ -22,6 +23,8 @@ __all__ = ["Pardiso"]
 _POSITIVE_DEFINITE = 2
 _ANALYSE, _FACTORISE, _SOLVE, _FORWARD, _RELEASE = 11, 22, 33, 331, -1
 _ZERO_PIVOT = -4
+_DOMAIN = 4
+"""MKL's number for Pardiso where threads are set by domain."""
 _CHOSEN, _ORDERING = 0, 1
 _NESTED_DISSECTION = 2
 _DOUBLES, _INTEGERS = ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_int32)
@@ -35,16 +38,19 @@ def _pardiso() -> Any:
     beside = sorted((Path(sys.prefix) / "lib").glob("libmkl_rt.so*"))
     if beside:
         os.environ.setdefault("PYPARDISO_MKL_RT", str(beside[0]))
-    return PyPardisoSolver()._mkl_pardiso
+    solver = PyPardisoSolver()
+    # A factor made by one number of threads and used by another ends the process, as where MKL_NUM_THREADS asks for several and
+    # a solve is bounded to one (`core.threads`).
+    solver.libmkl.MKL_Domain_Set_Num_Threads(1, _DOMAIN)
+    return solver._mkl_pardiso
 
 
-def _aligned(right: FloatArray) -> FloatArray:
-    """A copy that begins at a cache line: MKL's last digits depend on where an array lies."""
-    memory = np.empty(right.size + 8)
+def _room(shape: tuple[int, ...]) -> FloatArray:
+    """An array in column order that begins at a cache line: MKL's last digits depend on where an array lies."""
+    size = math.prod(shape)
+    memory = np.empty(size + 8)
     begin = -memory.ctypes.data // 8 % 8
-    copy = memory[begin : begin + right.size].reshape(right.shape, order="F")
-    copy[...] = right
-    return copy
+    return memory[begin : begin + size].reshape(shape, order="F")
 
 
 class _Handle:
@@ -64,15 +70,15 @@ class _Handle:
 
     def run(self, phase: int, right: FloatArray) -> FloatArray:
         """Carry out a phase; returns the solution (n,) or (n, m) in column order where the phase has one."""
-        solution, error = _aligned(right), ctypes.c_int32(0)
-        right = _aligned(right)
+        solution, given, error = _room(right.shape), _room(right.shape), ctypes.c_int32(0)
+        given[...] = right
         number = [ctypes.byref(ctypes.c_int32(value)) for value in (1, _POSITIVE_DEFINITE, phase, self.size)]
         columns = ctypes.byref(ctypes.c_int32(1 if right.ndim == 1 else right.shape[1]))
         self.call(
             self.memory.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)), number[0], number[0], number[1], number[2], number[3],
             self.matrix.data.ctypes.data_as(_DOUBLES), self.rows.ctypes.data_as(_INTEGERS), self.columns.ctypes.data_as(_INTEGERS),
             self.order.ctypes.data_as(_INTEGERS), columns, self.options.ctypes.data_as(_INTEGERS), ctypes.byref(ctypes.c_int32(0)),
-            right.ctypes.data_as(_DOUBLES), solution.ctypes.data_as(_DOUBLES), ctypes.byref(error),
+            given.ctypes.data_as(_DOUBLES), solution.ctypes.data_as(_DOUBLES), ctypes.byref(error),
         )  # fmt: skip
         if error.value == _ZERO_PIVOT:
             raise NotPositiveDefinite("the matrix has no Cholesky factor")

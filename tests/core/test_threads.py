@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from threadpoolctl import ThreadpoolController
@@ -29,3 +34,26 @@ def test_replay_takes_one_thread_and_gives_the_others_back() -> None:
         replay(SETUP, push, grid, report=lambda *_: seen.append(_threads(pools)))
         assert seen == [{1}, {1}]
         assert _threads(pools) == {2}
+
+
+PUSHES = """
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from pushed_block import SETUP, poke
+from core.grading import PAGE_GRID
+from core.live import Live
+
+live = Live(SETUP, PAGE_GRID.for_tool(SETUP.tool.radius))
+print(all(live.at(np.array(poke(depth))).converged for depth in (-1e-3, 1e-3, 2e-3, 4e-3, 3e-3, 5e-3)))
+"""
+
+
+def test_factors_hold_where_mkl_is_told_to_use_several_threads() -> None:
+    here = Path(__file__).parents[2]
+    known = {**os.environ, "MKL_NUM_THREADS": "2", "PYTHONPATH": os.pathsep.join([str(here), str(here / "tests")])}
+    done = subprocess.run([sys.executable, "-c", PUSHES], env=known, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.strip()) == (0, "True"), done.stderr
