@@ -156,6 +156,7 @@ class Jobs:
             self._records.note(identity, "info", said)
         scratch = Path(job.request["scratch"])
         scratch.mkdir(parents=True, exist_ok=True)
+        ending: tuple[Any, ...] | None = None
         here, there = self._context.Pipe()
         process = self._context.Process(target=work, args=(self._targets[job.kind], job.request, there))
         try:
@@ -167,32 +168,42 @@ class Jobs:
             self._records.note(identity, "info", f"started, attempt {job.attempt}")
             if self.get(identity).state.is_finished:
                 self._stop(identity)
-            self._follow(identity, here)
-            process.join()
+            ending = self._follow(identity, here)
+            process.join(None if ending is None else _ENDING)
         finally:
             self._stop(identity)
             here.close()
             for place in (scratch, *(folder / identity for folder in self._beside)):
                 shutil.rmtree(place, ignore_errors=True)
-            self._died(identity, process.exitcode)
+            self._ended(identity, ending, process.exitcode)
             self._running.pop(identity, None)
 
-    def _died(self, identity: str, code: int | None) -> None:
-        """Close the record of a worker that ended without a word; killed from outside, its job was interrupted."""
-        if code is not None and code < 0:
+    def _ended(self, identity: str, ending: tuple[Any, ...] | None, code: int | None) -> None:
+        """Close the record with what the worker said last, now that its folders are gone.
+
+        A worker that ended without a word and was killed from outside interrupted its job.
+        """
+        if ending is not None and ending[0] == "failed":
+            self._finish(identity, JobState.FAILED, error=ending[1])
+        elif ending is not None and ending[0] == "cancelled":
+            self._finish(identity, JobState.CANCELLED, text="cancelled")
+        elif ending is not None:
+            self._finish(identity, JobState.DONE, result=ending[1], fraction=1.0, text="done")
+        elif code is not None and code < 0:
             message = f"the worker process was ended from outside ({signal.Signals(-code).name}); retry it"
             self._finish(identity, JobState.INTERRUPTED, error={"kind": "WorkerDied", "message": message, "where": {}})
         else:
             message = f"the worker process ended with code {code}"
             self._finish(identity, JobState.FAILED, error={"kind": "WorkerDied", "message": message, "where": {}})
 
-    def _follow(self, identity: str, pipe: Connection) -> None:
+    def _follow(self, identity: str, pipe: Connection) -> tuple[Any, ...] | None:
+        """Write down what the worker tells, until its last message, which is returned: None of a worker that died."""
         written, stage = 0.0, ""
         while True:
             try:
                 message = pipe.recv()
             except (EOFError, OSError):
-                return
+                return None
             if message[0] == "progress":
                 _, fraction, text = message
                 if _NUMBERS.sub("#", text) != stage:
@@ -204,12 +215,8 @@ class Jobs:
                 self._records.update(identity, fraction=fraction, text=text)
             elif message[0] == "note":
                 self._records.note(identity, message[1], message[2])
-            elif message[0] == "failed":
-                self._finish(identity, JobState.FAILED, error=message[1])
-            elif message[0] == "cancelled":
-                self._finish(identity, JobState.CANCELLED, text="cancelled")
             else:
-                self._finish(identity, JobState.DONE, result=message[1], fraction=1.0, text="done")
+                return message  # type: ignore[no-any-return]
 
     def _finish(self, identity: str, state: JobState, **values: Any) -> None:
         if self._records.update(identity, state=state, finished=time.time(), **values):
