@@ -36,8 +36,8 @@ PRIOR_STEPS = 4.0
 TRUST = 2.5
 """Longest step of a fit at once, in the scales of what it moves."""
 _ITERATIONS = 6
-_WORTH = 0.5
-"""A step that promises less [nats] is not made."""
+_WORTH, _SETTLED = 0.5, 0.02
+"""A step that promises less [nats] is not made, while models are compared and in the last fit: to 1 and 0.2 deviations."""
 _OPTIMISM = (10.0, 3.0)
 """A fit is given up where so many times what its next step promises would not save it, before the first step and after it: to
 first order a tool's shift by millimetres promises a small part of what it does."""
@@ -176,8 +176,7 @@ class Bench:
             known.append(OWN_GRID)
             own = self.on_own_grid = with_columns([f.result() for f in self.predict(known, None, own)], own)
         fine = [f.result() for f in self.predict(known, None, own, self.fine)]
-        places = model.extra["lumps"]
-        surface = self.surface if self.seen else None
+        places, surface = model.extra["lumps"], self.surface if self.seen else None
         self.noises = under_stated(noises(own, fine, surface, slice(places[0], places[-1] + 1)), model.predictions)
         model = self.assemble(tuple(effects), model.setup, model.predictions, tangents, len(lumps))
         self.temperature = self.misfit(model)
@@ -243,12 +242,12 @@ class Bench:
         self.tell(f"fitting {' and '.join(effect.name for effect in effects)}")
         return self._fitted(self.evaluate(effects, starts), self.nuisances.precision, hopeless)
 
-    def _fitted(self, model: Model, nuisances: FloatArray, hopeless: float = -np.inf) -> Model:
+    def _fitted(self, model: Model, nuisances: FloatArray, hopeless: float = -np.inf, worth: float = _WORTH) -> Model:
         best, radius = self.objective(model, nuisances), TRUST
         for iteration in range(_ITERATIONS):
             promised = self._promised(model, nuisances)
             lost = best + _OPTIMISM[min(iteration, 1)] * promised < hopeless or (iteration == 2 and best < hopeless)
-            if lost or promised < _WORTH:
+            if lost or promised < worth:
                 break
             step = self._step(model, nuisances, radius)
             if np.abs(step / model.scales).max() < 0.05:
@@ -257,7 +256,7 @@ class Bench:
             value = self.objective(trial, nuisances)
             if value > best:
                 gained, model, best = value - best, trial, value
-                if gained < 1.0:
+                if gained < 2 * worth:
                     break
             else:
                 radius = 0.3 * np.abs(step / model.scales).max()
@@ -267,10 +266,9 @@ class Bench:
 
     def _step(self, model: Model, nuisances: FloatArray, reach: float) -> FloatArray:
         """Most probable change of the search coordinates, none by more than `reach` of its scales."""
-        columns = [*model.nuisance, *model.columns]
-        own = range(len(model.nuisance), len(columns))
-        change = within_reach(self.tempered(model), columns, self.precision(model, nuisances), own, model.scales, reach)
-        return change[len(model.nuisance) :]
+        columns, first = [*model.nuisance, *model.columns], len(model.nuisance)
+        own, precision = range(first, len(columns)), self.precision(model, nuisances)
+        return within_reach(self.tempered(model), columns, precision, own, model.scales, reach)[first:]
 
     def _promised(self, model: Model, nuisances: FloatArray) -> float:
         """What the best values of the model's search coordinates would gain to first order [nats]."""
@@ -291,7 +289,7 @@ class Bench:
             fine = [f.result() for f in self.predict(plain, None, here, self.fine)]
             self.noises = [n.remeshed(m, f) for n, m, f in zip(self.noises, here, fine, strict=True)]
         found = self.assemble(model.effects, model.setup, model.predictions, (), 0)
-        return self._fitted(found, self.nuisances.beside(found.effects))
+        return self._fitted(found, self.nuisances.beside(found.effects), worth=_SETTLED)
 
     def _shift(self, model: Model, step: FloatArray) -> list[Effect]:
         effects, at = [], 0

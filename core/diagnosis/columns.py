@@ -155,6 +155,6 @@ class Columns:
         here = self._seen[reference]
         for number, (others, step) in enumerate(zip(self._others, self.wanted.steps, strict=True)):
             if not others[reference].same(here):
-                moved = others[reference].place(here.read(compared.points))
+                moved = others[reference].place(here.read(compared.places))
                 values[:, TOOL_COLUMNS + number] += compared.along_sight(moved, others[reference].scale) / step
         return values

@@ -26,13 +26,15 @@ class Trial:
     """A refitted model and its gain over the baseline [nats], with the misfit per value it leaves.
 
     `parts` says where the gain comes from, once all trials are scored at one temperature: each block of data, and last the stated
-    accuracies.
+    accuracies. `asked` is the gain that so many causes must bring [nats] before they are named; infinite for what was refused
+    although it brings it.
     """
 
     model: Model
     gain: float
     misfit: float
     parts: tuple[float, ...] = ()
+    asked: float = 0.0
 
     def scored(self) -> Trial:
         """Without the replays, which nobody asks for of a model that was not accepted: they take most of the memory."""
@@ -65,9 +67,9 @@ class Findings:
     known: tuple[Effect, ...] = ()
 
     def withdraw(self, why: str) -> None:
-        """Name nothing after all."""
-        names = self.best.model.names if self.best else ()
-        self.trials = [trial for trial in self.trials if trial.model.names != names]
+        """Name nothing after all, neither alone nor with a further cause."""
+        names = set(self.best.model.names if self.best else ())
+        self.trials = [trial for trial in self.trials if not names or not names.issubset(trial.model.names)]
         self.best, self.left, self.withdrawn = None, self.structure, why
 
     def rivals(self) -> list[Trial]:

@@ -81,7 +81,7 @@ def search(bench: Bench, seed: int) -> Findings:
         findings.screened[name] = max(float(gain), findings.screened.get(name, -np.inf))
     current = Trial(baseline, 0.0, findings.misfit)
     if known:
-        current = findings.best = _trial(bench, known, origin.predictions, baseline)
+        current = findings.best = replace(_trial(bench, known, origin.predictions, baseline), asked=findings.bound)
         findings.trials.append(current)
     for order in range(len(known), MOST_CAUSES):
         bench.tell("looking for a second cause" if order else "fitting the most promising causes", 0.45 + 0.25 * order)
@@ -116,10 +116,10 @@ def _forward(
     bench: Bench, findings: Findings, current: Trial, screened: Model, candidates: list[Candidate], gains: np.ndarray
 ) -> Trial | None:
     """The best further cause that gains more than the bound and that is no accident of one sequence, else None."""
-    trials: list[Trial] = []
+    trials, needed = list[Trial](), _needed(findings, current)
     wrong = current.model.names == _known(findings) or findings.left.significant
     settled = beyond_first_order(bench, screened, candidates) if wrong else []
-    chosen = shortlist(gains, candidates, PROMISING * _needed(findings, current), settled)
+    chosen = shortlist(gains, candidates, PROMISING * needed, settled)
     before, linear = bench.objective(current.model), {id(one): gain for one, gain in zip(candidates, gains, strict=True)}
     # What is dear, or refitted whatever its gain, comes last, when a better one may show that it is hopeless.
     for candidate in sorted(chosen, key=lambda one: (isinstance(one.start, TRACED), one in settled)):
@@ -127,10 +127,13 @@ def _forward(
         if isinstance(candidate.start, TRACED) and before + DEAR_OPTIMISM * linear[id(candidate)] < hopeless:
             continue
         effects = [*current.model.effects, begin(candidate, screened, bench)]
-        trials.append(_trial(bench, effects, current.model.predictions, current.model, hopeless))
+        trial = _trial(bench, effects, current.model.predictions, current.model, hopeless)
+        trials.append(replace(trial, asked=current.asked + needed))
     trials.sort(key=lambda trial: -trial.gain)
-    enough = [trial for trial in trials if trial.gain > _needed(findings, current)]
+    enough = [trial for trial in trials if trial.gain > needed]
     best = next((trial for trial in enough if stands(bench, trial.model, current.model)), None)
+    if best is None:
+        trials = [replace(trial, asked=np.inf) if trial in enough else trial for trial in trials]
     findings.trials.extend(trial if trial is best else trial.scored() for trial in trials)
     return best
 
@@ -150,6 +153,7 @@ def _paired(bench: Bench, findings: Findings, current: Trial, screening: Screeni
         effects = [begin(one, screened, bench, other), begin(other, screened, bench, one)]
         hopeless = bench.objective(current.model) - HOPELESS
         trial = _trial(bench, effects, findings.baseline.predictions, findings.baseline, hopeless)
+        trial = replace(trial, asked=current.asked + SECOND_FACTOR * findings.bound)
         gain = predictive_gain(bench.score(trial.model), bench.score(current.model))[0]
         left = structure_of(bench, trial.model, seed)
         if gain > SECOND_FACTOR * findings.bound and not left.significant:
@@ -157,7 +161,7 @@ def _paired(bench: Bench, findings: Findings, current: Trial, screening: Screeni
             findings.best, findings.left = trial, left
             bench.temperature = max(1.0, trial.misfit)
             return
-        findings.trials.append(trial.scored())
+        findings.trials.append(replace(trial.scored(), asked=np.inf if left.significant else trial.asked))
 
 
 def _apart(ranked: Sequence[tuple[float, Candidate, Candidate]], most: int) -> list[tuple[float, Candidate, Candidate]]:
@@ -193,6 +197,7 @@ def _reconsidered(bench: Bench, findings: Findings, best: Trial, finite: Sequenc
         if len(rest) == len(best.model.effects):  # exchanged already
             continue
         without = _trial(bench, rest, best.model.predictions, findings.baseline)
+        without = replace(without, asked=best.asked - findings.bound)
         lost = predictive_gain(bench.score(best.model), bench.score(without.model))[0]
         if lost <= findings.bound:
             findings.trials.append(without)
@@ -214,6 +219,7 @@ def _exchanged(bench: Bench, findings: Findings, trials: tuple[Trial, Trial], lo
         effects = [*without.model.effects, begin(candidate, screened, bench)]
         bench.tell(f"trying {candidate.start.name} instead")
         other = _trial(bench, effects, without.model.predictions, findings.baseline, bench.objective(best.model) - HOPELESS)
+        other = replace(other, asked=best.asked)
         better = predictive_gain(bench.score(other.model), bench.score(best.model))[0] > 0
         if better and stands(bench, other.model, without.model):
             findings.trials.append(other)

@@ -38,10 +38,13 @@ def verdict_of(findings: Findings) -> str:
 
 
 def _probabilities(findings: Findings) -> dict[tuple[str, ...], float]:
-    """Softmax of tempered gains over the models tried and none; not calibrated on a suite yet."""
-    gains: dict[tuple[str, ...], float] = {(): findings.bound}
+    """Softmax, over the models tried and none, of what each gains beyond what is asked of it; not calibrated on a suite yet.
+
+    What is asked is part of the odds: what the search refused for too little is less probable than what it named.
+    """
+    gains: dict[tuple[str, ...], float] = {(): 0.0}
     for trial in findings.trials:
-        gains[trial.model.names] = max(trial.gain, gains.get(trial.model.names, -np.inf))
+        gains[trial.model.names] = max(trial.gain - trial.asked, gains.get(trial.model.names, -np.inf))
     names = list(gains)
     logits = np.array([gains[name] for name in names]) / _TEMPERATURE
     weights = np.exp(logits - logits.max())

@@ -83,7 +83,7 @@ Tried = tuple[tuple[Effect, ...], float, float]
 
 def _findings(bench: Bench, *trials: Tried, accepted: bool = True, misfit: float = 2.0) -> Findings:
     """Trials as (effects, gain, misfit left), best first; the first is accepted or not."""
-    made = [Trial(_model(bench, *effects), gain, left) for effects, gain, left in trials]
+    made = [Trial(_model(bench, *effects), gain, left, asked=12.0 * len(effects)) for effects, gain, left in trials]
     screened = {kind.name: 0.5 * number for number, kind in enumerate(DIAGNOSED)}
     return Findings(_model(bench), made[0] if accepted and made else None, made, 12.0, misfit, screened)
 
@@ -273,6 +273,17 @@ def test_probabilities_of_exclusive_causes_add_up_to_at_most_one(bench, dataset,
     assert all(0 <= chance <= 1 for chance in chances)
     assert sum(chances) <= 1 + 1e-3
     assert sum(chances) < 0.99  # that there is no cause has a probability, too
+
+
+def test_a_further_cause_that_was_refused_is_less_probable_than_not(bench, dataset):
+    """It gains 10 nats where the search asks 12 of it: the odds against it are what is lacking."""
+    findings = _findings(bench, ((LUMP,), 90.0, 1.05), ((LUMP, RADIUS), 100.0, 1.02))
+    chances = {row["effect"]: row["probability"] for row in report_of(dataset, bench, findings, None, "test")["ranking"]}
+    assert 0.2 < chances["tool_radius"] < 0.5
+    findings.trials[1] = replace(findings.trials[1], gain=1000.0, asked=np.inf)  # of one sequence alone
+    report = report_of(dataset, bench, findings, None, "test")
+    assert {row["effect"]: row["probability"] for row in report["ranking"]}["tool_radius"] == 0.0
+    assert report["causes"][0]["probability"] == pytest.approx(1.0, abs=1e-3)
 
 
 def test_what_is_left_is_told_by_place_and_sequence(bench, dataset):
