@@ -91,7 +91,9 @@ def _model(trial: Trial) -> dict[str, Any]:
     blocks = [*(block.name for block in trial.model.blocks), "stated accuracies"]
     parts = [{"of": name, "gain_nats": round(part, 2)} for name, part in zip(blocks, trial.parts, strict=bool(trial.parts))]
     effects = [effect.to_json() for effect in trial.model.effects]
-    return {"effects": effects, "gain_nats": round(trial.gain, 2), "misfit": round(trial.misfit, 4), "parts": parts}
+    asked = round(trial.asked, 2) if np.isfinite(trial.asked) else None  # refused, although it gains what was asked
+    gain, misfit = round(trial.gain, 2), round(trial.misfit, 4)
+    return {"effects": effects, "gain_nats": gain, "asked_nats": asked, "misfit": misfit, "parts": parts}
 
 
 def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
