@@ -201,7 +201,7 @@ class Jobs:
         written, stage = 0.0, ""
         while True:
             try:
-                message = pipe.recv()
+                message: tuple[Any, ...] = pipe.recv()
             except (EOFError, OSError):
                 return None
             if message[0] == "progress":
@@ -216,7 +216,7 @@ class Jobs:
             elif message[0] == "note":
                 self._records.note(identity, message[1], message[2])
             else:
-                return message  # type: ignore[no-any-return]
+                return message
 
     def _finish(self, identity: str, state: JobState, **values: Any) -> None:
         if self._records.update(identity, state=state, finished=time.time(), **values):

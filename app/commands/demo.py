@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -52,7 +53,7 @@ def demo(
         settings = Settings(port=port, runs=folder / "runs", datasets=folder / "datasets", workers=workers)
         serve(settings, lambda address: announce(address, f"/?run={run.name}"))
     else:
-        look = f"palpate serve --runs {folder / 'runs'} --datasets {folder / 'datasets'}"
+        look = f"{sys.argv[0]} serve --runs {folder / 'runs'} --datasets {folder / 'datasets'}"
         out.print(f"to look at it: [bold]{look}[/]", highlight=False, soft_wrap=True)
 
 

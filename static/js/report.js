@@ -13,7 +13,7 @@ export function showReport(heading, report, patterns, palette) {
   fill(panel(),
     element("div", { class: "eyebrow" }, element("span", { class: `verdict-tag ${report.verdict}` }, report.verdict), `${heading.folder ?? heading.dataset} · ${when(heading.created)}`),
     element("h1", { class: "verdict" }, heading.sentence),
-    element("p", {}, element("a", { class: "button", href: `/api/runs/${encodeURIComponent(heading.id)}/report.html`, download: `${heading.id}.html` }, "Save as one file"), " ", exportButton(heading.id)),
+    element("p", { class: "actions" }, element("a", { class: "button", href: `/api/runs/${encodeURIComponent(heading.id)}/report.html`, download: `${heading.id}.html` }, "Save as one file"), exportButton(heading.id)),
     (heading.notes ?? []).map((text) => element("p", { class: "gain-note" }, text)),
     causes.length ? section(report.verdict === "replay" ? "Added to the stated setup" : causes.length > 1 ? "Causes" : "Cause", report.verdict === "replay" ? "" : "interval", causes.map(cause)) : null,
     report.gain ? section("Error on sequences not fitted on", report.gain.unit ?? "mm", gain(report.gain, causes.length > 0)) : null,

@@ -37,11 +37,6 @@ def test_replay_takes_one_thread_and_gives_the_others_back() -> None:
 
 
 PUSHES = """
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 from pushed_block import SETUP, poke
 from core.grading import PAGE_GRID
