@@ -31,7 +31,7 @@ from core.yielding import GRAVITY, give_way, slide, weight_of
 
 __all__ = ["GRAVITY", "Equilibrium", "Replay", "replay", "require_converged", "rest"]
 
-_MOST_SLIDES, _DRAG_STEP = 12, 1e-3
+_MOST_SLIDES, _DRAG_STEP = 40, 1e-3
 """Of a base in one frame; of a tool with friction, unless another `drag_step` is asked for [m]."""
 
 
@@ -255,6 +255,8 @@ class Replay:
                 break
             self.slip = self.slip + step
             way.append(self.held(probe, way[-1]))
+        else:
+            way[-1] = replace(way[-1], outcome=Outcome.BASE_SLIDES)
         return self._after([*frame.way, replace(frame, way=()), *way[1:]][:-1], way[-1])
 
 

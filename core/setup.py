@@ -239,6 +239,11 @@ class Setup:
         """Whether a frame depends on all those before it, so that none may be left out."""
         return bool(self.tool.friction_coefficient) or self.material.remembers
 
+    @property
+    def marked_by_pushes(self) -> bool:
+        """Whether a push leaves something when the tool is gone: a dent in a material that remembers, or a block that slid."""
+        return self.support.friction_coefficient is not None or self.material.remembers
+
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON, SI units."""
         return {

@@ -19,10 +19,9 @@ _STEP = 1e-6
 def _slid(force: FloatArray, reach: float, setup: Setup) -> FloatArray:
     """How far a base moves on (2,) [m] that is known to."""
     friction = setup.support.friction_coefficient
-    step = None if friction is None else slide_by(force, reach, friction, weight_of(setup))
-    if step is None:
-        raise SolveError("a base that slid is about to be held, so that there is no gradient")
-    return step
+    if friction is None:
+        raise SolveError("a base that slid is held in the other setup, so that there is no gradient")
+    return slide_by(force, reach, friction, weight_of(setup))
 
 
 class SlideStep:

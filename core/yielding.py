@@ -21,6 +21,11 @@ _PLACED, _MOST_PLACES = 1e-2, 30
 """How well a tool that gives way is placed [m], over the tolerance, and how often that is tried."""
 _LONGEST_SLIDE = 1e-3
 _SHALLOWEST = 2e-4
+_HELD = 2e-4
+"""A base stays where friction holds all but this share of the push [1]."""
+_STIFFENING = 1.5
+"""Stiffness of a push over its force by its depth [1]: of a ball on a flat, whose force grows with the depth to the power 1.5
+(Hertz); of deeper ones it is less. A slide by this falls short of where friction holds; one that went beyond would stay there."""
 
 
 def give_way(
@@ -54,18 +59,21 @@ def slide(frame: Equilibrium, friction: float, weight: float) -> FloatArray | No
     Args:
         friction: coefficient [1]. weight: of the block [N]; with the tool's push it loads the base.
     """
+    if _excess(frame.force, friction, weight) <= _HELD * friction * weight:
+        return None
     return slide_by(frame.force, reach_of(frame), friction, weight)
 
 
-def slide_by(force: FloatArray, reach: float, friction: float, weight: float) -> FloatArray | None:
-    """The same, by the force on the tool (3,) [N] and the sideways indentation [m] that it stands for."""
-    push = -force
-    pull, load = float(np.linalg.norm(push[:2])), max(weight - push[2], 0.0)
-    excess = pull - friction * load
-    if excess <= 1e-3 * friction * weight:
-        return None
-    stiffness = pull / max(reach, _SHALLOWEST)
-    return np.asarray(push[:2] / pull * min(excess / stiffness, _LONGEST_SLIDE))
+def slide_by(force: FloatArray, reach: float, friction: float, weight: float) -> FloatArray:
+    """The same of a base that does slide, by the force on the tool (3,) [N] and the sideways indentation [m] it stands for."""
+    push, pull = -force[:2], float(np.linalg.norm(force[:2]))
+    stiffness = _STIFFENING * pull / max(reach, _SHALLOWEST)
+    return np.asarray(push / pull * min(_excess(force, friction, weight) / stiffness, _LONGEST_SLIDE))
+
+
+def _excess(force: FloatArray, friction: float, weight: float) -> float:
+    """Sideways push beyond what friction holds [N]."""
+    return float(np.linalg.norm(force[:2])) - friction * max(weight + float(force[2]), 0.0)
 
 
 def weight_of(setup: Setup) -> float:

@@ -11,9 +11,9 @@ import numpy as np
 from core.diagnosis.columns import TOOL_COLUMNS, Wanted
 from core.diagnosis.evidence import Block, explained, fit, log_evidence, predictive_score, within_reach
 from core.diagnosis.hypothesis import Model, Nuisances, nuisance_setups, with_effects
-from core.diagnosis.led import led, with_replays
+from core.diagnosis.led import led
 from core.diagnosis.noise import Noise, noises
-from core.diagnosis.ordered import ORDERED, TRACED
+from core.diagnosis.ordered import TRACED
 from core.diagnosis.prediction import Prediction
 from core.diagnosis.resolution import OWN_GRID, under_stated, with_columns
 from core.diagnosis.still import Still
@@ -104,7 +104,7 @@ class Bench:
         pairs = nuisance_setups(setup, self.nuisances.forces)
         for index, effect in enumerate(effects):
             for number in range(len(effect.numbers())):
-                alone = isinstance(effect, (*ORDERED, MeshResolution))
+                alone = isinstance(effect, (*TRACED, MeshResolution))
                 pairs.append((setup, 1.0) if alone else self._moved(effects, index, number))
         pairs += [tangent.changed(setup) for tangent in tangents]
         return Wanted(
@@ -132,7 +132,7 @@ class Bench:
         if any(isinstance(effect, TRACED) for effect in effects):
             return self.assemble(tuple(effects), setup, led(self, effects, starts, tangents, lumps), tangents, len(lumps))
         predictions = [f.result() for f in self.predict(effects, self._wanted(effects, setup, tangents, lumps), starts)]
-        model = self.assemble(tuple(effects), setup, with_replays(self, effects, predictions), tangents, len(lumps))
+        model = self.assemble(tuple(effects), setup, predictions, tangents, len(lumps))
         self.known = [*self.known[:1], model]
         return model
 

@@ -13,9 +13,10 @@ from core.diagnosis.columns import TOOL_COLUMNS
 from core.diagnosis.evidence import fit
 from core.diagnosis.hypothesis import Model, with_effects
 from core.diagnosis.noise import DISPLACEMENT_ERROR, FIELD_LENGTH, STIFFNESS_ERROR, smooth_basis
-from core.diagnosis.ordered import ORDERED
+from core.diagnosis.ordered import TRACED
 from core.diagnosis.pushes import Push
 from core.effects.material import PoissonRatio
+from core.effects.support import BaseSlip
 from core.effects.tool import ToolRadius
 from core.fem.model import rule_of
 from core.fem.newton import Outcome
@@ -76,7 +77,7 @@ def survivor(bench: Bench, model: Model) -> Survivor:
             coordinates[number] += step
             changed = [*model.effects[:index], effect.at(coordinates), *model.effects[index + 1 :]]
             # What hangs on all that was done before has no derivative here.
-            if not isinstance(effect, ORDERED):
+            if not isinstance(effect, (BaseSlip, *TRACED)):
                 varied.append((with_effects(bench.setup, changed), step))
                 kept.append(at)
             at += 1

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from core.diagnosis.comparison import Compared, observe
+from core.diagnosis.sliding import Sliding
 from core.effects.base import LOG_PER_CONTRAST
 from core.fem.model import rule_of
 from core.fem.newton import Outcome
@@ -56,6 +57,8 @@ class Columns:
         self._others = [{at_rest: sight_of(other, reference=at_rest) for at_rest in (False, True)} for other in wanted.setups]
         self._grown = [other.scale / here.scale - 1.0 for other in wanted.setups]
         self._alike = not any(growth.any() for growth in self._grown)
+        slides = here.support.friction_coefficient is not None
+        self._sliding = Sliding(here, wanted.setups, wanted.steps, TOOL_COLUMNS, self.count) if slides else None
 
     @property
     def count(self) -> int:
@@ -83,8 +86,9 @@ class Columns:
         return np.concatenate([tool, np.array(turned), scaled, lumps])
 
     def _with_forces(self, frame: Equilibrium, steps: Sequence[Change], moved: FloatArray) -> FloatArray:
-        """Displacements (k, n, 3) [m], and last the forces that come with them [N]; zero where none is felt."""
-        pressed = force_changes(self.block, frame, steps, moved) if self.felt else np.zeros((len(moved), 3))
+        """Displacements (k, n, 3) [m], and last the forces that come with them [N]; zero where nobody asks for them."""
+        wanted = self.felt or self._sliding is not None
+        pressed = force_changes(self.block, frame, steps, moved) if wanted else np.zeros((len(moved), 3))
         return np.concatenate([moved, pressed[:, None]], axis=1)
 
     def of_force(self, changes: FloatArray, measured: FloatArray, turned: FloatArray) -> FloatArray:
@@ -140,7 +144,12 @@ class Columns:
             found = np.zeros((self.count, len(frame.displacement) + 1, 3))
         for number, (growth, step) in enumerate(zip(self._grown, self.wanted.steps, strict=True)):
             found[TOOL_COLUMNS + number, :-1] += frame.mesh.nodes * growth / step
-        return found
+        return found if self._sliding is None else self._sliding.after(frame, found)
+
+    def passed(self, frame: Equilibrium, moves: FloatArray) -> None:
+        """Take note of an equilibrium between two groups, in which a base may slide; `moves` as for `changes`."""
+        if self._sliding is not None and self._sliding.slid(frame):
+            self._sliding.after(frame, self.changes(frame, moves))
 
     def project(
         self, frame: Equilibrium, changes: FloatArray, moves: FloatArray, compared: Compared, reference: bool

@@ -84,6 +84,12 @@ class Compared:
         np.add.at(total, patch, values)
         return np.asarray(total / np.maximum(self.means.count, 1)[:, None])
 
+    def elsewhere(self, sample: Sample) -> FloatArray:
+        """Share (p,) of each patch's points that meet another side of this model than of the one that chose them [1]."""
+        other = self.seen.side != sample.side[self.seen.index]
+        found = np.bincount(self.seen.patch[other], minlength=len(self.means.count))
+        return np.asarray(found / np.maximum(self.means.count, 1))
+
     def along_sight(self, moved: FloatArray, scale: float = 1.0) -> FloatArray:
         """Change of the averages (p,) [m] when the camera sees the places at (m, 3) [m] instead, and reads lengths `scale` [1].
 

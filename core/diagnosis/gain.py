@@ -51,9 +51,9 @@ def ladder(
 ) -> Ladder:
     """Compare two models on test sequences; probes are resampled whole.
 
-    Groups in touch count, and of a material that remembers also what a push has left.
+    Groups in touch count, and where a push leaves something (a dent, a block that slid) also those after it.
     """
-    sums = probe_sums(data, (baseline, extended), found.material.remembers)
+    sums = probe_sums(data, (baseline, extended), found.marked_by_pushes)
     drawn, whole = sums.rms(sums.draws(seed)), sums.rms()[0]
     low, high = np.quantile(removed_share(*drawn.T), [0.025, 0.975])
     return Ladder(

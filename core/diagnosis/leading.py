@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,13 +25,15 @@ class Led:
 
     Attributes:
         correction: stated to true phantom_from_robot. centres: (g, 3) of the tool [m]. moves: (s, g, 3) how other setups move
-            them [m]. turned: (s, 3, 3) how these turn a measured force. measured: force on the tool (g, 3) and its deviation (g,)
-            [N]; None without forces.
+            them [m]. turns: of a base that slides, where the tool was deepest since the group before it, a place (3,) and how
+            the setups move it (s, 3) [m]; None where that is the group's own place. turned: (s, 3, 3) how these turn a measured
+            force. measured: force on the tool (g, 3) and its deviation (g,) [N]; None without forces.
     """
 
     correction: Transform
     centres: FloatArray
     moves: FloatArray
+    turns: list[tuple[FloatArray, FloatArray] | None]
     turned: FloatArray
     measured: tuple[FloatArray, FloatArray] | None
 
@@ -47,4 +49,17 @@ def led(data: Observations, setup: Setup, grid: Meshing, wanted: Wanted | None) 
         there = touch_correction(other, grid)
         moves[number] = there.apply(data.centres(other)) - centres
         turned[number] = (there @ other.phantom_from_robot @ robot.inverse()).rotation
-    return Led(correction, centres, moves, turned, data.felt(robot, setup.sensor.time_offset))
+    turns = _turns(data, setup, grid, wanted)
+    return Led(correction, centres, moves, turns, turned, data.felt(robot, setup.sensor.time_offset))
+
+
+def _turns(data: Observations, setup: Setup, grid: Meshing, wanted: Wanted | None) -> list[tuple[FloatArray, FloatArray] | None]:
+    """As `Led.turns`; another clock says when a cloud was taken, not where the tool turned."""
+    if setup.support.friction_coefficient is None:
+        return [None] * len(data.groups)
+    chosen, clock = data.turns(setup), setup.sensor.time_offset
+    setups = (setup, *(wanted.setups if wanted else ()))
+    timed = [replace(one, sensor=replace(one.sensor, time_offset=clock)) for one in setups]
+    ways = [touch_correction(one, grid).apply(data.way(same)[1]) for one, same in zip(setups, timed, strict=True)]
+    places = [None if number is None else np.stack([way[number] for way in ways]) for number in chosen]
+    return [None if place is None else (place[0], place[1:] - place[0]) for place in places]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from core.diagnosis.ordered import ORDERED, TRACED
+from core.diagnosis.ordered import TRACED
 from core.diagnosis.prediction import Prediction
 from core.diagnosis.tangent import Tangent
 from core.diagnosis.traces import moved, moves, with_traces
@@ -20,10 +20,7 @@ from core.setup import Inclusion
 if TYPE_CHECKING:
     from core.diagnosis.bench import Bench
 
-__all__ = ["led", "with_replays"]
-
-_STEP = 0.25
-"""Step of a derivative by two replays, in the scale of what is moved."""
+__all__ = ["led"]
 
 
 def led(
@@ -53,19 +50,3 @@ def led(
             found = [here.with_column(one, column, step) for here, one in zip(found, there, strict=True)]
         column += len(effect.numbers())
     return found
-
-
-def with_replays(bench: Bench, effects: Sequence[Effect], predictions: list[Prediction]) -> list[Prediction]:
-    """With columns of effects in whose replays a frame hangs on all those before it: by one more replay for each number."""
-    column = len(bench.nuisances.precision) - 1
-    for index, effect in enumerate(effects):
-        for number, item in enumerate(effect.numbers()):
-            if isinstance(effect, ORDERED):
-                coordinates, step = effect.coordinates, _STEP * item.scale
-                step = -step if coordinates[number] + step > item.coordinate(item.high) else step
-                coordinates[number] += step
-                changed = [*effects[:index], effect.at(coordinates), *effects[index + 1 :]]
-                others = [one.result() for one in bench.predict(changed, None, predictions)]
-                predictions = [here.with_column(there, column, step) for here, there in zip(predictions, others, strict=True)]
-            column += 1
-    return predictions

@@ -26,6 +26,8 @@ STIFFNESS_ERROR = 0.08
 """Standard deviation of the logarithm of local stiffness that stands for discretisation and law [1]."""
 FIELD_LENGTH = 8e-3
 _WHITE_FLOOR = 2e-5
+_ELSEWHERE = 0.2
+"""A patch is no more what it was where so many of its points meet another side of the model [1]."""
 
 
 def patch_variance(predictions: Sequence[Prediction]) -> FloatArray:
@@ -118,11 +120,18 @@ class Noise:
         return cls(weights, np.where(seen, gap, 0.0), mesh, np.concatenate(parts, axis=2), centred=False)
 
     def remeshed(self, model: Prediction, fine: Prediction) -> Noise:
-        """With the mesh's error as it is in another model; all else stays, so that no patch gains or loses weight."""
+        """With the mesh's error as it is in another model, which is settled by now.
+
+        A patch of which it shows another side loses its weight: of a block that slid from under its edge the points that were the
+        top's are a side's, with that side's share of the camera's pattern. All else stays, so that no patch gains or loses.
+        """
         gap, finer = rows_of(model)[0], rows_of(fine)[0]
         seen = np.isfinite(gap) & np.isfinite(finer) & (self.weights > 0)
         seen[list(set(model.failed) | set(fine.failed))] = False
-        return replace(self, mesh=np.where(seen, finer - gap, self.mesh))
+        weights = self.weights.copy()
+        if model.elsewhere is not None:
+            weights[:, : model.elsewhere.shape[1]][model.elsewhere > _ELSEWHERE] = 0.0
+        return replace(self, weights=weights, mesh=np.where(seen, finer - gap, self.mesh))
 
     def block(self, prediction: Prediction) -> Block:
         """Quadratic form of a model's residual and columns (mesh error last), with the discrepancy integrated out.

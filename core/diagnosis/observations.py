@@ -108,23 +108,23 @@ class Observations:
         variance = [self.forces.white / len(one) + strayed[one].mean() if one else np.nan for one in frames]
         return force @ phantom_from_robot.rotation.T, np.sqrt(variance)
 
-    def turns(self, setup: Setup) -> list[FloatArray | None]:
-        """For each group the place (3,) [m] where the tool was deepest since the group before; None where that is its own place.
+    def turns(self, setup: Setup) -> list[int | None]:
+        """For each group at which place of the `way` the tool was deepest since the group before; None where that is its own place.
 
         A base that slides has gone as far as the deepest push took it, whether a cloud was taken there or not.
         """
         times, way = self.way(setup)
         depths = _depth(setup.box.size, way)
-        found: list[FloatArray | None] = []
+        found: list[int | None] = []
         last = np.inf
         for group, centre in zip(self.groups, self.centres(setup), strict=True):
             instant = self.instant(group, setup)
             now = np.inf if instant is None else instant
             between = np.flatnonzero((times > last) & (times <= now))
             last = now
-            deepest = between[np.argmax(depths[between])] if len(between) else None
+            deepest = int(between[np.argmax(depths[between])]) if len(between) else None
             deeper = deepest is not None and depths[deepest] > _depth(setup.box.size, centre[None])[0] + _TURN
-            found.append(way[deepest] if deeper else None)
+            found.append(deepest if deeper else None)
         return found
 
 

@@ -13,19 +13,16 @@ import numpy as np
 from core.diagnosis.observations import CLEARANCE, FAR, Observations, clear_of
 from core.effects import Effect
 from core.effects.memory import PermanentSet, Viscoelasticity
-from core.effects.support import BaseSlip
 from core.effects.tool import ToolFriction
 from core.fem.newton import Outcome
 from core.frames import FloatArray, Transform
 from core.replay import Equilibrium, Replay
 from core.setup import Setup
 
-__all__ = ["ORDERED", "TRACED", "Past", "forgetful", "travel"]
+__all__ = ["TRACED", "Past", "forgetful", "travel"]
 
 TRACED: tuple[type[Effect], ...] = (Viscoelasticity, PermanentSet, ToolFriction)
 """Effects whose replays are led along the tool's whole way; what they do is screened by traces of the plain replay."""
-ORDERED: tuple[type[Effect], ...] = (BaseSlip, *TRACED)
-"""Effects in whose replays a frame hangs on those before it."""
 
 TRAVEL, HOLD = 1e-3, 0.4
 """Longest motion [m] and longest time [s] between two places while the tool is near the block."""

@@ -45,7 +45,7 @@ def patterns(bench: Bench, data: Sequence[Observations], baseline: Model, found:
     untouched block already (sag, a camera that was moved) with it.
     """
     pairs = [row for row in zip(data, baseline.predictions, found.predictions, strict=True) if not row[0].unseen]
-    lasting = found.setup.material.remembers
+    lasting = found.setup.marked_by_pushes
     compared = [_compare(item, before, after, whole=False, lasting=lasting) for item, before, after in pairs]
     if sum(still for _, still, _ in compared) > sum((rows.change**2 * rows.points).sum() for _, _, rows in compared):
         compared = [_compare(item, before, after, whole=True, lasting=lasting) for item, before, after in pairs]
@@ -80,7 +80,7 @@ def _compare(
 ) -> tuple[FloatArray, float, _Rows]:
     """Probe of each touched group (g,), how much the cause changes untouched frames, and the errors in the touched ones.
 
-    What a push leaves in a material that remembers (`lasting`) is of that push.
+    What a push leaves behind (`lasting`: a dent, a block that slid) is of that push.
     """
     (own, known), other = fixed_pattern(item, before, lasting), fixed_pattern(item, after, lasting)[0]
     seen = np.isfinite(before.gap) & np.isfinite(after.gap) & (known >= _LEAST_POINTS)

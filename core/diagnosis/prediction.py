@@ -30,6 +30,8 @@ class Prediction:
     Attributes:
         gap: (g, p) mean of measured minus simulated [m], NaN where unseen. count: (g, p) points. spread: (g, p) [m].
         columns: (g, p, k) change of gap: TOOL_COLUMNS, then setups, then lumps.
+        elsewhere: (g, p) share of the points that meet another side of this model than of the one that chose them [1]; None where
+            there are no points.
         equilibria: of each group. samples: of each group, for the predictions of other models; none without clouds, where there
             are no patches. felt: forces, if there are any.
     """
@@ -42,6 +44,7 @@ class Prediction:
     equilibria: tuple[Equilibrium, ...]
     samples: tuple[Sample, ...]
     felt: Felt | None = None
+    elsewhere: FloatArray | None = None
 
     @property
     def unseen(self) -> bool:
@@ -60,7 +63,7 @@ class Prediction:
         points = tuple(self.samples[row] for row in own) if self.samples else ()
         felt = None if self.felt is None else self.felt.of_groups(own)
         seen = (self.gap[own], self.count[own], self.spread[own], self.columns[own])
-        return Prediction(self.name, *seen, frames, points, felt)
+        return Prediction(self.name, *seen, frames, points, felt, None if self.elsewhere is None else self.elsewhere[own])
 
     def with_rows(self, columns: FloatArray) -> Prediction:
         """With other columns (g, p, k), or (g, p + 3, k) where the last rows are the force's."""
@@ -120,13 +123,14 @@ def predict(
     way = led(data, setup, grid, wanted)
     true_from_stated, centres, moves, turned, measured = way.correction, way.centres, way.moves, way.turned, way.measured
     columns = Columns(block, wanted, measured is not None) if wanted and not setup.remembers else None
-    gap, count, spread, changes, pressed, frames, chosen = [], [], [], [], [], [], []
+    gap, count, spread, changes, pressed, frames, chosen, elsewhere = [], [], [], [], [], [], [], []
     past = Past(data, block, true_from_stated) if setup.remembers else None
-    turns = data.turns(setup) if past is None and setup.support.friction_coefficient is not None else [None] * len(centres)
     previous: Equilibrium | None = None
-    for number, (group, centre, turn) in enumerate(zip(data.groups, centres, turns, strict=True)):
-        if turn is not None:
-            block.step(true_from_stated.apply(turn[None])[0], previous)
+    for number, (group, centre, turn) in enumerate(zip(data.groups, centres, way.turns, strict=True)):
+        if turn is not None and past is None:
+            deepest = block.step(turn[0], previous)
+            if columns is not None:
+                columns.passed(deepest, turn[1])
         if past is not None:
             frame = past.reach(centre, data.instant(group, setup))
         else:
@@ -139,6 +143,7 @@ def predict(
         gap.append(compared.means.mean)
         count.append(compared.means.count)
         spread.append(compared.means.spread)
+        elsewhere.append(compared.elsewhere(sample))
         frames.append(replace(frame, way=()))  # what was on the way to it is for this replay alone
         if columns is not None:
             moved = columns.of_group(frame, moves[:, number])
@@ -153,5 +158,5 @@ def predict(
         stacked, pressed = forgotten.columns, [] if forgotten.felt is None else list(forgotten.felt.columns)
     return Prediction(
         data.name, np.array(gap), np.array(count, dtype=float), np.array(spread), stacked, tuple(frames), tuple(chosen),
-        None if measured is None else Felt.of(measured, frames, pressed),
+        None if measured is None else Felt.of(measured, frames, pressed), np.array(elsewhere),
     )  # fmt: skip

@@ -84,7 +84,7 @@ def removed_share(baseline: FloatArray, model: FloatArray, floor: FloatArray) ->
 def fixed_pattern(item: Observations, model: Prediction, before: bool = False) -> tuple[FloatArray, FloatArray]:
     """The camera's fixed pattern (p,) [m] in the frames clear of the block, and how many points it rests on (p,).
 
-    Of a block that may keep a dent only those `before` the first touch count, if there are any.
+    Of a block that may keep a dent, or stay where it slid to, only those `before` the first touch count, if there are any.
     """
     free = np.array([group.free for group in item.groups])[:, None]
     early = np.array([group.free and not group.probe for group in item.groups])[:, None]
@@ -100,8 +100,8 @@ def probe_sums(
     """Sums over the touched groups of sequences under several models.
 
     Args:
-        models: for each model its predictions, one for each sequence. lasting: whether also what a push has left counts, of a
-            material that remembers. ends: the two models along whose difference fixed patterns are errors; the second one's scatter
+        models: for each model its predictions, one for each sequence. lasting: whether also what a push has left counts, a dent
+            or a block that slid. ends: the two models along whose difference fixed patterns are errors; the second one's scatter
             and points make the noise floor and the weights.
 
     Raises DiagnosisError where a sequence has no untouched frame, or none of them a touched one.

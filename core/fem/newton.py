@@ -31,6 +31,7 @@ class Outcome(Enum):
     INDEFINITE = "the stiffness stayed indefinite: the block buckles or an element is almost inverted"
     INVERTED = "an element is inverted at the start of the solve"
     TOOL_SWINGS = "the tool gives way so much that no place was found where its spring balances the block"
+    BASE_SLIDES = "the base slides on and on and finds no place where friction holds it"
     GRIP_SWINGS = "pressure and friction under the tool do not come to agree; the motion between frames is too large"
     BASE_IN_TOOL = "the tool reaches into the base, which is held: nothing can make way for it"
     INSIDE_TOOL = "the material came to rest inside the tool, or the tool inside the material"

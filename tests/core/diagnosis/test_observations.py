@@ -146,7 +146,8 @@ def test_centres_follow_the_robots_registration(sequence):
 
 def test_turns_are_the_deepest_places_that_no_group_has(sequence):
     observed = _observed(sequence, most=4)
-    turns, centres = observed.turns(SETUP), observed.centres(SETUP)
+    way, centres = observed.way(SETUP)[1], observed.centres(SETUP)
+    turns = [None if number is None else way[number] for number in observed.turns(SETUP)]
     bottom = TOP + 5e-3 - 4e-3
     deep = [(turn, centre) for turn, centre in zip(turns, centres, strict=True) if turn is not None]
     assert len(deep) >= 2  # both pushes turn between groups
