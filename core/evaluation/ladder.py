@@ -113,25 +113,31 @@ def _judged(names: Sequence[str], sums: ProbeSums, paper: _Paper, seed: int) -> 
     moving, drawn_moving = sums.rms(still=False)[0], sums.rms(draws, still=False)
     mean, drawn_mean = paper.means(np.arange(len(sums.names))[None])[0], paper.means(draws)
     (share, drawn_share), (share_moving, drawn_moving_share) = _shares(whole, drawn), _shares(moving, drawn_moving)
+    nearer, drawn_nearer = _nearer(mean), _nearer(drawn_mean)
     errors = {}
     for number, name in enumerate(names):
-        nearer, drawn_nearer = 1 - mean[number] / mean[0], 1 - drawn_mean[:, number] / drawn_mean[:, 0]
         errors[name] = {
             "error": _mm(whole[number]), **dict(zip(("low", "high"), map(_mm, _ends(drawn[:, number])), strict=True)),
             "removed": _interval(float(share[number]), drawn_share[:, number]),
             "moving": {
                 "error": _mm(moving[number]), "removed": _interval(float(share_moving[number]), drawn_moving_share[:, number]),
             },
-            "paper": {"error": _mm(mean[number]), "improvement": _interval(float(nearer), drawn_nearer)},
+            "paper": {"error": _mm(mean[number]), "improvement": _interval(nearer[number], drawn_nearer[:, number])},
         }  # fmt: skip
     beyond = {
         name: {
             "removed": _interval(float(share[number] - share[1]), drawn_share[:, number] - drawn_share[:, 1]),
-            "paper": _interval((mean[1] - mean[number]) / mean[0], (drawn_mean[:, 1] - drawn_mean[:, number]) / drawn_mean[:, 0]),
+            "paper": _interval(nearer[number] - nearer[1], drawn_nearer[:, number] - drawn_nearer[:, 1]),
         }
         for number, name in enumerate(names[2:], 2)
     }
     return {"noise_floor": _mm(whole[-1]), "errors": errors, "beyond_second": beyond}
+
+
+def _nearer(distances: FloatArray) -> FloatArray:
+    """Share of the first model's mean distance that is gone (..., m); none where no frame was touched, so none was measured."""
+    first = distances[..., :1]
+    return np.where(first > 0, 1 - distances / np.where(first > 0, first, 1.0), 0.0)
 
 
 def _shares(whole: FloatArray, drawn: FloatArray) -> tuple[FloatArray, FloatArray]:

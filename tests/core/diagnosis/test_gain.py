@@ -11,6 +11,7 @@ from core.diagnosis.observations import Group, Observations
 from core.diagnosis.prediction import Prediction
 from core.diagnosis.probe_sums import fixed_pattern
 from core.effects.memory import PermanentSet
+from core.effects.support import BaseSlip
 from core.errors import DiagnosisError
 from core.frames import FloatArray
 from core.measurement import Surface
@@ -180,11 +181,12 @@ def test_papers_metric_is_the_mean_over_touched_groups():
     assert found.paper == pytest.approx((wanted, wanted))
 
 
-def test_what_a_push_leaves_counts_where_the_material_remembers():
+@pytest.mark.parametrize("effect", [PermanentSet(retained_fraction=0.2), BaseSlip(friction_coefficient=0.1)])
+def test_what_a_push_leaves_counts_where_the_material_remembers_or_the_base_slides(effect):
     item = _observations([0, 1, 1, 2])
     item = replace(item, groups=tuple(replace(g, free=n in (0, 2)) for n, g in enumerate(item.groups)))
     stated, named = _model([0.0, 1e-3, 4e-3, 1e-3]), _model([0.0, 1e-3, 1e-3, 1e-3])
-    kept = PermanentSet(retained_fraction=0.2).apply(SETUP)
+    kept = effect.apply(SETUP)
     found = ladder([item], [stated], [named], SETUP, kept, seed=0)
     assert found.baseline == pytest.approx(np.sqrt((1 + 16 + 1) / 3) * 1e-3)
     assert found.extended == pytest.approx(1e-3) and found.probes == 2

@@ -118,3 +118,17 @@ def test_sentence_of_a_lone_model_asks_for_another():
 def test_sentence_of_a_network_alone_says_what_cannot_be_told_without_a_second_model():
     text = meaning(_climbed(*THREE[:2], ends=(0, 0)))
     assert "50 % and 0 % of the error that moves with the tool" in text and "may be the camera's" in text
+
+
+def test_block_that_stays_where_it_slid_is_no_pattern_of_the_cameras():
+    item = _observations()
+    after = (False, False, True, False, True)  # the second and the fourth look are at a block that was left
+    rows = zip(item.groups, after, (0, 1, 1, 2, 2), strict=True)
+    groups = tuple(replace(group, free=free or not probe, probe=probe) for group, free, probe in rows)
+    slid, corrected = _sized(3e-3, 3e-3, 3e-3, 3e-3), _sized(1e-3, 3e-3, 1e-3, 3e-3)
+    rungs = [_rung("baseline", slid), _rung("baseline_network", corrected, network=True), _rung("true", _sized(0, 0, 0, 0))]
+    found = _part(ladder([replace(item, groups=groups)], rungs, KINDS, {"top"}), "all")["errors"]
+    assert found["baseline"]["error"] == pytest.approx(3.0)
+    # It is right while the tool is there to tell it, and pays for what it leaves, not for what it mends.
+    assert found["baseline_network"]["error"] == pytest.approx(np.sqrt((1 + 9) / 2), abs=1e-3)
+    assert found["baseline_network"]["removed"]["value"] == pytest.approx((3 - np.sqrt(5)) / 2, abs=1e-3)
