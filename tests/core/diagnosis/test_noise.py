@@ -138,3 +138,14 @@ def test_mesh_error_of_another_model_keeps_the_weights():
     assert np.allclose(other.mesh[seen], 0.7)
     assert np.array_equal(other.mesh[~seen], noise.mesh[~seen])
     assert np.array_equal(other.weights, noise.weights)
+
+
+def test_patch_of_which_a_settled_model_shows_another_side_loses_its_weight():
+    gap = np.full((3, 4), 0.1e-3)
+    noise = Noise(np.ones((3, 4)), gap, np.zeros((3, 4)), np.zeros((3, 4, 1)))
+    turned = np.zeros((3, 4))
+    turned[1, 2], turned[2, 3] = 0.9, 0.1
+    here = replace(prediction(gap), elsewhere=turned)
+    settled = noise.remeshed(here, here)
+    assert settled.weights[1, 2] == 0.0 and settled.weights.sum() == 11.0
+    assert noise.weights.all()

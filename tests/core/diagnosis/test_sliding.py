@@ -105,3 +105,12 @@ def test_base_that_is_held_has_the_columns_it_had(data):
     wanted = Wanted(setups=(_free(CHANGED["radius"](1e-7)),), steps=(1e-7,), pivot=PIVOT)
     found = predict(data, _free(SLIDING), GRID, wanted, tolerance=TIGHT)
     assert not found.columns[-1, :, :3].any()
+
+
+def test_patch_that_slid_from_under_its_points_is_told(data):
+    """The far edge of the top has gone, and what lay on it is seen on the side, or on nothing."""
+    stated = predict(data, _free(SLIDING), GRID)
+    found = predict(data, SLIDING, GRID, None, None, 3e-4, stated.samples)
+    assert found.elsewhere is not None and stated.elsewhere is not None
+    assert not stated.elsewhere.any()
+    assert not (found.elsewhere[1] > 0.2).any() and (found.elsewhere[-1] > 0.2).any()
