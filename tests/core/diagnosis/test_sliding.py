@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from pushed_block import GRID, SETUP, SIZE, TOP, observed
 
+from core import replay as replay_module
 from core.diagnosis.columns import TOOL_COLUMNS, Wanted
 from core.diagnosis.observations import FAR, Observations
 from core.diagnosis.prediction import Prediction, predict
@@ -114,3 +115,11 @@ def test_patch_that_slid_from_under_its_points_is_told(data):
     assert found.elsewhere is not None and stated.elsewhere is not None
     assert not stated.elsewhere.any()
     assert not (found.elsewhere[1] > 0.2).any() and (found.elsewhere[-1] > 0.2).any()
+
+
+def test_base_that_finds_no_rest_is_told_and_stays_where_it_was(monkeypatch):
+    monkeypatch.setattr(replay_module, "_MOST_SLIDES", 1)
+    block = Replay(SLIDING, GRID, 1e-6)
+    frame = block.step(_pushed(5e-3))
+    assert frame.outcome is Outcome.BASE_SLIDES and "friction" in frame.outcome.value
+    assert not block.slip.any()
