@@ -93,10 +93,11 @@ def search(bench: Bench, seed: int) -> Findings:
         current = findings.best = step
         bench.temperature = max(1.0, current.misfit)
         findings.left = structure_of(bench, current.model, seed)
+    grown = findings.best
     if findings.left.significant and not known:
         _paired(bench, findings, current, first, seed)
     if findings.best is not None and len(findings.best.model.effects) > 1 and not known:
-        findings.best = _reconsidered(bench, findings, findings.best, finite, origin)
+        findings.best = _reconsidered(bench, findings, findings.best, grown, finite, origin)
     _rescore(bench, findings)
     if findings.best is not None:
         refined = bench.refine(findings.best.model)
@@ -190,9 +191,16 @@ def _needed(findings: Findings, current: Trial) -> float:
     return max(SECOND_FACTOR * findings.bound, share * current.gain)
 
 
-def _reconsidered(bench: Bench, findings: Findings, best: Trial, finite: Sequence[Signature], origin: Model) -> Trial:
-    """Drop each cause in turn, for what a later one explains as well need not stay; or exchange it for one that does better."""
+def _reconsidered(
+    bench: Bench, findings: Findings, best: Trial, grown: Trial | None, finite: Sequence[Signature], origin: Model
+) -> Trial:
+    """Drop each cause in turn, for what a later one explains as well need not stay; or exchange it for one that does better.
+
+    The last cause of a model that was `grown` by steps forward was weighed against all others beside the same causes just before.
+    """
     for name in best.model.names:
+        if best is grown and name == best.model.names[-1]:
+            break
         rest = [effect for effect in best.model.effects if effect.name != name]
         if len(rest) == len(best.model.effects):  # exchanged already
             continue
