@@ -90,7 +90,8 @@ def test_side_that_is_pushed_goes_with_the_tool(data, here):
 
 @pytest.mark.parametrize("steps", [1, 3, 9])
 def test_how_far_it_slides_hangs_not_on_how_often_one_looks(steps):
-    block, frame = Replay(SLIDING, GRID, 1e-6), None
+    block = Replay(SLIDING, GRID, 1e-6)
+    frame = block.free
     for depth in np.linspace(0.0, 6e-3, steps + 1)[1:]:
         frame = block.sought(_pushed(float(depth)), (frame,))
     assert frame.outcome is Outcome.CONVERGED
