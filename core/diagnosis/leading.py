@@ -25,9 +25,11 @@ class Led:
 
     Attributes:
         correction: stated to true phantom_from_robot. centres: (g, 3) of the tool [m]. moves: (s, g, 3) how other setups move
-            them [m]. turns: of a base that slides, where the tool was deepest since the group before it, a place (3,) and how
-            the setups move it (s, 3) [m]; None where that is the group's own place. turned: (s, 3, 3) how these turn a measured
-            force. measured: force on the tool (g, 3) and its deviation (g,) [N]; None without forces.
+            them [m].
+        turns: of a base that slides, where the tool was deepest since the group before it, a place (3,) and how the setups move
+            it (s, 3) [m]; None where that is the group's own place, and of what is led along the tool's whole way.
+        turned: (s, 3, 3) how the setups turn a measured force. measured: force on the tool (g, 3) and its deviation (g,) [N]; None
+            without forces.
     """
 
     correction: Transform
@@ -55,7 +57,7 @@ def led(data: Observations, setup: Setup, grid: Meshing, wanted: Wanted | None) 
 
 def _turns(data: Observations, setup: Setup, grid: Meshing, wanted: Wanted | None) -> list[tuple[FloatArray, FloatArray] | None]:
     """As `Led.turns`; another clock says when a cloud was taken, not where the tool turned."""
-    if setup.support.friction_coefficient is None:
+    if setup.support.friction_coefficient is None or setup.remembers:
         return [None] * len(data.groups)
     chosen, clock = data.turns(setup), setup.sensor.time_offset
     setups = (setup, *(wanted.setups if wanted else ()))

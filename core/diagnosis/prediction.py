@@ -127,7 +127,7 @@ def predict(
     past = Past(data, block, true_from_stated) if setup.remembers else None
     previous: Equilibrium | None = None
     for number, (group, centre, turn) in enumerate(zip(data.groups, centres, way.turns, strict=True)):
-        if turn is not None and past is None:
+        if turn is not None:
             deepest = block.step(turn[0], previous)
             if columns is not None:
                 columns.passed(deepest, turn[1])
