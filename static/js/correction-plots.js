@@ -55,7 +55,7 @@ function bar({ name, label, network }, { errors, noise_floor: floor }, most) {
   const { error, low, high, removed } = errors[name];
   const at = (value) => `${Math.min(100, 100 * value / most)}%`;
   const colour = network ? "corrected" : name === "baseline" ? "raw" : "extended";
-  const said = name === "baseline" ? "" : `${percent(removed.value)} (${Math.round(100 * removed.low)}–${Math.round(100 * removed.high)})`;
+  const said = name === "baseline" ? "" : `${percent(removed.value)} (${percent(removed.low)} to ${percent(removed.high)})`;
   return element("div", { class: "rung", "data-rung": name, title: `${label}: ${error.toFixed(3)} mm (${low.toFixed(3)} to ${high.toFixed(3)} mm)` },
     element("span", {}, short({ name, network })),
     element("div", { class: "bar" }, element("i", { style: { width: at(error), background: `var(--${colour})` } }), element("i", { class: "noise", style: { width: at(floor) } }),

@@ -28,7 +28,7 @@ export function parameter({ value, unit, low, high }) {
 export function percent(fraction, digits = 0) {
   if (typeof fraction !== "number") return "–";
   if (fraction > 0 && fraction < 0.005 && !digits) return "<1 %";
-  return `${(100 * fraction).toFixed(digits)} %`;
+  return `${(100 * fraction).toFixed(digits).replace("-", "−")} %`;
 }
 
 export function duration(seconds) {
