@@ -160,4 +160,5 @@ def test_what_loads_late_does_not_take_the_front(page: Any) -> None:
     page.reload()
     page.click("#tab-sweep")
     page.wait_for_selector("#panel .empty-panel", state="attached")
-    assert page.locator("#panel-sweep >> text=Start the sweep").is_visible()
+    page.wait_for_selector("#panel-sweep >> text=Start the sweep", state="visible")
+    assert page.get_attribute("#tab-sweep", "aria-selected") == "true"
