@@ -36,6 +36,8 @@ DEAR_OPTIMISM = 2.0
 """What is replayed along the tool's whole way, several times as dear as others, comes last, and not at all where so many times its
 linear gain would leave it that far behind."""
 
+RIVALS = 2
+"""Causes that may take the place of another one, at most, where their linear gains are that near."""
 PAIRS = 2
 """Pairs that are fitted at once, at most, where causes one after another leave structure."""
 
@@ -223,7 +225,8 @@ def _exchanged(bench: Bench, findings: Findings, trials: tuple[Trial, Trial], lo
     """
     (best, without), (screened, candidates, gains) = trials, screening
     others = [number for number, candidate in enumerate(candidates) if candidate.start.name not in best.model.names]
-    for candidate in shortlist(gains[others], [candidates[number] for number in others], PROMISING * lost)[:1]:
+    least = max(PROMISING * lost, float(gains[others].max(initial=0.0)) - HOPELESS)
+    for candidate in shortlist(gains[others], [candidates[number] for number in others], least)[:RIVALS]:
         effects = [*without.model.effects, begin(candidate, screened, bench)]
         bench.tell(f"trying {candidate.start.name} instead")
         other = _trial(bench, effects, without.model.predictions, findings.baseline, bench.objective(best.model) - HOPELESS)
@@ -231,8 +234,9 @@ def _exchanged(bench: Bench, findings: Findings, trials: tuple[Trial, Trial], lo
         better = predictive_gain(bench.score(other.model), bench.score(best.model))[0] > 0
         if better and stands(bench, other.model, without.model):
             findings.trials.append(other)
-            return other
-        findings.trials.append(other.scored())
+            best = other
+        else:
+            findings.trials.append(other.scored())
     return best
 
 

@@ -13,11 +13,13 @@ from core.diagnosis.hypothesis import Model
 from core.diagnosis.workers import Workers
 from core.effects.load import Gravity
 from core.effects.support import BaseSlip
+from core.effects.tool import ToolRadius
 from core.mesh import GridSpec
 
 GRID, FINE = GridSpec(nodes=(9, 7, 6), spacing=2e-3), GridSpec(nodes=(11, 9, 7), spacing=1.7e-3)
 STATED = replace(SETUP, landmarks=CORNERS)
 WEIGHT, SLIDING = Gravity(specific_weight_over_stiffness=1.5), BaseSlip(friction_coefficient=0.1)
+THICK = ToolRadius(radius=2 * STATED.tool.radius)
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +36,8 @@ def origin(bench: Bench) -> Model:
     return bench.evaluate(())
 
 
-@pytest.mark.parametrize(("there", "added"), [(SLIDING, WEIGHT), (WEIGHT, SLIDING)])
-def test_weight_and_what_it_presses_on_are_weighed_anew_on_top_of_each_other(bench: Bench, origin: Model, there, added):
+@pytest.mark.parametrize(("there", "added"), [(SLIDING, WEIGHT), (WEIGHT, SLIDING), (THICK, WEIGHT)])
+def test_weight_and_what_hangs_on_it_are_weighed_anew_on_top_of_each_other(bench: Bench, origin: Model, there, added):
     finite = _replayed(bench, origin, [there, added], origin)
     model = bench.evaluate([there], origin.predictions)
     both = bench.evaluate([there, added], model.predictions)
@@ -47,6 +49,6 @@ def test_weight_and_what_it_presses_on_are_weighed_anew_on_top_of_each_other(ben
     assert np.linalg.norm(stale - true) > 0.15 * np.linalg.norm(true)
 
 
-def test_on_a_support_as_stated_signatures_stay_what_they_are(bench: Bench, origin: Model):
+def test_where_nothing_was_found_signatures_stay_what_they_are(bench: Bench, origin: Model):
     finite = _replayed(bench, origin, [WEIGHT, SLIDING], origin)
     assert [one for _, one in renewed(bench, origin, finite, origin)] == [one for _, one in finite]
