@@ -15,7 +15,7 @@ from core.diagnosis.shortlist import SHORTLIST, beyond_first_order, shortlist
 from core.diagnosis.workers import Workers
 from core.effects.load import Gravity
 from core.effects.material import PoissonRatio, StiffInclusion
-from core.effects.sensor import TimeOffset
+from core.effects.sensor import CameraRegistration, TimeOffset
 from core.effects.support import BaseSlip
 from core.effects.tool import ToolOffset, ToolRadius
 from core.mesh import GridSpec
@@ -24,6 +24,7 @@ NUISANCES, GROUPS = TOOL_COLUMNS + 9, 4
 OFFSET = Candidate(start=ToolOffset.neutral(SETUP), widened={0: 2e-3, 1: 2e-3, 2: 2e-3})
 RADIUS = Candidate(start=ToolRadius.neutral(SETUP), widened={TOOL_COLUMNS: 1e-3})
 NU = Candidate(start=PoissonRatio.neutral(SETUP), widened={TOOL_COLUMNS + 1: 0.1})
+CAMERA = Candidate(start=CameraRegistration.neutral(SETUP), widened={TOOL_COLUMNS + 2: 1e-3})
 CLOCK = Candidate(start=TimeOffset.neutral(SETUP), columns=(NUISANCES,), spread=(0.2,))
 SAG = Candidate(start=Gravity(specific_weight_over_stiffness=1.5), columns=(NUISANCES,), spread=(1.0,))
 SLIDING = Candidate(start=BaseSlip(friction_coefficient=0.2), columns=(NUISANCES,), spread=(1.0,))
@@ -53,18 +54,18 @@ def _pulled(bench: Bench, pulls: dict[int, float]) -> Model:
     return Model((), SETUP, (prediction(gap),), (block,), (), {}, tuple(range(NUISANCES)))
 
 
-def test_tools_offset_is_always_refitted(bench):
-    assert beyond_first_order(bench, _pulled(bench, {}), [SAG, RADIUS, OFFSET, NU, CLOCK]) == [OFFSET]
+def test_tools_offset_and_radius_are_always_refitted(bench):
+    assert beyond_first_order(bench, _pulled(bench, {}), [SAG, RADIUS, OFFSET, NU, CLOCK]) == [RADIUS, OFFSET]
 
 
 def test_the_worst_of_the_accuracies_that_the_data_break_is_refitted_too(bench):
-    model = _pulled(bench, {TOOL_COLUMNS: 20.0, TOOL_COLUMNS + 1: 6.0})
-    assert beyond_first_order(bench, model, [OFFSET, NU, RADIUS]) == [OFFSET, RADIUS]
+    model = _pulled(bench, {TOOL_COLUMNS + 2: 6.0, TOOL_COLUMNS + 1: 20.0})
+    assert beyond_first_order(bench, model, [OFFSET, CAMERA, NU]) == [OFFSET, NU]
 
 
 def test_what_lies_within_the_stated_accuracy_is_not_refitted_for_it(bench):
-    model = _pulled(bench, {0: 2.0, TOOL_COLUMNS: 3.0, TOOL_COLUMNS + 1: -2.5})
-    assert beyond_first_order(bench, model, [SAG, RADIUS, NU, CLOCK]) == []
+    model = _pulled(bench, {0: 2.0, TOOL_COLUMNS + 2: 3.0, TOOL_COLUMNS + 1: -2.5})
+    assert beyond_first_order(bench, model, [SAG, CAMERA, NU, CLOCK]) == []
 
 
 def test_settled_one_comes_first_and_takes_nobodys_place():
