@@ -10,12 +10,13 @@ import numpy as np
 
 from core.errors import SolveError
 from core.fem.friction import Hold
-from core.fem.model import Probe
+from core.fem.model import BlockModel, Probe
 from core.fem.newton import Outcome
+from core.fem.path import FREE_STEP
 from core.frames import FloatArray
 from core.meshing import Mesh
 
-__all__ = ["Equilibrium", "require_converged"]
+__all__ = ["Equilibrium", "extrapolated", "require_converged"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,3 +66,20 @@ def require_converged(frames: Sequence[Equilibrium]) -> None:
                 f"frame {number}: {frame.outcome.value} (residual {frame.residual:.2g} after {frame.iterations} iterations)",
                 frame=number, residual=frame.residual, outcome=frame.outcome.name,
             )  # fmt: skip
+
+
+def extrapolated(model: BlockModel, last: tuple[Equilibrium, Equilibrium], positions: FloatArray, probe: Probe) -> FloatArray:
+    """Where the last two frames point to (n, 3) [m], if that lies lower in energy than the last one's `positions`.
+
+    `probe` is the tool's next place, seen from the slid block.
+    """
+    earlier, start = last
+    if not (earlier.in_contact and earlier.mesh is start.mesh is model.mesh):
+        return positions
+    here = start.probe.centre - np.append(start.slip, 0.0)
+    way, now = here - (earlier.probe.centre - np.append(earlier.slip, 0.0)), probe.centre - here
+    if not way.any() or max(np.linalg.norm(way), np.linalg.norm(now)) > FREE_STEP:
+        return positions
+    share = float(now @ way / (way @ way))
+    guess = positions + min(max(share, -1.0), 1.5) * (start.displacement - earlier.displacement)
+    return guess if model.energy(guess, probe) < model.energy(positions, probe) else positions

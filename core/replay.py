@@ -13,13 +13,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from core.equilibrium import Equilibrium, require_converged
+from core.equilibrium import Equilibrium, extrapolated, require_converged
 from core.errors import SetupError, SolveError
 from core.fem.drag import Past, drag
 from core.fem.follow import Follower
 from core.fem.model import BlockModel, Probe
 from core.fem.newton import RELATIVE_TOLERANCE, Outcome, Solution, blocked, solve
-from core.fem.path import FREE_STEP, first_touch, lead
+from core.fem.path import first_touch, lead
 from core.frames import FloatArray
 from core.memory import Memory, State
 from core.mesh import meshing_for
@@ -128,7 +128,8 @@ class Replay:
         model.expect(positions, (before, local))
         if (failed := blocked(model, positions, local)) is not None:
             return self._equilibrium(failed, model.mesh, probe)
-        positions = self._extrapolated(model, start, positions, local)
+        if self._before is not None and self._before[1] is start:
+            positions = extrapolated(model, (self._before[0], start), positions, local)
         if self.setup.tool.friction_coefficient:
             past = Past.of(model, start, Probe(before.centre - carried, before.radius))
             return self._dragged(model, positions, (before, local), past, probe)
@@ -182,21 +183,6 @@ class Replay:
         if self._before is not None and self._before[1] is frame:
             self._before = (self._before[0], found)
         return found
-
-    def _extrapolated(self, model: BlockModel, start: Equilibrium, positions: FloatArray, probe: Probe) -> FloatArray:
-        """Where the last two frames point to, if that lies lower in energy than the last frame itself."""
-        if self._before is None or self._before[1] is not start:
-            return positions
-        earlier = self._before[0]
-        if not (earlier.in_contact and earlier.mesh is start.mesh is model.mesh):
-            return positions
-        here = start.probe.centre - np.append(start.slip, 0.0)
-        last, now = here - (earlier.probe.centre - np.append(earlier.slip, 0.0)), probe.centre - here
-        if not last.any() or max(np.linalg.norm(last), np.linalg.norm(now)) > FREE_STEP:
-            return positions
-        share = float(now @ last / (last @ last))
-        guess = positions + min(max(share, -1.0), 1.5) * (start.displacement - earlier.displacement)
-        return guess if model.energy(guess, probe) < model.energy(positions, probe) else positions
 
     @on_one_thread
     def step(self, stated_centre: FloatArray, start: Equilibrium | None = None, time: float | None = None) -> Equilibrium:

@@ -3,11 +3,10 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from pushed_block import SETUP, dwelling, poke, prediction, registration
+from pushed_block import SETUP, prediction, registration
 from small_dataset import write_valid_dataset
 
 from core.dataset import Dataset, open_dataset
@@ -19,8 +18,6 @@ from core.diagnosis.gain import Ladder
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.intervals import intervals, stands
 from core.diagnosis.noise import Noise
-from core.diagnosis.observations import Group, Observations
-from core.diagnosis.patterns import draw_patterns, patterns
 from core.diagnosis.structure import Structure
 from core.diagnosis.verdict import UNEXPLAINED_MISFIT, report_of, verdict_of
 from core.diagnosis.withdrawal import objection
@@ -291,53 +288,3 @@ def test_what_is_left_is_told_by_place_and_sequence(bench, dataset):
     left = report_of(dataset, bench, findings, None, "test")["unexplained"]
     assert left["when"] == "most in poke-02"
     assert 0 <= left["fraction"] <= 1 and "mm" in left["where"]
-
-
-def _pictured(bench: Bench, gap: FloatArray, count: FloatArray) -> Model:
-    return Model((), SETUP, (prediction(gap, count=count),), (), (), {}, ())
-
-
-def _watched(probes: list[int | None], frames: int = 1) -> list[Observations]:
-    """The rest cloud, then groups of these pushes; None stands for an untouched one."""
-    times, stream = dwelling(np.array([poke(2e-3)] * len(probes)))
-    cloud = np.zeros((frames, 3))
-    groups = [
-        Group((number,), cloud, probe is None, reference=number == 0, probe=probe or 0) for number, probe in enumerate(probes)
-    ]
-    return [Observations("poke-01", times, stream, tuple(groups))]
-
-
-def test_patterns_show_the_push_in_which_the_cause_matters_most(bench, tmp_path):
-    random = np.random.default_rng(1)
-    patches = bench.surface.patches
-    camera = 1e-4 * random.standard_normal(patches)
-    size = np.array([0.0, 0.0, 1.0, 2.0])[:, None]
-    gap, count = camera + size * 3e-4, np.full((4, patches), 10.0)
-    after = gap - size * 2e-4
-    data = _watched([None, None, 0, 1])
-    found = patterns(bench, data, _pictured(bench, gap, count), _pictured(bench, after, count))
-    # A uniform error stays what it is when smoothed; the camera's pattern is taken off.
-    assert np.allclose(found.measured, 6e-4)
-    assert np.allclose(found.predicted, 4e-4)
-    found.save(tmp_path / "patterns.npz")
-    with np.load(tmp_path / "patterns.npz") as saved:
-        assert set(saved) == {"centres", "normals", "measured", "predicted"}
-        assert saved["centres"].shape == saved["normals"].shape == (patches, 3)
-
-
-def test_patches_never_seen_are_left_open(bench):
-    gap = np.full((3, bench.surface.patches), 1e-4)
-    gap[0:2] = 0.0
-    gap[:, 4] = np.nan
-    count = np.full(gap.shape, 10.0)
-    found = patterns(bench, _watched([None, None, 0]), _pictured(bench, gap, count), _pictured(bench, 0 * gap, count))
-    assert np.isnan(found.measured[4]) and np.isfinite(np.delete(found.measured, 4)).all()
-
-
-def test_patterns_are_drawn_as_png(bench, tmp_path: Path):
-    gap = 1e-3 * np.random.default_rng(2).standard_normal((4, bench.surface.patches))
-    count = np.full(gap.shape, 10.0)
-    found = patterns(bench, _watched([None, None, 0, 0]), _pictured(bench, gap, count), _pictured(bench, 0.2 * gap, count))
-    draw_patterns(found, bench.surface, tmp_path / "patterns.png")
-    assert (tmp_path / "patterns.png").read_bytes().startswith(b"\x89PNG")
-    assert (tmp_path / "patterns.png").stat().st_size > 10_000
