@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich.box import SIMPLE
+from rich.console import Group
 from rich.table import Table
 
 from app.blind_tables import TITLES, figure_text, hidden_text, named_text, target_text
@@ -83,14 +85,21 @@ def _write(folder: Path, summary: dict[str, Any], results: Sequence[Result]) -> 
 
 
 def _cases(results: Sequence[Result]) -> Table:
-    table = Table(title="blind suite", header_style="bold")
-    for column in ("case", "hidden", "verdict", "named", "gain (bound)", "reducible error removed", "time", ""):
-        table.add_column(column, overflow="fold")
+    """A line for each case, and below it what was hidden and what was named: parameters need the whole width."""
+    table = Table(title="blind suite", header_style="bold", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
+    table.add_column("")
+    table.add_column("case", overflow="fold")
+    table.add_column("verdict")
+    for column in ("gain (bound)", "removed", "time"):
+        table.add_column(column, justify="right")
     for result in results:
         removed = "–" if result.removed is None else f"{100 * result.removed:.0f} %"
+        told = Table.grid(padding=(0, 1))
+        told.add_row("[dim]hidden[/]", hidden_text(result))
+        told.add_row("[dim]named[/]", named_text(result))
         table.add_row(
-            result.name, hidden_text(result), result.verdict, named_text(result), f"{result.gain:.0f} ({result.bound:.0f}) nats",
-            removed, f"{result.seconds:.0f} s", "[green]✓[/]" if result.right else "[red]✗[/]",
+            "[green]✓[/]" if result.right else "[red]✗[/]", Group(result.name, told), result.verdict,
+            f"{result.gain:.0f} ({result.bound:.0f}) nats", removed, f"{result.seconds:.0f} s", end_section=True,
         )  # fmt: skip
     return table
 
