@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from app.one_file import INK, figure, themed
-from app.sentences import SHOWN
+from app.quantities import SHOWN
 from core.blind.parameters import Said
 
 __all__ = ["gain_plot", "parameter_plot", "reliability_plot"]

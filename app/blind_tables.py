@@ -9,7 +9,7 @@ from typing import Any
 
 from app.console import parameters_text
 from app.one_file import table
-from app.sentences import NARROW, quantity
+from app.quantities import NARROW, quantity
 from core.blind import Result
 
 __all__ = [

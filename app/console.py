@@ -16,7 +16,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from app.sentences import quantity
+from app.quantities import between
 from app.stop import stop
 from core.errors import Cancelled, PalpateError
 from core.progress import Report
@@ -112,16 +112,7 @@ def _causes(causes: list[dict[str, Any]]) -> str:
 
 
 def _parameters(cause: dict[str, Any]) -> list[str]:
-    return [_parameter(name, entry) for name, entry in cause.get("parameters", {}).items()]
-
-
-def _parameter(name: str, entry: dict[str, Any]) -> str:
-    unit = entry.get("unit", "1")
-    text = f"{name} {quantity(entry['value'], unit)}"
-    if not isinstance(entry.get("low"), (int, float)):
-        return text
-    low, high = (quantity(entry[end], unit).split("\N{NO-BREAK SPACE}")[0] for end in ("low", "high"))
-    return f"{text} ({low} to {high})"
+    return [f"{name} {between(entry)}" for name, entry in cause.get("parameters", {}).items()]
 
 
 def _removed(report: dict[str, Any]) -> str:

@@ -8,7 +8,8 @@ from typing import Any
 
 from app.comparison import SequenceErrors
 from app.one_file import table
-from app.sentences import NARROW, control_sentences, limit_phrase, probe_sentence, quantity
+from app.quantities import NARROW, measured
+from app.sentences import control_sentences, limit_phrase, probe_sentence
 
 __all__ = [
     "cause_tables", "control_list", "ladder_bars", "limit_table", "probe_list", "ranking_table", "sequence_table", "untold_list",
@@ -26,7 +27,7 @@ def cause_tables(causes: Sequence[dict[str, Any]]) -> str:
     parts = []
     for cause in causes:
         rows = [
-            (_words(name), f"<b>{escape(quantity(entry['value'], entry['unit'], 3))}</b>", escape(_interval(entry)))
+            (_words(name), f"<b>{escape(measured(entry)[0])}</b>", escape(_interval(entry)))
             for name, entry in cause.get("parameters", {}).items()
         ]
         probable = _percent(cause.get("probability"))
@@ -37,7 +38,7 @@ def cause_tables(causes: Sequence[dict[str, Any]]) -> str:
 
 def _interval(entry: dict[str, Any]) -> str:
     told = entry.get("identifiability", "interval")
-    low, high = (quantity(entry[end], entry["unit"], 3) if entry.get(end) is not None else "" for end in ("low", "high"))
+    _, low, high = measured(entry)
     if told in ("at least", "at most"):
         return f"{told} {low if told == 'at least' else high}"
     return f"{low} to {high}" if told == "interval" and low and high else "" if told == "interval" else "not determined"

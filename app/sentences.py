@@ -6,40 +6,21 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from app.quantities import NARROW, between, quantity
+
 __all__ = [
-    "between",
     "cause_phrase",
     "control_sentences",
     "determined_sentences",
     "limit_phrase",
     "palpation_sentences",
     "probe_sentence",
-    "quantity",
     "registration_sentences",
     "verdict_sentence",
 ]
 
-NARROW = "\N{NO-BREAK SPACE}"
 Values = dict[str, float]
-SHOWN = {"m": (1e3, "mm"), "Pa": (1e-3, "kPa"), "s": (1e3, "ms"), "rad": (180.0 / math.pi, "°"), "1": (1.0, ""), "": (1.0, "")}
 SIDES = {"-x": "the left short side", "+x": "the right short side", "-y": "the front side", "+y": "the back side"}
-
-
-def quantity(value: Any, unit: str, digits: int = 2) -> str:
-    """A number in the unit people read, with sensible digits: 0.00043 m is 0.43 mm."""
-    if not isinstance(value, (int, float)):
-        return str(value)
-    factor, shown = SHOWN.get(unit, (1.0, unit))
-    scaled = float(f"{float(value) * factor:.{digits}g}")
-    places = max(0, digits - 1 - math.floor(math.log10(abs(scaled)))) if scaled and math.isfinite(scaled) else 0
-    text = f"{scaled:.{min(places, 4)}f}"
-    return f"{text}{'' if shown in ('', '°') else NARROW}{shown}"
-
-
-def between(entry: dict[str, Any]) -> str:
-    """A parameter of a report with its interval: 5.1 kPa (4.8 kPa to 5.4 kPa)."""
-    value, low, high = (quantity(entry[name], entry["unit"], 3) for name in ("value", "low", "high"))
-    return f"{value} ({low} to {high})"
 
 
 def verdict_sentence(report: dict[str, Any], size: Sequence[float] | None = None) -> str:

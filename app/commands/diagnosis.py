@@ -18,8 +18,8 @@ from rich.table import Table
 from rich.text import Text
 
 from app.console import Registration, out, progress, verdict_cells, verdict_table, write_json
+from app.quantities import between
 from app.sentences import (
-    between,
     control_sentences,
     determined_sentences,
     limit_phrase,

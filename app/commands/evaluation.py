@@ -12,7 +12,7 @@ from rich.table import Table
 
 from app.commands.diagnosis import true_effects
 from app.console import out, progress, write_json
-from app.sentences import quantity
+from app.quantities import quantity
 
 __all__ = ["evaluate"]
 

@@ -11,7 +11,7 @@ import typer
 from rich.table import Table
 
 from app.console import Registration, out, progress
-from app.sentences import quantity
+from app.quantities import quantity
 from core.errors import EffectError
 
 __all__ = ["sweep"]

@@ -110,7 +110,7 @@ def test_figures_are_said_as_people_read_them() -> None:
 
 
 def test_what_is_hidden_and_named_is_said_in_words() -> None:
-    assert hidden_text(RESULTS[0]) == "stiff_inclusion: x 10\N{NO-BREAK SPACE}mm"
+    assert hidden_text(RESULTS[0]) == "stiff_inclusion: x 10.0\N{NO-BREAK SPACE}mm"
     assert [hidden_text(one) for one in RESULTS[3:5]] == ["nothing", "camera_drift"]
     assert named_text(RESULTS[3]) == "–" and named_text(RESULTS[-1]).startswith("diagnosing it: SolveError")
 

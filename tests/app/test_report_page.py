@@ -62,7 +62,7 @@ def test_page_has_every_part_of_the_report_and_fetches_nothing(run: Run) -> None
     assert seen.fetched == [] and "script" not in seen.tags
     assert re.findall(r"url\((?!#)", text) == [] and "@import" not in text
     assert "The simulation misses a stiff lump" in text
-    assert re.search(r"radius</td><td><b>7\.50.mm</b></td><td>7\.00.mm to 8\.00.mm", text)
+    assert re.search(r"radius</td><td><b>7\.5.mm</b></td><td>7\.0.mm to 8\.0.mm", text)
     assert re.search(r"<b>drag-01</b></td><td>test</td>", text)
     assert "press 6 mm deep on the top" in text.lower()
 
