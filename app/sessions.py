@@ -72,8 +72,7 @@ class Session:
 
     def __init__(self, identity: str, reel_of: Callable[[str, str], Reel], end_of: Callable[[str, Quantity], float | None]) -> None:
         self.identity = identity
-        self.view: View | None = None
-        self.picture: Picture | None = None
+        self._shown: tuple[View, Picture] | None = None
         self._trial: Trial | None = None
         self._touch: Touch | None = None
         self._stand: tuple[str, Lookout] | None = None
@@ -81,6 +80,16 @@ class Session:
         self._scenes: list[Scene] = []
         self._framed: tuple[str, tuple[tuple[float, float, float], ...]] | None = None
         self._lock = threading.Lock()
+
+    @property
+    def view(self) -> View | None:
+        """What was asked for last and is drawn."""
+        return None if self._shown is None else self._shown[0]
+
+    @property
+    def picture(self) -> Picture | None:
+        """Of that view."""
+        return None if self._shown is None else self._shown[1]
 
     def show(self, view: View) -> dict[str, Any]:
         """Draw this view in all scenes of the page and return what is held now."""
@@ -93,11 +102,11 @@ class Session:
             frame = min(view.frame, len(reel.replay) - 1)
             if self._trial is not None and self._trial.fits(view, frame):
                 reel = reel.instead(frame, self._trial.moment)
-            self.view = seen = view.model_copy(update={"frame": frame})
+            shown = seen = view.model_copy(update={"frame": frame})
             if self._touch is not None and (self._touch.run, self._touch.sequence) == (view.run, view.sequence):
                 reel, seen = reel.instead(frame, self._touch.felt, self._touch.model), self._touch.seen(seen)
             picture = reel.picture(seen, self._end_of(seen.run, seen.quantity) if seen.scale == "fixed" else None)
-            self.picture = picture
+            self._shown = shown, picture  # at once: who asks meanwhile is told a view with its own picture
             for scene in self._scenes:
                 scene.draw(picture)
             if self._framed != (view.run, picture.columns):
@@ -178,9 +187,10 @@ class Session:
 
     def state(self) -> dict[str, Any]:
         """The view as held here and counts and a digest of the arrays drawn."""
-        if self.view is None or self.picture is None:
+        shown = self._shown
+        if shown is None:
             return {"view": None, "drawn": None, "scenes": len(self._scenes)}
-        return {"view": self.view.model_dump(), "drawn": self.picture.summary(), "scenes": len(self._scenes)}
+        return {"view": shown[0].model_dump(), "drawn": shown[1].summary(), "scenes": len(self._scenes)}
 
 
 class Sessions:

@@ -65,8 +65,14 @@ class Page:
 
     def settled(self) -> dict[str, Any]:
         """Wait until the server holds the frame that the page shows."""
-        self.until(lambda: self.held["view"].get("frame") == self.frame)
-        return self.held
+        found: dict[str, Any] = {}
+
+        def there() -> bool:
+            found.update(self.held)
+            return (found["view"] or {}).get("frame") == self.frame
+
+        self.until(there)
+        return found
 
     def visible(self) -> set[str]:
         return {name for name in self.viewer.evaluate(VISIBLE) if name}

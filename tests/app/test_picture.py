@@ -12,6 +12,7 @@ from app.figures import Cloud, Label, Lines, Mesh, Tool
 from app.furniture import furniture_of
 from app.picture import MOST_TRIANGLES, Picture, Reel
 from app.runs import Run
+from app.sessions import Session
 from app.view import Layer, View
 
 ALL: tuple[Layer, ...] = ("measured", "raw", "extended", "tool")
@@ -157,3 +158,23 @@ def test_lump_landmarks_base_and_path_are_layers(reel: Reel) -> None:
     assert interval.opacity < ball.opacity < 1
     assert {"base", "path"} <= set(picture.of(Lines))
     assert reel.lumps == 1 and reel.landmarks == 0
+
+
+def test_who_asks_while_a_picture_is_drawn_is_told_the_last_view_with_its_own_picture(reel: Reel, run_name: str) -> None:
+    seen: list[dict[str, Any]] = []
+
+    def asked_for(run: str, sequence: str) -> Reel:
+        seen.append(session.state())
+        return reel
+
+    def end_of(run: str, quantity: str) -> None:
+        seen.append(session.state())
+
+    session = Session("page", asked_for, end_of)
+    view = View.model_validate({"run": run_name, "sequence": "poke-01", "frame": 1, "colour": "raw", "scale": "fixed"})
+    before = session.show(view)
+    assert seen[0]["view"] is None and seen[1]["view"] is None
+    seen.clear()
+    after = session.show(view.model_copy(update={"frame": 3}))
+    assert seen == [before, before]
+    assert after["view"]["frame"] == 3 and after["drawn"]["checksum"] != before["drawn"]["checksum"]
