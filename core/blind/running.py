@@ -89,8 +89,10 @@ def known_results(folder: Path, cases: Sequence[Case], any_version: bool = False
     return [known[case.name] for case in cases if case.name in known]
 
 
-def run_case(case: Case, folder: Path) -> Result:
+def run_case(case: Case, folder: Path, kept: Path | None = None) -> Result:
     """Make the dataset, diagnose it without a look at the truth, and compare; nothing but the result is kept.
+
+    In `kept`, where it is given, stay CASE/dataset and CASE/run, which then has its replays and controls as any other.
 
     Whatever goes wrong on the way is a result, too: with the error, and counted as wrong.
     """
@@ -98,7 +100,7 @@ def run_case(case: Case, folder: Path) -> Result:
     from core.diagnosis import diagnose  # noqa: PLC0415 (heavy)
     from core.synthetic import make_dataset  # noqa: PLC0415 (heavy)
 
-    place, doing, began, seconds = folder / case.name, "making the dataset", time.monotonic(), 0.0
+    place, doing, began, seconds = (kept or folder) / case.name, "making the dataset", time.monotonic(), 0.0
     hidden: list[dict[str, Any]] = []
     outside: list[dict[str, Any]] = []
     try:
@@ -106,14 +108,16 @@ def run_case(case: Case, folder: Path) -> Result:
         made = make_dataset(place / "dataset", scenario, case.seed)
         hidden, outside = _truth(made, scenario.size)
         doing, began = "diagnosing it", time.monotonic()
-        said = diagnose(open_dataset(place / "dataset"), place / "run", workers=1, replays=False, assurance=False)
+        more = kept is not None
+        said = diagnose(open_dataset(place / "dataset"), place / "run", workers=1, replays=more, assurance=more)
         seconds = round(time.monotonic() - began, 1)
     except Exception as error:  # any one: 200 cases must not end with it
         return Result(
             case, hidden, outside=outside, seconds=seconds, code=code_digest(), error=f"{doing}: {type(error).__name__}: {error}"
         )
     finally:
-        shutil.rmtree(place, ignore_errors=True)
+        if kept is None:
+            shutil.rmtree(place, ignore_errors=True)
     from core.blind.sizes import size_over_limit  # noqa: PLC0415 (heavy)
 
     told = said.pop("ambiguity_map", [])
