@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,26 +32,53 @@ Registration = Annotated[
 ]
 """The option by which verbs take an accepted registration."""
 
+BETWEEN_LINES = 30.0
+"""Between two lines of progress in a log [s]."""
+
 out = Console()
 errors = Console(stderr=True)
 
 
 @contextmanager
 def progress(title: str) -> Iterator[Report]:
-    """A bar with elapsed and remaining time on the error channel, so that the output can be piped."""
-    columns = (
-        TextColumn("[bold]{task.fields[title]}"), BarColumn(bar_width=28), TextColumn("{task.percentage:>3.0f} %"),
-        TimeElapsedColumn(), TimeRemainingColumn(), TextColumn("[dim]{task.description}", markup=True),
-    )  # fmt: skip
-    with Progress(*columns, console=errors, transient=errors.is_terminal) as bar:
-        task = bar.add_task("", total=1.0, title=title)
+    """A bar with elapsed and remaining time on the error channel, so that the output can be piped; in a log a line now and then."""
+    shown = _bar(title) if errors.is_terminal else _lines(title)
+    with shown as show:
 
         def report(fraction: float, text: str) -> None:
             if stop.asked:
                 raise Cancelled
-            bar.update(task, completed=min(1.0, fraction), description=escape(text))
+            show(min(1.0, fraction), text)
 
         yield report
+
+
+@contextmanager
+def _bar(title: str) -> Iterator[Report]:
+    columns = (
+        TextColumn("[bold]{task.fields[title]}"), BarColumn(bar_width=28), TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(), TimeRemainingColumn(), TextColumn("[dim]{task.description}", markup=True),
+    )  # fmt: skip
+    with Progress(*columns, console=errors, transient=True) as bar:
+        task = bar.add_task("", total=1.0, title=title)
+        yield lambda fraction, text: bar.update(task, completed=fraction, description=escape(text))
+
+
+@contextmanager
+def _lines(title: str) -> Iterator[Report]:
+    """For those who look at a log: what is being done, at most twice a minute."""
+    began = last = time.monotonic()
+
+    def show(fraction: float, text: str) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last >= BETWEEN_LINES:
+            last = now
+            errors.print(
+                f"{title}: {100 * fraction:.0f} % after {now - began:.0f} s, {text}", highlight=False, markup=False, soft_wrap=True
+            )
+
+    yield show
 
 
 def verdict_table(with_truth: bool, title: str | None = None) -> Table:

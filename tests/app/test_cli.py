@@ -149,6 +149,14 @@ def test_stop_that_an_import_swallowed_is_remembered() -> None:
         report(0.5, "going on")
 
 
+def test_log_gets_a_line_of_progress_now_and_then(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    with progress("a long verb") as report:
+        report(0.1, "not yet")
+        monkeypatch.setattr("app.console.BETWEEN_LINES", 0.0)
+        report(0.5, "fitting [one] effect")
+    assert capsys.readouterr().err == "a long verb: 50 % after 0 s, fitting [one] effect\n"
+
+
 def _wait_until_at_work(process: subprocess.Popen[str], seconds: float) -> None:
     """Until it has used that much of a core [s], however busy the machine is."""
     used = 0.0
