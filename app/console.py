@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,7 +24,8 @@ from core.errors import Cancelled, PalpateError
 from core.progress import Report
 
 __all__ = [
-    "Registration", "errors", "out", "parameters_text", "print_problem", "progress", "verdict_cells", "verdict_table", "write_json",
+    "Registration", "errors", "look_at", "out", "parameters_text", "print_problem", "progress", "verdict_cells", "verdict_table",
+    "write_json",
 ]  # fmt: skip
 
 Registration = Annotated[
@@ -79,6 +81,12 @@ def _lines(title: str) -> Iterator[Report]:
             )
 
     yield show
+
+
+def look_at(folder: Path) -> None:
+    """Say how to look at the runs and datasets in a folder."""
+    look = f"{sys.argv[0]} serve --runs {folder / 'runs'} --datasets {folder / 'datasets'}"
+    out.print(f"to look at it: [bold]{escape(look)}[/]", highlight=False, soft_wrap=True)
 
 
 def verdict_table(with_truth: bool, title: str | None = None) -> Table:

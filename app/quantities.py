@@ -18,7 +18,10 @@ def quantity(value: Any, unit: str, digits: int = 2) -> str:
     factor, shown = SHOWN.get(unit, (1.0, unit))
     scaled = float(f"{float(value) * factor:.{digits}g}")
     places = max(0, digits - 1 - math.floor(math.log10(abs(scaled)))) if scaled and math.isfinite(scaled) else 0
-    text = f"{scaled:.{min(places, 4)}f}"
+    return _with_unit(f"{scaled:.{min(places, 4)}f}", shown)
+
+
+def _with_unit(text: str, shown: str) -> str:
     return f"{text}{'' if shown in ('', '°') else NARROW}{shown}"
 
 
@@ -31,14 +34,12 @@ def measured(entry: dict[str, Any]) -> tuple[str, str, str]:
     if not isinstance(value, (int, float)):
         return str(value), "", ""
     factor, shown = SHOWN.get(unit, (1.0, unit))
-    ends = [end if isinstance(end, (int, float)) and math.isfinite(end) else None for end in (entry.get("low"), entry.get("high"))]
-    low, high = ends
+    low, high = (end if isinstance(end, (int, float)) and math.isfinite(end) else None for end in map(entry.get, ("low", "high")))
     width = abs(value) / 5 if low is None or high is None else high - low
-    places = max((1 - math.floor(math.log10(size * factor)) for size in (abs(value), width) if size > 0), default=0)
+    places = max((1 - math.floor(math.log10(size * factor)) for size in (abs(value), width) if 0 < size < math.inf), default=0)
 
     def told(number: float | None) -> str:
-        text = "" if number is None else f"{number * factor:.{min(4, max(0, places))}f}"
-        return text if not text or shown == "" else f"{text}{'' if shown == '°' else NARROW}{shown}"
+        return "" if number is None else _with_unit(f"{number * factor:.{min(4, max(0, places))}f}", shown)
 
     return told(value), told(low), told(high)
 

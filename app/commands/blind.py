@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,8 +14,8 @@ from rich.console import Group
 from rich.table import Table
 
 from app.blind_tables import TITLES, figure_text, hidden_text, named_text, target_text
-from app.console import out, progress, write_json
-from core.blind import Result, all_cases, draw_cases, known_results, run_suite, summary_of
+from app.console import look_at, out, progress, write_json
+from core.blind import Result, all_cases, draw_cases, known_results, run_case, run_suite, summary_of
 
 __all__ = ["blind"]
 
@@ -42,12 +43,15 @@ def blind(
         bool, typer.Option("--score", help="Run nothing: score what is there, also of a suite that still runs.")
     ] = False,
     again: Annotated[bool, typer.Option("--again", help="Do those again that ended in an error.")] = False,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="Keep dataset and run of each case in FOLDER/kept, to be looked at.")
+    ] = False,
 ) -> None:
     """Hide effects, what no effect expresses, and nothing; say how often, and how well, a diagnosis that is not told finds it.
 
     Writes results.jsonl, summary.json and report.html into the folder. Can be stopped and taken up again.
     """
-    wanted = _parted(effects)
+    wanted, kept = _parted(effects), folder / "kept"
     if scenarios is None:
         if kinds is not None:
             raise typer.BadParameter("--kinds needs --scenarios, the number of cases to draw")
@@ -59,7 +63,8 @@ def blind(
         results = known_results(folder, cases, any_version)
     else:
         with progress("blind suite") as report:
-            results = run_suite(folder, cases, workers, report, any_version=any_version, again=again)
+            run = partial(run_case, kept=kept) if keep else None
+            results = run_suite(folder, cases, workers, report, any_version=any_version, again=again, run=run)
     summary = summary_of(results, seed, missing=len(cases) - len(results))
     _write(folder, summary, results)
     out.print(_cases(results))
@@ -69,6 +74,8 @@ def blind(
         named = f", a cause falsely named in {false['hits']}" if kind in ("control", "outside", "modulus") else ""
         out.print(f"{TITLES[kind]}: {right['hits']} of {right['n']} right{named}", highlight=False)
     out.print(f"{folder / 'report.html'}", highlight=False, soft_wrap=True)
+    if kept.exists():
+        look_at(kept)
 
 
 def _parted(text: str | None) -> list[str] | None:

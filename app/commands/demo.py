@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import secrets
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +12,7 @@ import typer
 
 from app.commands.diagnosis import print_report, run_diagnosis
 from app.commands.service import announce
-from app.console import out, progress, verdict_cells, verdict_table
+from app.console import look_at, out, progress, verdict_cells, verdict_table
 from app.settings import Settings
 
 __all__ = ["demo"]
@@ -53,8 +52,7 @@ def demo(
         settings = Settings(port=port, runs=folder / "runs", datasets=folder / "datasets", workers=workers)
         serve(settings, lambda address: announce(address, f"/?run={run.name}"))
     else:
-        look = f"{sys.argv[0]} serve --runs {folder / 'runs'} --datasets {folder / 'datasets'}"
-        out.print(f"to look at it: [bold]{look}[/]", highlight=False, soft_wrap=True)
+        look_at(folder)
 
 
 def _make(dataset: Path, seed: int, effects: int, workers: int, palpation: str | None) -> dict[str, Any]:

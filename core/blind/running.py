@@ -92,7 +92,7 @@ def known_results(folder: Path, cases: Sequence[Case], any_version: bool = False
 def run_case(case: Case, folder: Path, kept: Path | None = None) -> Result:
     """Make the dataset, diagnose it without a look at the truth, and compare; nothing but the result is kept.
 
-    In `kept`, where it is given, stay CASE/dataset and CASE/run, which then has its replays and controls as any other.
+    In `kept`, where it is given, datasets/CASE and runs/CASE stay instead, the run with replays and controls as of any diagnosis.
 
     Whatever goes wrong on the way is a result, too: with the error, and counted as wrong.
     """
@@ -100,23 +100,25 @@ def run_case(case: Case, folder: Path, kept: Path | None = None) -> Result:
     from core.diagnosis import diagnose  # noqa: PLC0415 (heavy)
     from core.synthetic import make_dataset  # noqa: PLC0415 (heavy)
 
-    place, doing, began, seconds = (kept or folder) / case.name, "making the dataset", time.monotonic(), 0.0
+    place, doing, began, seconds = kept or folder / case.name, "making the dataset", time.monotonic(), 0.0
+    dataset, run, whole = place / "datasets" / case.name, place / "runs" / case.name, kept is not None
     hidden: list[dict[str, Any]] = []
     outside: list[dict[str, Any]] = []
     try:
         scenario = scenario_of(case)
-        made = make_dataset(place / "dataset", scenario, case.seed)
+        for older in (dataset, run):
+            shutil.rmtree(older, ignore_errors=True)
+        made = make_dataset(dataset, scenario, case.seed)
         hidden, outside = _truth(made, scenario.size)
         doing, began = "diagnosing it", time.monotonic()
-        more = kept is not None
-        said = diagnose(open_dataset(place / "dataset"), place / "run", workers=1, replays=more, assurance=more)
+        said = diagnose(open_dataset(dataset), run, workers=1, replays=whole, assurance=whole)
         seconds = round(time.monotonic() - began, 1)
     except Exception as error:  # any one: 200 cases must not end with it
         return Result(
             case, hidden, outside=outside, seconds=seconds, code=code_digest(), error=f"{doing}: {type(error).__name__}: {error}"
         )
     finally:
-        if kept is None:
+        if not whole:
             shutil.rmtree(place, ignore_errors=True)
     from core.blind.sizes import size_over_limit  # noqa: PLC0415 (heavy)
 

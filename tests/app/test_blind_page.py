@@ -137,6 +137,18 @@ def test_suite_that_is_done_is_scored_and_printed(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "results.jsonl", "summary.json"]
 
 
+def test_where_cases_are_kept_it_is_said_how_to_look_at_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = draw_cases(4, 3)[0]
+    add_result(tmp_path / "results.jsonl", replace(RESULTS[3], case=case, code=code_digest()))
+    score = ("--folder", str(tmp_path), "--seed", "4", "--scenarios", "3", "--score")
+    assert run(monkeypatch, *score) == 0 and "to look at it" not in capsys.readouterr().out
+    (tmp_path / "kept").mkdir()
+    assert run(monkeypatch, *score) == 0
+    assert f"serve --runs {tmp_path / 'kept' / 'runs'} --datasets {tmp_path / 'kept' / 'datasets'}" in capsys.readouterr().out
+
+
 def test_suite_that_still_runs_is_scored_as_far_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     case = draw_cases(4, 3)[0]
     add_result(tmp_path / "results.jsonl", replace(RESULTS[3], case=case, code=code_digest()))

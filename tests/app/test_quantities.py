@@ -46,5 +46,9 @@ def test_value_without_an_interval_stands_alone() -> None:
     assert between({"value": "-x", "unit": ""}) == "-x"
 
 
+def test_value_without_bounds_is_said_and_no_error() -> None:
+    assert measured({"value": float("inf"), "low": 2.0, "high": float("inf"), "unit": "1"}) == ("inf", "2", "")
+
+
 def test_open_end_is_left_empty_and_the_other_told() -> None:
     assert measured({"value": 3.2, "low": 2.1, "high": None, "unit": "1"}) == ("3.20", "2.10", "")

@@ -23,4 +23,4 @@ def loop(tmp_path_factory: pytest.TempPathFactory) -> Loop:
     folder, kept = tmp_path_factory.mktemp("suite"), tmp_path_factory.mktemp("kept")
     found, nothing = run_suite(folder, [*fresh, *control], workers=2, run=partial(run_case, kept=kept))
     assert not found.error and not nothing.error, f"seed {seed}: {found.error}{nothing.error}"
-    return Loop(seed, folder, found, nothing, kept / found.name / "run")
+    return Loop(seed, folder, found, nothing, kept / "runs" / found.name)
