@@ -36,12 +36,12 @@ class SequenceErrors:
 
     @property
     def removed(self) -> float | None:
-        """Share of the error above the noise floor that the extended model removes [1]; None where hardly any lies above it."""
+        """Share of the error above the noise floor that the extended model removes [1], at most all; None where hardly any is."""
         if self.raw is None or self.extended is None or self.noise_floor is None:
             return None
         if self.raw <= (1 + LEAST_REDUCIBLE) * self.noise_floor:
             return None
-        return (self.raw - self.extended) / (self.raw - self.noise_floor)
+        return min(1.0, (self.raw - self.extended) / (self.raw - self.noise_floor))
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""

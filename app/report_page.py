@@ -57,7 +57,8 @@ def report_page(run: Run) -> str:
 
 
 _KEY = (
-    "RMS distance between the measured points and the model's surface. "
+    "RMS distance between the measured points and the model's surface, over all frames; the gain above is of the pushes alone, "
+    "without the camera's fixed pattern. "
     "<span class='key'><span><i style='background: var(--raw)'></i>raw model</span>"
     "<span><i style='background: var(--extended)'></i>extended model</span>"
     "<span><i style='background: var(--floor)'></i>noise floor</span></span>"

@@ -30,7 +30,7 @@ export function comparisonSection(heading) {
 function shown({ runs, sequences }) {
   const several = runs.length > 1;
   const names = runs.map(({ causes, verdict }, place) => `${place ? "the other" : "this"}: ${causes.map(words).join(", ") || verdict}`);
-  return element("table", { class: "comparison" },
+  return [element("table", { class: "comparison" },
     element("thead", {}, element("tr", {}, element("th", {}, ""), element("th", { class: "number" }, "raw"),
       names.map((name) => element("th", { class: "number" }, several ? name : "extended")), element("th", { class: "number" }, "floor"),
       several ? null : element("th", { class: "number" }, "removed"))),
@@ -43,7 +43,8 @@ function shown({ runs, sequences }) {
         rows.map((row) => element("td", { class: several && row?.extended === best ? "number best" : "number" }, millimetres(row?.extended))),
         element("td", { class: "number muted" }, millimetres(one.noise_floor)),
         several ? null : element("td", { class: "number" }, percent(one.removed)));
-    })));
+    }))),
+  element("p", { class: "gain-note" }, "Distance of the measured points from the model, over all frames; the gain above is of the pushes alone, without the camera's fixed pattern.")];
 }
 
 const millimetres = (value) => (typeof value === "number" ? (1000 * value).toFixed(3) : "–");

@@ -39,6 +39,12 @@ def test_error_of_a_sequence_is_the_rms_over_frames_that_both_models_have(run: R
     assert row.removed == pytest.approx((row.raw - 1e-4) / (row.raw - 5e-5))
 
 
+def test_no_more_than_all_of_the_error_is_removed(run: Run) -> None:
+    rewrite(run, "drag-01", distance_raw=np.full(5, 3e-4), distance_extended=np.full(5, 1e-4), noise_floor=1.5e-4)
+    row = next(row for row in sequence_errors(run) if row.sequence == "drag-01")
+    assert row.extended == pytest.approx(1e-4) and row.removed == 1.0
+
+
 def test_sequences_that_were_fitted_on_come_first(run: Run) -> None:
     assert [row.split for row in sequence_errors(run)] == ["train", "test"]
 
