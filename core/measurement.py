@@ -268,18 +268,22 @@ class PatchMeans:
 
 
 def within_spread(values: FloatArray, patch: IntArray, patches: int) -> MaskArray:
-    """Which values (m,) lie within four robust deviations of their patch's median; one deviation for all patches."""
+    """Which values (m,) lie within four robust deviations of their patch's median; one deviation for all patches.
+
+    The deviation is that of differences within patches, which is right for patches of any size: three points lie so near to their
+    own median that a deviation from it would throw out good points, and leave averages that scatter more than they seem to.
+    """
     if not len(values):
         return np.zeros(0, dtype=bool)
-    centre = np.zeros(patches)
+    centre, apart = np.zeros(patches), []
     order = np.argsort(patch, kind="stable")
     edges = np.flatnonzero(np.diff(patch[order])) + 1
     for name, group in zip(patch[order][np.concatenate([[0], edges])], np.split(values[order], edges), strict=True):
         centre[name] = np.median(group)
-    away = np.abs(values - centre[patch])
-    crowded = np.bincount(patch, minlength=patches)[patch] > 2  # a lone point lies on its own median and says nothing of noise
-    scale = 1.4826 * float(np.median(away[crowded])) if crowded.any() else np.inf
-    return np.asarray(away <= 4 * scale)
+        apart.append(np.abs(group - np.roll(group, len(group) // 2))[: len(group) if len(group) > 1 else 0])
+    differences = np.concatenate(apart)
+    scale = 1.4826 / np.sqrt(2) * float(np.median(differences)) if len(differences) else np.inf
+    return np.asarray(np.abs(values - centre[patch]) <= 4 * scale)
 
 
 def plain_means(values: FloatArray, patch: IntArray, patches: int, least: int = 2) -> PatchMeans:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from core.frames import FloatArray
-from core.measurement import SIDES, Surface, gaps, patch_means
+from core.measurement import SIDES, Surface, gaps, patch_means, plain_means, within_spread
 from core.mesh import GridSpec
 from core.replay import Equilibrium, replay, rest
 from core.setup import Box, Setup, Tool
@@ -169,3 +169,24 @@ def test_patches_with_one_point_do_not_empty_the_others():
     assert np.allclose(means.mean[:5], 1e-3, atol=3e-4)
     pairs = patch_means(np.array([1e-3, 1.2e-3]), np.array([0, 0]), 1)
     assert pairs.mean[0] == pytest.approx(1.1e-3)
+
+
+@pytest.mark.parametrize("points", [2, 3, 4, 5, 8])
+def test_averages_of_few_points_scatter_as_much_as_the_points_say(points: int):
+    """Were good points of small patches thrown out for lying far from their own median, a noise floor would be set too low."""
+    patches = 6000
+    values, patch = np.random.default_rng(points).normal(size=patches * points), np.repeat(np.arange(patches), points)
+    kept = within_spread(values, patch, patches)
+    means = plain_means(values[kept], patch[kept], patches)
+    assert (~kept).mean() < 1e-3
+    whole = means.count == points
+    squares = means.mean[whole] ** 2 * points / np.average(means.spread[whole] ** 2)
+    assert squares.mean() == pytest.approx(1.0, abs=4 * np.sqrt(2 * (1 + 1 / (points - 1)) / patches))
+
+
+def test_a_stray_point_of_a_small_patch_is_left_out():
+    values, patch = np.random.default_rng(1).normal(size=600), np.repeat(np.arange(200), 3)
+    values[::30] += 12.0
+    kept = within_spread(values, patch, 200)
+    assert not kept[::30].any()
+    assert kept.sum() >= 578
