@@ -34,7 +34,6 @@ from core.correction import (
 from core.correction.inference import FEEDBACKS, CorrectedFrame
 from core.correction.sampling import robot_of, tool_columns
 from core.dataset import open_dataset
-from core.dataset.sequence import read_sequence
 from core.diagnosis.smoothing import smooth_centres
 from core.measurement import Surface
 from core.mesh import GridSpec
@@ -117,7 +116,7 @@ def _feedbacks(recorder: Recorder, samples: Samples, networks: dict[tuple[str, f
 
 
 def _replayed(recorder: Recorder, corrector: Corrector) -> tuple[np.ndarray, list[CorrectedFrame]]:
-    sequence, robot = read_sequence(recorder.root, TESTED), robot_of(recorder)
+    sequence, robot = recorder.dataset.sequence(TESTED), robot_of(recorder)
     times = np.asarray(sequence.cloud_times)
     centres, tools = robot.apply(smooth_centres(sequence.kinematics, times)), tool_columns(sequence, times, robot, False)
     return tools, list(replay_corrected(corrector, recorder.setup, centres, tools, recorder.grid))

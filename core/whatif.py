@@ -29,6 +29,7 @@ from core.registration import register, setup_from
 from core.replay import replay
 from core.setup import Setup, Shape
 from core.sight import sight_of
+from core.standing import as_it_stood
 from core.touches import touch_correction
 
 __all__ = ["Moment", "WhatIf", "opened"]
@@ -72,7 +73,7 @@ class WhatIf:
         dataset = open_dataset(folder).registered(Accepted.from_json(registered) if registered else None)
         if isinstance(dataset.geometry, Shape) or not len(dataset.sequence(sequence)):
             raise RunError(f"{sequence} has no clouds of a block, so that there is nothing to compare with", sequence=sequence)
-        registration = register(dataset)
+        dataset, registration = as_it_stood(dataset, register(dataset))
         self.stated = setup_from(dataset, registration)
         self.tuned = tuned_as(self.stated, extended)
         self._sequence = dataset.sequence(sequence)

@@ -37,7 +37,7 @@ def write_recorded_run(datasets: Path, runs: Path) -> Path:
     (run / "replays").mkdir(parents=True)
     cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration.mended)
     grid = PAGE_GRID.for_tool(stated.tool.radius)
-    record(folder, SEQUENCE, stated, found, cleaner, shaft, grid, run / "replays" / f"{SEQUENCE}.npz")
+    record(dataset.sequence(SEQUENCE), stated, found, cleaner, shaft, grid, run / "replays" / f"{SEQUENCE}.npz")
     parameters = {"radius": {"value": RADIUS, "unit": "m", "low": RADIUS - 1e-4, "high": RADIUS + 1e-4}}
     report = {
         "format": 1, "dataset": dataset.name, "verdict": "found",

@@ -122,6 +122,8 @@ def scenario_of(case: Case) -> Scenario:
         scenario = draw_scenario(case.seed, effects=len(case.hidden), clear=case.kind != "subtle", among=case.hidden)
     if case.kind == "twins":
         scenario = _pressing(scenario)
+    # Nobody sees that a block has slid by a millimetre, and it is pushed on where it lies.
+    scenario = replace(scenario, put_back=scenario.hidden("base_slip") is None)
     return replace(scenario, sequences=SHORT_PROTOCOL) if case.short else scenario
 
 

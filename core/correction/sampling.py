@@ -8,7 +8,7 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -20,9 +20,8 @@ from core.cleaning import Cleaner, cleaner_for, find_shaft_axis, tool_poses
 from core.correction.arrays import Arrays
 from core.correction.body import Body
 from core.correction.samples import FORMAT, Samples, open_samples
-from core.dataset import Dataset, open_dataset
+from core.dataset import Dataset
 from core.dataset import Sequence as Recording
-from core.dataset.sequence import read_sequence
 from core.diagnosis.observations import CLEARANCE, clear_of
 from core.diagnosis.smoothing import SMOOTHING, averaged, smooth_centres
 from core.errors import CorrectionError, RunError
@@ -36,6 +35,7 @@ from core.registration import Registration, register, setup_from
 from core.replay import Equilibrium, Replay
 from core.setup import Setup
 from core.sight import Sight, sight_of
+from core.standing import as_it_stood
 from core.touches import touch_correction
 
 __all__ = ["Recorder", "canonical", "make_samples", "recorder_for", "tool_columns"]
@@ -49,11 +49,12 @@ class Recorder:
     """What turns the frames of a dataset into samples under one setup.
 
     Attributes:
-        root: of the dataset. setup: the model. grid: its mesh. body: what is sampled of it. cleaner, shaft: take the phantom out of
-            the clouds. points: kept of a cloud, at most. measured: whether forces are those of the sensor. seed: of what is drawn.
+        dataset: with each sequence as seen from the block where it stood. setup: the model. grid: its mesh. body: what is sampled
+            of it. cleaner, shaft: take the phantom out of the clouds. points: kept of a cloud, at most. measured: whether forces
+            are those of the sensor. seed: of what is drawn.
     """
 
-    root: Path
+    dataset: Dataset
     setup: Setup
     grid: Meshing
     body: Body
@@ -62,6 +63,10 @@ class Recorder:
     points: int
     measured: bool
     seed: int = 0
+
+    def only(self, name: str) -> Recorder:
+        """The same with one sequence alone, to be sent to a process."""
+        return replace(self, dataset=replace(self.dataset, loaded=(self.dataset.sequence(name),)))
 
 
 def recorder_for(
@@ -81,11 +86,11 @@ def recorder_for(
         setup: the model; the stated one with the registrations found when left out. grid: its mesh; that of the page when left out.
         nodes: of the grid that is sampled, along x, y, z. body: instead of a grid. registration: if it is known already.
     """
-    registration = registration or register(dataset)
+    dataset, registration = as_it_stood(dataset, registration or register(dataset))
     setup = setup or setup_from(dataset, registration)
     felt = [dataset.sequence(name).forces is not None for name in dataset.sequences]
     return Recorder(
-        dataset.path, setup, grid or PAGE_GRID.for_tool(setup.tool.radius), body or Body.block(setup.box.size, nodes),
+        dataset, setup, grid or PAGE_GRID.for_tool(setup.tool.radius), body or Body.block(setup.box.size, nodes),
         cleaner_for(dataset, registration), find_shaft_axis(dataset, registration), points, all(felt), seed,
     )  # fmt: skip
 
@@ -110,7 +115,7 @@ def make_samples(
     """
     if folder.exists():
         raise RunError(f"{folder} exists already; choose another name or remove it", path=str(folder))
-    dataset = open_dataset(recorder.root)
+    dataset = recorder.dataset
     names = tuple(sequences or [name for name in dataset.sequences if len(dataset.sequence(name))])
     if every < 1 or not names:
         raise CorrectionError(f"every = {every} of {len(names)} sequences with clouds; expected at least one", key="every")
@@ -159,7 +164,7 @@ def _all(
             yield name, _sample(recorder, folder, name, every, told)
         return
     with ProcessPoolExecutor(min(workers, len(names)), get_context("forkserver"), bound_to, (os.getpid(),)) as pool:
-        futures = [pool.submit(_sample, recorder, folder, name, every) for name in names]
+        futures = [pool.submit(_sample, recorder.only(name), folder, name, every) for name in names]
         try:
             for done, future in enumerate(as_completed(futures)):
                 found = future.result()
@@ -172,7 +177,7 @@ def _all(
 
 def _sample(recorder: Recorder, folder: Path, name: str, every: int, report: Report = silent) -> _Made:
     """Write one sequence's arrays, a frame at a time."""
-    sequence = read_sequence(recorder.root, name)
+    sequence = recorder.dataset.sequence(name)
     chosen = np.arange(0, len(sequence), every)
     stamps = np.asarray(sequence.cloud_times)[chosen]
     times, robot = stamps - recorder.setup.sensor.time_offset, robot_of(recorder)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -61,6 +61,7 @@ class Sequence:
     Attributes:
         cloud_times: (m,) [s], the clock of the kinematics as far as the experimenter knows.
         cloud_files: (m) paths relative to the dataset.
+        shift: (3,) by which clouds are moved on reading [m], camera frame.
     """
 
     root: Path
@@ -69,6 +70,7 @@ class Sequence:
     cloud_times: FloatArray
     cloud_files: tuple[str, ...]
     forces: Forces | None
+    shift: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.cloud_files)
@@ -79,7 +81,13 @@ class Sequence:
 
     def cloud(self, index: int) -> FloatArray:
         """The raw cloud (k, 3) [m], camera frame, read from disk at each call."""
-        return read_cloud(self.root, self.cloud_files[index], within=f"sequences/{self.name}")
+        points = read_cloud(self.root, self.cloud_files[index], within=f"sequences/{self.name}")
+        return points if self.shift is None else points + self.shift
+
+    def moved(self, camera: FloatArray, robot: FloatArray) -> Sequence:
+        """The same with clouds and tool moved by one vector, (3,) [m] in the camera's and in the robot's frame."""
+        path = replace(self.kinematics, position=self.kinematics.position + robot)
+        return replace(self, kinematics=path, shift=camera if self.shift is None else self.shift + camera)
 
 
 def read_sequence(root: Path, name: str) -> Sequence:

@@ -35,6 +35,7 @@ from core.progress import Report, part, silent
 from core.registration import Registration, register, setup_from
 from core.setup import Setup, Shape
 from core.shape.pushed import FINE_PUSHES, REPLAY_PUSHES, SCREEN_PUSHES
+from core.standing import as_it_stood
 
 __all__ = ["diagnose"]
 
@@ -70,7 +71,7 @@ def diagnose(
     fitted, tested = _splits(dataset)
     report(0.0, "reading every cloud")
     dataset.validate(part(report, 0.0, 0.02))
-    registration = register(dataset)
+    dataset, registration = as_it_stood(dataset, register(dataset))
     setup, mended = setup_from(dataset, registration), registration.mended
     seen_from = setup_from(dataset, mended)
     data = observe_each(dataset, fitted, seen_from, mended, (FIT_GROUPS, FIT_FELT), part(report, 0.02, 0.04))
@@ -174,7 +175,7 @@ def _record(
     cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration.mended)
     page = PAGE_GRID.for_tool(stated.tool.radius)
     tasks = [
-        pool.run(record, dataset.path, name, stated, found, cleaner, shaft, page, folder / f"{name}.npz")
+        pool.run(record, dataset.sequence(name), stated, found, cleaner, shaft, page, folder / f"{name}.npz")
         for name in dataset.sequences
         if len(dataset.sequence(name))
     ]

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from core.cleaning import Cleaner, tool_poses
-from core.dataset import open_dataset
+from core.dataset import Sequence as Recording
 from core.diagnosis.inside import Inside
 from core.diagnosis.smoothing import smooth_centres
 from core.fem.newton import Outcome
@@ -21,6 +21,7 @@ from core.metrics import paper_distance
 from core.replay import Equilibrium, replay
 from core.setup import Setup
 from core.sight import sight_of
+from core.standing import camera_of
 from core.touches import touch_correction
 
 __all__ = ["Recorded", "observed", "record"]
@@ -93,10 +94,9 @@ def observed(setup: Setup, frames: Sequence[Equilibrium], clouds: Sequence[Float
 
 
 def record(
-    folder: Path, name: str, stated: Setup, found: Setup, cleaner: Cleaner, shaft: FloatArray | None, grid: Meshing, target: Path
+    sequence: Recording, stated: Setup, found: Setup, cleaner: Cleaner, shaft: FloatArray | None, grid: Meshing, target: Path
 ) -> str:
     """Replay one sequence under both models and write `target`; returns the sequence's name."""
-    sequence = open_dataset(folder).sequence(name)
     total = len(sequence)
     index = np.unique(np.linspace(0, total - 1, min(total, MOST_FRAMES)).round().astype(int))
     times = np.asarray(sequence.cloud_times)[index]
@@ -125,9 +125,9 @@ def record(
         tool_radius_raw=np.array(stated.tool.radius), tool_radius_extended=np.array(found.tool.radius),
         error_raw=before.error.astype(np.float32), error_extended=after.error.astype(np.float32),
         distance_raw=before.distance, distance_extended=after.distance, paper_raw=before.paper, paper_extended=after.paper,
-        noise_floor=np.array(float(np.nanmean(floor))), camera_raw=sight_of(stated).pose.matrix,
-        camera_extended=sight_of(found).pose.matrix, outcome=np.maximum(before.outcome, after.outcome),
+        noise_floor=np.array(float(np.nanmean(floor))), camera_raw=camera_of(sequence, sight_of(stated).pose).matrix,
+        camera_extended=camera_of(sequence, sight_of(found).pose).matrix, outcome=np.maximum(before.outcome, after.outcome),
         **{f"{key}_{model}": getattr(side, key) for model, side in sides.items() for key in ("outcome", "force", "iterations")},
         **before.inside.arrays("raw"), **after.inside.arrays("extended"),
     )  # fmt: skip
-    return name
+    return sequence.name

@@ -21,6 +21,7 @@ from core.grading import PAGE_GRID
 from core.processes import bound_to_parent
 from core.progress import Report, silent
 from core.registration import register, setup_from
+from core.standing import as_it_stood
 
 __all__ = ["replay_into"]
 
@@ -40,7 +41,7 @@ def replay_into(
     if not names:
         raise DatasetError("no sequence has clouds, and a replay is compared with clouds; record some", key="sequences")
     report(0.0, "relating robot, camera and phantom")
-    registration = register(dataset)
+    dataset, registration = as_it_stood(dataset, register(dataset))
     stated = setup_from(dataset, registration)
     found = with_effects(stated, effects) if effects else stated
     cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration.mended)
@@ -49,7 +50,7 @@ def replay_into(
     (out / "pictures").mkdir()
     with ProcessPoolExecutor(min(workers, len(names)), get_context("spawn"), bound_to_parent) as pool:
         tasks = [
-            pool.submit(record, dataset.path, name, stated, found, cleaner, shaft, grid, out / "replays" / f"{name}.npz")
+            pool.submit(record, dataset.sequence(name), stated, found, cleaner, shaft, grid, out / "replays" / f"{name}.npz")
             for name in names
         ]
         for number, task in enumerate(as_completed(tasks)):

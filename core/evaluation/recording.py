@@ -23,6 +23,7 @@ from core.progress import Report, silent
 from core.registration import register, setup_from
 from core.replay import replay
 from core.sight import sight_of
+from core.standing import as_it_stood, camera_of
 from core.touches import touch_correction
 
 __all__ = ["record_corrections"]
@@ -46,7 +47,7 @@ def record_corrections(
 
     What was in `out` before is replaced once all is there.
     """
-    registration = register(dataset)
+    dataset, registration = as_it_stood(dataset, register(dataset))
     stated = setup_from(dataset, registration)
     setup, grid = kept_setup(stated, model), PAGE_GRID.for_tool(stated.tool.radius)
     cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration.mended)
@@ -68,7 +69,8 @@ def record_corrections(
             np.savez_compressed(
                 aside / f"{name}.npz", cloud_index=index, corrected=side.surface.astype(np.float32), tool_corrected=side.tool,
                 tool_radius_corrected=np.array(setup.tool.radius), error_corrected=side.error.astype(np.float32),
-                distance_corrected=side.distance, paper_corrected=side.paper, camera_corrected=sight_of(setup).pose.matrix,
+                distance_corrected=side.distance, paper_corrected=side.paper,
+                camera_corrected=camera_of(sequence, sight_of(setup).pose).matrix,
                 **side.inside.arrays("corrected"),
             )  # fmt: skip
         aside.chmod(0o755)

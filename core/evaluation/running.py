@@ -31,6 +31,7 @@ from core.meshing import Meshing
 from core.progress import Report, part, silent
 from core.registration import register, setup_from
 from core.setup import Setup
+from core.standing import as_it_stood
 
 __all__ = ["FILE", "MODELS", "Asked", "Bench", "Step", "evaluate"]
 
@@ -82,7 +83,7 @@ class Bench:
                 "no sequence of [splits] test has clouds, so there is nothing to evaluate on; name one", key="splits"
             )
         report(0.0, "relating robot, camera and phantom")
-        registration = register(dataset)
+        dataset, registration = as_it_stood(dataset, register(dataset))
         stated, mended = setup_from(dataset, registration), registration.mended
         data = observe_each(dataset, tested, setup_from(dataset, mended), mended, (TEST_GROUPS, TEST_FELT), part(report, 0.1, 1.0))
         trained = kinds_in(dataset, (*dataset.config.train, *dataset.config.validation), stated)

@@ -17,6 +17,7 @@ from core.frames import FloatArray
 from core.progress import Report, silent
 from core.registration import register, setup_from
 from core.setup import Setup
+from core.standing import as_it_stood
 
 __all__ = ["Watched", "watch"]
 
@@ -61,7 +62,7 @@ def watch(dataset: Dataset, names: Sequence[str], frames: int, report: Report = 
                 f"{name} has no clouds to compare with; choose other sequences", file=f"sequences/{name}", key="sequences"
             )
     report(0.0, "relating robot, camera and phantom")
-    registration = register(dataset)
+    dataset, registration = as_it_stood(dataset, register(dataset))
     setup = setup_from(dataset, registration)
     cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration)
     found = []

@@ -26,26 +26,35 @@ Mesher = Callable[[Scenario, Probe, float], Block]
 """A body for one probe of a scenario, fine where it touches."""
 
 
-def perform(scenario: Scenario, motion: Motion, fine: float | None = None, body: Mesher | None = None) -> Track:
+def perform(
+    scenario: Scenario,
+    motion: Motion,
+    fine: float | None = None,
+    body: Mesher | None = None,
+    begun: tuple[float, float] = (0.0, 0.0),
+) -> Track:
     """Solve one motion of a scenario; every probe gets a grid that is fine where it touches, a block that remembers one for all.
 
-    Without a `body` it is the block's; one that remembers is always that.
+    Without a `body` it is the block's; one that remembers is always that. `begun` says how far the base had slid before [m].
 
     Pressed against a hard lump, the block gives way at some depth: it jumps aside, and the tool leads to no equilibrium any more.
     The operator stops such a push short of it; the track's motion is the one that was carried out.
     """
     fine = fine or scenario.fine
     ends = [*(float(probe.times[0]) for probe in motion.probes[1:]), motion.duration]
+    slip = np.array([*begun, 0.0])
     if scenario.remembers:
-        stretches = _lasting(scenario, motion.probes, ends, fine)
+        stretches = _lasting(scenario, motion.probes, ends, fine, slip)
     else:
-        stretches = _apart(scenario, motion.probes, ends, fine, body or _block)
+        stretches = _apart(scenario, motion.probes, ends, fine, body or _block, slip)
     return Track(replace(motion, probes=tuple(stretch.probe for stretch in stretches)), tuple(stretches))
 
 
-def _apart(scenario: Scenario, probes: Sequence[Probe], ends: Sequence[float], fine: float, body: Mesher) -> list[Stretch]:
+def _apart(
+    scenario: Scenario, probes: Sequence[Probe], ends: Sequence[float], fine: float, body: Mesher, slip: FloatArray
+) -> list[Stretch]:
     """Each probe on a grid of its own: of those before only the base's slip is left."""
-    slip, stretches = np.zeros(3), []
+    stretches = []
     for probe, end in zip(probes, ends, strict=True):
         stretch, slip = _as_deep_as_it_goes(scenario, probe, slip, fine, end, body)
         stretches.append(stretch)
@@ -72,10 +81,10 @@ def _as_deep_as_it_goes(
     raise failure
 
 
-def _lasting(scenario: Scenario, probes: Sequence[Probe], ends: Sequence[float], fine: float) -> list[Stretch]:
+def _lasting(scenario: Scenario, probes: Sequence[Probe], ends: Sequence[float], fine: float, slip: FloatArray) -> list[Stretch]:
     """All probes on one grid, on which the block remembers."""
     block = mesh_block(scenario.true_size, _grading(scenario, probes, fine))
-    bench, stretches = Specimen(scenario, block, np.zeros(3)), []
+    bench, stretches = Specimen(scenario, block, slip), []
     try:
         for probe, end in zip(probes, ends, strict=True):
             settled, standing = bench.surface, bench.standing

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -21,7 +22,7 @@ from core.synthetic.camera import DepthCamera, Scene, place_camera
 from core.synthetic.disturbance import drifted
 from core.synthetic.force import ForceSensor
 from core.synthetic.motion import Motion, draw_motion
-from core.synthetic.scenario import Scenario
+from core.synthetic.scenario import STRAYED, Scenario
 from core.synthetic.track import Track
 from core.synthetic.truth import Truth
 from core.synthetic.visibility import changed, visible_weights
@@ -47,15 +48,20 @@ class _Job:
     seen: FloatArray
     folder: Path
     seed: int
+    begun: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class _Record:
-    """Of one sequence: mean squares of the change by what is hidden [m^2], and how far each push stopped short [m]."""
+    """Of one sequence: mean squares of the change by what is hidden [m^2], how far each push stopped short [m], and how far the
+    base lies from its place (x, y) [m] at the beginning and at the end.
+    """
 
     sequence: str
     squares: list[float]
     shortened: list[float]
+    begun: tuple[float, float]
+    slid: tuple[float, float]
 
 
 def make_dataset(folder: Path, scenario: Scenario, seed: int, workers: int = 1, report: Report = silent) -> Truth:
@@ -90,14 +96,16 @@ def _fill(folder: Path, scenario: Scenario, seed: int, workers: int, report: Rep
     ]
     squares: list[float] = []
     shortened: dict[str, list[float]] = {}
+    begun: dict[str, tuple[float, float]] = {}
     for done, record in enumerate(_all(jobs, workers)):
         squares += record.squares
+        begun |= {record.sequence: record.begun} if any(record.begun) else {}
         shortened |= {record.sequence: record.shortened} if any(record.shortened) else {}
         stopped = "; a push there stopped short where the block gives way" if any(record.shortened) else ""
         report(0.05 + 0.95 * (done + 1) / len(jobs), f"recorded {done + 1} of {len(jobs)} sequences{stopped}")
     visibility = float(np.sqrt(np.mean(squares))) if squares else 0.0
     return Truth(
-        scenario.effects, visibility, camera.phantom_from_camera, robot_from_phantom, shift, shortened, scenario.disturbances
+        scenario.effects, visibility, camera.phantom_from_camera, robot_from_phantom, shift, shortened, scenario.disturbances, begun
     )  # fmt: skip
 
 
@@ -116,7 +124,19 @@ def _motions(scenario: Scenario, seen: FloatArray, seed: int) -> list[Motion]:
     ]
 
 
+def _one_after_another(jobs: list[_Job]) -> Iterator[_Record]:
+    """Each from where the one before left the block."""
+    begun = (0.0, 0.0)
+    for job in jobs:
+        record = _record(replace(job, begun=begun))
+        begun = record.slid if math.hypot(*record.slid) < STRAYED else (0.0, 0.0)
+        yield record
+
+
 def _all(jobs: list[_Job], workers: int) -> Iterator[_Record]:
+    if not jobs[0].scenario.put_back:
+        yield from _one_after_another(jobs)
+        return
     if workers <= 1:
         yield from (_record(job) for job in jobs)
         return
@@ -179,7 +199,7 @@ def _mistaken(scenario: Scenario, corners: FloatArray) -> FloatArray:
 def _record(job: _Job) -> _Record:
     """Solve one sequence and write its files."""
     planned = job.motion
-    track = perform(job.scenario, planned)
+    track = perform(job.scenario, planned, begun=job.begun)
     job = replace(job, motion=track.motion)
     shortened = [
         float(before.corners[1] - after.corners[1]) for before, after in zip(planned.probes, track.motion.probes, strict=True)
@@ -198,7 +218,7 @@ def _record(job: _Job) -> _Record:
     write_clouds(job.folder / "clouds.csv", stamps, files)
     for file, instant in zip(files, instants.tolist(), strict=True):
         write_ply(job.folder / file, _camera(job, instant).cloud(_scene(job, track, instant), rng))
-    return _Record(planned.name, _visibility(job, track), shortened)
+    return _Record(planned.name, _visibility(job, track), shortened, job.begun, track.slid)
 
 
 def _camera(job: _Job, instant: float) -> DepthCamera:
@@ -242,11 +262,14 @@ def _visibility(job: _Job, track: Track) -> list[float]:
     hidden = job.scenario.hidden("time_offset")
     late = hidden.value("offset") if hidden else 0.0
     mechanical = any(effect.effect not in _SEEN_OTHERWISE for effect in job.scenario.effects)
-    stretch = track.hardest
+    stretch, begun = track.hardest, np.array([*job.begun, 0.0])
     weights = visible_weights(stretch.rest, stretch.faces, job.scenario.true_size, job.seen)
     squares = []
     for instant in stretch.deepest[1:] if mechanical else stretch.deepest:
-        centre = job.motion.centre(np.array([instant + late]))[0]
-        believed = neutral_displacement(job.scenario, stretch, centre) if mechanical else stretch.displacement(instant + late)
-        squares.append(changed(stretch.rest, stretch.displacement(instant), believed, job.camera_shift, weights))
+        centre = job.motion.centre(np.array([instant + late]))[0] - begun
+        moved = stretch.displacement(instant) - begun
+        believed = (
+            neutral_displacement(job.scenario, stretch, centre) if mechanical else stretch.displacement(instant + late) - begun
+        )
+        squares.append(changed(stretch.rest, moved, believed, job.camera_shift, weights))
     return squares

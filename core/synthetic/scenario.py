@@ -11,7 +11,7 @@ from core.errors import EffectError
 from core.synthetic.disturbance import Disturbance
 from core.synthetic.naming import check_named
 
-__all__ = ["HIDDEN", "QUICK", "SHORT_PROTOCOL", "WEIGHED", "HiddenEffect", "Scenario", "draw_scenario"]
+__all__ = ["HIDDEN", "QUICK", "SHORT_PROTOCOL", "STRAYED", "WEIGHED", "HiddenEffect", "Scenario", "draw_scenario"]
 
 HIDDEN: Mapping[str, Mapping[str, str]] = {
     "poisson_ratio": {"nu": "1"},
@@ -48,6 +48,9 @@ QUICK = (
     "tool_compliance",
 )  # fmt: skip
 """Those drawn unless others are asked for: a phantom that remembers, or that a tool drags, takes minutes to make."""
+
+STRAYED = 4e-3
+"""A block that lies so far from its place [m] is laid back by any operator."""
 
 SHORT_PROTOCOL = ("poke-top-01", "poke-top-02", "poke-side-01", "poke-side-02", "drag-01")
 """Every kind of motion to fit on, and a push from another side, which shows most causes, to test on."""
@@ -90,6 +93,8 @@ class Scenario:
         noise: standard deviation of a depth at 0.35 m [m].
         fine: longest element edge at the contact [m].
         force_noise: standard deviation of one sample of the force on the tool [N]; None for a tool without a force sensor.
+        put_back: whether a block that slid is laid back to where it was before the next sequence; otherwise it stays where it is,
+            up to STRAYED, when anybody would see it.
     """
 
     effects: tuple[HiddenEffect, ...] = ()
@@ -109,6 +114,7 @@ class Scenario:
     noise: float = 0.7e-3
     fine: float = 2.6e-3
     force_noise: float | None = None
+    put_back: bool = True
 
     @property
     def true_size(self) -> tuple[float, float, float]:

@@ -162,6 +162,12 @@ class Track:
         return found
 
     @property
+    def slid(self) -> tuple[float, float]:
+        """How far the base lies from where it was put as the motion ends [m]."""
+        x, y = self.moments[-1].slip
+        return float(x), float(y)
+
+    @property
     def moments(self) -> list[Moment]:
         """All solved keys."""
         return [moment for stretch in self.stretches for passage in stretch.passages for moment in passage.moments]

@@ -26,6 +26,7 @@ class Truth:
         robot_from_phantom: of the robot's true frame.
         camera_shift: phantom frame; `camera_shift @ phantom_from_camera` holds in the sequences.
         disturbances: what no effect of the catalogue expresses; the verdict is then unexplained.
+        begun: by sequence, how far along x and y a block that was not put back lay from its place as it began [m].
         shortened: by sequence, how far each of its pushes stopped short of its plan because the block gave way [m].
     """
 
@@ -36,6 +37,7 @@ class Truth:
     camera_shift: Transform = field(default_factory=Transform)
     shortened: Mapping[str, list[float]] = field(default_factory=dict)
     disturbances: tuple[Disturbance, ...] = ()
+    begun: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def verdict(self) -> str:
@@ -50,6 +52,7 @@ class Truth:
             **self._disturbed(),
             "visibility_mm": round(self.visibility * 1e3, 4),
             "stopped_short_mm": {name: [round(part * 1e3, 3) for part in parts] for name, parts in self.shortened.items()},
+            "began_off_mm": {name: [round(part * 1e3, 4) for part in parts] for name, parts in self.begun.items()},
             "registration": {
                 "phantom_from_camera": self.phantom_from_camera.matrix.tolist(),
                 "robot_from_phantom_R": self.robot_from_phantom.rotation.tolist(),

@@ -47,7 +47,8 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     found, tested = effect.apply(stated), SPLITS["test"][0]
     (run / "replays").mkdir(parents=True)
     cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration.mended)
-    record(path, tested, stated, found, cleaner, shaft, PAGE_GRID.for_tool(stated.tool.radius), run / "replays" / f"{tested}.npz")
+    grid = PAGE_GRID.for_tool(stated.tool.radius)
+    record(dataset.sequence(tested), stated, found, cleaner, shaft, grid, run / "replays" / f"{tested}.npz")
     cause = {"effect": "tool_radius", "probability": 1.0, "parameters": {"radius": {"value": RADIUS, "unit": "m"}}}
     values = {
         "report": {"format": 1, "dataset": dataset.name, "verdict": "found", "causes": [cause]},
