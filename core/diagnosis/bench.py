@@ -1,4 +1,4 @@
-"""The bench on which hypotheses are evaluated and refitted by Gauss-Newton: setup, workers, noise and priors in one place."""
+"""The bench on which hypotheses are evaluated and refitted: setup, workers, noise and priors in one place."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from core.diagnosis.columns import TOOL_COLUMNS, Wanted
-from core.diagnosis.evidence import Block, explained, fit, log_evidence, predictive_score, within_reach
+from core.diagnosis.evidence import Block, fit, log_evidence, predictive_score
+from core.diagnosis.fitting import SETTLED, fitted
 from core.diagnosis.hypothesis import Model, Nuisances, nuisance_setups, with_effects
 from core.diagnosis.led import led
 from core.diagnosis.noise import Noise, noises
@@ -29,18 +30,10 @@ from core.progress import Report, silent
 from core.registration import Registration
 from core.setup import Inclusion, Setup
 
-__all__ = ["PRIOR_STEPS", "TRUST", "Bench"]
+__all__ = ["PRIOR_STEPS", "Bench"]
 
 PRIOR_STEPS = 4.0
 """Prior standard deviation of a search coordinate, in its scales."""
-TRUST = 2.5
-"""Longest step of a fit at once, in the scales of what it moves."""
-_ITERATIONS = 6
-_WORTH, _SETTLED = 0.5, 0.02
-"""A step that promises less [nats] is not made, while models are compared and in the last fit: to 1 and 0.2 deviations."""
-_OPTIMISM = (10.0, 3.0)
-"""A fit is given up where so many times what its next step promises would not save it, before the first step and after it: to
-first order a tool's shift by millimetres promises a small part of what it does."""
 
 
 class Bench:
@@ -235,45 +228,12 @@ class Bench:
         return log_evidence(self.tempered(model), model.nuisance, self.nuisances.precision if nuisances is None else nuisances)
 
     def refit(self, effects: Sequence[Effect], starts: Sequence[Prediction] | None, hopeless: float = -np.inf) -> Model:
-        """Gauss-Newton with a trust region from these values; returns the best model met.
+        """Fit from these values (`core.diagnosis.fitting`); returns the best model met.
 
         A model whose log evidence will hardly reach `hopeless` is given up.
         """
         self.tell(f"fitting {' and '.join(effect.name for effect in effects)}")
-        return self._fitted(self.evaluate(effects, starts), self.nuisances.precision, hopeless)
-
-    def _fitted(self, model: Model, nuisances: FloatArray, hopeless: float = -np.inf, worth: float = _WORTH) -> Model:
-        best, radius = self.objective(model, nuisances), TRUST
-        for iteration in range(_ITERATIONS):
-            promised = self._promised(model, nuisances)
-            lost = best + _OPTIMISM[min(iteration, 1)] * promised < hopeless or (iteration == 2 and best < hopeless)
-            if lost or promised < worth:
-                break
-            step = self._step(model, nuisances, radius)
-            if np.abs(step / model.scales).max() < 0.05:
-                break
-            trial = self.evaluate(self._shift(model, step), model.predictions)
-            value = self.objective(trial, nuisances)
-            if value > best:
-                gained, model, best = value - best, trial, value
-                if gained < 2 * worth:
-                    break
-            else:
-                radius = 0.3 * np.abs(step / model.scales).max()
-                if radius < 0.1:
-                    break
-        return model
-
-    def _step(self, model: Model, nuisances: FloatArray, reach: float) -> FloatArray:
-        """Most probable change of the search coordinates, none by more than `reach` of its scales."""
-        columns, first = [*model.nuisance, *model.columns], len(model.nuisance)
-        own, precision = range(first, len(columns)), self.precision(model, nuisances)
-        return within_reach(self.tempered(model), columns, precision, own, model.scales, reach)[first:]
-
-    def _promised(self, model: Model, nuisances: FloatArray) -> float:
-        """What the best values of the model's search coordinates would gain to first order [nats]."""
-        blocks, whole = self.tempered(model), self.precision(model, nuisances)
-        return explained(blocks, [*model.nuisance, *model.columns], whole) - explained(blocks, model.nuisance, nuisances)
+        return fitted(self, self.evaluate(effects, starts), self.nuisances.precision, hopeless)
 
     def refine(self, model: Model) -> Model:
         """Fit an accepted model's parameters once more, with the mesh's error measured in it and not in the stated setup.
@@ -289,12 +249,4 @@ class Bench:
             fine = [f.result() for f in self.predict(plain, None, here, self.fine)]
             self.noises = [n.remeshed(m, f) for n, m, f in zip(self.noises, here, fine, strict=True)]
         found = self.assemble(model.effects, model.setup, model.predictions, (), 0)
-        return self._fitted(found, self.nuisances.beside(found.effects), worth=_SETTLED)
-
-    def _shift(self, model: Model, step: FloatArray) -> list[Effect]:
-        effects, at = [], 0
-        for effect in model.effects:
-            number = len(effect.numbers())
-            effects.append(effect.at((np.array(effect.coordinates) + step[at : at + number]).tolist()))
-            at += number
-        return effects
+        return fitted(self, found, self.nuisances.beside(found.effects), worth=SETTLED)

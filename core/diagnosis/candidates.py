@@ -8,9 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.diagnosis.bench import PRIOR_STEPS, TRUST, Bench
+from core.diagnosis.bench import PRIOR_STEPS, Bench
 from core.diagnosis.beneath import lumps_under
 from core.diagnosis.evidence import within_reach
+from core.diagnosis.fitting import TRUST
 from core.diagnosis.hypothesis import TWINS, Model
 from core.diagnosis.ordered import TRACED
 from core.diagnosis.prediction import Prediction

@@ -101,6 +101,8 @@ class Effect(ABC):
     name: ClassVar[str]
     enters: ClassVar[Slot]
     summary: ClassVar[str]
+    kinked: ClassVar[bool] = False
+    """Whether something begins or ends with its numbers, as a slide does: a fit then looks beyond what derivatives show."""
 
     def __post_init__(self) -> None:
         for item in self.parameters():

@@ -22,6 +22,7 @@ class BaseSlip(Effect):
 
     name, enters = "base_slip", Slot.SUPPORT
     summary = "the base slides on the table"
+    kinked = True  # a push that slides at one friction holds at the next
     # Friction is told from the sideways force, which a replay on the grid for diagnosis has to some percent only.
     friction_coefficient: float = parameter("1", low=0.01, high=3.0, scale=0.2, log=True, accuracy=0.04)
 
