@@ -151,7 +151,7 @@ def _paired(bench: Bench, findings: Findings, current: Trial, screening: Screeni
     nuisance = (*screened.nuisance, *screened.columns)
     blocks = bench.tempered(screened)
     ranked = pair_gains(blocks, right_sides(blocks), nuisance, bench.precision(screened), candidates)
-    for _, one, other in _apart(ranked, PAIRS):
+    for _, one, other in _apart([row for row in ranked if not _weighed_already(row[1:], current)], PAIRS):
         bench.tell(f"trying {one.start.name} and {other.start.name} at once")
         effects = [begin(one, screened, bench, other), begin(other, screened, bench, one)]
         hopeless = bench.objective(current.model) - HOPELESS
@@ -165,6 +165,12 @@ def _paired(bench: Bench, findings: Findings, current: Trial, screening: Screeni
             bench.temperature = max(1.0, trial.misfit)
             return
         findings.trials.append(replace(trial.scored(), asked=np.inf if left.significant else trial.asked))
+
+
+def _weighed_already(pair: Sequence[Candidate], current: Trial) -> bool:
+    """Whether a pair is the cause found and one that is dear to replay: that was screened beside it, and not found worth a fit."""
+    dear = any(isinstance(candidate.start, TRACED) for candidate in pair)
+    return dear and any(candidate.start.name in current.model.names for candidate in pair)
 
 
 def _apart(ranked: Sequence[tuple[float, Candidate, Candidate]], most: int) -> list[tuple[float, Candidate, Candidate]]:
