@@ -129,6 +129,7 @@ def _check_one(path: Path, picture: Path | None) -> None:
     from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
     from core.dataset.check import check_dataset  # noqa: PLC0415 (heavy)
     from core.registration import register as relate  # noqa: PLC0415 (heavy)
+    from core.standing import as_it_stood  # noqa: PLC0415 (heavy)
 
     dataset = open_dataset(path)
     found: Registration | None = None
@@ -136,7 +137,7 @@ def _check_one(path: Path, picture: Path | None) -> None:
         dataset.validate(part(report, 0.0, 0.4))
         try:
             found = relate(dataset, part(report, 0.4, 0.6))
-            warnings = found.warnings
+            warnings = as_it_stood(dataset, found)[1].warnings
         except RegistrationError as error:
             warnings = (error.message,)
         summary = check_dataset(dataset, found.phantom_from_robot if found else None, part(report, 0.6, 1.0))
