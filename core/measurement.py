@@ -23,7 +23,7 @@ __all__ = ["Gaps", "PatchMeans", "Surface", "gaps", "gaps_beside", "patch_means"
 
 MaskArray = np.ndarray[Any, np.dtype[np.bool_]]
 SIDES = ("+z", "-y", "+y", "-x", "+x")
-_GRAZING = 0.3
+GRAZING = 0.3
 """Cosine between ray and normal below which a depth error counts for too much along the surface."""
 _EDGE = 1.5e-3
 """Points this near to an edge of the block [m] are left out: depth cameras round edges off."""
@@ -192,12 +192,21 @@ class Gaps:
     side: IntArray
 
 
-def gaps(points: FloatArray, camera: FloatArray, frame: Equilibrium, surface: Surface, *, everything: bool = False) -> Gaps:
+def gaps(
+    points: FloatArray,
+    camera: FloatArray,
+    frame: Equilibrium,
+    surface: Surface,
+    *,
+    everything: bool = False,
+    grazing: float = GRAZING,
+) -> Gaps:
     """Compare measured points with the surface of one frame, along the camera's rays.
 
     Args:
         points: (n, 3) [m], phantom frame, cleaned. camera: (3,) optical centre [m], phantom frame.
         frame: the simulated block. surface: its material points. everything: keep all points whose ray meets the block.
+        grazing: cosine between ray and normal below which a ray grazes it [1].
 
     Otherwise points whose ray grazes it, passes near an edge, or ends more than 8 mm away are left out, too.
     """
@@ -226,7 +235,7 @@ def gaps(points: FloatArray, camera: FloatArray, frame: Equilibrium, surface: Su
     gap = np.einsum("mi,mi->m", points[hit] - frame.move(foot), normal)
     side = surface.side[triangle]
     facing = -np.einsum("mi,mi->m", rays, normal)
-    good = (facing > _GRAZING) & (surface.edge_distance(foot, side) > _EDGE) & (np.abs(gap) < _OUTLIER)
+    good = (facing > grazing) & (surface.edge_distance(foot, side) > _EDGE) & (np.abs(gap) < _OUTLIER)
     good |= everything
     foot, side = foot[good], side[good]
     return Gaps(hit[good], gap[good], foot, normal[good], facing[good], surface.patch_of(foot, side), side)
@@ -275,14 +284,14 @@ def within_spread(values: FloatArray, patch: IntArray, patches: int) -> MaskArra
     """
     if not len(values):
         return np.zeros(0, dtype=bool)
-    centre, apart = np.zeros(patches), []
+    centre, apart = np.zeros(patches), list[FloatArray]()
     order = np.argsort(patch, kind="stable")
     edges = np.flatnonzero(np.diff(patch[order])) + 1
     for name, group in zip(patch[order][np.concatenate([[0], edges])], np.split(values[order], edges), strict=True):
         centre[name] = np.median(group)
-        apart.append(np.abs(group - np.roll(group, len(group) // 2))[: len(group) if len(group) > 1 else 0])
-    differences = np.concatenate(apart)
-    scale = 1.4826 / np.sqrt(2) * float(np.median(differences)) if len(differences) else np.inf
+        if len(group) > 1:  # a lone point says nothing of noise
+            apart.append(np.abs(group - np.roll(group, len(group) // 2)))
+    scale = 1.4826 / np.sqrt(2) * float(np.median(np.concatenate(apart))) if apart else np.inf
     return np.asarray(np.abs(values - centre[patch]) <= 4 * scale)
 
 

@@ -38,9 +38,9 @@ _DOUBT, _NEVER = 1.5e-4, 1e30
 """A direction that no side shows this exactly [m] counts as unseen; the weight that holds it."""
 _FEWEST, _PATCH = 12, 8e-3
 """Patches that must be seen both then and now, and their edge [m]: of a side at a low angle a cloud has few points."""
-_GRAZING, _EDGE, _FARTHEST = 0.12, 1.5e-3, 8e-3
-"""Cosine between ray and normal, distance from an edge [m], and gap [m] that a point may have. A side that is seen at a low angle
-tells best where it lies, for the error is along the ray."""
+_GRAZING = 0.12
+"""Cosine between ray and normal from which a point counts: a side that is seen at a low angle tells best where it lies, for the
+error is along the ray."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +84,9 @@ def _seen_from(sequence: Sequence, registration: Registration, way: FloatArray |
     if way is None:
         return sequence
     back = -np.append(way, 0.0)
-    return sequence.moved(
-        registration.phantom_from_camera.inverse().rotate(back), registration.phantom_from_robot.inverse().rotate(back)
-    )
+    # Where touches were of other landmarks, which way the robot's axes point is what the mended ones say.
+    robot = registration.mended.phantom_from_robot
+    return sequence.moved(registration.phantom_from_camera.inverse().rotate(back), robot.inverse().rotate(back))
 
 
 def standing(dataset: Dataset, registration: Registration) -> dict[str, FloatArray]:
@@ -145,9 +145,8 @@ def _untouched(sequence: Sequence, setup: Setup, cleaner: Cleaner, shaft: FloatA
 def _means(setup: Setup, points: FloatArray, way: FloatArray, bare: Equilibrium, surface: Surface) -> PatchMeans:
     """Of cleaned points (n, 3) [m], camera frame, against the block moved by `way` (3,) [m]."""
     pose = setup.phantom_from_camera
-    seen = gaps(pose.apply(points) - way, pose.translation - way, bare, surface, everything=True)
-    good = (seen.facing > _GRAZING) & (np.abs(seen.gap) < _FARTHEST) & (surface.edge_distance(seen.foot, seen.side) > _EDGE)
-    return patch_means(seen.gap[good], seen.patch[good], surface.patches)
+    seen = gaps(pose.apply(points) - way, pose.translation - way, bare, surface, grazing=_GRAZING)
+    return patch_means(seen.gap, seen.patch, surface.patches)
 
 
 def _compared(setup: Setup, points: FloatArray, before: PatchMeans, bare: Equilibrium, surface: Surface) -> Standing | None:

@@ -11,7 +11,8 @@ import pytest
 
 from core.cleaning import cleaner_for
 from core.dataset import Dataset, open_dataset
-from core.registration import register, setup_from
+from core.frames import Transform
+from core.registration import Repair, RobotFit, register, setup_from
 from core.standing import as_it_stood, camera_of, displaced, standing
 from core.synthetic import HiddenEffect, Scenario, Truth, make_dataset
 
@@ -73,6 +74,20 @@ def test_clouds_and_tool_move_together_and_a_raw_cloud_can_be_put_beside_them(sl
     path = robot.apply(moved.kinematics.position)
     assert path == pytest.approx(robot.apply(raw.kinematics.position) - [1e-3, -2e-3, 0.0], abs=1e-9)
     assert len(cleaner_for(dataset, registration).clean(moved.cloud(0)).indices) > 300
+
+
+def test_the_tool_moves_with_the_block_where_its_touches_were_of_other_landmarks(slid: tuple[Dataset, Truth]) -> None:
+    dataset, _ = slid
+    registration = register(dataset)
+    right = registration.phantom_from_robot
+    turned = Transform.from_vector(np.zeros(3), np.array([0.0, 0.0, np.pi / 2])) @ right
+    fit = RobotFit(
+        right, registration.touch_residuals, registration.touch_rms, 1e-4, registration.robot_pivot, registration.robot_covariance
+    )
+    paired = replace(registration, phantom_from_robot=turned, repair=Repair("turn-1", 1.0, fit, 1e-2))
+    moved = displaced(dataset, paired, {"poke-side-02": np.array([1e-3, -2e-3])}).sequence("poke-side-02")
+    step = right.rotate(moved.kinematics.position - dataset.sequence("poke-side-02").kinematics.position)
+    assert step == pytest.approx(np.broadcast_to([-1e-3, 2e-3, 0.0], step.shape), abs=1e-9)
 
 
 def test_a_camera_that_was_moved_is_no_block_that_slid(bumped: Dataset) -> None:
