@@ -46,34 +46,32 @@ def perform(
     if scenario.remembers:
         stretches = _lasting(scenario, motion.probes, ends, fine, slip)
     else:
-        stretches = _apart(scenario, motion.probes, ends, fine, body or _block, slip)
+        stretches = _apart(scenario, motion, ends, fine, body or _block, slip)
     return Track(replace(motion, probes=tuple(stretch.probe for stretch in stretches)), tuple(stretches))
 
 
-def _apart(
-    scenario: Scenario, probes: Sequence[Probe], ends: Sequence[float], fine: float, body: Mesher, slip: FloatArray
-) -> list[Stretch]:
+def _apart(scenario: Scenario, motion: Motion, ends: Sequence[float], fine: float, body: Mesher, slip: FloatArray) -> list[Stretch]:
     """Each probe on a grid of its own: of those before only the base's slip is left."""
     stretches = []
-    for probe, end in zip(probes, ends, strict=True):
-        stretch, slip = _as_deep_as_it_goes(scenario, probe, slip, fine, end, body)
+    for probe, end in zip(motion.probes, ends, strict=True):
+        stretch, slip = _as_deep_as_it_goes(scenario, probe, motion.axis, slip, fine, end, body)
         stretches.append(stretch)
     return stretches
 
 
 def _as_deep_as_it_goes(
-    scenario: Scenario, probe: Probe, slip: FloatArray, fine: float, end: float, body: Mesher
+    scenario: Scenario, probe: Probe, axis: FloatArray, slip: FloatArray, fine: float, end: float, body: Mesher
 ) -> tuple[Stretch, FloatArray]:
     """One probe from a base that has slipped by `slip` (3,) [m], and the slip after it."""
     for short in np.arange(0.0, MOST_SHORT, SHORTER):
         tried = probe.shallower(float(short))
         block = body(scenario, tried, fine)
-        bench = Specimen(scenario, block, slip)
+        bench = Specimen(scenario, block, slip, axis)
         try:
-            settled = bench.settled + slip
-            return Stretch(
-                tried, block.surface_rest, block.surface_faces, settled, bench.passages(tried, end), (tried,)
-            ), bench.slip  # fmt: skip
+            creep = bench.creep
+            settled = bench.settled + (creep * float(tried.times[0]) if creep.any() else slip)
+            drawn = (block.surface_rest, block.surface_faces, settled, bench.passages(tried, end), (tried,), creep)
+            return Stretch(tried, *drawn), bench.slip
         except GivesWay as error:
             failure = error
         finally:
@@ -165,6 +163,9 @@ def _touched(scenario: Scenario, probe: Probe, fine: float) -> tuple[FloatArray,
     touching = touching if len(touching) else way[-1:]
     shallow = touching[:1] if len(probe.waypoints) == 2 else touching[touching[:, 2] < touching[:, 2].min() + 1e-4]
     points = _on_surface(shallow, low, high)
+    if scenario.disturbance("shaft_contact") is not None and abs(probe.outwards[2]) < 0.5:
+        points = np.concatenate([points, np.clip([[*way[-1][:2], high[2]]], low, high)])
+        return points, np.full(2, 0.8 * radius), np.array([fine, 1.2 * fine])
     reach = np.full(len(points), (0.8 if len(points) == 1 else 0.5) * radius)
     return points, reach, np.full(len(points), fine if len(points) == 1 else 1.2 * fine)
 

@@ -8,12 +8,13 @@ import numpy as np
 
 from core.frames import FloatArray
 from core.synthetic.block import Block
-from core.synthetic.equilibrium import Solid
 from core.synthetic.fibres import fibre_modulus
+from core.synthetic.obstacle import SHAFT_RADIUS, Neighbour, Shaft
 from core.synthetic.remembering import relaxed_share
-from core.synthetic.scenario import HiddenEffect, Scenario
+from core.synthetic.scenario import Scenario
+from core.synthetic.solid import Solid
 
-__all__ = ["levels_of", "seams_of", "solid_of", "true_offset", "true_radius"]
+__all__ = ["creep_of", "levels_of", "seams_of", "solid_of", "true_offset", "true_radius"]
 
 BoolArray = np.ndarray[Any, np.dtype[np.bool_]]
 
@@ -30,6 +31,15 @@ def true_offset(scenario: Scenario) -> FloatArray:
     return np.array([hidden.value(name) for name in ("dx", "dy", "dz")]) if hidden else np.zeros(3)
 
 
+def creep_of(scenario: Scenario) -> FloatArray:
+    """How fast the block moves on its table (3,) [m/s]."""
+    creep = scenario.disturbance("phantom_creep")
+    if creep is None:
+        return np.zeros(3)
+    direction = creep.value("direction")
+    return creep.value("speed") * np.array([np.cos(direction), np.sin(direction), 0.0])
+
+
 def levels_of(scenario: Scenario) -> tuple[float, ...]:
     """Heights between two materials [m]: under a skin, where there is one."""
     skin = scenario.hidden("surface_layer")
@@ -41,18 +51,17 @@ def seams_of(scenario: Scenario) -> tuple[tuple[int, float], ...]:
     strip = scenario.hidden("base_detachment")
     if strip is None:
         return ()
-    axis, sign = _edge(strip)
+    axis, sign = _side(str(strip.parameters["edge"]))
     return ((axis, sign * (scenario.true_size[axis] / 2 - strip.value("extent"))),)
 
 
-def _edge(strip: HiddenEffect) -> tuple[int, float]:
-    """Axis and side of a strip's edge."""
-    edge = str(strip.parameters["edge"])
-    return "xy".index(edge[1]), -1.0 if edge[0] == "-" else 1.0
+def _side(name: str) -> tuple[int, float]:
+    """Axis and sign of a side called like "-x"."""
+    return "xy".index(name[1]), -1.0 if name[0] == "-" else 1.0
 
 
-def solid_of(scenario: Scenario, block: Block) -> Solid:
-    """The solid that fills `block`."""
+def solid_of(scenario: Scenario, block: Block, axis: FloatArray | None = None) -> Solid:
+    """The solid that fills `block`, and what touches it; `axis` (3,) points from the tool's shaft towards the tip."""
     nu, weight = scenario.hidden("poisson_ratio"), scenario.hidden("gravity")
     limit, fibres, springs = (scenario.hidden(name) for name in ("strain_stiffening", "anisotropy", "base_compliance"))
     poisson_ratio = nu.value("nu") if nu else scenario.poisson_ratio
@@ -70,7 +79,24 @@ def solid_of(scenario: Scenario, block: Block) -> Solid:
         fibre_modulus=fibre_modulus(fibres.value("stiffness_ratio"), poisson_ratio) if fibres else 0.0,
         springs=_springs(scenario, block, springs.value("stiffness_over_E")) if springs else None,
         relaxed=relaxed_share(scenario),
+        shaft=_shaft(scenario, axis),
+        neighbour=_neighbour(scenario),
     )
+
+
+def _shaft(scenario: Scenario, axis: FloatArray | None) -> Shaft | None:
+    """Up to well above the block; where nothing is said of it, it touches nothing."""
+    if axis is None or scenario.disturbance("shaft_contact") is None:
+        return None
+    return Shaft(-axis, min(SHAFT_RADIUS, 0.8 * true_radius(scenario)), 2 * scenario.true_size[2])
+
+
+def _neighbour(scenario: Scenario) -> Neighbour | None:
+    body = scenario.disturbance("second_body")
+    if body is None:
+        return None
+    axis, sign = _side(str(body.parameters["side"]))
+    return Neighbour(axis, sign, body.value("overlap"), body.value("stiffness_over_E") * scenario.true_modulus)
 
 
 def _modulus(scenario: Scenario, block: Block) -> FloatArray:
@@ -98,7 +124,7 @@ def _bonded(scenario: Scenario, places: FloatArray) -> BoolArray:
     strip = scenario.hidden("base_detachment")
     if strip is None:
         return np.ones(places.shape[:-1], dtype=bool)
-    axis, sign = _edge(strip)
+    axis, sign = _side(str(strip.parameters["edge"]))
     return np.asarray(scenario.true_size[axis] / 2 - sign * places[..., axis] >= strip.value("extent") - 1e-9)
 
 

@@ -10,11 +10,11 @@ from scipy.spatial.transform import Rotation
 
 from core.frames import FloatArray, Transform
 from core.synthetic.disturbance import Disturbance, rippled
+from core.synthetic.obstacle import SHAFT_RADIUS
 
 __all__ = ["DepthCamera", "Scene", "place_camera", "tool_solid"]
 
 TABLE = 0.13
-SHAFT_RADIUS = 3e-3
 SHAFT_LENGTH = 0.16
 QUANTUM = 0.125e-3
 EDGE = 4e-3

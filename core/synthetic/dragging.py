@@ -18,7 +18,8 @@ from numba import njit
 from core.errors import SolveError
 from core.frames import FloatArray
 from core.synthetic.block import Block, IntArray
-from core.synthetic.law import SOFT_GAP, spread
+from core.synthetic.law import spread
+from core.synthetic.obstacle import SOFT_GAP
 
 __all__ = ["Dragging", "Rub", "assemble_rub"]
 
@@ -156,7 +157,7 @@ def assemble_rub(
     coupling: Any,
     total: Any,
 ) -> float:
-    """Energy [J] of a `Rub` at displacements u (n, 3) [m]; with `derivative`, adds what `law.assemble_obstacle` adds."""
+    """Energy [J] of a `Rub` at displacements u (n, 3) [m]; with `derivative`, adds what `obstacle.assemble_obstacle` adds."""
     energy = 0.0
     way = np.empty(3)
     pull = np.empty(3)

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from core.errors import SolveError
 from core.frames import FloatArray
-from core.synthetic.block import Block, Sampling, shape_values
+from core.synthetic.block import Block, shape_values
 from core.synthetic.dragging import Rub, assemble_rub
 from core.synthetic.fibres import assemble_fibres, fibre_energy
-from core.synthetic.law import assemble_obstacle, assemble_solid, constants, solid_energy
+from core.synthetic.law import assemble_solid, constants, solid_energy
 from core.synthetic.metric import assemble_metric, metric_energy
+from core.synthetic.obstacle import Obstacle, assemble_obstacle
+from core.synthetic.solid import Solid
 from core.synthetic.stiffening import assemble_stiffening, stiffening_energy
 from core.synthetic.system import System
 
-__all__ = ["Equilibrium", "GivesWay", "Solid", "State"]
+__all__ = ["Equilibrium", "GivesWay", "State"]
 
 PENALTY_OVER_E = 4.5e4
 SOFTER = 1 / 12
@@ -27,36 +28,6 @@ _NOWHERE = np.array([0.0, 0.0, 10.0])
 
 class GivesWay(SolveError):
     """The block is about to jump: where Newton's method ended, its energy was not convex."""
-
-
-@dataclass(frozen=True)
-class Solid:
-    """What the block really is.
-
-    Attributes:
-        young_modulus: (e, 4) at the volume points [Pa].
-        poisson_ratio: [1].
-        weight: per volume [N/m^3].
-        held: (n,) bool, nodes that do not move.
-        tool_radius: [m].
-        lifts: whether some of the base may lift off the table.
-        stretch_limit: J_m of Gent's law [1]; None for a material without.
-        fibres: (3,) unit vector along them; None for a material without. fibre_modulus: theirs over Young's modulus [1].
-        springs: (f, q) per area, in all directions, at the points of the sole [N/m^3]; None for a base without.
-        relaxed: share of the shear modulus that has relaxed after a long rest [1].
-    """
-
-    young_modulus: FloatArray
-    poisson_ratio: float
-    weight: float
-    held: Any
-    tool_radius: float
-    lifts: bool
-    stretch_limit: float | None = None
-    fibres: FloatArray | None = None
-    fibre_modulus: float = 0.0
-    springs: FloatArray | None = None
-    relaxed: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -104,6 +75,7 @@ class Equilibrium:
         self._stiffness = np.zeros((len(block.elements), 10, 10, 3, 3))
         self._load = self._own_weight()
         self._springs = self._under_base()
+        self._beside = None if solid.neighbour is None else solid.neighbour.against(block)
         self._tolerance = 1e-4 * self.modulus * solid.tool_radius**2
         self.iterations = 0
         self._penalty = 0.0
@@ -223,8 +195,8 @@ class Equilibrium:
     def _energy(self, u: FloatArray, centre: FloatArray) -> float:
         energy = self._stored(u)
         if np.isfinite(energy):
-            for sampling, where, radius in self._obstacles(centre):
-                energy += self._press(u, sampling, where, radius, False, _UNUSED)[0]
+            for one in self._obstacles(centre):
+                energy += self._press(u, one, False, _UNUSED)[0]
             energy += self._rubbed(u, centre, False, _UNUSED)
         return energy - float(np.sum(self._load * u))
 
@@ -235,11 +207,11 @@ class Equilibrium:
         push, coupling, total, deepest = np.zeros(3), np.zeros((len(u), 3, 3)), np.zeros((3, 3)), 0.0
         if np.isfinite(energy):
             self._resist(u, force)
-            for sampling, where, radius in self._obstacles(centre):
-                of_tool = (push, coupling, total) if radius > 0 else (np.zeros(3), np.zeros_like(coupling), np.zeros((3, 3)))
-                part, depth = self._press(u, sampling, where, radius, True, (self._stiffness, force, *of_tool))
+            for one in self._obstacles(centre):
+                of_tool = (push, coupling, total) if one.of_tool else (np.zeros(3), np.zeros_like(coupling), np.zeros((3, 3)))
+                part, depth = self._press(u, one, True, (self._stiffness, force, *of_tool))
                 energy += part
-                deepest = max(deepest, depth)
+                deepest = max(deepest, depth) if one.penalty == self._penalty else deepest
             energy += self._rubbed(u, centre, True, (self._stiffness, force, push, coupling, total))
         return energy - float(np.sum(self._load * u)), force, push, coupling, total, deepest
 
@@ -272,16 +244,22 @@ class Equilibrium:
             np.add.at(force, self._sole, np.einsum("fab,fbi->fai", self._springs, u[self._sole]))
             np.add.at(self._stiffness, self.block.sole.owner, self._springs[..., None, None] * np.eye(3))
 
-    def _obstacles(self, centre: FloatArray) -> list[tuple[Sampling, FloatArray, float]]:
-        tool = (self.block.skin, centre, self.solid.tool_radius)
-        return [tool, (self.block.sole, np.zeros(3), 0.0)] if self.solid.lifts else [tool]
+    def _obstacles(self, centre: FloatArray) -> list[Obstacle]:
+        block, solid = self.block, self.solid
+        found = [Obstacle(block.skin, centre, np.zeros(3), solid.tool_radius, self._penalty, True)]
+        if solid.shaft is not None:
+            rod = solid.shaft
+            found.append(Obstacle(block.skin, centre, rod.length * rod.away, rod.radius, self._penalty, True))
+        if solid.lifts:
+            found.append(Obstacle(block.sole, np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.0, self._penalty, False))
+        return found + ([self._beside] if self._beside is not None else [])
 
-    def _press(
-        self, u: FloatArray, sampling: Sampling, centre: FloatArray, radius: float, derivative: bool, out: tuple[FloatArray, ...]
-    ) -> tuple[float, float]:
-        block = self.block
+    def _press(self, u: FloatArray, one: Obstacle, derivative: bool, out: tuple[FloatArray, ...]) -> tuple[float, float]:
+        block, sampling = self.block, one.sampling
         parts = (u, block.nodes, block.elements, sampling.owner, sampling.values, sampling.weights)
-        energy, deepest = assemble_obstacle(*parts, centre, radius, self._penalty, self._cautious, derivative, *out)
+        energy, deepest = assemble_obstacle(
+            *parts, one.centre, one.along, one.radius, one.penalty, self._cautious, derivative, *out
+        )
         return float(energy), float(deepest)
 
     def _rubbed(self, u: FloatArray, centre: FloatArray, derivative: bool, out: tuple[FloatArray, ...]) -> float:

@@ -16,13 +16,11 @@ from numba import njit
 
 from core.frames import FloatArray
 
-__all__ = ["SECOND_INVARIANT_SHARE", "assemble_obstacle", "assemble_solid", "constants", "deformation_gradient", "solid_energy",
-    "spread", "turn_gradients",
+__all__ = [
+    "SECOND_INVARIANT_SHARE", "assemble_solid", "constants", "deformation_gradient", "solid_energy", "spread", "turn_gradients",
 ]  # fmt: skip
 
 SECOND_INVARIANT_SHARE = 0.1
-SOFT_GAP = 0.03e-3
-CAUTIOUS_GAP = 0.02
 _FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 
@@ -176,83 +174,3 @@ def assemble_solid(
                 for i in range(3):
                     for k in range(3):
                         stiffness[e, m, n, i, k] += second * mean_gradient[m, i] * mean_gradient[n, k]
-
-
-@njit(cache=True, fastmath=_FAST)
-def assemble_obstacle(  # noqa: PLR0912
-    u: Any,
-    nodes: Any,
-    elements: Any,
-    owner: Any,
-    values: Any,
-    areas: Any,
-    centre: Any,
-    radius: float,
-    penalty: float,
-    cautious: bool,
-    derivative: bool,
-    stiffness: Any,
-    force: Any,
-    push: Any,
-    coupling: Any,
-    total: Any,
-) -> tuple[float, float]:
-    """A rigid sphere, or with radius 0 the table z = 0, pressing on surface points; frictionless penalty [Pa/m].
-
-    The pressure sets in quadratically over SOFT_GAP: a kink there makes Newton jump between sets of touching points.
-
-    Where the pressure turns as the block slides along the sphere, the stiffness can be negative; a `cautious` one leaves that part
-    out where the pressure is high.
-
-    Adds to element stiffness, nodal force, push (3,) the force on the block [N], coupling (n, 3, 3) = -d force / d centre,
-    and total (3, 3) its sum, where `derivative`; returns energy [J] and deepest penetration [m].
-    """
-    energy = 0.0
-    deepest = 0.0
-    x = np.empty(3)
-    n = np.empty(3)
-    pull = np.empty(3)
-    t = np.empty((3, 3))
-    for s in range(owner.shape[0]):
-        element = elements[owner[s]]
-        for q in range(areas.shape[1]):
-            x[:] = 0.0
-            for a in range(10):
-                value = values[s, q, a]
-                for i in range(3):
-                    x[i] += value * (nodes[element[a], i] + u[element[a], i])
-            n[:] = 0.0
-            distance = 1.0
-            if radius > 0:
-                distance = np.sqrt((x[0] - centre[0]) ** 2 + (x[1] - centre[1]) ** 2 + (x[2] - centre[2]) ** 2)
-                gap = radius - distance
-                if gap <= 0 or distance < 1e-9:
-                    continue
-                for i in range(3):
-                    n[i] = (x[i] - centre[i]) / distance
-            else:
-                gap = -x[2]
-                if gap <= 0:
-                    continue
-                n[2] = 1.0
-            deepest = max(deepest, gap)
-            stiff = penalty * areas[s, q]
-            if gap < SOFT_GAP:
-                pressure = 0.5 * stiff * gap * gap / SOFT_GAP
-                energy += pressure * gap / 3
-                slope = stiff * gap / SOFT_GAP
-            else:
-                pressure = stiff * (gap - 0.5 * SOFT_GAP)
-                energy += stiff * (0.5 * gap * (gap - SOFT_GAP) + SOFT_GAP * SOFT_GAP / 6)
-                slope = stiff
-            if not derivative:
-                continue
-            bend = pressure / distance if radius > 0 and (gap < CAUTIOUS_GAP * radius or not cautious) else 0.0
-            for i in range(3):
-                pull[i] = -pressure * n[i]
-                push[i] -= pull[i]
-                for k in range(3):
-                    t[i, k] = (slope + bend) * n[i] * n[k] - (bend if i == k else 0.0)
-                    total[i, k] += t[i, k]
-            spread(values[s, q], element, pull, t, stiffness[owner[s]], force, coupling)
-    return energy, deepest

@@ -76,7 +76,7 @@ def make_dataset(folder: Path, scenario: Scenario, seed: int, workers: int = 1, 
 
 def _fill(folder: Path, scenario: Scenario, seed: int, workers: int, report: Report) -> Truth:
     rng = np.random.default_rng([seed, 1])
-    seen = rng.choice([-1.0, 1.0], size=2)
+    seen = _looking(scenario, rng.choice([-1.0, 1.0], size=2))
     robot_from_phantom = Transform(Rotation.random(rng=rng).as_matrix(), rng.uniform(-0.25, 0.25, 3))
     report(0.0, "letting the block settle")
     rest, settled, faces = rest_surface(scenario)
@@ -109,6 +109,15 @@ def _fill(folder: Path, scenario: Scenario, seed: int, workers: int, report: Rep
     )  # fmt: skip
 
 
+def _looking(scenario: Scenario, seen: FloatArray) -> FloatArray:
+    """The signs (2,) of the sides that the camera sees: none that another body lies against."""
+    body = scenario.disturbance("second_body")
+    if body is None:
+        return seen
+    side = str(body.parameters["side"])
+    return np.where([side[1] == axis for axis in "xy"], 1.0 if side[0] == "-" else -1.0, seen)
+
+
 def _misread(scenario: Scenario) -> tuple[float, float]:
     """Offset [m] and scale [1] with which the camera misreads depth, from before it was registered."""
     hidden = scenario.hidden("depth_bias")
@@ -118,10 +127,14 @@ def _misread(scenario: Scenario) -> tuple[float, float]:
 def _motions(scenario: Scenario, seen: FloatArray, seed: int) -> list[Motion]:
     """Planned by who sees the block as it is, whatever its stated size."""
     kinds, size, radius = [name.rpartition("-")[0] for name in scenario.sequences], scenario.true_size, scenario.tool_radius
+    upright = scenario.disturbance("shaft_contact")
     return [
-        draw_motion(name, kinds[:place].count(kinds[place]), size, radius, seen, seed, scenario.rounds.get(name, 1))
+        draw_motion(
+            name, kinds[:place].count(kinds[place]), size, radius, seen, seed, scenario.rounds.get(name, 1),
+            None if upright is None else upright.value("lean"),
+        )
         for place, name in enumerate(scenario.sequences)
-    ]
+    ]  # fmt: skip
 
 
 def _one_after_another(jobs: list[_Job]) -> Iterator[_Record]:

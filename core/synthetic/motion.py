@@ -96,7 +96,14 @@ def _eased(times: FloatArray, knots: FloatArray, values: FloatArray) -> FloatArr
 
 
 def draw_motion(
-    name: str, number: int, size: tuple[float, float, float], tool_radius: float, seen: FloatArray, seed: int, rounds: int = 1
+    name: str,
+    number: int,
+    size: tuple[float, float, float],
+    tool_radius: float,
+    seen: FloatArray,
+    seed: int,
+    rounds: int = 1,
+    lean: float | None = None,
 ) -> Motion:
     """The motion of one sequence.
 
@@ -108,6 +115,7 @@ def draw_motion(
         seen: (2,) signs of the x and y sides that the camera sees.
         seed: of this sequence.
         rounds: of touches; each further one is at the next place. Pushes into sides are into one side in all of them.
+        lean: of the shaft over the block in pushes from the side, from the vertical [rad]; without it the shaft is clear of it.
     """
     rng = np.random.default_rng([seed, *name.encode()])
     kind = name.rpartition("-")[0]
@@ -117,7 +125,7 @@ def draw_motion(
         if kind == "poke-top":
             touched, own = _top(rng, number + turn, size, tool_radius)
         elif kind == "poke-side":
-            touched, own = _side(rng, number, size, tool_radius, seen)
+            touched, own = _side(rng, number, size, tool_radius, seen, lean)
         elif kind == "drag":
             touched, own = _drag(rng, number + turn, size, tool_radius)
         else:
@@ -141,7 +149,12 @@ def _top(
 
 
 def _side(
-    rng: np.random.Generator, number: int, size: tuple[float, float, float], radius: float, seen: FloatArray
+    rng: np.random.Generator,
+    number: int,
+    size: tuple[float, float, float],
+    radius: float,
+    seen: FloatArray,
+    lean: float | None,
 ) -> tuple[list[FloatArray], FloatArray]:
     normal = int(number % 2 == 0)
     sign = float(seen[normal])
@@ -155,6 +168,8 @@ def _side(
         paths.append(np.array([start, end]))
     axis = np.array([0.0, 0.0, -0.74])
     axis[normal] = -0.67 * sign
+    if lean is not None:
+        axis[2], axis[normal] = -np.cos(lean), np.sin(lean) * sign
     return paths, axis / np.linalg.norm(axis)
 
 

@@ -126,6 +126,10 @@ class Scenario:
         """The effect of that name, if it is hidden here."""
         return next((hidden for hidden in self.effects if hidden.effect == effect), None)
 
+    def disturbance(self, name: str) -> Disturbance | None:
+        """The disturbance of that name, if there is one here."""
+        return next((one for one in self.disturbances if one.name == name), None)
+
     @property
     def remembers(self) -> bool:
         """Whether the material keeps something of what was done to it."""

@@ -7,15 +7,16 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator
-from scipy.spatial import Delaunay, cKDTree
+from scipy.spatial import Delaunay
 
 from core.errors import SolveError
 from core.frames import FloatArray
 from core.synthetic.block import Block
-from core.synthetic.body import solid_of, true_offset, true_radius
+from core.synthetic.body import creep_of, solid_of, true_offset, true_radius
 from core.synthetic.dragging import Dragging, Rub
 from core.synthetic.equilibrium import Equilibrium, GivesWay, State
 from core.synthetic.motion import Probe
+from core.synthetic.reach import Reach
 from core.synthetic.remembering import Past, Remembering
 from core.synthetic.scenario import Scenario
 from core.synthetic.track import Moment, Passage
@@ -47,9 +48,9 @@ class Standing:
 class Specimen:
     """One block with its solver, how far it has slipped, and what it remembers."""
 
-    def __init__(self, scenario: Scenario, block: Block, slip: FloatArray) -> None:
+    def __init__(self, scenario: Scenario, block: Block, slip: FloatArray, axis: FloatArray | None = None) -> None:
         self.block = block
-        self.solver = Equilibrium(block, solid_of(scenario, block))
+        self.solver = Equilibrium(block, solid_of(scenario, block, axis))
         self.offset = true_offset(scenario)
         self.radius = true_radius(scenario)
         hidden = scenario.hidden("base_slip")
@@ -58,6 +59,7 @@ class Specimen:
         giving = scenario.hidden("tool_compliance")
         self.softness = giving.value("compliance_times_stiffness") / scenario.true_modulus if giving else 0.0
         self.slip = slip
+        self.creep = creep_of(scenario)
         lasting = scenario.remembers
         self.memory = Remembering(scenario, block) if lasting else None
         if self.memory is not None:
@@ -65,7 +67,7 @@ class Specimen:
         rough = scenario.hidden("tool_friction")
         self.drag = Dragging(block, rough.value("friction_coefficient"), self.radius, self.solver.hardest) if rough else None
         self.settled = np.asarray(block.surface @ self.solver.rest.displacement)
-        self._tree = cKDTree(block.surface_rest + self.settled)
+        self._reach = Reach(block.surface_rest + self.settled, self.radius, self.solver.solid.shaft)
         self._last = self._before = self.solver.rest
         self._mesh: Delaunay | None = None
         self._stated: FloatArray | None = None
@@ -92,18 +94,19 @@ class Specimen:
     @property
     def _ordered(self) -> bool:
         """Whether the way back is another than the way in."""
-        return self.friction is not None or self.memory is not None or self.drag is not None
+        return self._goes_on or self.friction is not None or self.memory is not None or self.drag is not None
 
     @property
-    def _delays(self) -> bool:
-        return self.memory is not None and self.memory.delays
+    def _goes_on(self) -> bool:
+        """Whether something happens while the tool stands still."""
+        return bool(self.creep.any()) or (self.memory is not None and self.memory.delays)
 
     def passages(self, probe: Probe, until: float) -> tuple[Passage, ...]:
         """All passages of one probe in order of time, and the rest after it `until` the next [s], if anything goes on there."""
         passages: list[Passage] = []
         for number, (first, last) in enumerate(pairwise(probe.arcs)):
             if first == last:
-                if self._delays:
+                if self._goes_on:
                     passages.append(self._wait(probe, number, float(probe.times[number + 1])))
                 continue
             low, high = float(min(first, last)), float(max(first, last))
@@ -119,15 +122,14 @@ class Specimen:
             else:
                 arcs, moments = known.arcs, list(known.moments)
             passages.append(Passage(float(probe.times[number]), float(probe.times[number + 1]), arcs, tuple(moments)))
-        if self._delays:
+        if self._goes_on:
             passages.append(self._wait(probe, len(probe.times) - 1, until))
         return tuple(passages)
 
     def _wait(self, probe: Probe, number: int, until: float) -> Passage:
         """The tool stands where it was at a knot of the probe; keys lie the farther apart the longer it has stood."""
-        assert self.memory is not None
         centre, times = probe.place(probe.arcs[number : number + 1])[0] + self.offset, [float(probe.times[number])]
-        step = max(_FIRST_WAIT[0], _FIRST_WAIT[1] * self.memory.time_constant)
+        step = _FIRST_WAIT[1] if self.memory is None else max(_FIRST_WAIT[0], _FIRST_WAIT[1] * self.memory.time_constant)
         while times[-1] + 1.3 * step < until:
             times.append(times[-1] + step)
             step *= _LONGER
@@ -138,9 +140,9 @@ class Specimen:
     def _keys(self, probe: Probe, low: float, high: float) -> FloatArray:
         """Where to solve: evenly while the tool presses, and once more just after contact begins."""
         fine = np.linspace(low, high, 2 + int((high - low) / 5e-5))
-        touching = np.nonzero(self._gap(probe.place(fine) + self.offset) < 0)[0]
+        touching = np.nonzero(self._reach.gap(probe.place(fine) + self.offset - self.slip) < 0)[0]
         if not len(touching):
-            return np.linspace(low, high, 5) if self._delays else np.array([low, high])
+            return np.linspace(low, high, 5) if self._goes_on else np.array([low, high])
         begin, end = fine[max(touching[0] - 1, 0)], fine[min(touching[-1] + 1, len(fine) - 1)]
         sliding = begin == low and end == high
         spacing = SLIDING_SPACING if sliding else KEY_SPACING
@@ -148,16 +150,14 @@ class Specimen:
         keys = [np.array([low, high]), np.linspace(begin, end, 2 + int((end - begin) / spacing))]
         keys += [begin + np.array([0.3e-3])] if begin > low else []
         keys += [end - np.array([0.3e-3])] if end < high else []
-        keys += [np.linspace(low, begin, 4)] if self._delays else []
+        keys += [np.linspace(low, begin, 4)] if self._goes_on else []
         return np.unique(np.clip(np.concatenate(keys), low, high))
 
-    def _gap(self, centres: FloatArray) -> FloatArray:
-        """From the sphere to the settled block (n,) [m], negative where it presses."""
-        return np.asarray(self._tree.query(centres - self.slip)[0]) - self.radius
-
     def moment(self, centre: FloatArray, time: float | None = None) -> Moment:
-        """With the tool's stated centre here (3,) [m], at a time [s] for a block that remembers."""
+        """With the tool's stated centre here (3,) [m], at a time [s] for a block that remembers or creeps."""
         before = self._last
+        if time is not None and self.creep.any():
+            self.slip = self.creep * time
         state = self._lived(centre, time) if self.memory is not None else self._reached(centre)
         if self.drag is not None:
             self.drag.leave(state.displacement, state.centre)
@@ -242,7 +242,7 @@ class Specimen:
         return state
 
     def _elastic(self, centre: FloatArray) -> State:
-        if self._tree.query(centre)[0] > self.radius + 0.1e-3:
+        if self._reach.gap(centre[None])[0] > 0.1e-3:
             state = self._alone(centre)
         elif self.drag is not None:
             state = self._dragged(self.drag, centre)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -90,6 +90,7 @@ class Stretch:
         faces: (t, 3).
         settled: (s, 3) displacement before the probe, slip included [m].
         meshed: the probes for which the grid is fine.
+        creep: (3,) how fast the block moves before the probe [m/s].
     """
 
     probe: Probe
@@ -98,13 +99,14 @@ class Stretch:
     settled: FloatArray
     passages: tuple[Passage, ...]
     meshed: tuple[Probe, ...]
+    creep: FloatArray = field(default_factory=lambda: np.zeros(3))
 
     def displacement(self, time: float) -> FloatArray:
         """Displacement (s, 3) from the stated shape [m] at a time [s]."""
         last = self.settled
         for passage in self.passages:
             if time < passage.begin:
-                return last
+                return last + (time - self.passages[0].begin) * self.creep if passage is self.passages[0] else last
             instant = min(time, passage.end)
             last = passage.surface(passage.key(self.probe, instant))
             if time < passage.end:

@@ -11,8 +11,9 @@ from scipy.interpolate import LinearNDInterpolator
 
 from core.frames import FloatArray
 from core.synthetic.block import Block, Grading, mesh_block
-from core.synthetic.equilibrium import Equilibrium, Solid, State
+from core.synthetic.equilibrium import Equilibrium, State
 from core.synthetic.law import constants, solid_energy
+from core.synthetic.solid import Solid
 
 SIZE = (0.0687, 0.0393, 0.0358)
 TOP = np.array([0.0, 0.0, SIZE[2]])
