@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from core.diagnosis.ambiguity import Told
+from core.diagnosis.camera_errors import CALM, Ripple
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.structure import NOTHING, Structure
 from core.effects import Effect
@@ -50,6 +51,7 @@ class Findings:
         bound: least gain of a cause [nats]. misfit: of the baseline, per value. screened: linear gain by effect name.
         structure: error of the baseline that is smooth and grows with the push. left: the same of the best model.
         told: what this experiment tells of each effect, whatever the data say.
+        ripple: of the camera's depth in the rest cloud, which no effect expresses.
         withdrawn: why what was found is not named after all; empty where nothing was withdrawn.
         known: what no replay could do without: touches that were surely of other landmarks.
     """
@@ -63,6 +65,7 @@ class Findings:
     structure: Structure = NOTHING
     left: Structure = NOTHING
     told: tuple[Told, ...] = ()
+    ripple: Ripple = CALM
     withdrawn: str = ""
     known: tuple[Effect, ...] = ()
 
@@ -71,6 +74,11 @@ class Findings:
         names = set(self.best.model.names if self.best else ())
         self.trials = [trial for trial in self.trials if not names or not names.issubset(trial.model.names)]
         self.best, self.left, self.withdrawn = None, self.structure, why
+
+    @property
+    def structured(self) -> bool:
+        """Whether the stated setup leaves an error that noise does not make."""
+        return self.structure.significant or self.ripple.significant
 
     def rivals(self) -> list[Trial]:
         """Other sets of as many causes that explain the data about as well as the best."""

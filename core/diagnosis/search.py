@@ -9,6 +9,7 @@ import numpy as np
 
 from core.diagnosis.ambiguity import ambiguity_map
 from core.diagnosis.bench import Bench
+from core.diagnosis.camera_errors import CALM
 from core.diagnosis.candidates import Signature, begin, candidates_of, lump_places, renewed, signatures, tangents
 from core.diagnosis.evidence import predictive_gain
 from core.diagnosis.findings import LEAST_GAIN, Findings, Trial
@@ -71,6 +72,7 @@ def search(bench: Bench, seed: int) -> Findings:
     origin = bench.baseline(tangents(with_effects(bench.setup, known), names, bench.weighed), lump_places(bench), known)
     baseline = bench.evaluate((), origin.predictions) if known else origin
     findings = Findings(baseline, misfit=bench.misfit(baseline), known=known)
+    findings.ripple = bench.static.cloud.errors.ripple if bench.static else CALM
     findings.structure = findings.left = structure_of(bench, origin, seed)
     finite = signatures(bench, origin)
     first = screened, candidates, gains = _screen(bench, origin, finite, origin)

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from core.cleaning import Cleaner
+from core.diagnosis.camera_errors import CameraErrors, camera_errors
 from core.diagnosis.evidence import Block
 from core.frames import FloatArray
 from core.measurement import Surface, gaps, patch_means
@@ -24,14 +25,9 @@ from core.sight import sight_of
 
 __all__ = ["StaticChannel"]
 
-BIAS_SIZES = np.array([0.15, 0.2, 0.3, 0.4, 0.6, 1.0]) * 1e-3
-BIAS_REACHES = np.array([0.01, 0.014, 0.02, 0.028, 0.04, 0.06])
-WHITE_FACTORS = np.array([1.0, 1.5, 2.2])
-"""Standard deviation and length [m] of the camera's smooth bias, and factor on the scatter's variance, that are tried."""
 _TABLE_CELL = 0.012
 _POSE_FREEDOM = 0.05
 _LEAST_POINTS = 3
-_FLOOR = 2e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +39,7 @@ class StaticChannel:
         table: (t, 3) of the table's cells [m].
         residual: (p + t,) of the stated model, at the patches and at the table's cells [m].
         factor: Cholesky factor of its covariance (p + t, p + t) [m^2], the camera's pose and bias included.
-        bias, reach: of the camera's smooth error [m].
+        errors: of the camera.
     """
 
     centres: FloatArray
@@ -51,8 +47,7 @@ class StaticChannel:
     table: FloatArray
     residual: FloatArray
     factor: FloatArray
-    bias: float
-    reach: float
+    errors: CameraErrors
 
     @classmethod
     def of(cls, cloud: FloatArray, cleaner: Cleaner, setup: Setup, grid: Meshing) -> StaticChannel:
@@ -71,9 +66,10 @@ class StaticChannel:
         pivot = np.array([0.0, 0.0, setup.box.size[2]])
         moved = np.einsum("ni,nij->nj", directions, motion_jacobian(places, pivot))
         free = np.column_stack([moved, _bulges(places[: len(used)], normals, len(residual))])
-        covariance, bias, reach = _camera_errors(places, white, residual, free)
-        covariance += _POSE_FREEDOM**2 * moved @ np.diag([1, 1, 1, 100, 100, 100]) @ moved.T
-        return cls(centres, normals, table, residual, cho_factor(covariance)[0], bias, reach)
+        depth = sight.pose.inverse().apply(places)[:, 2]
+        errors = camera_errors(places, depth, white, residual, free)
+        covariance = errors.covariance + _POSE_FREEDOM**2 * moved @ np.diag([1, 1, 1, 100, 100, 100]) @ moved.T
+        return cls(centres, normals, table, residual, cho_factor(covariance)[0], errors)
 
     def block(self, stated: Setup, setup: Setup, grid: Meshing, columns: int, varied: dict[int, tuple[Setup, float]]) -> Block:
         """Quadratic form with the pose and the bias integrated out.
@@ -121,37 +117,3 @@ def _bulges(centres: FloatArray, normals: FloatArray, rows: int) -> FloatArray:
         shapes = [here, *(here * centres[:, axis] ** power for axis in along for power in (1, 2))]
         found += [np.concatenate([shape, np.zeros(rows - len(centres))]) for shape in shapes]
     return np.column_stack(found) if found else np.zeros((rows, 0))
-
-
-def _camera_errors(
-    places: FloatArray, white: FloatArray, residual: FloatArray, free: FloatArray
-) -> tuple[FloatArray, float, float]:
-    """Covariance (n, n) [m^2] of the camera's errors, with size and reach [m] of its bias, by restricted maximum likelihood.
-
-    Patterson and Thompson 1971: the likelihood of what the `free` columns (n, c) cannot explain.
-    """
-    scale = np.linalg.norm(free, axis=0)
-    basis, sizes, _ = np.linalg.svd(free[:, scale > 0] / scale[scale > 0], full_matrices=False)
-    basis = basis[:, sizes > 1e-6 * sizes[0]]
-    distance = np.linalg.norm(places[:, None] - places, axis=2)
-    best, found = -np.inf, None
-    for reach in BIAS_REACHES:
-        kernel = np.exp(-0.5 * (distance / reach) ** 2)
-        for size in BIAS_SIZES:
-            for factor in WHITE_FACTORS:
-                covariance = size**2 * kernel + np.diag(factor * white + _FLOOR**2)
-                value = _restricted(covariance, residual, basis)
-                if value > best:
-                    best, found = value, (covariance, float(size), float(reach))
-    if found is None:
-        raise np.linalg.LinAlgError("no model of the camera's errors is positive definite")
-    return found
-
-
-def _restricted(covariance: FloatArray, residual: FloatArray, basis: FloatArray) -> float:
-    """Restricted log likelihood of a residual (n,) up to a constant [nats]."""
-    factor = cho_factor(covariance)
-    solved = cho_solve(factor, np.column_stack([basis, residual]))
-    information, right = basis.T @ solved[:, :-1], basis.T @ solved[:, -1]
-    misfit = residual @ solved[:, -1] - right @ np.linalg.solve(information, right)
-    return float(-0.5 * (misfit + 2 * np.log(np.diag(factor[0])).sum() + np.linalg.slogdet(information)[1]))

@@ -31,7 +31,7 @@ _TEMPERATURE = 4.0
 def verdict_of(findings: Findings) -> str:
     """One of found, none, ambiguous, unexplained."""
     if findings.best is None:
-        return "unexplained" if findings.structure.significant or findings.misfit > UNEXPLAINED_MISFIT else "none"
+        return "unexplained" if findings.structured or findings.misfit > UNEXPLAINED_MISFIT else "none"
     if findings.rivals():
         return "ambiguous"
     return "found"
@@ -106,8 +106,12 @@ def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
     fraction = max(left.ratio - 1.0, 0.0) / max(before.ratio, left.ratio, 1.0) if left.significant else 0.0
     place = 1e3 * place
     where = f"{100 * share:.0f} % of it within 8 mm of ({place[0]:.0f}, {place[1]:.0f}, {place[2]:.0f}) mm"
+    when = f"most in {when}"
+    if findings.ripple.significant and not left.significant:
+        fraction = findings.ripple.share
+        where, when = "all over rest.ply, alike at equal distances from the camera", "always, also while nothing is touched"
     return {
-        "fraction": round(fraction, 4), "where": where, "when": f"most in {when}",
+        "fraction": round(fraction, 4), "where": where, "when": when,
         "misfit_per_value": round(bench.misfit(model), 4), "structure": round(left.ratio, 4),
         "structure_bound": round(left.bound / left.expected, 4),
     }  # fmt: skip
@@ -153,6 +157,7 @@ def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder |
     named = {cause["effect"] for cause in causes}
     known, unknown = _modulus(bench, findings, named)
     coarse = "" if bench.on_own_grid else too_coarse(findings.screened.get(MeshResolution.name, 0.0), findings.bound)
+    told = (findings.withdrawn, coarse, findings.ripple.warning)
     report: dict[str, Any] = {
         "format": 1, "dataset": dataset.name, "verdict": verdict, "causes": causes, "interval_level": INTERVAL_LEVEL,
         "ranking": _ranking(bench, findings, named), "models": [_model(trial) for trial in findings.trials],
@@ -164,7 +169,7 @@ def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder |
             "structure_bound": round(findings.structure.bound / findings.structure.expected, 4), "evaluations": bench.evaluations,
             "fitted_on": list(bench.names),
         },
-        "warnings": [*bench.registration.warnings, *(text for text in (findings.withdrawn, coarse) if text)],
+        "warnings": [*bench.registration.warnings, *(text for text in told if text)],
     }  # fmt: skip
     if isinstance(gain, FeltLadder):
         report["gain"] = gain.to_json(split)

@@ -29,7 +29,7 @@ from core.synthetic.visibility import changed, visible_weights
 from core.synthetic.whole import whole_or_nothing
 from core.synthetic.writing import write_clouds, write_config, write_forces, write_kinematics, write_ply, write_touches
 
-__all__ = ["make_dataset"]
+__all__ = ["make_dataset", "motions"]
 
 KINEMATICS_NOISE = 0.05e-3
 TOUCH_NOISE = 0.15e-3
@@ -92,7 +92,7 @@ def _fill(folder: Path, scenario: Scenario, seed: int, workers: int, report: Rep
     write_config(folder / "dataset.toml", f"block-{rng.integers(16**4):04x}", scenario, _landmarks(scenario.size), guess)
     jobs = [
         _Job(scenario, motion, camera, robot_from_phantom, shift, seen, folder / "sequences" / motion.name, seed)
-        for motion in _motions(scenario, seen, seed)
+        for motion in motions(scenario, seen, seed)
     ]
     squares: list[float] = []
     shortened: dict[str, list[float]] = {}
@@ -124,7 +124,7 @@ def _misread(scenario: Scenario) -> tuple[float, float]:
     return (hidden.value("offset"), hidden.value("scale")) if hidden else (0.0, 1.0)
 
 
-def _motions(scenario: Scenario, seen: FloatArray, seed: int) -> list[Motion]:
+def motions(scenario: Scenario, seen: FloatArray, seed: int) -> list[Motion]:
     """Planned by who sees the block as it is, whatever its stated size."""
     kinds, size, radius = [name.rpartition("-")[0] for name in scenario.sequences], scenario.true_size, scenario.tool_radius
     upright = scenario.disturbance("shaft_contact")

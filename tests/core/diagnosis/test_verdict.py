@@ -11,6 +11,7 @@ from small_dataset import write_valid_dataset
 
 from core.dataset import Dataset, open_dataset
 from core.diagnosis.bench import Bench
+from core.diagnosis.camera_errors import Ripple
 from core.diagnosis.columns import TOOL_COLUMNS
 from core.diagnosis.evidence import Block, gram
 from core.diagnosis.findings import RIVAL, Findings, Trial
@@ -113,6 +114,24 @@ def test_structured_error_without_a_cause_is_unexplained(bench):
     assert verdict_of(findings) == "unexplained"
     findings.structure = findings.left = Structure(29.0, 20.0, 30.0)
     assert verdict_of(findings) == "none"
+
+
+def test_depth_that_waves_is_told_and_is_no_noise(bench, dataset):
+    findings = _findings(bench, misfit=1.0)
+    assert verdict_of(findings) == "none"
+    findings.ripple = Ripple(size=2e-4, reach=4e-3, gain=80.0, share=0.3)
+    report = report_of(dataset, bench, findings, LADDER, "test")
+    assert (report["verdict"], report["causes"], report["unexplained"]["fraction"]) == ("unexplained", [], 0.3)
+    assert "rest.ply" in report["unexplained"]["where"]
+    assert any("waves with the distance from the camera, by about 0.2 mm" in text for text in report["warnings"])
+
+
+def test_named_cause_stands_beside_waves_of_depth(bench, dataset):
+    findings = _findings(bench, ((RADIUS,), 60.0, 1.0))
+    findings.ripple = Ripple(size=2e-4, reach=4e-3, gain=80.0, share=0.3)
+    report = report_of(dataset, bench, findings, LADDER, "test")
+    assert report["verdict"] == "found"
+    assert any("waves with the distance" in text for text in report["warnings"])
 
 
 @pytest.mark.parametrize("effect", [LUMP, RADIUS, NU, CAMERA, Gravity(specific_weight_over_stiffness=1.2)], ids=lambda e: e.name)
