@@ -15,6 +15,7 @@ from core.setup import Setup
 
 __all__ = ["LOG_PER_CONTRAST", "Effect", "Parameter", "Slot", "parameter"]
 
+_SHORT = 1e-3
 _MATRIX = 1.5
 LOG_PER_CONTRAST = 1.0 + _MATRIX
 """Change of a stiffness ratio's logarithm per change of its contrast, where the ratio is one."""
@@ -63,6 +64,11 @@ class Parameter:
     def value(self, coordinate: float) -> float:
         """The inverse of `coordinate`, brought back into the bounds."""
         return min(max(self._free(coordinate), self.low), self.high)
+
+    def within(self, coordinate: float) -> float:
+        """The value at this coordinate, a thousandth of a scale short of the bounds at least."""
+        short = _SHORT * self.scale
+        return self.value(min(max(coordinate, self.coordinate(self.low) + short), self.coordinate(self.high) - short))
 
     def factor(self, size: float) -> float | None:
         """That to which one grows with a coordinate's change by `size`; None of a parameter that is searched as it is."""
@@ -168,8 +174,11 @@ class Effect(ABC):
         return [item.coordinate(getattr(self, item.name)) for item in self.numbers()]
 
     def at(self, coordinates: Sequence[float]) -> Self:
-        """The same effect at other search coordinates, brought back into the bounds."""
-        return self.moved([item.value(float(c)) for item, c in zip(self.numbers(), coordinates, strict=True)])
+        """The same effect at other search coordinates, brought back to just within the bounds.
+
+        At a bound an effect can be absent, as a base is rigid there: what is absent has no first-order changes.
+        """
+        return self.moved([item.within(float(c)) for item, c in zip(self.numbers(), coordinates, strict=True)])
 
     def to_json(self) -> dict[str, Any]:
         """Plain values from which `core.effects.from_json` makes the same effect."""

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pushed_block import looking_at
 
+from core.diagnosis.tangent import SMALL
 from core.effects import CATALOGUE, Effect, Slot, effect_named, from_json
 from core.effects.material import StiffInclusion, YoungModulus
 from core.effects.sensor import CameraRegistration, TimeOffset
@@ -228,6 +229,27 @@ def test_moved_keeps_words_and_stays_within_bounds(effect):
     far = example.moved([item.high + 1 for item in effect.numbers()])
     assert [getattr(far, item.name) for item in effect.numbers()] == [item.high for item in effect.numbers()]
     assert all(getattr(far, item.name) == getattr(example, item.name) for item in effect.parameters() if item.choices)
+
+
+def _kinds(setup: Setup) -> tuple[bool, ...]:
+    """What a setup has or has not, and no small change gives or takes."""
+    support, material = setup.support, setup.material
+    moves = bool(support.detached) or support.stiffness_over_E is not None
+    return moves, support.friction_coefficient is not None, setup.remembers, material.fibres is not None
+
+
+@EACH
+def test_small_step_from_the_end_of_what_a_search_reaches_gives_and_takes_nothing(effect):
+    """A search that stepped to the bound where a base is rigid had no first-order changes there, and broke off."""
+    start = effect.starts(SETUP)[0]
+    for number, item in enumerate(effect.numbers()):
+        for far, back in ((item.low, 1.0), (item.high, -1.0)):
+            coordinates = start.coordinates
+            coordinates[number] = item.coordinate(far)
+            end = start.at(coordinates)
+            beside = end.coordinates
+            beside[number] += back * SMALL * item.scale
+            assert _kinds(end.apply(SETUP)) == _kinds(end.at(beside).apply(SETUP)), item.name
 
 
 def test_unknown_effect_is_an_error_that_lists_the_known():
