@@ -16,6 +16,7 @@ from core.diagnosis.assurance import assured
 from core.diagnosis.bench import Bench
 from core.diagnosis.felt_picture import draw_palpation
 from core.diagnosis.findings import Findings
+from core.diagnosis.held_out import held_out
 from core.diagnosis.observations import Observations
 from core.diagnosis.palpation import palpated
 from core.diagnosis.patterns import draw_patterns, patterns
@@ -24,7 +25,7 @@ from core.diagnosis.search import search
 from core.diagnosis.static import StaticChannel
 from core.diagnosis.still import Still
 from core.diagnosis.unseen import observe_each, pushed_places
-from core.diagnosis.verdict import report_of
+from core.diagnosis.verdict import report_of, verdict_of
 from core.diagnosis.withdrawal import objection
 from core.diagnosis.workers import Workers
 from core.diagnosis.worth import tuned, worth
@@ -144,6 +145,9 @@ def _run(
     if why := objection(findings, gain):
         findings.withdraw(why)
         model, gain = findings.baseline, worth(bench, findings, unseen, pool, fine, seed) if unseen else None
+    if verdict_of(findings) == "none":
+        report(0.77, "looking whether the test sequences are as clear")
+        findings.beyond = held_out(bench, unseen, seed)
     found = tuned(bench, model) if findings.best else setup
     result = report_of(dataset, bench, findings, gain, "test")
     if dataset.accepted is not None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from core.diagnosis.ambiguity import Told
 from core.diagnosis.camera_errors import CALM, Ripple
+from core.diagnosis.held_out import HeldOut
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.structure import NOTHING, Structure
 from core.effects import Effect
@@ -52,6 +53,7 @@ class Findings:
         structure: error of the baseline that is smooth and grows with the push. left: the same of the best model.
         told: what this experiment tells of each effect, whatever the data say.
         ripple: of the camera's depth in the rest cloud, which no effect expresses.
+        beyond: what the stated setup leaves on sequences that nothing was fitted on; only looked at before an all-clear.
         withdrawn: why what was found is not named after all; empty where nothing was withdrawn.
         known: what no replay could do without: touches that were surely of other landmarks.
     """
@@ -66,6 +68,7 @@ class Findings:
     left: Structure = NOTHING
     told: tuple[Told, ...] = ()
     ripple: Ripple = CALM
+    beyond: HeldOut | None = None
     withdrawn: str = ""
     known: tuple[Effect, ...] = ()
 
@@ -78,7 +81,12 @@ class Findings:
     @property
     def structured(self) -> bool:
         """Whether the stated setup leaves an error that noise does not make."""
-        return self.structure.significant or self.ripple.significant
+        return self.structure.significant or self.ripple.significant or self.missed
+
+    @property
+    def missed(self) -> bool:
+        """Whether it leaves one where nothing was fitted."""
+        return self.beyond is not None and self.beyond.structure.significant
 
     def rivals(self) -> list[Trial]:
         """Other sets of as many causes that explain the data about as well as the best."""

@@ -99,14 +99,17 @@ def _model(trial: Trial) -> dict[str, Any]:
 def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
     """How much of the structured error is left, over what chance gives, and where and when it sits."""
     model = findings.best.model if findings.best else findings.baseline
+    before, left, note = findings.structure, findings.left, ""
+    if findings.missed and findings.beyond is not None:
+        model, before, left = findings.beyond.model, findings.beyond.structure, findings.beyond.structure
+        note = ", on which nothing was fitted"
     worst = {block.name: block.gram[0, 0] / max(block.values, 1) for block in model.blocks if block.name != "rest"}
     when = max(worst, key=lambda name: worst[name])
     place, share = _worst_patch(model, bench) if bench.seen else _worst_push(model, bench)
-    before, left = findings.structure, findings.left
     fraction = max(left.ratio - 1.0, 0.0) / max(before.ratio, left.ratio, 1.0) if left.significant else 0.0
     place = 1e3 * place
     where = f"{100 * share:.0f} % of it within 8 mm of ({place[0]:.0f}, {place[1]:.0f}, {place[2]:.0f}) mm"
-    when = f"most in {when}"
+    when = f"most in {when}{note}"
     if findings.ripple.significant and not left.significant:
         fraction = findings.ripple.share
         where, when = "all over rest.ply, alike at equal distances from the camera", "always, also while nothing is touched"
@@ -114,6 +117,16 @@ def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
         "fraction": round(fraction, 4), "where": where, "when": when,
         "misfit_per_value": round(bench.misfit(model), 4), "structure": round(left.ratio, 4),
         "structure_bound": round(left.bound / left.expected, 4),
+    }  # fmt: skip
+
+
+def _held_out(findings: Findings) -> dict[str, float]:
+    """What an all-clear was checked against on the test sequences; nothing where none was given."""
+    if findings.beyond is None:
+        return {}
+    beyond = findings.beyond.structure
+    return {
+        "held_out_structure": round(beyond.ratio, 4), "held_out_structure_bound": round(beyond.bound / beyond.expected, 4),
     }  # fmt: skip
 
 
@@ -167,7 +180,7 @@ def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder |
             "gain_nats": round(findings.best.gain, 2) if findings.best else 0.0, "bound_nats": round(findings.bound, 2),
             "baseline_misfit": round(findings.misfit, 4), "structure": round(findings.structure.ratio, 4),
             "structure_bound": round(findings.structure.bound / findings.structure.expected, 4), "evaluations": bench.evaluations,
-            "fitted_on": list(bench.names),
+            "fitted_on": list(bench.names), **_held_out(findings),
         },
         "warnings": [*bench.registration.warnings, *(text for text in told if text)],
     }  # fmt: skip

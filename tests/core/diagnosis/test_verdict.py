@@ -16,6 +16,7 @@ from core.diagnosis.columns import TOOL_COLUMNS
 from core.diagnosis.evidence import Block, gram
 from core.diagnosis.findings import RIVAL, Findings, Trial
 from core.diagnosis.gain import Ladder
+from core.diagnosis.held_out import HeldOut
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.intervals import intervals, stands
 from core.diagnosis.noise import Noise
@@ -124,6 +125,18 @@ def test_depth_that_waves_is_told_and_is_no_noise(bench, dataset):
     assert (report["verdict"], report["causes"], report["unexplained"]["fraction"]) == ("unexplained", [], 0.3)
     assert "rest.ply" in report["unexplained"]["where"]
     assert any("waves with the distance from the camera, by about 0.2 mm" in text for text in report["warnings"])
+
+
+def test_error_that_only_the_test_sequences_show_is_no_all_clear(bench, dataset):
+    findings = _findings(bench, misfit=1.0)
+    findings.beyond = HeldOut(_model(bench), Structure(20.0, 20.0, 30.0))
+    clear = report_of(dataset, bench, findings, LADDER, "test")
+    assert (clear["verdict"], clear["unexplained"]["fraction"]) == ("none", 0.0)
+    assert (clear["evidence"]["held_out_structure"], clear["evidence"]["held_out_structure_bound"]) == (1.0, 1.5)
+    findings.beyond = HeldOut(_model(bench), Structure(50.0, 20.0, 30.0))
+    report = report_of(dataset, bench, findings, LADDER, "test")
+    assert (report["verdict"], report["causes"], report["unexplained"]["fraction"]) == ("unexplained", [], 0.6)
+    assert report["unexplained"]["when"] == "most in poke-02, on which nothing was fitted"
 
 
 def test_named_cause_stands_beside_waves_of_depth(bench, dataset):
