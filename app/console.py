@@ -6,7 +6,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,8 +24,8 @@ from core.errors import Cancelled, PalpateError
 from core.progress import Report
 
 __all__ = [
-    "Registration", "errors", "look_at", "out", "parameters_text", "print_problem", "progress", "verdict_cells", "verdict_table",
-    "write_json",
+    "Registration", "errors", "look_at", "out", "parameters_text", "print_problem", "print_warnings", "progress", "verdict_cells",
+    "verdict_table", "write_json",
 ]  # fmt: skip
 
 Registration = Annotated[
@@ -123,6 +123,12 @@ def agrees(report: dict[str, Any], truth: dict[str, Any]) -> bool:
     """Whether verdict and causes are those of the truth, in any order."""
     named = {cause["effect"] for cause in report.get("causes", [])}
     return report.get("verdict") == truth["verdict"] and named == {one["effect"] for one in truth["effects"]}
+
+
+def print_warnings(warnings: Sequence[str]) -> None:
+    """One by one, as they stand."""
+    for warning in warnings:
+        out.print(f"[yellow]warning[/] {escape(warning)}", highlight=False)
 
 
 def print_problem(error: PalpateError, place: str = "") -> None:

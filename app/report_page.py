@@ -22,7 +22,7 @@ from app.report_tables import (
     untold_list,
 )
 from app.runs import Run
-from app.sentences import palpation_sentences, registration_sentences, verdict_sentence
+from app.sentences import left_sentences, palpation_sentences, registration_sentences, verdict_sentence
 
 __all__ = ["report_page"]
 
@@ -76,7 +76,7 @@ def _head(run: Run, size: list[float] | None) -> str:
     return (
         f"<p class='eyebrow'><span class='tag {verdict}'>{verdict}</span>{escape(str(report.get('dataset', run.name)))}</p>"
         f"<h1>{escape(verdict_sentence(report, size))}</h1>"
-        + "".join(f"<p class='note'>{escape(text)}</p>" for text in registration_sentences(report))
+        + "".join(f"<p class='note'>{escape(text)}</p>" for text in (*left_sentences(report), *registration_sentences(report)))
         + (f"<ul class='warning'>{warnings}</ul>" if warnings else "")
     )
 

@@ -12,6 +12,7 @@ __all__ = [
     "cause_phrase",
     "control_sentences",
     "determined_sentences",
+    "left_sentences",
     "limit_phrase",
     "palpation_sentences",
     "probe_sentence",
@@ -113,6 +114,15 @@ def determined_sentences(causes: Sequence[dict[str, Any]]) -> list[str]:
             elif told != "interval":
                 said.append(f"{label} is {told} from this data")
     return said
+
+
+def left_sentences(report: dict[str, Any]) -> list[str]:
+    """How much of the structured error no cause explains, where it sits and when."""
+    left = report.get("unexplained") or {}
+    if not left.get("fraction"):
+        return []
+    place = "; ".join(str(left[key]) for key in ("where", "when") if left.get(key))
+    return [f"{100 * left['fraction']:.0f}{NARROW}% of the structured error is left{f': {place}' if place else ''}."]
 
 
 def _gain(report: dict[str, Any]) -> str:

@@ -13,7 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from app.console import Registration as Registered
-from app.console import out, print_problem, progress
+from app.console import out, print_problem, print_warnings, progress
 from core.errors import DatasetError, PalpateError, RegistrationError
 from core.progress import part
 
@@ -63,7 +63,7 @@ def register(dataset: Folder) -> None:
     out.print(f"touches miss their landmarks by {1e3 * found.touch_rms:.2f} mm RMS", highlight=False)
     if found.weak_directions:
         out.print(f"weakly determined: {', '.join(found.weak_directions)}", highlight=False)
-    _print_warnings(found.warnings)
+    print_warnings(found.warnings)
 
 
 def replay(
@@ -142,7 +142,7 @@ def _check_one(path: Path, picture: Path | None) -> None:
             warnings = (error.message,)
         summary = check_dataset(dataset, found.phantom_from_robot if found else None, part(report, 0.6, 1.0))
     _print_summary(dataset, summary, found)
-    _print_warnings((*summary.warnings, *warnings))
+    print_warnings((*summary.warnings, *warnings))
     if picture is not None and found is not None:
         from core.dataset.coverage import coverage_picture  # noqa: PLC0415 (heavy)
 
@@ -182,11 +182,6 @@ def _motion(motion: Any) -> str:
         return "–"
     kinds = ", ".join(dict.fromkeys(contact.kind for contact in motion.contacts)) or "no contact"
     return f"{kinds}, {max(0.0, -1e3 * motion.nearest):.1f} mm"
-
-
-def _print_warnings(warnings: tuple[str, ...]) -> None:
-    for warning in warnings:
-        out.print(f"[yellow]warning[/] {escape(warning)}", highlight=False)
 
 
 def _pose(transform: Any, covariance: Any) -> tuple[str, str, str]:

@@ -17,11 +17,12 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from app.console import Registration, out, progress, verdict_cells, verdict_table, write_json
+from app.console import Registration, out, print_warnings, progress, verdict_cells, verdict_table, write_json
 from app.quantities import between
 from app.sentences import (
     control_sentences,
     determined_sentences,
+    left_sentences,
     limit_phrase,
     palpation_sentences,
     probe_sentence,
@@ -65,6 +66,7 @@ def diagnose(
             write_json(file / f"{path.name}.json" if several else file, report)
         if several:
             out.print(f"{path.name}: {verdict_sentence(report)}", highlight=False)
+            print_warnings(report.get("warnings", []))
         else:
             print_report(report)
     out.print(table)
@@ -123,12 +125,14 @@ def print_report(report: dict[str, Any]) -> None:
         lines.append(Text(f"identified: {one['effect']}: {shown}; {one.get('why', '')}", style="dim"))
     for one in report.get("not_identifiable", []):
         lines.append(Text(f"not identifiable: {one['effect']}: {one.get('why', '')}", style="dim"))
+    lines += [Text(said) for said in left_sentences(report)]
     lines += [Text(said, style="dim") for said in registration_sentences(report)]
     lines += [Text(said) for said in palpation_sentences(report)]
     lines += [Text(said, style="dim") for said in determined_sentences(report.get("causes", []))]
     lines += [Text(f"control: {said}", style="dim") for said in control_sentences(report.get("controls") or [])]
     lines += [Text(f"next probe: {probe_sentence(row)}") for row in (report.get("next_probe") or [])[:1]]
     out.print(Panel(Group(*lines), expand=False))
+    print_warnings(report.get("warnings", []))
     if report.get("ranking"):
         out.print(_ranking(report["ranking"]))
     if report.get("ambiguity_map"):

@@ -249,6 +249,17 @@ def test_report_is_printed_with_what_the_data_can_tell(
     assert "nothing else" in shown and "(20 %)" not in shown
 
 
+def test_report_is_printed_with_what_is_left_and_with_its_warnings(
+    report: dict[str, Any], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(console.out, "width", 200)
+    left = {"fraction": 0.3, "where": "all over rest.ply", "when": "always"}
+    print_report({**report, "verdict": "unexplained", "unexplained": left, "warnings": ["rest.ply: depth waves [by 0.2 mm]"]})
+    shown = capsys.readouterr().out.replace("\N{NO-BREAK SPACE}", " ").replace("\N{NARROW NO-BREAK SPACE}", " ")
+    assert "30 % of the structured error is left: all over rest.ply; always." in shown
+    assert "warning rest.ply: depth waves [by 0.2 mm]" in shown
+
+
 def test_report_is_printed_with_its_controls_and_the_next_probe(
     report: dict[str, Any], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -11,6 +11,7 @@ from app.sentences import (
     cause_phrase,
     control_sentences,
     determined_sentences,
+    left_sentences,
     limit_phrase,
     palpation_sentences,
     probe_sentence,
@@ -41,6 +42,15 @@ def test_two_causes_are_named_in_one_sentence(report: dict[str, Any]) -> None:
 )
 def test_other_verdicts_say_so(report: dict[str, Any], verdict: str, words: str) -> None:
     assert words in verdict_sentence({**report, "verdict": verdict})
+
+
+def test_what_is_left_is_told_with_place_and_time(report: dict[str, Any]) -> None:
+    left = {"fraction": 0.55, "where": "12 % of it within 8 mm of (-34, -10, 34) mm", "when": "most in poke-side-02"}
+    (said,) = left_sentences({**report, "unexplained": left})
+    words = "55 % of the structured error is left: 12 % of it within 8 mm of (-34, -10, 34) mm; most in poke-side-02."
+    assert plain(said) == words
+    assert left_sentences({**report, "unexplained": {**left, "fraction": 0.0}}) == []
+    assert left_sentences({**report, "unexplained": None}) == []
 
 
 def test_every_effect_the_bench_can_hide_has_its_own_words() -> None:
