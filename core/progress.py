@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-__all__ = ["Report", "part", "silent"]
+__all__ = ["Report", "part", "rising", "silent"]
 
 Report = Callable[[float, str], None]
 
@@ -20,3 +20,15 @@ def part(report: Report, low: float, high: float) -> Report:
         report(low + (high - low) * fraction, text)
 
     return scaled
+
+
+def rising(report: Report) -> Report:
+    """A report that never falls back: a part that is gone through again stays where the whole has come."""
+    most = 0.0
+
+    def held(fraction: float, text: str) -> None:
+        nonlocal most
+        most = max(most, fraction)
+        report(most, text)
+
+    return held

@@ -32,7 +32,7 @@ from core.diagnosis.worth import tuned, worth
 from core.errors import DiagnosisError, RunError
 from core.grading import FINE_GRID, PAGE_GRID, REPLAY_GRID, SCREEN_GRID
 from core.meshing import Meshing
-from core.progress import Report, part, silent
+from core.progress import Report, part, rising, silent
 from core.registration import Registration, register, setup_from
 from core.setup import Setup, Shape
 from core.shape.pushed import FINE_PUSHES, REPLAY_PUSHES, SCREEN_PUSHES
@@ -69,6 +69,7 @@ def diagnose(
     out = Path(out)
     if out.exists():
         raise RunError(f"{out} exists already; name another folder or move it away", file=str(out))
+    report = rising(report)
     fitted, tested = _splits(dataset)
     report(0.0, "reading every cloud")
     dataset.validate(part(report, 0.0, 0.02))
