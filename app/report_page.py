@@ -42,7 +42,8 @@ def report_page(run: Run) -> str:
         _if("Every sequence", _KEY, (sequence_table(rows) + error_plots(ordered, splits)) if rows else ""),
         _if(
             "The error and its explanation",
-            "As measured, and as the cause predicts it; squares are patches of the surface.",
+            f"As measured, and {'as the cause predicts it' if causes else 'nothing beside it, for no cause was named'}; "
+            "squares are patches of the surface.",
             _image(run, "patterns"),
         ),
         _if("Palpation", "; ".join(palpation_sentences(report)), _image(run, "palpation") if report.get("palpation") else ""),
@@ -76,7 +77,11 @@ def _head(run: Run, size: list[float] | None) -> str:
     return (
         f"<p class='eyebrow'><span class='tag {verdict}'>{verdict}</span>{escape(str(report.get('dataset', run.name)))}</p>"
         f"<h1>{escape(verdict_sentence(report, size))}</h1>"
-        + "".join(f"<p class='note'>{escape(text)}</p>" for text in (*left_sentences(report), *registration_sentences(report)))
+        + "".join(
+            f"<p class='note'>{escape(text)}</p>"
+            for text in (" ".join(left_sentences(report)), *registration_sentences(report))
+            if text
+        )
         + (f"<ul class='warning'>{warnings}</ul>" if warnings else "")
     )
 

@@ -117,12 +117,12 @@ def determined_sentences(causes: Sequence[dict[str, Any]]) -> list[str]:
 
 
 def left_sentences(report: dict[str, Any]) -> list[str]:
-    """How much of the structured error no cause explains, where it sits and when."""
+    """Where the structured error sits that no cause explains, and when; beside a cause also how much of it is left."""
     left = report.get("unexplained") or {}
     if not left.get("fraction"):
         return []
-    place = "; ".join(str(left[key]) for key in ("where", "when") if left.get(key))
-    return [f"{100 * left['fraction']:.0f}{NARROW}% of the structured error is left{f': {place}' if place else ''}."]
+    share = [f"{100 * left['fraction']:.0f}{NARROW}% of the structured error is left."] if report.get("causes") else []
+    return [*share, *(f"{key.capitalize()}: {left[key]}." for key in ("where", "when") if left.get(key))]
 
 
 def _gain(report: dict[str, Any]) -> str:

@@ -125,7 +125,7 @@ def print_report(report: dict[str, Any]) -> None:
         lines.append(Text(f"identified: {one['effect']}: {shown}; {one.get('why', '')}", style="dim"))
     for one in report.get("not_identifiable", []):
         lines.append(Text(f"not identifiable: {one['effect']}: {one.get('why', '')}", style="dim"))
-    lines += [Text(said) for said in left_sentences(report)]
+    lines += [Text(" ".join(said)) for said in [left_sentences(report)] if said]
     lines += [Text(said, style="dim") for said in registration_sentences(report)]
     lines += [Text(said) for said in palpation_sentences(report)]
     lines += [Text(said, style="dim") for said in determined_sentences(report.get("causes", []))]

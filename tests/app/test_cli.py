@@ -256,7 +256,7 @@ def test_report_is_printed_with_what_is_left_and_with_its_warnings(
     left = {"fraction": 0.3, "where": "all over rest.ply", "when": "always"}
     print_report({**report, "verdict": "unexplained", "unexplained": left, "warnings": ["rest.ply: depth waves [by 0.2 mm]"]})
     shown = capsys.readouterr().out.replace("\N{NO-BREAK SPACE}", " ").replace("\N{NARROW NO-BREAK SPACE}", " ")
-    assert "30 % of the structured error is left: all over rest.ply; always." in shown
+    assert "30 % of the structured error is left. Where: all over rest.ply. When: always." in shown
     assert "warning rest.ply: depth waves [by 0.2 mm]" in shown
 
 

@@ -46,9 +46,10 @@ def test_other_verdicts_say_so(report: dict[str, Any], verdict: str, words: str)
 
 def test_what_is_left_is_told_with_place_and_time(report: dict[str, Any]) -> None:
     left = {"fraction": 0.55, "where": "12 % of it within 8 mm of (-34, -10, 34) mm", "when": "most in poke-side-02"}
-    (said,) = left_sentences({**report, "unexplained": left})
-    words = "55 % of the structured error is left: 12 % of it within 8 mm of (-34, -10, 34) mm; most in poke-side-02."
-    assert plain(said) == words
+    place = ["Where: 12 % of it within 8 mm of (-34, -10, 34) mm.", "When: most in poke-side-02."]
+    assert left_sentences({**report, "causes": [], "unexplained": left}) == place
+    share, *same = left_sentences({**report, "unexplained": left})
+    assert (plain(share), same) == ("55 % of the structured error is left.", place)
     assert left_sentences({**report, "unexplained": {**left, "fraction": 0.0}}) == []
     assert left_sentences({**report, "unexplained": None}) == []
 
