@@ -1,11 +1,12 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from pushed_block import SETUP
 
 from core.diagnosis.findings import LEAST_GAIN, Findings, Trial
 from core.diagnosis.hypothesis import Model
-from core.diagnosis.search import _needed
+from core.diagnosis.search import PROMISING, _asks_for_more, _needed
 from core.diagnosis.structure import Structure
 from core.effects.support import BaseCompliance
 
@@ -37,3 +38,14 @@ def test_nothing_is_named_beside_an_only_cause(only: float, best: float):
 
 def test_where_structure_is_left_a_fainter_second_cause_is_let_in():
     assert _second(2508.0, LOUD) == 2 * LEAST_GAIN < _second(2508.0)
+
+
+def test_what_tangents_know_little_of_is_refitted_beside_a_cause_only_where_another_might_be_named():
+    needed = _second(994.0)
+    quiet, promising = np.array([3.0, 0.9 * PROMISING * needed]), np.array([3.0, 1.1 * PROMISING * needed])
+    assert _asks_for_more(Findings(STATED), Trial(STATED, 0.0, 1.2), quiet)
+    soft = Trial(SOFT, 994.0, 1.06)
+    assert not _asks_for_more(Findings(STATED, left=QUIET), soft, quiet)
+    assert _asks_for_more(Findings(STATED, left=QUIET), soft, promising)
+    assert _asks_for_more(Findings(STATED, left=LOUD), soft, quiet)
+    assert not _asks_for_more(Findings(STATED, left=QUIET), soft, np.empty(0))
