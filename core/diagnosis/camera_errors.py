@@ -26,7 +26,11 @@ RIPPLE_SIZES = np.array([0.05, 0.1, 0.2, 0.4, 0.8]) * 1e-3
 RIPPLE_REACHES = np.array([1.5, 2.5, 4.0, 6.0]) * 1e-3
 """Standard deviation of what waves with the distance, and the distance over which it is alike [m], that are tried."""
 LEAST_RIPPLE = 12.0
-"""Gain in restricted log likelihood [nats] for which waves are told."""
+"""Gain in restricted log likelihood [nats] for which waves are told.
+
+Of the virtual bench's rest clouds 12 with rippled depth gain 32 to 111, 12 with nothing wrong at most 2.2, 28 with another cause at
+most 2.8; of another solver's five the best gains 0.7.
+"""
 _FLOOR = 2e-5
 _SMOOTH = 2
 """Waves are tried beside a bias of at least this place in BIAS_REACHES: a rough one imitates them."""

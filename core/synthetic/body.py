@@ -9,7 +9,7 @@ import numpy as np
 from core.frames import FloatArray
 from core.synthetic.block import Block
 from core.synthetic.fibres import fibre_modulus
-from core.synthetic.obstacle import SHAFT_RADIUS, Neighbour, Shaft
+from core.synthetic.obstacle import Neighbour, Shaft, shaft_radius
 from core.synthetic.remembering import relaxed_share
 from core.synthetic.scenario import Scenario
 from core.synthetic.solid import Solid
@@ -88,7 +88,7 @@ def _shaft(scenario: Scenario, axis: FloatArray | None) -> Shaft | None:
     """Up to well above the block; where nothing is said of it, it touches nothing."""
     if axis is None or scenario.disturbance("shaft_contact") is None:
         return None
-    return Shaft(-axis, min(SHAFT_RADIUS, 0.8 * true_radius(scenario)), 2 * scenario.true_size[2])
+    return Shaft(-axis, shaft_radius(true_radius(scenario)), 2 * scenario.true_size[2])
 
 
 def _neighbour(scenario: Scenario) -> Neighbour | None:

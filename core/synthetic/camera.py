@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from core.frames import FloatArray, Transform
 from core.synthetic.disturbance import Disturbance, rippled
-from core.synthetic.obstacle import SHAFT_RADIUS
+from core.synthetic.obstacle import shaft_radius
 
 __all__ = ["DepthCamera", "Scene", "place_camera", "tool_solid"]
 
@@ -169,7 +169,7 @@ def tool_solid(centre: FloatArray, axis: FloatArray, radius: float) -> list[tupl
     import open3d as o3d
 
     ball = o3d.geometry.TriangleMesh.create_sphere(radius, resolution=16)
-    shaft = o3d.geometry.TriangleMesh.create_cylinder(min(SHAFT_RADIUS, 0.8 * radius), SHAFT_LENGTH, resolution=16, split=1)
+    shaft = o3d.geometry.TriangleMesh.create_cylinder(shaft_radius(radius), SHAFT_LENGTH, resolution=16, split=1)
     turn = Rotation.align_vectors(-axis[None], [[0.0, 0.0, 1.0]])[0].as_matrix()
     rod = (np.asarray(shaft.vertices) + np.array([0.0, 0.0, SHAFT_LENGTH / 2])) @ turn.T + centre
     return [(np.asarray(ball.vertices) + centre, np.asarray(ball.triangles)), (rod, np.asarray(shaft.triangles))]

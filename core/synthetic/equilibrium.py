@@ -211,6 +211,7 @@ class Equilibrium:
                 of_tool = (push, coupling, total) if one.of_tool else (np.zeros(3), np.zeros_like(coupling), np.zeros((3, 3)))
                 part, depth = self._press(u, one, True, (self._stiffness, force, *of_tool))
                 energy += part
+                # What a soft body gives way by is no penetration.
                 deepest = max(deepest, depth) if one.penalty == self._penalty else deepest
             energy += self._rubbed(u, centre, True, (self._stiffness, force, push, coupling, total))
         return energy - float(np.sum(self._load * u)), force, push, coupling, total, deepest

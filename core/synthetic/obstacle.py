@@ -12,13 +12,16 @@ from core.frames import FloatArray
 from core.synthetic.block import Block, Sampling
 from core.synthetic.law import spread
 
-__all__ = ["SHAFT_RADIUS", "SOFT_GAP", "Neighbour", "Obstacle", "Shaft", "assemble_obstacle"]
+__all__ = ["SOFT_GAP", "Neighbour", "Obstacle", "Shaft", "assemble_obstacle", "shaft_radius"]
 
-SHAFT_RADIUS = 3e-3
-"""Of the rod [m], or four fifths of the ball's where that is less."""
 SOFT_GAP = 0.03e-3
 CAUTIOUS_GAP = 0.02
 _FAST = {"contract", "reassoc", "arcp", "nsz"}
+
+
+def shaft_radius(ball: float) -> float:
+    """Of the rod on which a ball of this radius sits [m]."""
+    return min(3e-3, 0.8 * ball)
 
 
 @dataclass(frozen=True)
