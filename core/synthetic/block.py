@@ -83,6 +83,7 @@ class Block:
         sole: points of the base, where the table acts.
         surface: (s, n) operator from nodal values to the points of the drawn surface.
         surface_rest: (s, 3) [m].
+        surface_normals: (s, 3) outward at rest; points of several faces that coincide have one each.
         surface_faces: (t, 3) triangles of the drawn surface, without the base.
     """
 
@@ -95,6 +96,7 @@ class Block:
     sole: Sampling
     surface: Any
     surface_rest: FloatArray
+    surface_normals: FloatArray
     surface_faces: IntArray
 
 
@@ -128,6 +130,7 @@ def block_of(mesh: Any, mapping: Any = None) -> Block:
         sole=_sampling(FacetBasis(mesh, element, mapping=mapping, facets=base, intorder=4)),
         surface=surface,
         surface_rest=np.asarray(surface @ nodes),
+        surface_normals=np.ascontiguousarray(np.transpose(np.asarray(drawn.normals), (1, 2, 0))).reshape(-1, 3),
         surface_faces=(triangles[None] + offsets).reshape(-1, 3),
     )
 

@@ -67,7 +67,7 @@ class Specimen:
         rough = scenario.hidden("tool_friction")
         self.drag = Dragging(block, rough.value("friction_coefficient"), self.radius, self.solver.hardest) if rough else None
         self.settled = np.asarray(block.surface @ self.solver.rest.displacement)
-        self._reach = Reach(block.surface_rest + self.settled, self.radius, self.solver.solid.shaft)
+        self._reach = Reach(block.surface_rest + self.settled, block.surface_normals, self.radius, self.solver.solid.shaft)
         self._last = self._before = self.solver.rest
         self._mesh: Delaunay | None = None
         self._stated: FloatArray | None = None
