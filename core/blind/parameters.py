@@ -68,7 +68,7 @@ class Said:
         low, value, high, true = (self._coordinate(one) for one in (self.low, self.value, self.high, self.nearest))
         # A rounded end must not decide.
         slack = 1e-9 * max(abs(high - low), abs(value))
-        return value + narrower * (low - value) - slack <= true <= value + narrower * (high - value) + slack
+        return bool(value + narrower * (low - value) - slack <= true <= value + narrower * (high - value) + slack)
 
     def _coordinate(self, value: float) -> float:
         if self.searched is None:
