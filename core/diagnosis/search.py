@@ -156,13 +156,15 @@ def _paired(bench: Bench, findings: Findings, current: Trial, screening: Screeni
     """Take two causes at once that leave no structure where one after another did: each alone may look like a third.
 
     A stated setup of which two things are wrong can be nearer to a third cause than to either of them (Tropp 2004, on greedy
-    pursuit), so that every step forward is a wrong one.
+    pursuit), so that every step forward is a wrong one. Such a pair promises more than the best single cause, by as much as a step
+    forward asks for; the others are the cause found beside anything, which the steps forward have weighed.
     """
     screened, candidates, _ = screening
-    nuisance = (*screened.nuisance, *screened.columns)
-    blocks = bench.tempered(screened)
-    ranked = pair_gains(blocks, right_sides(blocks), nuisance, bench.precision(screened), candidates)
-    for _, one, other in _apart([row for row in ranked if not _weighed_already(row[1:], current)], PAIRS):
+    blocks, nuisance = bench.tempered(screened), (*screened.nuisance, *screened.columns)
+    known = (blocks, right_sides(blocks), nuisance, bench.precision(screened), candidates)
+    least = float(linear_gains(*known).max()) + PROMISING * SECOND_FACTOR * findings.bound
+    ranked = [row for row in pair_gains(*known) if row[0] > least and not _weighed_already(row[1:], current)]
+    for _, one, other in _apart(ranked, PAIRS):
         bench.tell(f"trying {one.start.name} and {other.start.name} at once")
         effects = [begin(one, screened, bench, other), begin(other, screened, bench, one)]
         hopeless = bench.objective(current.model) - HOPELESS

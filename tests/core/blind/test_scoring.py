@@ -100,7 +100,8 @@ def test_coverage_counts_intervals_and_not_cases() -> None:
 def test_numbers_that_were_never_written_cover_as_those_of_a_file_do() -> None:
     one = inclusion(0.0, 0.0, 0.02, (0.0, 0.0, 0.02), "a")
     (cause,) = one.causes
-    fresh = {name: {key: np.float64(v) if isinstance(v, float) else v for key, v in p.items()} for name, p in cause["parameters"].items()}
+    numbers = cause["parameters"].items()
+    fresh = {name: {key: np.float64(v) if isinstance(v, float) else v for key, v in entry.items()} for name, entry in numbers}
     said = replace(one, report=one.report | {"causes": [cause | {"parameters": fresh}]})
     assert (coverage(said_of([said])).hits, coverage(said_of([one])).hits) == (3, 3)
 
