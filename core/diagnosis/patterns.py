@@ -42,18 +42,19 @@ def patterns(bench: Bench, data: Sequence[Observations], baseline: Model, found:
     """The error of the one push in which the cause matters most, and what the cause predicts of it, smoothed alike.
 
     A cause that shows in the push is compared without what the untouched frames show, the camera's pattern; one that shows in the
-    untouched block already (sag, a camera that was moved) with it.
+    untouched block already (sag, a camera that was moved) with it. Where no cause is named it is the push with the largest error.
     """
     pairs = [row for row in zip(data, baseline.predictions, found.predictions, strict=True) if not row[0].unseen]
     lasting = found.setup.marked_by_pushes
     compared = [_compare(item, before, after, whole=False, lasting=lasting) for item, before, after in pairs]
     if sum(still for _, still, _ in compared) > sum((rows.change**2 * rows.points).sum() for _, _, rows in compared):
         compared = [_compare(item, before, after, whole=True, lasting=lasting) for item, before, after in pairs]
+    unnamed = not any(rows.change.any() for _, _, rows in compared)
     best: tuple[float, _Rows] | None = None
     for touched, _, rows in compared:
         for probe in np.unique(touched[touched > 0]):
             points = rows.points * (touched == probe)[:, None]
-            size = float((rows.change**2 * points).sum())
+            size = float(((rows.error if unnamed else rows.change) ** 2 * points).sum())
             if best is None or size > best[0]:
                 best = (size, _Rows(points, rows.error, rows.change))
     if best is None:
@@ -102,17 +103,19 @@ def _kernel(surface: Surface) -> FloatArray:
 
 
 def draw_patterns(found: Patterns, surface: Surface, path: Path) -> None:
-    """Both patterns on the unfolded block, one colour scale in mm, as PNG."""
+    """Both patterns, or the error alone where no cause is named, on the unfolded block, one colour scale in mm, as PNG."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10, 4.6), layout="constrained")
+    shown = [("measured error", found.measured), ("predicted by the cause", found.predicted)]
+    shown = shown if np.nan_to_num(found.predicted).any() else shown[:1]
+    figure = Figure(figsize=(1.4 + 4.3 * len(shown), 4.6), layout="constrained")
     FigureCanvasAgg(figure)
     sizes = np.abs(np.concatenate([found.measured, found.predicted]))
     seen = sizes[np.isfinite(sizes)]
     limit = max(1e3 * float(np.quantile(seen, 0.98)), 0.05) if len(seen) else 1.0
-    for number, (title, values) in enumerate((("measured error", found.measured), ("predicted by the cause", found.predicted))):
-        axes = figure.add_subplot(1, 2, number + 1)
+    for number, (title, values) in enumerate(shown):
+        axes = figure.add_subplot(1, len(shown), number + 1)
         drawn = _unfold(axes, found, values * 1e3, surface, limit)
         axes.set_title(title)
         axes.set_aspect("equal")

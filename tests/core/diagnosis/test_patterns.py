@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 from pushed_block import SETUP, dwelling, poke, prediction, registration
 
 from core.diagnosis.bench import Bench
@@ -73,3 +74,17 @@ def test_patterns_are_drawn_as_png(bench, tmp_path: Path):
     draw_patterns(found, bench.surface, tmp_path / "patterns.png")
     assert (tmp_path / "patterns.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "patterns.png").stat().st_size > 10_000
+
+
+def test_without_a_cause_the_largest_error_is_shown_and_alone(bench, tmp_path):
+    size = np.array([0.0, 0.0, 1.0, 2.0])[:, None]
+    gap, count = size * np.full((1, bench.surface.patches), 3e-4), np.full((4, bench.surface.patches), 10.0)
+    model = _pictured(bench, gap, count)
+    unnamed = patterns(bench, _watched([None, None, 0, 1]), model, model)
+    assert np.allclose(unnamed.measured, 6e-4) and not unnamed.predicted.any()
+    named = patterns(bench, _watched([None, None, 0, 1]), model, _pictured(bench, 0.2 * gap, count))
+    widths = []
+    for number, one in enumerate((unnamed, named)):
+        draw_patterns(one, bench.surface, tmp_path / f"{number}.png")
+        widths.append(imread(tmp_path / f"{number}.png").shape[1])
+    assert widths[0] < 0.65 * widths[1]
