@@ -11,7 +11,7 @@ import numpy as np
 from core.diagnosis.columns import TOOL_COLUMNS, Wanted
 from core.diagnosis.evidence import Block, fit, log_evidence, predictive_score
 from core.diagnosis.fitting import SETTLED, fitted
-from core.diagnosis.hypothesis import Model, Nuisances, nuisance_setups, with_effects
+from core.diagnosis.hypothesis import HELD, Model, Nuisances, nuisance_setups, with_effects
 from core.diagnosis.led import led
 from core.diagnosis.noise import Noise, noises
 from core.diagnosis.ordered import TRACED
@@ -206,6 +206,22 @@ class Bench:
         precision[own, own] = (PRIOR_STEPS * model.scales) ** -2 if len(own) else 0
         return precision
 
+    def held(self, model: Model, nuisances: FloatArray | None = None) -> FloatArray:
+        """The same with no room for what lies at a bound and is pulled beyond it.
+
+        A weight of nothing is no weight; with room for less than nothing it explained a block of another height.
+        """
+        precision, first, columns = self.precision(model, nuisances), len(model.nuisance), [*model.nuisance, *model.columns]
+        ways = model.ends
+        while (ways != 0).any():
+            change = fit(self.tempered(model), columns, precision).change[first:]
+            pressed = first + np.flatnonzero(ways * change > 0)
+            if not len(pressed):
+                break
+            precision[pressed, pressed] = HELD * model.scales[pressed - first] ** -2
+            ways[pressed - first] = 0
+        return precision
+
     def tempered(self, model: Model) -> list[Block]:
         """Blocks divided by the misfit per value that the present best model leaves."""
         return [
@@ -216,12 +232,12 @@ class Bench:
     def misfit(self, model: Model) -> float:
         """Misfit per value with nuisances at their best; one when only noise is left."""
         blocks = [block for block in model.blocks if block.name != "rest"]
-        best = fit(blocks, [*model.nuisance, *model.columns], self.precision(model))
+        best = fit(blocks, [*model.nuisance, *model.columns], self.held(model))
         return best.misfit / sum(block.values for block in blocks)
 
     def score(self, model: Model) -> FloatArray:
         """Log predictive density of each block given the others [nats]."""
-        return predictive_score(self.tempered(model), [*model.nuisance, *model.columns], self.precision(model), len(model.nuisance))
+        return predictive_score(self.tempered(model), [*model.nuisance, *model.columns], self.held(model), len(model.nuisance))
 
     def objective(self, model: Model, nuisances: FloatArray | None = None) -> float:
         """Log evidence at these values of the search coordinates [nats]; `nuisances` as for `precision`."""

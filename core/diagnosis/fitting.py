@@ -94,13 +94,13 @@ def _aside(model: Model) -> Iterator[FloatArray]:
 def _step(bench: Bench, model: Model, nuisances: FloatArray, reach: float) -> FloatArray:
     """Most probable change of the search coordinates, none by more than `reach` of its scales."""
     columns, first = [*model.nuisance, *model.columns], len(model.nuisance)
-    own, precision = range(first, len(columns)), bench.precision(model, nuisances)
+    own, precision = range(first, len(columns)), bench.held(model, nuisances)
     return within_reach(bench.tempered(model), columns, precision, own, model.scales, reach)[first:]
 
 
 def _promised(bench: Bench, model: Model, nuisances: FloatArray) -> float:
     """What the best values of the model's search coordinates would gain to first order [nats]."""
-    blocks, whole = bench.tempered(model), bench.precision(model, nuisances)
+    blocks, whole = bench.tempered(model), bench.held(model, nuisances)
     return explained(blocks, [*model.nuisance, *model.columns], whole) - explained(blocks, model.nuisance, nuisances)
 
 

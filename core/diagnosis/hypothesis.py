@@ -19,7 +19,7 @@ from core.frames import FloatArray
 from core.registration import Registration
 from core.setup import Setup
 
-__all__ = ["TWINS", "Model", "Nuisances", "nuisance_setups", "with_effects"]
+__all__ = ["HELD", "TWINS", "Model", "Nuisances", "nuisance_setups", "with_effects"]
 
 TIP = 1e-4
 RADIUS = 5e-5
@@ -42,6 +42,10 @@ TWINS: Mapping[type[Effect], tuple[int, ...]] = {
 
 The last of them is there only where forces were measured: no surface shows it."""
 _PINNED = 1e6
+HELD = 1e10
+"""Precision of a coordinate that a bound holds, in its scales [1]."""
+_AT_END = 0.05
+"""A coordinate lies at a bound where it is no more of its scales away: shorter steps no fit makes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +118,15 @@ class Model:
     def coordinates(self) -> FloatArray:
         """Search coordinates of all effects."""
         return np.array([value for effect in self.effects for value in effect.coordinates])
+
+    @property
+    def ends(self) -> FloatArray:
+        """-1 of each search coordinate that lies at its lower bound, 1 at the upper, else 0."""
+        items, here = [item for effect in self.effects for item in effect.numbers()], self.coordinates
+        low = np.array([item.coordinate(item.low) for item in items])
+        high = np.array([item.coordinate(item.high) for item in items])
+        room = _AT_END * self.scales
+        return np.where(here - low < room, -1, np.where(high - here < room, 1, 0))
 
     @property
     def names(self) -> tuple[str, ...]:

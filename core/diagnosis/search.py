@@ -52,7 +52,7 @@ def _screen(bench: Bench, model: Model, finite: Sequence[Signature], origin: Mod
     candidates = candidates_of(with_columns, bench, finite)
     blocks = bench.tempered(with_columns)
     nuisance = (*with_columns.nuisance, *with_columns.columns)
-    gains = linear_gains(blocks, right_sides(blocks), nuisance, bench.precision(with_columns), candidates)[0]
+    gains = linear_gains(blocks, right_sides(blocks), nuisance, bench.held(with_columns), candidates)[0]
     return with_columns, candidates, gains
 
 

@@ -33,7 +33,7 @@ def beyond_first_order(bench: Bench, model: Model, candidates: Sequence[Candidat
     A tangent knows little of what a tool that is elsewhere, or another one, does over millimetres: of a shift of 2.4 mm it finds
     0.4, and for a ball of 3.4 mm that is said to have 5 it promises under 14 nats, a tool that gives way 282.
     """
-    change = fit(bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model)).change
+    change = fit(bench.tempered(model), [*model.nuisance, *model.columns], bench.held(model)).change
     covariance = np.linalg.inv(bench.nuisances.precision)
     least, strained = 2 * float(norm.sf(STRAINED)), []
     for candidate in candidates:

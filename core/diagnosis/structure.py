@@ -117,7 +117,7 @@ def structure_of(bench: Bench, model: Model, seed: int) -> Structure:
     size = blocks[0].gram.shape[0] - 1
     first = model.predictions[0].columns.shape[2]
     fitted = [*model.nuisance[:-1], size - 1, *model.columns]  # the mesh's error is the last column
-    precision = bench.precision(model)
+    precision = bench.held(model)
     modes = range(first, size - 1)
     data = np.array([[block.gram[1:, 0] for block in blocks]])
     rights = draw_rights(blocks, fitted, precision, DRAWS, np.random.default_rng(seed))

@@ -37,7 +37,7 @@ def tuned(bench: Bench, model: Model) -> Setup:
 
     Not the camera's pose: the fixed pattern of each sequence holds what it is off. Not the modulus: no surface shows it.
     """
-    change = fit(bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model)).change
+    change = fit(bench.tempered(model), [*model.nuisance, *model.columns], bench.held(model)).change
     moved, radius, nu = change[:TOOL_COLUMNS], float(change[TOOL_COLUMNS]), float(change[TOOL_COLUMNS + 1])
     setup = model.setup
     pose = small_motion(np.asarray(moved), bench.registration.robot_pivot) @ setup.phantom_from_robot

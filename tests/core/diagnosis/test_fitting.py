@@ -47,7 +47,7 @@ class Slope:
     def tempered(self, model: Model) -> list[Block]:
         return list(model.blocks)
 
-    def precision(self, model: Model, nuisances: FloatArray) -> FloatArray:
+    def held(self, model: Model, nuisances: FloatArray) -> FloatArray:
         return PRIOR
 
 
