@@ -90,7 +90,7 @@ class Cleaner:
         reason = np.zeros(len(points), dtype=np.int8)
         apart = box_distance(points, np.asarray(self.size))
         height = self._height(points, apart)
-        thickness = max(SIGMAS * self.noise * self._table_slant(), 1.0e-3)
+        thickness = self._thickness
         reason[apart > self.bulge] = REASONS.index("background")
         on_table = np.abs(height) < thickness
         reason[height < thickness] = REASONS.index("background")
@@ -110,6 +110,20 @@ class Cleaner:
             points[on_table & (apart > thickness) & (apart < TABLE_REACH)],
             {name: int(count) for name, count in zip(REASONS, counts, strict=True)},
         )
+
+    @property
+    def lowest(self) -> float:
+        """Height [m] over the table up to which noise decides whether a point passes for the table's.
+
+        What is kept of a side below it are the points that noise has lifted: they stand out by a part of it, and the more,
+        the lower they are.
+        """
+        return 2 * self._thickness
+
+    @property
+    def _thickness(self) -> float:
+        """How far from the table's plane a point is the table's [m]."""
+        return max(SIGMAS * self.noise * self._table_slant(), 1.0e-3)
 
     def _height(self, points: FloatArray, apart: FloatArray) -> FloatArray:
         """Height (n,) [m] over the table as this frame shows it: a camera that was bumped sees it tilted and shifted."""

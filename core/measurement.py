@@ -200,15 +200,17 @@ def gaps(
     *,
     everything: bool = False,
     grazing: float = GRAZING,
+    lowest: float = 0.0,
 ) -> Gaps:
     """Compare measured points with the surface of one frame, along the camera's rays.
 
     Args:
         points: (n, 3) [m], phantom frame, cleaned. camera: (3,) optical centre [m], phantom frame.
         frame: the simulated block. surface: its material points. everything: keep all points whose ray meets the block.
-        grazing: cosine between ray and normal below which a ray grazes it [1].
+        grazing: cosine between ray and normal below which a ray grazes it [1]. lowest: height of the lowest material point that
+            counts [m] (`core.cleaning.Cleaner.lowest`).
 
-    Otherwise points whose ray grazes it, passes near an edge, or ends more than 8 mm away are left out, too.
+    Otherwise points whose ray grazes it, passes near an edge, meets it too low, or ends more than 8 mm away are left out, too.
     """
     import open3d as o3d
 
@@ -236,6 +238,7 @@ def gaps(
     side = surface.side[triangle]
     facing = -np.einsum("mi,mi->m", rays, normal)
     good = (facing > grazing) & (surface.edge_distance(foot, side) > _EDGE) & (np.abs(gap) < _OUTLIER)
+    good &= foot[:, 2] >= surface.bounds[0][2] + lowest
     good |= everything
     foot, side = foot[good], side[good]
     return Gaps(hit[good], gap[good], foot, normal[good], facing[good], surface.patch_of(foot, side), side)

@@ -117,7 +117,7 @@ def observe(frame: Equilibrium, compared: Compared) -> sp.csr_matrix:
 def choose(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) -> Sample:
     """The points to average, by the model at hand: those on clear parts of the surface, without stray ones."""
     sight = sight_of(setup, reference=group.reference)
-    seen = gaps(sight.place(group.points), sight.pose.translation, frame, surface)
+    seen = gaps(sight.place(group.points), sight.pose.translation, frame, surface, lowest=group.lowest)
     kept = within_spread(seen.gap, seen.patch, surface.patches)
     kept[kept] = among_neighbours(seen.gap[kept], seen.patch[kept], surface)
     index, patch = seen.index[kept].astype(np.int32), seen.patch[kept].astype(np.int32)

@@ -54,6 +54,7 @@ class Group:
         frames: their numbers. points: (n, 3) cleaned points of all of them [m], camera frame.
         free: whether the tool is surely clear of the block. reference: whether this is the rest cloud instead, taken when the
             camera was registered and without a tool. probe: which push of the sequence this belongs to.
+        lowest: height of the lowest points of a side that are free of the table's [m].
     """
 
     frames: tuple[int, ...]
@@ -61,6 +62,7 @@ class Group:
     free: bool
     reference: bool = False
     probe: int = 0
+    lowest: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +168,7 @@ def observe(
     centres = setup.phantom_from_robot.apply(smooth_centres(kinematics, times))
     free = clear_of(setup.box.size, centres) > setup.tool.radius + CLEARANCE
     poses = tool_poses(kinematics, times, setup.phantom_from_robot, shaft)
-    groups = [Group((), rest[cleaner.clean(rest).indices], True, True)] if rest is not None else []
+    groups = [Group((), rest[cleaner.clean(rest).indices], True, True, lowest=cleaner.lowest)] if rest is not None else []
     probes = np.cumsum(np.diff(free.astype(int), prepend=1) < 0)
     runs = _thin(_split(centres, free, times), free, most)
     for number, run in enumerate(runs):
@@ -176,7 +178,7 @@ def observe(
         room = MOST_UNTOUCHED if free[run[0]] else MOST_POINTS
         if len(points) > room:
             points = points[np.random.default_rng(number).choice(len(points), room, replace=False)]
-        groups.append(Group(tuple(picked), points, bool(free[run[0]]), probe=int(probes[run[0]])))
+        groups.append(Group(tuple(picked), points, bool(free[run[0]]), probe=int(probes[run[0]]), lowest=cleaner.lowest))
     return Observations(sequence.name, times, kinematics, tuple(groups), _forces(sequence, setup))
 
 

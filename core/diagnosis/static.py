@@ -55,7 +55,8 @@ class StaticChannel:
         clean = cleaner.clean(cloud)
         table, height, scatter = _table_cells(clean.table_points)
         surface, sight = Surface.of(setup), sight_of(setup, reference=True)
-        seen = gaps(sight.place(cloud[clean.indices]), sight.pose.translation, rest(setup, grid), surface)
+        points = sight.place(cloud[clean.indices])
+        seen = gaps(points, sight.pose.translation, rest(setup, grid), surface, lowest=cleaner.lowest)
         means = patch_means(seen.gap, seen.patch, surface.patches, least=_LEAST_POINTS)
         used = np.flatnonzero(np.isfinite(means.mean) & (means.count >= _LEAST_POINTS))
         centres, normals = surface.patch_centres[used], surface.patch_normals[used]
