@@ -51,6 +51,24 @@ def test_tool_points_go_and_the_dent_around_them_stays(scene, shaft, depth):
     assert kept(found, view.label, BLOCK) > 0.94
 
 
+def test_above_the_lowest_height_noise_does_not_decide_what_is_kept_of_a_side(scene):
+    """Below it only points are left that noise has brought out of the side."""
+    random, noise = np.random.default_rng(8), 5e-4
+    pose = scene().look(seed=1).pose
+    camera = pose.translation
+    side = np.array([0, 1])[int(abs(camera[1]) > abs(camera[0]))]
+    foot = random.uniform([-0.015] * 3, [0.015] * 3, (40_000, 3))
+    foot[:, side], foot[:, 2] = np.sign(camera[side]) * SIZE[side] / 2, random.uniform(0.0, 0.012, 40_000)
+    away = (foot - camera) / np.linalg.norm(foot - camera, axis=1)[:, None]
+    off = noise * random.standard_normal(len(foot))
+    cleaner = Cleaner(size=SIZE, phantom_from_camera=pose, tool_radius=0.005, noise=noise)
+    found = cleaner.clean(pose.inverse().apply(foot + off[:, None] * away)).indices
+    above = foot[found, 2] > cleaner.lowest
+    assert abs(off[found][above].mean()) < 4 * noise / np.sqrt(above.sum())
+    assert off[found][~above].mean() < -0.1 * noise
+    assert above[foot[found, 2] > 2.5e-3].all()
+
+
 def test_points_are_handed_over_in_the_phantom_frame_with_their_rows(scene):
     view = scene().look(seed=3)
     found = cleaned(view)

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from pushed_block import GRID, POSE, SETUP, SIZE
 
@@ -60,6 +62,15 @@ def test_gap_does_not_jump_where_a_rim_passes_the_ray():
         found = compare(group, lifted, BLOCK, SURFACE, sample).means
         # The gap counts along the ray, times the cosine that the stated surface has: the height by which the points lie off it.
         assert np.allclose(found.mean[found.count > 0], lift, atol=1e-5)
+
+
+def test_points_of_a_side_that_lie_too_low_are_not_chosen():
+    heights = np.linspace(2e-3, 12e-3, 200)
+    points = np.column_stack([np.linspace(-0.02, 0.02, 200), np.full(200, -SIZE[1] / 2), heights])
+    group = Group((0,), POSE.inverse().apply(points), False)
+    assert len(choose(group, SETUP, BLOCK, SURFACE).index) == 200
+    low = choose(replace(group, lowest=5e-3), SETUP, BLOCK, SURFACE)
+    assert np.array_equal(low.index, np.flatnonzero(heights >= 5e-3))
 
 
 def _top(noise: float) -> Group:
