@@ -96,10 +96,22 @@ def null_gains(
 
 
 def pair_gains(
-    blocks: Sequence[Block], rights: FloatArray, nuisance: Sequence[int], known: FloatArray, candidates: Sequence[Candidate]
+    blocks: Sequence[Block],
+    rights: FloatArray,
+    nuisance: Sequence[int],
+    known: FloatArray,
+    candidates: Sequence[Candidate],
+    more: float = -np.inf,
 ) -> list[tuple[float, Candidate, Candidate]]:
-    """Gain [nats] of every two candidates of different effects together on one set of right sides (1, b, k), best first."""
+    """Gain [nats] of every two effects together on one set of right sides (1, b, k), best first, each by its best candidates.
+
+    Only those that gain so much `more` than the best candidate alone.
+    """
+    least = linear_gains(blocks, rights, nuisance, known, candidates).max() + more
     pairs = [(one, other) for one, other in combinations(candidates, 2) if one.start.name != other.start.name]
     gains = linear_gains(blocks, rights, nuisance, known, [one.beside(other) for one, other in pairs])[0].tolist()
-    found = [(gain, one, other) for gain, (one, other) in zip(gains, pairs, strict=True)]
-    return sorted(found, key=lambda row: -row[0])
+    found: dict[frozenset[str], tuple[float, Candidate, Candidate]] = {}
+    for gain, (one, other) in sorted(zip(gains, pairs, strict=True), key=lambda row: -row[0]):
+        if gain > least:
+            found.setdefault(frozenset((one.start.name, other.start.name)), (gain, one, other))
+    return list(found.values())

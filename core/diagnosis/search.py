@@ -161,10 +161,9 @@ def _paired(bench: Bench, findings: Findings, current: Trial, screening: Screeni
     """
     screened, candidates, _ = screening
     blocks, nuisance = bench.tempered(screened), (*screened.nuisance, *screened.columns)
-    known = (blocks, right_sides(blocks), nuisance, bench.precision(screened), candidates)
-    least = float(linear_gains(*known).max()) + PROMISING * SECOND_FACTOR * findings.bound
-    ranked = [row for row in pair_gains(*known) if row[0] > least and not _weighed_already(row[1:], current)]
-    for _, one, other in _apart(ranked, PAIRS):
+    more = PROMISING * SECOND_FACTOR * findings.bound
+    ranked = pair_gains(blocks, right_sides(blocks), nuisance, bench.precision(screened), candidates, more)
+    for _, one, other in ranked[:PAIRS]:
         bench.tell(f"trying {one.start.name} and {other.start.name} at once")
         effects = [begin(one, screened, bench, other), begin(other, screened, bench, one)]
         hopeless = bench.objective(current.model) - HOPELESS
@@ -178,20 +177,6 @@ def _paired(bench: Bench, findings: Findings, current: Trial, screening: Screeni
             bench.temperature = max(1.0, trial.misfit)
             return
         findings.trials.append(replace(trial.scored(), asked=np.inf if left.significant else trial.asked))
-
-
-def _weighed_already(pair: Sequence[Candidate], current: Trial) -> bool:
-    """Whether a pair is the cause found and one that is dear to replay: that was screened beside it, and not found worth a fit."""
-    dear = any(isinstance(candidate.start, TRACED) for candidate in pair)
-    return dear and any(candidate.start.name in current.model.names for candidate in pair)
-
-
-def _apart(ranked: Sequence[tuple[float, Candidate, Candidate]], most: int) -> list[tuple[float, Candidate, Candidate]]:
-    """The best of each pair of effects, so many of them at most."""
-    found: dict[frozenset[str], tuple[float, Candidate, Candidate]] = {}
-    for row in ranked:
-        found.setdefault(frozenset((row[1].start.name, row[2].start.name)), row)
-    return list(found.values())[:most]
 
 
 def _known(findings: Findings) -> tuple[str, ...]:

@@ -110,6 +110,18 @@ def test_two_causes_that_a_third_looks_like_are_found_as_a_pair():
     together, precision = one.beside(other).precision(list(NUISANCE), KNOWN)
     without = predictive_score(blocks, NUISANCE, KNOWN, stated=3).sum()
     assert gain == pytest.approx(predictive_score(blocks, together, precision, stated=3).sum() - without, abs=1e-8)
+    more = gain - alone.max()
+    assert len(pair_gains(blocks, right_sides(blocks), NUISANCE, KNOWN, catalogue, 0.99 * more)) == 1
+    assert not pair_gains(blocks, right_sides(blocks), NUISANCE, KNOWN, catalogue, 1.01 * more)
+
+
+def test_each_pair_of_effects_comes_once_by_its_best_candidates_and_none_beside_an_only_cause():
+    catalogue = [Candidate(start=ToolRadius.neutral(SETUP), columns=(9,), spread=(2.0,)), *CATALOGUE[:4]]
+    lump, radius = CATALOGUE[2].columns[0], 9
+    both, one = _blocks({lump: 0.3, radius: 0.3}, seed=11), _blocks({radius: 0.3}, seed=11)
+    ((_, first, second),) = pair_gains(both, right_sides(both), NUISANCE, KNOWN, catalogue, 25.0)
+    assert {first.columns, second.columns} == {(lump,), (radius,)}
+    assert not pair_gains(one, right_sides(one), NUISANCE, KNOWN, catalogue, 25.0)
 
 
 def test_null_draws_repeat_with_their_seed():
