@@ -15,7 +15,8 @@ from rich.table import Table
 
 from app.blind_tables import TITLES, figure_text, hidden_text, named_text, target_text
 from app.console import look_at, out, progress, write_json
-from core.blind import Result, all_cases, draw_cases, known_results, run_case, run_suite, summary_of
+from core.blind import RESULTS_FILE, Result, all_cases, draw_cases, known_results, read_results, run_case, run_suite, summary_of
+from core.errors import RunError
 
 __all__ = ["blind"]
 
@@ -61,6 +62,8 @@ def blind(
     cases = [case for case in cases if only is None or only in case.name]
     if score:
         results = known_results(folder, cases, any_version)
+        if not results:
+            raise RunError(_nothing_of(folder, len(cases)), file=str(folder))
     else:
         with progress("blind suite") as report:
             run = partial(run_case, kept=kept) if keep else None
@@ -76,6 +79,16 @@ def blind(
     out.print(f"{folder / 'report.html'}", highlight=False, soft_wrap=True)
     if kept.exists():
         look_at(kept)
+
+
+def _nothing_of(folder: Path, wanted: int) -> str:
+    """What is in a folder whose results are none of the cases that are asked for."""
+    others = len(read_results(folder / RESULTS_FILE))
+    if not others:
+        return f"{folder} holds no {RESULTS_FILE} with results to score"
+    return (
+        f"{folder / RESULTS_FILE}: none of its {others} results is of these {wanted} cases; give the options that it was made with"
+    )
 
 
 def _parted(text: str | None) -> list[str] | None:

@@ -5,11 +5,11 @@
 """
 
 from core.blind.cases import KINDS, MIX, Case, all_cases, draw_cases, scenario_of
-from core.blind.results import Result, read_results
+from core.blind.results import RESULTS_FILE, Result, read_results
 from core.blind.running import known_results, run_case, run_suite
 from core.blind.summary import summary_of
 
 __all__ = [
-    "KINDS", "MIX", "Case", "Result", "all_cases", "draw_cases", "known_results", "read_results", "run_case", "run_suite",
-    "scenario_of", "summary_of",
+    "KINDS", "MIX", "RESULTS_FILE", "Case", "Result", "all_cases", "draw_cases", "known_results", "read_results", "run_case",
+    "run_suite", "scenario_of", "summary_of",
 ]  # fmt: skip

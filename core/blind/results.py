@@ -12,8 +12,9 @@ from typing import Any
 from core.blind.cases import Case
 from core.errors import RunError
 
-__all__ = ["STATED_LEVEL", "Result", "add_result", "read_results"]
+__all__ = ["RESULTS_FILE", "STATED_LEVEL", "Result", "add_result", "read_results"]
 
+RESULTS_FILE = "results.jsonl"
 STATED_LEVEL = 0.95
 """Of the intervals in a report that does not state its own as `interval_level`."""
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from core.blind.cases import Case, scenario_of
-from core.blind.results import Result, add_result, read_results
+from core.blind.results import RESULTS_FILE, Result, add_result, read_results
 from core.errors import RunError
 from core.processes import bound_to
 from core.progress import Report, silent
@@ -25,7 +25,6 @@ from core.progress import Report, silent
 __all__ = ["code_digest", "known_results", "run_case", "run_suite"]
 
 Run = Callable[[Case, Path], Result]
-_FILE = "results.jsonl"
 _PATIENCE = 5.0
 """A process that was told to end gets this long [s] before it is killed."""
 
@@ -49,7 +48,7 @@ def run_suite(
     Raises RunError where a result of the same name is of another case.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    file = folder / _FILE
+    file = folder / RESULTS_FILE
     read_results(file, mend=True)
     known = {one.name: one for one in known_results(folder, cases, any_version) if not (again and one.error)}
     wanted = [case for case in cases if case.name not in known]
@@ -69,7 +68,7 @@ def run_suite(
 
 def known_results(folder: Path, cases: Sequence[Case], any_version: bool = False) -> list[Result]:
     """Those of these cases that are done, in their order; of two of one name the later. RunError as from `run_suite`."""
-    file = folder / _FILE
+    file = folder / RESULTS_FILE
     wanted, digest = {case.name: case for case in cases}, code_digest()
     known: dict[str, Result] = {}
     for result in read_results(file):

@@ -160,6 +160,18 @@ def test_suite_that_still_runs_is_scored_as_far_as_it_is(tmp_path: Path, monkeyp
     assert (tmp_path / "results.jsonl").read_text() == torn
 
 
+def test_results_of_other_cases_are_not_scored_as_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = ("--folder", str(tmp_path), "--seed", "4", "--scenarios", "3", "--score")
+    assert run(monkeypatch, *asked) == 2
+    assert "holds no results.jsonl with results to score" in capsys.readouterr().err.replace("\n", " ")
+    add_result(tmp_path / "results.jsonl", replace(RESULTS[3], case=draw_cases(5, 3)[0], code=code_digest()))
+    assert run(monkeypatch, *asked) == 2
+    assert "none of its 1 results is of these 3 cases" in capsys.readouterr().err.replace("\n", " ")
+    assert [path.name for path in tmp_path.iterdir()] == ["results.jsonl"]
+
+
 def test_drawn_suite_takes_kinds_and_effects(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
