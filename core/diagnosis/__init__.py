@@ -12,6 +12,7 @@ from typing import Any
 
 from core.cleaning import cleaner_for, find_shaft_axis
 from core.dataset import Dataset
+from core.diagnosis.allowance import most_asked
 from core.diagnosis.assurance import assured
 from core.diagnosis.bench import Bench
 from core.diagnosis.felt_picture import draw_palpation
@@ -147,7 +148,8 @@ def _run(
         findings.withdraw(why)
         model, gain = findings.baseline, worth(bench, findings, unseen, pool, fine, seed) if unseen else None
     if verdict_of(findings) == "none":
-        report(0.77, "looking whether the test sequences are as clear")
+        report(0.77, "looking whether every sequence, also of the test, is as clear")
+        findings.asked = most_asked(bench, findings.baseline)
         findings.beyond = held_out(bench, unseen, seed)
     found = tuned(bench, model) if findings.best else setup
     result = report_of(dataset, bench, findings, gain, "test")

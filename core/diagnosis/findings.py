@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from core.diagnosis.allowance import Asked
 from core.diagnosis.ambiguity import Told
 from core.diagnosis.camera_errors import CALM, Ripple
 from core.diagnosis.held_out import HeldOut
@@ -53,7 +54,8 @@ class Findings:
         structure: error of the baseline that is smooth and grows with the push. left: the same of the best model.
         told: what this experiment tells of each effect, whatever the data say.
         ripple: of the camera's depth in the rest cloud, which no effect expresses.
-        beyond: what the stated setup leaves on sequences that nothing was fitted on; only looked at before an all-clear.
+        asked: how much of the engine's own error some sequence asks for; only looked at before an all-clear.
+        beyond: what the stated setup leaves on sequences that nothing was fitted on; likewise.
         withdrawn: why what was found is not named after all; empty where nothing was withdrawn.
         known: what no replay could do without: touches that were surely of other landmarks.
     """
@@ -68,6 +70,7 @@ class Findings:
     left: Structure = NOTHING
     told: tuple[Told, ...] = ()
     ripple: Ripple = CALM
+    asked: Asked | None = None
     beyond: HeldOut | None = None
     withdrawn: str = ""
     known: tuple[Effect, ...] = ()
@@ -81,12 +84,18 @@ class Findings:
     @property
     def structured(self) -> bool:
         """Whether the stated setup leaves an error that noise does not make."""
-        return self.structure.significant or self.ripple.significant or self.missed
+        return self.structure.significant or self.ripple.significant or self.missed or self.unusual is not None
 
     @property
     def missed(self) -> bool:
         """Whether it leaves one where nothing was fitted."""
         return self.beyond is not None and self.beyond.structure.significant
+
+    @property
+    def unusual(self) -> Asked | None:
+        """What a sequence asks for that the engine's own error does not explain; of those fitted first."""
+        looked_at = (self.asked, self.beyond.asked if self.beyond else None)
+        return next((one for one in looked_at if one is not None and one.significant), None)
 
     def rivals(self) -> list[Trial]:
         """Other sets of as many causes that explain the data about as well as the best."""

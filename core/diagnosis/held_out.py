@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from core.diagnosis.allowance import Asked, most_asked
 from core.diagnosis.bench import Bench
 from core.diagnosis.candidates import lump_places
 from core.diagnosis.hypothesis import Model
@@ -20,10 +21,11 @@ __all__ = ["HeldOut", "held_out"]
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """The stated setup on sequences that nothing was fitted on, and the structured error it leaves there."""
+    """The stated setup on sequences that nothing was fitted on, the structured error it leaves there, and what they ask for."""
 
     model: Model
     structure: Structure
+    asked: Asked | None = None
 
 
 def held_out(bench: Bench, unseen: Sequence[Observations], seed: int) -> HeldOut | None:
@@ -34,4 +36,4 @@ def held_out(bench: Bench, unseen: Sequence[Observations], seed: int) -> HeldOut
     stated, forces = (bench.setup, bench.registration, bench.workers), bench.nuisances.forces
     other = Bench(*stated, names, bench.static, bench.grid, bench.fine, forces=forces)
     model = other.baseline((), lump_places(other))
-    return HeldOut(model, structure_of(other, model, seed))
+    return HeldOut(model, structure_of(other, model, seed), most_asked(other, model))

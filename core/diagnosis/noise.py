@@ -68,7 +68,7 @@ class Noise:
         weights: (g, r) inverse variances [1/m^2]. residual: (g, r) of the baseline [m], zero where unseen.
         mesh: (g, r) fine minus default mesh [m]. discrepancy: (g, r, d) columns of the engine's own error, unit variance.
         centred: whether each row has a constant of its own, as the camera's pattern is; forces alone have none, since their bias
-            was taken off.
+            was taken off. spots: how many of the last discrepancies are of local stiffness.
     """
 
     weights: FloatArray
@@ -76,6 +76,7 @@ class Noise:
     mesh: FloatArray
     discrepancy: FloatArray
     centred: bool = True
+    spots: int = 0
 
     @classmethod
     def of(cls, baseline: Prediction, fine: Prediction, surface: Surface, variance: FloatArray, lumps: slice) -> Noise:
@@ -98,7 +99,8 @@ class Noise:
             displacement = _aside(displacement, force_discrepancy(baseline.felt, baseline.equilibria))
         stiffness = STIFFNESS_ERROR * columns[..., lumps].astype(float)
         weights = np.where(seen, 1 / scatter, 0.0)
-        return cls(weights, np.where(seen, gap, 0.0), mesh, np.concatenate([displacement, stiffness], axis=2))
+        discrepancy = np.concatenate([displacement, stiffness], axis=2)
+        return cls(weights, np.where(seen, gap, 0.0), mesh, discrepancy, spots=stiffness.shape[2])
 
     @classmethod
     def felt(cls, baseline: Prediction, fine: Prediction, lumps: slice) -> Noise:
@@ -134,7 +136,15 @@ class Noise:
         return replace(self, weights=weights, mesh=np.where(seen, finer - gap, self.mesh))
 
     def block(self, prediction: Prediction) -> Block:
-        """Quadratic form of a model's residual and columns (mesh error last), with the discrepancy integrated out.
+        """Quadratic form of a model's residual and columns (mesh error last), with the discrepancy integrated out."""
+        matrix, values = self.whole(prediction)
+        kept = matrix.shape[0] - self.discrepancy.shape[2]
+        cross, inner = matrix[:kept, kept:], matrix[kept:, kept:]
+        reduced = matrix[:kept, :kept] - cross @ np.linalg.solve(inner + np.eye(len(inner)), cross.T)
+        return Block(prediction.name, reduced, values)
+
+    def whole(self, prediction: Prediction) -> tuple[FloatArray, float]:
+        """Gram matrix of residual, columns, mesh error and the columns of the discrepancy, and the number of values.
 
         Where a model lost sight of a patch or found no equilibrium, the baseline's residual stands: nothing is gained there.
         """
@@ -144,11 +154,7 @@ class Noise:
         residual = np.where(usable, gap, self.residual) + self.mesh
         columns = np.where(usable[..., None], columns, 0.0)
         stacked = np.concatenate([columns, self.mesh[..., None], self.discrepancy], axis=2)
-        matrix, values = gram(residual, stacked, self.weights, self.centred)
-        kept = matrix.shape[0] - self.discrepancy.shape[2]
-        cross, inner = matrix[:kept, kept:], matrix[kept:, kept:]
-        reduced = matrix[:kept, :kept] - cross @ np.linalg.solve(inner + np.eye(len(inner)), cross.T)
-        return Block(prediction.name, reduced, values)
+        return gram(residual, stacked, self.weights, self.centred)
 
 
 def _aside(surface: FloatArray, force: FloatArray) -> FloatArray:

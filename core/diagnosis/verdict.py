@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,8 @@ from core.diagnosis.bench import Bench
 from core.diagnosis.felt_gain import FeltLadder
 from core.diagnosis.findings import Findings, Trial
 from core.diagnosis.gain import Ladder
-from core.diagnosis.hypothesis import Model
 from core.diagnosis.intervals import INTERVAL_LEVEL, intervals, modulus_interval
+from core.diagnosis.prediction import Prediction
 from core.diagnosis.resolution import too_coarse
 from core.effects.geometry import MeshResolution
 from core.effects.material import YoungModulus
@@ -26,6 +27,9 @@ MOST_DOUBT = 2.0
 """A modulus whose interval reaches up to more than this many times its value is not identified [1]."""
 _TEMPERATURE = 4.0
 """Gains are divided by this before they become probabilities: predictive densities of a model that is not true are over-sure."""
+
+
+_NOT_FITTED = ", on which nothing was fitted"
 
 
 def verdict_of(findings: Findings) -> str:
@@ -102,11 +106,17 @@ def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
     before, left, note = findings.structure, findings.left, ""
     if findings.missed and findings.beyond is not None:
         model, before, left = findings.beyond.model, findings.beyond.structure, findings.beyond.structure
-        note = ", on which nothing was fitted"
+        note = _NOT_FITTED
     worst = {block.name: block.gram[0, 0] / max(block.values, 1) for block in model.blocks if block.name != "rest"}
     when = max(worst, key=lambda name: worst[name])
-    place, share = _worst_patch(model, bench) if bench.seen else _worst_push(model, bench)
     fraction = max(left.ratio - 1.0, 0.0) / max(before.ratio, left.ratio, 1.0) if left.significant else 0.0
+    looked_at = model.predictions
+    if (one := findings.unusual) is not None and not left.significant:
+        if one is not findings.asked and findings.beyond is not None:
+            looked_at, note = findings.beyond.model.predictions, _NOT_FITTED
+        looked_at = tuple(item for item in looked_at if item.name == one.sequence)
+        when, fraction = one.sequence, one.share
+    place, share = _worst_patch(looked_at, bench) if bench.seen else _worst_push(looked_at, bench)
     place = 1e3 * place
     where = f"{100 * share:.0f} % of it within 8 mm of ({place[0]:.0f}, {place[1]:.0f}, {place[2]:.0f}) mm"
     when = f"most in {when}{note}"
@@ -120,20 +130,23 @@ def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _held_out(findings: Findings) -> dict[str, float]:
-    """What an all-clear was checked against on the test sequences; nothing where none was given."""
-    if findings.beyond is None:
-        return {}
-    beyond = findings.beyond.structure
-    return {
-        "held_out_structure": round(beyond.ratio, 4), "held_out_structure_bound": round(beyond.bound / beyond.expected, 4),
-    }  # fmt: skip
+def _all_clear(findings: Findings) -> dict[str, Any]:
+    """What an all-clear was checked against; nothing where none was given."""
+    found: dict[str, Any] = {}
+    if findings.beyond is not None:
+        beyond = findings.beyond.structure
+        found["held_out_structure"] = round(beyond.ratio, 4)
+        found["held_out_structure_bound"] = round(beyond.bound / beyond.expected, 4)
+    looked_at = (findings.asked, findings.beyond.asked if findings.beyond else None)
+    if rows := [one.to_json() for one in looked_at if one is not None]:
+        found["local_stiffness_error"] = rows
+    return found
 
 
-def _worst_push(model: Model, bench: Bench) -> tuple[FloatArray, float]:
+def _worst_push(predictions: Sequence[Prediction], bench: Bench) -> tuple[FloatArray, float]:
     """Place (3,) [m] of the push with the largest squared error of the force around it, and its share of the whole."""
     total: list[float] = []
-    for item in model.predictions:
+    for item in predictions:
         assert item.felt is not None and item.felt.push is not None
         squares = np.nan_to_num(item.felt.gap**2).sum(axis=1)
         total += [float(squares[item.felt.push == name].sum()) for name in np.unique(item.felt.push)]
@@ -147,10 +160,10 @@ def _gathered(centres: FloatArray, total: FloatArray) -> tuple[FloatArray, float
     return centres[worst], float(around[worst] / max(total.sum(), 1e-300))
 
 
-def _worst_patch(model: Model, bench: Bench) -> tuple[FloatArray, float]:
+def _worst_patch(predictions: Sequence[Prediction], bench: Bench) -> tuple[FloatArray, float]:
     """Centre (3,) [m] of the patch with the largest squared residual around it, and its share of the whole."""
     total = np.zeros(bench.surface.patches)
-    for item in model.predictions:
+    for item in predictions:
         if item.unseen:
             continue
         touched = np.array([frame.in_contact for frame in item.equilibria])
@@ -170,7 +183,7 @@ def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder |
     named = {cause["effect"] for cause in causes}
     known, unknown = _modulus(bench, findings, named)
     coarse = "" if bench.on_own_grid else too_coarse(findings.screened.get(MeshResolution.name, 0.0), findings.bound)
-    told = (findings.withdrawn, coarse, findings.ripple.warning)
+    told = (findings.withdrawn, coarse, findings.ripple.warning, findings.unusual.warning if findings.unusual else "")
     report: dict[str, Any] = {
         "format": 1, "dataset": dataset.name, "verdict": verdict, "causes": causes, "interval_level": INTERVAL_LEVEL,
         "ranking": _ranking(bench, findings, named), "models": [_model(trial) for trial in findings.trials],
@@ -180,7 +193,7 @@ def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder |
             "gain_nats": round(findings.best.gain, 2) if findings.best else 0.0, "bound_nats": round(findings.bound, 2),
             "baseline_misfit": round(findings.misfit, 4), "structure": round(findings.structure.ratio, 4),
             "structure_bound": round(findings.structure.bound / findings.structure.expected, 4), "evaluations": bench.evaluations,
-            "fitted_on": list(bench.names), **_held_out(findings),
+            "fitted_on": list(bench.names), **_all_clear(findings),
         },
         "warnings": [*bench.registration.warnings, *(text for text in told if text)],
     }  # fmt: skip

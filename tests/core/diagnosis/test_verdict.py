@@ -10,6 +10,7 @@ from pushed_block import SETUP, prediction, registration
 from small_dataset import write_valid_dataset
 
 from core.dataset import Dataset, open_dataset
+from core.diagnosis.allowance import Asked
 from core.diagnosis.bench import Bench
 from core.diagnosis.camera_errors import Ripple
 from core.diagnosis.columns import TOOL_COLUMNS
@@ -137,6 +138,29 @@ def test_error_that_only_the_test_sequences_show_is_no_all_clear(bench, dataset)
     report = report_of(dataset, bench, findings, LADDER, "test")
     assert (report["verdict"], report["causes"], report["unexplained"]["fraction"]) == ("unexplained", [], 0.6)
     assert report["unexplained"]["when"] == "most in poke-02, on which nothing was fitted"
+
+
+def test_sequence_that_asks_for_more_than_a_replay_errs_is_no_all_clear(bench, dataset):
+    findings = _findings(bench, misfit=1.0)
+    name = findings.baseline.predictions[-1].name
+    findings.asked = Asked(name, 1.2, 0.5, 6.0)
+    clear = report_of(dataset, bench, findings, LADDER, "test")
+    assert clear["verdict"] == "none" and clear["evidence"]["local_stiffness_error"][0]["sequence"] == name
+    findings.asked = Asked(name, 4.0, 13.2, 6.0)
+    report = report_of(dataset, bench, findings, LADDER, "test")
+    assert (report["verdict"], report["causes"], report["unexplained"]["fraction"]) == ("unexplained", [], 0.9375)
+    assert report["unexplained"]["when"] == f"most in {name}"
+    assert report["warnings"][-1].startswith(f"{name} would need local stiffness that is off by 16 %")
+
+
+def test_test_sequence_that_asks_for_more_is_no_all_clear_either(bench, dataset):
+    findings = _findings(bench, misfit=1.0)
+    other = _model(bench)
+    findings.asked = Asked("poke-01", 1.0, 0.0, 6.0)
+    findings.beyond = HeldOut(other, Structure(20.0, 20.0, 30.0), Asked(other.predictions[-1].name, 4.0, 13.2, 6.0))
+    report = report_of(dataset, bench, findings, LADDER, "test")
+    assert report["verdict"] == "unexplained"
+    assert report["unexplained"]["when"] == f"most in {other.predictions[-1].name}, on which nothing was fitted"
 
 
 def test_named_cause_stands_beside_waves_of_depth(bench, dataset):
