@@ -68,7 +68,7 @@ class Asked:
             return ""
         usual = 100 * USUAL * STIFFNESS_ERROR
         return (
-            f"{self.sequence} would need local stiffness that is off by {usual * self.factor:.0f} % and in no other sequence; a "
+            f"{self.sequence} would need local stiffness that is off by {usual * self.factor:.0f} %, in a pattern of its own; a "
             f"replay's own error is like {usual:.0f} % at most: something acts there that is not modelled"
         )
 
