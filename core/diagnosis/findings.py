@@ -92,10 +92,15 @@ class Findings:
         return self.beyond is not None and self.beyond.structure.significant
 
     @property
+    def looked_at(self) -> tuple[Asked, ...]:
+        """What sequences ask for, of those fitted first; nothing where no all-clear was in question."""
+        both = (self.asked, self.beyond.asked if self.beyond else None)
+        return tuple(one for one in both if one is not None)
+
+    @property
     def unusual(self) -> Asked | None:
-        """What a sequence asks for that the engine's own error does not explain; of those fitted first."""
-        looked_at = (self.asked, self.beyond.asked if self.beyond else None)
-        return next((one for one in looked_at if one is not None and one.significant), None)
+        """The first that the engine's own error does not explain."""
+        return next((one for one in self.looked_at if one.significant), None)
 
     def rivals(self) -> list[Trial]:
         """Other sets of as many causes that explain the data about as well as the best."""

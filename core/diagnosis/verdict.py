@@ -110,13 +110,13 @@ def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
     worst = {block.name: block.gram[0, 0] / max(block.values, 1) for block in model.blocks if block.name != "rest"}
     when = max(worst, key=lambda name: worst[name])
     fraction = max(left.ratio - 1.0, 0.0) / max(before.ratio, left.ratio, 1.0) if left.significant else 0.0
-    looked_at = model.predictions
+    predictions = model.predictions
     if (one := findings.unusual) is not None and not left.significant:
         if one is not findings.asked and findings.beyond is not None:
-            looked_at, note = findings.beyond.model.predictions, _NOT_FITTED
-        looked_at = tuple(item for item in looked_at if item.name == one.sequence)
+            predictions, note = findings.beyond.model.predictions, _NOT_FITTED
+        predictions = tuple(item for item in predictions if item.name == one.sequence)
         when, fraction = one.sequence, one.share
-    place, share = _worst_patch(looked_at, bench) if bench.seen else _worst_push(looked_at, bench)
+    place, share = _worst_patch(predictions, bench) if bench.seen else _worst_push(predictions, bench)
     place = 1e3 * place
     where = f"{100 * share:.0f} % of it within 8 mm of ({place[0]:.0f}, {place[1]:.0f}, {place[2]:.0f}) mm"
     when = f"most in {when}{note}"
@@ -137,9 +137,8 @@ def _all_clear(findings: Findings) -> dict[str, Any]:
         beyond = findings.beyond.structure
         found["held_out_structure"] = round(beyond.ratio, 4)
         found["held_out_structure_bound"] = round(beyond.bound / beyond.expected, 4)
-    looked_at = (findings.asked, findings.beyond.asked if findings.beyond else None)
-    if rows := [one.to_json() for one in looked_at if one is not None]:
-        found["local_stiffness_error"] = rows
+    if findings.looked_at:
+        found["local_stiffness_error"] = [one.to_json() for one in findings.looked_at]
     return found
 
 
