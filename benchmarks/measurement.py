@@ -7,8 +7,9 @@ from rich.table import Table
 
 from benchmarks.reference import SETUP
 from benchmarks.stopwatch import timed
-from core.measurement import Surface, gaps, patch_means
+from core.measurement import Surface, gaps
 from core.mesh import GridSpec
+from core.patch_means import patch_means
 from core.replay import replay
 
 __all__ = ["run"]

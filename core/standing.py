@@ -17,7 +17,8 @@ from core.dataset import Dataset, Sequence
 from core.equilibrium import Equilibrium
 from core.frames import FloatArray, Transform
 from core.grading import SCREEN_GRID
-from core.measurement import PatchMeans, Surface, gaps, patch_means
+from core.measurement import Surface, gaps
+from core.patch_means import PatchMeans, patch_means
 from core.registration import Registration, setup_from
 from core.replay import rest
 from core.setup import Setup, Shape

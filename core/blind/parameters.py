@@ -19,9 +19,6 @@ __all__ = ["SCORED_LEVEL", "Said", "coverage", "distances", "parameter_errors", 
 SCORED_LEVEL = 0.9
 """Of the intervals that are scored: those of a report are narrowed to it as a normal distribution's would be."""
 
-_DIRECTIONS = {("anisotropy", "direction"): math.pi}
-"""Parameters that come round, with their period [rad]."""
-
 
 @dataclass(frozen=True)
 class Said:
@@ -52,8 +49,10 @@ class Said:
     @property
     def nearest(self) -> float:
         """The truth; of a direction, that of its turns which is next to what is said."""
-        period = _DIRECTIONS.get((self.effect, self.name))
-        return self.true if period is None else self.true + period * round((self.value - self.true) / period)
+        if self.searched is None or not self.searched.periodic:
+            return self.true
+        period = self.searched.high - self.searched.low
+        return self.true + period * round((self.value - self.true) / period)
 
     @property
     def error(self) -> float:

@@ -17,9 +17,10 @@ import numpy as np
 from scipy.stats import chi2
 
 from core.diagnosis.bench import Bench
-from core.diagnosis.evidence import Block, log_evidence
+from core.diagnosis.evidence import Block, fit, log_evidence
 from core.diagnosis.hypothesis import Model
-from core.diagnosis.noise import STIFFNESS_ERROR
+from core.diagnosis.noise import STIFFNESS_ERROR, Noise
+from core.diagnosis.worst import Worst, gathered
 from core.frames import FloatArray
 
 __all__ = ["USUAL", "Asked", "asked_of", "bound_for", "most_asked"]
@@ -43,13 +44,14 @@ class Asked:
     Attributes:
         sequence: its name. factor: deviation of local stiffness that explains it best, over the usual one [1].
         gain: what that gains over the usual one [nats]. bound: what it would gain once in a thousand datasets where the usual one
-            is true [nats].
+            is true [nats]. place: where most of what such errors change is seen.
     """
 
     sequence: str
     factor: float
     gain: float
     bound: float
+    place: Worst
 
     @property
     def significant(self) -> bool:
@@ -88,11 +90,21 @@ def most_asked(bench: Bench, model: Model) -> Asked | None:
     for noise, item in zip(bench.noises, model.predictions, strict=True):
         if not item.unseen:
             whole, own = Block(item.name, *noise.whole(item)), noise.discrepancy.shape[2]
-            found.append((item.name, *asked_of(whole, [*model.nuisance, *model.columns], precision, own, noise.spots)))
+            wanted = asked_of(whole, [*model.nuisance, *model.columns], precision, own, noise.spots)
+            found.append((item.name, wanted, noise))
     if not found:
         return None
-    name, factor, gain = max(found, key=lambda row: row[2])
-    return Asked(name, factor, gain, bound_for(len(found)))
+    name, wanted, noise = max(found, key=lambda row: row[1].gain)
+    place = gathered(bench.surface.patch_centres, _seen(noise, wanted.errors)[: bench.surface.patches])
+    return Asked(name, wanted.factor, wanted.gain, bound_for(len(found)), place)
+
+
+def _seen(noise: Noise, errors: FloatArray) -> FloatArray:
+    """What errors (s,) of local stiffness, over the allowed deviation, change in each row of a sequence: squared, over noise."""
+    pattern = noise.discrepancy[..., -noise.spots :] @ errors
+    weight = noise.weights.sum(axis=0)
+    away = pattern - (noise.weights * pattern).sum(axis=0) / np.maximum(weight, 1e-300)
+    return np.asarray((noise.weights * away**2).sum(axis=0))
 
 
 def bound_for(sequences: int) -> float:
@@ -104,19 +116,30 @@ def bound_for(sequences: int) -> float:
     return 0.5 * float(chi2.isf(2 * FALSE / sequences, 1))
 
 
-def asked_of(block: Block, fitted: list[int], precision: FloatArray, own: int, spots: int) -> tuple[float, float]:
-    """Factor and gain of a block whose last `own` columns are the engine's error, the last `spots` of them of local stiffness."""
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """Of one sequence: `factor` and `gain` as of `Asked`, and the most probable `errors` (s,) of local stiffness there, over the
+    deviation that is allowed."""
+
+    factor: float
+    gain: float
+    errors: FloatArray
+
+
+def asked_of(block: Block, fitted: list[int], precision: FloatArray, own: int, spots: int) -> Wanted:
+    """Of a block whose last `own` columns are the engine's error, the last `spots` of them of local stiffness."""
     count = block.gram.shape[0] - 1
     columns = [*fitted, *range(count - own, count)]
     fixed = len(fitted)
 
-    def evidence(move: float, spot: float) -> float:
-        prior = np.zeros((len(columns), len(columns)))
-        prior[:fixed, :fixed] = precision
+    def prior(move: float, spot: float) -> FloatArray:
+        found = np.zeros((len(columns), len(columns)))
+        found[:fixed, :fixed] = precision
         deviation = np.array([*[move] * (own - spots), *[spot] * spots])
-        prior[fixed:, fixed:] = np.diag(deviation**-2)
-        return log_evidence([block], columns, prior)
+        found[fixed:, fixed:] = np.diag(deviation**-2)
+        return found
 
-    usual = max(evidence(*pair) for pair in product(_MOVES, _SPOTS))
-    more, factor = max((evidence(move, spot), spot) for move, spot in product(_MOVES, _MORE))
-    return factor / USUAL, max(more - usual, 0.0)
+    usual = max(log_evidence([block], columns, prior(*pair)) for pair in product(_MOVES, _SPOTS))
+    more, move, spot = max((log_evidence([block], columns, prior(*pair)), *pair) for pair in product(_MOVES, _MORE))
+    errors = fit([block], columns, prior(move, spot)).change[-spots:]
+    return Wanted(spot / USUAL, max(more - usual, 0.0), errors)

@@ -10,8 +10,9 @@ import scipy.sparse as sp
 from core.diagnosis.observations import Group
 from core.diagnosis.strays import among_neighbours
 from core.frames import FloatArray
-from core.measurement import Gaps, PatchMeans, Surface, gaps, gaps_beside, plain_means, within_spread
+from core.measurement import Gaps, Surface, gaps, gaps_beside
 from core.mesh import IntArray
+from core.patch_means import PatchMeans, plain_means, within_spread
 from core.replay import Equilibrium
 from core.setup import Setup
 from core.sight import sight_of

@@ -123,8 +123,7 @@ class Model:
     def ends(self) -> FloatArray:
         """-1 of each search coordinate that lies at its lower bound, 1 at the upper, else 0."""
         items, here = [item for effect in self.effects for item in effect.numbers()], self.coordinates
-        low = np.array([item.coordinate(item.low) for item in items])
-        high = np.array([item.coordinate(item.high) for item in items])
+        low, high = np.array([item.ends for item in items]).reshape(-1, 2).T
         room = _AT_END * self.scales
         return np.where(here - low < room, -1, np.where(high - here < room, 1, 0))
 

@@ -77,7 +77,7 @@ def intervals(bench: Bench, model: Model) -> list[dict[str, dict[str, Any]]]:
         number = len(effect.numbers())
         entry: dict[str, dict[str, Any]] = {}
         for item, value, sd in zip(effect.numbers(), effect.coordinates, spread[at : at + number], strict=True):
-            low, high = item.value(value - _NORMAL_95 * sd), item.value(value + _NORMAL_95 * sd)
+            low, high = item.interval(value, _NORMAL_95 * sd)
             entry[item.name] = {"value": item.value(value), "unit": item.unit, "low": low, "high": high}
         for name, (reported, unit) in effect.reported(bench.setup).items():
             entry.setdefault(name, {"value": reported, "unit": unit})

@@ -53,9 +53,9 @@ def profile(
     best, deviation = evidence(at), float(np.sqrt(covariance[index, index]))
     along, used = covariance[:, index] / covariance[index, index], 0
     closed = []
-    for sign, bound in ((-1.0, item.low), (1.0, item.high)):
-        # Where a logarithm is searched, a bound of zero is infinitely far.
-        room = abs(item.coordinate(bound) - at[index]) if bound > 0 or not item.log else np.inf
+    for sign, end in zip((-1.0, 1.0), item.ends, strict=True):
+        # What comes round is farthest off at half a turn.
+        room = (item.high - item.low) / 2 if item.periodic else abs(end - at[index])
         falls = False
         for far in dict.fromkeys(min(reach * deviation, room) for reach in (NEAR, FAR)):
             used += 1

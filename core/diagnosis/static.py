@@ -16,8 +16,9 @@ from core.cleaning import Cleaner
 from core.diagnosis.camera_errors import CameraErrors, camera_errors
 from core.diagnosis.evidence import Block
 from core.frames import FloatArray
-from core.measurement import Surface, gaps, patch_means
+from core.measurement import Surface, gaps
 from core.meshing import Meshing
+from core.patch_means import patch_means
 from core.registration import motion_jacobian
 from core.replay import rest
 from core.setup import Setup

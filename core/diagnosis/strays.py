@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from core.frames import FloatArray
-from core.measurement import MaskArray, Surface
+from core.measurement import Surface
 from core.mesh import IntArray
+from core.patch_means import MaskArray
 
 __all__ = ["among_neighbours"]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,11 +12,10 @@ from core.diagnosis.felt_gain import FeltLadder
 from core.diagnosis.findings import Findings, Trial
 from core.diagnosis.gain import Ladder
 from core.diagnosis.intervals import INTERVAL_LEVEL, intervals, modulus_interval
-from core.diagnosis.prediction import Prediction
 from core.diagnosis.resolution import too_coarse
+from core.diagnosis.worst import worst_patch, worst_push
 from core.effects.geometry import MeshResolution
 from core.effects.material import YoungModulus
-from core.frames import FloatArray
 
 __all__ = ["UNEXPLAINED_MISFIT", "report_of", "verdict_of"]
 
@@ -110,15 +108,12 @@ def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
     worst = {block.name: block.gram[0, 0] / max(block.values, 1) for block in model.blocks if block.name != "rest"}
     when = max(worst, key=lambda name: worst[name])
     fraction = max(left.ratio - 1.0, 0.0) / max(before.ratio, left.ratio, 1.0) if left.significant else 0.0
-    predictions = model.predictions
     if (one := findings.unusual) is not None and not left.significant:
-        if one is not findings.asked and findings.beyond is not None:
-            predictions, note = findings.beyond.model.predictions, _NOT_FITTED
-        predictions = tuple(item for item in predictions if item.name == one.sequence)
-        when, fraction = one.sequence, one.share
-    place, share = _worst_patch(predictions, bench) if bench.seen else _worst_push(predictions, bench)
-    place = 1e3 * place
-    where = f"{100 * share:.0f} % of it within 8 mm of ({place[0]:.0f}, {place[1]:.0f}, {place[2]:.0f}) mm"
+        note = note if one is findings.asked else _NOT_FITTED
+        when, fraction, place = one.sequence, one.share, one.place
+    else:
+        place = worst_patch(model.predictions, bench) if bench.seen else worst_push(model.predictions, bench)
+    where = str(place)
     when = f"most in {when}{note}"
     if findings.ripple.significant and not left.significant:
         fraction = findings.ripple.share
@@ -140,37 +135,6 @@ def _all_clear(findings: Findings) -> dict[str, Any]:
     if findings.looked_at:
         found["local_stiffness_error"] = [one.to_json() for one in findings.looked_at]
     return found
-
-
-def _worst_push(predictions: Sequence[Prediction], bench: Bench) -> tuple[FloatArray, float]:
-    """Place (3,) [m] of the push with the largest squared error of the force around it, and its share of the whole."""
-    total: list[float] = []
-    for item in predictions:
-        assert item.felt is not None and item.felt.push is not None
-        squares = np.nan_to_num(item.felt.gap**2).sum(axis=1)
-        total += [float(squares[item.felt.push == name].sum()) for name in np.unique(item.felt.push)]
-    return _gathered(bench.pushed[0], np.array(total))
-
-
-def _gathered(centres: FloatArray, total: FloatArray) -> tuple[FloatArray, float]:
-    """Of places (p, 3) [m] that with the most of a total (p,) around it, and its share."""
-    around = (np.linalg.norm(centres[:, None] - centres, axis=2) < 8e-3) @ total
-    worst = int(around.argmax())
-    return centres[worst], float(around[worst] / max(total.sum(), 1e-300))
-
-
-def _worst_patch(predictions: Sequence[Prediction], bench: Bench) -> tuple[FloatArray, float]:
-    """Centre (3,) [m] of the patch with the largest squared residual around it, and its share of the whole."""
-    total = np.zeros(bench.surface.patches)
-    for item in predictions:
-        if item.unseen:
-            continue
-        touched = np.array([frame.in_contact for frame in item.equilibria])
-        still = np.isfinite(item.gap) & ~touched[:, None]
-        zero = np.where(still, item.gap, 0.0).sum(axis=0) / np.maximum(still.sum(axis=0), 1)
-        away = np.where(still.any(axis=0), np.nan_to_num(item.gap - zero), 0.0)
-        total += (away**2 * item.count * touched[:, None]).sum(axis=0)
-    return _gathered(bench.surface.patch_centres, total)
 
 
 def report_of(dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder | FeltLadder | None, split: str) -> dict[str, Any]:

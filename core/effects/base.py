@@ -42,7 +42,8 @@ class Parameter:
             `scale` and `accuracy` are of the logarithm. contrast: whether a ratio k of stiffness is searched by
             (k - 1) / (k + 3/2), and `scale` and `accuracy` are of that: in proportion to it a ball in an incompressible matrix
             moves what surrounds it (Eshelby 1957), so that k = 10 and k = 50 are next to each other, as they are in data.
-            accuracy: standard deviation that the replay's own error leaves, however good the data.
+            accuracy: standard deviation that the replay's own error leaves, however good the data. periodic: whether it comes
+            round, as an axis does: its upper bound is its lower one.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Parameter:
     log: bool = False
     contrast: bool = False
     accuracy: float = 0.0
+    periodic: bool = False
 
     def coordinate(self, value: float) -> float:
         """What a search moves instead of the value."""
@@ -63,12 +65,30 @@ class Parameter:
 
     def value(self, coordinate: float) -> float:
         """The inverse of `coordinate`, brought back into the bounds."""
-        return min(max(self._free(coordinate), self.low), self.high)
+        return self.bounded(self._free(coordinate))
+
+    def bounded(self, value: float) -> float:
+        """The value in its bounds that is next to this one; of a periodic parameter the one that is the same."""
+        if self.periodic:
+            return self.low + (value - self.low) % (self.high - self.low)
+        return min(max(value, self.low), self.high)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Search coordinates of the bounds; infinite where the parameter comes round."""
+        return (-math.inf, math.inf) if self.periodic else (self.coordinate(self.low), self.coordinate(self.high))
+
+    def interval(self, coordinate: float, width: float) -> tuple[float, float]:
+        """Values at so much to either side; of a periodic parameter they may pass its bounds, as -3 to 5 degrees do."""
+        if self.periodic:
+            width = min(width, (self.high - self.low) / 2)
+            return self.bounded(coordinate) - width, self.bounded(coordinate) + width
+        return self.value(coordinate - width), self.value(coordinate + width)
 
     def within(self, coordinate: float) -> float:
         """The value at this coordinate, a thousandth of a scale short of the bounds at least."""
-        short = _SHORT * self.scale
-        return self.value(min(max(coordinate, self.coordinate(self.low) + short), self.coordinate(self.high) - short))
+        (low, high), short = self.ends, _SHORT * self.scale
+        return self.value(min(max(coordinate, low + short), high - short))
 
     def factor(self, size: float) -> float | None:
         """That to which one grows with a coordinate's change by `size`; None of a parameter that is searched as it is."""
@@ -90,12 +110,13 @@ def parameter(
     log: bool = False,
     contrast: bool = False,
     accuracy: float = 0.0,
+    periodic: bool = False,
 ) -> Any:
     """A dataclass field that carries a Parameter."""
     return dataclasses.field(
         metadata={
             "unit": unit, "low": low, "high": high, "scale": scale, "choices": choices, "log": log, "contrast": contrast,
-            "accuracy": accuracy,
+            "accuracy": accuracy, "periodic": periodic,
         }
     )  # fmt: skip
 
@@ -166,7 +187,7 @@ class Effect(ABC):
     def moved(self, values: Sequence[float]) -> Self:
         """The same effect with other numbers, brought back into their bounds."""
         pairs = zip(self.numbers(), values, strict=True)
-        return dataclasses.replace(self, **{item.name: min(max(float(v), item.low), item.high) for item, v in pairs})
+        return dataclasses.replace(self, **{item.name: item.bounded(float(v)) for item, v in pairs})
 
     @property
     def coordinates(self) -> list[float]:

@@ -68,6 +68,8 @@ def _check_number(name: str, item: Parameter) -> None:
         raise EffectError(f"{name}: {item.name} is bounded by {item.low:g} and {item.high:g}", parameter=item.name)
     if item.log and item.low <= 0:
         raise EffectError(f"{name}: {item.name} is searched by its logarithm and may be {item.low:g}", parameter=item.name)
+    if item.periodic and (item.log or item.contrast):
+        raise EffectError(f"{name}: {item.name} comes round and is searched by a logarithm or contrast", parameter=item.name)
     if item.contrast and (item.log or item.low < 0):
         what = "by its logarithm, too" if item.log else f"and may be {item.low:g}"
         raise EffectError(f"{name}: {item.name} is searched as a ratio's contrast {what}", parameter=item.name)

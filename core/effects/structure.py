@@ -89,7 +89,7 @@ class Anisotropy(Effect):
 
     name, enters = "anisotropy", Slot.MATERIAL
     summary = "the material is stiffer along one direction"
-    direction: float = parameter("rad", low=0.0, high=math.pi, scale=0.3)
+    direction: float = parameter("rad", low=0.0, high=math.pi, scale=0.3, periodic=True)
     stiffness_ratio: float = parameter("1", low=1.0, high=30.0, scale=0.3, log=True)
 
     @classmethod
@@ -100,11 +100,6 @@ class Anisotropy(Effect):
     @classmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:
         return [cls(direction=angle, stiffness_ratio=3.0) for angle in (0.0, math.pi / 4, math.pi / 2, 3 * math.pi / 4)]
-
-    def at(self, coordinates: Sequence[float]) -> Self:
-        """As for every effect, but a direction that turns past the x axis comes in again at the other end."""
-        direction, *strength = coordinates
-        return super().at([direction % math.pi, *strength])
 
     def apply(self, setup: Setup) -> Setup:
         if self.stiffness_ratio == 1.0 and setup.material.fibres is None:

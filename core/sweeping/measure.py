@@ -11,9 +11,10 @@ from core.diagnosis.smoothing import smooth_centres
 from core.errors import PalpateError, SolveError
 from core.fem.newton import Outcome
 from core.frames import FloatArray
-from core.measurement import Surface, gaps, patch_means
+from core.measurement import Surface, gaps
 from core.meshing import Meshing
 from core.metrics import paper_distance
+from core.patch_means import patch_means
 from core.replay import replay
 from core.setup import Setup
 from core.sight import sight_of

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from core.frames import FloatArray
-from core.measurement import SIDES, Surface, gaps, patch_means, plain_means, within_spread
+from core.measurement import SIDES, Surface, gaps
 from core.mesh import GridSpec
+from core.patch_means import patch_means, plain_means, within_spread
 from core.replay import Equilibrium, replay, rest
 from core.setup import Box, Setup, Tool
 

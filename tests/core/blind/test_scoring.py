@@ -55,8 +55,11 @@ def test_interval_of_a_parameter_that_is_searched_by_its_logarithm_is_narrowed_t
     assert replace(wide, true=4.0 / narrowed * 1.01).covers(0.9) and not replace(wide, true=4.0 / narrowed * 0.99).covers(0.9)
 
 
+AXIS = effect_named("anisotropy").numbers()[0]
+
+
 def test_direction_comes_round_at_half_a_turn() -> None:
-    fibres = said("anisotropy", "direction", 0.02, math.pi - 0.01, math.pi - 0.1, math.pi + 0.1)
+    fibres = said("anisotropy", "direction", 0.02, math.pi - 0.01, math.pi - 0.1, math.pi + 0.1, AXIS)
     assert fibres.error == pytest.approx(-0.03) and fibres.covers()
     assert said("time_offset", "offset", 0.02, math.pi - 0.01, 3.0, 3.3).error == pytest.approx(math.pi - 0.03)
 

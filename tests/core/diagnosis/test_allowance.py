@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pushed_block import CORNERS, SETUP, observed, poke, registration
+from pushed_block import CORNERS, SETUP, TOP, observed, poke, registration
 
-from core.diagnosis.allowance import USUAL, Asked, asked_of, bound_for, most_asked
+from core.diagnosis.allowance import USUAL, Asked, Wanted, asked_of, bound_for, most_asked
 from core.diagnosis.bench import Bench
 from core.diagnosis.candidates import lump_places
 from core.diagnosis.evidence import Block, gram
@@ -17,6 +17,7 @@ from core.diagnosis.hypothesis import with_effects
 from core.diagnosis.noise import STIFFNESS_ERROR
 from core.diagnosis.observations import Observations
 from core.diagnosis.workers import Workers
+from core.diagnosis.worst import Worst
 from core.effects.material import StiffInclusion
 from core.mesh import GridSpec
 from core.setup import Setup
@@ -58,6 +59,9 @@ def test_what_is_as_stated_asks_for_nothing_unusual(workers: Workers) -> None:
 def test_what_acts_in_one_sequence_alone_is_told_with_its_name(workers: Workers) -> None:
     found = _looked_at(workers, "clear", "alike", "lumpy")
     assert found.significant and found.sequence == "lumpy" and found.factor > 2
+    x, y, z = found.place.place
+    # Straight above the lump the tool is in the way.
+    assert np.hypot(x - LUMP.x, y - LUMP.y) < 15e-3 and z == TOP and 0.1 < found.place.share < 0.3
     assert "lumpy would need local stiffness that is off by" in found.warning and "4 % at most" in found.warning
 
 
@@ -65,7 +69,7 @@ GROUPS, PATCHES, NUISANCES, MOVED, SPOTS = 8, 60, 2, 6, 20
 FITTED, OWN = [0, 1], MOVED + SPOTS
 
 
-def _asked(deviation: float, seed: int) -> tuple[float, float]:
+def _asked(deviation: float, seed: int) -> Wanted:
     """Of white noise, nuisances, and errors of local stiffness of this deviation over the allowed one."""
     random = np.random.default_rng(seed)
     columns = random.standard_normal((GROUPS, PATCHES, NUISANCES + OWN)) * 0.3
@@ -77,14 +81,14 @@ def _asked(deviation: float, seed: int) -> tuple[float, float]:
 
 @pytest.mark.parametrize("deviation", [0.05, USUAL])
 def test_what_is_usual_is_rarely_too_much(deviation: float) -> None:
-    gains = np.array([_asked(deviation, seed)[1] for seed in range(200)])
+    gains = np.array([_asked(deviation, seed).gain for seed in range(200)])
     assert (gains > bound_for(1)).sum() <= 2 and np.median(gains) < 0.5
 
 
 def test_more_than_usual_is_measured() -> None:
-    found = np.array([_asked(4 * USUAL, seed) for seed in range(20)])
-    assert (found[:, 1] > bound_for(4)).all()
-    assert np.median(found[:, 0]) == pytest.approx(4.0, rel=0.5)
+    found = [_asked(4 * USUAL, seed) for seed in range(20)]
+    assert all(one.gain > bound_for(4) for one in found)
+    assert np.median([one.factor for one in found]) == pytest.approx(4.0, rel=0.5)
 
 
 def test_more_sequences_ask_for_more_by_chance() -> None:
@@ -92,7 +96,7 @@ def test_more_sequences_ask_for_more_by_chance() -> None:
 
 
 def test_factor_is_said_in_percent_of_stiffness() -> None:
-    found = Asked("poke-side-01", 4.0, 13.2, 6.1)
+    found = Asked("poke-side-01", 4.0, 13.2, 6.1, Worst((0.0, 0.0, 0.0), 1.0))
     assert f"off by {100 * 4 * USUAL * STIFFNESS_ERROR:.0f} %" in found.warning and found.share == 1 - 1 / 16
     assert found.to_json()["deviation"] == pytest.approx(4 * USUAL * STIFFNESS_ERROR)
     assert replace(found, gain=5.0).warning == ""

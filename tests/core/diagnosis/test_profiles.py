@@ -70,6 +70,18 @@ def test_bound_of_the_parameter_is_the_farthest_that_is_looked_at():
     assert min(seen) == pytest.approx(0.0) and max(seen) == pytest.approx(0.04) and len(seen) == 4
 
 
+def test_direction_is_looked_at_as_far_as_half_a_turn():
+    seen: list[float] = []
+    axis = Parameter(name="direction", unit="rad", low=0.0, high=np.pi, scale=0.3, periodic=True)
+
+    def evidence(coordinates: FloatArray) -> float:
+        seen.append(float(coordinates[0]))
+        return 0.0
+
+    profile(evidence, np.array([0.1]), np.array([[1.0]]), 0, axis)
+    assert min(seen) == pytest.approx(0.1 - np.pi / 2) and max(seen) == pytest.approx(0.1 + np.pi / 2)
+
+
 def test_only_what_the_linearised_fit_does_not_know_is_looked_at():
     assert vague(SURE, [RATIO, RADIUS]) == [0]
     assert vague(np.diag([0.01, 0.04]), [RATIO, RADIUS]) == [1]

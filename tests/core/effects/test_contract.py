@@ -13,6 +13,7 @@ from core.diagnosis.tangent import SMALL
 from core.effects import CATALOGUE, Effect, Slot, effect_named, from_json
 from core.effects.material import StiffInclusion, YoungModulus
 from core.effects.sensor import CameraRegistration, TimeOffset
+from core.effects.structure import Anisotropy
 from core.effects.tool import ToolOffset
 from core.errors import EffectError
 from core.mesh import GridSpec
@@ -143,6 +144,16 @@ def test_contrast_of_a_lump_says_how_strongly_it_acts_in_a_matrix():
     assert ratio.factor(0.4) == pytest.approx(1.6 / 0.6) and ratio.factor(1.0) == np.inf
 
 
+def test_direction_has_no_end():
+    turn, _ = Anisotropy.numbers()
+    assert turn.value(-0.1) == pytest.approx(np.pi - 0.1) and turn.value(np.pi + 0.1) == pytest.approx(0.1)
+    assert turn.ends == (-np.inf, np.inf) and turn.within(0.0) == 0.0
+    assert turn.interval(0.02, 0.05) == pytest.approx((-0.03, 0.07))
+    assert turn.interval(np.pi + 0.02, 9.0) == pytest.approx((0.02 - np.pi / 2, 0.02 + np.pi / 2))
+    fibres = Anisotropy(direction=0.05, stiffness_ratio=3.0)
+    assert fibres.at([-0.1, 1.0]).direction == fibres.moved([-0.1, 3.0]).direction == pytest.approx(np.pi - 0.1)
+
+
 @EACH
 def test_neutral_changes_nothing_in_a_replay(effect, baseline):
     setup = effect.neutral(SETUP).apply(SETUP)
@@ -227,7 +238,9 @@ def test_starts_lie_within_bounds_and_change_the_setup(effect):
 def test_moved_keeps_words_and_stays_within_bounds(effect):
     example = _example(effect)
     far = example.moved([item.high + 1 for item in effect.numbers()])
-    assert [getattr(far, item.name) for item in effect.numbers()] == [item.high for item in effect.numbers()]
+    assert [getattr(far, item.name) for item in effect.numbers()] == [
+        item.low + 1 if item.periodic else item.high for item in effect.numbers()
+    ]
     assert all(getattr(far, item.name) == getattr(example, item.name) for item in effect.parameters() if item.choices)
 
 

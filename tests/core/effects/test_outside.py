@@ -123,6 +123,7 @@ WRONG = {
     "logarithm of zero": (_sized(log=True), "may be 0"),
     "contrast of what is no ratio": (_sized(contrast=True, low=-0.5), "contrast and may be -0.5"),
     "logarithm and contrast": (_sized(contrast=True, log=True, low=0.5), "contrast by its logarithm, too"),
+    "logarithm that comes round": (_sized(periodic=True, log=True, low=0.5), "comes round"),
     "no scale": (_sized(scale=0.0), "scale of size is 0"),
 }
 
