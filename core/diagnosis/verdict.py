@@ -12,6 +12,7 @@ from core.diagnosis.felt_gain import FeltLadder
 from core.diagnosis.findings import Findings, Trial
 from core.diagnosis.gain import Ladder
 from core.diagnosis.intervals import INTERVAL_LEVEL, intervals, modulus_interval
+from core.diagnosis.probabilities import probabilities
 from core.diagnosis.resolution import too_coarse
 from core.diagnosis.worst import worst_patch, worst_push
 from core.effects.geometry import MeshResolution
@@ -23,9 +24,6 @@ UNEXPLAINED_MISFIT = 1.25
 """Misfit per value above which structured error is left: the engine's own accuracy is in the noise already."""
 MOST_DOUBT = 2.0
 """A modulus whose interval reaches up to more than this many times its value is not identified [1]."""
-_TEMPERATURE = 4.0
-"""Gains are divided by this before they become probabilities: predictive densities of a model that is not true are over-sure."""
-
 
 _NOT_FITTED = ", on which nothing was fitted"
 
@@ -40,17 +38,11 @@ def verdict_of(findings: Findings) -> str:
 
 
 def _probabilities(findings: Findings) -> dict[tuple[str, ...], float]:
-    """Softmax, over the models tried and none, of what each gains beyond what is asked of it; not calibrated on a suite yet.
-
-    What is asked is part of the odds: what the search refused for too little is less probable than what it named.
-    """
-    gains: dict[tuple[str, ...], float] = {(): 0.0}
+    """Of the sets of causes that were tried, each by the fit that gains most, and of none."""
+    surplus: dict[tuple[str, ...], float] = {}
     for trial in findings.trials:
-        gains[trial.model.names] = max(trial.gain - trial.asked, gains.get(trial.model.names, -np.inf))
-    names = list(gains)
-    logits = np.array([gains[name] for name in names]) / _TEMPERATURE
-    weights = np.exp(logits - logits.max())
-    return {name: float(w) for name, w in zip(names, weights / weights.sum(), strict=True)}
+        surplus[trial.model.names] = max(trial.gain - trial.asked, surplus.get(trial.model.names, -np.inf))
+    return probabilities(surplus)
 
 
 def _removed(findings: Findings, misfit: float) -> float:
