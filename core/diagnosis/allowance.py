@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from core.diagnosis.bench import Bench
-from core.diagnosis.evidence import Block, fit, log_evidence
+from core.diagnosis.evidence import Block, fit, less_constants, log_evidence
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.noise import STIFFNESS_ERROR, Noise
 from core.diagnosis.worst import Worst, gathered
@@ -102,8 +102,7 @@ def most_asked(bench: Bench, model: Model) -> Asked | None:
 def _seen(noise: Noise, errors: FloatArray) -> FloatArray:
     """What errors (s,) of local stiffness, over the allowed deviation, change in each row of a sequence: squared, over noise."""
     pattern = noise.discrepancy[..., -noise.spots :] @ errors
-    weight = noise.weights.sum(axis=0)
-    away = pattern - (noise.weights * pattern).sum(axis=0) / np.maximum(weight, 1e-300)
+    away = less_constants(pattern[..., None], noise.weights)[..., 0]
     return np.asarray((noise.weights * away**2).sum(axis=0))
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from core.frames import FloatArray
 
 __all__ = [
-    "FLAT", "Block", "Fit", "draw_rights", "explained", "fit", "gram", "log_evidence", "predictive_gain", "predictive_score",
-    "within_reach",
+    "FLAT", "Block", "Fit", "draw_rights", "explained", "fit", "gram", "less_constants", "log_evidence", "predictive_gain",
+    "predictive_score", "within_reach",
 ]  # fmt: skip
 
 
@@ -39,13 +39,18 @@ def gram(residual: FloatArray, columns: FloatArray, weights: FloatArray, centred
         (1 + k, 1 + k) matrix, and the number of values less the constants taken out.
     """
     stacked = np.concatenate([np.where(weights > 0, residual, 0.0)[..., None], columns], axis=2)
-    total = weights.sum(axis=0)
-    taken = float((total > 0).sum()) if centred else 0.0
+    taken = float((weights.sum(axis=0) > 0).sum()) if centred else 0.0
     if centred:
-        stacked = stacked - np.einsum("gp,gpk->pk", weights, stacked) / np.maximum(total, 1e-300)[:, None]
+        stacked = less_constants(stacked, weights)
     white = stacked * np.sqrt(weights)[..., None]
     flat = white.reshape(-1, white.shape[2])
     return np.asarray(flat.T @ flat), float((weights > 0).sum() - taken)
+
+
+def less_constants(columns: FloatArray, weights: FloatArray) -> FloatArray:
+    """Columns (g, p, k) less each patch's mean over the groups, by weights (g, p)."""
+    total = np.maximum(weights.sum(axis=0), 1e-300)
+    return np.asarray(columns - np.einsum("gp,gpk->pk", weights, columns) / total[:, None])
 
 
 @dataclass(frozen=True, eq=False)

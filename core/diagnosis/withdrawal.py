@@ -5,8 +5,9 @@ from __future__ import annotations
 from core.diagnosis.felt_gain import FeltLadder
 from core.diagnosis.findings import Findings
 from core.diagnosis.gain import Ladder
+from core.diagnosis.structure import Structure
 
-__all__ = ["objection"]
+__all__ = ["leaves_most", "objection"]
 
 _WORSE = 0.1
 """Share of the reducible error that a cause surely adds on test sequences before it is withdrawn [1]: less may be the mesh's."""
@@ -39,8 +40,7 @@ def _no_explanation(names: str, findings: Findings, gain: Ladder | FeltLadder | 
     """They remove something, but what is wrong stays: the larger part of the smooth error that grows with the push, and of what
     could be removed on test sequences."""
     before, left = findings.structure, findings.left
-    most = _LEFT * max(before.ratio - 1.0, 0.0)
-    if not left.significant or left.ratio - 1.0 < most or (gain is not None and gain.removed[0] > 1.0 - _LEFT):
+    if not leaves_most(before, left, None if gain is None else gain.removed[0]):
         return ""
     tested = "" if gain is None else f", and of the reducible error on test sequences {_share(gain)} is removed"
     return (
@@ -48,6 +48,13 @@ def _no_explanation(names: str, findings: Findings, gain: Ladder | FeltLadder | 
         f"grows with the push stays: {left.ratio:.1f} times what chance gives, {before.ratio:.1f} times without it{tested}. "
         "It is not named"
     )
+
+
+def leaves_most(before: Structure, left: Structure, removed: float | None) -> bool:
+    """Whether a cause leaves what is wrong: significant structure, the larger part of that without it, and of the reducible error
+    on test sequences no more than the smaller part is `removed` [1]; None without such sequences."""
+    stays = left.significant and left.ratio - 1.0 >= _LEFT * max(before.ratio - 1.0, 0.0)
+    return stays and (removed is None or removed <= 1.0 - _LEFT)
 
 
 def _share(gain: Ladder | FeltLadder) -> str:
