@@ -1,0 +1,40 @@
+"""The rule that withholds a cause which leaves most of what is wrong, by rows of suites that were run and kept."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+from rich.console import Console
+
+from benchmarks.withheld import run
+
+KEPT = Path(__file__).parents[3] / "benchmarks" / "blind"
+
+
+def _printed(name: str) -> list[str]:
+    page = Console(file=io.StringIO(), width=300)
+    run(page, [KEPT / name])
+    assert isinstance(page.file, io.StringIO)
+    return page.file.getvalue().splitlines()
+
+
+def _of(lines: list[str], case: str) -> str:
+    (line,) = [line for line in lines if case in line]
+    return line
+
+
+def test_what_stood_for_a_second_body_is_withheld() -> None:
+    line = _of(_printed("suite-1400-replaced.jsonl"), "outside-1400-004-second_body")
+    cells = [cell.strip() for cell in line.split("│")]
+    assert cells[3:9] == ["stiff_inclusion", "no", "2.21", "1.88", "29 %", "yes"]
+
+
+def test_pair_that_leaves_a_hundredth_is_kept() -> None:
+    line = _of(_printed("suite-1400-first.jsonl"), "pair-1400-000")
+    assert [cell.strip() for cell in line.split("│")][4:9] == ["yes", "76.40", "1.88", "95 %", "no"]
+
+
+def test_rows_that_leave_nothing_significant_are_only_counted() -> None:
+    lines = _printed("suite-1400-replaced.jsonl")
+    assert "5 rows that name a cause" in lines[0] and sum(line.startswith("│") for line in lines) == 2
