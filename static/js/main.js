@@ -62,11 +62,16 @@ async function openSequence() {
   if (state().run !== run || state().sequence !== sequence) return;
   const fresh = state().series === null || state().series.name !== sequence;
   set({ series });
-  if (fresh && state().frame === 0) timeline.go(worst(series.distance_raw));
+  if (fresh && state().frame === 0) timeline.go(opening(series));
 }
 
-/** The frame with the largest raw error: there is nothing to see in an untouched one. */
-const worst = (errors) => errors.reduce((best, value, index) => ((value ?? 0) > (errors[best] ?? 0) ? index : best), 0);
+/** The frame in which naming the cause changes most, else the one with the largest raw error: the sensor's noise is no first sight. */
+function opening({ distance_raw: raw, distance_extended: extended }) {
+  const gain = raw.map((error, frame) => (error ?? 0) - (extended?.[frame] ?? error ?? 0));
+  return highest(gain.some((value) => value > 0) ? gain : raw);
+}
+
+const highest = (values) => values.reduce((best, value, index) => ((value ?? 0) > (values[best] ?? 0) ? index : best), 0);
 
 async function start() {
   startTheme();

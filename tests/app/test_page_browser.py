@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from browsing import NEEDS_CHROMIUM, Page
 
 from app.settings import Settings
@@ -30,6 +31,20 @@ def test_page_opens_on_the_verdict_and_the_worst_frame(page: Page, tmp_path: Pat
     assert page.frame == 2
     page.page.screenshot(path=tmp_path / "page.png")
     assert (tmp_path / "page.png").stat().st_size > 50_000
+
+
+def test_page_opens_where_naming_the_cause_changes_most_not_where_the_sensor_is_noisiest(
+    browser: Any, serve: Any, place: Any, run_name: str
+) -> None:
+    path = place.runs / run_name / "replays" / "drag-01.npz"
+    with np.load(path) as stored:
+        kept = {name: stored[name] for name in stored.files}
+    noisy, without = np.array([1, 6, 1, 4, 2]) * 1e-4, np.array([1, 6, 1, 1, 2]) * 1e-4
+    np.savez(path, **{**kept, "distance_raw": noisy, "distance_extended": without})
+    with serve(place.settings) as client, browser.new_context() as context:
+        page = Page(context.new_page(), client)
+        page.open()
+        page.until(lambda: page.settled()["view"]["sequence"] == "drag-01" and page.frame == 3)
 
 
 def test_panel_says_what_the_data_can_tell(page: Page) -> None:
