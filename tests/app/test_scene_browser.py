@@ -107,6 +107,6 @@ def test_views_stills_and_clips(page: Page, tmp_path: Path) -> None:
 
     page.page.route("**/still.png*", hold)
     page.page.click("#clip")
+    page.until(lambda: bool(held))
     page.page.get_by_role("button", name="Cancel").click()
     page.until(lambda: page.page.is_hidden("#clip-bar") and page.frame == 0)
-    assert held
