@@ -28,7 +28,8 @@ def _with_unit(text: str, shown: str) -> str:
 def measured(entry: dict[str, Any]) -> tuple[str, str, str]:
     """Value, low and high end of a report's parameter, with as many decimals as tell the ends apart: 1.043, 1.038, 1.048.
 
-    Two digits of the interval's width and of the value at least; an end that is not known is an empty text.
+    Two digits of the interval's width and of the value at least; of a value that its interval dwarfs, of the width alone. An end
+    that is not known is an empty text.
     """
     value, unit = entry["value"], entry.get("unit", "1")
     if not isinstance(value, (int, float)):
@@ -36,10 +37,11 @@ def measured(entry: dict[str, Any]) -> tuple[str, str, str]:
     factor, shown = SHOWN.get(unit, (1.0, unit))
     low, high = (end if isinstance(end, (int, float)) and math.isfinite(end) else None for end in map(entry.get, ("low", "high")))
     width = abs(value) / 5 if low is None or high is None else high - low
-    places = max((1 - math.floor(math.log10(size * factor)) for size in (abs(value), width) if 0 < size < math.inf), default=0)
+    sizes = (abs(value) if abs(value) > width / 100 else 0.0, width)
+    places = max((1 - math.floor(math.log10(size * factor)) for size in sizes if 0 < size < math.inf), default=0)
 
     def told(number: float | None) -> str:
-        return "" if number is None else _with_unit(f"{number * factor:.{min(4, max(0, places))}f}", shown)
+        return "" if number is None else _with_unit(f"{number * factor:z.{min(4, max(0, places))}f}", shown)
 
     return told(value), told(low), told(high)
 

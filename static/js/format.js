@@ -14,14 +14,15 @@ export function mm(metres, unit = true) {
   return value.toFixed(Math.abs(value) < 9.995 ? 2 : 1) + (unit ? " mm" : "");
 }
 
-/** A parameter and its interval, with as many decimals as the interval's width deserves. */
+/** A parameter and its interval, with as many decimals as the interval's width deserves; a value that it dwarfs adds none. */
 export function parameter({ value, unit, low, high }) {
   if (typeof value !== "number") return { value: String(value), unit: "", interval: "" };
   const [factor, shown] = UNITS[unit] ?? [1, unit];
   const open = typeof low !== "number" || typeof high !== "number";
   const width = open ? Math.abs(value * factor) / 5 : Math.abs(high - low) * factor;
-  const places = Math.min(4, Math.max(0, 1 - Math.floor(Math.log10(width || 1)), 1 - Math.floor(Math.log10(Math.abs(value * factor) || 1))));
-  const text = (number) => (number * factor).toFixed(places).replace("-", "−");
+  const size = Math.abs(value * factor) > width / 100 ? Math.abs(value * factor) : 0;
+  const places = Math.min(4, Math.max(0, 1 - Math.floor(Math.log10(width || 1)), 1 - Math.floor(Math.log10(size || 1))));
+  const text = (number) => (number * factor).toFixed(places).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
   return { value: text(value), unit: shown, interval: open ? "" : `${text(low)} to ${text(high)}` };
 }
 
