@@ -21,7 +21,7 @@ export function parameter({ value, unit, low, high }) {
   const open = typeof low !== "number" || typeof high !== "number";
   const width = open ? Math.abs(value * factor) / 5 : Math.abs(high - low) * factor;
   const size = Math.abs(value * factor) > width / 100 ? Math.abs(value * factor) : 0;
-  const places = Math.min(4, Math.max(0, 1 - Math.floor(Math.log10(width || 1)), 1 - Math.floor(Math.log10(size || 1))));
+  const places = Math.min(4, Math.max(0, 1 - Math.floor(Math.log10(width || Infinity)), 1 - Math.floor(Math.log10(size || Infinity))));
   const text = (number) => (number * factor).toFixed(places).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
   return { value: text(value), unit: shown, interval: open ? "" : `${text(low)} to ${text(high)}` };
 }
