@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from types import TracebackType
-from typing import ParamSpec, Self, TypeVar
+from typing import Generic, ParamSpec, Self, TypeVar
 
 from core.diagnosis.columns import Wanted
 from core.diagnosis.comparison import Sample
@@ -18,7 +18,7 @@ from core.diagnosis.prediction import Prediction, predict
 from core.diagnosis.traces import Trace, traces_of
 from core.effects import Effect
 from core.meshing import Meshing
-from core.processes import bound_to_parent
+from core.processes import bound_to_parent, giving_memory_back
 from core.replay import Equilibrium
 from core.setup import Setup
 
@@ -36,6 +36,19 @@ def _begin(data: Sequence[Observations]) -> None:
     """Keep the measurements in this process."""
     bound_to_parent()
     _DATA.update({item.name: item for item in data})
+
+
+@dataclass(frozen=True)
+class _Tidily(Generic[P, T]):
+    """A task of a module's top level that leaves its process holding no memory which is not in use."""
+
+    task: Callable[P, T]
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> T:
+        try:
+            return self.task(*args, **kwargs)
+        finally:
+            giving_memory_back()
 
 
 def _task(
@@ -114,7 +127,7 @@ class Workers:
         for number, name in enumerate(names):
             begin = None if starts is None else starts[number].equilibria
             points = None if starts is None or not same_points else starts[number].samples or None
-            future = self._pool.submit(_task, name, setup, grid, wanted, begin, points, tolerance)
+            future = self._pool.submit(_Tidily(_task), name, setup, grid, wanted, begin, points, tolerance)
             pending.append(Pending(future, points))
         return pending
 
@@ -123,10 +136,10 @@ class Workers:
     ) -> list[Future[list[Trace]]]:
         """Begin the traces of these effects in these sequences, whose replays without them are `plain`."""
         return [
-            self._pool.submit(_trace, name, setup, grid, item.equilibria, item.samples, effects)
+            self._pool.submit(_Tidily(_trace), name, setup, grid, item.equilibria, item.samples, effects)
             for name, item in zip(names, plain, strict=True)
         ]
 
     def run(self, task: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Begin any other task of a module's top level."""
-        return self._pool.submit(task, *args, **kwargs)
+        return self._pool.submit(_Tidily(task), *args, **kwargs)

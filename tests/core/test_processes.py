@@ -10,7 +10,10 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from core.processes import giving_memory_back
 
 MAKER = """
 import sys
@@ -43,6 +46,21 @@ def test_making_that_is_killed_leaves_no_process_behind(tmp_path: Path) -> None:
     finally:
         for process in _session(maker.pid):
             os.kill(process, signal.SIGKILL)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc, and tells glibc")
+def test_freed_arrays_below_one_in_use_are_given_back() -> None:
+    arrays = [np.ones(10_000) for _ in range(2000)]
+    del arrays[:-1]
+    before = _resident()
+    giving_memory_back()
+    assert before - _resident() > 0.5 * 2000 * arrays[-1].nbytes
+
+
+def _resident() -> int:
+    """Memory of this process [bytes]."""
+    rows = Path("/proc/self/smaps_rollup").read_text().splitlines()
+    return 1024 * next(int(row.split()[1]) for row in rows if row.startswith("Rss:"))
 
 
 def _within(seconds: float, holds: Callable[[], bool]) -> bool:
