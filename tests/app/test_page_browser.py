@@ -44,7 +44,8 @@ def test_page_opens_where_naming_the_cause_changes_most_not_where_the_sensor_is_
     with serve(place.settings) as client, browser.new_context() as context:
         page = Page(context.new_page(), client)
         page.open()
-        page.until(lambda: page.settled()["view"]["sequence"] == "drag-01" and page.frame == 3)
+        assert page.settled()["view"]["sequence"] == "drag-01"
+        assert page.frame == 3
 
 
 def test_panel_says_what_the_data_can_tell(page: Page) -> None:
