@@ -62,7 +62,8 @@ def keeping_memory() -> None:
 def giving_memory_back() -> None:
     """Give what this process has freed back to the system (glibc; elsewhere nothing), for after work whose arrays differ in size.
 
-    Between them glibc keeps what lies below any array that is still in use: a third of what a worker of a diagnosis held.
+    Between them glibc keeps what lies below any array that is still in use: a tenth to a third of what a diagnosis'
+    worker held.
     """
     if os.name == "posix" and os.uname().sysname == "Linux":
         trim = getattr(ctypes.CDLL(None), "malloc_trim", None)

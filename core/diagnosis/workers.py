@@ -127,7 +127,7 @@ class Workers:
         for number, name in enumerate(names):
             begin = None if starts is None else starts[number].equilibria
             points = None if starts is None or not same_points else starts[number].samples or None
-            future = self._pool.submit(_Tidily(_task), name, setup, grid, wanted, begin, points, tolerance)
+            future = self.run(_task, name, setup, grid, wanted, begin, points, tolerance)
             pending.append(Pending(future, points))
         return pending
 
@@ -136,10 +136,10 @@ class Workers:
     ) -> list[Future[list[Trace]]]:
         """Begin the traces of these effects in these sequences, whose replays without them are `plain`."""
         return [
-            self._pool.submit(_Tidily(_trace), name, setup, grid, item.equilibria, item.samples, effects)
+            self.run(_trace, name, setup, grid, item.equilibria, item.samples, effects)
             for name, item in zip(names, plain, strict=True)
         ]
 
     def run(self, task: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Begin any other task of a module's top level."""
+        """Begin a task of a module's top level."""
         return self._pool.submit(_Tidily(task), *args, **kwargs)
