@@ -91,6 +91,22 @@ class Observations:
         """When a group's frames were taken, on the robot's clock [s]; None for the rest cloud."""
         return float(self.times[list(group.frames)].mean()) - setup.sensor.time_offset if group.frames else None
 
+    def holds_together(self, setup: Setup) -> bool:
+        """Whether under this setup's clock every frame was taken about where its group is replayed.
+
+        That is within TRAVEL of the group's place, or with the tool out of touch where it is said to be clear of the block.
+        """
+        if self.unseen:
+            return True
+        places = setup.phantom_from_robot.apply(smooth_centres(self.kinematics, self.times - setup.sensor.time_offset))
+        for group, centre in zip(self.groups, self.centres(setup), strict=True):
+            own = places[list(group.frames)]
+            if group.free and (clear_of(setup.box.size, own) < setup.tool.radius).any():
+                return False
+            if not group.free and (np.linalg.norm(own - centre, axis=1) > TRAVEL).any():
+                return False
+        return True
+
     def way(self, setup: Setup) -> tuple[FloatArray, FloatArray]:
         """Times (t,) [s] of the recording, on the robot's clock, and stated tool centres (t, 3) [m], phantom frame."""
         times = np.arange(self.times[0], self.times[-1], _TURN_STEP) - setup.sensor.time_offset
@@ -159,15 +175,16 @@ def _thin(runs: list[list[int]], free: np.ndarray, most: int) -> list[list[int]]
 def observe(
     sequence: Sequence, setup: Setup, cleaner: Cleaner, shaft: FloatArray | None, most: int, rest: FloatArray | None = None
 ) -> Observations:
-    """Group a sequence's frames and clean their clouds.
+    """Group a sequence's frames by where the tool was under the setup's clock, and clean their clouds.
 
     Args:
         most: groups with the tool near the block, at most. rest: the raw rest cloud, which becomes the first group.
     """
     kinematics, times = sequence.kinematics, np.asarray(sequence.cloud_times)
-    centres = setup.phantom_from_robot.apply(smooth_centres(kinematics, times))
+    instants = times - setup.sensor.time_offset
+    centres = setup.phantom_from_robot.apply(smooth_centres(kinematics, instants))
     free = clear_of(setup.box.size, centres) > setup.tool.radius + CLEARANCE
-    poses = tool_poses(kinematics, times, setup.phantom_from_robot, shaft)
+    poses = tool_poses(kinematics, instants, setup.phantom_from_robot, shaft)
     groups = [Group((), rest[cleaner.clean(rest).indices], True, True, lowest=cleaner.lowest)] if rest is not None else []
     probes = np.cumsum(np.diff(free.astype(int), prepend=1) < 0)
     runs = _thin(_split(centres, free, times), free, most)

@@ -96,7 +96,16 @@ class Workers:
         # One thread each: the processes are the parallelism, and small factorisations only lose by sharing cores.
         for name in _THREADS:
             os.environ.setdefault(name, "1")
-        self._pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _begin, (data,))
+        self._count = count
+        self._pool = self._started(data)
+
+    def _started(self, data: Sequence[Observations]) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(self._count, multiprocessing.get_context("spawn"), _begin, (data,))
+
+    def hold(self, data: Sequence[Observations]) -> None:
+        """Keep other measurements from now on, in new processes: what the old ones are doing is still done."""
+        self._pool.shutdown(wait=True)
+        self._pool = self._started(data)
 
     def __enter__(self) -> Self:
         return self

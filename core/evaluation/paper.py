@@ -69,7 +69,7 @@ def run_paper(
     best = dataset.config.young_modulus if flat else coarse["best"]["values"][_NAME]  # of a flat search any modulus is the best
     near = (max(COARSE[0], best / 10**0.5), best * 10**0.5)
     fine = _search(dataset, folder / "fine", near, FINE_STEPS, request.frames, store, workers, part(report, 0.08, 0.18))
-    bench = Bench.of(dataset, part(report, 0.18, 0.2))
+    bench = Bench.of(dataset, report=part(report, 0.18, 0.2))
     rows = []
     for number, modulus in enumerate(request.moduli):
         low, width = 0.2 + 0.8 * number / len(request.moduli), 0.8 / len(request.moduli)

@@ -7,7 +7,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -75,8 +75,11 @@ class Bench:
     grid: Meshing
 
     @classmethod
-    def of(cls, dataset: Dataset, report: Report = silent) -> Bench:
-        """Reads the clouds; DiagnosisError where no test sequence has any."""
+    def of(cls, dataset: Dataset, asked: Asked | None = None, report: Report = silent) -> Bench:
+        """Reads the clouds, and groups them by the clock of the best model that is asked for.
+
+        Raises DiagnosisError where no test sequence has clouds.
+        """
         tested = [name for name in dataset.config.test if len(dataset.sequence(name))]
         if not tested:
             raise DiagnosisError(
@@ -85,7 +88,9 @@ class Bench:
         report(0.0, "relating robot, camera and phantom")
         dataset, registration = as_it_stood(dataset, register(dataset))
         stated, mended = setup_from(dataset, registration), registration.mended
-        data = observe_each(dataset, tested, setup_from(dataset, mended), mended, (TEST_GROUPS, TEST_FELT), part(report, 0.1, 1.0))
+        *_, believed = _setups(stated, asked or Asked()).values()
+        seen_from = replace(setup_from(dataset, mended), sensor=believed.sensor)
+        data = observe_each(dataset, tested, seen_from, mended, (TEST_GROUPS, TEST_FELT), part(report, 0.1, 1.0))
         trained = kinds_in(dataset, (*dataset.config.train, *dataset.config.validation), stated)
         kinds = kinds_of_pushes(dataset, data, stated)
         return cls(dataset, stated, data, kinds, trained, PAGE_GRID.for_tool(stated.tool.radius))
@@ -134,7 +139,7 @@ def evaluate(
     if out.exists():
         raise RunError(f"{out} exists already; name another folder or move it away", file=str(out))
     networks = {name: Network.load(folder, asked.feedback) for name, folder in asked.networks.items()}
-    bench = Bench.of(dataset, part(report, 0.0, 0.2))
+    bench = Bench.of(dataset, asked, part(report, 0.0, 0.2))
     steps = [Step(name, MODELS[name], setup, _own(name, networks)) for name, setup in _setups(bench.stated, asked).items()]
     climbed = bench.climb(steps, workers=workers, seed=seed, report=part(report, 0.2, 0.95))
     found = {"format": 1, "dataset": dataset.name, "folder": dataset.path.resolve().name, "split": "test", **climbed}

@@ -137,6 +137,18 @@ def test_time_offset_moves_the_centres_back_along_the_path(sequence):
     assert np.abs(late - item.centres(SETUP)).max() > 1e-3
 
 
+def test_frames_near_one_another_by_one_clock_are_not_by_another(sequence):
+    late = replace(SETUP, sensor=Sensor(time_offset=0.12))
+    stated, found = _observed(sequence), observe(sequence, late, CLEANER, None, 100)
+    assert stated.holds_together(SETUP) and not stated.holds_together(late)
+    assert found.holds_together(late) and not found.holds_together(SETUP)
+    moved = _two_pushes(np.arange(FRAMES) / RATE - 0.12)
+    for group in found.groups:
+        here = moved[list(group.frames)]
+        assert ((clear_of(SIZE, here) > 6.5e-3) == group.free).all()
+        assert group.free or np.linalg.norm(here - here[0], axis=1).max() < TRAVEL
+
+
 def test_centres_follow_the_robots_registration(sequence):
     item = _observed(sequence)
     motion = small_motion(np.array([1e-3, 0.0, -2e-3, 0.0, 0.02, 0.0]), np.array([0.0, 0.0, TOP]))
