@@ -13,6 +13,9 @@ from core.blind import summary_of
 from core.blind.cases import scenario_of
 from core.effects import DIAGNOSED, from_json
 
+pytestmark = pytest.mark.timeout(2400)
+"""The first test waits for both diagnoses: on two busy cores that are slow, too, one takes a quarter of an hour."""
+
 
 def test_effect_that_was_drawn_is_named(loop: Loop) -> None:
     found = loop.found
