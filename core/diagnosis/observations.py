@@ -84,8 +84,12 @@ class Observations:
 
     def centres(self, setup: Setup) -> FloatArray:
         """Stated tool centre (g, 3) [m] of each group, phantom frame, under the setup's clock and registration."""
-        poses = setup.phantom_from_robot.apply(smooth_centres(self.kinematics, self.times - setup.sensor.time_offset))
-        return np.array([poses[list(g.frames)].mean(axis=0) if g.frames else FAR for g in self.groups])
+        places = self._places(setup)
+        return np.array([places[list(g.frames)].mean(axis=0) if g.frames else FAR for g in self.groups])
+
+    def _places(self, setup: Setup) -> FloatArray:
+        """The same (f, 3) [m] of each frame."""
+        return setup.phantom_from_robot.apply(smooth_centres(self.kinematics, self.times - setup.sensor.time_offset))
 
     def instant(self, group: Group, setup: Setup) -> float | None:
         """When a group's frames were taken, on the robot's clock [s]; None for the rest cloud."""
@@ -98,7 +102,7 @@ class Observations:
         """
         if self.unseen:
             return True
-        places = setup.phantom_from_robot.apply(smooth_centres(self.kinematics, self.times - setup.sensor.time_offset))
+        places = self._places(setup)
         for group, centre in zip(self.groups, self.centres(setup), strict=True):
             own = places[list(group.frames)]
             if group.free and (clear_of(setup.box.size, own) < setup.tool.radius).any():
