@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from pathlib import Path
 
 from rich.console import Console
@@ -36,5 +37,8 @@ def test_pair_that_leaves_a_hundredth_is_kept() -> None:
 
 
 def test_rows_that_leave_nothing_significant_are_only_counted() -> None:
-    lines = _printed("suite-1400-replaced.jsonl")
-    assert "5 rows that name a cause" in lines[0] and sum(line.startswith("│") for line in lines) == 2
+    name = "suite-1400-replaced.jsonl"  # it grows with each row of the suite that is done again
+    reports = [json.loads(line)["report"] for line in (KEPT / name).read_text().splitlines()]
+    lines = _printed(name)
+    assert f"{sum(bool(one['causes']) for one in reports)} rows that name a cause" in lines[0]
+    assert sum(line.startswith("│") for line in lines) == 2
