@@ -184,6 +184,61 @@ def _threads(count: int) -> Iterator[None]:
         torch.set_num_threads(before)
 
 
+def _on_card() -> list[Table]:
+    """The same step on CUDA beside the processor's gradient; nothing where there is no card."""
+    if not torch.cuda.is_available():
+        return []
+    table = Table(
+        "network", "batch", "gradients differ", "samples/s", "bfloat16", title=f"correction on {torch.cuda.get_device_name()}"
+    )
+    for kind in ("unet2d", "unet3d"):
+        for count in (BATCH, 8 * BATCH):
+            table.add_row(*_card_row(kind, count))
+    return [table]
+
+
+def _card_row(kind: str, count: int) -> tuple[str, ...]:
+    body = Body.top(SIZE, NODES) if kind == "unet2d" else Body.block(SIZE, NODES)
+    batch, gradients = samples_of(body, count), []
+    for place in ("cpu", "cuda"):
+        network = build(NetworkSpec(kind=kind), body).to(place)  # type: ignore[arg-type]
+        with torch.no_grad():
+            network.inside.last.weight.copy_(0.02 * torch.randn(network.inside.last.weight.shape, generator=_drawn()))
+        loss, here = SurfaceLoss(body, np.ones(len(body.rest)), hold=0.0, device=place), batch.to(torch.device(place))
+        with torch.backends.cudnn.flags(allow_tf32=False):
+            gradients.append(_gradient(network, loss(network(here.positions, here.tool), here, here.positions).total).cpu())
+    apart = float((gradients[1] - gradients[0]).norm() / gradients[0].norm())
+    if not apart < _AGREE:
+        raise RuntimeError(f"{kind}: gradients of card and processor differ by {apart:.2g}, under {_AGREE:g} is wanted")
+    optimizer, rates = torch.optim.Adam(network.parameters(), 1e-6, fused=True), []
+    for mixed in (False, True):
+
+        def total(mixed: bool = mixed) -> Tensor:
+            with torch.autocast("cuda", torch.bfloat16, enabled=mixed):
+                corrected = network(here.positions, here.tool)
+            return loss(corrected.float(), here, here.positions).total
+
+        rates.append(_card_rate(optimizer, total, count))
+    return (kind, str(count), f"{apart:.1e}", *(f"{rate:.0f}" for rate in rates))
+
+
+def _drawn() -> torch.Generator:
+    return torch.Generator().manual_seed(0)
+
+
+def _card_rate(optimizer: torch.optim.Optimizer, total: Callable[[], Tensor], count: int) -> float:
+    """Samples per second on the wall: the work has ended when the card says so."""
+    for steps in (STEPS, 5 * STEPS):
+        torch.cuda.synchronize()
+        began = time.perf_counter()
+        for _ in range(steps):
+            optimizer.zero_grad(set_to_none=True)
+            total().backward()
+            optimizer.step()
+        torch.cuda.synchronize()
+    return steps * count / (time.perf_counter() - began)
+
+
 def run() -> list[Table]:
     """One thread, and frames on two as well; RuntimeError where a result is wrong."""
     with _threads(1):
@@ -194,4 +249,4 @@ def run() -> list[Table]:
         )  # fmt: skip
         for kind in ("unet2d", "unet3d"):
             table.add_row(*_row(kind))
-        return [table]
+        return [table, *_on_card()]

@@ -3,15 +3,19 @@
 Twelve sequences at 30 frames a second: eight to learn from, two that stop the training, two to test on. What is simulated is the
 stated block; what is measured is a block whose tool is larger and that sags, replayed by the same engine on another mesh (the
 virtual bench makes another engine's data, but not 20 000 frames of it in minutes). FOLDER keeps the samples, and a training that
-was stopped goes on.
+was stopped goes on. `--device cuda` trains on a card.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import time
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -70,8 +74,9 @@ def _cloud(frame: Equilibrium, rng: np.random.Generator) -> tuple[FloatArray, in
     return points + rng.normal(0, NOISE, (POINTS, 1)) * rays / np.linalg.norm(rays, axis=1)[:, None], int(upper)
 
 
-def _sequence(folder: Path, name: str, frames: int, body: Body) -> int:
+def _sequence(folder: Path, body: Body, named: tuple[str, int]) -> int:
     """Write one sequence; returns how many frames of it have an equilibrium in both blocks."""
+    name, frames = named
     (folder / name).mkdir(parents=True)
     arrays, row, rng = Arrays(folder / name, frames, len(body.rest), POINTS), 0, np.random.default_rng([5, *name.encode()])
     blocks = [Replay(STATED, GridSpec(nodes=NODES), 1e-3), Replay(TRUE, GridSpec(nodes=(13, 7, 7), spacing=2.5e-3), 1e-3)]
@@ -94,9 +99,10 @@ def _made(folder: Path, console: Console) -> Samples:
     """The samples, made where they are not there yet."""
     if (folder / "samples.json").exists():
         return open_samples(folder)
-    body, made = Body.block(SIZE, NODES), {}
-    for name, frames in _names().items():
-        made[name] = _sequence(folder, name, frames, body)
+    body, wanted = Body.block(SIZE, NODES), _names()
+    with ProcessPoolExecutor(min(len(wanted), os.cpu_count() or 1), mp_context=get_context("spawn")) as pool:
+        made = dict(zip(wanted, pool.map(partial(_sequence, folder, body), wanted.items()), strict=True))
+    for name, frames in wanted.items():
         console.print(f"{name}: {made[name]} of {frames} frames")
     names = list(made)
     about = {
@@ -116,10 +122,12 @@ def main() -> None:
     parser.add_argument("--kind", default="unet2d", choices=["unet2d", "unet3d", "graph"])
     parser.add_argument("--epochs", type=int, default=40)
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--device", default="cpu", help="of torch, such as cuda")
     asked, console = parser.parse_args(), Console()
     samples = _made(asked.folder / "samples", console)
     split = Split.of(samples)
-    spec = TrainingSpec(network=NetworkSpec(kind=asked.kind), hold=0.0, epochs=asked.epochs, device="cpu", threads=asked.threads)
+    network = NetworkSpec(kind=asked.kind)
+    spec = TrainingSpec(network=network, hold=0.0, epochs=asked.epochs, device=asked.device, threads=asked.threads)
     wall, cpu, told = time.monotonic(), time.process_time(), -1
 
     def report(fraction: float, text: str) -> None:
@@ -132,9 +140,10 @@ def main() -> None:
     trained = train(samples, split, spec, asked.folder / asked.kind, report)
     console.print(f"trained on {len(samples.rows(split.train))} samples in {time.monotonic() - wall:.0f} s, "
                   f"{time.process_time() - cpu:.0f} CPU s; best after epoch {trained.about['epoch']}")  # fmt: skip
-    loss = SurfaceLoss(trained.body, samples.seen[trained.body.index])
+    loss = SurfaceLoss(trained.body, samples.seen[trained.body.index], device=asked.device)
     for name in split.test:
-        raw, found = (errors_of(net, loss, trained.body, samples, samples.rows([name])).mean() for net in (None, trained.network))
+        rows = samples.rows([name])
+        raw, found = (errors_of(net, loss, trained.body, samples, rows, asked.device).mean() for net in (None, trained.network))
         console.print(f"{name}: {raw:.3f} mm without, {found:.3f} mm with the network")
 
 
