@@ -96,4 +96,4 @@ def test_what_was_trained_on_a_card_corrects_alike_on_a_processor(samples, tmp_p
         loaded = Trained.load(tmp_path, place)
         loss = SurfaceLoss(trained.body, samples.seen[trained.body.index], device=place)
         errors.append(errors_of(loaded.network, loss, trained.body, samples, rows, place).numpy())
-    assert np.allclose(*errors, rtol=1e-3)
+    assert np.allclose(errors[0], errors[1], rtol=1e-3)
