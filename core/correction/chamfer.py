@@ -152,8 +152,8 @@ def _by_all(points: Tensor, others: Tensor) -> Tensor:
     step = max(1, _ROOM // (points.shape[1] * others.shape[1]))
     for start in range(0, len(points), step):
         part = slice(start, start + step)
-        # Through a matrix product distances below a tenth of a millimetre would be lost, and torch.cdist without one takes twenty
-        # times as long as all the rest of a training step.
+        # Through a matrix product distances below a tenth of a millimetre would be lost, and torch.cdist without one was
+        # 88 to 98 % of a training step on an H200.
         here, there = points[part, :, None], others[part, None]
         apart = (here[..., 0] - there[..., 0]).square_()
         for axis in (1, 2):
