@@ -8,17 +8,13 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from core.synthetic import HiddenEffect, Scenario, make_dataset
+from swept import write_swept_phantom
 
 
 @pytest.fixture(scope="module")
 def phantom(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Its tool is larger than stated."""
-    folder = tmp_path_factory.mktemp("swept") / "phantom"
-    hidden = HiddenEffect("tool_radius", {"radius": 6e-3})
-    make_dataset(folder, Scenario(effects=(hidden,), sequences=("poke-top-01",)), 3)
-    return folder
+    return write_swept_phantom(tmp_path_factory.mktemp("swept") / "phantom")
 
 
 def palpate(*words: str) -> subprocess.CompletedProcess[str]:

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 from job_working import family, gone
+from swept import write_swept_phantom
 
 from app.client import Client
-from core.synthetic import HiddenEffect, Scenario, make_dataset
 
 POINTS = 300
 
@@ -24,8 +24,7 @@ POINTS = 300
 def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folders of a server with one dataset, whose tool is larger than stated."""
     folder = tmp_path_factory.mktemp("killed")
-    hidden = HiddenEffect("tool_radius", {"radius": 6e-3})
-    make_dataset(folder / "datasets" / "phantom", Scenario(effects=(hidden,), sequences=("poke-top-01",)), 3)
+    write_swept_phantom(folder / "datasets" / "phantom")
     return folder
 
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import httpx
 import pytest
+from swept import write_swept_phantom
 
 from app.settings import Settings
-from core.synthetic import HiddenEffect, Scenario, make_dataset
 
 ASKED: dict[str, Any] = {
     "dataset": "phantom",
@@ -24,8 +24,7 @@ ASKED: dict[str, Any] = {
 def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folders of a server with one dataset, whose tool is larger than stated."""
     folder = tmp_path_factory.mktemp("swept")
-    hidden = HiddenEffect("tool_radius", {"radius": 6e-3})
-    make_dataset(folder / "datasets" / "phantom", Scenario(effects=(hidden,), sequences=("poke-top-01",)), 3)
+    write_swept_phantom(folder / "datasets" / "phantom")
     return folder
 
 

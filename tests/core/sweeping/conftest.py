@@ -5,14 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
-from core.synthetic import HiddenEffect, Scenario, make_dataset
+from swept import write_swept_phantom
 
 
 @pytest.fixture(scope="session")
 def phantom(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Pushes from above by a ball of 6 mm that is stated to have 5 mm."""
-    folder = tmp_path_factory.mktemp("sweeping") / "phantom"
-    hidden = HiddenEffect("tool_radius", {"radius": 6e-3})
-    make_dataset(folder, Scenario(effects=(hidden,), sequences=("poke-top-01",)), 3)
-    return folder
+    return write_swept_phantom(tmp_path_factory.mktemp("sweeping") / "phantom")
