@@ -1,0 +1,34 @@
+"""What the README says of the blind suite is what its kept rows say."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from core.blind import read_results, summary_of
+
+ROOT = Path(__file__).parents[3]
+SEED = 1400
+
+
+@pytest.fixture(scope="module")
+def told() -> str:
+    return re.sub(r"\s+", " ", (ROOT / "README.md").read_text())
+
+
+def test_readme_has_the_figures_of_the_rows(told: str) -> None:
+    rows = read_results(ROOT / "benchmarks" / "blind" / f"suite-{SEED}.jsonl")
+    reached = {target["key"]: target["reached"] for target in summary_of(rows, SEED)["targets"]}
+    assert f"first {len(rows)} of its 200 cases with seed {SEED}" in told
+    for key in ("clear.first", "limit_clear.first", "subtle.first", "pair.exact"):
+        found = reached[key]
+        share = f"{100 * found['low']:.0f} to {100 * found['high']:.0f} %"
+        assert f"in {found['hits']} of {found['n']} ({share})" in told, key
+    nothing, outside, held = reached["control.named"], reached["outside.right"], reached["coverage"]
+    assert f"nothing is named in {nothing['n'] - nothing['hits']} of {nothing['n']} " in told
+    assert f"{outside['hits']} of {outside['n']} causes outside the catalogue" in told
+    assert f"hold the truth in {held['hits']} of {held['n']}," in told
+    assert f"probabilities are {100 * reached['calibration']['value']:.1f} % off" in told
+    assert f"removes {100 * reached['removed']['value']:.0f} % of the reducible error" in told
