@@ -16,6 +16,7 @@ from core.axes import even_axis, graded_axis
 from core.errors import MeshError
 from core.fem.elements import HEXAHEDRA
 from core.frames import FloatArray
+from core.interpolation import grid_shapes, weighted_nodes
 from core.meshing import FINER, Connectivity, IntArray, Meshing
 
 if TYPE_CHECKING:
@@ -205,21 +206,15 @@ class BoxMesh:
 
     def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """Elements' nodes and shape functions (m, a) at rest positions (m, 3) [m]; outside is moved to the block."""
-        first, parts = [], []
+        first, along = np.empty((3, len(points)), dtype=np.int64), np.empty((3, self.order + 1, len(points)))
         for axis, coordinates in enumerate(self.axes):
             ends = coordinates[:: self.order]
             value = np.clip(points[:, axis], ends[0], ends[-1])
             index = np.clip(np.searchsorted(ends, value, side="right") - 1, 0, len(ends) - 2)
-            first.append(index * self.order)
+            first[axis] = index * self.order
             local = (value - ends[index]) / (ends[index + 1] - ends[index])
-            parts.append([1 - local, local] if self.order == 1 else _quadratic(local))
-        nodes, weights, steps = [], [], range(self.order + 1)
-        for dz in steps:
-            for dy in steps:
-                for dx in steps:
-                    nodes.append(self._numbers[first[2] + dz, first[1] + dy, first[0] + dx])
-                    weights.append(parts[0][dx] * parts[1][dy] * parts[2][dz])
-        return np.stack(nodes, axis=1), np.stack(weights, axis=1)
+            along[axis] = [1 - local, local] if self.order == 1 else _quadratic(local)
+        return grid_shapes(first, along, *self.shape[:2])
 
     def shapes_along(self, axis: int, at: FloatArray) -> FloatArray:
         """Shape functions (p, n) of the nodes along one axis at coordinates (p,) [m] within the block."""
@@ -234,7 +229,7 @@ class BoxMesh:
     def interpolate(self, field: FloatArray, points: FloatArray) -> FloatArray:
         """A nodal field (n, c) at rest positions (m, 3) [m]."""
         nodes, weights = self.locate(points)
-        return np.asarray(np.einsum("ma,mac->mc", weights, field[nodes]))
+        return weighted_nodes(nodes, weights, field)
 
 
 def box_mesh(size: tuple[float, float, float], grid: GridSpec, focus: FloatArray | None = None) -> BoxMesh:

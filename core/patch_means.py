@@ -10,7 +10,7 @@ import numpy as np
 from core.frames import FloatArray
 from core.mesh import IntArray
 
-__all__ = ["MaskArray", "PatchMeans", "patch_means", "plain_means", "within_spread"]
+__all__ = ["MaskArray", "PatchMeans", "patch_means", "patch_medians", "plain_means", "within_spread"]
 
 MaskArray = np.ndarray[Any, np.dtype[np.bool_]]
 
@@ -24,6 +24,15 @@ class PatchMeans:
     spread: FloatArray
 
 
+def patch_medians(values: FloatArray, patch: IntArray, patches: int) -> FloatArray:
+    """Medians (p,) of values (m,) by patch (m,); NaN where there are none."""
+    order, count = np.lexsort((values, patch)), np.bincount(patch, minlength=patches)
+    found, seen, first = np.full(patches, np.nan), count > 0, np.cumsum(count) - count
+    lower, upper = (order[first[seen] + (count[seen] - less) // 2] for less in (1, 0))
+    found[seen] = (values[lower] + values[upper]) / 2
+    return found
+
+
 def within_spread(values: FloatArray, patch: IntArray, patches: int) -> MaskArray:
     """Which values (m,) lie within four robust deviations of their patch's median; one deviation for all patches.
 
@@ -32,14 +41,14 @@ def within_spread(values: FloatArray, patch: IntArray, patches: int) -> MaskArra
     """
     if not len(values):
         return np.zeros(0, dtype=bool)
-    centre, apart = np.zeros(patches), list[FloatArray]()
     order = np.argsort(patch, kind="stable")
-    edges = np.flatnonzero(np.diff(patch[order])) + 1
-    for name, group in zip(patch[order][np.concatenate([[0], edges])], np.split(values[order], edges), strict=True):
-        centre[name] = np.median(group)
-        if len(group) > 1:  # a lone point says nothing of noise
-            apart.append(np.abs(group - np.roll(group, len(group) // 2)))
-    scale = 1.4826 / np.sqrt(2) * float(np.median(np.concatenate(apart))) if apart else np.inf
+    count = np.bincount(patch, minlength=patches)
+    size, first, ordered = count[patch[order]], (np.cumsum(count) - count)[patch[order]], values[order]
+    # Each is compared with the one half a patch's points before it, in a ring; a lone point says nothing of noise.
+    ring = first + (np.arange(len(order)) - first - size // 2) % size
+    apart = np.abs(ordered - ordered[ring])[size > 1]
+    scale = 1.4826 / np.sqrt(2) * float(np.median(apart)) if len(apart) else np.inf
+    centre = patch_medians(values, patch, patches)
     return np.asarray(np.abs(values - centre[patch]) <= 4 * scale)
 
 

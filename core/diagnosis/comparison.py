@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from core.diagnosis.observations import Group
 from core.diagnosis.strays import among_neighbours
 from core.frames import FloatArray
+from core.interpolation import patch_rows
 from core.measurement import Gaps, Surface, gaps, gaps_beside
 from core.mesh import IntArray
 from core.patch_means import PatchMeans, plain_means, within_spread
@@ -109,10 +110,11 @@ def observe(frame: Equilibrium, compared: Compared) -> sp.csr_matrix:
     seen, patches = compared.seen, len(compared.means.mean)
     nodes, weights = frame.mesh.locate(seen.foot)
     share = 1.0 / np.maximum(compared.means.count, 1)[seen.patch]
-    entries = (weights[:, :, None] * seen.normal[:, None, :] * share[:, None, None]).ravel()
-    columns = (3 * nodes[:, :, None] + np.arange(3)).ravel()
-    rows = np.repeat(seen.patch, 3 * nodes.shape[1])
-    return sp.coo_matrix((entries, (rows, columns)), shape=(patches, 3 * len(frame.mesh.nodes))).tocsr()
+    by_patch = np.argsort(seen.patch, kind="stable")
+    ends = np.searchsorted(seen.patch[by_patch], np.arange(patches + 1))
+    count = len(frame.mesh.nodes)
+    entries, columns, rows = patch_rows(nodes[by_patch], weights[by_patch], (seen.normal * share[:, None])[by_patch], ends, count)
+    return sp.csr_matrix((entries, columns, rows), shape=(patches, 3 * count))
 
 
 def choose(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) -> Sample:
@@ -156,7 +158,9 @@ def _met_or_beside(points: FloatArray, camera: FloatArray, frame: Equilibrium, s
     met = gaps(points, camera, frame, surface, everything=True)
     usual = surface.own(sample.foot.astype(float))
     away = np.linalg.norm(met.foot - usual[met.index], axis=1) > JUMP
-    elsewhere = np.concatenate([np.setdiff1d(np.arange(len(points)), met.index), met.index[away]])
+    missed = np.ones(len(points), dtype=bool)
+    missed[met.index] = False
+    elsewhere = np.concatenate([np.flatnonzero(missed), met.index[away]])
     if not len(elsewhere):
         return met
     foot, side = usual[elsewhere], sample.side[elsewhere].astype(np.int64)
@@ -164,7 +168,9 @@ def _met_or_beside(points: FloatArray, camera: FloatArray, frame: Equilibrium, s
     by_ray = np.full(len(points), np.inf)
     by_ray[met.index] = np.abs(met.gap)
     nearer = np.abs(beside.gap) < by_ray[elsewhere] - MUCH_NEARER
-    kept = ~np.isin(met.index, elsewhere[nearer])
+    given_up = np.zeros(len(points), dtype=bool)
+    given_up[elsewhere[nearer]] = True
+    kept = ~given_up[met.index]
     parts = (_taken(met, np.flatnonzero(kept)), _taken(beside, np.flatnonzero(nearer)))
     return Gaps(*(np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(Gaps)))
 

@@ -11,7 +11,7 @@ import numpy as np
 from core.frames import FloatArray
 from core.measurement import Surface
 from core.mesh import IntArray
-from core.patch_means import MaskArray
+from core.patch_means import MaskArray, patch_medians
 
 __all__ = ["among_neighbours"]
 
@@ -36,7 +36,7 @@ def among_neighbours(gap: FloatArray, patch: IntArray, surface: Surface) -> Mask
     if not len(seen):
         return np.ones(0, dtype=bool)
     well = count[seen] >= max(_FEW * float(np.median(count[seen])), _FEWEST)
-    middle = np.array([float(np.median(gap[patch == number])) for number in seen])
+    middle = patch_medians(gap, patch, surface.patches)[seen]
     centres, normals = surface.patch_centres[seen], surface.patch_normals[seen]
     near = (np.linalg.norm(centres[:, None] - centres, axis=2) < _AROUND) & (normals @ normals.T > 0.5) & well
     np.fill_diagonal(near, False)

@@ -33,11 +33,11 @@ _DOUBLES, _INTEGERS = ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_i
 @lru_cache(maxsize=1)
 def _pardiso() -> Any:
     """MKL's entry point. pypardiso looks through the whole environment for the library, for a second or three in each process."""
+    beside = sorted((Path(sys.prefix) / "lib").glob("libmkl_rt.so*"))
+    if beside:  # said before the import, which looks for the library already
+        os.environ.setdefault("PYPARDISO_MKL_RT", str(beside[0]))
     from pypardiso import PyPardisoSolver  # noqa: PLC0415 (heavy)
 
-    beside = sorted((Path(sys.prefix) / "lib").glob("libmkl_rt.so*"))
-    if beside:
-        os.environ.setdefault("PYPARDISO_MKL_RT", str(beside[0]))
     solver = PyPardisoSolver()
     # A factor made by one number of threads and used by another ends the process, as where MKL_NUM_THREADS asks for several and
     # a solve is bounded to one (`core.threads`).

@@ -10,6 +10,7 @@ import numpy as np
 
 from core.fem.elements import EDGES, TET10, shapes_of
 from core.frames import FloatArray
+from core.interpolation import weighted_nodes
 from core.meshing import Connectivity, IntArray
 from core.shape.fixed import BoolArray
 from core.shape.nearest import containing, nearest
@@ -119,4 +120,4 @@ class SolidMesh:
     def interpolate(self, field: FloatArray, points: FloatArray) -> FloatArray:
         """A nodal field (n, c) at rest positions (m, 3) [m]."""
         nodes, weights = self.locate(points)
-        return np.asarray(np.einsum("ma,mac->mc", weights, field[nodes]))
+        return weighted_nodes(nodes, weights, field)
