@@ -199,6 +199,17 @@ class BoxMesh:
         """Nodes at z = 0."""
         return np.asarray(self._numbers[0].ravel())
 
+    @cached_property
+    def near_focus(self) -> IntArray:
+        """Nodes (k,) of the free surface at most two elements from the focus; none of an even grid, which follows no tool."""
+        if all(np.allclose(np.diff(axis), axis[1] - axis[0]) for axis in self.axes):
+            return np.empty(0, dtype=np.int64)
+        middle = [int(np.argmin(np.abs(axis - at))) for axis, at in zip(self.axes, self.focus, strict=True)]
+        x, y, z = (
+            np.flatnonzero(np.abs(np.arange(count) - at) <= 2 * self.order) for count, at in zip(self.shape, middle, strict=True)
+        )
+        return np.intersect1d(self._numbers[np.ix_(z, y, x)], self.free_surface)
+
     @property
     def connectivity(self) -> Connectivity:
         """Shared by all grids of this shape and order."""

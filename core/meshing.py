@@ -58,6 +58,10 @@ class Mesh(Protocol):
     def focus(self) -> FloatArray:
         """Where a mesh that follows the tool is finest (3,) [m]; the same place for all meshes that do not."""
 
+    @property
+    def near_focus(self) -> IntArray:
+        """Nodes (k,) of the free surface around the focus, on which a tool there presses; none where no tool is followed."""
+
     def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """Elements' nodes and shape functions (m, a) at rest positions (m, 3) [m]; outside is moved into the body."""
 

@@ -47,7 +47,7 @@ def factorise_at(block: Replay, frame: Equilibrium) -> BlockModel | None:
     model.expect(frame.mesh.nodes + frame.displacement, (local_probe(frame),))
     state = model.assemble(frame.mesh.nodes + frame.displacement, local_probe(frame))
     try:
-        model.topology.factor.factorise(state.data)
+        model.factorise(state.data)
     except NotPositiveDefinite:
         return None
     return model

@@ -122,7 +122,7 @@ def _look(block: Replay, frames: Sequence[Equilibrium], number: int, time: Timel
     still = replace(frame, mesh=mesh, displacement=frame.mesh.interpolate(frame.displacement, mesh.nodes))
     model = block.model(mesh)
     try:
-        model.topology.factor.factorise(model.assemble(mesh.nodes + still.displacement, None).data)
+        model.factorise(model.assemble(mesh.nodes + still.displacement, None).data)
     except NotPositiveDefinite:
         return None
     return _Look(still, model)

@@ -65,7 +65,7 @@ class Compliance:
             return None
         state = model.assemble(positions, probe, bending=False)
         try:
-            top.factor.factorise(state.data)
+            model.factorise(state.data)
         except NotPositiveDefinite:
             return None
         return cls(model, near, nodes, positions, probe)

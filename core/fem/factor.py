@@ -23,8 +23,11 @@ class Factor(Protocol):
 
     generation: int
 
-    def factorise(self, data: FloatArray) -> None:
-        """Factorise the matrix with these entries of its upper triangle; raises NotPositiveDefinite."""
+    def factorise(self, data: FloatArray, asked: IntArray | None = None) -> None:
+        """Factorise the matrix with these entries of its upper triangle; raises NotPositiveDefinite.
+
+        `answers` between unknowns that are among those `asked` (m,) may be had for less; others are as right.
+        """
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve for one (n,) or several (n, m) right sides with the last factor."""

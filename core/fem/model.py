@@ -153,6 +153,11 @@ class BlockModel:
         self.weight_force = self._weight(setup.load.specific_weight_over_stiffness)
         self._prepare_base(setup)
 
+    def factorise(self, data: FloatArray) -> None:
+        """Factorise a tangent with these entries [m]; raises NotPositiveDefinite."""
+        near = self.topology.unknown[self.mesh.near_focus].ravel()
+        self.topology.factor.factorise(data, near[near >= 0])
+
     def harden(self, hardness: float) -> None:
         """Make the contact so many times as stiff as it is at first [1]."""
         if hardness != self.hardness:
@@ -217,17 +222,9 @@ class BlockModel:
             total += self.carried.energy((positions - self.mesh.nodes)[top.free])
         if probe is not None:
             total += contact_energy(
-                top.surface,
-                self.areas,
-                self.face.shapes,
-                self.face.gradients,
-                positions,
-                probe.centre,
-                probe.radius,
-                False,
-                not self.dense,
-                CONTACT_STIFFNESS,
-            )
+                top.surface, self.areas, self.face.shapes, self.face.gradients, positions, probe.centre, probe.radius, False,
+                not self.dense, CONTACT_STIFFNESS,
+            )  # fmt: skip
             if self.grip is not None:
                 total += self.grip.energy(top.surface, self.face, positions, probe.centre)
         if self.sprung:

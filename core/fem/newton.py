@@ -98,7 +98,7 @@ def _direction(model: BlockModel, probe: Probe | None, positions: FloatArray, st
             data = data.copy()
             data[top.diagonal] += shift * float(np.median(np.abs(data[top.diagonal])))
         try:
-            top.factor.factorise(data)
+            model.factorise(data)
         except NotPositiveDefinite:
             continue
         return -top.factor.solve(state.residual), shift is None

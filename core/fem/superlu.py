@@ -27,8 +27,8 @@ class SuperLUFactor:
         self._lu: SuperLU | None = None
         self.generation = 0
 
-    def factorise(self, data: FloatArray) -> None:
-        """Factorise the matrix with these entries of its upper triangle; raises NotPositiveDefinite."""
+    def factorise(self, data: FloatArray, asked: IntArray | None = None) -> None:
+        """Factorise the matrix with these entries of its upper triangle; raises NotPositiveDefinite. All `asked` cost alike."""
         self.generation += 1
         matrix = sp.csc_matrix((np.asarray(data, dtype=float)[self._source], self._indices, self._starts), shape=self._shape)
         try:

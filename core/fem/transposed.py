@@ -33,7 +33,7 @@ class TransposedTangent:
 
     def __init__(self, model: BlockModel, positions: FloatArray, probe: Probe, beside: Sequence[Beside]) -> None:
         self._top, self._beside = model.topology, beside
-        self._top.factor.factorise(model.assemble(positions, probe).data)
+        model.factorise(model.assemble(positions, probe).data)
 
     def field(self, free: FloatArray) -> FloatArray:
         """Unknowns (u,) at the nodes (n, 3)."""

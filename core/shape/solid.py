@@ -86,6 +86,11 @@ class SolidMesh:
         """Nowhere else in another frame."""
         return np.zeros(3)
 
+    @property
+    def near_focus(self) -> IntArray:
+        """None."""
+        return np.empty(0, dtype=np.int64)
+
     @cached_property
     def _frames(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Bounds (e, 3) twice [m], first corners (e, 3) [m] and the inverses (e, 3, 3) [1/m] that give barycentric coordinates."""

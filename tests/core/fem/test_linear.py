@@ -57,6 +57,57 @@ def test_indefinite_matrix_is_refused_and_the_next_good_one_taken(solver):
     assert np.allclose(_whole(good) @ factor.solve(np.ones(20)), 1.0, atol=1e-12)
 
 
+def _grid(count: int) -> sp.csr_matrix:
+    """Upper triangle of springs along the lines of a cube, each point held a little."""
+    line = sp.diags_array([[1.0] * (count - 1)], offsets=(1,), shape=(count, count))
+    alone = sp.eye_array(count)
+    along = sum(sp.kron(sp.kron(a, b), c) for a, b, c in ((line, alone, alone), (alone, line, alone), (alone, alone, line)))
+    return sp.csr_matrix(6.3 * sp.eye_array(count**3) - along)
+
+
+@EACH
+def test_answers_are_the_inverses_entries_whether_they_were_asked_for_or_not(solver):
+    upper = _grid(9)
+    factor, inverse = factor_of(upper.copy(), solver), np.linalg.inv(_whole(upper))
+    asked, others = np.arange(700, 729), np.array([5, 300, 720])
+    for wanted in (None, asked, others, np.empty(0, dtype=int)):
+        for scale in (1.0, 3.0):
+            factor.factorise(scale * upper.data, wanted)
+            for unknowns in (asked, asked[4:9], others, np.arange(695, 710), np.empty(0, dtype=int)):
+                assert np.allclose(scale * factor.answers(unknowns), inverse[np.ix_(unknowns, unknowns)], atol=1e-13)
+            right = np.ones((len(inverse), 2))
+            assert np.allclose(scale * factor.solve(right), inverse @ right, atol=1e-11)
+
+
+def test_what_is_asked_for_is_eliminated_in_the_same_order_whatever_was_asked_before():
+    pardiso = pytest.importorskip("core.fem.pardiso")
+    upper, right = _grid(9), np.random.default_rng(1).normal(size=729)
+    asked, others = np.arange(700, 729), np.arange(50)
+    fresh, used = pardiso.Pardiso(upper.copy()), pardiso.Pardiso(upper.copy())
+    for wanted in (others, None, asked):
+        used.factorise(upper.data, wanted)
+    fresh.factorise(upper.data, asked)
+    assert np.array_equal(fresh.solve(right), used.solve(right))
+    assert np.array_equal(fresh.answers(asked), used.answers(asked))
+
+
+def test_wrong_answers_to_sparse_loads_are_told_and_done_without(monkeypatch, caplog):
+    pardiso = pytest.importorskip("core.fem.pardiso")
+    upper, asked = _grid(7), np.arange(300, 343)
+    factor, inverse = pardiso.Pardiso(upper.copy()), np.linalg.inv(_whole(upper))
+    carry_out = pardiso._Handle.run
+
+    def wrong(handle, phase, right, sparse=pardiso._NONE):
+        found = carry_out(handle, phase, right, sparse)
+        return 1.001 * found if phase == pardiso._SOLVE and len(sparse) else found
+
+    monkeypatch.setattr(pardiso._Handle, "run", wrong)
+    for _ in range(2):
+        factor.factorise(upper.data, asked)
+        assert np.allclose(factor.answers(asked), inverse[np.ix_(asked, asked)], atol=1e-13)
+    assert caplog.text.count("wrong on this machine") == 1
+
+
 @EACH
 def test_two_factors_do_not_disturb_each_other(solver):
     first, second = _chain(15, 2.5), _chain(25, 3.5)
