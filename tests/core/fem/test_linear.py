@@ -59,10 +59,12 @@ def test_indefinite_matrix_is_refused_and_the_next_good_one_taken(solver):
 
 def _grid(count: int) -> sp.csr_matrix:
     """Upper triangle of springs along the lines of a cube, each point held a little."""
-    line = sp.diags_array([[1.0] * (count - 1)], offsets=(1,), shape=(count, count))
-    alone = sp.eye_array(count)
-    along = sum(sp.kron(sp.kron(a, b), c) for a, b, c in ((line, alone, alone), (alone, line, alone), (alone, alone, line)))
-    return sp.csr_matrix(6.3 * sp.eye_array(count**3) - along)
+    number = np.arange(count**3).reshape(count, count, count)
+    pairs = [(number[:-1], number[1:]), (number[:, :-1], number[:, 1:]), (number[:, :, :-1], number[:, :, 1:])]
+    rows, columns = (np.concatenate([pair[end].ravel() for pair in pairs]) for end in (0, 1))
+    entries = np.concatenate([np.full(count**3, 6.3), np.full(len(rows), -1.0)])
+    places = np.concatenate([number.ravel(), rows]), np.concatenate([number.ravel(), columns])
+    return sp.csr_matrix((entries, places), shape=(count**3, count**3))
 
 
 @EACH
