@@ -124,7 +124,7 @@ class Pardiso:
         self._matrix = pattern
         self._idle = np.zeros(pattern.shape[0])
         self.generation = 0
-        self._trusted, self._checked = True, False
+        self._trusted = True
         self._analyse(_NONE)
 
     def _analyse(self, asked: IntArray) -> None:

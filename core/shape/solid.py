@@ -88,7 +88,7 @@ class SolidMesh:
 
     @property
     def near_focus(self) -> IntArray:
-        """None."""
+        """None: it follows no tool."""
         return np.empty(0, dtype=np.int64)
 
     @cached_property

@@ -9,6 +9,7 @@ from core.fem.follow import Follower
 from core.fem.model import BlockModel, Probe
 from core.fem.newton import misfit, solve
 from core.frames import FloatArray
+from core.grading import REPLAY_GRID
 from core.mesh import GridSpec
 from core.replay import Replay
 from core.setup import Box, Setup, Tool
@@ -69,6 +70,17 @@ def test_linearisation_is_given_up_with_its_factor():
     assert compliance is not None and compliance.fits(model)
     model.topology.factor.factorise(model.assemble(positions, probe).data)
     assert not compliance.fits(model)
+
+
+@pytest.mark.parametrize("place", [PLACE, np.array([SIZE[0] / 2 + 5e-3 - 2e-3, 4e-3, 0.02])], ids=["top", "side"])
+def test_what_a_tool_presses_on_is_what_the_graded_mesh_says_is_near(place):
+    block = Replay(SETUP, REPLAY_GRID, 1e-6)
+    frame = block.step(place)
+    compliance = Compliance.at(block.model(frame.mesh), frame.mesh.nodes + frame.displacement, frame.probe)
+    assert frame.in_contact and compliance is not None
+    assert np.isin(compliance._nodes, frame.mesh.near_focus).all()
+    assert len(frame.mesh.near_focus) < 0.1 * len(frame.mesh.nodes)
+    assert not len(GridSpec(nodes=(9, 9, 5), order=2).mesh(SETUP, place).near_focus)
 
 
 def test_tool_that_is_far_away_leaves_nothing_to_linearise():
