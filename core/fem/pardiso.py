@@ -124,7 +124,7 @@ class Pardiso:
         self._matrix = pattern
         self._idle = np.zeros(pattern.shape[0])
         self.generation = 0
-        self._trusted = True
+        self._trusted, self._current = True, False
         self._analyse(_NONE)
 
     def _analyse(self, asked: IntArray) -> None:
@@ -138,15 +138,20 @@ class Pardiso:
         """Factorise the matrix with these entries of its upper triangle; raises NotPositiveDefinite.
 
         `answers` between unknowns that are all among those `asked` (m,) take a fifth of the time; asking for others than the last
-        time takes an analysis.
+        time takes an analysis. The factor there is stays where it is of these very entries.
         """
-        self.generation += 1
         wanted = asked if asked is not None and self._trusted else _NONE
-        if not np.array_equal(wanted, self._asked):
+        same = np.array_equal(wanted, self._asked)
+        if same and self._current and np.array_equal(data, self._matrix.data):
+            return
+        self.generation += 1
+        self._current = False
+        if not same:
             self._forget()
             self._analyse(wanted)
         self._matrix.data[:] = data
         self._handle.run(_FACTORISE, self._idle, self._asked)
+        self._current = True
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve for one (n,) or several (n, m) right sides with the last factor."""

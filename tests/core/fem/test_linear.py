@@ -110,6 +110,20 @@ def test_wrong_answers_to_sparse_loads_are_told_and_done_without(monkeypatch, ca
     assert caplog.text.count("wrong on this machine") == 1
 
 
+def test_factor_stays_while_the_entries_do_and_one_that_there_was_none_of_is_not_taken_for_one():
+    pardiso = pytest.importorskip("core.fem.pardiso")
+    upper, asked = _grid(7), np.arange(300, 343)
+    factor, numbers, indefinite = pardiso.Pardiso(upper.copy()), [], -upper.data
+    for data, wanted in ((upper.data, asked), (upper.data.copy(), asked), (2 * upper.data, asked), (2 * upper.data, None)):
+        factor.factorise(data, wanted)
+        numbers.append(factor.generation)
+        assert np.allclose(data[0] / upper.data[0] * _whole(upper) @ factor.solve(np.ones(343)), 1.0, atol=1e-12)
+    assert numbers == [1, 1, 2, 3]
+    for _ in range(2):
+        with pytest.raises(NotPositiveDefinite):
+            factor.factorise(indefinite)
+
+
 @EACH
 def test_two_factors_do_not_disturb_each_other(solver):
     first, second = _chain(15, 2.5), _chain(25, 3.5)
