@@ -69,7 +69,7 @@ def register(dataset: Folder) -> None:
 def replay(
     dataset: Folder,
     sequence: Annotated[str, typer.Option(help="Which sequence.", show_default=False)],
-    file: Annotated[Path, typer.Option("--out", help="Where the frames go (.npz).", show_default=False)],
+    file: Annotated[Path, typer.Option("--out", dir_okay=False, help="Where the frames go (.npz).", show_default=False)],
     grid: Annotated[str, typer.Option(help="Even nodes along x, y, z, as in 13x5x5; or finest at the tool.")] = "graded",
     registration: Registered = None,
     runs: Annotated[Path, typer.Option(help="Accepted registrations are looked for below this folder.")] = Path("runs"),

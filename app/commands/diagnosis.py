@@ -53,6 +53,7 @@ def diagnose(
     from app.registrations import accepted_for  # noqa: PLC0415 (heavy)
 
     several = len(datasets) > 1
+    _refuse_place(file, run, several)
     _refuse_broken(datasets)
     registered = {path: accepted_for(path, registration, runs) for path in datasets}
     truths = {path: truth_beside(path) for path in datasets}
@@ -160,6 +161,18 @@ def _told(rows: list[dict[str, Any]]) -> Table:
         like = "".join(f"{one['effect']} ({100 * one['share']:.0f} %)" for one in alike)
         table.add_row(row["effect"], limit_phrase(row), like or "nothing else")
     return table
+
+
+def _refuse_place(file: Path | None, run: Path | None, several: bool) -> None:
+    """Before the work, not after it: raise BadParameter where the report could not be written."""
+    if file is None:
+        return
+    if several and file.is_file():
+        raise typer.BadParameter(f"--out {file} is a file; of several datasets it is a folder of their reports")
+    if not several and file.is_dir():
+        raise typer.BadParameter(f"--out {file} is a folder; name a file, such as {file / 'report.json'}")
+    if not several and run is not None and file.resolve() == run.resolve():
+        raise typer.BadParameter(f"--out and --run are both {file}: the one is a file, the other a folder that has the report, too")
 
 
 def _refuse_broken(datasets: list[Path]) -> None:

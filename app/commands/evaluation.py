@@ -36,7 +36,7 @@ def evaluate(
     epochs: Annotated[int, typer.Option(help="At most, of each network that --paper trains.")] = 40,
     features: Annotated[str, typer.Option(help="Of the blocks of these networks.")] = "64,128,256",
     every: Annotated[int, typer.Option(help="Each how many clouds these networks learn from one.")] = 1,
-    file: Annotated[Path | None, typer.Option("--out", help="The result (JSON).")] = None,
+    file: Annotated[Path | None, typer.Option("--out", dir_okay=False, help="The result (JSON).")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of all draws.")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
     runs: Annotated[Path, typer.Option(help="Results go to RUNS/evaluations.")] = Path("runs"),

@@ -15,7 +15,7 @@ __all__ = ["export"]
 
 def export(
     run: Annotated[Path, typer.Argument(help="Folder of a run, as `palpate diagnose --run` keeps it.", show_default=False)],
-    file: Annotated[Path | None, typer.Option("--out", help="The page; RUN.html where you are without it.")] = None,
+    file: Annotated[Path | None, typer.Option("--out", dir_okay=False, help="The page; RUN.html where you are without it.")] = None,
 ) -> None:
     """Write the report of a run as one HTML page that needs nothing but itself: to keep, print or send."""
     from app.report_page import report_page  # noqa: PLC0415 (heavy)

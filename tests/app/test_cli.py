@@ -103,6 +103,25 @@ def test_run_folder_that_exists_is_not_overwritten(palpate: Palpate, dataset: Pa
     assert list((tmp_path / "run").iterdir()) == []
 
 
+@pytest.mark.parametrize("verb", ["diagnose", "evaluate", "replay", "export"])
+def test_result_that_a_folder_is_in_the_way_of_is_refused_before_any_computing(
+    palpate: Palpate, dataset: Path, tmp_path: Path, verb: str
+) -> None:
+    (tmp_path / "there").mkdir()
+    code, _, err = palpate(verb, dataset, "--out", tmp_path / "there")
+    assert code == 2 and re.search("is a (folder|directory)", re.sub(r"[\s│]+", " ", err)) and "Traceback" not in err
+    assert not list((tmp_path / "there").iterdir())
+
+
+def test_reports_of_several_datasets_need_a_folder_and_one_no_run_folder(palpate: Palpate, dataset: Path, tmp_path: Path) -> None:
+    (tmp_path / "there.json").write_text("{}")
+    code, _, err = palpate("diagnose", dataset, write_valid_dataset(tmp_path / "more"), "--out", tmp_path / "there.json")
+    assert code == 2 and "is a file; of several datasets it is a folder" in re.sub(r"[\s│]+", " ", err)
+    code, _, err = palpate("diagnose", dataset, "--out", tmp_path / "new", "--run", tmp_path / "new")
+    assert code == 2 and "--out and --run are both" in err and not (tmp_path / "new").exists()
+    assert (tmp_path / "there.json").read_text() == "{}"
+
+
 def test_serve_refuses_a_token_that_others_may_read(palpate: Any, tmp_path: Path) -> None:
     (tmp_path / "login.json").write_text('{"salt": "00", "scrypt": "00"}')
     (tmp_path / "login.json").chmod(0o644)
