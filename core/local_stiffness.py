@@ -36,7 +36,7 @@ def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray
     shape = (int(model.topology.unknown.max()) + 1, elements * points)
     gather = sp.csr_matrix((forces.reshape(unknown.shape)[used], (unknown[used], column[used])), shape=shape)
     right = gather @ sp.csc_matrix(log_factors.reshape(len(log_factors), -1).T)
-    free = -model.topology.factor.solve(right.toarray())
+    free = -model.topology.factor.approximate(right.toarray())
     if gives(block.setup):
         free = GivingTool(block, frame, model).moved([(block.setup, np.zeros(3))] * len(log_factors), free)
     result[:, model.topology.free] = free.T

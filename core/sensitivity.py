@@ -218,7 +218,7 @@ def displacement_changes(block: Replay, frame: Equilibrium, changes: Sequence[Ch
     model = factorise_at(block, frame) if _holds(block, frame) else None
     if model is None or not changes:
         return result
-    free = model.topology.factor.solve(_unbalanced(block, frame, model, changes)[0])
+    free = model.topology.factor.approximate(_unbalanced(block, frame, model, changes)[0])
     if gives(block.setup, *(setup for setup, _ in changes)):
         free = GivingTool(block, frame, model).moved(changes, free)
     result[:, model.topology.free] = free.T

@@ -86,7 +86,7 @@ class Compliance:
 
     def step(self, model: BlockModel, positions: FloatArray, residual: FloatArray, probe: Probe) -> FloatArray | None:
         """Positions after one step; None when the contact finds no balance."""
-        free = model.topology.factor.solve(residual)
+        free = model.topology.factor.approximate(residual)
         here = positions[self._nodes]
         touched, _ = self._contact(model, here, probe)
         change = self._balance(model, here, probe, self._held @ free[self._unknown] - touched)
@@ -96,7 +96,7 @@ class Compliance:
         moved = positions.copy()
         further = np.zeros_like(residual)
         further[self._unknown] = force - touched - self._share @ change
-        moved[model.topology.free] -= free + model.topology.factor.solve(further)
+        moved[model.topology.free] -= free + model.topology.factor.approximate(further)
         return moved
 
     def _balance(self, model: BlockModel, here: FloatArray, probe: Probe, load: FloatArray) -> FloatArray | None:

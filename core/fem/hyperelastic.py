@@ -17,6 +17,8 @@ __all__ = ["add_forces", "add_matrices", "energy", "project", "scatter"]
 _FUSED = {"contract", "reassoc", "nsz"}
 _LANES = 4
 """Rows of element matrices are padded to a multiple of this, so that whole vectors fill them: twice as fast for 27 nodes."""
+_BLOCKS = 6
+"""Of an element's symmetric matrix, sorted by axes: (0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)."""
 
 
 @njit(cache=True, fastmath=_FUSED, inline="always")
@@ -138,61 +140,80 @@ def add_forces(
                 force[nodes[e, a], i] += own[a, i]
 
 
-@njit(cache=True, fastmath=_FUSED, inline="always")
-def _images(g: Any, f: Any, c: Any, turned: Any, closed: Any, straight: Any) -> None:
-    """F g, cof(F) g and g of each node's gradient g, axis by axis (3, a)."""
-    for a in range(g.shape[0]):
-        g0, g1, g2 = g[a, 0], g[a, 1], g[a, 2]
-        for i in range(3):
-            turned[i, a] = f[3 * i] * g0 + f[3 * i + 1] * g1 + f[3 * i + 2] * g2
-            closed[i, a] = c[3 * i] * g0 + c[3 * i + 1] * g1 + c[3 * i + 2] * g2
-            straight[i, a] = g[a, i]
-
-
 @njit(cache=True, fastmath=_FUSED)
-def _add_point(
-    scale: float, press: float, hardening: float, square: float, det: float, turned: Any, closed: Any, straight: Any, matrix: Any
-) -> None:
-    """Add one point's part to the blocks (i, j >= i) of the element's matrix, whose rows are contiguous over the nodes.
+def _moduli(scale: float, press: float, hardening: float, square: float, det: float, f: Any, c: Any, tensor: Any) -> None:
+    """How the stress changes with F at one point: dP_ik / dF_jl at [3 i + k, 3 j + l], for j >= i.
 
-    With f = F g, c = cof(F) g of each node: scale [(g.g') 1 - 2/(3 J) (f c' + c f') + 5 I1/(9 J^2) c c'] plus what the
-    cofactor's own change brings, (press / J) (c c' - c' c) crosswise, press the factor of cof(F) in the stress, plus
-    hardening d d' with d = f - I1/(3 J) c.
+    It is scale [1 - 2/(3 J) (F C + C F) + 5 I1/(9 J^2) C C] plus what the cofactor's own change brings, (press / J) (C C - C C
+    crosswise), press the factor of C = cof(F) in the stress, plus hardening D D with D = F - I1/(3 J) C.
     """
     deviation = square / (3.0 * det)
     mixed, crossed = -2.0 / 3.0 * scale / det, press / det
     squared = 5.0 / 9.0 * scale * square / (det * det) + crossed
     for i in range(3):
-        for a in range(matrix.shape[2]):
-            hard = hardening * (turned[i, a] - deviation * closed[i, a])
-            by_closed = mixed * turned[i, a] + squared * closed[i, a] - deviation * hard
-            by_turned = mixed * closed[i, a] + hard
-            g0, g1, g2, row = scale * straight[0, a], scale * straight[1, a], scale * straight[2, a], matrix[i, i, a]
-            along = by_closed - crossed * closed[i, a]
-            for b in range(matrix.shape[3]):
-                row[b] += along * closed[i, b] + by_turned * turned[i, b]
-                row[b] += g0 * straight[0, b] + g1 * straight[1, b] + g2 * straight[2, b]
-            for j in range(i + 1, 3):
-                row, across = matrix[i, j, a], crossed * closed[j, a]
-                for b in range(matrix.shape[3]):
-                    row[b] += by_closed * closed[j, b] + by_turned * turned[j, b] - across * closed[i, b]
+        for k in range(3):
+            turned, closed = f[3 * i + k], c[3 * i + k]
+            hard = hardening * (turned - deviation * closed)
+            by_closed = mixed * turned + squared * closed - deviation * hard
+            by_turned = mixed * closed + hard
+            for j in range(i, 3):
+                across = crossed * c[3 * j + k]
+                for m in range(3):
+                    change = by_closed * c[3 * j + m] + by_turned * f[3 * j + m] - across * c[3 * i + m]
+                    tensor[3 * i + k, 3 * j + m] = change
+            tensor[3 * i + k, 3 * i + k] += scale
 
 
 @njit(cache=True, fastmath=_FUSED)
-def _add_volume(weights: Any, modes: Any, bulk: Any, theta: Any, moved: Any, matrix: Any) -> None:
+def _bend(tensor: Any, straight: Any, bent: Any) -> None:
+    """The change of each row (i, k) of the stress that each node's motion along j >= i brings: `bent` (k, ij, a) of a point.
+
+    `straight` (3, a) are the gradients of the nodes' shape functions.
+    """
+    block = 0
+    for i in range(3):
+        for j in range(i, 3):
+            for k in range(3):
+                own, row = tensor[3 * i + k], bent[k, block]
+                by_x, by_y, by_z = own[3 * j], own[3 * j + 1], own[3 * j + 2]
+                for b in range(straight.shape[1]):
+                    row[b] = by_x * straight[0, b] + by_y * straight[1, b] + by_z * straight[2, b]
+            block += 1
+
+
+@njit(cache=True, fastmath=_FUSED)
+def _swell(weight: float, modes: Any, c: Any, straight: Any, moved: Any) -> None:
+    """Add one point's part to the change (m, 3, a) of each mode's theta with each node's motion."""
+    for i in range(3):
+        by_x, by_y, by_z = weight * c[3 * i], weight * c[3 * i + 1], weight * c[3 * i + 2]
+        for m in range(modes.shape[0]):
+            row, share = moved[m, i], modes[m]
+            for b in range(straight.shape[1]):
+                row[b] += share * (by_x * straight[0, b] + by_y * straight[1, b] + by_z * straight[2, b])
+
+
+@njit(cache=True, fastmath=_FUSED)
+def _add_volume(weights: Any, modes: Any, bulk: Any, theta: Any, moved: Any, pressed: Any, blocks: Any) -> None:
     """Add what the pressures' own change brings: sum over m, n of D_mn b_m b_n', b_m (m, 3, a) the change of mode m's theta."""
     for m in range(modes.shape[1]):
+        pressed[:] = 0.0
         for n in range(modes.shape[1]):
             stiffness = 0.0
             for q in range(modes.shape[0]):
                 curvature = 0.5 * bulk[q] * (1.0 + 1.0 / (theta[q] * theta[q]))
                 stiffness += weights[q] * curvature * modes[q, m] * modes[q, n]
+            for j in range(3):
+                for b in range(pressed.shape[1]):
+                    pressed[j, b] += stiffness * moved[n, j, b]
+        for a in range(blocks.shape[0]):
+            block = 0
             for i in range(3):
+                share = moved[m, i, a]
                 for j in range(i, 3):
-                    for a in range(matrix.shape[2]):
-                        share, row = stiffness * moved[m, i, a], matrix[i, j, a]
-                        for b in range(matrix.shape[3]):
-                            row[b] += share * moved[n, j, b]
+                    row = blocks[a, block]
+                    for b in range(pressed.shape[1]):
+                        row[b] += share * pressed[j, b]
+                    block += 1
 
 
 @njit(cache=True, fastmath=_FUSED)
@@ -208,50 +229,55 @@ def add_matrices(
     slots: Any,
     data: Any,
 ) -> None:
-    """Add the energy's tangent over E [m] to `data`; `slots` (e, 3 a, 3 a) as in `assemble_elastic`."""
-    points, corners = weights.shape[1], nodes.shape[1]
+    """Add the energy's tangent over E [m] to `data`; `slots` (e, 3 a, 3 a) as in `assemble_elastic`.
+
+    With G (3 q, a) an element's gradients, its blocks side by side are one product of matrices, G' times what `_bend` makes of G.
+    """
+    points, corners, count = weights.shape[1], nodes.shape[1], modes.shape[2]
     wide = (corners + _LANES - 1) // _LANES * _LANES
     x, f, c, scalars = np.empty((corners, 3)), np.empty((points, 9)), np.empty((points, 9)), np.empty((4, points))
-    turned, closed, straight = np.zeros((3, wide)), np.zeros((3, wide)), np.zeros((3, wide))
-    moved, matrix = np.empty((modes.shape[2], 3, wide)), np.empty((3, 3, corners, wide))
+    tensor, straight, bent = np.empty((9, 9)), np.zeros((points, 3, wide)), np.empty((points, 3, _BLOCKS, wide))
+    moved, pressed, matrix = np.empty((count, 3, wide)), np.empty((3, wide)), np.empty((wide, _BLOCKS * wide))
+    blocks = matrix.reshape(wide, _BLOCKS, wide)
     for e in range(nodes.shape[0]):
         _gather(positions, nodes[e], x)
         _press(gradients[e], weights[e], modes[e], bulk[e], x, f, c, scalars)
-        matrix[:] = 0.0
         moved[:] = 0.0
         for q in range(points):
+            for a in range(corners):
+                for k in range(3):
+                    straight[q, k, a] = gradients[e, q, a, k]
             weight, det, square = weights[e, q], scalars[0, q], _square(f[q])
             root = np.cbrt(det * det)
             harder = _hardening(square, root, stiffening)
             scale = weight * mu[e, q] / root * harder
             hardening = 2.0 * scale * stiffening * harder / root
-            _images(gradients[e, q], f[q], c[q], turned, closed, straight)
             press = weight * scalars[3, q] - scale * square / (3.0 * det)
-            _add_point(scale, press, hardening, square, det, turned, closed, straight, matrix)
-            for m in range(modes.shape[2]):
-                share = weight * modes[e, q, m]
-                for i in range(3):
-                    for b in range(wide):
-                        moved[m, i, b] += share * closed[i, b]
-        _add_volume(weights[e], modes[e], bulk[e], scalars[1], moved, matrix)
-        _scatter_blocks(matrix, slots[e], data)
+            _moduli(scale, press, hardening, square, det, f[q], c[q], tensor)
+            _bend(tensor, straight[q], bent[q])
+            _swell(weight, modes[e, q], c[q], straight[q], moved)
+        np.dot(straight.reshape(3 * points, wide).T, bent.reshape(3 * points, _BLOCKS * wide), matrix)
+        _add_volume(weights[e], modes[e], bulk[e], scalars[1], moved, pressed, blocks[:corners])
+        _scatter_blocks(blocks, slots[e], data)
 
 
-@njit(cache=True, inline="always")
-def _scatter_blocks(matrix: Any, slots: Any, data: Any) -> None:
-    """Write the blocks (i, j >= i, a, b) of a symmetric element matrix where their entries belong."""
-    corners = matrix.shape[2]
-    for i in range(3):
-        for j in range(i, 3):
-            for a in range(corners):
+@njit(cache=True)
+def _scatter_blocks(blocks: Any, slots: Any, data: Any) -> None:
+    """Write the blocks (a, ij, b), j >= i, of a symmetric element matrix where their entries belong."""
+    corners = slots.shape[0] // 3
+    for a in range(corners):
+        block = 0
+        for i in range(3):
+            for j in range(i, 3):
                 for b in range(corners):
                     slot = slots[3 * a + i, 3 * b + j]
                     if slot >= 0:
-                        data[slot] += matrix[i, j, a, b]
+                        data[slot] += blocks[a, block, b]
                     if i != j:
                         slot = slots[3 * b + j, 3 * a + i]
                         if slot >= 0:
-                            data[slot] += matrix[i, j, a, b]
+                            data[slot] += blocks[a, block, b]
+                block += 1
 
 
 @njit(cache=True)

@@ -84,7 +84,7 @@ class Topology:
         self.pattern = pattern
         rows = np.repeat(np.arange(pattern.shape[0]), np.diff(pattern.indptr))
         self.diagonal = np.flatnonzero(rows == pattern.indices)
-        self.factor = factor_of(pattern)
+        self.factor = factor_of(pattern, single=True)
 
 
 @lru_cache(maxsize=5)

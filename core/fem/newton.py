@@ -101,7 +101,7 @@ def _direction(model: BlockModel, probe: Probe | None, positions: FloatArray, st
             model.factorise(data)
         except NotPositiveDefinite:
             continue
-        return -top.factor.solve(state.residual), shift is None
+        return -top.factor.approximate(state.residual), shift is None
     return None
 
 

@@ -46,6 +46,10 @@ class SuperLUFactor:
             raise RuntimeError("nothing has been factorised yet")
         return np.ascontiguousarray(self._lu.solve(np.asarray(right, dtype=float)))
 
+    def approximate(self, right: FloatArray) -> FloatArray:
+        """As `solve`."""
+        return self.solve(right)
+
     def answers(self, unknowns: IntArray) -> FloatArray:
         """The inverse's entries (m, m) between these unknowns (m,)."""
         return self.solve(np.eye(self._shape[0])[:, unknowns])[unknowns]

@@ -124,6 +124,34 @@ def test_factor_stays_while_the_entries_do_and_one_that_there_was_none_of_is_not
             factor.factorise(indefinite)
 
 
+def test_factor_of_single_precision_answers_to_its_own_precision_and_solves_to_a_doubles():
+    pardiso = pytest.importorskip("core.fem.pardiso")
+    upper, asked, right = _grid(9), np.arange(700, 729), np.random.default_rng(3).normal(size=(729, 3))
+    factor, inverse = pardiso.Pardiso(upper.copy(), single=True), np.linalg.inv(_whole(upper))
+    for wanted in (None, asked):
+        for scale in (1.0, 3.0):
+            factor.factorise(scale * upper.data, wanted)
+            near, exact = factor.approximate(right), factor.solve(right)
+            assert 1e-9 < np.abs(scale * near - inverse @ right).max() < 1e-5  # the factor is no double's
+            assert np.abs(scale * exact - inverse @ right).max() < 1e-12
+            assert np.abs(scale * factor.solve(right[:, 0]) - inverse @ right[:, 0]).max() < 1e-12
+            assert np.abs(scale * factor.answers(asked) - inverse[np.ix_(asked, asked)]).max() < 1e-6
+    with pytest.raises(NotPositiveDefinite):
+        factor.factorise(-upper.data)
+
+
+def test_what_single_precision_is_not_enough_for_is_told_and_solved_in_double(caplog):
+    pardiso = pytest.importorskip("core.fem.pardiso")
+    upper = _chain(20_000, 2.0)  # held at its ends alone: the condition number is 1.6e8
+    places, factor = np.arange(1.0, 20_001), pardiso.Pardiso(upper.copy(), single=True)
+    bent = places * (20_001 - places) / 2
+    factor.factorise(upper.data)
+    assert np.abs(factor.solve(np.ones(20_000)) - bent).max() < 1e-6 * bent.max()
+    assert caplog.text.count("too ill-conditioned for single precision") == 1
+    factor.factorise(2 * upper.data)
+    assert np.abs(factor.approximate(np.ones(20_000)) - bent / 2).max() < 1e-6 * bent.max()
+
+
 @EACH
 def test_two_factors_do_not_disturb_each_other(solver):
     first, second = _chain(15, 2.5), _chain(25, 3.5)
