@@ -9,7 +9,7 @@ from numba import njit
 
 from core.frames import FloatArray
 
-__all__ = ["grid_shapes", "patch_rows", "weighted_nodes"]
+__all__ = ["grid_shapes", "means_around", "patch_rows", "weighted_nodes"]
 
 
 @njit(cache=True)
@@ -66,3 +66,42 @@ def patch_rows(nodes: Any, weights: Any, normals: Any, ends: Any, count: int) ->
                     entries[place[node] + i] += weights[m, a] * normals[m, i]
         rows[row + 1] = used
     return entries[:used].copy(), columns[:used].copy(), rows
+
+
+def means_around(places: FloatArray, points: FloatArray, values: FloatArray, reach: float, least: int) -> FloatArray:
+    """Mean (m,) of the values (n,) of points (n, 3) nearer than `reach` to each place (m, 3); NaN where fewer than `least` are."""
+    if not len(points):
+        return np.full(len(places), np.nan)
+    low = points.min(axis=0)
+    cells = ((points - low) / reach).astype(np.int64)
+    shape = cells.max(axis=0) + 1
+    number = (cells[:, 0] * shape[1] + cells[:, 1]) * shape[2] + cells[:, 2]
+    order = np.argsort(number, kind="stable")
+    begins = np.searchsorted(number[order], np.arange(shape.prod() + 1))
+    return np.asarray(_means(places, points[order], values[order], begins, low, shape, reach, least))
+
+
+@njit(cache=True)
+def _means(places: Any, points: Any, values: Any, begins: Any, low: Any, shape: Any, reach: float, least: int) -> Any:
+    """The points are sorted by cubic cells as wide as the reach, those of cell i from begins[i] to begins[i + 1]."""
+    found, first, last = np.full(len(places), np.nan), np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
+    for m in range(len(places)):
+        for i in range(3):
+            cell = int(np.floor((places[m, i] - low[i]) / reach))
+            first[i], last[i] = max(cell - 1, 0), min(cell + 2, shape[i])
+        total, count = 0.0, 0
+        for x in range(first[0], last[0]):
+            for y in range(first[1], last[1]):
+                row = (x * shape[1] + y) * shape[2]
+                if last[2] <= first[2]:
+                    continue
+                for n in range(begins[row + first[2]], begins[row + last[2]]):
+                    far = 0.0
+                    for i in range(3):
+                        far += (places[m, i] - points[n, i]) ** 2
+                    if far < reach * reach:
+                        total += values[n]
+                        count += 1
+        if count >= least:
+            found[m] = total / count
+    return found

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from core.frames import FloatArray
+from core.frames import FloatArray, lengths
 from core.mesh import IntArray
 from core.replay import Equilibrium
 from core.setup import Box, Setup
@@ -168,7 +168,8 @@ class Surface:
         inside = np.minimum(points - low, high - points)
         normal_axis = np.array(["xyz".index(name[1]) for name in SIDES])[side]
         inside[np.arange(len(points)), normal_axis] = np.inf
-        return np.asarray(inside.min(axis=1))
+        x, y, z = inside.T
+        return np.asarray(np.minimum(np.minimum(x, y), z))
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,8 +219,7 @@ def gaps(
         o3d.core.Tensor.from_numpy(moved.astype(np.float32)), o3d.core.Tensor.from_numpy(surface.faces.astype(np.uint32))
     )
     rays = points - camera
-    length = np.linalg.norm(rays, axis=1)
-    rays = rays / length[:, None]
+    rays = rays / lengths(rays)[:, None]
     lines = np.hstack([np.broadcast_to(camera, points.shape), rays]).astype(np.float32)
     cast = scene.cast_rays(o3d.core.Tensor.from_numpy(lines))
     triangle = cast["primitive_ids"].numpy().astype(np.int64)
@@ -229,8 +229,9 @@ def gaps(
     corners = surface.faces[triangle]
     weights = np.stack([1 - u - v, u, v], axis=1)
     foot = np.einsum("ma,mai->mi", weights, surface.vertices[corners])
-    normal = np.cross(moved[corners[:, 1]] - moved[corners[:, 0]], moved[corners[:, 2]] - moved[corners[:, 0]])
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    one, two, three = moved[surface.faces.T]
+    across = np.cross(two - one, three - one)
+    normal = across[triangle] / lengths(across)[triangle][:, None]
     # The triangles are chords of the curved surface; the gap is taken to the finite elements' own point.
     gap = np.einsum("mi,mi->m", points[hit] - frame.move(foot), normal)
     side = surface.side[triangle]

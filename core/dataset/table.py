@@ -98,10 +98,9 @@ def check_increasing(file: str, time: FloatArray) -> None:
 
 def check_coordinates(file: str, points: FloatArray, first_row: int = FIRST_ROW) -> None:
     """Refuse positions (n, 3) [m] with a number that is not finite or lies further out than any bench reaches."""
-    bad = np.flatnonzero(~(np.abs(points) <= LARGEST_COORDINATE).all(axis=1))
-    if len(bad):
-        at = int(bad[0])
-        axis = int(np.flatnonzero(~(np.abs(points[at]) <= LARGEST_COORDINATE))[0])
+    within = np.abs(points) <= LARGEST_COORDINATE
+    if not within.all():
+        at, axis = (int(number) for number in np.argwhere(~within)[0])
         value = float(points[at, axis])
         found = f"{'xyz'[axis]} = {value:g}"
         if math.isfinite(value):

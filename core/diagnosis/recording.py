@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from core.cleaning import Cleaner, tool_poses
 from core.dataset import Sequence as Recording
@@ -16,6 +14,7 @@ from core.diagnosis.inside import Inside
 from core.diagnosis.smoothing import smooth_centres
 from core.fem.newton import Outcome
 from core.frames import FloatArray
+from core.interpolation import means_around
 from core.measurement import Gaps, Surface, gaps
 from core.meshing import Meshing
 from core.metrics import paper_distance
@@ -54,21 +53,12 @@ class Recorded:
 
 def _vertex_errors(seen: Gaps, surface: Surface) -> FloatArray:
     """Mean gap (v,) [m] of the points around each material vertex on its own side; NaN where too few were seen."""
-    errors = np.full(len(surface.vertices), np.nan)
-    if not len(seen.gap):
-        return errors
     # Points on another side of an edge are near in space but say nothing of this side.
-    lift = 0.05
-    side_of = np.zeros(len(surface.vertices))
-    side_of[surface.faces.ravel()] = np.repeat(surface.side, 3)
-    # Many points at once, each found once: what a careful tree saves in the search, making it costs.
-    tree = cKDTree(np.column_stack([seen.foot, lift * seen.side]), leafsize=32, compact_nodes=False, balanced_tree=False)
-    places = np.column_stack([surface.vertices, lift * side_of])
-    around = np.asarray(tree.query_ball_point(places, _REACH, return_sorted=False), dtype=object)
-    count = np.array([len(near) for near in around])
-    found = np.fromiter(chain.from_iterable(around), np.int64, int(count.sum()))
-    total = np.bincount(np.repeat(np.arange(len(around)), count), seen.gap[found], len(around))
-    errors[count >= _LEAST] = total[count >= _LEAST] / count[count >= _LEAST]
+    errors = np.full(len(surface.vertices), np.nan)
+    for number in np.unique(seen.side):
+        own = np.unique(surface.faces[surface.side == number])
+        here = seen.side == number
+        errors[own] = means_around(surface.vertices[own], seen.foot[here], seen.gap[here], _REACH, _LEAST)
     return errors
 
 

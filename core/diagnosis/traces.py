@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,11 @@ class _Look:
     frame: Equilibrium
     model: BlockModel
 
+    @cached_property
+    def coupling(self) -> FloatArray:
+        """How the residual changes with the tool's place (u, 3), over E [m]."""
+        return tool_slopes(self.model, self.frame.mesh.nodes + self.frame.displacement, local_probe(self.frame))[0]
+
 
 def traces_of(
     data: Observations,
@@ -92,7 +98,7 @@ def traces_of(
             continue
         seen = observe(look.frame, compare(group, setup, look.frame, surface, samples[number]))
         answers = {
-            name: look.model.topology.factor.solve(past.load(look.model, stress, look.frame.displacement))
+            name: look.model.topology.factor.approximate(past.load(look.model, stress, look.frame.displacement))
             for name, stress in missing.items()
         }
         if touched and rough:
@@ -138,8 +144,7 @@ def _state(
     if not look.frame.in_contact:
         return
     # Measured minus simulated force on the tool, which the coupling of the residual tells (see `core.sensitivity.force_changes`).
-    coupling = tool_slopes(look.model, look.frame.mesh.nodes + look.frame.displacement, local_probe(look.frame))[0]
-    trace.force[number] = modulus * (answer @ coupling + drag)
+    trace.force[number] = modulus * (answer @ look.coupling + drag)
 
 
 def moved(effect: Effect, number: int) -> tuple[Effect, float]:

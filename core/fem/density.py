@@ -17,7 +17,7 @@ def energy_density(model: BlockModel, positions: FloatArray) -> FloatArray:
         model: the body with its law, see `core.fem.elastic`. positions: (n, 3) current node positions [m], no element inverted.
     """
     law, rule, nodes = model.law, model.rule, model.topology.elements
-    deformed = np.einsum("eai,eqaj->eqij", positions[nodes], rule.gradients)
+    deformed = positions[nodes].swapaxes(1, 2)[:, None] @ rule.gradients
     if law.corotational:
         left, stretches, right = np.linalg.svd(deformed)
         turned = np.linalg.det(left @ right)  # of a reflection the smallest stretch counts negative
@@ -48,8 +48,7 @@ def _followed(model: BlockModel, values: FloatArray) -> FloatArray:
 def nodal_density(model: BlockModel, positions: FloatArray) -> FloatArray:
     """The same at the nodes (n,) [1], each the mean of the points around it, weighed by the square of its shape function."""
     top, rule = model.topology, model.rule
-    share = np.einsum("eq,qa->eqa", rule.weights, top.element.shapes**2)
-    total, weight = np.zeros(len(positions)), np.zeros(len(positions))
-    np.add.at(total, top.elements, np.einsum("eqa,eq->ea", share, energy_density(model, positions)))
-    np.add.at(weight, top.elements, share.sum(axis=1))
+    total, weight, shares = np.zeros(len(positions)), np.zeros(len(positions)), top.element.shapes**2
+    np.add.at(total, top.elements, (rule.weights * energy_density(model, positions)) @ shares)
+    np.add.at(weight, top.elements, rule.weights @ shares)
     return total / weight

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from core.frames import FloatArray
+from core.frames import FloatArray, lengths
 
 IndexArray = np.ndarray[Any, np.dtype[np.int64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
@@ -104,4 +104,5 @@ def box_distance(points: FloatArray, size: FloatArray) -> FloatArray:
     """Signed distance (n,) [m] of points (n, 3), phantom frame, to the surface of the block, positive outside."""
     half = np.asarray(size) / 2
     outside = np.abs(points - np.array([0.0, 0.0, half[2]])) - half
-    return np.asarray(np.linalg.norm(np.maximum(outside, 0.0), axis=1) + np.minimum(outside.max(axis=1), 0.0))
+    x, y, z = outside.T
+    return np.asarray(lengths(np.maximum(outside, 0.0)) + np.minimum(np.maximum(np.maximum(x, y), z), 0.0))

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from core.interpolation import patch_rows, weighted_nodes
+from core.interpolation import means_around, patch_rows, weighted_nodes
 from core.patch_means import patch_medians
 
 RANDOM = np.random.default_rng(3)
@@ -35,3 +35,17 @@ def test_medians_by_patch_are_numpys_and_not_a_number_where_nothing_is_seen():
     patch[:2], patch[patch == 5] = 5, 6
     expected = [np.median(values[patch == number]) if (patch == number).any() else np.nan for number in range(31)]
     assert np.array_equal(patch_medians(values, patch, 31), expected, equal_nan=True)
+
+
+def test_means_around_places_are_those_of_the_points_within_reach():
+    rng = np.random.default_rng(4)
+    points, values, places = rng.uniform(-1, 1, (400, 3)), rng.normal(size=400), rng.uniform(-1.5, 1.5, (60, 3))
+    near = np.linalg.norm(places[:, None] - points, axis=2) < 0.4
+    found = means_around(places, points, values, 0.4, 3)
+    enough = near.sum(axis=1) >= 3
+    assert 5 < enough.sum() < 55
+    assert np.array_equal(np.isfinite(found), enough)
+    assert np.allclose(found[enough], [values[row].mean() for row in near[enough]])
+    assert np.isnan(means_around(places, points[:0], values[:0], 0.4, 3)).all()
+    flat = np.column_stack([points[:, :2], np.full(400, 0.7)])
+    assert np.allclose(means_around(flat[:5], flat, values, 5.0, 3), values.mean())
