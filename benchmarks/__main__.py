@@ -25,10 +25,12 @@ from benchmarks import (
     service,
     shapes,
     sweep,
+    tangent,
 )
 
 ALL = {
     "replay": replay.run,
+    "tangent": tangent.run,
     "peers": peers.run,
     "gradings": gradings.run,
     "convergence": convergence.run,

@@ -73,7 +73,7 @@ class Columns:
         setup, wanted = self.block.setup, self.wanted
         steps = [(setup, TOOL_STEP * axis) for axis in np.eye(3)]
         steps += [(other, move) for other, move in zip(wanted.setups, moves, strict=True)]
-        changed = self._with_forces(frame, steps, displacement_changes(self.block, frame, steps))
+        changed = self._with_forces(frame, steps, displacement_changes(self.block, frame, steps, exact=False))
         tool = changed[:3] / TOOL_STEP
         for axis in np.flatnonzero(np.abs(tool[:, :-1]).max(axis=(1, 2)) > _MOST_RESPONSE):
             self._span(frame, int(axis), tool, changed[3:], moves)
