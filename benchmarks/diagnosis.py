@@ -33,10 +33,10 @@ STEPS = {
     "fitting": "the most promising causes fitted",
     "looking": "a second cause looked for",
     "measuring": "the gain on test sequences",
-    "trying": "controls",
+    "trying": "controls, and sequences replayed for the page",
     "how far": "profiles of the parameters",
     "which": "the next probe",
-    "replaying every": "sequences replayed for the page",
+    "replaying every": "the last sequences replayed for the page",
 }
 """By the first words of what a diagnosis says it does; the first that fits."""
 

@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import tempfile
+from concurrent.futures import Future
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -189,15 +190,15 @@ def _run(
         findings.asked = most_asked(bench, findings.baseline)
         findings.beyond = held_out(bench, unseen, seed)
     found = tuned(bench, model) if findings.best else setup
+    (making / "replays").mkdir()
+    (making / "pictures").mkdir()
+    # Begun before what is worked out meanwhile: that leaves a process idle now and then.
+    recordings = _recordings(dataset, registration, (setup, found), pool, making / "replays") if replays and seen else []
     result = report_of(dataset, bench, findings, gain, "test")
     if dataset.accepted is not None:
         result["registration"] = dataset.accepted.to_json()
     if assurance:
         result = assured(result, bench, fitted, findings)
-    (making / "replays").mkdir()
-    (making / "pictures").mkdir()
-    if replays and seen:
-        _record(dataset, registration, (setup, found), pool, making / "replays", part(report, 0.8, 1.0))
     if seen:
         pictured = patterns(bench, fitted, findings.baseline, model)
         pictured.save(making / "patterns.npz")
@@ -206,26 +207,26 @@ def _run(
         result, pushes, shown = palpated(result, bench, fitted, findings)
         lump = next((cause for cause in result["causes"] if "cover" in cause), None)
         draw_palpation(making / "pictures" / "palpation.png", setup.geometry, pushes, shown, lump)
+    for number, task in enumerate(recordings):
+        part(report, 0.8, 1.0)(number / len(recordings), "replaying every sequence for the page")
+        task.result()
     (making / "model.json").write_text(json.dumps(_model(dataset, found, findings, names), indent=1))
     (making / "report.json").write_text(json.dumps(result, indent=1))
     return result
 
 
-def _record(
-    dataset: Dataset, registration: Registration, setups: tuple[Setup, Setup], pool: Workers, folder: Path, report: Report
-) -> None:
-    """Every sequence under the stated and the extended setup, for the page."""
+def _recordings(
+    dataset: Dataset, registration: Registration, setups: tuple[Setup, Setup], pool: Workers, folder: Path
+) -> list[Future[str]]:
+    """Begin to record every sequence under the stated and the extended setup, for the page."""
     stated, found = setups
     cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration.mended)
     page = PAGE_GRID.for_tool(stated.tool.radius)
-    tasks = [
+    return [
         pool.run(record, dataset.sequence(name), stated, found, cleaner, shaft, page, folder / f"{name}.npz")
         for name in dataset.sequences
         if len(dataset.sequence(name))
     ]
-    for number, task in enumerate(tasks):
-        report(number / len(tasks), "replaying every sequence for the page")
-        task.result()
 
 
 def _model(dataset: Dataset, setup: Setup, findings: Findings, fitted: list[str]) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from core.diagnosis.prediction import Prediction, predict
 from core.diagnosis.traces import Trace, traces_of
 from core.effects import Effect
 from core.meshing import Meshing
-from core.processes import bound_to_parent, giving_memory_back
+from core.processes import bound_to_parent, giving_memory_back, keeping_memory
 from core.replay import Equilibrium
 from core.setup import Setup
 
@@ -35,6 +35,7 @@ _DATA: dict[str, Observations] = {}
 def _begin(data: Sequence[Observations]) -> None:
     """Keep the measurements in this process."""
     bound_to_parent()
+    keeping_memory()
     _DATA.update({item.name: item for item in data})
 
 
