@@ -30,7 +30,7 @@ OFF, DIGITS = 1e-5, {True: 1e-4, False: 1e-10}
 
 
 def _pressed() -> tuple[BlockModel, FloatArray, sp.csr_matrix, FloatArray]:
-    """The block under a push: its model, the nodes' positions (n, 3) [m], tangent and residual there."""
+    """The block under a push: its model, the nodes' positions (n, 3) [m], tangent there, and a load (u,)."""
     top = SETUP.geometry.height + SETUP.tool.radius
     frame = replay(SETUP, np.array([[0.0, 0.0, top - depth] for depth in DEPTHS]), REPLAY_GRID)[-1]
     model, positions = BlockModel(SETUP, frame.mesh), frame.mesh.nodes + frame.displacement

@@ -89,12 +89,12 @@ def _means(places: Any, points: Any, values: Any, begins: Any, low: Any, shape: 
         for i in range(3):
             cell = int(np.floor((places[m, i] - low[i]) / reach))
             first[i], last[i] = max(cell - 1, 0), min(cell + 2, shape[i])
+        if last[2] <= first[2]:
+            continue
         total, count = 0.0, 0
         for x in range(first[0], last[0]):
             for y in range(first[1], last[1]):
                 row = (x * shape[1] + y) * shape[2]
-                if last[2] <= first[2]:
-                    continue
                 for n in range(begins[row + first[2]], begins[row + last[2]]):
                     far = 0.0
                     for i in range(3):

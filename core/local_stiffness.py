@@ -21,7 +21,7 @@ def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray
         log_factors: (m, e, q) logarithm of new over old stiffness, at the quadrature points of the frame's mesh.
 
     Returns:
-        (m, n, 3) [m]; cheap in m, since a point's share of the residual is what it alone would resist with.
+        (m, n, 3) [m], to five digits; cheap in m, since a point's share of the residual is what it alone would resist with.
     """
     refuse_histories(block.setup)
     result = np.zeros((len(log_factors), *frame.displacement.shape))

@@ -60,26 +60,28 @@ def worth(
     names, stated = [item.name for item in unseen], bench.setup
     found = tuned(bench, findings.best.model) if findings.best else stated
     first, second = (found, stated) if findings.known else (stated, found)
+    felt = all(item.unseen for item in unseen)
+    without = tuned(bench, findings.baseline) if alone and findings.best and not findings.known and not felt else None
     one = _found(pool.submit(names, first, grid))
-    without = tuned(bench, findings.baseline) if alone and findings.best and not findings.known else None
     # Side by side: one sequence may take three times as long as the others.
-    others = [one if setup is first else pool.submit(names, setup, grid, None, one) for setup in (second, without) if setup]
-    other = _found(others[0])
+    begun = [] if first is second else pool.submit(names, second, grid, None, one)
+    by_itself = [] if without is None else pool.submit(names, without, grid, None, one)
+    other = _found(begun) if begun else one
     baseline, extended = (other, one) if findings.known else (one, other)
     touched = [{n for n, group in enumerate(item.groups) if not group.free} for item in unseen]
     rows = zip(touched, baseline, extended, strict=True)
     if findings.known and all(own <= {*before.failed, *after.failed} for own, before, after in rows):
         return None
-    if all(item.unseen for item in unseen):
+    if felt:
         return felt_ladder(unseen, baseline, extended, seed, _stiffer(bench, findings))
     gain = ladder(unseen, baseline, extended, stated, found, seed)
     if without is not None:
-        gain = replace(gain, tuned=ladder(unseen, baseline, _found(others[1]), stated, without, seed).removed)
+        gain = replace(gain, tuned=ladder(unseen, baseline, _found(by_itself), stated, without, seed).removed)
     return gain
 
 
-def _found(pending: Sequence[Pending] | list[Prediction]) -> list[Prediction]:
-    return [item if isinstance(item, Prediction) else item.result() for item in pending]
+def _found(begun: Sequence[Pending]) -> list[Prediction]:
+    return [pending.result() for pending in begun]
 
 
 def _stiffer(bench: Bench, findings: Findings) -> tuple[float, float]:
