@@ -7,14 +7,28 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import ParamSpec, TypeVar
 
-__all__ = ["bound_to", "bound_to_parent", "bound_to_process", "giving_memory_back", "keeping_memory"]
+__all__ = ["at_once", "bound_to", "bound_to_parent", "bound_to_process", "giving_memory_back", "keeping_memory"]
 
 _DIE_WITH_PARENT = 1
 _EVERY = 2.0
 """How often [s] a process looks whether the one it works for is there."""
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _KEPT, _LARGE = -1, -3, 1 << 27, 1 << 25
 """Numbers of glibc's mallopt, and bytes: freed memory that is kept, and the size from which an array has pages of its own."""
+
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def at_once(task: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+    """Carry out a task here and now, where a pool could do it in another process."""
+    done: Future[T] = Future()
+    done.set_result(task(*args, **kwargs))
+    return done
 
 
 def bound_to_parent() -> None:

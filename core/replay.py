@@ -49,6 +49,7 @@ class Replay:
         self._model: BlockModel | None = None
         self._mesh: Mesh | None = None
         self._before: tuple[Equilibrium, Equilibrium] | None = None
+        self.factorised: tuple[Equilibrium, BlockModel, int] | None = None
         self.slip, self.dense = np.zeros(2), False
         self._rest_mesh = self.grid.mesh(setup, np.array([0.0, 0.0, setup.geometry.height]))
         self.memory = Memory.of(setup, self.grid, self._rest_mesh)
@@ -72,6 +73,12 @@ class Replay:
         if self.memory is not None:
             self.memory.recall(self._model)
         return self._model
+
+    def tangent_at(self, frame: Equilibrium, model: BlockModel) -> bool:
+        """Whether the model's factor is that of its tangent at this frame (`core.sensitivity.factorise_at`), and only of it."""
+        known = self.factorised
+        same = known is not None and known[0] is frame and known[1] is model and known[2] == model.topology.factor.generation
+        return same and self.memory is None
 
     @cached_property
     def free(self) -> Equilibrium:

@@ -45,11 +45,14 @@ def factorise_at(block: Replay, frame: Equilibrium) -> BlockModel | None:
     model = block.model(frame.mesh)
     model.harden(frame.hardness)
     model.expect(frame.mesh.nodes + frame.displacement, (local_probe(frame),))
+    if block.tangent_at(frame, model):
+        return model
     state = model.assemble(frame.mesh.nodes + frame.displacement, local_probe(frame))
     try:
         model.factorise(state.data)
     except NotPositiveDefinite:
         return None
+    block.factorised = (frame, model, model.topology.factor.generation)
     return model
 
 

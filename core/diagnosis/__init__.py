@@ -77,18 +77,19 @@ def diagnose(
     report = rising(report)
     _check_splits(dataset)
     report(0.0, "reading every cloud")
-    dataset.validate(part(report, 0.0, 0.02))
-    dataset, registration = as_it_stood(dataset, register(dataset))
-    setup = setup_from(dataset, registration)
-    data = _observed(dataset, registration.mended, setup.sensor, part(report, 0.02, 0.05))
-    out.parent.mkdir(parents=True, exist_ok=True)
-    making = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
-    try:
-        with Workers([*data[0], *data[1]], workers) as pool:
+    with Workers([], workers) as pool:
+        pool.start()
+        dataset.validate(part(report, 0.0, 0.02))
+        dataset, registration = as_it_stood(dataset, register(dataset))
+        setup = setup_from(dataset, registration)
+        data = _observed(dataset, registration.mended, setup.sensor, pool, part(report, 0.02, 0.05))
+        out.parent.mkdir(parents=True, exist_ok=True)
+        making = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
+        try:
             result = _run(dataset, registration, setup, data, pool, making, report, seed, (replays, assurance))
-        os.rename(making, out)
-    finally:
-        shutil.rmtree(making, ignore_errors=True)
+            os.rename(making, out)
+        finally:
+            shutil.rmtree(making, ignore_errors=True)
     report(1.0, "done")
     return result
 
@@ -111,14 +112,16 @@ def _check_splits(dataset: Dataset) -> None:
         )
 
 
-def _observed(dataset: Dataset, registration: Registration, sensor: Sensor, report: Report) -> Data:
-    """What the fitted and the test sequences say, their frames grouped by the clock of this sensor."""
+def _observed(dataset: Dataset, registration: Registration, sensor: Sensor, pool: Workers, report: Report) -> Data:
+    """What the fitted and the test sequences say, their frames by the clock of this sensor; the pool holds it from now on."""
     config, setup = dataset.config, replace(setup_from(dataset, registration), sensor=sensor)
     fitted, tested = (*config.train, *config.validation), tuple(config.test)
-    return (
-        observe_each(dataset, fitted, setup, registration, (FIT_GROUPS, FIT_FELT), part(report, 0.0, 0.7)),
-        observe_each(dataset, tested, setup, registration, (TEST_GROUPS, TEST_FELT), part(report, 0.7, 1.0)),
+    data = (
+        observe_each(dataset, fitted, setup, registration, (FIT_GROUPS, FIT_FELT), part(report, 0.0, 0.7), pool.run),
+        observe_each(dataset, tested, setup, registration, (TEST_GROUPS, TEST_FELT), part(report, 0.7, 1.0), pool.run),
     )
+    pool.hold([*data[0], *data[1]])
+    return data
 
 
 def _bench(dataset: Dataset, registration: Registration, setup: Setup, data: Data, pool: Workers, report: Report) -> Bench:
@@ -148,8 +151,7 @@ def _searched(
     if late == setup.sensor.time_offset or all(item.holds_together(clock) for item in data[0]):
         return data, bench, findings
     del bench, findings
-    data = _observed(dataset, registration.mended, clock.sensor, silent)
-    pool.hold([*data[0], *data[1]])
+    data = _observed(dataset, registration.mended, clock.sensor, pool, silent)
     bench = _bench(dataset, registration, setup, data, pool, report)
     bench.tell("searching again, with the frames grouped by the clock that was found")
     return data, bench, search(bench, seed)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Sequence as Ordered
+from concurrent.futures import Future
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +14,7 @@ from core.dataset import Dataset, Kinematics, Sequence
 from core.diagnosis.force import ForceRecord
 from core.diagnosis.smoothing import smooth_centres
 from core.frames import FloatArray, Transform
+from core.processes import at_once
 from core.progress import Report, silent
 from core.registration import Registration
 from core.setup import Setup
@@ -212,13 +215,22 @@ def _forces(sequence: Sequence, setup: Setup) -> ForceRecord | None:
 
 
 def observe_all(
-    dataset: Dataset, names: Ordered[str], setup: Setup, registration: Registration, most: int, report: Report = silent
+    dataset: Dataset,
+    names: Ordered[str],
+    setup: Setup,
+    registration: Registration,
+    most: int,
+    report: Report = silent,
+    begin: Callable[..., Future[Observations]] = at_once,
 ) -> list[Observations]:
-    """Observations of these sequences."""
+    """Observations of these sequences; `begin` is where `observe` is carried out, as in a pool of processes."""
     cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration)
     rest = dataset.rest_cloud() if dataset.has_rest else None
-    found = []
+    pending, found = [], []
     for number, name in enumerate(names):
-        report(number / len(names), f"reading {name}")
-        found.append(observe(dataset.sequence(name), setup, cleaner, shaft, most, rest))
+        report(0.5 * number / len(names), f"reading {name}")
+        pending.append(begin(observe, dataset.sequence(name), setup, cleaner, shaft, most, rest))
+    for number, task in enumerate(pending, start=1):
+        found.append(task.result())
+        report(0.5 + 0.5 * number / len(names), f"read {found[-1].name}")
     return found

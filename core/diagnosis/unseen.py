@@ -7,7 +7,9 @@ of samples between them say the same again.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Sequence as Ordered
+from concurrent.futures import Future
 
 import numpy as np
 
@@ -17,6 +19,7 @@ from core.diagnosis.observations import CLEARANCE, Group, Observations, observe_
 from core.diagnosis.smoothing import SMOOTHING, smooth_centres
 from core.errors import DiagnosisError
 from core.frames import FloatArray
+from core.processes import at_once
 from core.progress import Report, silent
 from core.registration import Registration
 from core.setup import Setup
@@ -139,9 +142,16 @@ def deepest_rows(item: Observations) -> list[int]:
 
 
 def observe_each(
-    dataset: Dataset, names: Ordered[str], setup: Setup, registration: Registration, most: tuple[int, int], report: Report = silent
+    dataset: Dataset,
+    names: Ordered[str],
+    setup: Setup,
+    registration: Registration,
+    most: tuple[int, int],
+    report: Report = silent,
+    begin: Callable[..., Future[Observations]] = at_once,
 ) -> list[Observations]:
-    """Observations of these sequences, with clouds or without, at most so many groups of each."""
+    """Observations of these sequences, with clouds or without, at most so many groups of each; `begin` as of `observe_all`."""
     seen = [name for name in names if len(dataset.sequence(name))]
-    found = {item.name: item for item in observe_all(dataset, seen, setup, registration, most[0], report)} if seen else {}
+    known = observe_all(dataset, seen, setup, registration, most[0], report, begin) if seen else []
+    found = {item.name: item for item in known}
     return [found[name] if name in found else observe_forces(dataset.sequence(name), setup, most[1]) for name in names]

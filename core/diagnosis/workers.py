@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
+import tempfile
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from pathlib import Path
 from types import TracebackType
 from typing import Generic, ParamSpec, Self, TypeVar
 
@@ -29,14 +32,26 @@ TOLERANCE = 3e-4
 """Residual of a replay over the tool's push [1]."""
 P = ParamSpec("P")
 T = TypeVar("T")
-_DATA: dict[str, Observations] = {}
+_READ: dict[Path, Observations] = {}
+"""What this process has read of the measurements that are held, by file."""
 
 
-def _begin(data: Sequence[Observations]) -> None:
-    """Keep the measurements in this process."""
+def _begin() -> None:
     bound_to_parent()
     keeping_memory()
-    _DATA.update({item.name: item for item in data})
+
+
+def _ready() -> None:
+    """Nothing: a process that can do this has imported what there is to import."""
+
+
+def _measured(file: Path) -> Observations:
+    """What a sequence's file says; measurements that were held before are forgotten."""
+    if file not in _READ:
+        for other in [other for other in _READ if other.parent != file.parent]:
+            del _READ[other]
+        _READ[file] = pickle.loads(file.read_bytes())
+    return _READ[file]
 
 
 @dataclass(frozen=True)
@@ -53,7 +68,7 @@ class _Tidily(Generic[P, T]):
 
 
 def _task(
-    name: str,
+    file: Path,
     setup: Setup,
     grid: Meshing,
     wanted: Wanted | None,
@@ -61,9 +76,10 @@ def _task(
     samples: Sequence[Sample] | None,
     tolerance: float,
 ) -> Prediction:
-    if _DATA[name].unseen:
-        return predict_forces(_DATA[name], setup, grid, wanted, starts, tolerance)
-    found = predict(_DATA[name], setup, grid, wanted, starts, tolerance, samples)
+    data = _measured(file)
+    if data.unseen:
+        return predict_forces(data, setup, grid, wanted, starts, tolerance)
+    found = predict(data, setup, grid, wanted, starts, tolerance, samples)
     return found if samples is None else replace(found, samples=())
 
 
@@ -81,9 +97,9 @@ class Pending:
 
 
 def _trace(
-    name: str, setup: Setup, grid: Meshing, frames: Sequence[Equilibrium], samples: Sequence[Sample], effects: Sequence[Effect]
+    file: Path, setup: Setup, grid: Meshing, frames: Sequence[Equilibrium], samples: Sequence[Sample], effects: Sequence[Effect]
 ) -> list[Trace]:
-    return traces_of(_DATA[name], setup, grid, frames, samples, effects)
+    return traces_of(_measured(file), setup, grid, frames, samples, effects)
 
 
 class Workers:
@@ -97,16 +113,32 @@ class Workers:
         # One thread each: the processes are the parallelism, and small factorisations only lose by sharing cores.
         for name in _THREADS:
             os.environ.setdefault(name, "1")
-        self._count = count
-        self._pool = self._started(data)
+        self._count, self._held = count, 0
+        self._folder = tempfile.TemporaryDirectory(prefix="palpate-", ignore_cleanup_errors=True)
+        self._pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _begin)
+        self.hold(data)
 
-    def _started(self, data: Sequence[Observations]) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(self._count, multiprocessing.get_context("spawn"), _begin, (data,))
+    def start(self) -> None:
+        """Start the processes now, which takes seconds, and not with the first tasks."""
+        for _ in range(self._count):
+            self._pool.submit(_ready)
 
     def hold(self, data: Sequence[Observations]) -> None:
-        """Keep other measurements from now on, in new processes: what the old ones are doing is still done."""
-        self._pool.shutdown(wait=True)
-        self._pool = self._started(data)
+        """Let other measurements be predicted from now on; what is under way is of the old ones.
+
+        They are handed over in files, which a process reads when it first needs them.
+        """
+        self._held += 1
+        self._home.mkdir()
+        for item in data:
+            self._file(item.name).write_bytes(pickle.dumps(item, pickle.HIGHEST_PROTOCOL))
+
+    @property
+    def _home(self) -> Path:
+        return Path(self._folder.name) / str(self._held)
+
+    def _file(self, name: str) -> Path:
+        return self._home / f"{name}.pickle"
 
     def __enter__(self) -> Self:
         return self
@@ -117,6 +149,7 @@ class Workers:
         if kind is not None:
             for process in processes:
                 process.terminate()
+        self._folder.cleanup()
 
     def submit(
         self,
@@ -137,7 +170,7 @@ class Workers:
         for number, name in enumerate(names):
             begin = None if starts is None else starts[number].equilibria
             points = None if starts is None or not same_points else starts[number].samples or None
-            future = self.run(_task, name, setup, grid, wanted, begin, points, tolerance)
+            future = self.run(_task, self._file(name), setup, grid, wanted, begin, points, tolerance)
             pending.append(Pending(future, points))
         return pending
 
@@ -146,7 +179,7 @@ class Workers:
     ) -> list[Future[list[Trace]]]:
         """Begin the traces of these effects in these sequences, whose replays without them are `plain`."""
         return [
-            self.run(_trace, name, setup, grid, item.equilibria, item.samples, effects)
+            self.run(_trace, self._file(name), setup, grid, item.equilibria, item.samples, effects)
             for name, item in zip(names, plain, strict=True)
         ]
 

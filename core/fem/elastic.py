@@ -78,11 +78,11 @@ def elastic_energy(law: Law, rule: Quadrature, nodes: IntArray, mu: FloatArray, 
     Args:
         nodes: (e, a). mu, bulk: (e, q) moduli over E at the quadrature points. positions: (n, 3) current node positions [m].
     """
-    parts = (rule.gradients, rule.weights, rule.pressures, nodes, mu, bulk)
+    parts = (rule.weights, rule.pressures, nodes, mu, bulk)
     if law.corotational:
-        total = float(corotational.energy(*parts, positions))
+        total = float(corotational.energy(rule.gradients, *parts, positions))
     else:
-        total = float(hyperelastic.energy(*parts, law.stiffening, positions))
+        total = float(hyperelastic.energy(rule.slopes, *parts, law.stiffening, positions))
     if law.gamma:
         total += float(fibres.energy(rule.gradients, rule.weights, nodes, law.gamma * mu, law.direction, positions))
     return total
@@ -104,15 +104,15 @@ def assemble_elastic(
     `slots` (e, 3 a, 3 a) says where in `data` an entry of the element's matrix goes; -1 drops it (constrained, or below the
     diagonal of the symmetric matrix). Elements must not be inverted. Other arguments as in `elastic_energy`.
     """
-    parts = (rule.gradients, rule.weights, rule.pressures, nodes, mu, bulk)
+    parts = (rule.weights, rule.pressures, nodes, mu, bulk)
     if law.gamma:
         along = (rule.gradients, rule.weights, nodes, law.gamma * mu, law.direction, positions)
         fibres.add_forces(*along, force)
         if len(data):
             fibres.add_matrices(*along, slots, data)
     if law.corotational:
-        corotational.assemble(*parts, positions, slots, force, data)
+        corotational.assemble(rule.gradients, *parts, positions, slots, force, data)
         return
-    hyperelastic.add_forces(*parts, law.stiffening, positions, force)
+    hyperelastic.add_forces(rule.slopes, *parts, law.stiffening, positions, force)
     if len(data):
-        hyperelastic.add_matrices(*parts, law.stiffening, positions, slots, data)
+        hyperelastic.add_matrices(rule.slopes, *parts, law.stiffening, positions, slots, data)

@@ -15,28 +15,27 @@ from numba import njit
 __all__ = ["add_forces", "add_matrices", "energy", "project", "scatter"]
 
 _FUSED = {"contract", "reassoc", "nsz"}
-_LANES = 4
-"""Rows of element matrices are padded to a multiple of this, so that whole vectors fill them: twice as fast for 27 nodes."""
 _BLOCKS = 6
 """Of an element's symmetric matrix, sorted by axes: (0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)."""
 
 
 @njit(cache=True, fastmath=_FUSED, inline="always")
 def _gather(positions: Any, nodes: Any, x: Any) -> None:
+    """Positions of an element's nodes, one row for each axis: x (3, w)."""
     for a in range(nodes.shape[0]):
         for i in range(3):
-            x[a, i] = positions[nodes[a], i]
+            x[i, a] = positions[nodes[a], i]
 
 
 @njit(cache=True, fastmath=_FUSED, inline="always")
-def _deform(g: Any, x: Any, f: Any, c: Any) -> float:
+def _deform(slopes: Any, x: Any, f: Any, c: Any) -> float:
     """F and its cofactors, row by row (9,), of one point; returns det F."""
     f00 = f01 = f02 = f10 = f11 = f12 = f20 = f21 = f22 = 0.0
-    for a in range(g.shape[0]):
-        g0, g1, g2, x0, x1, x2 = g[a, 0], g[a, 1], g[a, 2], x[a, 0], x[a, 1], x[a, 2]
-        f00, f01, f02 = f00 + x0 * g0, f01 + x0 * g1, f02 + x0 * g2
-        f10, f11, f12 = f10 + x1 * g0, f11 + x1 * g1, f12 + x1 * g2
-        f20, f21, f22 = f20 + x2 * g0, f21 + x2 * g1, f22 + x2 * g2
+    g0, g1, g2, x0, x1, x2 = slopes[0], slopes[1], slopes[2], x[0], x[1], x[2]
+    for a in range(slopes.shape[1]):
+        f00, f01, f02 = f00 + x0[a] * g0[a], f01 + x0[a] * g1[a], f02 + x0[a] * g2[a]
+        f10, f11, f12 = f10 + x1[a] * g0[a], f11 + x1[a] * g1[a], f12 + x1[a] * g2[a]
+        f20, f21, f22 = f20 + x2[a] * g0[a], f21 + x2[a] * g1[a], f22 + x2[a] * g2[a]
     f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8] = f00, f01, f02, f10, f11, f12, f20, f21, f22
     c00, c01, c02 = f11 * f22 - f12 * f21, f12 * f20 - f10 * f22, f10 * f21 - f11 * f20
     c[0], c[1], c[2] = c00, c01, c02
@@ -66,16 +65,16 @@ def project(weights: Any, modes: Any, values: Any, projected: Any) -> None:
 
 
 @njit(cache=True, fastmath=_FUSED)
-def energy(gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: Any, stiffening: float, positions: Any) -> float:
+def energy(slopes: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: Any, stiffening: float, positions: Any) -> float:
     """Elastic energy over E [m^3]; infinite when an element is inverted or stretched to its limit at a quadrature point."""
     points = weights.shape[1]
-    x, f, c = np.empty((nodes.shape[1], 3)), np.empty(9), np.empty(9)
+    x, f, c = np.zeros((3, slopes.shape[3])), np.empty(9), np.empty(9)
     det, theta = np.empty(points), np.empty(points)
     total = 0.0
     for e in range(nodes.shape[0]):
         _gather(positions, nodes[e], x)
         for q in range(points):
-            det[q] = _deform(gradients[e, q], x, f, c)
+            det[q] = _deform(slopes[e, q], x, f, c)
             if not det[q] > 0.0:
                 return np.inf
             strain = _square(f) / np.cbrt(det[q] * det[q]) - 3.0
@@ -94,11 +93,11 @@ def energy(gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: 
 
 
 @njit(cache=True, fastmath=_FUSED, inline="always")
-def _press(gradients: Any, weights: Any, modes: Any, bulk: Any, x: Any, f: Any, c: Any, scalars: Any) -> None:
+def _press(slopes: Any, weights: Any, modes: Any, bulk: Any, x: Any, f: Any, c: Any, scalars: Any) -> None:
     """F and cofactors at all points of an element; rows of `scalars` get det F, theta, U'(theta), pressure."""
     det, theta, slope = scalars[0], scalars[1], scalars[2]
     for q in range(weights.shape[0]):
-        det[q] = _deform(gradients[q], x, f[q], c[q])
+        det[q] = _deform(slopes[q], x, f[q], c[q])
     project(weights, modes, det, theta)
     for q in range(weights.shape[0]):
         slope[q] = 0.5 * bulk[q] * (theta[q] - 1.0 / theta[q])
@@ -113,16 +112,16 @@ def _hardening(square: float, root: float, stiffening: float) -> float:
 
 @njit(cache=True, fastmath=_FUSED)
 def add_forces(
-    gradients: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: Any, stiffening: float, positions: Any, force: Any
+    slopes: Any, weights: Any, modes: Any, nodes: Any, mu: Any, bulk: Any, stiffening: float, positions: Any, force: Any
 ) -> None:
     """Add the energy's gradient over E to `force` (n, 3) [m^2]. Elements must not be inverted."""
-    points, corners = weights.shape[1], nodes.shape[1]
-    x, f, c, p = np.empty((corners, 3)), np.empty((points, 9)), np.empty((points, 9)), np.empty(9)
-    scalars, own = np.empty((4, points)), np.empty((corners, 3))
+    points, corners, wide = weights.shape[1], nodes.shape[1], slopes.shape[3]
+    x, f, c, p = np.zeros((3, wide)), np.empty((points, 9)), np.empty((points, 9)), np.empty(9)
+    scalars, own = np.empty((4, points)), np.empty((3, wide))
     det, press = scalars[0], scalars[3]
     for e in range(nodes.shape[0]):
         _gather(positions, nodes[e], x)
-        _press(gradients[e], weights[e], modes[e], bulk[e], x, f, c, scalars)
+        _press(slopes[e], weights[e], modes[e], bulk[e], x, f, c, scalars)
         own[:] = 0.0
         for q in range(points):
             root, square = np.cbrt(det[q] * det[q]), _square(f[q])
@@ -130,14 +129,21 @@ def add_forces(
             by_volume = weights[e, q] * press[q] - scale * square / (3.0 * det[q])
             for k in range(9):
                 p[k] = scale * f[q, k] + by_volume * c[q, k]
-            for a in range(corners):
-                g0, g1, g2 = gradients[e, q, a, 0], gradients[e, q, a, 1], gradients[e, q, a, 2]
-                own[a, 0] += p[0] * g0 + p[1] * g1 + p[2] * g2
-                own[a, 1] += p[3] * g0 + p[4] * g1 + p[5] * g2
-                own[a, 2] += p[6] * g0 + p[7] * g1 + p[8] * g2
+            _push(p, slopes[e, q], own)
         for a in range(corners):
             for i in range(3):
-                force[nodes[e, a], i] += own[a, i]
+                force[nodes[e, a], i] += own[i, a]
+
+
+@njit(cache=True, fastmath=_FUSED, inline="always")
+def _push(p: Any, slopes: Any, own: Any) -> None:
+    """Add a point's stress times volume, row by row (9,), to the forces on its element's nodes, one row for each axis (3, w)."""
+    p0, p1, p2, p3, p4, p5, p6, p7, p8 = p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8]
+    g0, g1, g2, x, y, z = slopes[0], slopes[1], slopes[2], own[0], own[1], own[2]
+    for a in range(slopes.shape[1]):
+        x[a] += p0 * g0[a] + p1 * g1[a] + p2 * g2[a]
+        y[a] += p3 * g0[a] + p4 * g1[a] + p5 * g2[a]
+        z[a] += p6 * g0[a] + p7 * g1[a] + p8 * g2[a]
 
 
 @njit(cache=True, fastmath=_FUSED)
@@ -165,31 +171,28 @@ def _moduli(scale: float, press: float, hardening: float, square: float, det: fl
 
 
 @njit(cache=True, fastmath=_FUSED)
-def _bend(tensor: Any, straight: Any, bent: Any) -> None:
-    """The change of each row (i, k) of the stress that each node's motion along j >= i brings: `bent` (k, ij, a) of a point.
-
-    `straight` (3, a) are the gradients of the nodes' shape functions.
-    """
+def _bend(tensor: Any, slopes: Any, bent: Any) -> None:
+    """The change of each row (i, k) of the stress that each node's motion along j >= i brings: `bent` (k, ij, w) of a point."""
     block = 0
     for i in range(3):
         for j in range(i, 3):
             for k in range(3):
                 own, row = tensor[3 * i + k], bent[k, block]
                 by_x, by_y, by_z = own[3 * j], own[3 * j + 1], own[3 * j + 2]
-                for b in range(straight.shape[1]):
-                    row[b] = by_x * straight[0, b] + by_y * straight[1, b] + by_z * straight[2, b]
+                for b in range(slopes.shape[1]):
+                    row[b] = by_x * slopes[0, b] + by_y * slopes[1, b] + by_z * slopes[2, b]
             block += 1
 
 
 @njit(cache=True, fastmath=_FUSED)
-def _swell(weight: float, modes: Any, c: Any, straight: Any, moved: Any) -> None:
+def _swell(weight: float, modes: Any, c: Any, slopes: Any, moved: Any) -> None:
     """Add one point's part to the change (m, 3, a) of each mode's theta with each node's motion."""
     for i in range(3):
         by_x, by_y, by_z = weight * c[3 * i], weight * c[3 * i + 1], weight * c[3 * i + 2]
         for m in range(modes.shape[0]):
             row, share = moved[m, i], modes[m]
-            for b in range(straight.shape[1]):
-                row[b] += share * (by_x * straight[0, b] + by_y * straight[1, b] + by_z * straight[2, b])
+            for b in range(slopes.shape[1]):
+                row[b] += share * (by_x * slopes[0, b] + by_y * slopes[1, b] + by_z * slopes[2, b])
 
 
 @njit(cache=True, fastmath=_FUSED)
@@ -218,7 +221,7 @@ def _add_volume(weights: Any, modes: Any, bulk: Any, theta: Any, moved: Any, pre
 
 @njit(cache=True, fastmath=_FUSED)
 def add_matrices(
-    gradients: Any,
+    slopes: Any,
     weights: Any,
     modes: Any,
     nodes: Any,
@@ -231,22 +234,19 @@ def add_matrices(
 ) -> None:
     """Add the energy's tangent over E [m] to `data`; `slots` (e, 3 a, 3 a) as in `assemble_elastic`.
 
-    With G (3 q, a) an element's gradients, its blocks side by side are one product of matrices, G' times what `_bend` makes of G.
+    With G (3 q, w) an element's slopes, its blocks side by side are one product of matrices, G' times what `_bend` makes of G.
     """
     points, corners, count = weights.shape[1], nodes.shape[1], modes.shape[2]
-    wide = (corners + _LANES - 1) // _LANES * _LANES
-    x, f, c, scalars = np.empty((corners, 3)), np.empty((points, 9)), np.empty((points, 9)), np.empty((4, points))
-    tensor, straight, bent = np.empty((9, 9)), np.zeros((points, 3, wide)), np.empty((points, 3, _BLOCKS, wide))
+    wide = slopes.shape[3]
+    x, f, c, scalars = np.zeros((3, wide)), np.empty((points, 9)), np.empty((points, 9)), np.empty((4, points))
+    tensor, bent = np.empty((9, 9)), np.empty((points, 3, _BLOCKS, wide))
     moved, pressed, matrix = np.empty((count, 3, wide)), np.empty((3, wide)), np.empty((wide, _BLOCKS * wide))
     blocks = matrix.reshape(wide, _BLOCKS, wide)
     for e in range(nodes.shape[0]):
         _gather(positions, nodes[e], x)
-        _press(gradients[e], weights[e], modes[e], bulk[e], x, f, c, scalars)
+        _press(slopes[e], weights[e], modes[e], bulk[e], x, f, c, scalars)
         moved[:] = 0.0
         for q in range(points):
-            for a in range(corners):
-                for k in range(3):
-                    straight[q, k, a] = gradients[e, q, a, k]
             weight, det, square = weights[e, q], scalars[0, q], _square(f[q])
             root = np.cbrt(det * det)
             harder = _hardening(square, root, stiffening)
@@ -254,9 +254,9 @@ def add_matrices(
             hardening = 2.0 * scale * stiffening * harder / root
             press = weight * scalars[3, q] - scale * square / (3.0 * det)
             _moduli(scale, press, hardening, square, det, f[q], c[q], tensor)
-            _bend(tensor, straight[q], bent[q])
-            _swell(weight, modes[e, q], c[q], straight[q], moved)
-        np.dot(straight.reshape(3 * points, wide).T, bent.reshape(3 * points, _BLOCKS * wide), matrix)
+            _bend(tensor, slopes[e, q], bent[q])
+            _swell(weight, modes[e, q], c[q], slopes[e, q], moved)
+        np.dot(slopes[e].reshape(3 * points, wide).T, bent.reshape(3 * points, _BLOCKS * wide), matrix)
         _add_volume(weights[e], modes[e], bulk[e], scalars[1], moved, pressed, blocks[:corners])
         _scatter_blocks(blocks, slots[e], data)
 

@@ -129,12 +129,15 @@ class Pardiso:
         single: precision of the factor.
     """
 
+    _handle: _Handle
+
     def __init__(self, pattern: sp.csr_matrix, single: bool = False) -> None:
         self._matrix, self._single = pattern, single
         self._idle = np.zeros(pattern.shape[0])
         self.generation = 0
         self._trusted, self._current = True, False
-        self._analyse(_NONE)
+        _pardiso()  # where it is missing, that is said here and now
+        self._asked: IntArray | None = None
 
     def _analyse(self, asked: IntArray) -> None:
         """Analyse the pattern, with cheap answers between these unknowns (m,): in which order they are eliminated hangs on it."""
@@ -150,17 +153,18 @@ class Pardiso:
         time takes an analysis. The factor there is stays where it is of these very entries.
         """
         wanted = asked if asked is not None and self._trusted else _NONE
-        same = np.array_equal(wanted, self._asked)
+        same = self._asked is not None and np.array_equal(wanted, self._asked)
         if same and self._current and np.array_equal(data, self._matrix.data):
             return
         self.generation += 1
         self._current = False
         if not same:
-            self._forget()
+            if self._asked is not None:
+                self._forget()
             self._analyse(wanted)
         self._matrix.data[:] = data
         self._handle.entries[:] = data
-        self._handle.run(_FACTORISE, self._idle, self._asked)
+        self._handle.run(_FACTORISE, self._idle, wanted)
         self._current = True
 
     def approximate(self, right: FloatArray) -> FloatArray:
@@ -187,9 +191,9 @@ class Pardiso:
         """As `solve`, of a matrix that single precision is not enough for, nor for those to come."""
         log.warning("a stiffness matrix is too ill-conditioned for single precision: solving in double takes about twice as long")
         self._forget()
-        self._single, self._current = False, False
-        self._analyse(self._asked)
-        self.factorise(self._matrix.data, self._asked)
+        self._single, self._current, asked = False, False, self._asked
+        self._asked = None
+        self.factorise(self._matrix.data, asked)
         return self.solve(right)
 
     def answers(self, unknowns: IntArray) -> FloatArray:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+from numba import njit
 
 from core.frames import FloatArray
 from core.setup import Inclusion, Layer, Material
@@ -37,27 +39,48 @@ _EDGE = 2.3
 """So many edges from its surface a lump or skin holds less than a ten-thousandth of a point's volume."""
 
 
-def _inside(depth: FloatArray, spots: Spots) -> FloatArray:
-    """Share (...) of each point's volume on the inner side of a surface that lies `depth` (...) [m] outwards of the point.
+@njit(cache=True)
+def _inside(depth: float, edge: float) -> float:
+    """Share of a point's volume on the inner side of a surface that lies `depth` [m] outwards of the point.
 
     A point stands for the volume around it, which the surface cuts while it passes over about an edge's length; the share is
     smooth, and so is all that follows from it.
     """
-    share = np.zeros(depth.shape)
-    edges = depth / spots.edges
-    near = edges > -_EDGE
-    share[near] = 0.5 * (1 + np.tanh(2 * edges[near]))
-    return share
+    edges = depth / edge
+    return 0.5 * (1 + math.tanh(2 * edges)) if edges > -_EDGE else 0.0
+
+
+@njit(cache=True)
+def _in_ball(places: Any, edges: Any, x: float, y: float, z: float, radius: float) -> Any:
+    """Share (m,) of the points at places (m, 3) within a ball; a diagnosis asks for those of hundreds in every frame."""
+    found = np.empty(len(places))
+    for m in range(len(places)):
+        apart = math.sqrt((places[m, 0] - x) ** 2 + (places[m, 1] - y) ** 2 + (places[m, 2] - z) ** 2)
+        found[m] = _inside(radius - apart, edges[m])
+    return found
+
+
+@njit(cache=True)
+def _above(heights: Any, edges: Any, least: float) -> Any:
+    """Share (m,) of the points at these heights (m,) above the least [m]."""
+    found = np.empty(len(heights))
+    for m in range(len(heights)):
+        found[m] = _inside(heights[m] - least, edges[m])
+    return found
 
 
 def lump_share(lump: Inclusion, spots: Spots) -> FloatArray:
     """Share (...) of the volume of each point that the lump holds [1]."""
-    return _inside(lump.radius - np.linalg.norm(spots.places - (lump.x, lump.y, lump.z), axis=-1), spots)
+    edges = spots.edges
+    share = _in_ball(spots.places.reshape(-1, 3), edges.ravel(), lump.x, lump.y, lump.z, lump.radius)
+    return np.asarray(share.reshape(edges.shape))
 
 
 def layer_share(layer: Layer, spots: Spots, height: float) -> FloatArray:
     """Share (...) of the volume of each point that the skin on top of a body of this height [m] holds [1]."""
-    return _inside(spots.places[..., 2] - (height - layer.thickness), spots)
+    edges = spots.edges
+    share = _above(np.ascontiguousarray(spots.places[..., 2]).ravel(), edges.ravel(), height - layer.thickness)
+    return np.asarray(share.reshape(edges.shape))
 
 
 def log_stiffness(material: Material, spots: Spots, height: float) -> FloatArray:

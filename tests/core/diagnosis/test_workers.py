@@ -1,27 +1,40 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 from core.diagnosis import workers
 from core.diagnosis.observations import Observations
 from core.diagnosis.workers import Workers
 
 
-def _held(names: tuple[str, ...]) -> tuple[int, list[float]]:
-    """The process, and how many frames it holds of each of these sequences; -1 of one it does not know."""
-    data = workers._DATA
-    return os.getpid(), [len(data[name].times) if name in data else -1 for name in names]
+def _read(names: tuple[str, ...], home: Path) -> tuple[int, list[int], int]:
+    """The process, the frames of each of these sequences, and how many sequences the process keeps."""
+    frames = [len(workers._measured(home / f"{name}.pickle").times) for name in names]
+    return os.getpid(), frames, len(workers._READ)
 
 
 def _item(name: str, frames: int) -> Observations:
     return Observations(name, [0.0] * frames, None, ())  # type: ignore[arg-type]
 
 
-def test_other_measurements_are_held_by_new_processes_alone():
-    names = ("poke-01", "drag-01")
+def test_other_measurements_are_held_by_the_same_process_which_forgets_the_old_ones():
     with Workers([_item("poke-01", 3), _item("drag-01", 5)], 1) as pool:
-        first, before = pool.run(_held, names).result()
+        old = pool._home
+        first, before, kept = pool.run(_read, ("poke-01", "drag-01"), old).result()
         pool.hold([_item("poke-01", 4)])
-        second, after = pool.run(_held, names).result()
-    assert before == [3, 5] and after == [4, -1]
-    assert first != second
+        second, after, left = pool.run(_read, ("poke-01",), pool._home).result()
+        _, again, _ = pool.run(_read, ("drag-01",), old).result()  # as what was begun before would
+    assert before == [3, 5] and kept == 2
+    assert after == [4] and left == 1
+    assert again == [5]
+    assert first == second
+    assert not old.exists()
+
+
+def test_processes_that_were_started_ahead_are_those_that_work():
+    with Workers([], 2) as pool:
+        pool.start()
+        started = set(pool._pool._processes)
+        process, _, _ = pool.run(_read, (), pool._home).result()
+    assert len(started) == 2 and process in started
