@@ -16,7 +16,7 @@ from core.fem.path import FREE_STEP
 from core.frames import FloatArray
 from core.meshing import Mesh
 
-__all__ = ["Equilibrium", "extrapolated", "require_converged"]
+__all__ = ["Equilibrium", "extrapolated", "require_converged", "taught"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,4 +82,24 @@ def extrapolated(model: BlockModel, last: tuple[Equilibrium, Equilibrium], posit
         return positions
     share = float(now @ way / (way @ way))
     guess = positions + min(max(share, -1.0), 1.5) * (start.displacement - earlier.displacement)
+    return guess if model.energy(guess, probe) < model.energy(positions, probe) else positions
+
+
+def taught(
+    model: BlockModel, lesson: tuple[Equilibrium, Equilibrium], start: Equilibrium, positions: FloatArray, probe: Probe
+) -> FloatArray:
+    """Where a frame of a similar setup points to (n, 3) [m], together with what the last one was found to be off by.
+
+    Args:
+        lesson: the last frame's start, and what was found from there. start: of the frame that is sought, whose `positions` are on
+            the model's mesh; they are returned where the lesson leads to no lower energy. probe: as for `extrapolated`.
+    """
+    other, found = lesson
+    here = start.probe.centre - np.append(start.slip, 0.0)
+    useful = other.in_contact and found.in_contact and start.in_contact and np.linalg.norm(probe.centre - here) <= FREE_STEP
+    if not useful or found.outcome is not Outcome.CONVERGED:
+        return positions
+    nodes, focus = model.mesh.nodes, model.mesh.focus
+    moved = [one.mesh.interpolate(one.displacement, nodes - (focus - one.mesh.focus)) for one in (found, other)]
+    guess = np.where(model.topology.free, positions + moved[0] - moved[1], positions)
     return guess if model.energy(guess, probe) < model.energy(positions, probe) else positions

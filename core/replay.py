@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from core.equilibrium import Equilibrium, extrapolated, require_converged
+from core.equilibrium import Equilibrium, extrapolated, require_converged, taught
 from core.errors import SetupError, SolveError
 from core.fem.drag import Past, drag
 from core.fem.follow import Follower
@@ -49,6 +49,7 @@ class Replay:
         self._model: BlockModel | None = None
         self._mesh: Mesh | None = None
         self._before: tuple[Equilibrium, Equilibrium] | None = None
+        self._hard = False
         self.factorised: tuple[Equilibrium, BlockModel, int] | None = None
         self.slip, self.dense = np.zeros(2), False
         self._rest_mesh = self.grid.mesh(setup, np.array([0.0, 0.0, setup.geometry.height]))
@@ -73,12 +74,6 @@ class Replay:
         if self.memory is not None:
             self.memory.recall(self._model)
         return self._model
-
-    def tangent_at(self, frame: Equilibrium, model: BlockModel) -> bool:
-        """Whether the model's factor is that of its tangent at this frame (`core.sensitivity.factorise_at`), and only of it."""
-        known = self.factorised
-        same = known is not None and known[0] is frame and known[1] is model and known[2] == model.topology.factor.generation
-        return same and self.memory is None
 
     @cached_property
     def free(self) -> Equilibrium:
@@ -137,10 +132,13 @@ class Replay:
             return self._equilibrium(failed, model.mesh, probe)
         if self._before is not None and self._before[1] is start:
             positions = extrapolated(model, (self._before[0], start), positions, local)
+        elif self._before is not None and self._hard:
+            positions = taught(model, self._before, start, positions, local)
         if self.setup.tool.friction_coefficient:
             past = Past.of(model, start, Probe(before.centre - carried, before.radius))
             return self._dragged(model, positions, (before, local), past, probe)
         solution = lead(model, positions, before, local, self.tolerance, self._follower, haste=not self.dense)
+        self._hard = self._hard or self._follower.failing
         return self._equilibrium(self._settled(model, local, solution), model.mesh, probe)
 
     def set_out(self, probe: Probe, start: Equilibrium) -> tuple[BlockModel, FloatArray, Probe, FloatArray]:

@@ -28,6 +28,11 @@ class Follower:
         self._compliance: Compliance | None = None
         self._failures = self._pause = 0
 
+    @property
+    def failing(self) -> bool:
+        """Whether the last frame was not found so."""
+        return self._failures > 0
+
     def solve(self, model: BlockModel, probe: Probe, start: FloatArray, tolerance: float) -> Solution | None:
         """Equilibrium near `start` (n, 3) [m]; None where it takes a full Newton method to find it.
 

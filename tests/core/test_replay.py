@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.equilibrium import taught
 from core.errors import SolveError
+from core.fem.model import BlockModel
 from core.fem.newton import Outcome
 from core.mesh import GridSpec
 from core.replay import GRAVITY, Equilibrium, Replay, replay, require_converged, rest
@@ -166,6 +168,37 @@ def test_frames_start_as_well_from_those_of_a_similar_setup():
     starts = replay(replace(SETUP, material=Material(poisson_ratio=0.4)), centres, GRADED)
     alone, led = replay(SETUP, centres, GRADED), replay(SETUP, centres, GRADED, starts=starts)
     assert _relative(led[-1].displacement, alone[-1].displacement) < 1e-4
+
+
+def test_what_one_frame_was_off_by_begins_the_next_where_the_base_comes_loose(monkeypatch):
+    loose = replace(SETUP, support=Support(detached=(Detachment(edge="-x", extent=0.02),)))
+    centres = _way((-0.022, 0, TOP + 4e-3), (-0.016, 0, TOP + 2e-3), frames=7)
+    factors, factorise = [0], BlockModel.factorise
+
+    def counted(self, data):
+        factors[-1] += 1
+        factorise(self, data)
+
+    monkeypatch.setattr(BlockModel, "factorise", counted)
+    starts = replay(SETUP, centres, GRADED)
+    factors.append(0)
+    led = replay(loose, centres, GRADED, starts=starts)
+    factors.append(0)
+    monkeypatch.setattr("core.replay.taught", lambda model, lesson, start, positions, probe: positions)
+    alone = replay(loose, centres, GRADED, starts=starts)
+    require_converged([*led, *alone])
+    assert max(_relative(one.displacement, other.displacement) for one, other in zip(led, alone, strict=True)) < 1e-4
+    assert factors[1] < 0.8 * factors[2]
+
+
+def test_a_frame_that_is_far_from_its_start_is_begun_without_what_the_last_one_taught():
+    way = _poke(4e-3, 5)
+    first, near = replay(SETUP, way, GRADED)[-2:]
+    model, positions = Replay(SETUP, GRADED).model(near.mesh), near.mesh.nodes + near.displacement
+    far = replace(near.probe, centre=near.probe.centre + np.array([2e-3, 0.0, 0.0]))
+    assert taught(model, (first, near), near, positions, far) is positions
+    failed = replace(near, outcome=Outcome.ITERATIONS)
+    assert taught(model, (first, failed), near, positions, near.probe) is positions
 
 
 @pytest.mark.parametrize("poisson_ratio", [0.44, 0.45])

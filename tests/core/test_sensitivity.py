@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -9,7 +9,6 @@ import pytest
 from pushed_block import GRID, SETUP, SIZE, poke
 
 from core.fem.elastic import elastic_energy
-from core.fem.elements import Quadrature
 from core.fem.model import BlockModel, rule_of
 from core.fem.newton import solve
 from core.fem.stiffness import lump_share
@@ -87,7 +86,8 @@ def test_point_forces_are_gradients_of_each_points_energy(pushed):
     random = np.random.default_rng(1)
     for element, point in random.integers(model.mu.shape, size=(5, 2)):
         only = slice(element, element + 1)
-        rule = Quadrature(*(getattr(model.rule, part.name)[only] for part in fields(Quadrature)))
+        parts = ("slopes", "weights", "pressures", "places")
+        rule = replace(model.rule, **{name: getattr(model.rule, name)[only] for name in parts})
         alone = np.arange(model.mu.shape[1]) == point
         nodes, mu, bulk = model.topology.elements[only], model.mu[only] * alone, model.bulk[only] * alone
         energy = partial(elastic_energy, model.law, rule, nodes, mu, bulk)
@@ -132,6 +132,30 @@ def test_changes_are_linear_in_the_step(pushed):
 
     one, two = displacement_changes(block, frame, [(softer(1e-4), np.zeros(3)), (softer(2e-4), np.zeros(3))])
     assert _relative(two, 2 * one) < 5e-3
+
+
+def test_tangent_at_a_frame_is_made_once_until_another_takes_its_place(monkeypatch, pushed):
+    block, frame = pushed
+    steps = [(block.setup, TOOL_STEP * np.array([0.0, 0.0, 1.0]))]
+    tangents, assemble = [], BlockModel.assemble
+
+    def counted(self, positions, probe, *, tangent=True, bending=True):
+        tangents.append(tangent)
+        return assemble(self, positions, probe, tangent=tangent, bending=bending)
+
+    monkeypatch.setattr(BlockModel, "assemble", counted)
+    block.factorised = None
+    first = displacement_changes(block, frame, steps)
+    assert sum(tangents) == 1
+    again = displacement_changes(block, frame, steps)
+    assert sum(tangents) == 1 and np.array_equal(first, again)
+    other = block.step(poke(3e-3), frame)
+    made = sum(tangents)
+    assert made > 1
+    assert np.allclose(displacement_changes(block, frame, steps), first, rtol=1e-8, atol=1e-15)
+    assert sum(tangents) == made + 1
+    elsewhere = displacement_changes(block, other, steps)
+    assert sum(tangents) == made + 2 and not np.allclose(elsewhere, first, rtol=1e-3)
 
 
 def test_untouched_block_answers_to_weight_only():
