@@ -53,9 +53,14 @@ class Equilibrium:
     def _moved(self) -> FloatArray:
         return np.asarray(self.displacement + np.append(self.slip, 0.0))
 
+    @cached_property
+    def at_rest(self) -> bool:
+        """Whether every point of the block is where it is stated to be."""
+        return not self._moved.any()
+
     def move(self, points: FloatArray) -> FloatArray:
         """Current positions of material points given by their rest positions (m, 3) [m]."""
-        return points + self.mesh.interpolate(self._moved, points) if self._moved.any() else points
+        return points if self.at_rest else points + self.mesh.interpolate(self._moved, points)
 
 
 def require_converged(frames: Sequence[Equilibrium]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import multiprocessing
 import os
 import pickle
@@ -13,6 +14,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Generic, ParamSpec, Self, TypeVar
 
+import numpy as np
+
 from core.diagnosis.columns import Wanted
 from core.diagnosis.comparison import Sample
 from core.diagnosis.felt_prediction import predict_forces
@@ -20,10 +23,11 @@ from core.diagnosis.observations import Observations
 from core.diagnosis.prediction import Prediction, predict
 from core.diagnosis.traces import Trace, traces_of
 from core.effects import Effect
+from core.grading import SCREEN_GRID
 from core.meshing import Meshing
 from core.processes import bound_to_parent, giving_memory_back, keeping_memory
-from core.replay import Equilibrium
-from core.setup import Setup
+from core.replay import Equilibrium, Replay
+from core.setup import Box, Setup, Tool
 
 __all__ = ["TOLERANCE", "Pending", "Workers"]
 
@@ -42,7 +46,10 @@ def _begin() -> None:
 
 
 def _ready() -> None:
-    """Nothing: a process that can do this has imported what there is to import."""
+    """Load what every task needs: libraries, and the compiled kernels of a replay."""
+    importlib.import_module("open3d")
+    block = Replay(Setup(geometry=Box(size=(0.03, 0.03, 0.02)), tool=Tool(radius=5e-3)), SCREEN_GRID, TOLERANCE)
+    block.step(np.array([0.0, 0.0, 0.024]))
 
 
 def _measured(file: Path) -> Observations:

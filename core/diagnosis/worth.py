@@ -8,6 +8,7 @@ would else be of no use. What that tuning is worth by itself, without a cause, i
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import as_completed
 from dataclasses import replace
 
 import numpy as np
@@ -62,11 +63,9 @@ def worth(
     first, second = (found, stated) if findings.known else (stated, found)
     felt = all(item.unseen for item in unseen)
     without = tuned(bench, findings.baseline) if alone and findings.best and not findings.known and not felt else None
-    one = _found(pool.submit(names, first, grid))
-    # Side by side: one sequence may take three times as long as the others.
-    begun = [] if first is second else pool.submit(names, second, grid, None, one)
-    by_itself = [] if without is None else pool.submit(names, without, grid, None, one)
-    other = _found(begun) if begun else one
+    further = [setup for setup in (None if first is second else second, without) if setup is not None]
+    one, rest = _begun(pool, names, [first, *further], grid)
+    other = one if first is second else _found(rest[0])
     baseline, extended = (other, one) if findings.known else (one, other)
     touched = [{n for n, group in enumerate(item.groups) if not group.free} for item in unseen]
     rows = zip(touched, baseline, extended, strict=True)
@@ -76,8 +75,26 @@ def worth(
         return felt_ladder(unseen, baseline, extended, seed, _stiffer(bench, findings))
     gain = ladder(unseen, baseline, extended, stated, found, seed)
     if without is not None:
-        gain = replace(gain, tuned=ladder(unseen, baseline, _found(by_itself), stated, without, seed).removed)
+        gain = replace(gain, tuned=ladder(unseen, baseline, _found(rest[-1]), stated, without, seed).removed)
     return gain
+
+
+def _begun(
+    pool: Workers, names: Sequence[str], setups: Sequence[Setup], grid: Meshing
+) -> tuple[list[Prediction], list[list[Pending]]]:
+    """Replays under the first setup, and those under each of the others, which begin from them and are under way.
+
+    Each sequence goes on as soon as it can: one may take three times as long as the others.
+    """
+    first, *others = setups
+    plain = pool.submit(names, first, grid)
+    further: dict[str, list[Pending]] = {}
+    number = {pending.future: place for place, pending in enumerate(plain)}
+    for done in as_completed(number):
+        place = number[done]
+        start = [plain[place].result()]
+        further[names[place]] = [pool.submit([names[place]], setup, grid, None, start)[0] for setup in others]
+    return _found(plain), [[further[name][row] for name in names] for row in range(len(others))]
 
 
 def _found(begun: Sequence[Pending]) -> list[Prediction]:
