@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from pushed_block import SETUP, registration
+from pushed_block import GRID, SETUP, observed, poke, registration
 
 from core.diagnosis.bench import Bench
 from core.diagnosis.columns import TOOL_COLUMNS
 from core.diagnosis.evidence import Block, gram
 from core.diagnosis.hypothesis import Model
 from core.diagnosis.workers import Workers
-from core.diagnosis.worth import tuned
+from core.diagnosis.worth import _begun, tuned
 from core.effects.material import YoungModulus
 from core.mesh import GridSpec
 from core.registration.pose import small_motion
+from core.setup import Material
 
 NUISANCES = TOOL_COLUMNS + 9
 OFF = np.array([2e-4, -1e-4, 1.5e-4, 2e-3, -1e-3, 3e-3])
@@ -59,3 +61,21 @@ def test_data_that_show_nothing_leave_the_setup_as_it_is(bench: Bench) -> None:
     found = tuned(bench, _shown(bench, 0.0))
     assert found.phantom_from_robot.matrix == pytest.approx(SETUP.phantom_from_robot.matrix, abs=1e-12)
     assert found.tool.radius == pytest.approx(SETUP.tool.radius)
+
+
+def test_each_sequence_goes_on_from_its_own_first_replay() -> None:
+    ways = {"short": [poke(2e-3)], "long": [poke(depth) for depth in (1e-3, 2e-3, 3e-3, 4e-3)]}
+    data = [replace(observed(SETUP, np.array(way), count=2000), name=name) for name, way in ways.items()]
+    softer = replace(SETUP, material=Material(poisson_ratio=0.35))
+    names = [item.name for item in data]
+    with Workers(data, 2) as pool:
+        plain, (under, again) = _begun(pool, names, [SETUP, softer, SETUP], GRID)
+        led = [pending.result() for pending in under]
+        same = [pending.result() for pending in again]
+        wanted = [pending.result() for pending in pool.submit(names, softer, GRID, None, plain)]
+        alone, none = _begun(pool, names, [SETUP], GRID)
+    assert [item.name for item in plain] == [item.name for item in led] == names and none == []
+    for one, other in ((led, wanted), (plain, alone)):
+        assert all(np.array_equal(a.gap, b.gap, equal_nan=True) for a, b in zip(one, other, strict=True))
+    assert all(np.nanmax(np.abs(a.gap - b.gap)) < 1e-6 for a, b in zip(same, plain, strict=True))
+    assert all(np.nanmax(np.abs(a.gap - b.gap)) > 1e-5 for a, b in zip(led, plain, strict=True))
