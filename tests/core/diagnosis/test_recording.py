@@ -7,9 +7,9 @@ from dataclasses import fields, replace
 import numpy as np
 from pushed_block import GRID, SETUP, TOP, poke, seen_points
 
-from core.diagnosis import recording
 from core.diagnosis.recording import Recorded, observed
 from core.frames import Transform
+from core.measurement import gaps
 from core.replay import replay
 from core.setup import Material, Sensor
 
@@ -29,13 +29,13 @@ def _same(one: Recorded, other: Recorded) -> bool:
 
 def _looks(monkeypatch) -> list[int]:
     """Grows by the number of points whenever a cloud is compared with a surface."""
-    seen, gaps = list[int](), recording.gaps
+    seen = list[int]()
 
     def counted(points, *rest, **known):
         seen.append(len(points))
         return gaps(points, *rest, **known)
 
-    monkeypatch.setattr(recording, "gaps", counted)
+    monkeypatch.setattr("core.diagnosis.recording.gaps", counted)
     return seen
 
 
