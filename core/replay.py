@@ -41,6 +41,9 @@ class Replay:
     Args:
         setup: what is believed. grid: the mesh, unless the setup has one. tolerance: residual of a converged frame, over the push.
         drag_step: longest motion of a tool with friction [m] that is taken as straight.
+
+    Attributes:
+        factorised: the frame of which a model holds the tangent's factor, and the factor's number (`core.sensitivity.factorise_at`).
     """
 
     def __init__(self, setup: Setup, grid: Meshing, tolerance: float = RELATIVE_TOLERANCE, drag_step: float = _DRAG_STEP) -> None:
@@ -49,7 +52,7 @@ class Replay:
         self._model: BlockModel | None = None
         self._mesh: Mesh | None = None
         self._before: tuple[Equilibrium, Equilibrium] | None = None
-        self._hard = False
+        self._hard = False  # whether some frame was lost by the quick solver: from then on each teaches the next (`taught`)
         self.factorised: tuple[Equilibrium, BlockModel, int] | None = None
         self.slip, self.dense = np.zeros(2), False
         self._rest_mesh = self.grid.mesh(setup, np.array([0.0, 0.0, setup.geometry.height]))

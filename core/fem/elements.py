@@ -21,6 +21,7 @@ from numba import njit
 from core.frames import FloatArray
 
 LANES = 4
+"""Numbers of double precision in a vector of the processor."""
 _DENSE = 8
 """Points along each edge of a hexahedron's dense side: none further apart than a fifth of it."""
 
