@@ -43,7 +43,7 @@ class Replay:
         drag_step: longest motion of a tool with friction [m] that is taken as straight.
 
     Attributes:
-        factorised: the frame of which a model holds the tangent's factor, and the factor's number (`core.sensitivity.factorise_at`).
+        factorised: the frame of which a model holds the factor, and the factor's number (`core.sensitivity.factorise_at`).
     """
 
     def __init__(self, setup: Setup, grid: Meshing, tolerance: float = RELATIVE_TOLERANCE, drag_step: float = _DRAG_STEP) -> None:
