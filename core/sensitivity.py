@@ -2,13 +2,12 @@
 
 At equilibrium the residual R(u, p) vanishes, so du/dp = -K^-1 dR/dp (implicit function theorem). dR/dp is taken by asking the
 changed Setup for its residual at the same displacement; thus any effect has its sensitivity without knowing the solver.
-A setup that remembers has none here: its frame hangs on all those before it, which a change would have changed, too; `core.adjoint`
-goes back through them.
+A setup with history has none here: its frame depends on all the frames before it, which the change would have changed, too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +25,7 @@ from core.threads import on_one_thread
 
 __all__ = [
     "TOOL_STEP", "Change", "GivingTool", "displacement_changes", "factorise_at", "force_changes", "gives", "local_probe",
-    "loss_changes", "mesh_in", "refuse_histories", "refuse_other_grid", "same_body", "tool_slopes",
+    "mesh_in", "refuse_histories", "refuse_other_grid", "same_body", "tool_slopes",
 ]  # fmt: skip
 
 Change = tuple[Setup, FloatArray]
@@ -152,13 +151,10 @@ class GivingTool:
         (1 + c (H - B' A)) dy = ds + dc f + c (df - B' free),    du = free - A dy.
 
     Attributes:
-        coupling: B (u, 3) [m]. answer: K^-T B, which is A where the tangent is symmetric.
+        coupling: B (u, 3) [m]. answer: A = K^-1 B.
     """
 
-    def __init__(
-        self, block: Replay, frame: Equilibrium, model: BlockModel, solve: Callable[[FloatArray], FloatArray] | None = None
-    ) -> None:
-        """`solve` is for the transposed tangent, where it is not the symmetric one that the model's factor is of."""
+    def __init__(self, block: Replay, frame: Equilibrium, model: BlockModel) -> None:
         self._block, self._model, self._here = block, model, local_probe(frame)
         self._frame = frame
         self._positions = frame.mesh.nodes + frame.displacement
@@ -166,18 +162,13 @@ class GivingTool:
         state = model.assemble(self._positions, self._here, tangent=False)
         self._force = -state.push
         self.coupling, harder = tool_slopes(model, self._positions, self._here)
-        self.answer = (solve or model.topology.factor.solve)(self.coupling)
+        self.answer = model.topology.factor.solve(self.coupling)
         self._inverse = np.linalg.inv(np.eye(3) + self._compliance * (harder - self.answer.T @ self.coupling))
 
     def moved(self, changes: Sequence[Change], free: FloatArray) -> FloatArray:
         """The change of the displacement (u, len(changes)) [m], by that at a fixed tool; for a symmetric tangent."""
         driven = self.driven(changes) - self._compliance * (self.coupling.T @ free)
         return np.asarray(free - self.answer @ (self._inverse @ driven))
-
-    def adjoint(self, free: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Of the displacement (u,) and, per `driven`, of the tool's place (3,), by the adjoint displacement at a fixed tool."""
-        place = -self._inverse.T @ (self.coupling.T @ free)
-        return free - self._compliance * (self.answer @ place), place
 
     def driven(self, changes: Sequence[Change]) -> FloatArray:
         """ds + dc f + c df (3, len(changes)) [m]."""
@@ -258,28 +249,3 @@ def force_changes(block: Replay, frame: Equilibrium, changes: Sequence[Change], 
             found[number] = np.linalg.solve(np.eye(3) + giving * harder, found[number] - harder @ driven)
         found[number] += (setup.material.young_modulus / modulus - 1) * frame.force / modulus
     return found * modulus
-
-
-def loss_changes(block: Replay, frame: Equilibrium, slope: FloatArray, changes: Sequence[Change]) -> FloatArray:
-    """How a function of the displacement changes, to first order, by the adjoint: one solve for any number of changes.
-
-    With K the (symmetric) tangent and K lambda = dL/du, the change is dL = -lambda . dR (e.g. Plessix 2006).
-
-    Args:
-        block, frame, changes: as for `displacement_changes`. slope: (n, 3) derivative of the function by the displacement [1/m].
-
-    Returns:
-        (len(changes),) changes of the function; zero where nothing holds the tool against the block.
-    """
-    refuse_histories(block.setup, *(setup for setup, _ in changes))
-    refuse_other_grid(block, [setup for setup, _ in changes])
-    model = factorise_at(block, frame) if _holds(block, frame) else None
-    if model is None or not changes:
-        return np.zeros(len(changes))
-    right = _unbalanced(block, frame, model, changes)[0]
-    adjoint = model.topology.factor.solve(slope[model.topology.free])
-    if not gives(block.setup, *(setup for setup, _ in changes)):
-        return np.asarray(adjoint @ right)
-    tool = GivingTool(block, frame, model)
-    adjoint, place = tool.adjoint(adjoint)
-    return np.asarray(adjoint @ right + place @ tool.driven(changes))

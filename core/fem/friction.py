@@ -102,14 +102,6 @@ class Hold:
         """The part of it on these faces (g,), where the points lie face by face."""
         return type(self)(self.places[faces], self.ways[faces], self.touched[faces], self.limits[faces])
 
-    def at_transposed(self, places: FloatArray, costate: FloatArray) -> FloatArray:
-        """The transpose of how `at` takes ways to other points: from costates there (..., 3) to those of the own ways (m, 3)."""
-        found = np.zeros_like(self.ways)
-        if self.touched.any():
-            near, weights, _ = self._near(places.reshape(-1, 3))
-            np.add.at(found, near, weights[..., None] * costate.reshape(-1, 1, 3))
-        return found
-
     def _near(self, places: FloatArray) -> tuple[IntArray, FloatArray, np.ndarray[Any, np.dtype[np.bool_]]]:
         """Own points next to each place (m, k), their weights, none where the nearest was not touched, and whether it was (m,)."""
         distance, near = (np.asarray(part) for part in cKDTree(self.places).query(places, k=_NEIGHBOURS))

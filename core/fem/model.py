@@ -43,7 +43,7 @@ class Probe:
 
 
 class Carried(Protocol):
-    """A quadratic potential of the unknowns' displacements that one step in time adds (`core.fem.inertia`, `core.fem.memory`)."""
+    """A quadratic potential of the unknowns' displacements that one step in time adds (`core.fem.memory`)."""
 
     @property
     def data(self) -> FloatArray:

@@ -22,8 +22,8 @@ from core.meshing import Mesh, Meshing
 from core.setup import Setup
 
 __all__ = [
-    "CellPoints", "MaterialPoints", "QuadraturePoints", "material_points", "quadrature_tangents", "quadrature_tangents_transposed",
-]  # fmt: skip
+    "CellPoints", "MaterialPoints", "QuadraturePoints", "material_points", "quadrature_tangents",
+]
 
 _CELLS_PER_EDGE, _MOST_CELLS = 1.5, 64
 """Cells along the finest edge of the grid, and at most along an axis. After a poke by 5 mm and release the dent that memory left
@@ -40,24 +40,11 @@ class MaterialPoints(Protocol):
     def read(self, mesh: Mesh, field: FloatArray) -> FloatArray:
         """A field (m, c) of the points at the quadrature points (e, q, c) of a grid."""
 
-    def tangents_transposed(self, mesh: Mesh, rows: FloatArray) -> FloatArray:
-        """The transpose of `tangents`, from (m, 3, 3) to the nodes (n, 3)."""
-
-    def read_transposed(self, mesh: Mesh, field: FloatArray) -> FloatArray:
-        """The transpose of `read`, from (e, q, c) to the points (m, c)."""
-
 
 def quadrature_tangents(mesh: Mesh, positions: FloatArray) -> FloatArray:
     """Derivatives (e, q, 3, 3) of the positions (n, 3) along x, y, z, one row each, at the quadrature points [1]."""
     gradients = rule_of(mesh).gradients
     return np.asarray(np.swapaxes(gradients, 2, 3) @ positions[mesh.connectivity.elements][:, None])
-
-
-def quadrature_tangents_transposed(mesh: Mesh, rows: FloatArray) -> FloatArray:
-    """The transpose of `quadrature_tangents`, from (e, q, 3, 3) to the nodes (n, 3)."""
-    found = np.zeros_like(mesh.nodes)
-    np.add.at(found, mesh.connectivity.elements, (rule_of(mesh).gradients @ rows).sum(axis=1))
-    return found
 
 
 class QuadraturePoints:
@@ -79,14 +66,6 @@ class QuadraturePoints:
         """As `MaterialPoints` has it."""
         self._same(mesh)
         return field.reshape(*rule_of(mesh).weights.shape, -1)
-
-    def tangents_transposed(self, mesh: Mesh, rows: FloatArray) -> FloatArray:
-        """As `MaterialPoints` has it."""
-        return quadrature_tangents_transposed(mesh, rows.reshape(*rule_of(mesh).weights.shape, 3, 3))
-
-    def read_transposed(self, mesh: Mesh, field: FloatArray) -> FloatArray:
-        """As `MaterialPoints` has it."""
-        return field.reshape(-1, field.shape[-1])
 
 
 class CellPoints:
@@ -118,25 +97,6 @@ class CellPoints:
         (ex, ey, ez), points = _elements(mesh), _points_along(mesh)
         found = found.reshape(ez, points, ey, points, ex, points, -1).transpose(0, 2, 4, 1, 3, 5, 6)
         return np.ascontiguousarray(found).reshape(ez * ey * ex, points**3, -1)
-
-    def tangents_transposed(self, mesh: Mesh, rows: FloatArray) -> FloatArray:
-        """As `MaterialPoints` has it."""
-        assert isinstance(mesh, BoxMesh)
-        (mx, dx), (my, dy), (mz, dz) = ((mean.T, slope.T) for mean, slope in (_means(self, mesh, axis) for axis in range(3)))
-        along_x, along_y, along_z = (rows[:, axis].reshape(*self._counts[::-1], 3) for axis in range(3))
-        low = _along(my, _along(dx, along_x, 2), 1) + _along(dy, _along(mx, along_y, 2), 1)
-        rising = _along(my, _along(mx, along_z, 2), 1)
-        return (_along(mz, low, 0) + _along(dz, rising, 0)).reshape(-1, 3)
-
-    def read_transposed(self, mesh: Mesh, field: FloatArray) -> FloatArray:
-        """As `MaterialPoints` has it."""
-        assert isinstance(mesh, BoxMesh)
-        (ex, ey, ez), points = _elements(mesh), _points_along(mesh)
-        found = field.reshape(ez, ey, ex, points, points, points, -1).transpose(0, 3, 1, 4, 2, 5, 6)
-        found = found.reshape(ez * points, ey * points, ex * points, -1)
-        for axis in range(3):
-            found = _along(_reading(self, mesh, axis).T, found, 2 - axis)
-        return np.ascontiguousarray(found).reshape(-1, found.shape[-1])
 
     @property
     def _counts(self) -> list[int]:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from core.accuracy import mesh_errors
-from core.dynamics import Damping, MovingBlock
 from core.errors import SetupError
 from core.fem import compliance, model
 from core.fem.elastic import Law, lame
@@ -19,7 +18,7 @@ from core.frames import FloatArray
 from core.local_stiffness import stiffness_changes
 from core.mesh import GridSpec
 from core.replay import Equilibrium, Replay, replay, require_converged, rest
-from core.sensitivity import displacement_changes, loss_changes
+from core.sensitivity import displacement_changes
 from core.setup import Box, Load, Material, Relaxation, Setup, Support, Tool
 
 SIZE = (0.0687, 0.0393, 0.0358)
@@ -210,10 +209,8 @@ def test_what_knows_nothing_of_the_past_says_so():
     asked = [
         lambda: displacement_changes(block, frame, [(setup, nowhere)]),
         lambda: displacement_changes(plain, frame, [(setup, nowhere)]),
-        lambda: loss_changes(plain, frame, frame.displacement, [(setup, nowhere)]),
         lambda: stiffness_changes(block, frame, np.ones((1, *block.model(frame.mesh).mu.shape))),
         lambda: mesh_errors(setup, [frame], EVEN),
-        lambda: MovingBlock(setup, EVEN, Damping()),
     ]
     for question in asked:
         with pytest.raises(SetupError, match="relaxation") as caught:
