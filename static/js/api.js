@@ -2,17 +2,32 @@
 import { element } from "./dom.js";
 
 export class Problem extends Error {
-  constructor({ kind, message, where }) { super(message); Object.assign(this, { kind, where }); }
+  constructor({ kind, message, where }) {
+    super(message);
+    Object.assign(this, { kind, where });
+  }
 }
 
-export async function get(path) { return answer(await reach(path)); }
+export async function get(path) {
+  return answer(await reach(path));
+}
 
 export async function post(path, body) {
-  return answer(await reach(path, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body ?? {}) }));
+  return answer(
+    await reach(path, {
+      method: "POST",
+      headers: { "content-type": "application/json" },
+      body: JSON.stringify(body ?? {}),
+    }),
+  );
 }
 
 export async function put(path, body) {
-  const response = await reach(path, { method: "PUT", headers: { "content-type": "application/json" }, body: JSON.stringify(body) });
+  const response = await reach(path, {
+    method: "PUT",
+    headers: { "content-type": "application/json" },
+    body: JSON.stringify(body),
+  });
   if (!response.ok) await answer(response);
 }
 
@@ -22,24 +37,43 @@ export async function remove(path) {
 }
 
 async function reach(path, options) {
-  try { return await fetch(`/api${path}`, options); } catch {
-    throw new Problem({ kind: "No answer", message: "The server does not answer. Start it again with: palpate serve", where: {} });
+  try {
+    return await fetch(`/api${path}`, options);
+  } catch {
+    throw new Problem({
+      kind: "No answer",
+      message: "The server does not answer. Start it again with: palpate serve",
+      where: {},
+    });
   }
 }
 
 async function answer(response) {
-  const body = await response.json().catch(() => ({ kind: "Error", message: `The server answered ${response.status}.`, where: {} }));
+  const body = await response
+    .json()
+    .catch(() => ({
+      kind: "Error",
+      message: `The server answered ${response.status}.`,
+      where: {},
+    }));
   if (response.status === 401) location.assign("/login");
   if (!response.ok) throw new Problem(body);
   return body;
 }
 
 export function toast(problem) {
-  const box = element("div", { class: "toast" }, element("strong", {}, title(problem)), problem.message);
+  const box = element(
+    "div",
+    { class: "toast" },
+    element("strong", {}, title(problem)),
+    problem.message,
+  );
   document.getElementById("toasts").append(box);
   setTimeout(() => box.remove(), 9000);
 }
 
 export function title(problem) {
-  return (problem.kind ?? "Error").replace(/Error$/, "").replace(/([a-z])([A-Z])/g, "$1 $2") || "Error";
+  return (
+    (problem.kind ?? "Error").replace(/Error$/, "").replace(/([a-z])([A-Z])/g, "$1 $2") || "Error"
+  );
 }

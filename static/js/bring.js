@@ -7,17 +7,24 @@ let box = null;
 
 /** Ask for a dataset; whoever drops an archive on the page has chosen it already. */
 export function askForDataset(file = null) {
-  box ??= document.body.appendChild(element("dialog", { class: "ask", "aria-label": "Import a dataset" }));
+  box ??= document.body.appendChild(
+    element("dialog", { class: "ask", "aria-label": "Import a dataset" }),
+  );
   draw(file);
   if (!box.open) box.showModal();
 }
 
 /** Archives dropped anywhere on the page are imported. */
 export function watchDrops() {
-  window.addEventListener("dragover", (event) => { if (event.dataTransfer?.types.includes("Files")) event.preventDefault(); });
+  window.addEventListener("dragover", (event) => {
+    if (event.dataTransfer?.types.includes("Files")) event.preventDefault();
+  });
   window.addEventListener("drop", (event) => {
     const [file] = event.dataTransfer?.files ?? [];
-    if (file) { event.preventDefault(); askForDataset(file); }
+    if (file) {
+      event.preventDefault();
+      askForDataset(file);
+    }
   });
 }
 
@@ -25,38 +32,111 @@ function draw(file) {
   const problem = element("div", { role: "alert" });
   const bar = element("i");
   const progress = element("div", { class: "progress", hidden: true }, bar);
-  const name = element("input", { name: "name", required: true, maxlength: 64, pattern: NAME, title: "Letters, digits, dot, dash, underscore", autocomplete: "off", value: file ? named(file.name) : "" });
-  const chosen = element("input", { type: "file", name: "file", accept: ".zip,.tar,.gz,.tgz,.bz2,.xz", "aria-label": "Archive of the dataset" });
-  chosen.addEventListener("change", () => { if (chosen.files[0] && !name.value) name.value = named(chosen.files[0].name); });
-  const folder = element("input", { name: "folder", placeholder: "/data/bench/block-07", autocomplete: "off", "aria-label": "Folder on the server" });
-  folder.addEventListener("input", () => { if (!name.dataset.own) name.value = named(folder.value.split("/").filter(Boolean).at(-1) ?? ""); });
-  name.addEventListener("input", () => { name.dataset.own = "yes"; });
+  const name = element("input", {
+    name: "name",
+    required: true,
+    maxlength: 64,
+    pattern: NAME,
+    title: "Letters, digits, dot, dash, underscore",
+    autocomplete: "off",
+    value: file ? named(file.name) : "",
+  });
+  const chosen = element("input", {
+    type: "file",
+    name: "file",
+    accept: ".zip,.tar,.gz,.tgz,.bz2,.xz",
+    "aria-label": "Archive of the dataset",
+  });
+  chosen.addEventListener("change", () => {
+    if (chosen.files[0] && !name.value) name.value = named(chosen.files[0].name);
+  });
+  const folder = element("input", {
+    name: "folder",
+    placeholder: "/data/bench/block-07",
+    autocomplete: "off",
+    "aria-label": "Folder on the server",
+  });
+  folder.addEventListener("input", () => {
+    if (!name.dataset.own) name.value = named(folder.value.split("/").filter(Boolean).at(-1) ?? "");
+  });
+  name.addEventListener("input", () => {
+    name.dataset.own = "yes";
+  });
   const start = element("button", { class: "button strong", type: "submit" }, "Import");
-  const form = element("form", { class: "ask-form", onsubmit: async (event) => {
-    event.preventDefault();
-    const archive = file ?? chosen.files[0] ?? null;
-    fill(problem);
-    if (!archive && !folder.value) { fill(problem, said({ kind: "Nothing chosen", message: "Choose an archive, or name a folder on the server." })); return; }
-    start.disabled = true;
-    progress.hidden = !archive;
-    try {
-      if (archive) await upload(archive, name.value, (share) => { bar.style.width = `${100 * share}%`; });
-      else await post("/imports/folder", { folder: folder.value, name: name.value });
-      box.close();
-    } catch (refused) { fill(problem, said(refused)); start.disabled = false; progress.hidden = true; }
-  } },
-  file ? element("p", {}, `${file.name}, ${(file.size / 2 ** 20).toFixed(1)} MB`)
-    : element("label", {}, "An archive of its folder (.zip, .tar, .tar.gz)", chosen),
-  file ? null : element("label", {}, "or a folder on the server’s disk", folder),
-  element("label", {}, "Its name here", name), progress, problem,
-  element("div", { class: "actions" }, start, element("button", { class: "button", type: "button", onclick: () => box.close() }, "Cancel")));
-  fill(box, element("h1", { class: "verdict" }, "Import a dataset"),
-    element("p", { class: "gain-note" }, "Every file is checked first: the dataset is taken as a whole, or refused with all that is wrong with it."), form);
+  const form = element(
+    "form",
+    {
+      class: "ask-form",
+      onsubmit: async (event) => {
+        event.preventDefault();
+        const archive = file ?? chosen.files[0] ?? null;
+        fill(problem);
+        if (!archive && !folder.value) {
+          fill(
+            problem,
+            said({
+              kind: "Nothing chosen",
+              message: "Choose an archive, or name a folder on the server.",
+            }),
+          );
+          return;
+        }
+        start.disabled = true;
+        progress.hidden = !archive;
+        try {
+          if (archive)
+            await upload(archive, name.value, (share) => {
+              bar.style.width = `${100 * share}%`;
+            });
+          else await post("/imports/folder", { folder: folder.value, name: name.value });
+          box.close();
+        } catch (refused) {
+          fill(problem, said(refused));
+          start.disabled = false;
+          progress.hidden = true;
+        }
+      },
+    },
+    file
+      ? element("p", {}, `${file.name}, ${(file.size / 2 ** 20).toFixed(1)} MB`)
+      : element("label", {}, "An archive of its folder (.zip, .tar, .tar.gz)", chosen),
+    file ? null : element("label", {}, "or a folder on the server’s disk", folder),
+    element("label", {}, "Its name here", name),
+    progress,
+    problem,
+    element(
+      "div",
+      { class: "actions" },
+      start,
+      element("button", { class: "button", type: "button", onclick: () => box.close() }, "Cancel"),
+    ),
+  );
+  fill(
+    box,
+    element("h1", { class: "verdict" }, "Import a dataset"),
+    element(
+      "p",
+      { class: "gain-note" },
+      "Every file is checked first: the dataset is taken as a whole, or refused with all that is wrong with it.",
+    ),
+    form,
+  );
 }
 
-const named = (file) => file.replace(/(\.tar)?\.(zip|tar|gz|tgz|bz2|xz)$/i, "").replace(/[^A-Za-z0-9._-]+/g, "-").replace(/^[^A-Za-z0-9]+/, "").slice(0, 64);
+const named = (file) =>
+  file
+    .replace(/(\.tar)?\.(zip|tar|gz|tgz|bz2|xz)$/i, "")
+    .replace(/[^A-Za-z0-9._-]+/g, "-")
+    .replace(/^[^A-Za-z0-9]+/, "")
+    .slice(0, 64);
 
-const said = (problem) => element("div", { class: "note-card bad" }, element("strong", {}, title(problem)), problem.message);
+const said = (problem) =>
+  element(
+    "div",
+    { class: "note-card bad" },
+    element("strong", {}, title(problem)),
+    problem.message,
+  );
 
 /** Send a file with its progress, which fetch cannot tell. */
 function upload(file, name, told) {
@@ -67,10 +147,22 @@ function upload(file, name, told) {
     request.upload.onprogress = ({ loaded, total }) => told(total ? loaded / total : 0);
     request.onload = () => {
       let body = { kind: "Error", message: `The server answered ${request.status}.`, where: {} };
-      try { body = JSON.parse(request.responseText); } catch { /* said above */ }
-      if (request.status < 300) done(body); else refused(new Problem(body));
+      try {
+        body = JSON.parse(request.responseText);
+      } catch {
+        /* said above */
+      }
+      if (request.status < 300) done(body);
+      else refused(new Problem(body));
     };
-    request.onerror = () => refused(new Problem({ kind: "No answer", message: "The connection broke while sending; try again.", where: {} }));
+    request.onerror = () =>
+      refused(
+        new Problem({
+          kind: "No answer",
+          message: "The connection broke while sending; try again.",
+          where: {},
+        }),
+      );
     request.send(file);
   });
 }

@@ -9,25 +9,37 @@ const CALM = 500; // ms without motion after which a place is kept
 /** Keep the place each time a person has turned, moved or zoomed. */
 export function keep(viewer) {
   let waiting = null;
-  const later = () => { clearTimeout(waiting); waiting = setTimeout(() => save(viewer), CALM); };
-  for (const kind of ["pointerup", "wheel"]) viewer.addEventListener(kind, later, { capture: true, passive: true });
+  const later = () => {
+    clearTimeout(waiting);
+    waiting = setTimeout(() => save(viewer), CALM);
+  };
+  for (const kind of ["pointerup", "wheel"])
+    viewer.addEventListener(kind, later, { capture: true, passive: true });
 }
 
 function save(viewer) {
   const { camera, cameraControl: control } = viewer.__viserMutable ?? {};
   if (!camera || !control || !state().run) return;
   const target = control._target ?? control.getTarget();
-  const place = (vector) => fromViewer(viewer, [vector.x, vector.y, vector.z]).map((value) => +value.toFixed(6));
-  localStorage.setItem(KEY, JSON.stringify({ run: state().run, position: place(camera.position), target: place(target) }));
+  const place = (vector) =>
+    fromViewer(viewer, [vector.x, vector.y, vector.z]).map((value) => +value.toFixed(6));
+  localStorage.setItem(
+    KEY,
+    JSON.stringify({ run: state().run, position: place(camera.position), target: place(target) }),
+  );
 }
 
 /** A standard view was asked for: it begins anew. */
-export function forget() { localStorage.removeItem(KEY); }
+export function forget() {
+  localStorage.removeItem(KEY);
+}
 
 /** Tell the server before the viewer opens. */
 export async function restore(page) {
   try {
     const kept = JSON.parse(localStorage.getItem(KEY));
     if (kept) await put(`/sessions/${page}/camera`, kept);
-  } catch { forget(); }
+  } catch {
+    forget();
+  }
 }

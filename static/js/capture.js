@@ -17,7 +17,9 @@ let stopped = null;
 export function start(id) {
   page = id;
   button("still", "camera", "Save the picture as PNG", () => still().catch(toast));
-  button("clip", "film", "Save a clip as GIF: the looped part, or the whole sequence", () => clip().catch(toast));
+  button("clip", "film", "Save a clip as GIF: the looped part, or the whole sequence", () =>
+    clip().catch(toast),
+  );
 }
 
 async function still() {
@@ -33,7 +35,10 @@ async function clip() {
   set({ playing: false });
   const [from, to] = range(series.time.length);
   const stride = Math.ceil((to - from + 1) / MOST_FRAMES);
-  const frames = Array.from({ length: Math.floor((to - from) / stride) + 1 }, (_, place) => from + place * stride);
+  const frames = Array.from(
+    { length: Math.floor((to - from) / stride) + 1 },
+    (_, place) => from + place * stride,
+  );
   const gif = GIFEncoder();
   try {
     for (const [place, frame] of frames.entries()) {
@@ -41,10 +46,15 @@ async function clip() {
       set({ frame });
       await until(() => state().held?.view?.frame === frame, stopped.signal);
       const canvas = await draw(Math.min(1, CLIP_WIDTH / box().width), stopped.signal);
-      const { data, width, height } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+      const { data, width, height } = canvas
+        .getContext("2d")
+        .getImageData(0, 0, canvas.width, canvas.height);
       const palette = quantize(data, 256);
       const lasts = (series.time[Math.min(to, frame + stride)] - series.time[frame]) / speed;
-      gif.writeFrame(applyPalette(data, palette), width, height, { palette, delay: Math.max(20, Math.round(1e3 * (lasts || 0.5))) });
+      gif.writeFrame(applyPalette(data, palette), width, height, {
+        palette,
+        delay: Math.max(20, Math.round(1e3 * (lasts || 0.5))),
+      });
     }
     gif.finish();
     save(new Blob([gif.bytes()], { type: "image/gif" }), "gif");
@@ -60,8 +70,20 @@ async function clip() {
 function progress(done, all) {
   const bar = document.getElementById("clip-bar");
   bar.hidden = false;
-  fill(bar, element("span", {}, `Clip: frame ${done + 1} of ${all}`), element("div", { class: "progress" }, element("i", { style: { width: `${100 * done / all}%` } })),
-    element("button", { class: "button small", type: "button", onclick: () => stopped?.abort() }, "Cancel"));
+  fill(
+    bar,
+    element("span", {}, `Clip: frame ${done + 1} of ${all}`),
+    element(
+      "div",
+      { class: "progress" },
+      element("i", { style: { width: `${(100 * done) / all}%` } }),
+    ),
+    element(
+      "button",
+      { class: "button small", type: "button", onclick: () => stopped?.abort() },
+      "Cancel",
+    ),
+  );
 }
 
 async function until(true_, signal) {
@@ -76,11 +98,18 @@ const box = () => document.getElementById("viewer").getBoundingClientRect();
 /** The scene with its legend and a line that says what it is, on the page's background. */
 async function draw(ratio, signal) {
   const { width, height } = box();
-  const size = [width, height].map((edge) => Math.max(16, Math.min(4096, Math.round(edge * ratio))));
-  const answer = await fetch(`/api/sessions/${page}/still.png?width=${size[0]}&height=${size[1]}`, { signal });
+  const size = [width, height].map((edge) =>
+    Math.max(16, Math.min(4096, Math.round(edge * ratio))),
+  );
+  const answer = await fetch(`/api/sessions/${page}/still.png?width=${size[0]}&height=${size[1]}`, {
+    signal,
+  });
   if (!answer.ok) throw await answer.json();
   const picture = await createImageBitmap(await answer.blob());
-  const canvas = Object.assign(document.createElement("canvas"), { width: size[0], height: size[1] });
+  const canvas = Object.assign(document.createElement("canvas"), {
+    width: size[0],
+    height: size[1],
+  });
   const pen = canvas.getContext("2d", { willReadFrequently: true });
   const style = getComputedStyle(document.documentElement);
   const ink = (name) => style.getPropertyValue(`--${name}`).trim();
@@ -104,23 +133,35 @@ function legend(pen, ink) {
   pen.textBaseline = "alphabetic";
   pen.fillText(what.title, left, 26);
   const step = tall / what.bands.length;
-  [...what.bands].reverse().forEach((rgb, place) => { pen.fillStyle = css(rgb); pen.fillRect(left, top + place * step, wide, step + 0.5); });
+  [...what.bands].reverse().forEach((rgb, place) => {
+    pen.fillStyle = css(rgb);
+    pen.fillRect(left, top + place * step, wide, step + 0.5);
+  });
   pen.fillStyle = ink("text-2");
   for (const part of [0, 0.25, 0.5, 0.75, 1]) {
-    pen.fillText(`${+(what.high + (what.low - what.high) * part).toPrecision(3)}`.replace("-", "−"), left + wide + 8, top + part * tall + 4);
+    pen.fillText(
+      `${+(what.high + (what.low - what.high) * part).toPrecision(3)}`.replace("-", "−"),
+      left + wide + 8,
+      top + part * tall + 4,
+    );
   }
 }
 
 function caption() {
   const { series, frame, sequence, heading } = state();
   if (!series) return "";
-  const errors = series.models.map((name) => `${name} ${mm(series[`distance_${name}`][frame], false)}`).join(", ");
+  const errors = series.models
+    .map((name) => `${name} ${mm(series[`distance_${name}`][frame], false)}`)
+    .join(", ");
   return `${heading?.dataset ?? ""} · ${sequence} · ${series.time[frame].toFixed(2)} s · RMS error ${errors} mm`;
 }
 
 function save(blob, kind) {
   const { sequence, frame } = state();
-  const link = element("a", { href: URL.createObjectURL(blob), download: kind === "png" ? `palpate-${sequence}-${frame + 1}.png` : `palpate-${sequence}.gif` });
+  const link = element("a", {
+    href: URL.createObjectURL(blob),
+    download: kind === "png" ? `palpate-${sequence}-${frame + 1}.png` : `palpate-${sequence}.gif`,
+  });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1e4);
 }

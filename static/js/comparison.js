@@ -6,7 +6,10 @@ import { percent, when, words } from "./format.js";
 /** A table that fills itself; another run of the same dataset can be put beside this one. */
 export function comparisonSection(heading) {
   const table = element("div", {}, element("p", { class: "muted" }, "Adding up…"));
-  const choice = element("select", { "aria-label": "Compare with another diagnosis", hidden: true });
+  const choice = element("select", {
+    "aria-label": "Compare with another diagnosis",
+    hidden: true,
+  });
   const load = async () => {
     const beside = choice.value ? `?beside=${encodeURIComponent(choice.value)}` : "";
     try {
@@ -17,34 +20,83 @@ export function comparisonSection(heading) {
   };
   choice.addEventListener("change", load);
   load();
-  get("/runs").then((runs) => {
-    const others = runs.filter(({ id, dataset }) => id !== heading.id && dataset === heading.dataset);
-    if (!others.length) return;
-    fill(choice, element("option", { value: "" }, "beside no other diagnosis"), others.map((run) =>
-      element("option", { value: run.id }, `beside ${run.causes.map(words).join(", ") || run.verdict}, ${when(run.created)}`)));
-    choice.hidden = false;
-  }).catch(() => {}); // the list in the rail says what is wrong with it
+  get("/runs")
+    .then((runs) => {
+      const others = runs.filter(
+        ({ id, dataset }) => id !== heading.id && dataset === heading.dataset,
+      );
+      if (!others.length) return;
+      fill(
+        choice,
+        element("option", { value: "" }, "beside no other diagnosis"),
+        others.map((run) =>
+          element(
+            "option",
+            { value: run.id },
+            `beside ${run.causes.map(words).join(", ") || run.verdict}, ${when(run.created)}`,
+          ),
+        ),
+      );
+      choice.hidden = false;
+    })
+    .catch(() => {}); // the list in the rail says what is wrong with it
   return [table, choice];
 }
 
 function shown({ runs, sequences }) {
   const several = runs.length > 1;
-  const names = runs.map(({ causes, verdict }, place) => `${place ? "the other" : "this"}: ${causes.map(words).join(", ") || verdict}`);
-  return [element("table", { class: "comparison" },
-    element("thead", {}, element("tr", {}, element("th", {}, ""), element("th", { class: "number" }, "raw"),
-      names.map((name) => element("th", { class: "number" }, several ? name : "extended")), element("th", { class: "number" }, "floor"),
-      several ? null : element("th", { class: "number" }, "removed"))),
-    element("tbody", {}, sequences.map(({ sequence, models }) => {
-      const rows = runs.map(({ id }) => models[id]);
-      const one = rows.find(Boolean);
-      const best = Math.min(...rows.map((row) => row?.extended ?? Infinity));
-      return element("tr", {},
-        element("th", {}, sequence, element("small", {}, one.split ?? "")), element("td", { class: "number" }, millimetres(one.raw)),
-        rows.map((row) => element("td", { class: several && row?.extended === best ? "number best" : "number" }, millimetres(row?.extended))),
-        element("td", { class: "number muted" }, millimetres(one.noise_floor)),
-        several ? null : element("td", { class: "number" }, percent(one.removed)));
-    }))),
-  element("p", { class: "gain-note" }, "Distance of the measured points from the model, over all frames; the gain above is of the pushes alone, without the camera's fixed pattern.")];
+  const names = runs.map(
+    ({ causes, verdict }, place) =>
+      `${place ? "the other" : "this"}: ${causes.map(words).join(", ") || verdict}`,
+  );
+  return [
+    element(
+      "table",
+      { class: "comparison" },
+      element(
+        "thead",
+        {},
+        element(
+          "tr",
+          {},
+          element("th", {}, ""),
+          element("th", { class: "number" }, "raw"),
+          names.map((name) => element("th", { class: "number" }, several ? name : "extended")),
+          element("th", { class: "number" }, "floor"),
+          several ? null : element("th", { class: "number" }, "removed"),
+        ),
+      ),
+      element(
+        "tbody",
+        {},
+        sequences.map(({ sequence, models }) => {
+          const rows = runs.map(({ id }) => models[id]);
+          const one = rows.find(Boolean);
+          const best = Math.min(...rows.map((row) => row?.extended ?? Infinity));
+          return element(
+            "tr",
+            {},
+            element("th", {}, sequence, element("small", {}, one.split ?? "")),
+            element("td", { class: "number" }, millimetres(one.raw)),
+            rows.map((row) =>
+              element(
+                "td",
+                { class: several && row?.extended === best ? "number best" : "number" },
+                millimetres(row?.extended),
+              ),
+            ),
+            element("td", { class: "number muted" }, millimetres(one.noise_floor)),
+            several ? null : element("td", { class: "number" }, percent(one.removed)),
+          );
+        }),
+      ),
+    ),
+    element(
+      "p",
+      { class: "gain-note" },
+      "Distance of the measured points from the model, over all frames; the gain above is of the pushes alone, without the camera's fixed pattern.",
+    ),
+  ];
 }
 
 const millimetres = (value) => (typeof value === "number" ? (1000 * value).toFixed(3) : "–");

@@ -3,9 +3,11 @@ const MATRIX = 1.5; // a ball in an incompressible matrix acts by (k - 1) / (k +
 const STEPS = 1000;
 const WIDE = 60; // in scales; of a parameter with wider bounds the slider shows a part
 
-const forth = ({ log, contrast }, value) => (contrast ? (value - 1) / (value + MATRIX) : log ? Math.log(value) : value);
+const forth = ({ log, contrast }, value) =>
+  contrast ? (value - 1) / (value + MATRIX) : log ? Math.log(value) : value;
 
-const back = ({ log, contrast }, at) => (contrast ? (1 + MATRIX * at) / (1 - at) : log ? Math.exp(at) : at);
+const back = ({ log, contrast }, at) =>
+  contrast ? (1 + MATRIX * at) / (1 - at) : log ? Math.exp(at) : at;
 
 /** The ends of a slider as coordinates: the bounds, or where those are far apart a part of them around a beginning. */
 export function ends(item, beginning) {
@@ -13,7 +15,10 @@ export function ends(item, beginning) {
   const high = item.high === null ? Infinity : forth(item, item.high);
   if ((high - low) / item.scale <= WIDE) return [low, high];
   const middle = forth(item, beginning);
-  return [Math.max(low, middle - (WIDE / 2) * item.scale), Math.min(high, middle + (WIDE / 2) * item.scale)];
+  return [
+    Math.max(low, middle - (WIDE / 2) * item.scale),
+    Math.min(high, middle + (WIDE / 2) * item.scale),
+  ];
 }
 
 /** Position 0 to 1000 of a value. */

@@ -6,15 +6,20 @@ const WIDTH = 380;
 const CURVE = 170;
 const BOX = { left: 44, right: 12, top: 10, bottom: 30 };
 const KINDS = { top: "pushes from above", side: "pushes into a side", drag: "drags" };
-const PARTS = { seen: "Kinds of motion that training has", unseen: "Kinds of motion that training never saw" };
+const PARTS = {
+  seen: "Kinds of motion that training has",
+  unseen: "Kinds of motion that training never saw",
+};
 const MODELS = { baseline: "Raw", extended: "Extended", true: "True" };
 const NETWORKS = { unet2d: "2D", unet3d: "3D", graph: "graph" };
 
-const short = ({ name, network }) => `${MODELS[name.split("_")[0]] ?? name}${network ? ` + ${NETWORKS[network.kind]} net` : ""}`;
+const short = ({ name, network }) =>
+  `${MODELS[name.split("_")[0]] ?? name}${network ? ` + ${NETWORKS[network.kind]} net` : ""}`;
 
 function svg(name, attributes = {}, ...children) {
   const node = document.createElementNS("http://www.w3.org/2000/svg", name);
-  for (const [key, value] of Object.entries(attributes)) if (value !== null) node.setAttribute(key, value);
+  for (const [key, value] of Object.entries(attributes))
+    if (value !== null) node.setAttribute(key, value);
   node.append(...children.flat(2).filter((child) => child !== null));
   return node;
 }
@@ -27,38 +32,115 @@ export function curve(history, without) {
   const known = [...errors, ...(without ? [without] : [])];
   const [low, high] = [Math.min(...known), Math.max(...known)];
   const room = Math.max(high - low, 0.02 * high) * 0.08;
-  const x = (epoch) => BOX.left + (errors.length < 2 ? 0.5 : epoch / (errors.length - 1)) * (WIDTH - BOX.left - BOX.right);
-  const y = (value) => BOX.top + (high + room - value) / (high - low + 2 * room || 1) * (CURVE - BOX.top - BOX.bottom);
+  const x = (epoch) =>
+    BOX.left +
+    (errors.length < 2 ? 0.5 : epoch / (errors.length - 1)) * (WIDTH - BOX.left - BOX.right);
+  const y = (value) =>
+    BOX.top +
+    ((high + room - value) / (high - low + 2 * room || 1)) * (CURVE - BOX.top - BOX.bottom);
   const best = errors.indexOf(Math.min(...errors));
-  return svg("svg", { class: "correction-plot", viewBox: `0 0 ${WIDTH} ${CURVE}`, role: "img", "aria-label": `Validation error by epoch, best ${tidy(errors[best])} mm in epoch ${best + 1}` },
-    svg("path", { class: "axis", d: `M${BOX.left} ${BOX.top}V${CURVE - BOX.bottom}H${WIDTH - BOX.right}` }),
-    [low, high].map((value) => svg("text", { x: BOX.left - 6, y: y(value) + 4, "text-anchor": "end" }, `${tidy(value)}`)),
-    svg("text", { x: WIDTH / 2, y: CURVE - 6, "text-anchor": "middle" }, `epoch 1 to ${errors.length}; mean distance in validation, mm`),
-    without ? svg("path", { class: "without", d: `M${BOX.left} ${y(without)}H${WIDTH - BOX.right}` }) : null,
-    without ? svg("text", { x: WIDTH - BOX.right, y: y(without) + 13, "text-anchor": "end" }, "without the network") : null,
+  return svg(
+    "svg",
+    {
+      class: "correction-plot",
+      viewBox: `0 0 ${WIDTH} ${CURVE}`,
+      role: "img",
+      "aria-label": `Validation error by epoch, best ${tidy(errors[best])} mm in epoch ${best + 1}`,
+    },
+    svg("path", {
+      class: "axis",
+      d: `M${BOX.left} ${BOX.top}V${CURVE - BOX.bottom}H${WIDTH - BOX.right}`,
+    }),
+    [low, high].map((value) =>
+      svg("text", { x: BOX.left - 6, y: y(value) + 4, "text-anchor": "end" }, `${tidy(value)}`),
+    ),
+    svg(
+      "text",
+      { x: WIDTH / 2, y: CURVE - 6, "text-anchor": "middle" },
+      `epoch 1 to ${errors.length}; mean distance in validation, mm`,
+    ),
+    without
+      ? svg("path", { class: "without", d: `M${BOX.left} ${y(without)}H${WIDTH - BOX.right}` })
+      : null,
+    without
+      ? svg(
+          "text",
+          { x: WIDTH - BOX.right, y: y(without) + 13, "text-anchor": "end" },
+          "without the network",
+        )
+      : null,
     svg("polyline", { points: errors.map((value, epoch) => `${x(epoch)},${y(value)}`).join(" ") }),
-    svg("circle", { class: "best", cx: x(best), cy: y(errors[best]), r: 4 }, svg("title", {}, `epoch ${best + 1}: ${tidy(errors[best])} mm`)));
+    svg(
+      "circle",
+      { class: "best", cx: x(best), cy: y(errors[best]), r: 4 },
+      svg("title", {}, `epoch ${best + 1}: ${tidy(errors[best])} mm`),
+    ),
+  );
 }
 
 /** Bars of every model with the interval from drawing pushes anew, for kinds of motion that were trained on and those that were not. */
 export function ladderPicture({ rungs, parts }) {
   const shown = parts.filter(({ part }) => part in PARTS);
   const groups = shown.length ? shown : parts.filter(({ part }) => part === "all");
-  const most = Math.max(...groups.flatMap(({ errors }) => Object.values(errors).map(({ high }) => high)));
-  return element("div", { class: "rungs" }, groups.map((one) => element("section", { "data-part": one.part },
-    element("h3", {}, PARTS[one.part] ?? "All pushes", element("small", {}, `${one.kinds.map((kind) => KINDS[kind] ?? kind).join(", ")}; ${one.probes} pushes`)),
-    rungs.map((rung) => bar(rung, one, most)))),
-  element("p", { class: "rungs-key" }, element("i", {}), "below the grey edge lies the sensor's noise; whiskers: 95 % interval from drawing pushes anew"));
+  const most = Math.max(
+    ...groups.flatMap(({ errors }) => Object.values(errors).map(({ high }) => high)),
+  );
+  return element(
+    "div",
+    { class: "rungs" },
+    groups.map((one) =>
+      element(
+        "section",
+        { "data-part": one.part },
+        element(
+          "h3",
+          {},
+          PARTS[one.part] ?? "All pushes",
+          element(
+            "small",
+            {},
+            `${one.kinds.map((kind) => KINDS[kind] ?? kind).join(", ")}; ${one.probes} pushes`,
+          ),
+        ),
+        rungs.map((rung) => bar(rung, one, most)),
+      ),
+    ),
+    element(
+      "p",
+      { class: "rungs-key" },
+      element("i", {}),
+      "below the grey edge lies the sensor's noise; whiskers: 95 % interval from drawing pushes anew",
+    ),
+  );
 }
 
 function bar({ name, label, network }, { errors, noise_floor: floor }, most) {
   const { error, low, high, removed } = errors[name];
-  const at = (value) => `${Math.min(100, 100 * value / most)}%`;
+  const at = (value) => `${Math.min(100, (100 * value) / most)}%`;
   const colour = network ? "corrected" : name === "baseline" ? "raw" : "extended";
-  const said = name === "baseline" ? "" : `${percent(removed.value)} (${percent(removed.low)} to ${percent(removed.high)})`;
-  return element("div", { class: "rung", "data-rung": name, title: `${label}: ${error.toFixed(3)} mm (${low.toFixed(3)} to ${high.toFixed(3)} mm)` },
+  const said =
+    name === "baseline"
+      ? ""
+      : `${percent(removed.value)} (${percent(removed.low)} to ${percent(removed.high)})`;
+  return element(
+    "div",
+    {
+      class: "rung",
+      "data-rung": name,
+      title: `${label}: ${error.toFixed(3)} mm (${low.toFixed(3)} to ${high.toFixed(3)} mm)`,
+    },
     element("span", {}, short({ name, network })),
-    element("div", { class: "bar" }, element("i", { style: { width: at(error), background: `var(--${colour})` } }), element("i", { class: "noise", style: { width: at(floor) } }),
-      element("i", { class: "whisker", style: { left: at(low), width: `calc(${at(high)} - ${at(low)})` } })),
-    element("b", {}, `${error.toFixed(2)} mm`), element("small", {}, said));
+    element(
+      "div",
+      { class: "bar" },
+      element("i", { style: { width: at(error), background: `var(--${colour})` } }),
+      element("i", { class: "noise", style: { width: at(floor) } }),
+      element("i", {
+        class: "whisker",
+        style: { left: at(low), width: `calc(${at(high)} - ${at(low)})` },
+      }),
+    ),
+    element("b", {}, `${error.toFixed(2)} mm`),
+    element("small", {}, said),
+  );
 }

@@ -7,7 +7,11 @@ import { onDone, opens } from "./jobs.js";
 import { addPanel, openedPanel, openPanel } from "./panels.js";
 import { on, state } from "./store.js";
 
-const KINDS = [["unet2d", "2D U-Net, top layer"], ["unet3d", "3D U-Net, volume"], ["graph", "Graph network, mesh"]];
+const KINDS = [
+  ["unet2d", "2D U-Net, top layer"],
+  ["unet3d", "3D U-Net, volume"],
+  ["graph", "Graph network, mesh"],
+];
 const PAUSE = 900;
 let box = null;
 let chosen = { dataset: null, run: "", kind: "unet2d", trust: 0.5, hold: 1, epochs: 40, every: 1 };
@@ -15,78 +19,212 @@ let watched = null; // {kind: "trainings" | "evaluations", id}
 let turn = 0;
 
 export function start(refresh) {
-  box = addPanel("correction", "Correction", opened, () => { turn += 1; });
+  box = addPanel("correction", "Correction", opened, () => {
+    turn += 1;
+  });
   opens("training", "Open the training", (id) => show("trainings", id));
   opens("evaluation", "Open the ladder", (id) => show("evaluations", id));
-  onDone((jobs) => { if (jobs.some(({ kind, result }) => kind === "training" && result)) refresh(); });
-  on(["run"], () => { if (openedPanel() === "correction" && !watched) opened(); });
+  onDone((jobs) => {
+    if (jobs.some(({ kind, result }) => kind === "training" && result)) refresh();
+  });
+  on(["run"], () => {
+    if (openedPanel() === "correction" && !watched) opened();
+  });
 }
 
-function show(kind, id) { watched = { kind, id }; openPanel("correction"); }
+function show(kind, id) {
+  watched = { kind, id };
+  openPanel("correction");
+}
 
-const broken = (problem) => element("div", { class: "note-card bad", role: "alert" }, element("strong", {}, title(problem)), problem.message);
+const broken = (problem) =>
+  element(
+    "div",
+    { class: "note-card bad", role: "alert" },
+    element("strong", {}, title(problem)),
+    problem.message,
+  );
 const isOpen = (job) => job && ["queued", "running"].includes(job.state);
 
 async function opened() {
   const mine = ++turn;
   while (mine === turn && openedPanel() === "correction") {
     let again = false;
-    try { again = watched ? await drawOne(mine) : await drawAll(mine); } catch (problem) { if (mine === turn) fill(box, broken(problem), back()); }
+    try {
+      again = watched ? await drawOne(mine) : await drawAll(mine);
+    } catch (problem) {
+      if (mine === turn) fill(box, broken(problem), back());
+    }
     if (!again) return;
     await new Promise((done) => setTimeout(done, PAUSE));
   }
 }
 
-const back = () => element("button", { class: "button", type: "button", onclick: () => { watched = null; opened(); } }, "All of them");
+const back = () =>
+  element(
+    "button",
+    {
+      class: "button",
+      type: "button",
+      onclick: () => {
+        watched = null;
+        opened();
+      },
+    },
+    "All of them",
+  );
 
 /** The form, what there is, and the newest ladder. */
 async function drawAll(mine) {
-  const [{ datasets, folder }, runs, trainings, evaluations] = await Promise.all([get("/datasets"), get("/runs"), get("/trainings"), get("/evaluations")]);
+  const [{ datasets, folder }, runs, trainings, evaluations] = await Promise.all([
+    get("/datasets"),
+    get("/runs"),
+    get("/trainings"),
+    get("/evaluations"),
+  ]);
   if (mine !== turn) return false;
   if (!datasets.length) {
-    fill(box, element("div", { class: "empty-panel" }, element("h1", {}, "No dataset yet"), element("p", {}, `A network learns from clouds. Put a dataset folder into ${folder} and open this panel again.`)));
+    fill(
+      box,
+      element(
+        "div",
+        { class: "empty-panel" },
+        element("h1", {}, "No dataset yet"),
+        element(
+          "p",
+          {},
+          `A network learns from clouds. Put a dataset folder into ${folder} and open this panel again.`,
+        ),
+      ),
+    );
     return false;
   }
   const current = runs.find(({ id }) => id === state().run);
-  if (!datasets.includes(chosen.dataset)) chosen = { ...chosen, dataset: datasets.includes(current?.folder) ? current.folder : datasets[0], run: "" };
+  if (!datasets.includes(chosen.dataset))
+    chosen = {
+      ...chosen,
+      dataset: datasets.includes(current?.folder) ? current.folder : datasets[0],
+      run: "",
+    };
   const models = runs.filter(({ folder: own, causes }) => own === chosen.dataset && causes?.length);
   const newest = evaluations.find(({ summary }) => summary?.folder === chosen.dataset);
-  fill(box, element("div", { class: "eyebrow" }, "Correction"),
-    element("h1", { class: "verdict" }, newest?.summary.sentence ?? "What can a network learn of the error that the model leaves?"),
+  fill(
+    box,
+    element("div", { class: "eyebrow" }, "Correction"),
+    element(
+      "h1",
+      { class: "verdict" },
+      newest?.summary.sentence ?? "What can a network learn of the error that the model leaves?",
+    ),
     newest ? ladderPicture(newest.summary) : null,
-    form(datasets, models), list("Trainings", "trainings", trainings), list("Ladders", "evaluations", evaluations));
+    form(datasets, models),
+    list("Trainings", "trainings", trainings),
+    list("Ladders", "evaluations", evaluations),
+  );
   return false;
 }
 
 function form(datasets, models) {
   const select = (name, entries) => {
-    const node = element("select", { name }, entries.map(([value, label]) => element("option", { value, selected: String(chosen[name]) === value }, label)));
-    node.addEventListener("change", () => { chosen[name] = node.value; if (name === "dataset") { chosen.run = ""; opened(); } });
+    const node = element(
+      "select",
+      { name },
+      entries.map(([value, label]) =>
+        element("option", { value, selected: String(chosen[name]) === value }, label),
+      ),
+    );
+    node.addEventListener("change", () => {
+      chosen[name] = node.value;
+      if (name === "dataset") {
+        chosen.run = "";
+        opened();
+      }
+    });
     return node;
   };
   const number = (name, label, low, high, step = 1) => {
-    const field = element("input", { name, type: "number", value: chosen[name], min: low, max: high, step, required: true });
-    field.addEventListener("change", () => { chosen[name] = +field.value; });
+    const field = element("input", {
+      name,
+      type: "number",
+      value: chosen[name],
+      min: low,
+      max: high,
+      step,
+      required: true,
+    });
+    field.addEventListener("change", () => {
+      chosen[name] = +field.value;
+    });
     return element("label", {}, label, field);
   };
-  const whole = element("form", { class: "sweep-form", onsubmit: async (event) => {
-    event.preventDefault();
-    const { dataset, run, ...rest } = chosen;
-    await ask("trainings", { dataset, run: run || null, ...rest }, whole);
-  } },
-  element("label", {}, "Dataset", select("dataset", datasets.map((name) => [name, name]))),
-  element("label", {}, "On top of", select("run", [["", "the stated model"], ...models.map(({ id }) => [id, `the extended model of ${id}`])])),
-  element("label", {}, "Network", select("kind", KINDS)),
-  element("details", {}, element("summary", {}, "More"), element("div", { class: "pair" }, number("epochs", "Epochs at most", 1, 100000), number("every", "One of so many clouds", 1, 10000),
-    number("trust", "Correction, voxels at most", 0.05, 10, 0.05), number("hold", "Weight that holds the hidden, 1/mm", 0, 1000, 0.1))),
-  element("div", { class: "actions" }, element("button", { class: "button strong", type: "submit" }, "Train"),
-    element("button", { class: "button", type: "button", title: "Compares models and their newest networks on the test sequences", onclick: () => ask("evaluations", { dataset: chosen.dataset, run: chosen.run || null }, whole) }, "Measure the ladder")));
+  const whole = element(
+    "form",
+    {
+      class: "sweep-form",
+      onsubmit: async (event) => {
+        event.preventDefault();
+        const { dataset, run, ...rest } = chosen;
+        await ask("trainings", { dataset, run: run || null, ...rest }, whole);
+      },
+    },
+    element(
+      "label",
+      {},
+      "Dataset",
+      select(
+        "dataset",
+        datasets.map((name) => [name, name]),
+      ),
+    ),
+    element(
+      "label",
+      {},
+      "On top of",
+      select("run", [
+        ["", "the stated model"],
+        ...models.map(({ id }) => [id, `the extended model of ${id}`]),
+      ]),
+    ),
+    element("label", {}, "Network", select("kind", KINDS)),
+    element(
+      "details",
+      {},
+      element("summary", {}, "More"),
+      element(
+        "div",
+        { class: "pair" },
+        number("epochs", "Epochs at most", 1, 100000),
+        number("every", "One of so many clouds", 1, 10000),
+        number("trust", "Correction, voxels at most", 0.05, 10, 0.05),
+        number("hold", "Weight that holds the hidden, 1/mm", 0, 1000, 0.1),
+      ),
+    ),
+    element(
+      "div",
+      { class: "actions" },
+      element("button", { class: "button strong", type: "submit" }, "Train"),
+      element(
+        "button",
+        {
+          class: "button",
+          type: "button",
+          title: "Compares models and their newest networks on the test sequences",
+          onclick: () =>
+            ask("evaluations", { dataset: chosen.dataset, run: chosen.run || null }, whole),
+        },
+        "Measure the ladder",
+      ),
+    ),
+  );
   return whole;
 }
 
 async function ask(kind, body, near) {
   for (const button of near.querySelectorAll("button")) button.disabled = true;
-  try { watched = { kind, id: (await post(`/${kind}`, body)).id }; opened(); } catch (problem) {
+  try {
+    watched = { kind, id: (await post(`/${kind}`, body)).id };
+    opened();
+  } catch (problem) {
     for (const button of near.querySelectorAll("button")) button.disabled = false;
     near.querySelector(".note-card")?.remove();
     near.append(broken(problem));
@@ -95,8 +233,36 @@ async function ask(kind, body, near) {
 
 function list(heading, kind, entries) {
   if (!entries.length) return null;
-  return element("section", {}, element("h2", {}, heading), element("div", { class: "sweep-list" }, entries.slice(0, 8).map(({ id, job, summary }) => element("button", { type: "button", [`data-${kind}`]: id, onclick: () => { watched = { kind, id }; opened(); } },
-    element("span", {}, id), element("span", { class: "muted" }, summary?.validation_error_mm ? `${summary.validation_error_mm.toFixed(3)} mm` : job?.state ?? "on disk")))));
+  return element(
+    "section",
+    {},
+    element("h2", {}, heading),
+    element(
+      "div",
+      { class: "sweep-list" },
+      entries.slice(0, 8).map(({ id, job, summary }) =>
+        element(
+          "button",
+          {
+            type: "button",
+            [`data-${kind}`]: id,
+            onclick: () => {
+              watched = { kind, id };
+              opened();
+            },
+          },
+          element("span", {}, id),
+          element(
+            "span",
+            { class: "muted" },
+            summary?.validation_error_mm
+              ? `${summary.validation_error_mm.toFixed(3)} mm`
+              : (job?.state ?? "on disk"),
+          ),
+        ),
+      ),
+    ),
+  );
 }
 
 /** One training or evaluation; whether it goes on. */
@@ -105,16 +271,97 @@ async function drawOne(mine) {
   const whole = await get(`/${kind}/${encodeURIComponent(id)}`);
   if (mine !== turn) return false;
   const { job } = whole;
-  const say = (path) => async ({ currentTarget }) => { currentTarget.disabled = true; await post(path).catch((problem) => box.append(broken(problem))); opened(); };
-  fill(box, element("div", { class: "eyebrow" }, element("span", {}, id), job ? element("span", { class: "verdict-tag none", "data-state": job.state }, job.state) : null),
-    element("h1", { class: "verdict" }, kind === "trainings" ? learned(whole) : whole.summary?.sentence ?? "Measuring the test sequences …"),
-    isOpen(job) ? element("div", {}, element("div", { class: "sweep-progress" }, element("i", { style: { width: `${100 * job.fraction}%` } })), element("p", { class: "gain-note" }, capital(job.text))) : null,
+  const say =
+    (path) =>
+    async ({ currentTarget }) => {
+      currentTarget.disabled = true;
+      await post(path).catch((problem) => box.append(broken(problem)));
+      opened();
+    };
+  fill(
+    box,
+    element(
+      "div",
+      { class: "eyebrow" },
+      element("span", {}, id),
+      job
+        ? element("span", { class: "verdict-tag none", "data-state": job.state }, job.state)
+        : null,
+    ),
+    element(
+      "h1",
+      { class: "verdict" },
+      kind === "trainings"
+        ? learned(whole)
+        : (whole.summary?.sentence ?? "Measuring the test sequences …"),
+    ),
+    isOpen(job)
+      ? element(
+          "div",
+          {},
+          element(
+            "div",
+            { class: "sweep-progress" },
+            element("i", { style: { width: `${100 * job.fraction}%` } }),
+          ),
+          element("p", { class: "gain-note" }, capital(job.text)),
+        )
+      : null,
     job?.error ? broken(job.error) : null,
-    whole.history?.length ? element("section", {}, element("h2", {}, "Validation by epoch"), curve(whole.history, whole.summary?.validation_error_without_mm)) : null,
-    kind === "evaluations" && whole.summary ? [ladderPicture(whole.summary), element("p", { class: "gain-note" }, "Of the moving part, which leaves out what is as wrong in the untouched block, the file on disk has the same shares, and the paper's mean distance.")] : null,
-    element("div", { class: "actions" }, isOpen(job) ? element("button", { class: "button", type: "button", onclick: say(`/${kind}/${id}/cancel`) }, "Stop") : null,
-      job?.can_retry ? element("button", { class: "button", type: "button", onclick: say(`/jobs/${id}/retry`) }, kind === "trainings" ? "Go on" : "Retry") : null,
-      kind === "trainings" && whole.summary ? element("button", { class: "button strong", type: "button", onclick: () => ask("evaluations", { dataset: whole.summary.folder, run: whole.request?.run ?? null }, box) }, "Measure the ladder") : null, back()));
+    whole.history?.length
+      ? element(
+          "section",
+          {},
+          element("h2", {}, "Validation by epoch"),
+          curve(whole.history, whole.summary?.validation_error_without_mm),
+        )
+      : null,
+    kind === "evaluations" && whole.summary
+      ? [
+          ladderPicture(whole.summary),
+          element(
+            "p",
+            { class: "gain-note" },
+            "Of the moving part, which leaves out what is as wrong in the untouched block, the file on disk has the same shares, and the paper's mean distance.",
+          ),
+        ]
+      : null,
+    element(
+      "div",
+      { class: "actions" },
+      isOpen(job)
+        ? element(
+            "button",
+            { class: "button", type: "button", onclick: say(`/${kind}/${id}/cancel`) },
+            "Stop",
+          )
+        : null,
+      job?.can_retry
+        ? element(
+            "button",
+            { class: "button", type: "button", onclick: say(`/jobs/${id}/retry`) },
+            kind === "trainings" ? "Go on" : "Retry",
+          )
+        : null,
+      kind === "trainings" && whole.summary
+        ? element(
+            "button",
+            {
+              class: "button strong",
+              type: "button",
+              onclick: () =>
+                ask(
+                  "evaluations",
+                  { dataset: whole.summary.folder, run: whole.request?.run ?? null },
+                  box,
+                ),
+            },
+            "Measure the ladder",
+          )
+        : null,
+      back(),
+    ),
+  );
   return isOpen(job);
 }
 
@@ -123,6 +370,7 @@ function learned({ job, history, summary }) {
     const [before, after] = [summary.validation_error_without_mm, summary.validation_error_mm];
     return `In validation the mean distance is ${after.toFixed(2)} mm with the network, ${before.toFixed(2)} mm without.`;
   }
-  if (!history.length) return isOpen(job) ? "Replaying what the network learns from …" : "Nothing was learned yet.";
+  if (!history.length)
+    return isOpen(job) ? "Replaying what the network learns from …" : "Nothing was learned yet.";
   return `After ${history.length} epochs the mean distance in validation is ${Math.min(...history.map(([, error]) => error)).toFixed(2)} mm.`;
 }

@@ -8,45 +8,164 @@ import { cameraChoice, registerByHand } from "./register.js";
 export async function showDataset(name, diagnose) {
   const panel = document.getElementById("panel");
   openPanel("report");
-  fill(panel, element("div", { class: "eyebrow" }, "Dataset"), element("h1", { class: "verdict" }, name), element("p", { class: "gain-note" }, "Reading every file …"));
+  fill(
+    panel,
+    element("div", { class: "eyebrow" }, "Dataset"),
+    element("h1", { class: "verdict" }, name),
+    element("p", { class: "gain-note" }, "Reading every file …"),
+  );
   let summary;
-  try { summary = await get(`/datasets/${encodeURIComponent(name)}/check`); } catch (problem) {
-    fill(panel, element("div", { class: "eyebrow" }, "Dataset"), element("h1", { class: "verdict" }, name), broken(problem));
+  try {
+    summary = await get(`/datasets/${encodeURIComponent(name)}/check`);
+  } catch (problem) {
+    fill(
+      panel,
+      element("div", { class: "eyebrow" }, "Dataset"),
+      element("h1", { class: "verdict" }, name),
+      broken(problem),
+    );
     return;
   }
   const camera = await cameraChoice(name);
-  const start = element("button", { class: "button strong", type: "button", onclick: async () => {
-    start.disabled = true;
-    start.textContent = "Started: see the jobs on the left";
-    await diagnose(name, camera.value || null).catch(() => { start.disabled = false; start.textContent = "Diagnose"; });
-  } }, "Diagnose");
+  const start = element(
+    "button",
+    {
+      class: "button strong",
+      type: "button",
+      onclick: async () => {
+        start.disabled = true;
+        start.textContent = "Started: see the jobs on the left";
+        await diagnose(name, camera.value || null).catch(() => {
+          start.disabled = false;
+          start.textContent = "Diagnose";
+        });
+      },
+    },
+    "Diagnose",
+  );
   const size = summary.size.map((edge) => mm(edge, false)).join(" × ");
-  fill(panel, element("div", { class: "eyebrow" }, "Dataset"), element("h1", { class: "verdict" }, name),
+  fill(
+    panel,
+    element("div", { class: "eyebrow" }, "Dataset"),
+    element("h1", { class: "verdict" }, name),
     element("p", { class: "gain-note" }, "Every file was read and is in order."),
-    element("div", { class: "actions" }, start, summary.has_rest ? element("button", { class: "button", type: "button", onclick: () => registerByHand(name) }, "Register by hand") : null, summary.has_rest ? asJob("Register automatically", "Keeps the automatic registration under a name", () => post(`/datasets/${encodeURIComponent(name)}/registrations/automatic`)) : null,
-      asJob("Replay", "All sequences as the setup is stated, seen like a diagnosis", () => post("/replays", { dataset: name, registration: camera.value || null }))),
+    element(
+      "div",
+      { class: "actions" },
+      start,
+      summary.has_rest
+        ? element(
+            "button",
+            { class: "button", type: "button", onclick: () => registerByHand(name) },
+            "Register by hand",
+          )
+        : null,
+      summary.has_rest
+        ? asJob("Register automatically", "Keeps the automatic registration under a name", () =>
+            post(`/datasets/${encodeURIComponent(name)}/registrations/automatic`),
+          )
+        : null,
+      asJob("Replay", "All sequences as the setup is stated, seen like a diagnosis", () =>
+        post("/replays", { dataset: name, registration: camera.value || null }),
+      ),
+    ),
     camera.hidden ? null : element("label", { class: "register-dataset" }, "Camera", camera),
-    notes("Doubtful", summary.warnings), notes("Missing for some causes", summary.lacks),
-    element("section", {}, element("h2", {}, "Setup as stated"), element("table", {}, element("tbody", {},
-      fact("Name", summary.name), fact("Phantom", `${size} mm`), fact("Mass", `${(summary.mass * 1e3).toFixed(1)} g`),
-      fact("Tool radius", mm(summary.tool_radius)), fact("Touches", summary.touches), fact("Rest cloud", summary.has_rest ? "yes" : "no")))),
-    element("section", {}, element("h2", {}, "Sequences"), element("table", {}, element("tbody", {},
-      summary.sequences.map(({ name: sequence, clouds, split }) => element("tr", {}, element("th", {}, sequence), element("td", {}, split ?? "no split"), element("td", { class: "number" }, `${clouds} clouds`)))))));
+    notes("Doubtful", summary.warnings),
+    notes("Missing for some causes", summary.lacks),
+    element(
+      "section",
+      {},
+      element("h2", {}, "Setup as stated"),
+      element(
+        "table",
+        {},
+        element(
+          "tbody",
+          {},
+          fact("Name", summary.name),
+          fact("Phantom", `${size} mm`),
+          fact("Mass", `${(summary.mass * 1e3).toFixed(1)} g`),
+          fact("Tool radius", mm(summary.tool_radius)),
+          fact("Touches", summary.touches),
+          fact("Rest cloud", summary.has_rest ? "yes" : "no"),
+        ),
+      ),
+    ),
+    element(
+      "section",
+      {},
+      element("h2", {}, "Sequences"),
+      element(
+        "table",
+        {},
+        element(
+          "tbody",
+          {},
+          summary.sequences.map(({ name: sequence, clouds, split }) =>
+            element(
+              "tr",
+              {},
+              element("th", {}, sequence),
+              element("td", {}, split ?? "no split"),
+              element("td", { class: "number" }, `${clouds} clouds`),
+            ),
+          ),
+        ),
+      ),
+    ),
+  );
 }
 
 /** A button that asks for a job. */
 function asJob(label, title, ask) {
-  const button = element("button", { class: "button", type: "button", title, onclick: async () => {
-    button.disabled = true;
-    try { await ask(); button.textContent = "Started"; } catch (problem) { toast(problem); button.disabled = false; }
-  } }, label);
+  const button = element(
+    "button",
+    {
+      class: "button",
+      type: "button",
+      title,
+      onclick: async () => {
+        button.disabled = true;
+        try {
+          await ask();
+          button.textContent = "Started";
+        } catch (problem) {
+          toast(problem);
+          button.disabled = false;
+        }
+      },
+    },
+    label,
+  );
   return button;
 }
 
-const fact = (label, value) => element("tr", {}, element("th", {}, label), element("td", { class: "number" }, String(value)));
+const fact = (label, value) =>
+  element("tr", {}, element("th", {}, label), element("td", { class: "number" }, String(value)));
 
-const notes = (title, sentences) => (sentences.length
-  ? element("section", {}, element("h2", {}, title), sentences.map((text) => element("div", { class: "note-card" }, capital(text)))) : null);
+const notes = (title, sentences) =>
+  sentences.length
+    ? element(
+        "section",
+        {},
+        element("h2", {}, title),
+        sentences.map((text) => element("div", { class: "note-card" }, capital(text))),
+      )
+    : null;
 
-const broken = ({ message, where }) => element("div", { class: "note-card bad" }, element("strong", {}, "This dataset is not in order"), message,
-  Object.keys(where ?? {}).length ? element("div", { class: "where" }, Object.entries(where).map(([key, value]) => `${key}: ${value}`).join("  ")) : null);
+const broken = ({ message, where }) =>
+  element(
+    "div",
+    { class: "note-card bad" },
+    element("strong", {}, "This dataset is not in order"),
+    message,
+    Object.keys(where ?? {}).length
+      ? element(
+          "div",
+          { class: "where" },
+          Object.entries(where)
+            .map(([key, value]) => `${key}: ${value}`)
+            .join("  "),
+        )
+      : null,
+  );

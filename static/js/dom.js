@@ -7,7 +7,11 @@ export function element(name, attributes = {}, ...children) {
     else if (key === "style") Object.assign(node.style, value);
     else node.setAttribute(key, value === true ? "" : value);
   }
-  node.append(...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false));
+  node.append(
+    ...children
+      .flat(Infinity)
+      .filter((child) => child !== null && child !== undefined && child !== false),
+  );
   return node;
 }
 
@@ -18,19 +22,32 @@ export function fill(id, ...children) {
 }
 
 const SHAPES = {
-  play: '<path class="full" d="M7 4.5v15l12-7.5z"/>', pause: '<path class="full" d="M6 4.5h4v15H6zM14 4.5h4v15h-4z"/>',
-  back: '<path d="M14 6l-6 6 6 6"/>', forth: '<path d="M10 6l6 6-6 6"/>', first: '<path d="M17 6l-6 6 6 6M7 6v12"/>',
-  last: '<path d="M7 6l6 6-6 6M17 6v12"/>', close: '<path d="M6 6l12 12M18 6L6 18"/>',
+  play: '<path class="full" d="M7 4.5v15l12-7.5z"/>',
+  pause: '<path class="full" d="M6 4.5h4v15H6zM14 4.5h4v15h-4z"/>',
+  back: '<path d="M14 6l-6 6 6 6"/>',
+  forth: '<path d="M10 6l6 6-6 6"/>',
+  first: '<path d="M17 6l-6 6 6 6M7 6v12"/>',
+  last: '<path d="M7 6l6 6-6 6M17 6v12"/>',
+  close: '<path d="M6 6l12 12M18 6L6 18"/>',
   sun: '<circle cx="12" cy="12" r="4"/><path d="M12 3v2M12 19v2M3 12h2M19 12h2M5.6 5.6L7 7M17 17l1.4 1.4M5.6 18.4L7 17M17 7l1.4-1.4"/>',
   moon: '<path d="M20 14.5A8.5 8.5 0 0 1 9.5 4 8.5 8.5 0 1 0 20 14.5z"/>',
-  loop: '<path d="M17 3l3 3-3 3M4 11V9a3 3 0 0 1 3-3h13M7 21l-3-3 3-3M20 13v2a3 3 0 0 1-3 3H4"/>', from: '<path d="M14 4H9v16h5"/>', to: '<path d="M10 4h5v16h-5"/>',
-  top: '<path d="M4 8l8-4 8 4-8 4z" class="full"/><path d="M4 8v8l8 4 8-4V8M12 12v8"/>', front: '<path d="M4 8v8l8 4v-8z" class="full"/><path d="M4 8l8-4 8 4-8 4zM20 8v8l-8 4M12 12v8"/>',
-  side: '<path d="M20 8v8l-8 4v-8z" class="full"/><path d="M4 8l8-4 8 4-8 4zM4 8v8l8 4M12 12v8"/>', columns: '<path d="M3 7h7v11H3zM14 7h7v11h-7z"/>',
-  section: '<path d="M5 19V5h9v14zM14 5l5 3v11h-5"/><path d="M12 2v20" stroke-dasharray="2.5 2.5"/>', camera: '<path d="M4 8h3l2-3h6l2 3h3v11H4z"/><circle cx="12" cy="13" r="3.4"/>',
-  film: '<path d="M4 5h16v14H4zM8 5v14M16 5v14M4 9.7h4M4 14.3h4M16 9.7h4M16 14.3h4"/>', layers: '<path d="M12 4l9 5-9 5-9-5zM3 14l9 5 9-5"/>', down: '<path d="M7 10l5 5 5-5"/>',
+  loop: '<path d="M17 3l3 3-3 3M4 11V9a3 3 0 0 1 3-3h13M7 21l-3-3 3-3M20 13v2a3 3 0 0 1-3 3H4"/>',
+  from: '<path d="M14 4H9v16h5"/>',
+  to: '<path d="M10 4h5v16h-5"/>',
+  top: '<path d="M4 8l8-4 8 4-8 4z" class="full"/><path d="M4 8v8l8 4 8-4V8M12 12v8"/>',
+  front: '<path d="M4 8v8l8 4v-8z" class="full"/><path d="M4 8l8-4 8 4-8 4zM20 8v8l-8 4M12 12v8"/>',
+  side: '<path d="M20 8v8l-8 4v-8z" class="full"/><path d="M4 8l8-4 8 4-8 4zM4 8v8l8 4M12 12v8"/>',
+  columns: '<path d="M3 7h7v11H3zM14 7h7v11h-7z"/>',
+  section:
+    '<path d="M5 19V5h9v14zM14 5l5 3v11h-5"/><path d="M12 2v20" stroke-dasharray="2.5 2.5"/>',
+  camera: '<path d="M4 8h3l2-3h6l2 3h3v11H4z"/><circle cx="12" cy="13" r="3.4"/>',
+  film: '<path d="M4 5h16v14H4zM8 5v14M16 5v14M4 9.7h4M4 14.3h4M16 9.7h4M16 14.3h4"/>',
+  layers: '<path d="M12 4l9 5-9 5-9-5zM3 14l9 5 9-5"/>',
+  down: '<path d="M7 10l5 5 5-5"/>',
   target: '<path d="M4 9V5h4M20 9V5h-4M4 15v4h4M20 15v4h-4"/><circle cx="12" cy="12" r="2.5"/>',
   leave: '<path d="M10 4H5v16h5M14 8l4 4-4 4M18 12H9"/>',
-  cloud: '<g class="full"><circle cx="6" cy="7" r="1.5"/><circle cx="12" cy="5" r="1.5"/><circle cx="18" cy="8" r="1.5"/><circle cx="5" cy="14" r="1.5"/><circle cx="11" cy="12" r="1.5"/><circle cx="18" cy="15" r="1.5"/><circle cx="9" cy="19" r="1.5"/><circle cx="15" cy="20" r="1.5"/></g>',
+  cloud:
+    '<g class="full"><circle cx="6" cy="7" r="1.5"/><circle cx="12" cy="5" r="1.5"/><circle cx="18" cy="8" r="1.5"/><circle cx="5" cy="14" r="1.5"/><circle cx="11" cy="12" r="1.5"/><circle cx="18" cy="15" r="1.5"/><circle cx="9" cy="19" r="1.5"/><circle cx="15" cy="20" r="1.5"/></g>',
 };
 
 export function icon(name) {
@@ -40,5 +57,8 @@ export function icon(name) {
 }
 
 export function swatch(thing, line = false) {
-  return element("i", { class: line ? "swatch line" : "swatch", style: { background: `var(--${thing})` } });
+  return element("i", {
+    class: line ? "swatch line" : "swatch",
+    style: { background: `var(--${thing})` },
+  });
 }

@@ -8,7 +8,8 @@ const axes = (viewer) => {
   return [0, 4, 8].map((column) => [turn[column], turn[column + 1], turn[column + 2]]);
 };
 export const fromViewer = (viewer, place) => axes(viewer).map((axis) => dot(axis, place));
-const toViewer = (viewer, place) => axes(viewer).reduce((sum, axis, i) => plus(sum, axis, place[i]), [0, 0, 0]);
+const toViewer = (viewer, place) =>
+  axes(viewer).reduce((sum, axis, i) => plus(sum, axis, place[i]), [0, 0, 0]);
 const dot = (a, b) => a.reduce((sum, value, i) => sum + value * b[i], 0);
 const plus = (a, b, times = 1) => a.map((value, i) => value + times * b[i]);
 const unit = (a) => a.map((value) => value / Math.hypot(...a));
@@ -17,21 +18,33 @@ const unit = (a) => a.map((value) => value / Math.hypot(...a));
 export function sight(viewer, event) {
   const { camera, canvas } = viewer.__viserMutable;
   const box = canvas.getBoundingClientRect();
-  const [x, y] = [(event.clientX - box.left) / box.width * 2 - 1, 1 - (event.clientY - box.top) / box.height * 2];
+  const [x, y] = [
+    ((event.clientX - box.left) / box.width) * 2 - 1,
+    1 - ((event.clientY - box.top) / box.height) * 2,
+  ];
   const lens = camera.projectionMatrixInverse.elements;
   const world = camera.matrixWorld.elements;
   const own = [x * lens[0], y * lens[5], -1];
   const direction = [0, 1, 2].map((row) => dot(own, [world[row], world[row + 4], world[row + 8]]));
-  return { from: fromViewer(viewer, [world[12], world[13], world[14]]), along: unit(fromViewer(viewer, direction)) };
+  return {
+    from: fromViewer(viewer, [world[12], world[13], world[14]]),
+    along: unit(fromViewer(viewer, direction)),
+  };
 }
 
 /** Where a place is in the viewer's window, in pixels. */
 export function onScreen(viewer, place) {
   const { camera, canvas } = viewer.__viserMutable;
   const box = canvas.getBoundingClientRect();
-  const apply = (matrix, [x, y, z, w]) => [0, 1, 2, 3].map((row) => matrix[row] * x + matrix[row + 4] * y + matrix[row + 8] * z + matrix[row + 12] * w);
-  const [x, y, , w] = apply(camera.projectionMatrix.elements, apply(camera.matrixWorldInverse.elements, [...toViewer(viewer, place), 1]));
-  return [(x / w + 1) / 2 * box.width + box.left, (1 - y / w) / 2 * box.height + box.top];
+  const apply = (matrix, [x, y, z, w]) =>
+    [0, 1, 2, 3].map(
+      (row) => matrix[row] * x + matrix[row + 4] * y + matrix[row + 8] * z + matrix[row + 12] * w,
+    );
+  const [x, y, , w] = apply(
+    camera.projectionMatrix.elements,
+    apply(camera.matrixWorldInverse.elements, [...toViewer(viewer, place), 1]),
+  );
+  return [((x / w + 1) / 2) * box.width + box.left, ((1 - y / w) / 2) * box.height + box.top];
 }
 
 /** Whether a pointer is on the ball of the tool, or next to it. */
@@ -40,7 +53,9 @@ export function onTool(viewer, event, centre, radius) {
   const way = plus(centre, from, -1);
   const beside = plus(way, along, -dot(way, along));
   const [x, y] = onScreen(viewer, centre);
-  return Math.hypot(...beside) < radius * 1.15 || Math.hypot(x - event.clientX, y - event.clientY) < NEAR;
+  return (
+    Math.hypot(...beside) < radius * 1.15 || Math.hypot(x - event.clientX, y - event.clientY) < NEAR
+  );
 }
 
 /**

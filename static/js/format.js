@@ -1,11 +1,23 @@
 // Numbers as people read them.
-export const UNITS = { m: [1e3, "mm"], Pa: [1e-3, "kPa"], s: [1e3, "ms"], rad: [180 / Math.PI, "°"], "1/m": [1, "/m"], 1: [1, ""] };
+export const UNITS = {
+  m: [1e3, "mm"],
+  Pa: [1e-3, "kPa"],
+  s: [1e3, "ms"],
+  rad: [180 / Math.PI, "°"],
+  "1/m": [1, "/m"],
+  1: [1, ""],
+};
 
 export const words = (name) => NAMES[name] ?? name.replaceAll("_", " ");
 
 export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
-const NAMES = { poisson_ratio: "Poisson’s ratio", young_modulus: "Young’s modulus", nu: "ν", specific_weight_over_stiffness: "ρg/E" };
+const NAMES = {
+  poisson_ratio: "Poisson’s ratio",
+  young_modulus: "Young’s modulus",
+  nu: "ν",
+  specific_weight_over_stiffness: "ρg/E",
+};
 
 /** Millimetres from metres: two decimals below 10 mm. */
 export function mm(metres, unit = true) {
@@ -21,8 +33,19 @@ export function parameter({ value, unit, low, high }) {
   const open = typeof low !== "number" || typeof high !== "number";
   const width = open ? Math.abs(value * factor) / 5 : Math.abs(high - low) * factor;
   const size = Math.abs(value * factor) > width / 100 ? Math.abs(value * factor) : 0;
-  const places = Math.min(4, Math.max(0, 1 - Math.floor(Math.log10(width || Infinity)), 1 - Math.floor(Math.log10(size || Infinity))));
-  const text = (number) => (number * factor).toFixed(places).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
+  const places = Math.min(
+    4,
+    Math.max(
+      0,
+      1 - Math.floor(Math.log10(width || Infinity)),
+      1 - Math.floor(Math.log10(size || Infinity)),
+    ),
+  );
+  const text = (number) =>
+    (number * factor)
+      .toFixed(places)
+      .replace(/^-(?=[0.]*$)/, "")
+      .replace("-", "−");
   return { value: text(value), unit: shown, interval: open ? "" : `${text(low)} to ${text(high)}` };
 }
 
@@ -34,9 +57,16 @@ export function percent(fraction, digits = 0) {
 
 export function duration(seconds) {
   const whole = Math.max(0, Math.round(seconds));
-  return whole < 60 ? `${whole} s` : `${Math.floor(whole / 60)} min ${String(whole % 60).padStart(2, "0")} s`;
+  return whole < 60
+    ? `${whole} s`
+    : `${Math.floor(whole / 60)} min ${String(whole % 60).padStart(2, "0")} s`;
 }
 
 export function when(epoch) {
-  return new Date(epoch * 1e3).toLocaleString(undefined, { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" });
+  return new Date(epoch * 1e3).toLocaleString(undefined, {
+    day: "numeric",
+    month: "short",
+    hour: "2-digit",
+    minute: "2-digit",
+  });
 }

@@ -2,8 +2,15 @@
 import { set, state } from "./store.js";
 
 export const LAYERS = {
-  measured: "Measured cloud", raw: "Raw model", extended: "Extended model", corrected: "Corrected model", tool: "Tool",
-  path: "Tool’s path", landmarks: "Touched landmarks", base: "Fixed base", lump: "Lump found",
+  measured: "Measured cloud",
+  raw: "Raw model",
+  extended: "Extended model",
+  corrected: "Corrected model",
+  tool: "Tool",
+  path: "Tool’s path",
+  landmarks: "Touched landmarks",
+  base: "Fixed base",
+  lump: "Lump found",
 };
 export const MODELS = ["raw", "extended", "corrected"];
 export const QUANTITIES = {
@@ -20,30 +27,52 @@ const front = () => shown().find((model) => model === state().colour) ?? shown()
 export const opacity = (layer) => state().looks[layer]?.opacity ?? 1;
 
 export function coloured(model) {
-  return state().looks[model]?.coloured ?? (state().colour !== "plain" && (state().side_by_side || (state().colour === model && model === front())));
+  return (
+    state().looks[model]?.coloured ??
+    (state().colour !== "plain" &&
+      (state().side_by_side || (state().colour === model && model === front())))
+  );
 }
 
-export function lines(model) { return state().looks[model]?.lines ?? (!state().side_by_side && model !== front()); }
+export function lines(model) {
+  return state().looks[model]?.lines ?? (!state().side_by_side && model !== front());
+}
 
-export function setLook(layer, change) { set({ looks: { ...state().looks, [layer]: { ...state().looks[layer], ...change } } }); }
+export function setLook(layer, change) {
+  set({ looks: { ...state().looks, [layer]: { ...state().looks[layer], ...change } } });
+}
 
 /** Why a layer cannot be shown here; null where it can. */
 export function absent(layer) {
   const { heading, series } = state();
-  if (layer === "measured" && heading && !heading.has_clouds) return "The dataset is not where this run says, so its clouds cannot be shown";
+  if (layer === "measured" && heading && !heading.has_clouds)
+    return "The dataset is not where this run says, so its clouds cannot be shown";
   if (!series) return null;
-  if (MODELS.includes(layer) && !series.models.includes(layer)) return layer === "corrected" ? "No correction network was trained for this run" : "This run does not hold the model";
+  if (MODELS.includes(layer) && !series.models.includes(layer))
+    return layer === "corrected"
+      ? "No correction network was trained for this run"
+      : "This run does not hold the model";
   if (layer === "lump" && !series.lumps) return "No stiff lump was found in this run";
-  if (layer === "landmarks" && !series.landmarks) return "This run does not say which landmarks were touched";
+  if (layer === "landmarks" && !series.landmarks)
+    return "This run does not say which landmarks were touched";
   return null;
 }
 
-export const noQuantity = (quantity) => (state().series && state().series.limits[quantity] === null ? state().series.inside : null);
+export const noQuantity = (quantity) =>
+  state().series && state().series.limits[quantity] === null ? state().series.inside : null;
 
 /** Draw one model coloured and in front, the others as lines; "plain" colours none. */
 export function choose(colour) {
-  const layers = colour === "plain" || state().layers.includes(colour) ? state().layers : [...state().layers, colour];
-  const looks = Object.fromEntries(Object.entries(state().looks).map(([layer, { opacity: kept }]) => [layer, kept ? { opacity: kept } : {}]));
+  const layers =
+    colour === "plain" || state().layers.includes(colour)
+      ? state().layers
+      : [...state().layers, colour];
+  const looks = Object.fromEntries(
+    Object.entries(state().looks).map(([layer, { opacity: kept }]) => [
+      layer,
+      kept ? { opacity: kept } : {},
+    ]),
+  );
   set({ colour, layers: order(layers), looks });
 }
 
@@ -51,17 +80,43 @@ export const order = (layers) => Object.keys(LAYERS).filter((layer) => layers.in
 
 export function toggle(layer) {
   const { layers } = state();
-  set({ layers: order(layers.includes(layer) ? layers.filter((other) => other !== layer) : [...layers, layer]) });
+  set({
+    layers: order(
+      layers.includes(layer) ? layers.filter((other) => other !== layer) : [...layers, layer],
+    ),
+  });
 }
 
 /** All that the server needs to draw. */
 export function wish() {
-  const { run, sequence, frame, layers, colour, quantity, ranges, limits, crop, side_by_side: aside, section, looks } = state();
+  const {
+    run,
+    sequence,
+    frame,
+    layers,
+    colour,
+    quantity,
+    ranges,
+    limits,
+    crop,
+    side_by_side: aside,
+    section,
+    looks,
+  } = state();
   const held = noQuantity(quantity) ? "error" : quantity;
   const range = ranges[held] ?? "robust";
   return {
-    run, sequence, frame, layers: order(layers), colour, quantity: held, scale: range === "fixed" ? "fixed" : "robust",
-    limit: range === "manual" ? limits[held] ?? null : null, crop, side_by_side: aside, section: section?.on ? { axis: section.axis, at: section.at, flip: section.flip } : null,
+    run,
+    sequence,
+    frame,
+    layers: order(layers),
+    colour,
+    quantity: held,
+    scale: range === "fixed" ? "fixed" : "robust",
+    limit: range === "manual" ? (limits[held] ?? null) : null,
+    crop,
+    side_by_side: aside,
+    section: section?.on ? { axis: section.axis, at: section.at, flip: section.flip } : null,
     looks: Object.fromEntries(Object.entries(looks).filter(([layer]) => layer in LAYERS)),
   };
 }

@@ -12,13 +12,31 @@ export function range(count) {
 /** Loop between two frames in either order; one frame alone is no loop. */
 export function mark(one, other, count) {
   const last = count - 1;
-  const [from, to] = [Math.min(one, other), Math.max(one, other)].map((frame) => Math.max(0, Math.min(last, frame)));
+  const [from, to] = [Math.min(one, other), Math.max(one, other)].map((frame) =>
+    Math.max(0, Math.min(last, frame)),
+  );
   set({ loop: to > from ? [from, to] : null });
 }
 
-const begin = (count) => { if (count) mark(state().frame, state().loop && state().loop[1] > state().frame ? state().loop[1] : count - 1, count); };
-const end = (count) => { if (count) mark(state().loop && state().loop[0] < state().frame ? state().loop[0] : 0, state().frame, count); };
-const toggle = (count) => { if (count > 1) set({ loop: state().loop ? null : [0, count - 1] }); };
+const begin = (count) => {
+  if (count)
+    mark(
+      state().frame,
+      state().loop && state().loop[1] > state().frame ? state().loop[1] : count - 1,
+      count,
+    );
+};
+const end = (count) => {
+  if (count)
+    mark(
+      state().loop && state().loop[0] < state().frame ? state().loop[0] : 0,
+      state().frame,
+      count,
+    );
+};
+const toggle = (count) => {
+  if (count > 1) set({ loop: state().loop ? null : [0, count - 1] });
+};
 
 export const KEYS = { i: begin, o: end, l: toggle };
 
@@ -29,10 +47,24 @@ const BUTTONS = [
 ];
 
 export function start(count) {
-  const draw = () => fill("looping", BUTTONS.map(([name, action, title]) => element("button", {
-    id: `loop-${name}`, class: "icon-button", type: "button", title, "aria-pressed": name === "loop" ? String(state().loop !== null) : null,
-    onclick: () => action(count()),
-  }, icon(name))));
+  const draw = () =>
+    fill(
+      "looping",
+      BUTTONS.map(([name, action, title]) =>
+        element(
+          "button",
+          {
+            id: `loop-${name}`,
+            class: "icon-button",
+            type: "button",
+            title,
+            "aria-pressed": name === "loop" ? String(state().loop !== null) : null,
+            onclick: () => action(count()),
+          },
+          icon(name),
+        ),
+      ),
+    );
   on(["loop"], draw);
   draw();
 }

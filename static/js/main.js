@@ -38,21 +38,33 @@ function startLogOut() {
 async function openRun(id) {
   set({ playing: false });
   try {
-    const [heading, report, patterns] = await Promise.all([get(`/runs/${id}`), get(`/runs/${id}/report`), get(`/runs/${id}/patterns`).catch(() => null)]);
+    const [heading, report, patterns] = await Promise.all([
+      get(`/runs/${id}`),
+      get(`/runs/${id}/report`),
+      get(`/runs/${id}/patterns`).catch(() => null),
+    ]);
     const known = heading.sequences.map(({ name }) => name);
-    const sequence = state().run === id && known.includes(state().sequence) ? state().sequence : preferred(heading.sequences);
+    const sequence =
+      state().run === id && known.includes(state().sequence)
+        ? state().sequence
+        : preferred(heading.sequences);
     showReport(heading, report, patterns, state().palette);
-    if (state().run !== id || state().sequence !== sequence) set({ frame: 0, series: null, loop: null });
+    if (state().run !== id || state().sequence !== sequence)
+      set({ frame: 0, series: null, loop: null });
     set({ run: id, sequence, heading, report });
     await openSequence();
-  } catch (problem) { showProblem(problem); }
+  } catch (problem) {
+    showProblem(problem);
+  }
 }
 
 /** The test sequence on which naming the cause changes most: what a visitor should see first. */
 function preferred(sequences) {
   const tested = sequences.filter(({ split }) => split === "test");
   const gain = ({ distance_raw: raw, distance_extended: extended }) => (raw ?? 0) - (extended ?? 0);
-  return [...(tested.length ? tested : sequences)].sort((a, b) => gain(b) - gain(a))[0]?.name ?? null;
+  return (
+    [...(tested.length ? tested : sequences)].sort((a, b) => gain(b) - gain(a))[0]?.name ?? null
+  );
 }
 
 async function openSequence() {
@@ -71,7 +83,8 @@ function opening({ distance_raw: raw, distance_extended: extended }) {
   return highest(gain.some((value) => value > 0) ? gain : raw);
 }
 
-const highest = (values) => values.reduce((best, value, index) => ((value ?? 0) > (values[best] ?? 0) ? index : best), 0);
+const highest = (values) =>
+  values.reduce((best, value, index) => ((value ?? 0) > (values[best] ?? 0) ? index : best), 0);
 
 async function start() {
   startTheme();
@@ -86,12 +99,22 @@ async function start() {
   scene.start();
   whatif.start();
   live.start();
-  on(["sequence"], () => { set({ series: null, frame: 0, loop: null }); openSequence().catch(toast); });
+  on(["sequence"], () => {
+    set({ series: null, frame: 0, loop: null });
+    openSequence().catch(toast);
+  });
   // What a person chooses comes to the front at once, what merely loads never does: they may have gone elsewhere meanwhile.
-  const datasets = await rail.start((id) => { openPanel("report"); return openRun(id); });
+  const datasets = await rail.start((id) => {
+    openPanel("report");
+    return openRun(id);
+  });
   const wanted = new URLSearchParams(location.search).get("run") ?? state().run;
   const run = rail.newestRun(wanted);
-  if (run) await openRun(run); else { set({ run: null, sequence: null }); showWelcome(datasets); }
+  if (run) await openRun(run);
+  else {
+    set({ run: null, sequence: null });
+    showWelcome(datasets);
+  }
 }
 
 start().catch(toast);

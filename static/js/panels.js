@@ -1,7 +1,15 @@
 // The right side: one panel for each thing that is done, a tab for each, the report first.
 import { element, fill } from "./dom.js";
 
-const panels = [{ id: "report", label: "Report", box: document.getElementById("panel"), opened: null, left: null }];
+const panels = [
+  {
+    id: "report",
+    label: "Report",
+    box: document.getElementById("panel"),
+    opened: null,
+    left: null,
+  },
+];
 let current = "report";
 
 /**
@@ -10,7 +18,14 @@ let current = "report";
  * @param left called when another comes to the front.
  */
 export function addPanel(id, label, opened, left = null) {
-  const box = element("div", { id: `panel-${id}`, class: "panel", role: "tabpanel", "aria-label": label, tabindex: "-1", hidden: true });
+  const box = element("div", {
+    id: `panel-${id}`,
+    class: "panel",
+    role: "tabpanel",
+    "aria-label": label,
+    tabindex: "-1",
+    hidden: true,
+  });
   document.getElementById("panel").parentElement.append(box);
   panels.push({ id, label, box, opened, left });
   draw();
@@ -32,9 +47,22 @@ export function openPanel(id) {
 export const openedPanel = () => current;
 
 function draw() {
-  const tabs = fill("tabs", panels.map(({ id, label, box }) => element("button", {
-    type: "button", role: "tab", id: `tab-${id}`, "aria-selected": String(id === current), "aria-controls": box.id,
-    onclick: () => openPanel(id),
-  }, label)));
+  const tabs = fill(
+    "tabs",
+    panels.map(({ id, label, box }) =>
+      element(
+        "button",
+        {
+          type: "button",
+          role: "tab",
+          id: `tab-${id}`,
+          "aria-selected": String(id === current),
+          "aria-controls": box.id,
+          onclick: () => openPanel(id),
+        },
+        label,
+      ),
+    ),
+  );
   tabs.hidden = panels.length < 2;
 }

@@ -20,8 +20,19 @@ const CORNERS = {
 
 export function patternSection(patterns, size, palette, explained = true) {
   const box = unfold(patterns, size);
-  if (!box.faces.length) return element("p", { class: "muted" }, "No patch of the surface was seen often enough to draw a pattern.");
-  const maps = () => element("div", { class: "maps" }, map("Measured error", "measured"), explained ? map("Predicted by the cause", "predicted") : null);
+  if (!box.faces.length)
+    return element(
+      "p",
+      { class: "muted" },
+      "No patch of the surface was seen often enough to draw a pattern.",
+    );
+  const maps = () =>
+    element(
+      "div",
+      { class: "maps" },
+      map("Measured error", "measured"),
+      explained ? map("Predicted by the cause", "predicted") : null,
+    );
   const map = (caption, key) => {
     const canvas = element("canvas", { "data-pattern": key });
     // Once it has a width: the panel may be behind another one while the report comes.
@@ -31,13 +42,30 @@ export function patternSection(patterns, size, palette, explained = true) {
       paint(canvas, box, patterns[key], patterns.limit, palette);
     });
     seen.observe(canvas);
-    return element("button", { class: "map", type: "button", title: "Enlarge", onclick: enlarge }, element("span", { class: "caption" }, caption), canvas);
+    return element(
+      "button",
+      { class: "map", type: "button", title: "Enlarge", onclick: enlarge },
+      element("span", { class: "caption" }, caption),
+      canvas,
+    );
   };
-  const legend = () => element("div", { class: "map-legend" }, scaleBar(palette.signed, patterns.limit),
-    element("p", { class: "note" }, "Measured surface minus raw simulation in mm, on the unfolded box: the top in the middle, the sides folded out; grey was not seen."));
+  const legend = () =>
+    element(
+      "div",
+      { class: "map-legend" },
+      scaleBar(palette.signed, patterns.limit),
+      element(
+        "p",
+        { class: "note" },
+        "Measured surface minus raw simulation in mm, on the unfolded box: the top in the middle, the sides folded out; grey was not seen.",
+      ),
+    );
   function enlarge() {
     const dialog = document.getElementById("enlarged");
-    if (dialog.open) { dialog.close(); return; }
+    if (dialog.open) {
+      dialog.close();
+      return;
+    }
     fill(dialog, maps(), legend());
     dialog.showModal();
   }
@@ -51,10 +79,18 @@ function unfold({ centres, normals, measured }, size) {
     const face = faceOf(normals[index]);
     if (face) byFace[face].push({ index, at: FOLD[face](centre, size) });
   });
-  const faces = FACES.filter((face) => byFace[face].some(({ index }) => measured[index] !== null))
-    .map((name) => ({ name, patches: byFace[name], rect: CORNERS[name](size), spacing: spacing(byFace[name]) }));
+  const faces = FACES.filter((face) =>
+    byFace[face].some(({ index }) => measured[index] !== null),
+  ).map((name) => ({
+    name,
+    patches: byFace[name],
+    rect: CORNERS[name](size),
+    spacing: spacing(byFace[name]),
+  }));
   const rects = faces.map(({ rect }) => rect);
-  const bounds = [0, 1].map((k) => Math.min(...rects.map((r) => r[k]))).concat([2, 3].map((k) => Math.max(...rects.map((r) => r[k]))));
+  const bounds = [0, 1]
+    .map((k) => Math.min(...rects.map((r) => r[k])))
+    .concat([2, 3].map((k) => Math.max(...rects.map((r) => r[k]))));
   return { faces, bounds };
 }
 
@@ -65,7 +101,13 @@ function faceOf(normal) {
 }
 
 function spacing(patches) {
-  const nearest = patches.map((a) => Math.min(...patches.map((b) => (a === b ? Infinity : Math.hypot(a.at[0] - b.at[0], a.at[1] - b.at[1])))));
+  const nearest = patches.map((a) =>
+    Math.min(
+      ...patches.map((b) =>
+        a === b ? Infinity : Math.hypot(a.at[0] - b.at[0], a.at[1] - b.at[1]),
+      ),
+    ),
+  );
   nearest.sort((a, b) => a - b);
   return nearest[Math.floor(nearest.length / 2)] || 0.003;
 }
@@ -76,16 +118,28 @@ function paint(canvas, { faces, bounds }, values, limit, palette) {
   const width = Math.round(canvas.clientWidth * ratio);
   const scale = width / (right - left);
   const height = Math.round((high - low) * scale);
-  canvas.width = width; canvas.height = height;
+  canvas.width = width;
+  canvas.height = height;
   const pen = canvas.getContext("2d");
   const image = pen.createImageData(width, height);
   for (const face of faces) {
     const field = interpolator(face, values);
     const [x0, y0, x1, y1] = face.rect;
-    for (let row = Math.max(0, Math.round((high - y1) * scale)); row < Math.min(height, Math.round((high - y0) * scale)); row++) {
-      for (let column = Math.max(0, Math.round((x0 - left) * scale)); column < Math.min(width, Math.round((x1 - left) * scale)); column++) {
+    for (
+      let row = Math.max(0, Math.round((high - y1) * scale));
+      row < Math.min(height, Math.round((high - y0) * scale));
+      row++
+    ) {
+      for (
+        let column = Math.max(0, Math.round((x0 - left) * scale));
+        column < Math.min(width, Math.round((x1 - left) * scale));
+        column++
+      ) {
         const value = field(left + (column + 0.5) / scale, high - (row + 0.5) / scale);
-        const rgb = value === null ? palette.things.unseen : palette.signed[bandOf(value, limit, palette.signed.length)];
+        const rgb =
+          value === null
+            ? palette.things.unseen
+            : palette.signed[bandOf(value, limit, palette.signed.length)];
         image.data.set([...rgb, value === null ? 110 : 255], 4 * (row * width + column));
       }
     }
@@ -93,7 +147,10 @@ function paint(canvas, { faces, bounds }, values, limit, palette) {
   pen.putImageData(image, 0, 0);
   pen.strokeStyle = getComputedStyle(document.documentElement).getPropertyValue("--surface");
   pen.lineWidth = 1.5 * ratio;
-  for (const { rect: [x0, y0, x1, y1] } of faces) pen.strokeRect((x0 - left) * scale, (high - y1) * scale, (x1 - x0) * scale, (y1 - y0) * scale);
+  for (const {
+    rect: [x0, y0, x1, y1],
+  } of faces)
+    pen.strokeRect((x0 - left) * scale, (high - y1) * scale, (x1 - x0) * scale, (y1 - y0) * scale);
 }
 
 /** A local mean of the patches around a place, null where the nearest patch was not seen or is too far. */
@@ -110,13 +167,19 @@ function interpolator({ patches, spacing: step }, values) {
     let sum = 0;
     let nearest = Infinity;
     let seen = false;
-    for (let i = -2; i <= 2; i++) for (let j = -2; j <= 2; j++) for (const { at, value } of cells.get(`${column + i},${row + j}`) ?? []) {
-      const distance = Math.hypot(at[0] - x, at[1] - y) / step;
-      if (distance < nearest) { nearest = distance; seen = value !== null; }
-      if (value === null) continue;
-      const weight = Math.exp(-2.2 * distance * distance);
-      total += weight; sum += weight * value;
-    }
+    for (let i = -2; i <= 2; i++)
+      for (let j = -2; j <= 2; j++)
+        for (const { at, value } of cells.get(`${column + i},${row + j}`) ?? []) {
+          const distance = Math.hypot(at[0] - x, at[1] - y) / step;
+          if (distance < nearest) {
+            nearest = distance;
+            seen = value !== null;
+          }
+          if (value === null) continue;
+          const weight = Math.exp(-2.2 * distance * distance);
+          total += weight;
+          sum += weight * value;
+        }
     return seen && nearest < 1.3 ? sum / total : null;
   };
 }

@@ -20,7 +20,10 @@ export async function start(open) {
   opens("run", "Open the report", open);
   opens("dataset", "Open the dataset", (name) => openDataset(name));
   onDone(async (done) => {
-    await Promise.all([refreshRuns(), done.some(({ result }) => result?.dataset) ? refreshDatasets() : null]);
+    await Promise.all([
+      refreshRuns(),
+      done.some(({ result }) => result?.dataset) ? refreshDatasets() : null,
+    ]);
     // Who has gone elsewhere meanwhile finds it among the jobs and the diagnoses.
     if (openedPanel() === "report" && done.some(({ id }) => id === asked)) openRun(asked);
   });
@@ -34,8 +37,22 @@ export async function start(open) {
 
 async function refreshDatasets() {
   const { datasets, folder } = await get("/datasets");
-  fill("datasets", datasets.length ? datasets.map((name) => element("button", { class: "row", type: "button", onclick: () => showDataset(name, diagnose) }, element("span", { class: "name" }, name)))
-    : element("p", { class: "empty" }, `None in ${folder}. Import one, or put its folder there and reload.`));
+  fill(
+    "datasets",
+    datasets.length
+      ? datasets.map((name) =>
+          element(
+            "button",
+            { class: "row", type: "button", onclick: () => showDataset(name, diagnose) },
+            element("span", { class: "name" }, name),
+          ),
+        )
+      : element(
+          "p",
+          { class: "empty" },
+          `None in ${folder}. Import one, or put its folder there and reload.`,
+        ),
+  );
   return datasets;
 }
 
@@ -44,31 +61,89 @@ export const openDataset = (name) => showDataset(name, diagnose);
 
 let runs = [];
 
-async function refreshRuns() { runs = await get("/runs"); drawRuns(); return runs; }
+async function refreshRuns() {
+  runs = await get("/runs");
+  drawRuns();
+  return runs;
+}
 
 export const newestRun = (wanted) => (runs.find(({ id }) => id === wanted) ?? runs[0])?.id ?? null;
 
 function drawRuns() {
-  fill("runs", runs.length ? runs.map(({ id, verdict, causes, created, dataset, folder }) => element("button", {
-    class: "row", type: "button", "aria-current": String(id === state().run), "data-run": id, title: id, onclick: () => openRun(id),
-  }, element("span", { class: "stack" }, element("span", { class: "name" }, causes.length ? causes.map(words).join(" + ") : verdict === "none" ? "nothing wrong" : verdict === "replay" ? "as stated" : verdict),
-    element("span", { class: "sub" }, `${verdict === "replay" ? "replay · " : ""}${folder ?? dataset} · ${when(created)}`))))
-    : element("p", { class: "empty" }, "None yet. Choose a dataset below and start one."));
+  fill(
+    "runs",
+    runs.length
+      ? runs.map(({ id, verdict, causes, created, dataset, folder }) =>
+          element(
+            "button",
+            {
+              class: "row",
+              type: "button",
+              "aria-current": String(id === state().run),
+              "data-run": id,
+              title: id,
+              onclick: () => openRun(id),
+            },
+            element(
+              "span",
+              { class: "stack" },
+              element(
+                "span",
+                { class: "name" },
+                causes.length
+                  ? causes.map(words).join(" + ")
+                  : verdict === "none"
+                    ? "nothing wrong"
+                    : verdict === "replay"
+                      ? "as stated"
+                      : verdict,
+              ),
+              element(
+                "span",
+                { class: "sub" },
+                `${verdict === "replay" ? "replay · " : ""}${folder ?? dataset} · ${when(created)}`,
+              ),
+            ),
+          ),
+        )
+      : element("p", { class: "empty" }, "None yet. Choose a dataset below and start one."),
+  );
 }
 
 function drawSequences() {
   const { heading, sequence } = state();
   document.getElementById("sequences-section").hidden = !heading;
   if (!heading) return;
-  fill("sequences", heading.sequences.map((entry) => element("button", {
-    class: "row", type: "button", "aria-current": String(entry.name === sequence), "data-sequence": entry.name,
-    title: `${entry.frames} frames, ${entry.seconds.toFixed(0)} s; error in the worst frame, raw → extended`, onclick: () => set({ sequence: entry.name, frame: 0, playing: false }),
-  }, element("span", { class: `tag ${entry.split ?? ""}` }, TAGS[entry.split] ?? "–"), element("span", { class: "name" }, entry.name),
-    element("span", { class: "value" }, `${mm(entry.distance_raw, false)} → ${mm(entry.distance_extended, false)}`))));
+  fill(
+    "sequences",
+    heading.sequences.map((entry) =>
+      element(
+        "button",
+        {
+          class: "row",
+          type: "button",
+          "aria-current": String(entry.name === sequence),
+          "data-sequence": entry.name,
+          title: `${entry.frames} frames, ${entry.seconds.toFixed(0)} s; error in the worst frame, raw → extended`,
+          onclick: () => set({ sequence: entry.name, frame: 0, playing: false }),
+        },
+        element("span", { class: `tag ${entry.split ?? ""}` }, TAGS[entry.split] ?? "–"),
+        element("span", { class: "name" }, entry.name),
+        element(
+          "span",
+          { class: "value" },
+          `${mm(entry.distance_raw, false)} → ${mm(entry.distance_extended, false)}`,
+        ),
+      ),
+    ),
+  );
 }
 
 export async function diagnose(dataset, registration = null) {
   try {
     asked = (await post("/diagnoses", { dataset, registration })).id;
-  } catch (problem) { toast(problem); throw problem; }
+  } catch (problem) {
+    toast(problem);
+    throw problem;
+  }
 }

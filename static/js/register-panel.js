@@ -13,17 +13,82 @@ const colourOf = (number) => `hsl(${((0.58 + number * 0.381966) % 1) * 360} 75% 
 export function drawPanel(box, work, view, actions) {
   const typing = document.activeElement?.id === "register-name" ? document.activeElement : null;
   const name = typing?.value ?? box.querySelector("#register-name")?.value;
-  fill(box, element("div", { class: "eyebrow" }, "Registration by hand"),
+  fill(
+    box,
+    element("div", { class: "eyebrow" }, "Registration by hand"),
     element("h1", { class: "verdict" }, heading(work, view)),
-    view.datasets.length ? null : element("p", { class: "gain-note" }, `No dataset in ${view.folder ?? "the datasets folder"} yet: import one, or put a folder there.`),
-    view.datasets.length ? element("label", { class: "register-dataset" }, "Dataset", element("select", { "aria-label": "Dataset to register", onchange: ({ target }) => actions.choose(target.value) },
-      view.datasets.map((one) => element("option", { value: one, selected: one === view.dataset }, one)))) : null,
+    view.datasets.length
+      ? null
+      : element(
+          "p",
+          { class: "gain-note" },
+          `No dataset in ${view.folder ?? "the datasets folder"} yet: import one, or put a folder there.`,
+        ),
+    view.datasets.length
+      ? element(
+          "label",
+          { class: "register-dataset" },
+          "Dataset",
+          element(
+            "select",
+            {
+              "aria-label": "Dataset to register",
+              onchange: ({ target }) => actions.choose(target.value),
+            },
+            view.datasets.map((one) =>
+              element("option", { value: one, selected: one === view.dataset }, one),
+            ),
+          ),
+        )
+      : null,
     view.cannot ? card(view.cannot) : null,
-    work && !view.cannot ? (work.values.found ? result(work, view, actions, name) : pairsPart(work, view, actions)) : null,
-    view.names.length ? element("section", {}, element("h2", {}, "Accepted for this dataset"), element("ul", { class: "register-names" }, view.names.map((one) => element("li", {}, element("span", {}, one),
-      element("a", { href: `/api/datasets/${encodeURIComponent(view.dataset)}/registrations/${encodeURIComponent(one)}`, download: `${view.dataset}-${one}.json` }, "Save as a file"))))) : null,
-    element("details", { class: "register-keys" }, element("summary", {}, "Keys"), element("dl", { class: "keys" }, KEYS.flatMap(([key, what]) => [element("dt", {}, key), element("dd", {}, what)]))));
-  if (typing) { const field = box.querySelector("#register-name"); field?.focus(); field?.setSelectionRange(field.value.length, field.value.length); }
+    work && !view.cannot
+      ? work.values.found
+        ? result(work, view, actions, name)
+        : pairsPart(work, view, actions)
+      : null,
+    view.names.length
+      ? element(
+          "section",
+          {},
+          element("h2", {}, "Accepted for this dataset"),
+          element(
+            "ul",
+            { class: "register-names" },
+            view.names.map((one) =>
+              element(
+                "li",
+                {},
+                element("span", {}, one),
+                element(
+                  "a",
+                  {
+                    href: `/api/datasets/${encodeURIComponent(view.dataset)}/registrations/${encodeURIComponent(one)}`,
+                    download: `${view.dataset}-${one}.json`,
+                  },
+                  "Save as a file",
+                ),
+              ),
+            ),
+          ),
+        )
+      : null,
+    element(
+      "details",
+      { class: "register-keys" },
+      element("summary", {}, "Keys"),
+      element(
+        "dl",
+        { class: "keys" },
+        KEYS.flatMap(([key, what]) => [element("dt", {}, key), element("dd", {}, what)]),
+      ),
+    ),
+  );
+  if (typing) {
+    const field = box.querySelector("#register-name");
+    field?.focus();
+    field?.setSelectionRange(field.value.length, field.value.length);
+  }
 }
 
 function heading(work, view) {
@@ -31,10 +96,13 @@ function heading(work, view) {
   if (view.busy) return view.busy;
   const { found, pairs } = work.values;
   const count = whole(pairs).length;
-  if (found) return `${mm(found.registration.residual_before)} before, ${mm(found.registration.residual_after)} after ICP`;
+  if (found)
+    return `${mm(found.registration.residual_before)} before, ${mm(found.registration.residual_after)} after ICP`;
   if (view.problem) return "These pairs do not fit yet";
   if (view.fit) return `${count} pairs fit to ${mm(view.fit.rms)} RMS`;
-  return count ? `${3 - count} more ${count === 2 ? "pair" : "pairs"} for a fit` : "Click a point of the cloud, then the same point of the phantom";
+  return count
+    ? `${3 - count} more ${count === 2 ? "pair" : "pairs"} for a fit`
+    : "Click a point of the cloud, then the same point of the phantom";
 }
 
 function pairsPart(work, view, actions) {
@@ -43,72 +111,322 @@ function pairsPart(work, view, actions) {
   return [
     view.missed ? element("p", { class: "note-card", role: "status" }, view.missed) : null,
     view.refused ? card(view.refused) : null,
-    shared ? element("div", { class: "note-card bad", role: "alert" }, element("strong", {}, "No fit"), capital(view.problem.message)) : null,
-    element("section", {}, element("h2", {}, "Pairs", element("small", {}, "residual, mm")), pairs.length ? element("table", { class: "register-pairs" }, element("tbody", {}, pairs.flatMap((pair, number) => row(pair, number, work, view)))) : element("p", { class: "empty" }, "None yet. Corners and edges tell most; three pairs that are far apart are enough.")),
+    shared
+      ? element(
+          "div",
+          { class: "note-card bad", role: "alert" },
+          element("strong", {}, "No fit"),
+          capital(view.problem.message),
+        )
+      : null,
+    element(
+      "section",
+      {},
+      element("h2", {}, "Pairs", element("small", {}, "residual, mm")),
+      pairs.length
+        ? element(
+            "table",
+            { class: "register-pairs" },
+            element(
+              "tbody",
+              {},
+              pairs.flatMap((pair, number) => row(pair, number, work, view)),
+            ),
+          )
+        : element(
+            "p",
+            { class: "empty" },
+            "None yet. Corners and edges tell most; three pairs that are far apart are enough.",
+          ),
+    ),
     (view.fit?.warnings ?? []).map((text) => element("div", { class: "note-card" }, text)),
-    Object.keys(view.landmarks).length ? element("section", {}, element("h2", {}, "Landmarks", element("small", {}, "as the phantom’s point")), element("div", { class: "register-landmarks" }, Object.keys(view.landmarks).map((name) => element("button", {
-      type: "button", class: "button small", "data-landmark": name, "aria-pressed": String(pairs.some((pair) => pair.landmark === name)), onclick: () => actions.landmark(name),
-    }, name)))) : null,
-    element("div", { class: "actions" },
-      element("button", { class: "button strong", type: "button", disabled: !view.fit || Boolean(view.busy), title: "Enter", onclick: () => actions.refine() }, view.busy ? "Working …" : "Refine by ICP"),
-      element("button", { class: "button", type: "button", disabled: !work.canUndo(), title: "Ctrl+Z", onclick: work.undo }, "Undo"),
-      element("button", { class: "button", type: "button", disabled: !pairs.length, onclick: actions.clear }, "Clear")),
+    Object.keys(view.landmarks).length
+      ? element(
+          "section",
+          {},
+          element("h2", {}, "Landmarks", element("small", {}, "as the phantom’s point")),
+          element(
+            "div",
+            { class: "register-landmarks" },
+            Object.keys(view.landmarks).map((name) =>
+              element(
+                "button",
+                {
+                  type: "button",
+                  class: "button small",
+                  "data-landmark": name,
+                  "aria-pressed": String(pairs.some((pair) => pair.landmark === name)),
+                  onclick: () => actions.landmark(name),
+                },
+                name,
+              ),
+            ),
+          ),
+        )
+      : null,
+    element(
+      "div",
+      { class: "actions" },
+      element(
+        "button",
+        {
+          class: "button strong",
+          type: "button",
+          disabled: !view.fit || Boolean(view.busy),
+          title: "Enter",
+          onclick: () => actions.refine(),
+        },
+        view.busy ? "Working …" : "Refine by ICP",
+      ),
+      element(
+        "button",
+        {
+          class: "button",
+          type: "button",
+          disabled: !work.canUndo(),
+          title: "Ctrl+Z",
+          onclick: work.undo,
+        },
+        "Undo",
+      ),
+      element(
+        "button",
+        { class: "button", type: "button", disabled: !pairs.length, onclick: actions.clear },
+        "Clear",
+      ),
+    ),
   ];
 }
 
 function row(pair, number, work, view) {
   const at = view.fit?.of.indexOf(number) ?? -1;
   const chosen = work.values.chosen;
-  const end = (side, label) => element("button", {
-    type: "button", class: "link", "data-end": `${number}-${side}`, "aria-pressed": String(chosen?.[0] === number && chosen[1] === side), disabled: !pair[side],
-    title: pair[side] ? "Choose this end, to move it" : "Not clicked yet", onclick: () => work.choose(number, side),
-  }, pair[side] ? label : "–");
+  const end = (side, label) =>
+    element(
+      "button",
+      {
+        type: "button",
+        class: "link",
+        "data-end": `${number}-${side}`,
+        "aria-pressed": String(chosen?.[0] === number && chosen[1] === side),
+        disabled: !pair[side],
+        title: pair[side] ? "Choose this end, to move it" : "Not clicked yet",
+        onclick: () => work.choose(number, side),
+      },
+      pair[side] ? label : "–",
+    );
   const bad = view.problem?.at.includes(number);
-  const swap = bad && view.problem.at.length === 2 && view.problem.at[0] === number && /exchanging/.test(view.problem.message);
-  return [element("tr", { "data-pair": number, class: bad ? "bad" : "" },
-    element("th", {}, element("b", { class: "pair-number", style: { background: colourOf(number) } }, String(number + 1))),
-    element("td", {}, end("cloud", "cloud")), element("td", {}, end("mesh", pair.landmark ?? "phantom")),
-    element("td", { class: "number", "data-residual": number }, at >= 0 ? mm(view.fit.residuals[at], false) : pair.cloud && pair.mesh ? "…" : ""),
-    element("td", {}, element("button", { class: "icon-button", type: "button", title: `Leave pair ${number + 1} out`, onclick: () => work.leaveOut(number) }, icon("close")))),
-  bad && view.problem.at[0] === number ? element("tr", { class: "said" }, element("td", { colspan: 5 }, element("div", { class: "note-card bad", role: "alert" }, capital(view.problem.message),
-    swap ? element("p", {}, element("button", { class: "button small", type: "button", onclick: () => work.exchange(...view.problem.at) }, "Exchange them")) : null))) : null].filter(Boolean);
+  const swap =
+    bad &&
+    view.problem.at.length === 2 &&
+    view.problem.at[0] === number &&
+    /exchanging/.test(view.problem.message);
+  return [
+    element(
+      "tr",
+      { "data-pair": number, class: bad ? "bad" : "" },
+      element(
+        "th",
+        {},
+        element(
+          "b",
+          { class: "pair-number", style: { background: colourOf(number) } },
+          String(number + 1),
+        ),
+      ),
+      element("td", {}, end("cloud", "cloud")),
+      element("td", {}, end("mesh", pair.landmark ?? "phantom")),
+      element(
+        "td",
+        { class: "number", "data-residual": number },
+        at >= 0 ? mm(view.fit.residuals[at], false) : pair.cloud && pair.mesh ? "…" : "",
+      ),
+      element(
+        "td",
+        {},
+        element(
+          "button",
+          {
+            class: "icon-button",
+            type: "button",
+            title: `Leave pair ${number + 1} out`,
+            onclick: () => work.leaveOut(number),
+          },
+          icon("close"),
+        ),
+      ),
+    ),
+    bad && view.problem.at[0] === number
+      ? element(
+          "tr",
+          { class: "said" },
+          element(
+            "td",
+            { colspan: 5 },
+            element(
+              "div",
+              { class: "note-card bad", role: "alert" },
+              capital(view.problem.message),
+              swap
+                ? element(
+                    "p",
+                    {},
+                    element(
+                      "button",
+                      {
+                        class: "button small",
+                        type: "button",
+                        onclick: () => work.exchange(...view.problem.at),
+                      },
+                      "Exchange them",
+                    ),
+                  )
+                : null,
+            ),
+          ),
+        )
+      : null,
+  ].filter(Boolean);
 }
 
 function result(work, view, actions, name) {
   const { registration: found } = work.values.found;
   const firm = found.directions.at(0);
-  const fact = (label, ...value) => element("tr", {}, element("th", {}, label), element("td", { class: "number" }, ...value));
+  const fact = (label, ...value) =>
+    element("tr", {}, element("th", {}, label), element("td", { class: "number" }, ...value));
   return [
-    element("section", {}, element("h2", {}, "What ICP did"), element("table", {}, element("tbody", {},
-      fact("Residual before", element("b", { id: "register-before" }, mm(found.residual_before))), fact("Residual after", element("b", { id: "register-after" }, mm(found.residual_after))),
-      fact("Points compared", String(found.points)), fact("Moved by", mm(found.moved)), fact("Turned by", `${(found.turned * DEGREES).toFixed(2)}°`)))),
-    element("section", {}, element("h2", {}, "How sure"), found.weak_directions.length
-      ? [element("p", { class: "gain-note" }, "The cloud determines these directions weakly; the arrows show them."), found.weak_directions.map((text) => element("div", { class: "note-card", "data-weak": "" }, capital(text)))]
-      : element("p", { class: "gain-note", "data-firm": "" }, `Every direction is firm; the weakest, mostly ${mainly(firm.parts)}, is known to ± ${mm(firm.sigma)}.`)),
-    found.warnings.length ? element("section", {}, element("h2", {}, "Doubtful"), found.warnings.map((text) => element("div", { class: "note-card" }, text))) : null,
+    element(
+      "section",
+      {},
+      element("h2", {}, "What ICP did"),
+      element(
+        "table",
+        {},
+        element(
+          "tbody",
+          {},
+          fact(
+            "Residual before",
+            element("b", { id: "register-before" }, mm(found.residual_before)),
+          ),
+          fact("Residual after", element("b", { id: "register-after" }, mm(found.residual_after))),
+          fact("Points compared", String(found.points)),
+          fact("Moved by", mm(found.moved)),
+          fact("Turned by", `${(found.turned * DEGREES).toFixed(2)}°`),
+        ),
+      ),
+    ),
+    element(
+      "section",
+      {},
+      element("h2", {}, "How sure"),
+      found.weak_directions.length
+        ? [
+            element(
+              "p",
+              { class: "gain-note" },
+              "The cloud determines these directions weakly; the arrows show them.",
+            ),
+            found.weak_directions.map((text) =>
+              element("div", { class: "note-card", "data-weak": "" }, capital(text)),
+            ),
+          ]
+        : element(
+            "p",
+            { class: "gain-note", "data-firm": "" },
+            `Every direction is firm; the weakest, mostly ${mainly(firm.parts)}, is known to ± ${mm(firm.sigma)}.`,
+          ),
+    ),
+    found.warnings.length
+      ? element(
+          "section",
+          {},
+          element("h2", {}, "Doubtful"),
+          found.warnings.map((text) => element("div", { class: "note-card" }, text)),
+        )
+      : null,
     view.refused ? card(view.refused) : null,
     ...(view.accepted ? accepted(view, actions) : [acceptForm(view, actions, name)]),
   ];
 }
 
 const accepted = (view, actions) => [
-  element("div", { class: "note-card good", role: "status" }, element("strong", {}, "Accepted"), `Kept as ${view.accepted}. A diagnosis or a sweep of ${view.dataset} can use it: choose it as “Camera” there.`),
-  element("div", { class: "actions" },
-    element("button", { class: "button strong", type: "button", onclick: () => actions.openDataset() }, "Open the dataset"),
-    element("button", { class: "button", type: "button", title: "Esc", onclick: actions.back }, "Back to the pairs")),
+  element(
+    "div",
+    { class: "note-card good", role: "status" },
+    element("strong", {}, "Accepted"),
+    `Kept as ${view.accepted}. A diagnosis or a sweep of ${view.dataset} can use it: choose it as “Camera” there.`,
+  ),
+  element(
+    "div",
+    { class: "actions" },
+    element(
+      "button",
+      { class: "button strong", type: "button", onclick: () => actions.openDataset() },
+      "Open the dataset",
+    ),
+    element(
+      "button",
+      { class: "button", type: "button", title: "Esc", onclick: actions.back },
+      "Back to the pairs",
+    ),
+  ),
 ];
 
-const acceptForm = (view, actions, name) => element("form", { class: "register-accept", onsubmit: (event) => { event.preventDefault(); actions.accept(new FormData(event.target).get("name").trim()); } },
-  element("label", {}, "Name", element("input", { id: "register-name", name: "name", required: true, maxlength: 64, pattern: "[A-Za-z0-9][A-Za-z0-9._\\-]*", title: "Letters, digits, dot, dash, underscore", autocomplete: "off", value: name ?? free(view.names) })),
-  element("div", { class: "actions" },
-    element("button", { class: "button strong", type: "submit", disabled: Boolean(view.busy) }, view.busy ? "Working …" : "Accept"),
-    element("button", { class: "button", type: "button", title: "Esc", onclick: actions.back }, "Back to the pairs")));
+const acceptForm = (view, actions, name) =>
+  element(
+    "form",
+    {
+      class: "register-accept",
+      onsubmit: (event) => {
+        event.preventDefault();
+        actions.accept(new FormData(event.target).get("name").trim());
+      },
+    },
+    element(
+      "label",
+      {},
+      "Name",
+      element("input", {
+        id: "register-name",
+        name: "name",
+        required: true,
+        maxlength: 64,
+        pattern: "[A-Za-z0-9][A-Za-z0-9._\\-]*",
+        title: "Letters, digits, dot, dash, underscore",
+        autocomplete: "off",
+        value: name ?? free(view.names),
+      }),
+    ),
+    element(
+      "div",
+      { class: "actions" },
+      element(
+        "button",
+        { class: "button strong", type: "submit", disabled: Boolean(view.busy) },
+        view.busy ? "Working …" : "Accept",
+      ),
+      element(
+        "button",
+        { class: "button", type: "button", title: "Esc", onclick: actions.back },
+        "Back to the pairs",
+      ),
+    ),
+  );
 
 /** A name that is not taken. */
 function free(names) {
-  for (let number = 1; ; number += 1) if (!names.includes(`by-hand-${number}`)) return `by-hand-${number}`;
+  for (let number = 1; ; number += 1)
+    if (!names.includes(`by-hand-${number}`)) return `by-hand-${number}`;
 }
 
-const mainly = (parts) => Object.entries(parts).sort((a, b) => Math.abs(b[1]) - Math.abs(a[1]))[0][0];
+const mainly = (parts) =>
+  Object.entries(parts).sort((a, b) => Math.abs(b[1]) - Math.abs(a[1]))[0][0];
 
-const card = (problem) => element("div", { class: "note-card bad", role: "alert" }, element("strong", {}, title(problem)), problem.message);
+const card = (problem) =>
+  element(
+    "div",
+    { class: "note-card bad", role: "alert" },
+    element("strong", {}, title(problem)),
+    problem.message,
+  );

@@ -2,16 +2,29 @@
 const KEY = "palpate.register";
 const FRESH = { pairs: [], mode: "cloud", chosen: null, start: "stated", over: false, found: null };
 
-const kept = () => { try { return JSON.parse(localStorage.getItem(KEY)) ?? {}; } catch { return {}; } };
+const kept = () => {
+  try {
+    return JSON.parse(localStorage.getItem(KEY)) ?? {};
+  } catch {
+    return {};
+  }
+};
 
 /** One dataset's unfinished registration; `changed` is called after every change, with whether the pairs are others now. */
 export function workOn(dataset, changed) {
   const values = { ...structuredClone(FRESH), ...(kept().of?.[dataset] ?? {}) };
   const past = [];
-  const keep = () => { const all = kept(); localStorage.setItem(KEY, JSON.stringify({ dataset, of: { ...all.of, [dataset]: values } })); };
+  const keep = () => {
+    const all = kept();
+    localStorage.setItem(KEY, JSON.stringify({ dataset, of: { ...all.of, [dataset]: values } }));
+  };
   keep();
 
-  function set(changes) { Object.assign(values, changes); keep(); changed(false); }
+  function set(changes) {
+    Object.assign(values, changes);
+    keep();
+    changed(false);
+  }
 
   /** Other pairs: what was before can be undone; what ICP found of the old ones is no longer so. */
   function put(pairs, more = {}) {
@@ -27,22 +40,51 @@ export function workOn(dataset, changed) {
     const open = values.pairs.findIndex((pair) => !pair[side]);
     const at = number ?? chosen ?? (open >= 0 ? open : values.pairs.length);
     const pairs = structuredClone(values.pairs);
-    pairs[at] = { cloud: null, mesh: null, landmark: null, ...pairs[at], [side]: point, ...(side === "mesh" ? { landmark } : {}) };
+    pairs[at] = {
+      cloud: null,
+      mesh: null,
+      landmark: null,
+      ...pairs[at],
+      [side]: point,
+      ...(side === "mesh" ? { landmark } : {}),
+    };
     const placed = number ?? chosen;
-    put(pairs, placed === null ? { mode: pairs[at][other(side)] ? next(pairs, side) : other(side), chosen: null } : {});
+    put(
+      pairs,
+      placed === null
+        ? { mode: pairs[at][other(side)] ? next(pairs, side) : other(side), chosen: null }
+        : {},
+    );
   }
 
   return {
-    values, set, put, place,
-    choose: (number, side) => set({ chosen: number === null ? null : [number, side], ...(number === null ? {} : { mode: side }) }),
-    leaveOut: (number) => put(values.pairs.filter((_, at) => at !== number), { chosen: null }),
+    values,
+    set,
+    put,
+    place,
+    choose: (number, side) =>
+      set({
+        chosen: number === null ? null : [number, side],
+        ...(number === null ? {} : { mode: side }),
+      }),
+    leaveOut: (number) =>
+      put(
+        values.pairs.filter((_, at) => at !== number),
+        { chosen: null },
+      ),
     exchange: (a, b) => {
       const pairs = structuredClone(values.pairs);
       [pairs[a].mesh, pairs[b].mesh] = [pairs[b].mesh, pairs[a].mesh];
       [pairs[a].landmark, pairs[b].landmark] = [pairs[b].landmark, pairs[a].landmark];
       put(pairs, { chosen: null });
     },
-    undo: () => { if (past.length) { Object.assign(values, JSON.parse(past.pop()), { found: null }); keep(); changed(true); } },
+    undo: () => {
+      if (past.length) {
+        Object.assign(values, JSON.parse(past.pop()), { found: null });
+        keep();
+        changed(true);
+      }
+    },
     canUndo: () => past.length > 0,
   };
 }
@@ -52,6 +94,7 @@ export const other = (side) => (side === "cloud" ? "mesh" : "cloud");
 const next = (pairs, side) => (pairs.some((pair) => !pair[other(side)]) ? other(side) : "cloud");
 
 /** Pairs with both ends, and which numbers they have. */
-export const whole = (pairs) => pairs.map((pair, number) => ({ ...pair, number })).filter(({ cloud, mesh }) => cloud && mesh);
+export const whole = (pairs) =>
+  pairs.map((pair, number) => ({ ...pair, number })).filter(({ cloud, mesh }) => cloud && mesh);
 
 export const lastDataset = () => kept().dataset ?? null;

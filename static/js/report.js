@@ -10,74 +10,254 @@ const panel = () => document.getElementById("panel");
 
 export function showReport(heading, report, patterns, palette) {
   const causes = report.causes ?? [];
-  fill(panel(),
-    element("div", { class: "eyebrow" }, element("span", { class: `verdict-tag ${report.verdict}` }, report.verdict), `${heading.folder ?? heading.dataset} · ${when(heading.created)}`),
+  fill(
+    panel(),
+    element(
+      "div",
+      { class: "eyebrow" },
+      element("span", { class: `verdict-tag ${report.verdict}` }, report.verdict),
+      `${heading.folder ?? heading.dataset} · ${when(heading.created)}`,
+    ),
     element("h1", { class: "verdict" }, heading.sentence),
-    element("p", { class: "actions" }, element("a", { class: "button", href: `/api/runs/${encodeURIComponent(heading.id)}/report.html`, download: `${heading.id}.html` }, "Save as one file"), exportButton(heading.id)),
+    element(
+      "p",
+      { class: "actions" },
+      element(
+        "a",
+        {
+          class: "button",
+          href: `/api/runs/${encodeURIComponent(heading.id)}/report.html`,
+          download: `${heading.id}.html`,
+        },
+        "Save as one file",
+      ),
+      exportButton(heading.id),
+    ),
     (heading.notes ?? []).map((text) => element("p", { class: "gain-note" }, text)),
-    causes.length ? section(report.verdict === "replay" ? "Added to the stated setup" : causes.length > 1 ? "Causes" : "Cause", report.verdict === "replay" ? "" : "interval", causes.map(cause)) : null,
-    report.gain ? section("Error on sequences not fitted on", report.gain.unit ?? "mm", gain(report.gain, causes.length > 0)) : null,
-    heading.sequences?.length ? section("Every sequence", "RMS distance, mm", comparisonSection(heading)) : null,
-    patterns ? section(causes.length ? "The error and its explanation" : "The error that is left", "", patternSection(patterns, heading.size, palette, causes.length > 0)) : null,
-    report.palpation ? section("Palpation", `${report.palpation.pushes} pushes`, palpation(heading.id, report.palpation, causes)) : null,
-    report.ranking?.length ? section("Ranking", "", ranking(report.ranking, causes.map(({ effect }) => effect))) : null,
-    report.ambiguity_map?.length ? section("What this data can tell", "smallest that would be named", told(report.ambiguity_map)) : null,
-    report.controls?.length ? section("Controls", "motions that were not made", controls(report.controls)) : null,
-    report.next_probe?.length ? section("Next probe", "would tell most", report.next_probe.map(probe)) : null,
+    causes.length
+      ? section(
+          report.verdict === "replay"
+            ? "Added to the stated setup"
+            : causes.length > 1
+              ? "Causes"
+              : "Cause",
+          report.verdict === "replay" ? "" : "interval",
+          causes.map(cause),
+        )
+      : null,
+    report.gain
+      ? section(
+          "Error on sequences not fitted on",
+          report.gain.unit ?? "mm",
+          gain(report.gain, causes.length > 0),
+        )
+      : null,
+    heading.sequences?.length
+      ? section("Every sequence", "RMS distance, mm", comparisonSection(heading))
+      : null,
+    patterns
+      ? section(
+          causes.length ? "The error and its explanation" : "The error that is left",
+          "",
+          patternSection(patterns, heading.size, palette, causes.length > 0),
+        )
+      : null,
+    report.palpation
+      ? section(
+          "Palpation",
+          `${report.palpation.pushes} pushes`,
+          palpation(heading.id, report.palpation, causes),
+        )
+      : null,
+    report.ranking?.length
+      ? section(
+          "Ranking",
+          "",
+          ranking(
+            report.ranking,
+            causes.map(({ effect }) => effect),
+          ),
+        )
+      : null,
+    report.ambiguity_map?.length
+      ? section(
+          "What this data can tell",
+          "smallest that would be named",
+          told(report.ambiguity_map),
+        )
+      : null,
+    report.controls?.length
+      ? section("Controls", "motions that were not made", controls(report.controls))
+      : null,
+    report.next_probe?.length
+      ? section("Next probe", "would tell most", report.next_probe.map(probe))
+      : null,
     report.unexplained ? section("Unexplained", "", unexplained(report.unexplained)) : null,
-    report.identified?.length ? section("Told by the forces", "interval", report.identified.map(known)) : null,
-    report.not_identifiable?.length ? section("Cannot be told from this data", "", report.not_identifiable.map(blind)) : null);
+    report.identified?.length
+      ? section("Told by the forces", "interval", report.identified.map(known))
+      : null,
+    report.not_identifiable?.length
+      ? section("Cannot be told from this data", "", report.not_identifiable.map(blind))
+      : null,
+  );
   document.getElementById("panel").scrollTop = 0;
 }
 
 /** Model, reports and replays as files: a job, whose files stand among the jobs when it is done. */
 function exportButton(run) {
-  const button = element("button", { class: "button", type: "button", title: "Reports, model and replays as files", onclick: async () => {
-    button.disabled = true;
-    try { await post("/exports", { run, what: ["report", "model", "replays"] }); openPanel("jobs"); } catch (problem) { toast(problem); }
-    button.disabled = false;
-  } }, "Export");
+  const button = element(
+    "button",
+    {
+      class: "button",
+      type: "button",
+      title: "Reports, model and replays as files",
+      onclick: async () => {
+        button.disabled = true;
+        try {
+          await post("/exports", { run, what: ["report", "model", "replays"] });
+          openPanel("jobs");
+        } catch (problem) {
+          toast(problem);
+        }
+        button.disabled = false;
+      },
+    },
+    "Export",
+  );
   return button;
 }
 
 export function showProblem(problem) {
-  fill(panel(), element("div", { class: "note-card bad" }, element("strong", {}, "This run cannot be shown"), problem.message));
+  fill(
+    panel(),
+    element(
+      "div",
+      { class: "note-card bad" },
+      element("strong", {}, "This run cannot be shown"),
+      problem.message,
+    ),
+  );
 }
 
 export function showWelcome(hasDatasets) {
-  fill(panel(), element("div", { class: "empty-panel" },
-    element("h1", {}, "No diagnosis yet"),
-    hasDatasets ? "Choose a dataset on the left, check it, and start its diagnosis. It takes a few minutes; the page shows how far it is."
-      : element("ol", {},
-        element("li", {}, "Import a dataset (left, under Datasets), or start with ", element("code", {}, "palpate serve --datasets DIR"), "."),
-        element("li", {}, "No data at hand? ", element("code", {}, "palpate demo"), " makes a phantom with a hidden effect and finds it."),
-        element("li", {}, "The button “?” above leads from nothing to a sweep and a registration in ten minutes."))));
+  fill(
+    panel(),
+    element(
+      "div",
+      { class: "empty-panel" },
+      element("h1", {}, "No diagnosis yet"),
+      hasDatasets
+        ? "Choose a dataset on the left, check it, and start its diagnosis. It takes a few minutes; the page shows how far it is."
+        : element(
+            "ol",
+            {},
+            element(
+              "li",
+              {},
+              "Import a dataset (left, under Datasets), or start with ",
+              element("code", {}, "palpate serve --datasets DIR"),
+              ".",
+            ),
+            element(
+              "li",
+              {},
+              "No data at hand? ",
+              element("code", {}, "palpate demo"),
+              " makes a phantom with a hidden effect and finds it.",
+            ),
+            element(
+              "li",
+              {},
+              "The button “?” above leads from nothing to a sweep and a registration in ten minutes.",
+            ),
+          ),
+    ),
+  );
 }
 
-const section = (title, aside, ...children) => element("section", {}, element("h2", {}, title, aside ? element("small", {}, aside) : null), ...children);
+const section = (title, aside, ...children) =>
+  element(
+    "section",
+    {},
+    element("h2", {}, title, aside ? element("small", {}, aside) : null),
+    ...children,
+  );
 
 function cause({ effect, probability, parameters }) {
   const rows = Object.entries(parameters ?? {}).map(([name, entry]) => {
     const shown = parameter(entry);
-    return element("tr", {}, element("th", {}, words(name)),
-      element("td", { class: "number" }, element("b", {}, shown.value), shown.unit ? ` ${shown.unit}` : ""),
-      element("td", { class: "number interval" }, determined(entry) ?? shown.interval));
+    return element(
+      "tr",
+      {},
+      element("th", {}, words(name)),
+      element(
+        "td",
+        { class: "number" },
+        element("b", {}, shown.value),
+        shown.unit ? ` ${shown.unit}` : "",
+      ),
+      element("td", { class: "number interval" }, determined(entry) ?? shown.interval),
+    );
   });
-  return element("div", { class: "cause" },
-    element("div", { class: "cause-head" }, element("strong", {}, capital(words(effect))), typeof probability === "number" ? element("span", {}, `probability ${percent(probability)}`) : null),
-    element("table", {}, element("tbody", {}, rows)));
+  return element(
+    "div",
+    { class: "cause" },
+    element(
+      "div",
+      { class: "cause-head" },
+      element("strong", {}, capital(words(effect))),
+      typeof probability === "number"
+        ? element("span", {}, `probability ${percent(probability)}`)
+        : null,
+    ),
+    element("table", {}, element("tbody", {}, rows)),
+  );
 }
 
 /** Pushes and footprint as drawn by the diagnosis, and what a hand would want to know of a lump. */
 function palpation(run, { depth, force, young_modulus: modulus }, causes) {
-  const rows = [["pushed", depth], ["resisted with", force], ...(modulus ? [["Young's modulus", modulus]] : []),
-    ...causes.flatMap((one) => one.cover ? [["depth of its centre", one.depth], ["tissue above it", one.cover]] : [])];
-  return [element("img", { src: `/api/runs/${encodeURIComponent(run)}/pictures/palpation.png`, alt: "The pushes from above with the footprint of what was found, and a cut through it", style: "width: 100%; border-radius: 8px; background: #fff" }),
-    element("table", {}, element("tbody", {}, rows.map(([name, entry]) => {
-      const shown = parameter(entry);
-      return element("tr", {}, element("th", {}, name), element("td", { class: "number" }, element("b", {}, shown.value), ` ${shown.unit}`),
-        element("td", { class: "number interval" }, entry.low === undefined ? "" : shown.interval));
-    })))];
+  const rows = [
+    ["pushed", depth],
+    ["resisted with", force],
+    ...(modulus ? [["Young's modulus", modulus]] : []),
+    ...causes.flatMap((one) =>
+      one.cover
+        ? [
+            ["depth of its centre", one.depth],
+            ["tissue above it", one.cover],
+          ]
+        : [],
+    ),
+  ];
+  return [
+    element("img", {
+      src: `/api/runs/${encodeURIComponent(run)}/pictures/palpation.png`,
+      alt: "The pushes from above with the footprint of what was found, and a cut through it",
+      style: "width: 100%; border-radius: 8px; background: #fff",
+    }),
+    element(
+      "table",
+      {},
+      element(
+        "tbody",
+        {},
+        rows.map(([name, entry]) => {
+          const shown = parameter(entry);
+          return element(
+            "tr",
+            {},
+            element("th", {}, name),
+            element("td", { class: "number" }, element("b", {}, shown.value), ` ${shown.unit}`),
+            element(
+              "td",
+              { class: "number interval" },
+              entry.low === undefined ? "" : shown.interval,
+            ),
+          );
+        }),
+      ),
+    ),
+  ];
 }
 
 /** In place of an interval that is open on a side, or none at all. */
@@ -87,52 +267,131 @@ function determined({ identifiability, unit, low, high }) {
   return identifiability === "not identifiable" ? "not determined" : null;
 }
 
-function gain({ baseline, extended, noise_floor: floor, unit = "mm", reducible_removed: removed, paper_metric: paper, split, ...others }, named) {
+function gain(
+  {
+    baseline,
+    extended,
+    noise_floor: floor,
+    unit = "mm",
+    reducible_removed: removed,
+    paper_metric: paper,
+    split,
+    ...others
+  },
+  named,
+) {
   const added = named || typeof others.baseline_network === "number";
-  const steps = [["Raw model", baseline, "raw"], ["Raw + network", others.baseline_network, "corrected"], ["Extended", added ? extended : null, "extended"],
-    ["Extended + network", others.extended_network, "corrected"], ["Noise floor", floor, "floor"]].filter(([, value]) => typeof value === "number");
+  const steps = [
+    ["Raw model", baseline, "raw"],
+    ["Raw + network", others.baseline_network, "corrected"],
+    ["Extended", added ? extended : null, "extended"],
+    ["Extended + network", others.extended_network, "corrected"],
+    ["Noise floor", floor, "floor"],
+  ].filter(([, value]) => typeof value === "number");
   const most = Math.max(...steps.map(([, value]) => value));
   const number = (value) => (value < 10 ? value.toFixed(value < 1 ? 3 : 2) : value.toFixed(1));
-  const range = removed && typeof removed.low === "number" ? ` (${percent(removed.low)} to ${percent(removed.high)})` : "";
-  return element("div", {},
-    element("div", { class: "ladder" }, steps.flatMap(([label, value, thing]) => [
-      element("span", {}, label),
-      element("div", { class: "bar" }, element("i", { style: { width: `${100 * value / most}%`, background: `var(--${thing})` } })),
-      element("span", { class: "bar-value" }, `${number(value)}`)])),
-    element("p", { class: "gain-note" },
-      !added ? "No cause was named, so the model stays as it was. " : removed && typeof removed.value === "number" ? [element("b", {}, percent(removed.value)), `${range} of the error above the noise floor is gone on the ${split} sequences. `] : null,
-      added && typeof others.tuned?.value === "number" ? `The robot's pose, the tool's radius and Poisson's ratio were fitted within their accuracies along with it; that alone, with no cause, ${others.tuned.value > 0.005 ? `removes ${percent(others.tuned.value)}` : "removes nothing"}. ` : null,
-      typeof paper?.baseline === "number" && typeof paper?.extended === "number" ? `Mean distance as in the literature: ${number(paper.baseline)}${added ? ` → ${number(paper.extended)}` : ""} ${unit}.` : null));
+  const range =
+    removed && typeof removed.low === "number"
+      ? ` (${percent(removed.low)} to ${percent(removed.high)})`
+      : "";
+  return element(
+    "div",
+    {},
+    element(
+      "div",
+      { class: "ladder" },
+      steps.flatMap(([label, value, thing]) => [
+        element("span", {}, label),
+        element(
+          "div",
+          { class: "bar" },
+          element("i", {
+            style: { width: `${(100 * value) / most}%`, background: `var(--${thing})` },
+          }),
+        ),
+        element("span", { class: "bar-value" }, `${number(value)}`),
+      ]),
+    ),
+    element(
+      "p",
+      { class: "gain-note" },
+      !added
+        ? "No cause was named, so the model stays as it was. "
+        : removed && typeof removed.value === "number"
+          ? [
+              element("b", {}, percent(removed.value)),
+              `${range} of the error above the noise floor is gone on the ${split} sequences. `,
+            ]
+          : null,
+      added && typeof others.tuned?.value === "number"
+        ? `The robot's pose, the tool's radius and Poisson's ratio were fitted within their accuracies along with it; that alone, with no cause, ${others.tuned.value > 0.005 ? `removes ${percent(others.tuned.value)}` : "removes nothing"}. `
+        : null,
+      typeof paper?.baseline === "number" && typeof paper?.extended === "number"
+        ? `Mean distance as in the literature: ${number(paper.baseline)}${added ? ` → ${number(paper.extended)}` : ""} ${unit}.`
+        : null,
+    ),
+  );
 }
 
 function ranking(entries, named) {
-  return element("div", { class: "ranking" },
-    element("span", { class: "head" }, "effect"), element("span", { class: "head" }, "error removed"), element("span"), element("span", { class: "head number" }, "prob."),
-    entries.slice(0, 8).flatMap(({ effect, probability, error_removed: removed }) => [
-      element("span", {}, words(effect)),
-      element("div", { class: named.includes(effect) ? "bar first" : "bar" }, element("i", { style: { width: `${100 * Math.max(0, removed ?? 0)}%` } })),
-      element("span", { class: "number" }, percent(removed)), element("span", { class: "number" }, percent(probability))]));
+  return element(
+    "div",
+    { class: "ranking" },
+    element("span", { class: "head" }, "effect"),
+    element("span", { class: "head" }, "error removed"),
+    element("span"),
+    element("span", { class: "head number" }, "prob."),
+    entries
+      .slice(0, 8)
+      .flatMap(({ effect, probability, error_removed: removed }) => [
+        element("span", {}, words(effect)),
+        element(
+          "div",
+          { class: named.includes(effect) ? "bar first" : "bar" },
+          element("i", { style: { width: `${100 * Math.max(0, removed ?? 0)}%` } }),
+        ),
+        element("span", { class: "number" }, percent(removed)),
+        element("span", { class: "number" }, percent(probability)),
+      ]),
+  );
 }
 
 function told(rows) {
-  return element("div", { class: "told" }, rows.flatMap((row) => {
-    const alike = row.alike[0];
-    const like = alike && alike.share >= 0.3 ? `${percent(alike.share)} like ${words(alike.effect)}` : "like nothing else";
-    return [element("strong", {}, capital(words(row.effect))), element("span", { class: "number" }, smallest(row)), element("small", {}, like)];
-  }));
+  return element(
+    "div",
+    { class: "told" },
+    rows.flatMap((row) => {
+      const alike = row.alike[0];
+      const like =
+        alike && alike.share >= 0.3
+          ? `${percent(alike.share)} like ${words(alike.effect)}`
+          : "like nothing else";
+      return [
+        element("strong", {}, capital(words(row.effect))),
+        element("span", { class: "number" }, smallest(row)),
+        element("small", {}, like),
+      ];
+    }),
+  );
 }
 
 /** The smallest size of an effect that this data would show: worst of each unit, best place of a lump, share of a finite cause. */
 function smallest({ limits, typical, at }) {
   const sizes = limits.map(({ change, factor, share }) => change ?? factor ?? share ?? null);
   if (sizes.includes(null)) return "not at any size";
-  const where = Object.entries(at).map(([name, entry]) => `${words(name)} ${reading(entry)}`).join(", ");
-  if ("factor" in limits[0] && !("x" in at)) return `${round(sizes[0])} times${where ? ` at ${where}` : ""}`; // has no place
-  if ("factor" in limits[0]) return `${round(sizes[0])} times at best; half of the places ${typical.factor ? `${round(typical.factor)} times` : "not at any size"}`;
+  const where = Object.entries(at)
+    .map(([name, entry]) => `${words(name)} ${reading(entry)}`)
+    .join(", ");
+  if ("factor" in limits[0] && !("x" in at))
+    return `${round(sizes[0])} times${where ? ` at ${where}` : ""}`; // has no place
+  if ("factor" in limits[0])
+    return `${round(sizes[0])} times at best; half of the places ${typical.factor ? `${round(typical.factor)} times` : "not at any size"}`;
   if ("share" in limits[0]) return `${percent(sizes[0])} of ${where}`;
   const worst = {};
   for (const { unit, change } of limits) worst[unit] = Math.max(change, worst[unit] ?? 0);
-  return Object.entries(worst).map(([unit, value]) => reading({ value, unit })).join(", ");
+  return Object.entries(worst)
+    .map(([unit, value]) => reading({ value, unit }))
+    .join(", ");
 }
 
 const round = (value) => Number(value.toPrecision(2));
@@ -146,28 +405,82 @@ function reading(entry) {
 /** One line for each cause under each falsified motion: the share of its gain that is left. */
 function controls(rows) {
   const several = new Set(rows.map(({ effect }) => effect)).size > 1;
-  return element("div", { class: "told" }, rows.flatMap(({ control, effect, kept, passed, why }) => [
-    element("strong", {}, capital(control)),
-    element("span", { class: passed === false ? "number failed" : "number" }, passed === null ? "says nothing" : `${percent(Math.max(0, kept))} of the gain left`),
-    element("small", {}, [several || passed === false ? capital(words(effect)) : "", passed === false ? "it may not come of the pushes" : passed === null ? words(why) : ""].filter(Boolean).join(": "))]));
+  return element(
+    "div",
+    { class: "told" },
+    rows.flatMap(({ control, effect, kept, passed, why }) => [
+      element("strong", {}, capital(control)),
+      element(
+        "span",
+        { class: passed === false ? "number failed" : "number" },
+        passed === null ? "says nothing" : `${percent(Math.max(0, kept))} of the gain left`,
+      ),
+      element(
+        "small",
+        {},
+        [
+          several || passed === false ? capital(words(effect)) : "",
+          passed === false ? "it may not come of the pushes" : passed === null ? words(why) : "",
+        ]
+          .filter(Boolean)
+          .join(": "),
+      ),
+    ]),
+  );
 }
 
 function probe({ text, separates, probability }) {
   const names = separates.map((name) => (name === "none" ? "nothing" : words(name)));
-  const chance = typeof probability === "number" ? `, ${probability > 0.99 ? "more than 99 %" : percent(probability)} likely to decide` : "";
-  return element("div", { class: "probe" }, element("span", {}, capital(text)), element("small", {}, `${capital(names[0])} or ${names[1]}${chance}`));
+  const chance =
+    typeof probability === "number"
+      ? `, ${probability > 0.99 ? "more than 99 %" : percent(probability)} likely to decide`
+      : "";
+  return element(
+    "div",
+    { class: "probe" },
+    element("span", {}, capital(text)),
+    element("small", {}, `${capital(names[0])} or ${names[1]}${chance}`),
+  );
 }
 
 function unexplained({ fraction, where, when: time, structure, structure_bound: bound }) {
-  const times = typeof structure === "number" ? `What is left is ${structure.toFixed(2)} times what chance gives, where more than ${bound.toFixed(2)} would be an error with a pattern.` : "";
-  if (fraction === 0 && times) return element("p", { class: "gain-note" }, element("b", {}, "Nothing"), ` beyond chance. ${times}`);
+  const times =
+    typeof structure === "number"
+      ? `What is left is ${structure.toFixed(2)} times what chance gives, where more than ${bound.toFixed(2)} would be an error with a pattern.`
+      : "";
+  if (fraction === 0 && times)
+    return element(
+      "p",
+      { class: "gain-note" },
+      element("b", {}, "Nothing"),
+      ` beyond chance. ${times}`,
+    );
   const place = [where, time].filter(Boolean).join("; ");
-  return element("p", { class: "gain-note" }, element("b", {}, percent(fraction)), ` of the structured error is left${place ? `: ${place}` : ""}.`);
+  return element(
+    "p",
+    { class: "gain-note" },
+    element("b", {}, percent(fraction)),
+    ` of the structured error is left${place ? `: ${place}` : ""}.`,
+  );
 }
 
-const known = ({ effect, why, parameters }) => element("div", { class: "note-card" }, element("strong", {}, capital(words(effect))),
-  Object.entries(parameters).map(([name, entry]) => `${words(name)} = ${parameter(entry).value} ${parameter(entry).unit} (${parameter(entry).interval}). `),
-  why ? `${capital(why)}.` : "");
+const known = ({ effect, why, parameters }) =>
+  element(
+    "div",
+    { class: "note-card" },
+    element("strong", {}, capital(words(effect))),
+    Object.entries(parameters).map(
+      ([name, entry]) =>
+        `${words(name)} = ${parameter(entry).value} ${parameter(entry).unit} (${parameter(entry).interval}). `,
+    ),
+    why ? `${capital(why)}.` : "",
+  );
 
-const blind = ({ effect, why, measure_instead: instead }) => element("div", { class: "note-card" },
-  element("strong", {}, capital(words(effect))), why ? `${capital(why)}. ` : "", instead ? `Measure instead: ${instead}.` : "");
+const blind = ({ effect, why, measure_instead: instead }) =>
+  element(
+    "div",
+    { class: "note-card" },
+    element("strong", {}, capital(words(effect))),
+    why ? `${capital(why)}. ` : "",
+    instead ? `Measure instead: ${instead}.` : "",
+  );

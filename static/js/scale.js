@@ -12,9 +12,20 @@ function bar(bands, low, high) {
     const near = Math.abs(value) < 1e-9 * (high - low) ? 0 : value;
     return (near > 0 && low < 0 ? "+" : "") + (+near.toPrecision(3)).toString().replace("-", "−");
   });
-  return element("div", {},
-    element("div", { class: "scale" }, bands.map((rgb) => element("i", { style: { background: css(rgb) } }))),
-    element("div", { class: "ticks" }, ticks.map((text) => element("span", {}, text))));
+  return element(
+    "div",
+    {},
+    element(
+      "div",
+      { class: "scale" },
+      bands.map((rgb) => element("i", { style: { background: css(rgb) } })),
+    ),
+    element(
+      "div",
+      { class: "ticks" },
+      ticks.map((text) => element("span", {}, text)),
+    ),
+  );
 }
 
 /** A scale upright between two numbers, the higher above. */
@@ -27,5 +38,5 @@ export function scaleTower(bands, low, high) {
 }
 
 export function bandOf(value, limit, count) {
-  return Math.min(count - 1, Math.max(0, Math.floor((value / limit + 1) * count / 2)));
+  return Math.min(count - 1, Math.max(0, Math.floor(((value / limit + 1) * count) / 2)));
 }

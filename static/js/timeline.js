@@ -12,29 +12,67 @@ let clock = 0;
 let last = 0;
 
 export function start() {
-  fill("speed", SPEEDS.map((speed) => element("option", { value: speed, selected: speed === state().speed }, `${speed}×`)))
-    .addEventListener("change", (event) => { set({ speed: +event.target.value }); event.target.blur(); });
-  const buttons = { first: () => go(0), back: () => step(-1), play: toggle, forth: () => step(1), last: () => go(count() - 1) };
-  for (const [name, action] of Object.entries(buttons)) fill(name, icon(name)).addEventListener("click", action);
+  fill(
+    "speed",
+    SPEEDS.map((speed) =>
+      element("option", { value: speed, selected: speed === state().speed }, `${speed}×`),
+    ),
+  ).addEventListener("change", (event) => {
+    set({ speed: +event.target.value });
+    event.target.blur();
+  });
+  const buttons = {
+    first: () => go(0),
+    back: () => step(-1),
+    play: toggle,
+    forth: () => step(1),
+    last: () => go(count() - 1),
+  };
+  for (const [name, action] of Object.entries(buttons))
+    fill(name, icon(name)).addEventListener("click", action);
   const scrub = document.getElementById("scrub");
-  scrub.addEventListener("input", () => { set({ playing: false }); go(+scrub.value); });
+  scrub.addEventListener("input", () => {
+    set({ playing: false });
+    go(+scrub.value);
+  });
   const far = (event) => (event.shiftKey ? 10 : 1);
-  bind({ " ": toggle, ArrowLeft: (event) => step(-far(event)), ArrowRight: (event) => step(far(event)), Home: () => step(-1e9), End: () => step(1e9) });
-  bind(Object.fromEntries(Object.entries(loop.KEYS).map(([key, action]) => [key, () => action(count())])));
+  bind({
+    " ": toggle,
+    ArrowLeft: (event) => step(-far(event)),
+    ArrowRight: (event) => step(far(event)),
+    Home: () => step(-1e9),
+    End: () => step(1e9),
+  });
+  bind(
+    Object.fromEntries(
+      Object.entries(loop.KEYS).map(([key, action]) => [key, () => action(count())]),
+    ),
+  );
   watchPlot();
   loop.start(count);
-  on(["playing"], ({ playing }) => { fill("play", icon(playing ? "pause" : "play")); if (playing) begin(); });
+  on(["playing"], ({ playing }) => {
+    fill("play", icon(playing ? "pause" : "play"));
+    if (playing) begin();
+  });
   on(["frame", "series", "theme", "palette", "loop"], draw);
   on(["series", "frame"], drawWorst);
-  new ResizeObserver(() => { draw(); drawWorst(); }).observe(document.getElementById("plot").parentElement);
+  new ResizeObserver(() => {
+    draw();
+    drawWorst();
+  }).observe(document.getElementById("plot").parentElement);
   draw();
 }
 
 const count = () => state().series?.time.length ?? 0;
 
-export function go(frame) { if (count()) set({ frame: Math.max(0, Math.min(count() - 1, frame)) }); }
+export function go(frame) {
+  if (count()) set({ frame: Math.max(0, Math.min(count() - 1, frame)) });
+}
 
-function step(by) { set({ playing: false }); go(state().frame + by); }
+function step(by) {
+  set({ playing: false });
+  go(state().frame + by);
+}
 
 function toggle() {
   if (!count()) return;
@@ -52,12 +90,13 @@ function begin() {
 function tick(now) {
   const { playing, speed, series } = state();
   if (!playing || !series) return;
-  clock += (now - last) / 1e3 * speed;
+  clock += ((now - last) / 1e3) * speed;
   last = now;
   const [from, to] = loop.range(count()).map((frame) => series.time[frame]);
-  if (clock >= to && state().loop && to > from) clock = from + (clock - from) % (to - from);
+  if (clock >= to && state().loop && to > from) clock = from + ((clock - from) % (to - from));
   set({ frame: frameAt(series.time, Math.min(clock, to)) });
-  if (clock >= to) set({ playing: false }); else requestAnimationFrame(tick);
+  if (clock >= to) set({ playing: false });
+  else requestAnimationFrame(tick);
 }
 
 function watchPlot() {
@@ -68,8 +107,11 @@ function watchPlot() {
   const frameOf = (event) => frameAt(state().series.time, canvas.timeAt(event.offsetX));
   canvas.addEventListener("pointerdown", (event) => {
     if (!count()) return;
-    dragging = true; canvas.setPointerCapture(event.pointerId); set({ playing: false });
-    if (event.shiftKey) marked = frameOf(event); else go(frameOf(event));
+    dragging = true;
+    canvas.setPointerCapture(event.pointerId);
+    set({ playing: false });
+    if (event.shiftKey) marked = frameOf(event);
+    else go(frameOf(event));
   });
   canvas.addEventListener("pointermove", (event) => {
     if (!count()) return;
@@ -83,22 +125,52 @@ function watchPlot() {
     tip.style.left = `${Math.max(half, Math.min(canvas.clientWidth - half, event.offsetX))}px`;
     tip.style.top = "2px";
   });
-  canvas.addEventListener("pointerup", () => { dragging = false; marked = null; });
-  canvas.addEventListener("pointerleave", () => { tip.hidden = true; });
+  canvas.addEventListener("pointerup", () => {
+    dragging = false;
+    marked = null;
+  });
+  canvas.addEventListener("pointerleave", () => {
+    tip.hidden = true;
+  });
 }
 
 /** A button over each of the worst frames. */
 function drawWorst() {
   const { series, frame } = state();
   const canvas = document.getElementById("plot");
-  fill("worst", series && canvas.timeToPixel ? series.worst.map((at, place) => element("button", {
-    type: "button", style: { left: `${canvas.timeToPixel(series.time[at])}px` }, "aria-pressed": String(frame === at), "data-frame": at,
-    title: `${["Worst", "Second worst", "Third worst"][place]} frame, ${at + 1}: raw ${mm(series.distance_raw[at])}`,
-    onclick: (event) => { set({ playing: false }); go(at); event.currentTarget?.blur(); },
-  }, String(place + 1))) : []);
+  fill(
+    "worst",
+    series && canvas.timeToPixel
+      ? series.worst.map((at, place) =>
+          element(
+            "button",
+            {
+              type: "button",
+              style: { left: `${canvas.timeToPixel(series.time[at])}px` },
+              "aria-pressed": String(frame === at),
+              "data-frame": at,
+              title: `${["Worst", "Second worst", "Third worst"][place]} frame, ${at + 1}: raw ${mm(series.distance_raw[at])}`,
+              onclick: (event) => {
+                set({ playing: false });
+                go(at);
+                event.currentTarget?.blur();
+              },
+            },
+            String(place + 1),
+          ),
+        )
+      : [],
+  );
 }
 
-const number = (thing, label, value) => element("span", { title: label }, swatch(thing, true), element("span", { class: "word" }, label), element("b", {}, value));
+const number = (thing, label, value) =>
+  element(
+    "span",
+    { title: label },
+    swatch(thing, true),
+    element("span", { class: "word" }, label),
+    element("b", {}, value),
+  );
 
 function draw() {
   const { series, frame, sequence } = state();
@@ -107,9 +179,25 @@ function draw() {
   scrub.max = Math.max(0, count() - 1);
   scrub.value = frame;
   const at = Math.min(frame, count() - 1);
-  fill("clock", series ? [element("strong", {}, `${series.time[at].toFixed(2)} s`), element("span", { class: "frames" }, ` · frame ${at + 1} of ${count()}`)] : [sequence ? "…" : ""]);
-  fill("readout", series ? [
-    ...series.models.map((name) => number(name, SHOWN[name], mm(series[`distance_${name}`][at], false))), number("floor", "Floor", mm(series.noise_floor))] : [])
-    .classList.toggle("full", (series?.models.length ?? 0) > 2);
+  fill(
+    "clock",
+    series
+      ? [
+          element("strong", {}, `${series.time[at].toFixed(2)} s`),
+          element("span", { class: "frames" }, ` · frame ${at + 1} of ${count()}`),
+        ]
+      : [sequence ? "…" : ""],
+  );
+  fill(
+    "readout",
+    series
+      ? [
+          ...series.models.map((name) =>
+            number(name, SHOWN[name], mm(series[`distance_${name}`][at], false)),
+          ),
+          number("floor", "Floor", mm(series.noise_floor)),
+        ]
+      : [],
+  ).classList.toggle("full", (series?.models.length ?? 0) > 2);
   drawPlot(document.getElementById("plot"), series, at, loop.range(count()));
 }

@@ -6,17 +6,35 @@ import { bind } from "./keys.js";
 import { order } from "./looks.js";
 import { on, set, state } from "./store.js";
 
-const VIEWS = [["reset", "target", "Look at the phantom again (0)"], ["top", "top", "From the top (1)"], ["front", "front", "From the front (2)"], ["side", "side", "From the side (3)"]];
+const VIEWS = [
+  ["reset", "target", "Look at the phantom again (0)"],
+  ["top", "top", "From the top (1)"],
+  ["front", "front", "From the front (2)"],
+  ["side", "side", "From the side (3)"],
+];
 const AXES = ["x", "y", "z"];
 let look = () => {};
 
 export function start(page) {
-  look = (where) => { forget(); post(`/sessions/${page}/look?where=${where}`).catch(toast); };
-  for (const [where, shape, title] of VIEWS) button(`${where}-view`, shape, title, () => look(where));
+  look = (where) => {
+    forget();
+    post(`/sessions/${page}/look?where=${where}`).catch(toast);
+  };
+  for (const [where, shape, title] of VIEWS)
+    button(`${where}-view`, shape, title, () => look(where));
   button("aside", "columns", "Models side by side (B)", aside);
   button("section", "section", "Cut the block open (X)", cut);
-  button("crop", "cloud", "Show the whole cloud, not only the points near the phantom", () => set({ crop: !state().crop }));
-  bind({ 0: () => look("reset"), 1: () => look("top"), 2: () => look("front"), 3: () => look("side"), b: aside, x: cut });
+  button("crop", "cloud", "Show the whole cloud, not only the points near the phantom", () =>
+    set({ crop: !state().crop }),
+  );
+  bind({
+    0: () => look("reset"),
+    1: () => look("top"),
+    2: () => look("front"),
+    3: () => look("side"),
+    b: aside,
+    x: cut,
+  });
   on(["side_by_side", "section", "crop"], press);
   on(["section", "series"], drawSection);
   press();
@@ -30,43 +48,107 @@ export function button(id, shape, title, act) {
   node.addEventListener("click", act);
 }
 
-function aside() { set({ side_by_side: !state().side_by_side }); }
+function aside() {
+  set({ side_by_side: !state().side_by_side });
+}
 
 function press() {
-  const pressed = { aside: state().side_by_side, section: Boolean(state().section?.on), crop: !state().crop };
-  for (const [id, value] of Object.entries(pressed)) document.getElementById(id).setAttribute("aria-pressed", String(value));
+  const pressed = {
+    aside: state().side_by_side,
+    section: Boolean(state().section?.on),
+    crop: !state().crop,
+  };
+  for (const [id, value] of Object.entries(pressed))
+    document.getElementById(id).setAttribute("aria-pressed", String(value));
 }
 
 function cut() {
   const { section, series } = state();
   if (!series) return;
-  const wanted = section ? { ...section, on: !section.on } : { on: true, axis: "y", at: middle("y"), flip: false };
+  const wanted = section
+    ? { ...section, on: !section.on }
+    : { on: true, axis: "y", at: middle("y"), flip: false };
   // Who opens the block wants to see what was found in it.
-  set({ section: wanted, layers: wanted.on && series.lumps ? order([...state().layers, "lump"]) : state().layers });
+  set({
+    section: wanted,
+    layers: wanted.on && series.lumps ? order([...state().layers, "lump"]) : state().layers,
+  });
 }
 
-const middle = (axis) => { const [low, high] = state().series.box; const at = AXES.indexOf(axis); return (low[at] + high[at]) / 2; };
+const middle = (axis) => {
+  const [low, high] = state().series.box;
+  const at = AXES.indexOf(axis);
+  return (low[at] + high[at]) / 2;
+};
 
 function drawSection() {
   const { section, series } = state();
   const box = document.getElementById("section-bar");
   box.hidden = !section?.on || !series;
-  if (box.hidden || box.contains(document.activeElement) && document.activeElement.type === "range") return;
+  if (
+    box.hidden ||
+    (box.contains(document.activeElement) && document.activeElement.type === "range")
+  )
+    return;
   const at = AXES.indexOf(section.axis);
   const [low, high] = series.box.map((corner) => corner[at] * 1e3);
   const number = element("output", {}, `${(section.at * 1e3).toFixed(1)} mm`);
   const bar = element("input", {
-    type: "range", min: Math.ceil(low * 10) / 10, max: Math.floor(high * 10) / 10, step: 0.1, value: section.at * 1e3, "aria-label": `Section at ${section.axis} in mm`,
-    oninput: (event) => { set({ section: { ...state().section, at: +event.target.value / 1e3 } }); number.textContent = `${(+event.target.value).toFixed(1)} mm`; },
+    type: "range",
+    min: Math.ceil(low * 10) / 10,
+    max: Math.floor(high * 10) / 10,
+    step: 0.1,
+    value: section.at * 1e3,
+    "aria-label": `Section at ${section.axis} in mm`,
+    oninput: (event) => {
+      set({ section: { ...state().section, at: +event.target.value / 1e3 } });
+      number.textContent = `${(+event.target.value).toFixed(1)} mm`;
+    },
   });
   bar.addEventListener("change", () => bar.blur());
-  fill(box,
+  fill(
+    box,
     element("span", { class: "label" }, "Section across"),
-    element("div", { class: "segments", role: "radiogroup", "aria-label": "Axis of the section" }, AXES.map((axis) => element("button", {
-      type: "button", role: "radio", "aria-checked": String(axis === section.axis), "data-axis": axis, onclick: () => set({ section: { ...section, axis, at: middle(axis) } }),
-    }, axis))),
-    bar, number,
-    element("button", { class: "button small", type: "button", title: "Keep the other part", onclick: () => set({ section: { ...section, flip: !section.flip } }) }, "Other part"),
+    element(
+      "div",
+      { class: "segments", role: "radiogroup", "aria-label": "Axis of the section" },
+      AXES.map((axis) =>
+        element(
+          "button",
+          {
+            type: "button",
+            role: "radio",
+            "aria-checked": String(axis === section.axis),
+            "data-axis": axis,
+            onclick: () => set({ section: { ...section, axis, at: middle(axis) } }),
+          },
+          axis,
+        ),
+      ),
+    ),
+    bar,
+    number,
+    element(
+      "button",
+      {
+        class: "button small",
+        type: "button",
+        title: "Keep the other part",
+        onclick: () => set({ section: { ...section, flip: !section.flip } }),
+      },
+      "Other part",
+    ),
     series.inside ? element("span", { class: "muted", title: series.inside }, "shell only") : null,
-    element("button", { class: "icon-button", type: "button", title: "Close the section (X)", "aria-label": "Close the section", onclick: cut }, icon("close")));
+    element(
+      "button",
+      {
+        class: "icon-button",
+        type: "button",
+        title: "Close the section (X)",
+        "aria-label": "Close the section",
+        onclick: cut,
+      },
+      icon("close"),
+    ),
+  );
 }

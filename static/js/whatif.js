@@ -22,20 +22,51 @@ let answer = null;
 export function start() {
   box = addPanel("whatif", "What if", open, leave);
   box.addEventListener("keydown", (event) => {
-    if ((event.ctrlKey || event.metaKey) && event.key === "z" && past.length) { event.preventDefault(); undo(); }
+    if ((event.ctrlKey || event.metaKey) && event.key === "z" && past.length) {
+      event.preventDefault();
+      undo();
+    }
   });
-  on(["run", "sequence"], () => { if (openedPanel() === "whatif") open(); });
-  on(["frame", "playing"], () => { if (openedPanel() === "whatif" && known && !state().playing) solve(); });
+  on(["run", "sequence"], () => {
+    if (openedPanel() === "whatif") open();
+  });
+  on(["frame", "playing"], () => {
+    if (openedPanel() === "whatif" && known && !state().playing) solve();
+  });
 }
 
 async function open() {
   const { run, sequence, layers, colour, heading } = state();
-  if (!run || !sequence) { fill(box, says("Choose a diagnosis on the left; here you then try its causes on the frame that is shown.")); return; }
-  if (!heading?.has_clouds) { fill(box, says("The dataset of this diagnosis is not where it was, so that there is nothing to compare with.")); return; }
+  if (!run || !sequence) {
+    fill(
+      box,
+      says(
+        "Choose a diagnosis on the left; here you then try its causes on the frame that is shown.",
+      ),
+    );
+    return;
+  }
+  if (!heading?.has_clouds) {
+    fill(
+      box,
+      says(
+        "The dataset of this diagnosis is not where it was, so that there is nothing to compare with.",
+      ),
+    );
+    return;
+  }
   looked ??= { layers, colour };
-  set({ layers: layers.includes("extended") ? layers : [...layers, "extended"], colour: "extended", trial: true });
+  set({
+    layers: layers.includes("extended") ? layers : [...layers, "extended"],
+    colour: "extended",
+    trial: true,
+  });
   const key = `${run}/${sequence}`;
-  if (known?.key === key) { draw(); solve(); return; }
+  if (known?.key === key) {
+    draw();
+    solve();
+    return;
+  }
   known = null;
   fill(box, says("Reading the dataset again, so that frames can be solved …"));
   try {
@@ -49,7 +80,17 @@ async function open() {
     past = [];
     draw();
     solve();
-  } catch (problem) { fill(box, element("div", { class: "note-card bad" }, element("strong", {}, "This cannot be tried"), problem.message)); }
+  } catch (problem) {
+    fill(
+      box,
+      element(
+        "div",
+        { class: "note-card bad" },
+        element("strong", {}, "This cannot be tried"),
+        problem.message,
+      ),
+    );
+  }
 }
 
 function leave() {
@@ -62,15 +103,23 @@ function leave() {
 
 const says = (text) => element("p", { class: "muted" }, text);
 
-const address = (verb) => `/runs/${encodeURIComponent(state().run)}/sequences/${encodeURIComponent(state().sequence)}/${verb}`;
+const address = (verb) =>
+  `/runs/${encodeURIComponent(state().run)}/sequences/${encodeURIComponent(state().sequence)}/${verb}`;
 
-const asDiagnosed = () => known.model.map(({ effect, parameters }) => ({ effect, on: true, parameters: { ...parameters } }));
+const asDiagnosed = () =>
+  known.model.map(({ effect, parameters }) => ({
+    effect,
+    on: true,
+    parameters: { ...parameters },
+  }));
 
 function recall(run) {
   try {
     const kept = JSON.parse(sessionStorage.getItem(KEY));
     return kept?.run === run ? kept : null;
-  } catch { return null; }
+  } catch {
+    return null;
+  }
 }
 
 /** Change something: `act` moves rows; what was before can be undone. A slider that is dragged is one change. */
@@ -85,7 +134,8 @@ function change(act, whole = true) {
 
 function undo() {
   const before = JSON.parse(past.pop());
-  rows = before.rows; tuned = before.tuned;
+  rows = before.rows;
+  tuned = before.tuned;
   sessionStorage.setItem(KEY, JSON.stringify({ run: state().run, rows, tuned }));
   draw();
   solve();
@@ -93,36 +143,104 @@ function undo() {
 
 /** Solve the shown frame; while one is being solved only the newest wish is kept. */
 async function solve() {
-  if (busy) { stale = true; return; }
-  busy = true; stale = false;
+  if (busy) {
+    stale = true;
+    return;
+  }
+  busy = true;
+  stale = false;
   const { frame } = state();
-  const waiting = setTimeout(() => { answer = { ...answer, waiting: true }; drawAnswer(); }, 400);
+  const waiting = setTimeout(() => {
+    answer = { ...answer, waiting: true };
+    drawAnswer();
+  }, 400);
   try {
-    const effects = rows.filter((row) => row.on).map(({ effect, parameters }) => ({ effect, parameters }));
+    const effects = rows
+      .filter((row) => row.on)
+      .map(({ effect, parameters }) => ({ effect, parameters }));
     answer = await post(address("whatif"), { frame, effects, tuned, page: pageId() });
-  } catch (problem) { answer = { problem }; }
+  } catch (problem) {
+    answer = { problem };
+  }
   clearTimeout(waiting);
   busy = false;
-  if (openedPanel() !== "whatif") { leave(); return; }
+  if (openedPanel() !== "whatif") {
+    leave();
+    return;
+  }
   drawAnswer();
   if (stale) solve();
 }
 
 function draw() {
   const changed = JSON.stringify(rows) !== JSON.stringify(asDiagnosed()) || !tuned;
-  const absent = catalogue.filter(({ name }) => known.beginnings.some(({ effect }) => effect === name) && !rows.some(({ effect }) => effect === name));
-  fill(box,
+  const absent = catalogue.filter(
+    ({ name }) =>
+      known.beginnings.some(({ effect }) => effect === name) &&
+      !rows.some(({ effect }) => effect === name),
+  );
+  fill(
+    box,
     element("h1", { class: "verdict" }, "What if …"),
-    element("p", { class: "gain-note" }, "Switch causes on and off and move them: the frame that is shown is solved again, and takes the place of the extended model in the scene."),
+    element(
+      "p",
+      { class: "gain-note" },
+      "Switch causes on and off and move them: the frame that is shown is solved again, and takes the place of the extended model in the scene.",
+    ),
     element("div", { id: "whatif-answer" }),
     rows.map(card),
-    element("label", { class: "whatif-switch" }, toggle(tuned, () => change(() => { tuned = !tuned; })), "Registration as the diagnosis fitted it"),
-    element("div", { class: "actions" },
-      element("select", { "aria-label": "Add a cause", onchange: (event) => add(event.target.value) },
-        element("option", { value: "" }, "Add a cause …"), absent.map(({ name, summary }) => element("option", { value: name, title: summary }, capital(words(name))))),
-      element("button", { class: "button", type: "button", disabled: !past.length, title: "Ctrl+Z", onclick: undo }, "Undo"),
-      element("button", { class: "button", type: "button", title: "Every frame of this sequence with these causes in the stated setup, as a job", onclick: replayAll }, "Replay the sequence"),
-      element("button", { class: "button", type: "button", disabled: !changed, onclick: () => change(() => { rows = asDiagnosed(); tuned = true; }) }, "As diagnosed")));
+    element(
+      "label",
+      { class: "whatif-switch" },
+      toggle(tuned, () =>
+        change(() => {
+          tuned = !tuned;
+        }),
+      ),
+      "Registration as the diagnosis fitted it",
+    ),
+    element(
+      "div",
+      { class: "actions" },
+      element(
+        "select",
+        { "aria-label": "Add a cause", onchange: (event) => add(event.target.value) },
+        element("option", { value: "" }, "Add a cause …"),
+        absent.map(({ name, summary }) =>
+          element("option", { value: name, title: summary }, capital(words(name))),
+        ),
+      ),
+      element(
+        "button",
+        { class: "button", type: "button", disabled: !past.length, title: "Ctrl+Z", onclick: undo },
+        "Undo",
+      ),
+      element(
+        "button",
+        {
+          class: "button",
+          type: "button",
+          title: "Every frame of this sequence with these causes in the stated setup, as a job",
+          onclick: replayAll,
+        },
+        "Replay the sequence",
+      ),
+      element(
+        "button",
+        {
+          class: "button",
+          type: "button",
+          disabled: !changed,
+          onclick: () =>
+            change(() => {
+              rows = asDiagnosed();
+              tuned = true;
+            }),
+        },
+        "As diagnosed",
+      ),
+    ),
+  );
   drawAnswer();
 }
 
@@ -130,28 +248,84 @@ function draw() {
 async function replayAll({ currentTarget }) {
   currentTarget.disabled = true;
   const { heading, sequence } = state();
-  const effects = rows.filter((row) => row.on).map(({ effect, parameters }) => ({ effect, parameters }));
-  try { await post("/replays", { dataset: heading.folder, sequences: [sequence], effects }); openPanel("jobs"); } catch (problem) { toast(problem); }
+  const effects = rows
+    .filter((row) => row.on)
+    .map(({ effect, parameters }) => ({ effect, parameters }));
+  try {
+    await post("/replays", { dataset: heading.folder, sequences: [sequence], effects });
+    openPanel("jobs");
+  } catch (problem) {
+    toast(problem);
+  }
   currentTarget.disabled = false;
 }
 
-const toggle = (checked, act) => element("input", { type: "checkbox", role: "switch", checked, onchange: act });
+const toggle = (checked, act) =>
+  element("input", { type: "checkbox", role: "switch", checked, onchange: act });
 
 function card(row) {
   const effect = catalogue.find(({ name }) => name === row.effect);
-  const beginning = known.model.find((one) => one.effect === row.effect) ?? known.beginnings.find((one) => one.effect === row.effect);
+  const beginning =
+    known.model.find((one) => one.effect === row.effect) ??
+    known.beginnings.find((one) => one.effect === row.effect);
   const own = known.model.some((one) => one.effect === row.effect);
-  return element("fieldset", { class: row.on ? "whatif-card" : "whatif-card off", "data-effect": row.effect },
-    element("legend", {},
-      element("label", { class: "whatif-switch", title: effect.summary }, toggle(row.on, () => change(() => { row.on = !row.on; })), capital(words(row.effect))),
-      own ? null : element("button", { class: "link", type: "button", "aria-label": `Take ${words(row.effect)} away`, onclick: () => change(() => { rows = rows.filter((other) => other !== row); }) }, "take away")),
-    effect.parameters.map((item) => (item.choices.length ? choice(row, item) : slider(row, item, beginning.parameters[item.name]))));
+  return element(
+    "fieldset",
+    { class: row.on ? "whatif-card" : "whatif-card off", "data-effect": row.effect },
+    element(
+      "legend",
+      {},
+      element(
+        "label",
+        { class: "whatif-switch", title: effect.summary },
+        toggle(row.on, () =>
+          change(() => {
+            row.on = !row.on;
+          }),
+        ),
+        capital(words(row.effect)),
+      ),
+      own
+        ? null
+        : element(
+            "button",
+            {
+              class: "link",
+              type: "button",
+              "aria-label": `Take ${words(row.effect)} away`,
+              onclick: () =>
+                change(() => {
+                  rows = rows.filter((other) => other !== row);
+                }),
+            },
+            "take away",
+          ),
+    ),
+    effect.parameters.map((item) =>
+      item.choices.length ? choice(row, item) : slider(row, item, beginning.parameters[item.name]),
+    ),
+  );
 }
 
 function choice(row, item) {
-  return element("label", { class: "whatif-parameter" }, element("span", {}, words(item.name)),
-    element("select", { disabled: !row.on, onchange: (event) => change(() => { row.parameters[item.name] = event.target.value; }) },
-      item.choices.map((word) => element("option", { value: word, selected: word === row.parameters[item.name] }, word))));
+  return element(
+    "label",
+    { class: "whatif-parameter" },
+    element("span", {}, words(item.name)),
+    element(
+      "select",
+      {
+        disabled: !row.on,
+        onchange: (event) =>
+          change(() => {
+            row.parameters[item.name] = event.target.value;
+          }),
+      },
+      item.choices.map((word) =>
+        element("option", { value: word, selected: word === row.parameters[item.name] }, word),
+      ),
+    ),
+  );
 }
 
 function slider(row, item, beginning) {
@@ -159,15 +333,38 @@ function slider(row, item, beginning) {
   const [factor, unit] = UNITS[item.unit] ?? [1, item.unit];
   const shown = () => Number((row.parameters[item.name] * factor).toPrecision(4));
   const label = `${capital(words(row.effect))}: ${words(item.name)}`;
-  const bar = element("input", { type: "range", min: 0, max: 1000, step: 1, value: position(item, span, row.parameters[item.name]), disabled: !row.on, "aria-label": label });
-  const number = element("input", { type: "number", step: "any", value: shown(), disabled: !row.on, "aria-label": `${label}${unit ? ` in ${unit}` : ""}` });
+  const bar = element("input", {
+    type: "range",
+    min: 0,
+    max: 1000,
+    step: 1,
+    value: position(item, span, row.parameters[item.name]),
+    disabled: !row.on,
+    "aria-label": label,
+  });
+  const number = element("input", {
+    type: "number",
+    step: "any",
+    value: shown(),
+    disabled: !row.on,
+    "aria-label": `${label}${unit ? ` in ${unit}` : ""}`,
+  });
   let begun = false;
   bar.addEventListener("input", () => {
-    if (!begun) { past.push(JSON.stringify({ rows, tuned })); begun = true; }
-    change(() => { row.parameters[item.name] = valueAt(item, span, +bar.value); }, false);
+    if (!begun) {
+      past.push(JSON.stringify({ rows, tuned }));
+      begun = true;
+    }
+    change(() => {
+      row.parameters[item.name] = valueAt(item, span, +bar.value);
+    }, false);
     number.value = shown();
   });
-  bar.addEventListener("change", () => { begun = false; draw(); refocus(label); });
+  bar.addEventListener("change", () => {
+    begun = false;
+    draw();
+    refocus(label);
+  });
   number.addEventListener("change", () => {
     const value = +number.value / factor;
     if (number.value === "" || value < (item.low ?? -Infinity) || value > (item.high ?? Infinity)) {
@@ -175,31 +372,99 @@ function slider(row, item, beginning) {
       number.reportValidity();
       return;
     }
-    change(() => { row.parameters[item.name] = value; });
+    change(() => {
+      row.parameters[item.name] = value;
+    });
   });
-  return element("div", { class: "whatif-parameter" }, element("span", {}, words(item.name)), bar, number, element("span", { class: "unit" }, unit));
+  return element(
+    "div",
+    { class: "whatif-parameter" },
+    element("span", {}, words(item.name)),
+    bar,
+    number,
+    element("span", { class: "unit" }, unit),
+  );
 }
 
-const between = ({ low, high }, factor, unit) => `${low === null ? "−∞" : low * factor} and ${high === null ? "∞" : high * factor}${unit ? ` ${unit}` : ""}`;
+const between = ({ low, high }, factor, unit) =>
+  `${low === null ? "−∞" : low * factor} and ${high === null ? "∞" : high * factor}${unit ? ` ${unit}` : ""}`;
 
-const refocus = (label) => [...box.querySelectorAll("input[type=range]")].find((bar) => bar.getAttribute("aria-label") === label)?.focus();
+const refocus = (label) =>
+  [...box.querySelectorAll("input[type=range]")]
+    .find((bar) => bar.getAttribute("aria-label") === label)
+    ?.focus();
 
 function add(name) {
   const beginning = known.beginnings.find(({ effect }) => effect === name);
-  if (beginning) change(() => { rows = [...rows, { effect: name, on: true, parameters: { ...beginning.parameters } }]; });
+  if (beginning)
+    change(() => {
+      rows = [...rows, { effect: name, on: true, parameters: { ...beginning.parameters } }];
+    });
 }
 
 function drawAnswer() {
   if (!document.getElementById("whatif-answer")) return;
-  if (answer?.problem) { fill("whatif-answer", element("div", { class: "note-card bad" }, element("strong", {}, "Not solved"), answer.problem.message)); return; }
-  if (typeof answer?.distance !== "number" && !answer?.outcome) { fill("whatif-answer", says("Solving …")); return; }
-  const { distance, distance_raw: raw, distance_extended: extended, noise_floor: floor, converged, outcome, waiting } = answer;
-  const steps = [["Raw model", raw, "raw"], ["Extended", extended, "extended"], ["What if", distance, "corrected"], ["Noise floor", floor, "floor"]];
+  if (answer?.problem) {
+    fill(
+      "whatif-answer",
+      element(
+        "div",
+        { class: "note-card bad" },
+        element("strong", {}, "Not solved"),
+        answer.problem.message,
+      ),
+    );
+    return;
+  }
+  if (typeof answer?.distance !== "number" && !answer?.outcome) {
+    fill("whatif-answer", says("Solving …"));
+    return;
+  }
+  const {
+    distance,
+    distance_raw: raw,
+    distance_extended: extended,
+    noise_floor: floor,
+    converged,
+    outcome,
+    waiting,
+  } = answer;
+  const steps = [
+    ["Raw model", raw, "raw"],
+    ["Extended", extended, "extended"],
+    ["What if", distance, "corrected"],
+    ["Noise floor", floor, "floor"],
+  ];
   const most = Math.max(...steps.map(([, value]) => value ?? 0)) || 1;
-  fill("whatif-answer", element("section", {},
-    element("h2", {}, "Error in this frame", element("small", {}, waiting ? "solving …" : "RMS")),
-    element("div", { class: "ladder" }, steps.flatMap(([label, value, thing]) => [element("span", {}, label),
-      element("div", { class: "bar" }, element("i", { style: { width: `${(100 * (value ?? 0)) / most}%`, background: `var(--${thing})` } })),
-      element("span", { class: "bar-value", "data-model": thing }, mm(value))])),
-    converged ? null : element("div", { class: "note-card bad" }, element("strong", {}, "No equilibrium"), `${capital(outcome)}.`)));
+  fill(
+    "whatif-answer",
+    element(
+      "section",
+      {},
+      element("h2", {}, "Error in this frame", element("small", {}, waiting ? "solving …" : "RMS")),
+      element(
+        "div",
+        { class: "ladder" },
+        steps.flatMap(([label, value, thing]) => [
+          element("span", {}, label),
+          element(
+            "div",
+            { class: "bar" },
+            element("i", {
+              style: { width: `${(100 * (value ?? 0)) / most}%`, background: `var(--${thing})` },
+            }),
+          ),
+          element("span", { class: "bar-value", "data-model": thing }, mm(value)),
+        ]),
+      ),
+      converged
+        ? null
+        : element(
+            "div",
+            { class: "note-card bad" },
+            element("strong", {}, "No equilibrium"),
+            `${capital(outcome)}.`,
+          ),
+    ),
+  );
 }
