@@ -1,7 +1,7 @@
 // Requests to our own server; a problem is shown with what it says to do.
 import { element } from "./dom.js";
 
-export class Problem extends Error {
+export class ApiError extends Error {
   constructor({ kind, message, where }) {
     super(message);
     Object.assign(this, { kind, where });
@@ -9,12 +9,12 @@ export class Problem extends Error {
 }
 
 export async function get(path) {
-  return answer(await reach(path));
+  return parsed(await request(path));
 }
 
 export async function post(path, body) {
-  return answer(
-    await reach(path, {
+  return parsed(
+    await request(path, {
       method: "POST",
       headers: { "content-type": "application/json" },
       body: JSON.stringify(body ?? {}),
@@ -23,24 +23,24 @@ export async function post(path, body) {
 }
 
 export async function put(path, body) {
-  const response = await reach(path, {
+  const response = await request(path, {
     method: "PUT",
     headers: { "content-type": "application/json" },
     body: JSON.stringify(body),
   });
-  if (!response.ok) await answer(response);
+  if (!response.ok) await parsed(response);
 }
 
 export async function remove(path) {
-  const response = await reach(path, { method: "DELETE" });
-  if (!response.ok) await answer(response);
+  const response = await request(path, { method: "DELETE" });
+  if (!response.ok) await parsed(response);
 }
 
-async function reach(path, options) {
+async function request(path, options) {
   try {
     return await fetch(`/api${path}`, options);
   } catch {
-    throw new Problem({
+    throw new ApiError({
       kind: "No answer",
       message: "The server does not answer. Start it again with: palpate serve",
       where: {},
@@ -48,16 +48,14 @@ async function reach(path, options) {
   }
 }
 
-async function answer(response) {
-  const body = await response
-    .json()
-    .catch(() => ({
-      kind: "Error",
-      message: `The server answered ${response.status}.`,
-      where: {},
-    }));
+async function parsed(response) {
+  const body = await response.json().catch(() => ({
+    kind: "Error",
+    message: `The server answered ${response.status}.`,
+    where: {},
+  }));
   if (response.status === 401) location.assign("/login");
-  if (!response.ok) throw new Problem(body);
+  if (!response.ok) throw new ApiError(body);
   return body;
 }
 
@@ -65,14 +63,14 @@ export function toast(problem) {
   const box = element(
     "div",
     { class: "toast" },
-    element("strong", {}, title(problem)),
+    element("strong", {}, errorTitle(problem)),
     problem.message,
   );
   document.getElementById("toasts").append(box);
   setTimeout(() => box.remove(), 9000);
 }
 
-export function title(problem) {
+export function errorTitle(problem) {
   return (
     (problem.kind ?? "Error").replace(/Error$/, "").replace(/([a-z])([A-Z])/g, "$1 $2") || "Error"
   );

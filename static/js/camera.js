@@ -4,14 +4,14 @@ import { fromViewer } from "./drag.js";
 import { state } from "./store.js";
 
 const KEY = "palpate.camera";
-const CALM = 500; // ms without motion after which a place is kept
+const SETTLE_MS = 500; // ms without motion after which a place is kept
 
 /** Keep the place each time a person has turned, moved or zoomed. */
-export function keep(viewer) {
+export function watchCamera(viewer) {
   let waiting = null;
   const later = () => {
     clearTimeout(waiting);
-    waiting = setTimeout(() => save(viewer), CALM);
+    waiting = setTimeout(() => save(viewer), SETTLE_MS);
   };
   for (const kind of ["pointerup", "wheel"])
     viewer.addEventListener(kind, later, { capture: true, passive: true });
@@ -30,16 +30,16 @@ function save(viewer) {
 }
 
 /** A standard view was asked for: it begins anew. */
-export function forget() {
+export function forgetCamera() {
   localStorage.removeItem(KEY);
 }
 
 /** Tell the server before the viewer opens. */
-export async function restore(page) {
+export async function restoreCamera(page) {
   try {
     const kept = JSON.parse(localStorage.getItem(KEY));
     if (kept) await put(`/sessions/${page}/camera`, kept);
   } catch {
-    forget();
+    forgetCamera();
   }
 }

@@ -2,38 +2,38 @@
 import { GIFEncoder, applyPalette, quantize } from "../vendor/gifenc/gifenc.esm.js";
 import { toast } from "./api.js";
 import { element, fill } from "./dom.js";
-import { mm } from "./format.js";
-import { told } from "./legend.js";
-import { range } from "./loop.js";
-import { css } from "./scale.js";
+import { formatMm } from "./format.js";
+import { legendContent } from "./legend.js";
+import { playedRange } from "./playback-loop.js";
+import { rgbCss } from "./colour-scale.js";
 import { set, state } from "./store.js";
-import { button } from "./views.js";
+import { initToolButton } from "./view-tools.js";
 
 const MOST_FRAMES = 150;
 const CLIP_WIDTH = 800;
 let page = null;
-let stopped = null;
+let running = null;
 
 export function start(id) {
   page = id;
-  button("still", "camera", "Save the picture as PNG", () => still().catch(toast));
-  button("clip", "film", "Save a clip as GIF: the looped part, or the whole sequence", () =>
-    clip().catch(toast),
+  initToolButton("still", "camera", "Save the picture as PNG", () => saveStill().catch(toast));
+  initToolButton("clip", "film", "Save a clip as GIF: the looped part, or the whole sequence", () =>
+    saveClip().catch(toast),
   );
 }
 
-async function still() {
-  const canvas = await draw(devicePixelRatio || 1);
+async function saveStill() {
+  const canvas = await captureCanvas(devicePixelRatio || 1);
   canvas.toBlob((blob) => save(blob, "png"));
 }
 
 /** Frame after frame as the scene shows it; may be stopped, and leaves the page where it was. */
-async function clip() {
+async function saveClip() {
   const { series, frame: before, speed } = state();
-  if (!series || stopped) return;
-  stopped = new AbortController();
+  if (!series || running) return;
+  running = new AbortController();
   set({ playing: false });
-  const [from, to] = range(series.time.length);
+  const [from, to] = playedRange(series.time.length);
   const stride = Math.ceil((to - from + 1) / MOST_FRAMES);
   const frames = Array.from(
     { length: Math.floor((to - from) / stride) + 1 },
@@ -42,10 +42,13 @@ async function clip() {
   const gif = GIFEncoder();
   try {
     for (const [place, frame] of frames.entries()) {
-      progress(place, frames.length);
+      showProgress(place, frames.length);
       set({ frame });
-      await until(() => state().held?.view?.frame === frame, stopped.signal);
-      const canvas = await draw(Math.min(1, CLIP_WIDTH / box().width), stopped.signal);
+      await until(() => state().held?.view?.frame === frame, running.signal);
+      const canvas = await captureCanvas(
+        Math.min(1, CLIP_WIDTH / viewerBox().width),
+        running.signal,
+      );
       const { data, width, height } = canvas
         .getContext("2d")
         .getImageData(0, 0, canvas.width, canvas.height);
@@ -61,13 +64,13 @@ async function clip() {
   } catch (problem) {
     if (problem.name !== "AbortError") throw problem;
   } finally {
-    stopped = null;
+    running = null;
     fill("clip-bar").hidden = true;
     set({ frame: before });
   }
 }
 
-function progress(done, all) {
+function showProgress(done, all) {
   const bar = document.getElementById("clip-bar");
   bar.hidden = false;
   fill(
@@ -80,7 +83,7 @@ function progress(done, all) {
     ),
     element(
       "button",
-      { class: "button small", type: "button", onclick: () => stopped?.abort() },
+      { class: "button small", type: "button", onclick: () => running?.abort() },
       "Cancel",
     ),
   );
@@ -93,11 +96,11 @@ async function until(true_, signal) {
   }
 }
 
-const box = () => document.getElementById("viewer").getBoundingClientRect();
+const viewerBox = () => document.getElementById("viewer").getBoundingClientRect();
 
 /** The scene with its legend and a line that says what it is, on the page's background. */
-async function draw(ratio, signal) {
-  const { width, height } = box();
+async function captureCanvas(ratio, signal) {
+  const { width, height } = viewerBox();
   const size = [width, height].map((edge) =>
     Math.max(16, Math.min(4096, Math.round(edge * ratio))),
   );
@@ -118,15 +121,15 @@ async function draw(ratio, signal) {
   pen.drawImage(picture, 0, 0);
   pen.scale(ratio, ratio);
   pen.font = '12px "Inter", Arial, sans-serif';
-  legend(pen, ink);
+  drawLegend(pen, ink);
   pen.fillStyle = ink("text-2");
   pen.textAlign = "left";
   pen.fillText(caption(), 16, height - 14);
   return canvas;
 }
 
-function legend(pen, ink) {
-  const what = told();
+function drawLegend(pen, ink) {
+  const what = legendContent();
   if (!what) return;
   const [left, top, wide, tall] = [16, 40, 16, 180];
   pen.fillStyle = ink("text");
@@ -134,7 +137,7 @@ function legend(pen, ink) {
   pen.fillText(what.title, left, 26);
   const step = tall / what.bands.length;
   [...what.bands].reverse().forEach((rgb, place) => {
-    pen.fillStyle = css(rgb);
+    pen.fillStyle = rgbCss(rgb);
     pen.fillRect(left, top + place * step, wide, step + 0.5);
   });
   pen.fillStyle = ink("text-2");
@@ -151,7 +154,7 @@ function caption() {
   const { series, frame, sequence, heading } = state();
   if (!series) return "";
   const errors = series.models
-    .map((name) => `${name} ${mm(series[`distance_${name}`][frame], false)}`)
+    .map((name) => `${name} ${formatMm(series[`distance_${name}`][frame], false)}`)
     .join(", ");
   return `${heading?.dataset ?? ""} · ${sequence} · ${series.time[frame].toFixed(2)} s · RMS error ${errors} mm`;
 }

@@ -1,7 +1,7 @@
 // Models side by side over sequences: what each is off by, where it was fitted and where it was not.
 import { get } from "./api.js";
 import { element, fill } from "./dom.js";
-import { percent, when, words } from "./format.js";
+import { formatPercent, formatDateTime, readableName } from "./format.js";
 
 /** A table that fills itself; another run of the same dataset can be put beside this one. */
 export function comparisonSection(heading) {
@@ -13,7 +13,10 @@ export function comparisonSection(heading) {
   const load = async () => {
     const beside = choice.value ? `?beside=${encodeURIComponent(choice.value)}` : "";
     try {
-      fill(table, shown(await get(`/runs/${encodeURIComponent(heading.id)}/comparison${beside}`)));
+      fill(
+        table,
+        comparisonTable(await get(`/runs/${encodeURIComponent(heading.id)}/comparison${beside}`)),
+      );
     } catch (problem) {
       fill(table, element("div", { class: "note-card bad" }, problem.message));
     }
@@ -33,7 +36,7 @@ export function comparisonSection(heading) {
           element(
             "option",
             { value: run.id },
-            `beside ${run.causes.map(words).join(", ") || run.verdict}, ${when(run.created)}`,
+            `beside ${run.causes.map(readableName).join(", ") || run.verdict}, ${formatDateTime(run.created)}`,
           ),
         ),
       );
@@ -43,11 +46,11 @@ export function comparisonSection(heading) {
   return [table, choice];
 }
 
-function shown({ runs, sequences }) {
+function comparisonTable({ runs, sequences }) {
   const several = runs.length > 1;
   const names = runs.map(
     ({ causes, verdict }, place) =>
-      `${place ? "the other" : "this"}: ${causes.map(words).join(", ") || verdict}`,
+      `${place ? "the other" : "this"}: ${causes.map(readableName).join(", ") || verdict}`,
   );
   return [
     element(
@@ -77,16 +80,16 @@ function shown({ runs, sequences }) {
             "tr",
             {},
             element("th", {}, sequence, element("small", {}, one.split ?? "")),
-            element("td", { class: "number" }, millimetres(one.raw)),
+            element("td", { class: "number" }, threeDecimals(one.raw)),
             rows.map((row) =>
               element(
                 "td",
                 { class: several && row?.extended === best ? "number best" : "number" },
-                millimetres(row?.extended),
+                threeDecimals(row?.extended),
               ),
             ),
-            element("td", { class: "number muted" }, millimetres(one.noise_floor)),
-            several ? null : element("td", { class: "number" }, percent(one.removed)),
+            element("td", { class: "number muted" }, threeDecimals(one.noise_floor)),
+            several ? null : element("td", { class: "number" }, formatPercent(one.removed)),
           );
         }),
       ),
@@ -99,4 +102,4 @@ function shown({ runs, sequences }) {
   ];
 }
 
-const millimetres = (value) => (typeof value === "number" ? (1000 * value).toFixed(3) : "–");
+const threeDecimals = (value) => (typeof value === "number" ? (1000 * value).toFixed(3) : "–");

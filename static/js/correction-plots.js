@@ -1,10 +1,10 @@
 // Pictures of the correction panel: the validation error by epoch, and the ladder with its intervals and the noise floor.
 import { element } from "./dom.js";
-import { percent } from "./format.js";
+import { formatPercent } from "./format.js";
 
 const WIDTH = 380;
-const CURVE = 170;
-const BOX = { left: 44, right: 12, top: 10, bottom: 30 };
+const HEIGHT = 170;
+const MARGIN = { left: 44, right: 12, top: 10, bottom: 30 };
 const KINDS = { top: "pushes from above", side: "pushes into a side", drag: "drags" };
 const PARTS = {
   seen: "Kinds of motion that training has",
@@ -13,7 +13,7 @@ const PARTS = {
 const MODELS = { baseline: "Raw", extended: "Extended", true: "True" };
 const NETWORKS = { unet2d: "2D", unet3d: "3D", graph: "graph" };
 
-const short = ({ name, network }) =>
+const shortName = ({ name, network }) =>
   `${MODELS[name.split("_")[0]] ?? name}${network ? ` + ${NETWORKS[network.kind]} net` : ""}`;
 
 function svg(name, attributes = {}, ...children) {
@@ -24,48 +24,55 @@ function svg(name, attributes = {}, ...children) {
   return node;
 }
 
-const tidy = (value) => +value.toPrecision(3);
+const threeDigits = (value) => +value.toPrecision(3);
 
 /** Validation error [mm] by epoch; `without` is the error without a network. */
-export function curve(history, without) {
+export function validationCurve(history, without) {
   const errors = history.map(([, error]) => error);
   const known = [...errors, ...(without ? [without] : [])];
   const [low, high] = [Math.min(...known), Math.max(...known)];
   const room = Math.max(high - low, 0.02 * high) * 0.08;
   const x = (epoch) =>
-    BOX.left +
-    (errors.length < 2 ? 0.5 : epoch / (errors.length - 1)) * (WIDTH - BOX.left - BOX.right);
+    MARGIN.left +
+    (errors.length < 2 ? 0.5 : epoch / (errors.length - 1)) * (WIDTH - MARGIN.left - MARGIN.right);
   const y = (value) =>
-    BOX.top +
-    ((high + room - value) / (high - low + 2 * room || 1)) * (CURVE - BOX.top - BOX.bottom);
+    MARGIN.top +
+    ((high + room - value) / (high - low + 2 * room || 1)) * (HEIGHT - MARGIN.top - MARGIN.bottom);
   const best = errors.indexOf(Math.min(...errors));
   return svg(
     "svg",
     {
       class: "correction-plot",
-      viewBox: `0 0 ${WIDTH} ${CURVE}`,
+      viewBox: `0 0 ${WIDTH} ${HEIGHT}`,
       role: "img",
-      "aria-label": `Validation error by epoch, best ${tidy(errors[best])} mm in epoch ${best + 1}`,
+      "aria-label": `Validation error by epoch, best ${threeDigits(errors[best])} mm in epoch ${best + 1}`,
     },
     svg("path", {
       class: "axis",
-      d: `M${BOX.left} ${BOX.top}V${CURVE - BOX.bottom}H${WIDTH - BOX.right}`,
+      d: `M${MARGIN.left} ${MARGIN.top}V${HEIGHT - MARGIN.bottom}H${WIDTH - MARGIN.right}`,
     }),
     [low, high].map((value) =>
-      svg("text", { x: BOX.left - 6, y: y(value) + 4, "text-anchor": "end" }, `${tidy(value)}`),
+      svg(
+        "text",
+        { x: MARGIN.left - 6, y: y(value) + 4, "text-anchor": "end" },
+        `${threeDigits(value)}`,
+      ),
     ),
     svg(
       "text",
-      { x: WIDTH / 2, y: CURVE - 6, "text-anchor": "middle" },
+      { x: WIDTH / 2, y: HEIGHT - 6, "text-anchor": "middle" },
       `epoch 1 to ${errors.length}; mean distance in validation, mm`,
     ),
     without
-      ? svg("path", { class: "without", d: `M${BOX.left} ${y(without)}H${WIDTH - BOX.right}` })
+      ? svg("path", {
+          class: "without",
+          d: `M${MARGIN.left} ${y(without)}H${WIDTH - MARGIN.right}`,
+        })
       : null,
     without
       ? svg(
           "text",
-          { x: WIDTH - BOX.right, y: y(without) + 13, "text-anchor": "end" },
+          { x: WIDTH - MARGIN.right, y: y(without) + 13, "text-anchor": "end" },
           "without the network",
         )
       : null,
@@ -73,13 +80,13 @@ export function curve(history, without) {
     svg(
       "circle",
       { class: "best", cx: x(best), cy: y(errors[best]), r: 4 },
-      svg("title", {}, `epoch ${best + 1}: ${tidy(errors[best])} mm`),
+      svg("title", {}, `epoch ${best + 1}: ${threeDigits(errors[best])} mm`),
     ),
   );
 }
 
 /** Bars of every model with the interval from drawing pushes anew, for kinds of motion that were trained on and those that were not. */
-export function ladderPicture({ rungs, parts }) {
+export function ladderChart({ rungs, parts }) {
   const shown = parts.filter(({ part }) => part in PARTS);
   const groups = shown.length ? shown : parts.filter(({ part }) => part === "all");
   const most = Math.max(
@@ -102,7 +109,7 @@ export function ladderPicture({ rungs, parts }) {
             `${one.kinds.map((kind) => KINDS[kind] ?? kind).join(", ")}; ${one.probes} pushes`,
           ),
         ),
-        rungs.map((rung) => bar(rung, one, most)),
+        rungs.map((rung) => ladderBar(rung, one, most)),
       ),
     ),
     element(
@@ -114,14 +121,14 @@ export function ladderPicture({ rungs, parts }) {
   );
 }
 
-function bar({ name, label, network }, { errors, noise_floor: floor }, most) {
+function ladderBar({ name, label, network }, { errors, noise_floor: floor }, most) {
   const { error, low, high, removed } = errors[name];
   const at = (value) => `${Math.min(100, (100 * value) / most)}%`;
   const colour = network ? "corrected" : name === "baseline" ? "raw" : "extended";
   const said =
     name === "baseline"
       ? ""
-      : `${percent(removed.value)} (${percent(removed.low)} to ${percent(removed.high)})`;
+      : `${formatPercent(removed.value)} (${formatPercent(removed.low)} to ${formatPercent(removed.high)})`;
   return element(
     "div",
     {
@@ -129,7 +136,7 @@ function bar({ name, label, network }, { errors, noise_floor: floor }, most) {
       "data-rung": name,
       title: `${label}: ${error.toFixed(3)} mm (${low.toFixed(3)} to ${high.toFixed(3)} mm)`,
     },
-    element("span", {}, short({ name, network })),
+    element("span", {}, shortName({ name, network })),
     element(
       "div",
       { class: "bar" },

@@ -1,5 +1,5 @@
 // Dragging the tool in the scene: from a pointer over the viewer's canvas to places in the phantom frame.
-const NEAR = 14; // pixels within which the tool is caught
+const GRAB_PIXELS = 14; // pixels within which the tool is caught
 const STEEP = 0.85; // a camera that looks down more than this sees no upright plane
 
 /** Axes of the phantom frame, as the viewer's own frame has them: a rotation. */
@@ -15,7 +15,7 @@ const plus = (a, b, times = 1) => a.map((value, i) => value + times * b[i]);
 const unit = (a) => a.map((value) => value / Math.hypot(...a));
 
 /** Origin and direction of the line of sight through a pointer, phantom frame [m]. */
-export function sight(viewer, event) {
+export function pointerRay(viewer, event) {
   const { camera, canvas } = viewer.__viserMutable;
   const box = canvas.getBoundingClientRect();
   const [x, y] = [
@@ -48,13 +48,14 @@ export function onScreen(viewer, place) {
 }
 
 /** Whether a pointer is on the ball of the tool, or next to it. */
-export function onTool(viewer, event, centre, radius) {
-  const { from, along } = sight(viewer, event);
+export function hitsTool(viewer, event, centre, radius) {
+  const { from, along } = pointerRay(viewer, event);
   const way = plus(centre, from, -1);
   const beside = plus(way, along, -dot(way, along));
   const [x, y] = onScreen(viewer, centre);
   return (
-    Math.hypot(...beside) < radius * 1.15 || Math.hypot(x - event.clientX, y - event.clientY) < NEAR
+    Math.hypot(...beside) < radius * 1.15 ||
+    Math.hypot(x - event.clientX, y - event.clientY) < GRAB_PIXELS
   );
 }
 
@@ -62,8 +63,8 @@ export function onTool(viewer, event, centre, radius) {
  * Where the pointer leads a place that is held: in the upright plane that faces the camera, so that dragging down pushes; level
  * with `level` or where one looks down.
  */
-export function led(viewer, event, held, level) {
-  const { from, along } = sight(viewer, event);
+export function projectPointer(viewer, event, held, level) {
+  const { from, along } = pointerRay(viewer, event);
   const flat = [along[0], along[1], 0];
   const normal = level || Math.abs(along[2]) > STEEP ? [0, 0, 1] : unit(flat);
   const share = dot(plus(held, from, -1), normal) / dot(along, normal);

@@ -8,9 +8,9 @@ export const UNITS = {
   1: [1, ""],
 };
 
-export const words = (name) => NAMES[name] ?? name.replaceAll("_", " ");
+export const readableName = (name) => NAMES[name] ?? name.replaceAll("_", " ");
 
-export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+export const capitalise = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 const NAMES = {
   poisson_ratio: "Poisson’s ratio",
@@ -20,14 +20,14 @@ const NAMES = {
 };
 
 /** Millimetres from metres: two decimals below 10 mm. */
-export function mm(metres, unit = true) {
+export function formatMm(metres, unit = true) {
   if (metres === null || metres === undefined || !Number.isFinite(metres)) return "–";
   const value = metres * 1e3;
   return value.toFixed(Math.abs(value) < 9.995 ? 2 : 1) + (unit ? " mm" : "");
 }
 
 /** A parameter and its interval, with as many decimals as the interval's width deserves; a value that it dwarfs adds none. */
-export function parameter({ value, unit, low, high }) {
+export function formatParameter({ value, unit, low, high }) {
   if (typeof value !== "number") return { value: String(value), unit: "", interval: "" };
   const [factor, shown] = UNITS[unit] ?? [1, unit];
   const open = typeof low !== "number" || typeof high !== "number";
@@ -49,20 +49,20 @@ export function parameter({ value, unit, low, high }) {
   return { value: text(value), unit: shown, interval: open ? "" : `${text(low)} to ${text(high)}` };
 }
 
-export function percent(fraction, digits = 0) {
+export function formatPercent(fraction, digits = 0) {
   if (typeof fraction !== "number") return "–";
   if (fraction > 0 && fraction < 0.005 && !digits) return "<1 %";
   return `${(100 * fraction).toFixed(digits).replace("-", "−")} %`;
 }
 
-export function duration(seconds) {
+export function formatDuration(seconds) {
   const whole = Math.max(0, Math.round(seconds));
   return whole < 60
     ? `${whole} s`
     : `${Math.floor(whole / 60)} min ${String(whole % 60).padStart(2, "0")} s`;
 }
 
-export function when(epoch) {
+export function formatDateTime(epoch) {
   return new Date(epoch * 1e3).toLocaleString(undefined, {
     day: "numeric",
     month: "short",

@@ -1,7 +1,7 @@
 // Help: the tutorial from nothing to a sweep and an accepted registration, and all keys. Opened by the button or by "?".
 import { element, fill, icon } from "./dom.js";
-import { bind } from "./keys.js";
-import { KEYS as REGISTER } from "./register-keys.js";
+import { bindShortcuts } from "./shortcuts.js";
+import { REGISTER_SHORTCUTS as REGISTER } from "./register-shortcuts.js";
 
 const PAGE = [
   ["?", "this help"],
@@ -169,5 +169,5 @@ export function startHelp() {
   };
   const button = document.getElementById("help-button");
   fill(button, "?").addEventListener("click", open);
-  bind({ "?": open });
+  bindShortcuts({ "?": open });
 }

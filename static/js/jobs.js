@@ -1,8 +1,8 @@
 // Jobs as they go: the newest few on the left, all of them with log and retry in a panel of their own.
 import { get, post, toast } from "./api.js";
-import { diskLine } from "./disk.js";
+import { diskUsageLine } from "./disk-usage.js";
 import { element, fill, icon } from "./dom.js";
-import { capital, duration, when } from "./format.js";
+import { capitalise, formatDuration, formatDateTime } from "./format.js";
 import { addPanel, openedPanel, openPanel } from "./panels.js";
 
 const JUST_ENDED = 15 * 60;
@@ -15,10 +15,10 @@ let jobs = [];
 let panel = null;
 
 /** Call `listener(jobs that have just ended well)` whenever some have. */
-export const onDone = (listener) => listeners.push(listener);
+export const onJobsDone = (listener) => listeners.push(listener);
 
 /** How to open what a job made: by the key of its result, a label and a function of its value. */
-export function opens(key, label, open) {
+export function addResultOpener(key, label, open) {
   openers[key] = { label, open };
 }
 
@@ -33,7 +33,8 @@ export function startJobs() {
     const done = jobs.filter(
       ({ id, state }) => state === "done" && before.has(id) && before.get(id) !== "done",
     );
-    if (done.length && panel.firstChild) document.getElementById("disk")?.replaceWith(diskLine());
+    if (done.length && panel.firstChild)
+      document.getElementById("disk")?.replaceWith(diskUsageLine());
     if (done.length) for (const listener of listeners) listener(done);
   };
   setInterval(draw, 1000);
@@ -45,7 +46,7 @@ const isRecent = ({ state, finished }) =>
 
 function draw() {
   const shown = jobs.filter((job) => isOpen(job) || isRecent(job)).slice(0, 6);
-  place(document.getElementById("jobs"), shown, "rail", "Nothing is running.");
+  placeRows(document.getElementById("jobs"), shown, "rail", "Nothing is running.");
   if (openedPanel() === "jobs") drawPanel();
 }
 
@@ -56,9 +57,9 @@ function drawPanel() {
       element("div", { class: "eyebrow" }, "Jobs"),
       element("h1", { class: "verdict" }, "What was asked for, and what became of it"),
       element("div", { class: "jobs-list" }),
-      diskLine(),
+      diskUsageLine(),
     );
-  place(
+  placeRows(
     panel.querySelector(".jobs-list"),
     jobs,
     "panel",
@@ -67,13 +68,13 @@ function drawPanel() {
 }
 
 /** Put rows into a box in order; a row is built anew only when its job's state changes, so that buttons stay where they are. */
-function place(box, shown, where, empty) {
+function placeRows(box, shown, where, empty) {
   const wanted = shown.map((job) => {
     const key = `${where} ${job.id}`;
     const mark = `${job.state} ${job.attempt}`;
     let row = rows.get(key);
     if (row?.mark !== mark) {
-      row = { mark, ...build(job, where === "panel") };
+      row = { mark, ...buildRow(job, where === "panel") };
       rows.set(key, row);
     }
     row.update(job);
@@ -89,7 +90,7 @@ function place(box, shown, where, empty) {
     box.replaceChildren(...nodes);
 }
 
-function build(job, wide) {
+function buildRow(job, wide) {
   const { id, kind, dataset, state, error, finished, started, can_retry: retriable } = job;
   const active = isOpen(job);
   const share = element("span", { class: "value muted" }, active ? "" : state);
@@ -130,7 +131,7 @@ function build(job, wide) {
       element(
         "span",
         { class: "name", title: id },
-        wide ? `${capital(kind)} · ${dataset ?? ""}` : dataset ? `${dataset} · ${kind}` : kind,
+        wide ? `${capitalise(kind)} · ${dataset ?? ""}` : dataset ? `${dataset} · ${kind}` : kind,
       ),
       share,
       ...buttons,
@@ -143,12 +144,16 @@ function build(job, wide) {
       ? element(
           "div",
           { class: "sub" },
-          element("span", {}, when(started ?? job.created)),
-          element("span", {}, finished && started ? `took ${duration(finished - started)}` : ""),
+          element("span", {}, formatDateTime(started ?? job.created)),
+          element(
+            "span",
+            {},
+            finished && started ? `took ${formatDuration(finished - started)}` : "",
+          ),
         )
       : null,
     wide
-      ? element("div", { class: "made" }, made(job), logOf(id))
+      ? element("div", { class: "made" }, resultLinks(job), jobLog(id))
       : element(
           "button",
           {
@@ -172,14 +177,14 @@ function build(job, wide) {
       state !== "running"
         ? ""
         : remaining !== null
-          ? `about ${duration(remaining)} left`
-          : duration(Date.now() / 1e3 - since);
+          ? `about ${formatDuration(remaining)} left`
+          : formatDuration(Date.now() / 1e3 - since);
   };
   return { node, update };
 }
 
 /** A way to each thing that the job made. */
-function made({ id, dataset, result }) {
+function resultLinks({ id, dataset, result }) {
   return Object.entries(openers)
     .filter(([key]) => result?.[key] !== undefined)
     .map(([key, { label, open }]) =>
@@ -210,7 +215,7 @@ function made({ id, dataset, result }) {
 }
 
 /** The job's log, read when it is opened and followed while it is. */
-function logOf(id) {
+function jobLog(id) {
   const lines = element("ol", { class: "log" });
   const box = element("details", { ontoggle: follow }, element("summary", {}, "Log"), lines);
   let next = 0;

@@ -1,19 +1,19 @@
 // Which layers are shown and how: switches in the toolbar, everything else in a panel that opens below them.
 import { element, fill, icon, swatch } from "./dom.js";
 import {
-  absent,
-  choose,
-  coloured,
+  unavailableReason,
+  colourBy,
+  isColoured,
   LAYERS,
-  lines,
+  isWireframe,
   MODELS,
-  noQuantity,
+  quantityUnavailableReason,
   opacity,
   QUANTITIES,
-  setLook,
-  toggle,
-} from "./looks.js";
-import { on, set, state } from "./store.js";
+  setLayerStyle,
+  toggleLayer,
+} from "./layer-styles.js";
+import { subscribe, set, state } from "./store.js";
 
 const CHIPS = {
   measured: "Measured",
@@ -26,28 +26,31 @@ const SEGMENTS = { plain: "Plain", raw: "Raw", extended: "Extended", corrected: 
 
 export function start() {
   const button = fill("layers-button", icon("layers"), "Layers");
-  button.addEventListener("click", () => open(box().hidden));
+  button.addEventListener("click", () => setOpen(box().hidden));
   document.addEventListener("pointerdown", (event) => {
     if (!box().hidden && !box().contains(event.target) && !button.contains(event.target))
-      open(false);
+      setOpen(false);
   });
   window.addEventListener("blur", () => {
-    if (document.activeElement?.id === "viewer") open(false);
+    if (document.activeElement?.id === "viewer") setOpen(false);
   });
   document.addEventListener("keydown", (event) => {
     if (event.key === "Escape" && !box().hidden) {
-      open(false);
+      setOpen(false);
       button.focus();
     }
   });
-  on(["layers", "colour", "quantity", "series", "heading"], drawToolbar);
-  on(["layers", "colour", "quantity", "looks", "series", "side_by_side", "heading"], drawRows);
+  subscribe(["layers", "colour", "quantity", "series", "heading"], drawToolbar);
+  subscribe(
+    ["layers", "colour", "quantity", "looks", "series", "side_by_side", "heading"],
+    drawRows,
+  );
   drawToolbar();
 }
 
 const box = () => document.getElementById("layers-panel");
 
-function open(wanted) {
+function setOpen(wanted) {
   box().hidden = !wanted;
   document.getElementById("layers-button").setAttribute("aria-expanded", String(wanted));
   if (wanted) {
@@ -56,7 +59,7 @@ function open(wanted) {
   }
 }
 
-const has = (model) =>
+const isAvailable = (model) =>
   !MODELS.includes(model) || !state().series || state().series.models.includes(model);
 
 function drawToolbar() {
@@ -74,11 +77,11 @@ function drawToolbar() {
           {
             class: "chip",
             type: "button",
-            disabled: absent(name) !== null,
-            title: absent(name) ?? LAYERS[name],
+            disabled: unavailableReason(name) !== null,
+            title: unavailableReason(name) ?? LAYERS[name],
             "aria-pressed": String(layers.includes(name)),
             "data-layer": name,
-            onclick: () => toggle(name),
+            onclick: () => toggleLayer(name),
           },
           swatch(name),
           label,
@@ -93,20 +96,22 @@ function drawToolbar() {
         {
           value: name,
           selected: name === quantity,
-          disabled: noQuantity(name) !== null,
-          title: noQuantity(name),
+          disabled: quantityUnavailableReason(name) !== null,
+          title: quantityUnavailableReason(name),
         },
         label,
       ),
     ),
   );
-  document.getElementById("quantity").title = noQuantity("energy")
-    ? `Energy density: ${noQuantity("energy")}`
+  document.getElementById("quantity").title = quantityUnavailableReason("energy")
+    ? `Energy density: ${quantityUnavailableReason("energy")}`
     : "What the colours show";
   fill(
     "colouring",
     Object.entries(SEGMENTS)
-      .filter(([name]) => name === "plain" || (has(name) && (name !== "corrected" || series)))
+      .filter(
+        ([name]) => name === "plain" || (isAvailable(name) && (name !== "corrected" || series)),
+      )
       .map(([name, label]) =>
         element(
           "button",
@@ -116,7 +121,7 @@ function drawToolbar() {
             "aria-checked": String(colour === name),
             "data-colour": name,
             title: name === "plain" ? "Each model in its own colour" : `Colour the ${name} model`,
-            onclick: () => choose(name),
+            onclick: () => colourBy(name),
           },
           label,
         ),
@@ -127,7 +132,7 @@ function drawToolbar() {
 export function startQuantity() {
   document.getElementById("quantity").addEventListener("change", (event) => {
     set({ quantity: event.target.value });
-    if (state().colour === "plain" && !MODELS.some(coloured)) choose("raw");
+    if (state().colour === "plain" && !MODELS.some(isColoured)) colourBy("raw");
     event.target.blur();
   });
 }
@@ -180,7 +185,7 @@ function drawRows() {
 }
 
 function row(name) {
-  const why = absent(name);
+  const why = unavailableReason(name);
   const shown = state().layers.includes(name) && why === null;
   const model = MODELS.includes(name);
   return element(
@@ -196,29 +201,29 @@ function row(name) {
         disabled: why !== null,
         "data-of": name,
         "data-kind": "shown",
-        onchange: () => toggle(name),
+        onchange: () => toggleLayer(name),
       }),
       swatch(name),
       LAYERS[name],
     ),
-    model ? painting(name, shown) : element("span"),
+    model ? colourSelect(name, shown) : element("span"),
     model
       ? element("input", {
           type: "checkbox",
           "aria-label": `${LAYERS[name]} as lines`,
-          checked: lines(name),
+          checked: isWireframe(name),
           disabled: !shown,
           "data-of": name,
           "data-kind": "lines",
-          onchange: (event) => setLook(name, { lines: event.target.checked }),
+          onchange: (event) => setLayerStyle(name, { lines: event.target.checked }),
         })
       : element("span"),
-    ["path", "landmarks", "base"].includes(name) ? element("span") : slider(name, shown),
+    ["path", "landmarks", "base"].includes(name) ? element("span") : opacitySlider(name, shown),
   );
 }
 
-function painting(name, shown) {
-  const value = coloured(name) ? state().quantity : "plain";
+function colourSelect(name, shown) {
+  const value = isColoured(name) ? state().quantity : "plain";
   return element(
     "select",
     {
@@ -229,7 +234,7 @@ function painting(name, shown) {
       onchange: (event) => {
         const plain = event.target.value === "plain";
         if (!plain) set({ quantity: event.target.value });
-        setLook(name, plain ? { coloured: false } : { coloured: true, lines: false });
+        setLayerStyle(name, plain ? { coloured: false } : { coloured: true, lines: false });
       },
     },
     element("option", { value: "plain", selected: value === "plain" }, "Plain"),
@@ -239,8 +244,8 @@ function painting(name, shown) {
         {
           value: quantity,
           selected: value === quantity,
-          disabled: noQuantity(quantity) !== null,
-          title: noQuantity(quantity),
+          disabled: quantityUnavailableReason(quantity) !== null,
+          title: quantityUnavailableReason(quantity),
         },
         label,
       ),
@@ -248,19 +253,19 @@ function painting(name, shown) {
   );
 }
 
-function slider(name, shown) {
+function opacitySlider(name, shown) {
   const bar = element("input", {
     type: "range",
     min: 5,
     max: 100,
     step: 5,
     value: Math.round(100 * opacity(name)),
-    disabled: !shown || (MODELS.includes(name) && lines(name)),
+    disabled: !shown || (MODELS.includes(name) && isWireframe(name)),
     "aria-label": `${name === "measured" ? "Density" : "Opacity"} of the ${LAYERS[name].toLowerCase()}`,
     title: name === "measured" ? "Share of the points that are drawn" : null,
     "data-of": name,
     "data-kind": "opacity",
-    oninput: (event) => setLook(name, { opacity: +event.target.value / 100 }),
+    oninput: (event) => setLayerStyle(name, { opacity: +event.target.value / 100 }),
   });
   bar.addEventListener("change", () => bar.blur());
   return bar;

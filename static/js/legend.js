@@ -1,9 +1,9 @@
 // The one legend: what the colours mean, with its unit and range.
 import { element, swatch } from "./dom.js";
 import { fill } from "./dom.js";
-import { coloured, MODELS, QUANTITIES } from "./looks.js";
-import { scaleTower } from "./scale.js";
-import { on, set, state } from "./store.js";
+import { isColoured, MODELS, QUANTITIES } from "./layer-styles.js";
+import { verticalScaleBar } from "./colour-scale.js";
+import { subscribe, set, state } from "./store.js";
 
 const RANGES = {
   robust: ["Robust", "Holds nearly all that occurs in the raw model of this sequence"],
@@ -12,16 +12,19 @@ const RANGES = {
 };
 
 export function start() {
-  on(["colour", "quantity", "ranges", "limits", "held", "palette", "trial", "looks", "live"], draw);
+  subscribe(
+    ["colour", "quantity", "ranges", "limits", "held", "palette", "trial", "looks", "live"],
+    draw,
+  );
 }
 
 /** What the legend says, for whoever draws it: null where nothing is coloured. */
-export function told() {
+export function legendContent() {
   const { held, palette, trial, colour } = state();
   const { quantity, limit } = held?.drawn ?? {};
   if (!palette || !quantity || !limit) return null;
   const { unit, factor, label } = QUANTITIES[quantity];
-  const names = MODELS.filter((model) => held.view.layers.includes(model) && coloured(model));
+  const names = MODELS.filter((model) => held.view.layers.includes(model) && isColoured(model));
   const one = state().live
     ? "live"
     : trial && colour === "extended"
@@ -45,7 +48,7 @@ export function told() {
 
 function draw() {
   const box = document.getElementById("legend");
-  const what = told();
+  const what = legendContent();
   box.hidden = what === null;
   if (
     box.hidden ||
@@ -64,7 +67,7 @@ function draw() {
     box,
     element("div", { class: "title" }, what.title),
     what.ends ? element("div", { class: "ends" }, what.ends[0]) : null,
-    scaleTower(what.bands, what.low, what.high),
+    verticalScaleBar(what.bands, what.low, what.high),
     what.ends ? element("div", { class: "ends" }, what.ends[1]) : null,
     element(
       "div",
@@ -83,13 +86,13 @@ function draw() {
           element("option", { value: name, selected: name === range, title }, label),
         ),
       ),
-      range === "manual" ? manual(what) : null,
+      range === "manual" ? limitField(what) : null,
     ),
     what.signed ? element("div", { class: "unseen" }, swatch("unseen"), "not seen") : null,
   );
 }
 
-function manual({ high, factor, unit, quantity, signed }) {
+function limitField({ high, factor, unit, quantity, signed }) {
   const label = `End of the scale in ${unit}`;
   return element(
     "label",

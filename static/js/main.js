@@ -1,18 +1,18 @@
 // Starts the parts and follows what is chosen.
 import { get, toast } from "./api.js";
-import * as correction from "./correction.js";
+import * as correction from "./correction-panel.js";
 import { fill, icon } from "./dom.js";
 import { startHelp } from "./help.js";
-import * as live from "./live.js";
+import * as live from "./live-panel.js";
 import { openPanel } from "./panels.js";
-import * as rail from "./rail.js";
-import { showProblem, showReport, showWelcome } from "./report.js";
+import * as rail from "./sidebar.js";
+import { showProblem, showReport, showWelcome } from "./report-panel.js";
 import * as scene from "./scene.js";
-import { on, set, state } from "./store.js";
+import { subscribe, set, state } from "./store.js";
 import { startRegister } from "./register.js";
-import { startSweeps } from "./sweep.js";
+import { startSweeps } from "./sweep-panel.js";
 import * as timeline from "./timeline.js";
-import * as whatif from "./whatif.js";
+import * as whatif from "./whatif-panel.js";
 
 const THEMES = { light: "moon", dark: "sun" };
 
@@ -24,7 +24,7 @@ function startTheme() {
     document.documentElement.dataset.theme = theme;
     set({ theme });
   });
-  on(["theme"], draw);
+  subscribe(["theme"], draw);
   draw();
 }
 
@@ -47,7 +47,7 @@ async function openRun(id) {
     const sequence =
       state().run === id && known.includes(state().sequence)
         ? state().sequence
-        : preferred(heading.sequences);
+        : preferredSequence(heading.sequences);
     showReport(heading, report, patterns, state().palette);
     if (state().run !== id || state().sequence !== sequence)
       set({ frame: 0, series: null, loop: null });
@@ -59,7 +59,7 @@ async function openRun(id) {
 }
 
 /** The test sequence on which naming the cause changes most: what a visitor should see first. */
-function preferred(sequences) {
+function preferredSequence(sequences) {
   const tested = sequences.filter(({ split }) => split === "test");
   const gain = ({ distance_raw: raw, distance_extended: extended }) => (raw ?? 0) - (extended ?? 0);
   return (
@@ -74,16 +74,16 @@ async function openSequence() {
   if (state().run !== run || state().sequence !== sequence) return;
   const fresh = state().series === null || state().series.name !== sequence;
   set({ series });
-  if (fresh && state().frame === 0) timeline.go(opening(series));
+  if (fresh && state().frame === 0) timeline.go(firstFrameShown(series));
 }
 
 /** The frame in which naming the cause changes most, else the one with the largest raw error: the sensor's noise is no first sight. */
-function opening({ distance_raw: raw, distance_extended: extended }) {
+function firstFrameShown({ distance_raw: raw, distance_extended: extended }) {
   const gain = raw.map((error, frame) => (error ?? 0) - (extended?.[frame] ?? error ?? 0));
-  return highest(gain.some((value) => value > 0) ? gain : raw);
+  return indexOfHighest(gain.some((value) => value > 0) ? gain : raw);
 }
 
-const highest = (values) =>
+const indexOfHighest = (values) =>
   values.reduce((best, value, index) => ((value ?? 0) > (values[best] ?? 0) ? index : best), 0);
 
 async function start() {
@@ -99,7 +99,7 @@ async function start() {
   scene.start();
   whatif.start();
   live.start();
-  on(["sequence"], () => {
+  subscribe(["sequence"], () => {
     set({ series: null, frame: 0, loop: null });
     openSequence().catch(toast);
   });
@@ -109,7 +109,7 @@ async function start() {
     return openRun(id);
   });
   const wanted = new URLSearchParams(location.search).get("run") ?? state().run;
-  const run = rail.newestRun(wanted);
+  const run = rail.runToOpen(wanted);
   if (run) await openRun(run);
   else {
     set({ run: null, sequence: null });

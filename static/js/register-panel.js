@@ -1,9 +1,9 @@
 // The panel of manual registration: pairs with their residuals, what is doubtful about them, and what ICP made of them.
-import { title } from "./api.js";
+import { errorTitle } from "./api.js";
 import { element, fill, icon } from "./dom.js";
-import { capital, mm } from "./format.js";
-import { whole } from "./register-state.js";
-import { KEYS } from "./register-keys.js";
+import { capitalise, formatMm } from "./format.js";
+import { completePairs } from "./register-pairs.js";
+import { REGISTER_SHORTCUTS } from "./register-shortcuts.js";
 
 const DEGREES = 180 / Math.PI;
 
@@ -41,10 +41,10 @@ export function drawPanel(box, work, view, actions) {
           ),
         )
       : null,
-    view.cannot ? card(view.cannot) : null,
+    view.cannot ? errorCard(view.cannot) : null,
     work && !view.cannot
       ? work.values.found
-        ? result(work, view, actions, name)
+        ? resultPart(work, view, actions, name)
         : pairsPart(work, view, actions)
       : null,
     view.names.length
@@ -80,7 +80,10 @@ export function drawPanel(box, work, view, actions) {
       element(
         "dl",
         { class: "keys" },
-        KEYS.flatMap(([key, what]) => [element("dt", {}, key), element("dd", {}, what)]),
+        REGISTER_SHORTCUTS.flatMap(([key, what]) => [
+          element("dt", {}, key),
+          element("dd", {}, what),
+        ]),
       ),
     ),
   );
@@ -95,11 +98,11 @@ function heading(work, view) {
   if (!work) return "Lay the cloud onto the phantom";
   if (view.busy) return view.busy;
   const { found, pairs } = work.values;
-  const count = whole(pairs).length;
+  const count = completePairs(pairs).length;
   if (found)
-    return `${mm(found.registration.residual_before)} before, ${mm(found.registration.residual_after)} after ICP`;
+    return `${formatMm(found.registration.residual_before)} before, ${formatMm(found.registration.residual_after)} after ICP`;
   if (view.problem) return "These pairs do not fit yet";
-  if (view.fit) return `${count} pairs fit to ${mm(view.fit.rms)} RMS`;
+  if (view.fit) return `${count} pairs fit to ${formatMm(view.fit.rms)} RMS`;
   return count
     ? `${3 - count} more ${count === 2 ? "pair" : "pairs"} for a fit`
     : "Click a point of the cloud, then the same point of the phantom";
@@ -110,13 +113,13 @@ function pairsPart(work, view, actions) {
   const shared = view.problem && !view.problem.at.length;
   return [
     view.missed ? element("p", { class: "note-card", role: "status" }, view.missed) : null,
-    view.refused ? card(view.refused) : null,
+    view.refused ? errorCard(view.refused) : null,
     shared
       ? element(
           "div",
           { class: "note-card bad", role: "alert" },
           element("strong", {}, "No fit"),
-          capital(view.problem.message),
+          capitalise(view.problem.message),
         )
       : null,
     element(
@@ -130,7 +133,7 @@ function pairsPart(work, view, actions) {
             element(
               "tbody",
               {},
-              pairs.flatMap((pair, number) => row(pair, number, work, view)),
+              pairs.flatMap((pair, number) => pairRow(pair, number, work, view)),
             ),
           )
         : element(
@@ -198,7 +201,7 @@ function pairsPart(work, view, actions) {
   ];
 }
 
-function row(pair, number, work, view) {
+function pairRow(pair, number, work, view) {
   const at = view.fit?.of.indexOf(number) ?? -1;
   const chosen = work.values.chosen;
   const end = (side, label) =>
@@ -239,7 +242,7 @@ function row(pair, number, work, view) {
       element(
         "td",
         { class: "number", "data-residual": number },
-        at >= 0 ? mm(view.fit.residuals[at], false) : pair.cloud && pair.mesh ? "…" : "",
+        at >= 0 ? formatMm(view.fit.residuals[at], false) : pair.cloud && pair.mesh ? "…" : "",
       ),
       element(
         "td",
@@ -266,7 +269,7 @@ function row(pair, number, work, view) {
             element(
               "div",
               { class: "note-card bad", role: "alert" },
-              capital(view.problem.message),
+              capitalise(view.problem.message),
               swap
                 ? element(
                     "p",
@@ -289,7 +292,7 @@ function row(pair, number, work, view) {
   ].filter(Boolean);
 }
 
-function result(work, view, actions, name) {
+function resultPart(work, view, actions, name) {
   const { registration: found } = work.values.found;
   const firm = found.directions.at(0);
   const fact = (label, ...value) =>
@@ -307,11 +310,14 @@ function result(work, view, actions, name) {
           {},
           fact(
             "Residual before",
-            element("b", { id: "register-before" }, mm(found.residual_before)),
+            element("b", { id: "register-before" }, formatMm(found.residual_before)),
           ),
-          fact("Residual after", element("b", { id: "register-after" }, mm(found.residual_after))),
+          fact(
+            "Residual after",
+            element("b", { id: "register-after" }, formatMm(found.residual_after)),
+          ),
           fact("Points compared", String(found.points)),
-          fact("Moved by", mm(found.moved)),
+          fact("Moved by", formatMm(found.moved)),
           fact("Turned by", `${(found.turned * DEGREES).toFixed(2)}°`),
         ),
       ),
@@ -328,13 +334,13 @@ function result(work, view, actions, name) {
               "The cloud determines these directions weakly; the arrows show them.",
             ),
             found.weak_directions.map((text) =>
-              element("div", { class: "note-card", "data-weak": "" }, capital(text)),
+              element("div", { class: "note-card", "data-weak": "" }, capitalise(text)),
             ),
           ]
         : element(
             "p",
             { class: "gain-note", "data-firm": "" },
-            `Every direction is firm; the weakest, mostly ${mainly(firm.parts)}, is known to ± ${mm(firm.sigma)}.`,
+            `Every direction is firm; the weakest, mostly ${dominantPart(firm.parts)}, is known to ± ${formatMm(firm.sigma)}.`,
           ),
     ),
     found.warnings.length
@@ -345,12 +351,12 @@ function result(work, view, actions, name) {
           found.warnings.map((text) => element("div", { class: "note-card" }, text)),
         )
       : null,
-    view.refused ? card(view.refused) : null,
-    ...(view.accepted ? accepted(view, actions) : [acceptForm(view, actions, name)]),
+    view.refused ? errorCard(view.refused) : null,
+    ...(view.accepted ? acceptedPart(view, actions) : [acceptForm(view, actions, name)]),
   ];
 }
 
-const accepted = (view, actions) => [
+const acceptedPart = (view, actions) => [
   element(
     "div",
     { class: "note-card good", role: "status" },
@@ -395,7 +401,7 @@ const acceptForm = (view, actions, name) =>
         pattern: "[A-Za-z0-9][A-Za-z0-9._\\-]*",
         title: "Letters, digits, dot, dash, underscore",
         autocomplete: "off",
-        value: name ?? free(view.names),
+        value: name ?? freeName(view.names),
       }),
     ),
     element(
@@ -415,18 +421,18 @@ const acceptForm = (view, actions, name) =>
   );
 
 /** A name that is not taken. */
-function free(names) {
+function freeName(names) {
   for (let number = 1; ; number += 1)
     if (!names.includes(`by-hand-${number}`)) return `by-hand-${number}`;
 }
 
-const mainly = (parts) =>
+const dominantPart = (parts) =>
   Object.entries(parts).sort((a, b) => Math.abs(b[1]) - Math.abs(a[1]))[0][0];
 
-const card = (problem) =>
+const errorCard = (problem) =>
   element(
     "div",
     { class: "note-card bad", role: "alert" },
-    element("strong", {}, title(problem)),
+    element("strong", {}, errorTitle(problem)),
     problem.message,
   );

@@ -1,28 +1,28 @@
 // Registration by hand: points clicked on cloud and phantom, a fit from three pairs on, ICP from there, accepted under a name or not.
-import { get, post, title, toast } from "./api.js";
+import { get, post, errorTitle, toast } from "./api.js";
 import { element, fill, icon } from "./dom.js";
 import { addPanel, openedPanel, openPanel } from "./panels.js";
 import { drawPanel } from "./register-panel.js";
-import { lastDataset, whole, workOn } from "./register-state.js";
+import { lastDataset, completePairs, createPairEditor } from "./register-pairs.js";
 import { pageId } from "./scene.js";
-import { onKeys } from "./register-keys.js";
+import { handleRegisterShortcut } from "./register-shortcuts.js";
 
 const ENDS = ["phantom", "cloud"];
 let box = null;
 let frame = null;
 let bar = null;
-let work = null;
+let editor = null;
 let socket = null;
 let view = null; // what the panel shows beside the pairs: datasets, fit, problem, busy, names, landmarks
-let asked = 0;
-let showing = false;
-let drawn = null;
+let fitRequests = 0;
+let sending = false;
+let drawnState = null;
 let stale = false;
 
-let openDatasetOf = null;
+let openDatasetPanel = null;
 
 export function startRegister(openDataset) {
-  openDatasetOf = openDataset;
+  openDatasetPanel = openDataset;
   box = addPanel("register", "Register", open, leave);
   frame = element("iframe", {
     id: "register-viewer",
@@ -38,20 +38,20 @@ export function startRegister(openDataset) {
   document.querySelector(".scene").append(frame);
   document.querySelector(".centre").prepend(bar);
   frame.addEventListener("load", () => {
-    dress();
-    frame.contentWindow?.addEventListener("keydown", keys, true);
+    applyTheme();
+    frame.contentWindow?.addEventListener("keydown", onKeyDown, true);
   });
-  window.addEventListener("keydown", keys, true);
+  window.addEventListener("keydown", onKeyDown, true);
 }
 
 /** Bring the panel to the front on one dataset. */
-export function registerByHand(dataset) {
+export function openRegistration(dataset) {
   choose(dataset).catch(toast);
   openPanel("register");
 }
 
 /** A choice of how the camera is registered: automatically, or as somebody accepted it; hidden where there is no choice. */
-export async function cameraChoice(dataset) {
+export async function cameraSelect(dataset) {
   const { registrations } = await get(
     `/datasets/${encodeURIComponent(dataset)}/registrations`,
   ).catch(() => ({ registrations: [] }));
@@ -64,7 +64,7 @@ export async function cameraChoice(dataset) {
 }
 
 async function open() {
-  drawn = null;
+  drawnState = null;
   document.body.classList.add("registering");
   if (!frame.src) frame.src = `/viser/${pageId()}-register`;
   frame.hidden = false;
@@ -88,7 +88,7 @@ async function open() {
     if (dataset) await choose(dataset);
     else draw();
   } catch (problem) {
-    fill(box, broken(problem));
+    fill(box, errorCard(problem));
   }
 }
 
@@ -110,28 +110,28 @@ async function choose(dataset) {
       landmarks: {},
       stated: true,
     };
-  if (view.dataset !== dataset || !work) {
+  if (view.dataset !== dataset || !editor) {
     Object.assign(view, { dataset, fit: null, problem: null, names: [] });
-    work = workOn(dataset, (others) => {
+    editor = createPairEditor(dataset, (others) => {
       draw();
-      show();
+      sendScene();
       if (others) fit();
     });
-    work.set({ chosen: null });
+    editor.set({ chosen: null });
     fit();
   }
   draw();
-  show();
+  sendScene();
   await listNames();
 }
 
 async function listNames() {
-  const { registrations } = await get(`${address()}`);
+  const { registrations } = await get(`${registrationsPath()}`);
   view.names = registrations;
   draw();
 }
 
-const address = () => `/datasets/${encodeURIComponent(view.dataset)}/registrations`;
+const registrationsPath = () => `/datasets/${encodeURIComponent(view.dataset)}/registrations`;
 
 /** Each click in the scene comes as the point that it means. */
 function connect() {
@@ -147,39 +147,39 @@ function connect() {
       if (openedPanel() === "register")
         setTimeout(() => {
           connect();
-          show();
+          sendScene();
         }, 1500);
     }
   };
 }
 
 function clicked({ picked, chosen, problem }) {
-  if (!work || view.busy) return;
+  if (!editor || view.busy) return;
   view.missed = problem ?? null;
   if (problem) {
     draw();
     return;
   }
   if (chosen) {
-    const now = work.values.chosen;
-    work.choose(
+    const now = editor.values.chosen;
+    editor.choose(
       now?.[0] === chosen.pair && now[1] === chosen.side ? null : chosen.pair,
       chosen.side,
     );
     return;
   }
-  work.place(picked.side, picked.point, picked.landmark, picked.pair);
+  editor.place(picked.side, picked.point, picked.landmark, picked.pair);
 }
 
 /** Have the scene show what is here; while it is being drawn only the newest is kept. */
-async function show() {
-  if (showing) {
+async function sendScene() {
+  if (sending) {
     stale = true;
     return;
   }
-  showing = true;
+  sending = true;
   stale = false;
-  const { pairs, mode, chosen, start, over, found } = work.values;
+  const { pairs, mode, chosen, start, over, found } = editor.values;
   const pose =
     found?.registration.phantom_from_camera ??
     (over ? (view.fit?.phantom_from_camera ?? null) : null);
@@ -192,68 +192,68 @@ async function show() {
       pose,
       start,
       over,
-      weak: weak(found),
+      weak: weakDirections(found),
     });
     Object.assign(view, { landmarks: held.landmarks, stated: held.stated, cannot: null });
-    if (!held.stated && start === "stated") work.values.start = "levelled";
+    if (!held.stated && start === "stated") editor.values.start = "levelled";
   } catch (problem) {
     view.cannot = problem;
   }
-  showing = false;
+  sending = false;
   draw();
-  if (stale) show();
+  if (stale) sendScene();
 }
 
-const MOTIONS = ["translation along x", "translation along y", "translation along z"];
-const TURNS = ["rotation about x", "rotation about y", "rotation about z"];
+const TRANSLATIONS = ["translation along x", "translation along y", "translation along z"];
+const ROTATIONS = ["rotation about x", "rotation about y", "rotation about z"];
 
 /** The directions that the cloud determines weakly, as arrows. */
-function weak(found) {
+function weakDirections(found) {
   return (found?.registration.directions ?? [])
     .slice(0, found?.registration.weak_directions.length ?? 0)
     .slice(0, 6)
     .map(({ parts }, at) => ({
-      translation: MOTIONS.map((name) => parts[name]),
-      rotation: TURNS.map((name) => parts[name]),
-      text: amount(found.registration.weak_directions[at]),
+      translation: TRANSLATIONS.map((name) => parts[name]),
+      rotation: ROTATIONS.map((name) => parts[name]),
+      text: uncertainty(found.registration.weak_directions[at]),
     }));
 }
 
 /** "± 1.2 mm" of the words for a weak direction, or that it is open. */
-const amount = (text) =>
+const uncertainty = (text) =>
   /\+- ([\d.]+ \w+)/.test(text) ? `± ${text.match(/\+- ([\d.]+ \w+)/)[1]}` : "open";
 
 /** The rigid fit of the whole pairs, or why there is none yet. */
 async function fit() {
-  const mine = ++asked;
-  const pairs = whole(work.values.pairs);
+  const mine = ++fitRequests;
+  const pairs = completePairs(editor.values.pairs);
   if (pairs.length < 3) {
     Object.assign(view, { fit: null, problem: null });
     draw();
     return;
   }
   try {
-    const found = await post(`${address()}/fit`, {
+    const found = await post(`${registrationsPath()}/fit`, {
       pairs: pairs.map(({ cloud, mesh }) => ({ cloud, mesh })),
     });
-    if (mine !== asked) return;
+    if (mine !== fitRequests) return;
     Object.assign(view, {
       fit: { ...found, of: pairs.map(({ number }) => number) },
       problem: null,
     });
   } catch (problem) {
-    if (mine !== asked) return;
+    if (mine !== fitRequests) return;
     Object.assign(view, {
       fit: null,
-      problem: { ...problem, message: problem.message, at: numbers(problem, pairs) },
+      problem: { ...problem, message: problem.message, at: pairNumbers(problem, pairs) },
     });
   }
   draw();
-  show();
+  sendScene();
 }
 
 /** Which pairs a refusal speaks of, as numbered in the list. */
-const numbers = (problem, pairs) =>
+const pairNumbers = (problem, pairs) =>
   typeof problem.where?.pairs === "string"
     ? problem.where.pairs
         .split(",")
@@ -265,9 +265,9 @@ async function refine(accept = null) {
   if (!view.fit || view.busy) return;
   view.busy = accept ? "Keeping it …" : "Laying the cloud against phantom and table …";
   draw();
-  const pairs = whole(work.values.pairs).map(({ cloud, mesh }) => ({ cloud, mesh }));
+  const pairs = completePairs(editor.values.pairs).map(({ cloud, mesh }) => ({ cloud, mesh }));
   try {
-    const found = await post(address(), { pairs, accept });
+    const found = await post(registrationsPath(), { pairs, accept });
     view.busy = null;
     if (accept) {
       view.accepted = accept;
@@ -275,7 +275,7 @@ async function refine(accept = null) {
       draw();
     } else {
       view.accepted = null;
-      work.set({ found, over: true, chosen: null });
+      editor.set({ found, over: true, chosen: null });
     }
   } catch (problem) {
     view.busy = null;
@@ -294,29 +294,29 @@ const actions = {
   back: () => {
     view.refused = null;
     view.accepted = null;
-    work.set({ found: null, over: false });
+    editor.set({ found: null, over: false });
   },
-  openDataset: () => openDatasetOf?.(view.dataset),
-  clear: () => work.put([], { mode: "cloud", chosen: null, over: false }),
+  openDataset: () => openDatasetPanel?.(view.dataset),
+  clear: () => editor.put([], { mode: "cloud", chosen: null, over: false }),
   look: () => post(`/sessions/${pageId()}/registering/look`).catch(toast),
-  landmark: (name) => work.place("mesh", view.landmarks[name], name),
+  landmark: (name) => editor.place("mesh", view.landmarks[name], name),
   nudge: async (right, up) => {
-    const [number, side] = work.values.chosen ?? [];
-    const point = work.values.pairs[number]?.[side];
+    const [number, side] = editor.values.chosen ?? [];
+    const point = editor.values.pairs[number]?.[side];
     if (!point) return;
     try {
       const moved = (
         await post(`/sessions/${pageId()}/registering/nudge`, { side, point, right, up })
       ).point;
-      work.place(side, moved, null, number);
+      editor.place(side, moved, null, number);
     } catch (problem) {
       toast(problem);
     }
   },
 };
 
-const keys = (event) => {
-  if (openedPanel() === "register" && work) onKeys(event, work, actions);
+const onKeyDown = (event) => {
+  if (openedPanel() === "register" && editor) handleRegisterShortcut(event, editor, actions);
 };
 
 /** The panel anew, where anything changed: a button that is replaced while it is pressed would do nothing. */
@@ -327,21 +327,21 @@ function draw() {
     view.problem?.message,
     view.refused?.message,
     view.cannot?.message,
-    work?.values,
-    work?.canUndo(),
+    editor?.values,
+    editor?.canUndo(),
   ]);
-  if (now === drawn) return;
-  drawn = now;
+  if (now === drawnState) return;
+  drawnState = now;
   drawBar();
-  drawPanel(box, work, view, actions);
+  drawPanel(box, editor, view, actions);
 }
 
 function drawBar() {
-  if (!work) {
+  if (!editor) {
     fill(bar);
     return;
   }
-  const { mode, over, start, found, pairs } = work.values;
+  const { mode, over, start, found, pairs } = editor.values;
   const segment = (now, entries, act) =>
     element(
       "div",
@@ -371,9 +371,13 @@ function drawBar() {
         ["cloud", "Cloud", "Key C"],
         ["mesh", "Phantom", "Key M"],
       ],
-      (value) => work.set({ mode: value, chosen: null }),
+      (value) => editor.set({ mode: value, chosen: null }),
     ),
-    element("span", { class: "label", id: "register-hint" }, hint(pairs, mode, work.values.chosen)),
+    element(
+      "span",
+      { class: "label", id: "register-hint" },
+      clickHint(pairs, mode, editor.values.chosen),
+    ),
     element("div", { class: "spring" }),
     segment(
       String(over),
@@ -381,14 +385,14 @@ function drawBar() {
         ["false", "Beside", "Cloud beside the phantom (V)"],
         ["true", "Over", "Cloud laid on the phantom (V)"],
       ],
-      (value) => work.set({ over: value === "true" }),
+      (value) => editor.set({ over: value === "true" }),
     ),
     element(
       "select",
       {
         "aria-label": "How the cloud is shown before there is a fit",
         disabled: Boolean(found),
-        onchange: ({ target }) => work.set({ start: target.value }),
+        onchange: ({ target }) => editor.set({ start: target.value }),
       },
       [
         ["stated", "First guess as stated", !view.stated],
@@ -411,7 +415,7 @@ function drawBar() {
   );
 }
 
-function hint(pairs, mode, chosen) {
+function clickHint(pairs, mode, chosen) {
   const thing = ENDS[mode === "cloud" ? 1 : 0];
   if (chosen)
     return `point ${chosen[0] + 1} on the ${thing}: click where it belongs, drag it, or move it by arrow keys`;
@@ -419,15 +423,15 @@ function hint(pairs, mode, chosen) {
   return `point ${(open >= 0 ? open : pairs.length) + 1} on the ${thing}`;
 }
 
-function dress() {
+function applyTheme() {
   const inside = frame.contentDocument?.documentElement;
   if (inside) inside.style.colorScheme = document.documentElement.dataset.theme;
 }
 
-const broken = (problem) =>
+const errorCard = (problem) =>
   element(
     "div",
     { class: "note-card bad", role: "alert" },
-    element("strong", {}, title(problem)),
+    element("strong", {}, errorTitle(problem)),
     problem.message,
   );

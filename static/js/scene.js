@@ -1,12 +1,12 @@
 // The 3D: the viewer in its frame, and the socket that says what to show.
 import * as camera from "./camera.js";
 import * as capture from "./capture.js";
-import { onKey } from "./keys.js";
+import { handleShortcut } from "./shortcuts.js";
 import * as layers from "./layers.js";
 import * as legend from "./legend.js";
-import { wish } from "./looks.js";
-import { on, set, state } from "./store.js";
-import * as views from "./views.js";
+import { viewRequest } from "./layer-styles.js";
+import { subscribe, set, state } from "./store.js";
+import * as views from "./view-tools.js";
 
 const SENT = [
   "run",
@@ -36,18 +36,18 @@ export function start() {
   legend.start();
   views.start(page);
   capture.start(page);
-  on([...SENT, "series"], () => send());
-  window.addEventListener("keydown", onKey);
-  on(["theme"], dress);
-  on(["heading"], note);
+  subscribe([...SENT, "series"], () => send());
+  window.addEventListener("keydown", handleShortcut);
+  subscribe(["theme"], applyTheme);
+  subscribe(["heading"], showNote);
   const frame = document.getElementById("viewer");
   frame.addEventListener("load", () => {
-    dress();
-    frame.contentWindow.addEventListener("keydown", onKey, true);
+    applyTheme();
+    frame.contentWindow.addEventListener("keydown", handleShortcut, true);
     for (const watch of watchers) watch(frame.contentWindow);
   });
-  onViewer(camera.keep);
-  camera.restore(page).finally(openFrame);
+  onViewerLoad(camera.watchCamera);
+  camera.restoreCamera(page).finally(openFrame);
   connect();
 }
 
@@ -56,7 +56,7 @@ export const pageId = () => page;
 const watchers = [];
 
 /** Call with the viewer's window each time it is opened. */
-export function onViewer(watch) {
+export function onViewerLoad(watch) {
   watchers.push(watch);
 }
 
@@ -69,25 +69,25 @@ function connect() {
   let opened = false;
   socket = new WebSocket(address);
   socket.onopen = () => {
-    if (wait > 500) camera.restore(page).finally(openFrame);
+    if (wait > 500) camera.restoreCamera(page).finally(openFrame);
     opened = true;
     wait = 500;
     busy = false;
-    note();
+    showNote();
     send();
   };
   socket.onmessage = ({ data }) => {
     const held = JSON.parse(data);
     busy = false;
-    if (held.problem) note(held.problem.message);
+    if (held.problem) showNote(held.problem.message);
     else {
       set({ held });
-      note();
+      showNote();
     }
     if (stale) send();
   };
   socket.onclose = () => {
-    note(
+    showNote(
       "The server does not answer. Trying again; if it was stopped, start it with: palpate serve",
     );
     wait = Math.min(opened ? 1000 : wait * 1.6, 8000);
@@ -96,7 +96,7 @@ function connect() {
 }
 
 /** Ask again for what is shown, where it has changed on the server. */
-export const refresh = () => send();
+export const refreshScene = () => send();
 
 /** Ask for what is wanted now; while an answer is awaited only the newest wish is kept. */
 function send() {
@@ -107,11 +107,11 @@ function send() {
   }
   busy = true;
   stale = false;
-  socket.send(JSON.stringify(wish()));
+  socket.send(JSON.stringify(viewRequest()));
 }
 
 /** Words over the scene while there is nothing to see in it. */
-function note(text = null) {
+function showNote(text = null) {
   const box = document.getElementById("scene-note");
   const message =
     typeof text === "string"
@@ -125,7 +125,7 @@ function note(text = null) {
   if (message) box.textContent = message;
 }
 
-function dress() {
+function applyTheme() {
   const inside = document.getElementById("viewer").contentDocument?.documentElement;
   if (inside) inside.style.colorScheme = state().theme;
 }

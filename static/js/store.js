@@ -1,5 +1,5 @@
 // What the page shows, in one place; parts subscribe to the keys they draw. Some keys outlive the page.
-const KEPT = [
+const STORED_KEYS = [
   "run",
   "sequence",
   "layers",
@@ -14,7 +14,7 @@ const KEPT = [
   "crop",
 ];
 
-const kept = () => {
+const readStored = () => {
   try {
     return JSON.parse(localStorage.getItem("palpate.view")) ?? {};
   } catch {
@@ -46,7 +46,7 @@ const values = {
   trial: false,
   live: false,
   theme: document.documentElement.dataset.theme,
-  ...kept(),
+  ...readStored(),
 };
 const listeners = [];
 
@@ -58,16 +58,16 @@ export function set(changes) {
   );
   if (!changed.length) return;
   Object.assign(values, changes);
-  if (changed.some((key) => KEPT.includes(key))) {
+  if (changed.some((key) => STORED_KEYS.includes(key))) {
     localStorage.setItem(
       "palpate.view",
-      JSON.stringify(Object.fromEntries(KEPT.map((key) => [key, values[key]]))),
+      JSON.stringify(Object.fromEntries(STORED_KEYS.map((key) => [key, values[key]]))),
     );
   }
   for (const [keys, listener] of listeners)
     if (changed.some((key) => keys.includes(key))) listener(values);
 }
 
-export function on(keys, listener) {
+export function subscribe(keys, listener) {
   listeners.push([keys, listener]);
 }

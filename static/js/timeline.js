@@ -1,13 +1,13 @@
 // Time: play by the wall clock, step, scrub; one cursor for scene and plot.
 import { element, fill, icon, swatch } from "./dom.js";
-import { mm } from "./format.js";
-import { bind } from "./keys.js";
-import * as loop from "./loop.js";
-import { drawPlot, frameAt, told } from "./plot.js";
-import { on, set, state } from "./store.js";
+import { formatMm } from "./format.js";
+import { bindShortcuts } from "./shortcuts.js";
+import * as loop from "./playback-loop.js";
+import { drawPlot, frameAt, frameSummary } from "./timeline-plot.js";
+import { subscribe, set, state } from "./store.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
-const SHOWN = { raw: "Raw", extended: "Extended", corrected: "Corrected" };
+const MODEL_LABELS = { raw: "Raw", extended: "Extended", corrected: "Corrected" };
 let clock = 0;
 let last = 0;
 
@@ -36,26 +36,26 @@ export function start() {
     go(+scrub.value);
   });
   const far = (event) => (event.shiftKey ? 10 : 1);
-  bind({
+  bindShortcuts({
     " ": toggle,
     ArrowLeft: (event) => step(-far(event)),
     ArrowRight: (event) => step(far(event)),
     Home: () => step(-1e9),
     End: () => step(1e9),
   });
-  bind(
+  bindShortcuts(
     Object.fromEntries(
-      Object.entries(loop.KEYS).map(([key, action]) => [key, () => action(count())]),
+      Object.entries(loop.LOOP_SHORTCUTS).map(([key, action]) => [key, () => action(count())]),
     ),
   );
   watchPlot();
   loop.start(count);
-  on(["playing"], ({ playing }) => {
+  subscribe(["playing"], ({ playing }) => {
     fill("play", icon(playing ? "pause" : "play"));
     if (playing) begin();
   });
-  on(["frame", "series", "theme", "palette", "loop"], draw);
-  on(["series", "frame"], drawWorst);
+  subscribe(["frame", "series", "theme", "palette", "loop"], draw);
+  subscribe(["series", "frame"], drawWorst);
   new ResizeObserver(() => {
     draw();
     drawWorst();
@@ -76,7 +76,7 @@ function step(by) {
 
 function toggle() {
   if (!count()) return;
-  const [from, to] = loop.range(count());
+  const [from, to] = loop.playedRange(count());
   if (!state().playing && (state().frame >= to || state().frame < from)) go(from);
   set({ playing: !state().playing });
 }
@@ -92,7 +92,7 @@ function tick(now) {
   if (!playing || !series) return;
   clock += ((now - last) / 1e3) * speed;
   last = now;
-  const [from, to] = loop.range(count()).map((frame) => series.time[frame]);
+  const [from, to] = loop.playedRange(count()).map((frame) => series.time[frame]);
   if (clock >= to && state().loop && to > from) clock = from + ((clock - from) % (to - from));
   set({ frame: frameAt(series.time, Math.min(clock, to)) });
   if (clock >= to) set({ playing: false });
@@ -117,10 +117,12 @@ function watchPlot() {
     if (!count()) return;
     const frame = frameOf(event);
     if (dragging && marked === null) go(frame);
-    if (dragging && marked !== null) loop.mark(marked, frame, count());
+    if (dragging && marked !== null) loop.setLoop(marked, frame, count());
     const { series } = state();
     tip.hidden = false;
-    tip.textContent = [`${series.time[frame].toFixed(2)} s`, ...told(series, frame)].join("\n");
+    tip.textContent = [`${series.time[frame].toFixed(2)} s`, ...frameSummary(series, frame)].join(
+      "\n",
+    );
     const half = tip.offsetWidth / 2 + 4;
     tip.style.left = `${Math.max(half, Math.min(canvas.clientWidth - half, event.offsetX))}px`;
     tip.style.top = "2px";
@@ -149,7 +151,7 @@ function drawWorst() {
               style: { left: `${canvas.timeToPixel(series.time[at])}px` },
               "aria-pressed": String(frame === at),
               "data-frame": at,
-              title: `${["Worst", "Second worst", "Third worst"][place]} frame, ${at + 1}: raw ${mm(series.distance_raw[at])}`,
+              title: `${["Worst", "Second worst", "Third worst"][place]} frame, ${at + 1}: raw ${formatMm(series.distance_raw[at])}`,
               onclick: (event) => {
                 set({ playing: false });
                 go(at);
@@ -163,7 +165,7 @@ function drawWorst() {
   );
 }
 
-const number = (thing, label, value) =>
+const readoutEntry = (thing, label, value) =>
   element(
     "span",
     { title: label },
@@ -193,11 +195,11 @@ function draw() {
     series
       ? [
           ...series.models.map((name) =>
-            number(name, SHOWN[name], mm(series[`distance_${name}`][at], false)),
+            readoutEntry(name, MODEL_LABELS[name], formatMm(series[`distance_${name}`][at], false)),
           ),
-          number("floor", "Floor", mm(series.noise_floor)),
+          readoutEntry("floor", "Floor", formatMm(series.noise_floor)),
         ]
       : [],
   ).classList.toggle("full", (series?.models.length ?? 0) > 2);
-  drawPlot(document.getElementById("plot"), series, at, loop.range(count()));
+  drawPlot(document.getElementById("plot"), series, at, loop.playedRange(count()));
 }

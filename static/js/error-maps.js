@@ -1,16 +1,16 @@
 // Patch pictures on the unfolded box: the top in the middle, the sides folded out; sides that were never seen are left out.
 import { element, fill } from "./dom.js";
-import { bandOf, scaleBar } from "./scale.js";
+import { bandIndex, scaleBar } from "./colour-scale.js";
 
 const FACES = ["top", "+x", "-x", "+y", "-y"];
-const FOLD = {
+const UNFOLDED = {
   top: ([x, y]) => [x, y],
   "+x": ([, y, z], [sx, , sz]) => [sx / 2 + sz - z, y],
   "-x": ([, y, z], [sx, , sz]) => [-sx / 2 - (sz - z), y],
   "+y": ([x, , z], [, sy, sz]) => [x, sy / 2 + sz - z],
   "-y": ([x, , z], [, sy, sz]) => [x, -sy / 2 - (sz - z)],
 };
-const CORNERS = {
+const FACE_RECTS = {
   top: ([sx, sy]) => [-sx / 2, -sy / 2, sx / 2, sy / 2],
   "+x": ([sx, sy, sz]) => [sx / 2, -sy / 2, sx / 2 + sz, sy / 2],
   "-x": ([sx, sy, sz]) => [-sx / 2 - sz, -sy / 2, -sx / 2, sy / 2],
@@ -19,7 +19,7 @@ const CORNERS = {
 };
 
 export function patternSection(patterns, size, palette, explained = true) {
-  const box = unfold(patterns, size);
+  const box = unfoldPatches(patterns, size);
   if (!box.faces.length)
     return element(
       "p",
@@ -39,7 +39,7 @@ export function patternSection(patterns, size, palette, explained = true) {
     const seen = new ResizeObserver(() => {
       if (!canvas.clientWidth) return;
       seen.disconnect();
-      paint(canvas, box, patterns[key], patterns.limit, palette);
+      drawMap(canvas, box, patterns[key], patterns.limit, palette);
     });
     seen.observe(canvas);
     return element(
@@ -73,19 +73,19 @@ export function patternSection(patterns, size, palette, explained = true) {
 }
 
 /** Places of the patches on the plane, by face, and the rectangle that holds all faces with anything seen. */
-function unfold({ centres, normals, measured }, size) {
+function unfoldPatches({ centres, normals, measured }, size) {
   const byFace = Object.fromEntries(FACES.map((face) => [face, []]));
   centres.forEach((centre, index) => {
     const face = faceOf(normals[index]);
-    if (face) byFace[face].push({ index, at: FOLD[face](centre, size) });
+    if (face) byFace[face].push({ index, at: UNFOLDED[face](centre, size) });
   });
   const faces = FACES.filter((face) =>
     byFace[face].some(({ index }) => measured[index] !== null),
   ).map((name) => ({
     name,
     patches: byFace[name],
-    rect: CORNERS[name](size),
-    spacing: spacing(byFace[name]),
+    rect: FACE_RECTS[name](size),
+    spacing: medianSpacing(byFace[name]),
   }));
   const rects = faces.map(({ rect }) => rect);
   const bounds = [0, 1]
@@ -100,7 +100,7 @@ function faceOf(normal) {
   return (normal[axis] > 0 ? "+" : "-") + "xy"[axis];
 }
 
-function spacing(patches) {
+function medianSpacing(patches) {
   const nearest = patches.map((a) =>
     Math.min(
       ...patches.map((b) =>
@@ -112,7 +112,7 @@ function spacing(patches) {
   return nearest[Math.floor(nearest.length / 2)] || 0.003;
 }
 
-function paint(canvas, { faces, bounds }, values, limit, palette) {
+function drawMap(canvas, { faces, bounds }, values, limit, palette) {
   const [left, low, right, high] = bounds;
   const ratio = devicePixelRatio || 1;
   const width = Math.round(canvas.clientWidth * ratio);
@@ -139,7 +139,7 @@ function paint(canvas, { faces, bounds }, values, limit, palette) {
         const rgb =
           value === null
             ? palette.things.unseen
-            : palette.signed[bandOf(value, limit, palette.signed.length)];
+            : palette.signed[bandIndex(value, limit, palette.signed.length)];
         image.data.set([...rgb, value === null ? 110 : 255], 4 * (row * width + column));
       }
     }

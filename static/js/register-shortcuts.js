@@ -1,7 +1,7 @@
 // The keyboard of manual registration.
 const STEP = 0.0002;
 
-export const KEYS = [
+export const REGISTER_SHORTCUTS = [
   ["C, M", "clicks are for the cloud, for the phantom"],
   ["1 to 9", "choose that pair’s end on this side"],
   ["Arrows", "move the chosen end by 0.2 mm, with Shift by 1 mm"],
@@ -14,7 +14,7 @@ export const KEYS = [
 ];
 
 /** Does what a key asks for; keys that are nobody's here go on to others. */
-export function onKeys(event, work, actions) {
+export function handleRegisterShortcut(event, work, actions) {
   if (event.target?.matches?.("input, select, textarea") || document.querySelector("dialog[open]"))
     return;
   const { chosen, pairs, mode, found, over } = work.values;

@@ -1,20 +1,20 @@
 // What if: causes switched on and off and moved by sliders; the shown frame is solved again at once.
 import { get, post, remove, toast } from "./api.js";
-import { ends, position, valueAt } from "./coordinate.js";
+import { sliderRange, toPosition, fromPosition } from "./slider-scale.js";
 import { element, fill } from "./dom.js";
-import { capital, mm, UNITS, words } from "./format.js";
+import { capitalise, formatMm, UNITS, readableName } from "./format.js";
 import { addPanel, openedPanel, openPanel } from "./panels.js";
 import { pageId } from "./scene.js";
-import { on, set, state } from "./store.js";
+import { subscribe, set, state } from "./store.js";
 
 const KEY = "palpate.whatif";
 let box = null;
 let catalogue = null;
-let known = null; // {key, model, beginnings} of the run and sequence that are shown
+let sequenceModel = null; // {key, model, beginnings} of the run and sequence that are shown
 let rows = []; // {effect, on, parameters}
 let tuned = true;
-let past = [];
-let looked = null; // what the scene showed before this panel came to the front
+let undoStack = [];
+let previousView = null; // what the scene showed before this panel came to the front
 let busy = false;
 let stale = false;
 let answer = null;
@@ -22,16 +22,16 @@ let answer = null;
 export function start() {
   box = addPanel("whatif", "What if", open, leave);
   box.addEventListener("keydown", (event) => {
-    if ((event.ctrlKey || event.metaKey) && event.key === "z" && past.length) {
+    if ((event.ctrlKey || event.metaKey) && event.key === "z" && undoStack.length) {
       event.preventDefault();
       undo();
     }
   });
-  on(["run", "sequence"], () => {
+  subscribe(["run", "sequence"], () => {
     if (openedPanel() === "whatif") open();
   });
-  on(["frame", "playing"], () => {
-    if (openedPanel() === "whatif" && known && !state().playing) solve();
+  subscribe(["frame", "playing"], () => {
+    if (openedPanel() === "whatif" && sequenceModel && !state().playing) solve();
   });
 }
 
@@ -40,7 +40,7 @@ async function open() {
   if (!run || !sequence) {
     fill(
       box,
-      says(
+      mutedText(
         "Choose a diagnosis on the left; here you then try its causes on the frame that is shown.",
       ),
     );
@@ -49,35 +49,35 @@ async function open() {
   if (!heading?.has_clouds) {
     fill(
       box,
-      says(
+      mutedText(
         "The dataset of this diagnosis is not where it was, so that there is nothing to compare with.",
       ),
     );
     return;
   }
-  looked ??= { layers, colour };
+  previousView ??= { layers, colour };
   set({
     layers: layers.includes("extended") ? layers : [...layers, "extended"],
     colour: "extended",
     trial: true,
   });
   const key = `${run}/${sequence}`;
-  if (known?.key === key) {
+  if (sequenceModel?.key === key) {
     draw();
     solve();
     return;
   }
-  known = null;
-  fill(box, says("Reading the dataset again, so that frames can be solved …"));
+  sequenceModel = null;
+  fill(box, mutedText("Reading the dataset again, so that frames can be solved …"));
   try {
     catalogue ??= await get("/effects");
-    const found = await get(address("whatif"));
+    const found = await get(sequencePath("whatif"));
     if (`${state().run}/${state().sequence}` !== key) return;
-    const same = recall(run);
-    known = { key, ...found };
-    rows = same?.rows ?? asDiagnosed();
+    const same = storedRows(run);
+    sequenceModel = { key, ...found };
+    rows = same?.rows ?? diagnosedRows();
     tuned = same?.tuned ?? true;
-    past = [];
+    undoStack = [];
     draw();
     solve();
   } catch (problem) {
@@ -94,26 +94,26 @@ async function open() {
 }
 
 function leave() {
-  if (looked) set(looked);
-  looked = null;
+  if (previousView) set(previousView);
+  previousView = null;
   if (answer) remove(`/sessions/${pageId()}/whatif`).catch(() => {}); // a page that was never shown has nothing to go back to
   answer = null;
   set({ trial: false });
 }
 
-const says = (text) => element("p", { class: "muted" }, text);
+const mutedText = (text) => element("p", { class: "muted" }, text);
 
-const address = (verb) =>
+const sequencePath = (verb) =>
   `/runs/${encodeURIComponent(state().run)}/sequences/${encodeURIComponent(state().sequence)}/${verb}`;
 
-const asDiagnosed = () =>
-  known.model.map(({ effect, parameters }) => ({
+const diagnosedRows = () =>
+  sequenceModel.model.map(({ effect, parameters }) => ({
     effect,
     on: true,
     parameters: { ...parameters },
   }));
 
-function recall(run) {
+function storedRows(run) {
   try {
     const kept = JSON.parse(sessionStorage.getItem(KEY));
     return kept?.run === run ? kept : null;
@@ -123,9 +123,9 @@ function recall(run) {
 }
 
 /** Change something: `act` moves rows; what was before can be undone. A slider that is dragged is one change. */
-function change(act, whole = true) {
+function applyChange(act, whole = true) {
   const before = JSON.stringify({ rows, tuned });
-  if (whole) past.push(before);
+  if (whole) undoStack.push(before);
   act();
   sessionStorage.setItem(KEY, JSON.stringify({ run: state().run, rows, tuned }));
   if (whole) draw();
@@ -133,7 +133,7 @@ function change(act, whole = true) {
 }
 
 function undo() {
-  const before = JSON.parse(past.pop());
+  const before = JSON.parse(undoStack.pop());
   rows = before.rows;
   tuned = before.tuned;
   sessionStorage.setItem(KEY, JSON.stringify({ run: state().run, rows, tuned }));
@@ -158,7 +158,7 @@ async function solve() {
     const effects = rows
       .filter((row) => row.on)
       .map(({ effect, parameters }) => ({ effect, parameters }));
-    answer = await post(address("whatif"), { frame, effects, tuned, page: pageId() });
+    answer = await post(sequencePath("whatif"), { frame, effects, tuned, page: pageId() });
   } catch (problem) {
     answer = { problem };
   }
@@ -173,10 +173,10 @@ async function solve() {
 }
 
 function draw() {
-  const changed = JSON.stringify(rows) !== JSON.stringify(asDiagnosed()) || !tuned;
+  const changed = JSON.stringify(rows) !== JSON.stringify(diagnosedRows()) || !tuned;
   const absent = catalogue.filter(
     ({ name }) =>
-      known.beginnings.some(({ effect }) => effect === name) &&
+      sequenceModel.beginnings.some(({ effect }) => effect === name) &&
       !rows.some(({ effect }) => effect === name),
   );
   fill(
@@ -188,12 +188,12 @@ function draw() {
       "Switch causes on and off and move them: the frame that is shown is solved again, and takes the place of the extended model in the scene.",
     ),
     element("div", { id: "whatif-answer" }),
-    rows.map(card),
+    rows.map(causeCard),
     element(
       "label",
       { class: "whatif-switch" },
-      toggle(tuned, () =>
-        change(() => {
+      switchInput(tuned, () =>
+        applyChange(() => {
           tuned = !tuned;
         }),
       ),
@@ -204,15 +204,21 @@ function draw() {
       { class: "actions" },
       element(
         "select",
-        { "aria-label": "Add a cause", onchange: (event) => add(event.target.value) },
+        { "aria-label": "Add a cause", onchange: (event) => addCause(event.target.value) },
         element("option", { value: "" }, "Add a cause …"),
         absent.map(({ name, summary }) =>
-          element("option", { value: name, title: summary }, capital(words(name))),
+          element("option", { value: name, title: summary }, capitalise(readableName(name))),
         ),
       ),
       element(
         "button",
-        { class: "button", type: "button", disabled: !past.length, title: "Ctrl+Z", onclick: undo },
+        {
+          class: "button",
+          type: "button",
+          disabled: !undoStack.length,
+          title: "Ctrl+Z",
+          onclick: undo,
+        },
         "Undo",
       ),
       element(
@@ -232,8 +238,8 @@ function draw() {
           type: "button",
           disabled: !changed,
           onclick: () =>
-            change(() => {
-              rows = asDiagnosed();
+            applyChange(() => {
+              rows = diagnosedRows();
               tuned = true;
             }),
         },
@@ -260,15 +266,15 @@ async function replayAll({ currentTarget }) {
   currentTarget.disabled = false;
 }
 
-const toggle = (checked, act) =>
+const switchInput = (checked, act) =>
   element("input", { type: "checkbox", role: "switch", checked, onchange: act });
 
-function card(row) {
+function causeCard(row) {
   const effect = catalogue.find(({ name }) => name === row.effect);
   const beginning =
-    known.model.find((one) => one.effect === row.effect) ??
-    known.beginnings.find((one) => one.effect === row.effect);
-  const own = known.model.some((one) => one.effect === row.effect);
+    sequenceModel.model.find((one) => one.effect === row.effect) ??
+    sequenceModel.beginnings.find((one) => one.effect === row.effect);
+  const own = sequenceModel.model.some((one) => one.effect === row.effect);
   return element(
     "fieldset",
     { class: row.on ? "whatif-card" : "whatif-card off", "data-effect": row.effect },
@@ -278,12 +284,12 @@ function card(row) {
       element(
         "label",
         { class: "whatif-switch", title: effect.summary },
-        toggle(row.on, () =>
-          change(() => {
+        switchInput(row.on, () =>
+          applyChange(() => {
             row.on = !row.on;
           }),
         ),
-        capital(words(row.effect)),
+        capitalise(readableName(row.effect)),
       ),
       own
         ? null
@@ -292,9 +298,9 @@ function card(row) {
             {
               class: "link",
               type: "button",
-              "aria-label": `Take ${words(row.effect)} away`,
+              "aria-label": `Take ${readableName(row.effect)} away`,
               onclick: () =>
-                change(() => {
+                applyChange(() => {
                   rows = rows.filter((other) => other !== row);
                 }),
             },
@@ -302,22 +308,24 @@ function card(row) {
           ),
     ),
     effect.parameters.map((item) =>
-      item.choices.length ? choice(row, item) : slider(row, item, beginning.parameters[item.name]),
+      item.choices.length
+        ? choiceField(row, item)
+        : sliderField(row, item, beginning.parameters[item.name]),
     ),
   );
 }
 
-function choice(row, item) {
+function choiceField(row, item) {
   return element(
     "label",
     { class: "whatif-parameter" },
-    element("span", {}, words(item.name)),
+    element("span", {}, readableName(item.name)),
     element(
       "select",
       {
         disabled: !row.on,
         onchange: (event) =>
-          change(() => {
+          applyChange(() => {
             row.parameters[item.name] = event.target.value;
           }),
       },
@@ -328,17 +336,17 @@ function choice(row, item) {
   );
 }
 
-function slider(row, item, beginning) {
-  const span = ends(item, beginning);
+function sliderField(row, item, beginning) {
+  const span = sliderRange(item, beginning);
   const [factor, unit] = UNITS[item.unit] ?? [1, item.unit];
   const shown = () => Number((row.parameters[item.name] * factor).toPrecision(4));
-  const label = `${capital(words(row.effect))}: ${words(item.name)}`;
+  const label = `${capitalise(readableName(row.effect))}: ${readableName(item.name)}`;
   const bar = element("input", {
     type: "range",
     min: 0,
     max: 1000,
     step: 1,
-    value: position(item, span, row.parameters[item.name]),
+    value: toPosition(item, span, row.parameters[item.name]),
     disabled: !row.on,
     "aria-label": label,
   });
@@ -352,11 +360,11 @@ function slider(row, item, beginning) {
   let begun = false;
   bar.addEventListener("input", () => {
     if (!begun) {
-      past.push(JSON.stringify({ rows, tuned }));
+      undoStack.push(JSON.stringify({ rows, tuned }));
       begun = true;
     }
-    change(() => {
-      row.parameters[item.name] = valueAt(item, span, +bar.value);
+    applyChange(() => {
+      row.parameters[item.name] = fromPosition(item, span, +bar.value);
     }, false);
     number.value = shown();
   });
@@ -368,25 +376,27 @@ function slider(row, item, beginning) {
   number.addEventListener("change", () => {
     const value = +number.value / factor;
     if (number.value === "" || value < (item.low ?? -Infinity) || value > (item.high ?? Infinity)) {
-      number.setCustomValidity(`${words(item.name)} lies between ${between(item, factor, unit)}`);
+      number.setCustomValidity(
+        `${readableName(item.name)} lies between ${boundsText(item, factor, unit)}`,
+      );
       number.reportValidity();
       return;
     }
-    change(() => {
+    applyChange(() => {
       row.parameters[item.name] = value;
     });
   });
   return element(
     "div",
     { class: "whatif-parameter" },
-    element("span", {}, words(item.name)),
+    element("span", {}, readableName(item.name)),
     bar,
     number,
     element("span", { class: "unit" }, unit),
   );
 }
 
-const between = ({ low, high }, factor, unit) =>
+const boundsText = ({ low, high }, factor, unit) =>
   `${low === null ? "−∞" : low * factor} and ${high === null ? "∞" : high * factor}${unit ? ` ${unit}` : ""}`;
 
 const refocus = (label) =>
@@ -394,10 +404,10 @@ const refocus = (label) =>
     .find((bar) => bar.getAttribute("aria-label") === label)
     ?.focus();
 
-function add(name) {
-  const beginning = known.beginnings.find(({ effect }) => effect === name);
+function addCause(name) {
+  const beginning = sequenceModel.beginnings.find(({ effect }) => effect === name);
   if (beginning)
-    change(() => {
+    applyChange(() => {
       rows = [...rows, { effect: name, on: true, parameters: { ...beginning.parameters } }];
     });
 }
@@ -417,7 +427,7 @@ function drawAnswer() {
     return;
   }
   if (typeof answer?.distance !== "number" && !answer?.outcome) {
-    fill("whatif-answer", says("Solving …"));
+    fill("whatif-answer", mutedText("Solving …"));
     return;
   }
   const {
@@ -454,7 +464,7 @@ function drawAnswer() {
               style: { width: `${(100 * (value ?? 0)) / most}%`, background: `var(--${thing})` },
             }),
           ),
-          element("span", { class: "bar-value", "data-model": thing }, mm(value)),
+          element("span", { class: "bar-value", "data-model": thing }, formatMm(value)),
         ]),
       ),
       converged
@@ -463,7 +473,7 @@ function drawAnswer() {
             "div",
             { class: "note-card bad" },
             element("strong", {}, "No equilibrium"),
-            `${capital(outcome)}.`,
+            `${capitalise(outcome)}.`,
           ),
     ),
   );

@@ -1,11 +1,11 @@
 // The panel of the correction network: train it on a model, watch it learn, and see what it is worth beside naming the cause.
-import { get, post, title } from "./api.js";
-import { curve, ladderPicture } from "./correction-plots.js";
+import { get, post, errorTitle } from "./api.js";
+import { validationCurve, ladderChart } from "./correction-plots.js";
 import { element, fill } from "./dom.js";
-import { capital } from "./format.js";
-import { onDone, opens } from "./jobs.js";
+import { capitalise } from "./format.js";
+import { onJobsDone, addResultOpener } from "./jobs.js";
 import { addPanel, openedPanel, openPanel } from "./panels.js";
-import { on, state } from "./store.js";
+import { subscribe, state } from "./store.js";
 
 const KINDS = [
   ["unet2d", "2D U-Net, top layer"],
@@ -14,61 +14,69 @@ const KINDS = [
 ];
 const PAUSE = 900;
 let box = null;
-let chosen = { dataset: null, run: "", kind: "unet2d", trust: 0.5, hold: 1, epochs: 40, every: 1 };
-let watched = null; // {kind: "trainings" | "evaluations", id}
-let turn = 0;
+let settings = {
+  dataset: null,
+  run: "",
+  kind: "unet2d",
+  trust: 0.5,
+  hold: 1,
+  epochs: 40,
+  every: 1,
+};
+let followed = null; // {kind: "trainings" | "evaluations", id}
+let generation = 0;
 
 export function start(refresh) {
-  box = addPanel("correction", "Correction", opened, () => {
-    turn += 1;
+  box = addPanel("correction", "Correction", followPanel, () => {
+    generation += 1;
   });
-  opens("training", "Open the training", (id) => show("trainings", id));
-  opens("evaluation", "Open the ladder", (id) => show("evaluations", id));
-  onDone((jobs) => {
+  addResultOpener("training", "Open the training", (id) => show("trainings", id));
+  addResultOpener("evaluation", "Open the ladder", (id) => show("evaluations", id));
+  onJobsDone((jobs) => {
     if (jobs.some(({ kind, result }) => kind === "training" && result)) refresh();
   });
-  on(["run"], () => {
-    if (openedPanel() === "correction" && !watched) opened();
+  subscribe(["run"], () => {
+    if (openedPanel() === "correction" && !followed) followPanel();
   });
 }
 
 function show(kind, id) {
-  watched = { kind, id };
+  followed = { kind, id };
   openPanel("correction");
 }
 
-const broken = (problem) =>
+const errorCard = (problem) =>
   element(
     "div",
     { class: "note-card bad", role: "alert" },
-    element("strong", {}, title(problem)),
+    element("strong", {}, errorTitle(problem)),
     problem.message,
   );
 const isOpen = (job) => job && ["queued", "running"].includes(job.state);
 
-async function opened() {
-  const mine = ++turn;
-  while (mine === turn && openedPanel() === "correction") {
+async function followPanel() {
+  const mine = ++generation;
+  while (mine === generation && openedPanel() === "correction") {
     let again = false;
     try {
-      again = watched ? await drawOne(mine) : await drawAll(mine);
+      again = followed ? await drawOne(mine) : await drawAll(mine);
     } catch (problem) {
-      if (mine === turn) fill(box, broken(problem), back());
+      if (mine === generation) fill(box, errorCard(problem), backButton());
     }
     if (!again) return;
     await new Promise((done) => setTimeout(done, PAUSE));
   }
 }
 
-const back = () =>
+const backButton = () =>
   element(
     "button",
     {
       class: "button",
       type: "button",
       onclick: () => {
-        watched = null;
-        opened();
+        followed = null;
+        followPanel();
       },
     },
     "All of them",
@@ -82,7 +90,7 @@ async function drawAll(mine) {
     get("/trainings"),
     get("/evaluations"),
   ]);
-  if (mine !== turn) return false;
+  if (mine !== generation) return false;
   if (!datasets.length) {
     fill(
       box,
@@ -100,14 +108,16 @@ async function drawAll(mine) {
     return false;
   }
   const current = runs.find(({ id }) => id === state().run);
-  if (!datasets.includes(chosen.dataset))
-    chosen = {
-      ...chosen,
+  if (!datasets.includes(settings.dataset))
+    settings = {
+      ...settings,
       dataset: datasets.includes(current?.folder) ? current.folder : datasets[0],
       run: "",
     };
-  const models = runs.filter(({ folder: own, causes }) => own === chosen.dataset && causes?.length);
-  const newest = evaluations.find(({ summary }) => summary?.folder === chosen.dataset);
+  const models = runs.filter(
+    ({ folder: own, causes }) => own === settings.dataset && causes?.length,
+  );
+  const newest = evaluations.find(({ summary }) => summary?.folder === settings.dataset);
   fill(
     box,
     element("div", { class: "eyebrow" }, "Correction"),
@@ -116,7 +126,7 @@ async function drawAll(mine) {
       { class: "verdict" },
       newest?.summary.sentence ?? "What can a network learn of the error that the model leaves?",
     ),
-    newest ? ladderPicture(newest.summary) : null,
+    newest ? ladderChart(newest.summary) : null,
     form(datasets, models),
     list("Trainings", "trainings", trainings),
     list("Ladders", "evaluations", evaluations),
@@ -130,14 +140,14 @@ function form(datasets, models) {
       "select",
       { name },
       entries.map(([value, label]) =>
-        element("option", { value, selected: String(chosen[name]) === value }, label),
+        element("option", { value, selected: String(settings[name]) === value }, label),
       ),
     );
     node.addEventListener("change", () => {
-      chosen[name] = node.value;
+      settings[name] = node.value;
       if (name === "dataset") {
-        chosen.run = "";
-        opened();
+        settings.run = "";
+        followPanel();
       }
     });
     return node;
@@ -146,14 +156,14 @@ function form(datasets, models) {
     const field = element("input", {
       name,
       type: "number",
-      value: chosen[name],
+      value: settings[name],
       min: low,
       max: high,
       step,
       required: true,
     });
     field.addEventListener("change", () => {
-      chosen[name] = +field.value;
+      settings[name] = +field.value;
     });
     return element("label", {}, label, field);
   };
@@ -163,8 +173,8 @@ function form(datasets, models) {
       class: "sweep-form",
       onsubmit: async (event) => {
         event.preventDefault();
-        const { dataset, run, ...rest } = chosen;
-        await ask("trainings", { dataset, run: run || null, ...rest }, whole);
+        const { dataset, run, ...rest } = settings;
+        await requestJob("trainings", { dataset, run: run || null, ...rest }, whole);
       },
     },
     element(
@@ -210,7 +220,11 @@ function form(datasets, models) {
           type: "button",
           title: "Compares models and their newest networks on the test sequences",
           onclick: () =>
-            ask("evaluations", { dataset: chosen.dataset, run: chosen.run || null }, whole),
+            requestJob(
+              "evaluations",
+              { dataset: settings.dataset, run: settings.run || null },
+              whole,
+            ),
         },
         "Measure the ladder",
       ),
@@ -219,15 +233,15 @@ function form(datasets, models) {
   return whole;
 }
 
-async function ask(kind, body, near) {
+async function requestJob(kind, body, near) {
   for (const button of near.querySelectorAll("button")) button.disabled = true;
   try {
-    watched = { kind, id: (await post(`/${kind}`, body)).id };
-    opened();
+    followed = { kind, id: (await post(`/${kind}`, body)).id };
+    followPanel();
   } catch (problem) {
     for (const button of near.querySelectorAll("button")) button.disabled = false;
     near.querySelector(".note-card")?.remove();
-    near.append(broken(problem));
+    near.append(errorCard(problem));
   }
 }
 
@@ -247,8 +261,8 @@ function list(heading, kind, entries) {
             type: "button",
             [`data-${kind}`]: id,
             onclick: () => {
-              watched = { kind, id };
-              opened();
+              followed = { kind, id };
+              followPanel();
             },
           },
           element("span", {}, id),
@@ -267,16 +281,16 @@ function list(heading, kind, entries) {
 
 /** One training or evaluation; whether it goes on. */
 async function drawOne(mine) {
-  const { kind, id } = watched;
+  const { kind, id } = followed;
   const whole = await get(`/${kind}/${encodeURIComponent(id)}`);
-  if (mine !== turn) return false;
+  if (mine !== generation) return false;
   const { job } = whole;
   const say =
     (path) =>
     async ({ currentTarget }) => {
       currentTarget.disabled = true;
-      await post(path).catch((problem) => box.append(broken(problem)));
-      opened();
+      await post(path).catch((problem) => box.append(errorCard(problem)));
+      followPanel();
     };
   fill(
     box,
@@ -292,7 +306,7 @@ async function drawOne(mine) {
       "h1",
       { class: "verdict" },
       kind === "trainings"
-        ? learned(whole)
+        ? trainingSentence(whole)
         : (whole.summary?.sentence ?? "Measuring the test sequences …"),
     ),
     isOpen(job)
@@ -304,21 +318,21 @@ async function drawOne(mine) {
             { class: "sweep-progress" },
             element("i", { style: { width: `${100 * job.fraction}%` } }),
           ),
-          element("p", { class: "gain-note" }, capital(job.text)),
+          element("p", { class: "gain-note" }, capitalise(job.text)),
         )
       : null,
-    job?.error ? broken(job.error) : null,
+    job?.error ? errorCard(job.error) : null,
     whole.history?.length
       ? element(
           "section",
           {},
           element("h2", {}, "Validation by epoch"),
-          curve(whole.history, whole.summary?.validation_error_without_mm),
+          validationCurve(whole.history, whole.summary?.validation_error_without_mm),
         )
       : null,
     kind === "evaluations" && whole.summary
       ? [
-          ladderPicture(whole.summary),
+          ladderChart(whole.summary),
           element(
             "p",
             { class: "gain-note" },
@@ -350,7 +364,7 @@ async function drawOne(mine) {
               class: "button strong",
               type: "button",
               onclick: () =>
-                ask(
+                requestJob(
                   "evaluations",
                   { dataset: whole.summary.folder, run: whole.request?.run ?? null },
                   box,
@@ -359,13 +373,13 @@ async function drawOne(mine) {
             "Measure the ladder",
           )
         : null,
-      back(),
+      backButton(),
     ),
   );
   return isOpen(job);
 }
 
-function learned({ job, history, summary }) {
+function trainingSentence({ job, history, summary }) {
   if (summary) {
     const [before, after] = [summary.validation_error_without_mm, summary.validation_error_mm];
     return `In validation the mean distance is ${after.toFixed(2)} mm with the network, ${before.toFixed(2)} mm without.`;

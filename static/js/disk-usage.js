@@ -8,7 +8,7 @@ const size = (bytes) =>
     : `${(bytes / 2 ** 20).toFixed(bytes < 2 ** 20 ? 2 : 0)} MB`;
 
 /** A line that says it; asked anew whenever it is made. */
-export function diskLine() {
+export function diskUsageLine() {
   const box = element("p", { class: "disk muted", id: "disk" });
   const show = ({ used, caches, limit }) =>
     fill(

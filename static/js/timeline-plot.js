@@ -1,5 +1,5 @@
 // Series of each frame against time in lanes with one cursor: errors with the noise floor, push depth, force, solver iterations.
-import { mm } from "./format.js";
+import { formatMm } from "./format.js";
 
 const LEFT = 46;
 const RIGHT = 16;
@@ -18,14 +18,14 @@ export function frameAt(times, time) {
 }
 
 /** What is drawn: title, share of the height, curves with the colour and name of each, and how a number is told. */
-function lanesOf(series) {
+function plotLanes(series) {
   const lanes = [
     {
       title: "RMS error, mm",
       share: 2.2,
       factor: 1e3,
       floor: series.noise_floor,
-      text: (value) => mm(value),
+      text: (value) => formatMm(value),
       curves: series.models.map((name) => ({
         name,
         ink: name,
@@ -38,7 +38,7 @@ function lanesOf(series) {
       title: "Push depth, mm",
       share: 1,
       factor: 1e3,
-      text: (value) => mm(value),
+      text: (value) => formatMm(value),
       curves: [{ name: "depth", ink: "tool", values: series.depth }],
     });
   const forces = Object.entries(series.forces ?? {}).map(([name, values]) => ({
@@ -73,8 +73,8 @@ function lanesOf(series) {
 }
 
 /** All numbers of a frame in words, a line for each lane; models that found no equilibrium are named. */
-export function told(series, frame) {
-  const lines = lanesOf(series).map(({ curves, text }) =>
+export function frameSummary(series, frame) {
+  const lines = plotLanes(series).map(({ curves, text }) =>
     curves.map(({ name, values }) => `${name} ${text(values[frame])}`).join("   "),
   );
   const failed = Object.entries(series.failed ?? {})
@@ -108,8 +108,8 @@ export function drawPlot(canvas, series, frame, [first, last]) {
   canvas.timeAt = (pixel) =>
     Math.max(0, Math.min(end, ((pixel - LEFT) / (width - LEFT - RIGHT)) * end));
   canvas.timeToPixel = x;
-  shade(pen, { series, x, height, ink });
-  const lanes = lanesOf(series);
+  drawContacts(pen, { series, x, height, ink });
+  const lanes = plotLanes(series);
   const titles = [];
   const head = series.worst.length ? 21 : 8; // room for the marks of the worst frames
   const whole = height - FOOT - head - GAP * (lanes.length - 1);
@@ -129,7 +129,7 @@ export function drawPlot(canvas, series, frame, [first, last]) {
   pen.fillStyle = ink("text-2");
   for (const [title, at] of titles) pen.fillText(title, LEFT + 5, at + 2);
   const at = x(series.time[frame]);
-  line(
+  strokeLine(
     pen,
     [
       [at, 4],
@@ -141,7 +141,7 @@ export function drawPlot(canvas, series, frame, [first, last]) {
 }
 
 /** Where the tool touches: the frames of a spell and half way to those beside it. */
-function shade(pen, { series, x, height, ink }) {
+function drawContacts(pen, { series, x, height, ink }) {
   const between = (one, other) => (series.time[one] + (series.time[other] ?? series.time[one])) / 2;
   pen.fillStyle = ink("sunken");
   for (const [first, last] of series.touching) {
@@ -155,12 +155,12 @@ function shade(pen, { series, x, height, ink }) {
 
 function drawLane(pen, { factor, floor, curves }, { series, frame, width, top, tall, x, ink }) {
   const seen = [...curves.flatMap(({ values }) => values), floor].filter(Number.isFinite);
-  const scale = niceTop(Math.max(0, ...seen) * factor, tall);
+  const scale = axisScale(Math.max(0, ...seen) * factor, tall);
   const y = (value) => top + tall - ((value * factor) / scale.end) * tall;
   pen.textBaseline = "middle";
   pen.textAlign = "right";
   for (let value = 0; value <= scale.end * 1.0001; value += scale.step) {
-    line(
+    strokeLine(
       pen,
       [
         [LEFT, y(value / factor)],
@@ -177,7 +177,7 @@ function drawLane(pen, { factor, floor, curves }, { series, frame, width, top, t
     pen.globalAlpha = 0.32;
     pen.fillRect(LEFT, y(floor), width - LEFT - RIGHT, y(0) - y(floor));
     pen.globalAlpha = 1;
-    line(
+    strokeLine(
       pen,
       [
         [LEFT, y(floor)],
@@ -189,7 +189,7 @@ function drawLane(pen, { factor, floor, curves }, { series, frame, width, top, t
   }
   const pixels = (values) =>
     series.time.map((time, i) => [x(time), Number.isFinite(values[i]) ? y(values[i]) : NaN]);
-  for (const { values, ink: name } of curves) line(pen, pixels(values), ink(name), 1.8);
+  for (const { values, ink: name } of curves) strokeLine(pen, pixels(values), ink(name), 1.8);
   for (const { values, ink: name } of curves) {
     if (!Number.isFinite(values[frame])) continue;
     pen.beginPath();
@@ -235,7 +235,7 @@ function drawRange(pen, { series, first, last, x, height, ink }) {
   pen.fillRect(to, 4, x(series.time.at(-1)) + 3 - to, height - FOOT - 4);
   pen.globalAlpha = 1;
   for (const at of [from, to])
-    line(
+    strokeLine(
       pen,
       [
         [at, 4],
@@ -246,7 +246,7 @@ function drawRange(pen, { series, first, last, x, height, ink }) {
     );
 }
 
-function line(pen, points, colour, width) {
+function strokeLine(pen, points, colour, width) {
   pen.beginPath();
   let down = false;
   for (const [px, py] of points) {
@@ -270,7 +270,7 @@ function niceStep(wanted) {
 }
 
 /** End and step of an axis that is `tall` pixels high. */
-function niceTop(value, tall) {
+function axisScale(value, tall) {
   const step = niceStep((value || 0.1) / Math.max(1, Math.min(3, tall / 24)));
   return { step, end: step * Math.max(1, Math.ceil((value * 1.04) / step)) };
 }

@@ -1,36 +1,36 @@
 // Live: the tool is led by hand, in the scene or on a pad, and the chosen model answers at once.
 import { get, remove } from "./api.js";
 import { element, fill } from "./dom.js";
-import { led, onTool } from "./drag.js";
-import { capital, mm } from "./format.js";
+import { projectPointer, hitsTool } from "./drag.js";
+import { capitalise, formatMm } from "./format.js";
 import { addPanel, openedPanel } from "./panels.js";
-import { onViewer, pageId, refresh } from "./scene.js";
-import { on, set, state } from "./store.js";
+import { onViewerLoad, pageId, refreshScene } from "./scene.js";
+import { subscribe, set, state } from "./store.js";
 
 const MODELS = { raw: "Raw model", extended: "Extended model", whatif: "As set under What if" };
 const PAD = 300;
 const PAUSE = 8; // ms
-let repeated = false;
+let retried = false;
 let box = null;
 let socket = null;
 let model = "extended";
-let known = null; // the extended model's effects
-let place = null; // of the tool's centre, as wished for [m]
+let extendedEffects = null; // the extended model's effects
+let toolCentre = null; // of the tool's centre, as wished for [m]
 let radius = 0.005;
-let waiting = null;
+let sendTimer = null;
 let answer = null;
-let times = [];
-let grip = null; // while the tool is dragged in the scene: from where its centre was held
+let answerTimes = [];
+let dragState = null; // while the tool is dragged in the scene: from where its centre was held
 
 export function start() {
   box = addPanel("live", "Live", open, leave);
-  onViewer(watch);
+  onViewerLoad(watchViewer);
   // What is seen inside is sent only where it is shown.
-  on(["section", "quantity", "layers"], () => {
+  subscribe(["section", "quantity", "layers"], () => {
     if (state().live && answer) send();
   });
-  on(["live"], drawBar);
-  on(["run", "sequence"], () => {
+  subscribe(["live"], drawBar);
+  subscribe(["run", "sequence"], () => {
     if (openedPanel() === "live") {
       leave();
       open();
@@ -41,22 +41,22 @@ export function start() {
 async function open() {
   const { run, sequence, heading, held } = state();
   if (!run || !sequence) {
-    fill(box, says("Choose a diagnosis on the left; here you then push its models by hand."));
+    fill(box, mutedText("Choose a diagnosis on the left; here you then push its models by hand."));
     return;
   }
   if (!heading?.has_clouds) {
     fill(
       box,
-      says(
+      mutedText(
         "The dataset of this diagnosis is not where it was, so that its models cannot be set up.",
       ),
     );
     return;
   }
-  fill(box, says("Setting the model up …"));
+  fill(box, mutedText("Setting the model up …"));
   try {
     const found = await get(`/runs/${encodeURIComponent(run)}/model`);
-    known = found.effects ?? [];
+    extendedEffects = found.effects ?? [];
     radius = found.setup?.tool?.radius ?? radius;
   } catch (problem) {
     fill(
@@ -72,8 +72,8 @@ async function open() {
   }
   if (openedPanel() !== "live") return;
   set({ live: true, playing: false });
-  place = held?.drawn?.tool ?? middle();
-  times = [];
+  toolCentre = held?.drawn?.tool ?? aboveMiddle();
+  answerTimes = [];
   answer = null;
   draw();
   connect();
@@ -83,22 +83,22 @@ async function leave() {
   if (!socket) return;
   socket.close();
   socket = null;
-  grip = null;
+  dragState = null;
   set({ live: false });
   await remove(`/sessions/${pageId()}/live`).catch(() => {}); // it goes with the connection, too, but somewhat later
-  refresh();
+  refreshScene();
 }
 
-const says = (text) => element("p", { class: "muted" }, text);
+const mutedText = (text) => element("p", { class: "muted" }, text);
 
-const corners = () =>
+const blockCorners = () =>
   state().series?.box ?? [
     [-0.04, -0.02, 0],
     [0.04, 0.02, 0.04],
   ];
 
-const middle = () => {
-  const [low, high] = corners();
+const aboveMiddle = () => {
+  const [low, high] = blockCorners();
   return [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, high[2] + 2 * radius];
 };
 
@@ -125,15 +125,15 @@ function received(found) {
   answer = found;
   if (found.problem) {
     drawAnswer();
-    if (!repeated) {
-      repeated = true;
+    if (!retried) {
+      retried = true;
       setTimeout(send, 1000);
     } // a solver that ended is started anew when it is asked again
     return;
   }
-  repeated = false;
+  retried = false;
   const now = performance.now();
-  times = [...times.filter((at) => now - at < 1000), now];
+  answerTimes = [...answerTimes.filter((at) => now - at < 1000), now];
   const { held } = state();
   if (held?.drawn && found.drawn)
     set({ held: { ...held, drawn: { ...held.drawn, ...found.drawn, tool: found.tool } } });
@@ -142,19 +142,19 @@ function received(found) {
 
 /** Ask for the newest place, at most once in `PAUSE`. No answer is awaited: the server solves the newest, and is not idle on the way. */
 function send() {
-  if (waiting || socket?.readyState !== WebSocket.OPEN) return;
-  waiting = setTimeout(() => {
-    waiting = null;
+  if (sendTimer || socket?.readyState !== WebSocket.OPEN) return;
+  sendTimer = setTimeout(() => {
+    sendTimer = null;
     if (socket?.readyState !== WebSocket.OPEN) return; // it is asked when the connection opens
     const { run, sequence } = state();
-    socket.send(JSON.stringify({ run, sequence, at: place, ...chosen() }));
+    socket.send(JSON.stringify({ run, sequence, at: toolCentre, ...modelRequest() }));
   }, PAUSE);
 }
 
-function chosen() {
+function modelRequest() {
   if (model === "raw") return { effects: [], tuned: false, shown: "raw" };
-  const tried = model === "whatif" ? recall() : null;
-  const rows = tried ? tried.rows.filter((row) => row.on) : known;
+  const tried = model === "whatif" ? storedWhatIf() : null;
+  const rows = tried ? tried.rows.filter((row) => row.on) : extendedEffects;
   return {
     effects: rows.map(({ effect, parameters }) => ({ effect, parameters })),
     tuned: tried?.tuned ?? true,
@@ -162,7 +162,7 @@ function chosen() {
   };
 }
 
-function recall() {
+function storedWhatIf() {
   try {
     const kept = JSON.parse(sessionStorage.getItem("palpate.whatif"));
     return kept?.run === state().run ? kept : null;
@@ -171,26 +171,30 @@ function recall() {
   }
 }
 
-function lead(to) {
-  place = to;
+function moveTool(to) {
+  toolCentre = to;
   drawPad();
   send();
 }
 
 /** The viewer's own window, each time it is opened anew. */
-function watch(viewer) {
+function watchViewer(viewer) {
   const caught = (event) =>
     state().live &&
     answer?.tool &&
     viewer.__viserMutable?.camera &&
-    onTool(viewer, event, answer.tool, radius);
+    hitsTool(viewer, event, answer.tool, radius);
   viewer.addEventListener(
     "pointerdown",
     (event) => {
       if (event.button !== 0 || !caught(event)) return;
       event.stopImmediatePropagation();
-      const held = led(viewer, event, answer.tool, event.shiftKey);
-      grip = { held, off: answer.tool.map((value, i) => value - held[i]), level: event.shiftKey };
+      const held = projectPointer(viewer, event, answer.tool, event.shiftKey);
+      dragState = {
+        held,
+        off: answer.tool.map((value, i) => value - held[i]),
+        level: event.shiftKey,
+      };
       viewer.document.body.style.cursor = "grabbing";
     },
     true,
@@ -198,19 +202,19 @@ function watch(viewer) {
   viewer.addEventListener(
     "pointermove",
     (event) => {
-      if (!grip) {
+      if (!dragState) {
         if (state().live) viewer.document.body.style.cursor = caught(event) ? "grab" : "";
         return;
       }
       event.stopImmediatePropagation();
-      if (event.shiftKey !== grip.level)
-        grip = {
-          ...grip,
-          held: answer.tool.map((value, i) => value - grip.off[i]),
+      if (event.shiftKey !== dragState.level)
+        dragState = {
+          ...dragState,
+          held: answer.tool.map((value, i) => value - dragState.off[i]),
           level: event.shiftKey,
         };
-      const at = led(viewer, event, grip.held, grip.level);
-      lead(at.map((value, i) => value + grip.off[i]));
+      const at = projectPointer(viewer, event, dragState.held, dragState.level);
+      moveTool(at.map((value, i) => value + dragState.off[i]));
     },
     true,
   );
@@ -218,7 +222,7 @@ function watch(viewer) {
     viewer.addEventListener(
       kind,
       () => {
-        grip = null;
+        dragState = null;
         viewer.document.body.style.cursor = "";
       },
       true,
@@ -227,8 +231,8 @@ function watch(viewer) {
 
 function draw() {
   const raised = () => {
-    const [, high] = corners();
-    lead([place[0], place[1], high[2] + 2 * radius]);
+    const [, high] = blockCorners();
+    moveTool([toolCentre[0], toolCentre[1], high[2] + 2 * radius]);
   };
   fill(
     box,
@@ -248,27 +252,27 @@ function draw() {
           "aria-label": "Model that answers",
           onchange: (event) => {
             model = event.target.value;
-            times = [];
+            answerTimes = [];
             send();
             event.target.blur();
           },
         },
         Object.entries(MODELS)
-          .filter(([name]) => name !== "whatif" || recall())
+          .filter(([name]) => name !== "whatif" || storedWhatIf())
           .map(([name, label]) =>
             element("option", { value: name, selected: name === model }, label),
           ),
       ),
     ),
     element("div", { id: "live-answer", "aria-live": "polite" }),
-    element("div", { class: "live-pad" }, pad(), depth()),
+    element("div", { class: "live-pad" }, toolPad(), depthSlider()),
     element(
       "div",
       { class: "actions" },
       element("button", { class: "button", type: "button", onclick: raised }, "Lift the tool"),
       element(
         "button",
-        { class: "button", type: "button", onclick: () => lead(middle()) },
+        { class: "button", type: "button", onclick: () => moveTool(aboveMiddle()) },
         "Above the middle",
       ),
     ),
@@ -278,8 +282,8 @@ function draw() {
 }
 
 /** The block from above; the tool is where the pointer is. */
-function pad() {
-  const [low, high] = corners();
+function toolPad() {
+  const [low, high] = blockCorners();
   const room = 2 * radius;
   const scale = PAD / (high[0] - low[0] + 2 * room);
   const tall = Math.round((high[1] - low[1] + 2 * room) * scale);
@@ -296,7 +300,11 @@ function pad() {
   node.innerHTML = `<rect x="${room * scale}" y="${room * scale}" width="${(high[0] - low[0]) * scale}" height="${(high[1] - low[1]) * scale}" rx="3"/><circle r="${radius * scale}"/>`;
   node.place = ([x, y]) => [(x - low[0] + room) * scale, (high[1] + room - y) * scale];
   const move = (event) =>
-    lead([event.offsetX / scale + low[0] - room, high[1] + room - event.offsetY / scale, place[2]]);
+    moveTool([
+      event.offsetX / scale + low[0] - room,
+      high[1] + room - event.offsetY / scale,
+      toolCentre[2],
+    ]);
   node.addEventListener("pointerdown", (event) => {
     node.setPointerCapture(event.pointerId);
     move(event);
@@ -310,14 +318,14 @@ function pad() {
     if (!step) return;
     event.preventDefault();
     event.stopPropagation();
-    lead([place[0] + 1e-3 * step[0], place[1] + 1e-3 * step[1], place[2]]);
+    moveTool([toolCentre[0] + 1e-3 * step[0], toolCentre[1] + 1e-3 * step[1], toolCentre[2]]);
   });
   return node;
 }
 
 /** How far the tool reaches below the top, mm. */
-function depth() {
-  const [low, high] = corners();
+function depthSlider() {
+  const [low, high] = blockCorners();
   const most = 0.25 * Math.min(...high.map((value, i) => value - low[i])) * 1e3;
   return element(
     "label",
@@ -330,7 +338,8 @@ function depth() {
       max: most.toFixed(1),
       step: 0.1,
       "aria-label": "Tool below the top in mm",
-      oninput: (event) => lead([place[0], place[1], high[2] + radius - +event.target.value / 1e3]),
+      oninput: (event) =>
+        moveTool([toolCentre[0], toolCentre[1], high[2] + radius - +event.target.value / 1e3]),
     }),
     element("output", { id: "live-below" }),
   );
@@ -338,12 +347,12 @@ function depth() {
 
 function drawPad() {
   const node = document.getElementById("live-pad");
-  if (!node || !place) return;
-  const [x, y] = node.place(place);
+  if (!node || !toolCentre) return;
+  const [x, y] = node.place(toolCentre);
   const circle = node.querySelector("circle");
   circle.setAttribute("cx", x);
   circle.setAttribute("cy", y);
-  const below = (corners()[1][2] + radius - place[2]) * 1e3;
+  const below = (blockCorners()[1][2] + radius - toolCentre[2]) * 1e3;
   const bar = document.getElementById("live-depth");
   if (document.activeElement !== bar) bar.value = below;
   document.getElementById("live-below").textContent = `${below.toFixed(1)} mm`;
@@ -359,21 +368,23 @@ function drawBar() {
     bar,
     answer.converged
       ? [
-          element("b", {}, mm(answer.depth)),
-          element("b", {}, newtons()),
-          element("span", { class: "muted" }, rate() ? `${rate().toFixed(0)}/s` : ""),
+          element("b", {}, formatMm(answer.depth)),
+          element("b", {}, forceText()),
+          element("span", { class: "muted" }, answerRate() ? `${answerRate().toFixed(0)}/s` : ""),
         ]
       : [element("b", {}, "No equilibrium")],
   );
 }
 
-const newtons = () => {
+const forceText = () => {
   const force = Math.hypot(...answer.force);
   return `${force.toFixed(force < 1 ? 3 : 2)} N`;
 };
 
-const rate = () =>
-  times.length > 1 ? (times.length - 1) / ((times.at(-1) - times[0]) / 1e3) : null;
+const answerRate = () =>
+  answerTimes.length > 1
+    ? (answerTimes.length - 1) / ((answerTimes.at(-1) - answerTimes[0]) / 1e3)
+    : null;
 
 function drawAnswer() {
   drawBar();
@@ -391,7 +402,7 @@ function drawAnswer() {
     return;
   }
   if (!answer) {
-    fill("live-answer", says("Setting the model up …"));
+    fill("live-answer", mutedText("Setting the model up …"));
     return;
   }
   const fact = (label, value, id) =>
@@ -401,9 +412,9 @@ function drawAnswer() {
     element(
       "div",
       { class: "live-facts" },
-      fact("Push depth", mm(answer.depth), "live-push"),
-      fact("Force", newtons(), "live-force"),
-      fact("Answers/s", rate() ? rate().toFixed(0) : "–", "live-rate"),
+      fact("Push depth", formatMm(answer.depth), "live-push"),
+      fact("Force", forceText(), "live-force"),
+      fact("Answers/s", answerRate() ? answerRate().toFixed(0) : "–", "live-rate"),
       fact("Solved in", `${(1e3 * answer.seconds).toFixed(0)} ms`, "live-solve"),
     ),
     answer.converged
@@ -412,7 +423,7 @@ function drawAnswer() {
           "div",
           { class: "note-card bad" },
           element("strong", {}, "No equilibrium"),
-          `${capital(answer.outcome)}. The last one is shown.`,
+          `${capitalise(answer.outcome)}. The last one is shown.`,
         ),
   );
 }

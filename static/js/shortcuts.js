@@ -2,11 +2,11 @@
 const actions = {};
 
 /** Bind keys to actions, which get the event; a key has one action. */
-export function bind(keys) {
+export function bindShortcuts(keys) {
   Object.assign(actions, keys);
 }
 
-export function onKey(event) {
+export function handleShortcut(event) {
   if (event.ctrlKey || event.metaKey || event.altKey || !(event.key in actions)) return;
   const typing = event.target?.matches?.(
     "input:not(#scrub):not([type=checkbox]), select, textarea",

@@ -19,31 +19,32 @@ export const QUANTITIES = {
   energy: { label: "Energy density", unit: "J/m³", factor: 1 },
 };
 
-const shown = () => [...MODELS].reverse().filter((model) => state().layers.includes(model));
+const shownModels = () => [...MODELS].reverse().filter((model) => state().layers.includes(model));
 
 /** Of the models that are shown, the one whose surface lies in front. */
-const front = () => shown().find((model) => model === state().colour) ?? shown()[0] ?? null;
+const frontModel = () =>
+  shownModels().find((model) => model === state().colour) ?? shownModels()[0] ?? null;
 
 export const opacity = (layer) => state().looks[layer]?.opacity ?? 1;
 
-export function coloured(model) {
+export function isColoured(model) {
   return (
     state().looks[model]?.coloured ??
     (state().colour !== "plain" &&
-      (state().side_by_side || (state().colour === model && model === front())))
+      (state().side_by_side || (state().colour === model && model === frontModel())))
   );
 }
 
-export function lines(model) {
-  return state().looks[model]?.lines ?? (!state().side_by_side && model !== front());
+export function isWireframe(model) {
+  return state().looks[model]?.lines ?? (!state().side_by_side && model !== frontModel());
 }
 
-export function setLook(layer, change) {
+export function setLayerStyle(layer, change) {
   set({ looks: { ...state().looks, [layer]: { ...state().looks[layer], ...change } } });
 }
 
 /** Why a layer cannot be shown here; null where it can. */
-export function absent(layer) {
+export function unavailableReason(layer) {
   const { heading, series } = state();
   if (layer === "measured" && heading && !heading.has_clouds)
     return "The dataset is not where this run says, so its clouds cannot be shown";
@@ -58,11 +59,11 @@ export function absent(layer) {
   return null;
 }
 
-export const noQuantity = (quantity) =>
+export const quantityUnavailableReason = (quantity) =>
   state().series && state().series.limits[quantity] === null ? state().series.inside : null;
 
 /** Draw one model coloured and in front, the others as lines; "plain" colours none. */
-export function choose(colour) {
+export function colourBy(colour) {
   const layers =
     colour === "plain" || state().layers.includes(colour)
       ? state().layers
@@ -73,22 +74,23 @@ export function choose(colour) {
       kept ? { opacity: kept } : {},
     ]),
   );
-  set({ colour, layers: order(layers), looks });
+  set({ colour, layers: inDrawOrder(layers), looks });
 }
 
-export const order = (layers) => Object.keys(LAYERS).filter((layer) => layers.includes(layer));
+export const inDrawOrder = (layers) =>
+  Object.keys(LAYERS).filter((layer) => layers.includes(layer));
 
-export function toggle(layer) {
+export function toggleLayer(layer) {
   const { layers } = state();
   set({
-    layers: order(
+    layers: inDrawOrder(
       layers.includes(layer) ? layers.filter((other) => other !== layer) : [...layers, layer],
     ),
   });
 }
 
 /** All that the server needs to draw. */
-export function wish() {
+export function viewRequest() {
   const {
     run,
     sequence,
@@ -103,13 +105,13 @@ export function wish() {
     section,
     looks,
   } = state();
-  const held = noQuantity(quantity) ? "error" : quantity;
+  const held = quantityUnavailableReason(quantity) ? "error" : quantity;
   const range = ranges[held] ?? "robust";
   return {
     run,
     sequence,
     frame,
-    layers: order(layers),
+    layers: inDrawOrder(layers),
     colour,
     quantity: held,
     scale: range === "fixed" ? "fixed" : "robust",

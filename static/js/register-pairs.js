@@ -1,8 +1,15 @@
 // Pairs of a manual registration as they are clicked: what is there, undo, and what outlives a reload. Nothing here draws.
 const KEY = "palpate.register";
-const FRESH = { pairs: [], mode: "cloud", chosen: null, start: "stated", over: false, found: null };
+const INITIAL = {
+  pairs: [],
+  mode: "cloud",
+  chosen: null,
+  start: "stated",
+  over: false,
+  found: null,
+};
 
-const kept = () => {
+const readStored = () => {
   try {
     return JSON.parse(localStorage.getItem(KEY)) ?? {};
   } catch {
@@ -11,11 +18,11 @@ const kept = () => {
 };
 
 /** One dataset's unfinished registration; `changed` is called after every change, with whether the pairs are others now. */
-export function workOn(dataset, changed) {
-  const values = { ...structuredClone(FRESH), ...(kept().of?.[dataset] ?? {}) };
+export function createPairEditor(dataset, changed) {
+  const values = { ...structuredClone(INITIAL), ...(readStored().of?.[dataset] ?? {}) };
   const past = [];
   const keep = () => {
-    const all = kept();
+    const all = readStored();
     localStorage.setItem(KEY, JSON.stringify({ dataset, of: { ...all.of, [dataset]: values } }));
   };
   keep();
@@ -52,7 +59,10 @@ export function workOn(dataset, changed) {
     put(
       pairs,
       placed === null
-        ? { mode: pairs[at][other(side)] ? next(pairs, side) : other(side), chosen: null }
+        ? {
+            mode: pairs[at][oppositeSide(side)] ? nextSide(pairs, side) : oppositeSide(side),
+            chosen: null,
+          }
         : {},
     );
   }
@@ -89,12 +99,13 @@ export function workOn(dataset, changed) {
   };
 }
 
-export const other = (side) => (side === "cloud" ? "mesh" : "cloud");
+export const oppositeSide = (side) => (side === "cloud" ? "mesh" : "cloud");
 
-const next = (pairs, side) => (pairs.some((pair) => !pair[other(side)]) ? other(side) : "cloud");
+const nextSide = (pairs, side) =>
+  pairs.some((pair) => !pair[oppositeSide(side)]) ? oppositeSide(side) : "cloud";
 
 /** Pairs with both ends, and which numbers they have. */
-export const whole = (pairs) =>
+export const completePairs = (pairs) =>
   pairs.map((pair, number) => ({ ...pair, number })).filter(({ cloud, mesh }) => cloud && mesh);
 
-export const lastDataset = () => kept().dataset ?? null;
+export const lastDataset = () => readStored().dataset ?? null;

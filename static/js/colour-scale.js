@@ -1,12 +1,12 @@
 // The banded colour scale with its numbers, the same in the scene's legend and under the patterns.
 import { element } from "./dom.js";
 
-export const css = (rgb) => `rgb(${rgb.join(" ")})`;
+export const rgbCss = (rgb) => `rgb(${rgb.join(" ")})`;
 
 /** Of errors from -limit to limit [m], in mm. */
-export const scaleBar = (bands, limit) => bar(bands, -limit * 1e3, limit * 1e3);
+export const scaleBar = (bands, limit) => bandsWithTicks(bands, -limit * 1e3, limit * 1e3);
 
-function bar(bands, low, high) {
+function bandsWithTicks(bands, low, high) {
   const ticks = [0, 0.25, 0.5, 0.75, 1].map((part) => {
     const value = low + (high - low) * part;
     const near = Math.abs(value) < 1e-9 * (high - low) ? 0 : value;
@@ -18,7 +18,7 @@ function bar(bands, low, high) {
     element(
       "div",
       { class: "scale" },
-      bands.map((rgb) => element("i", { style: { background: css(rgb) } })),
+      bands.map((rgb) => element("i", { style: { background: rgbCss(rgb) } })),
     ),
     element(
       "div",
@@ -29,14 +29,14 @@ function bar(bands, low, high) {
 }
 
 /** A scale upright between two numbers, the higher above. */
-export function scaleTower(bands, low, high) {
-  const tower = bar([...bands].reverse(), low, high);
+export function verticalScaleBar(bands, low, high) {
+  const tower = bandsWithTicks([...bands].reverse(), low, high);
   const ticks = tower.querySelector(".ticks");
   ticks.replaceChildren(...[...ticks.children].reverse());
   tower.className = "tower";
   return tower;
 }
 
-export function bandOf(value, limit, count) {
+export function bandIndex(value, limit, count) {
   return Math.min(count - 1, Math.max(0, Math.floor(((value / limit + 1) * count) / 2)));
 }

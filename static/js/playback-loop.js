@@ -1,16 +1,16 @@
 // The part of a sequence that is played again and again: buttons, keys, and what is marked in the plot.
 import { fill, icon, element } from "./dom.js";
-import { on, set, state } from "./store.js";
+import { subscribe, set, state } from "./store.js";
 
 /** First and last frame that are played; all of them without a loop. */
-export function range(count) {
+export function playedRange(count) {
   const { loop } = state();
   const last = Math.max(0, count - 1);
   return loop ? [Math.min(loop[0], last), Math.min(loop[1], last)] : [0, last];
 }
 
 /** Loop between two frames in either order; one frame alone is no loop. */
-export function mark(one, other, count) {
+export function setLoop(one, other, count) {
   const last = count - 1;
   const [from, to] = [Math.min(one, other), Math.max(one, other)].map((frame) =>
     Math.max(0, Math.min(last, frame)),
@@ -18,32 +18,32 @@ export function mark(one, other, count) {
   set({ loop: to > from ? [from, to] : null });
 }
 
-const begin = (count) => {
+const loopFromHere = (count) => {
   if (count)
-    mark(
+    setLoop(
       state().frame,
       state().loop && state().loop[1] > state().frame ? state().loop[1] : count - 1,
       count,
     );
 };
-const end = (count) => {
+const loopToHere = (count) => {
   if (count)
-    mark(
+    setLoop(
       state().loop && state().loop[0] < state().frame ? state().loop[0] : 0,
       state().frame,
       count,
     );
 };
-const toggle = (count) => {
+const toggleLoop = (count) => {
   if (count > 1) set({ loop: state().loop ? null : [0, count - 1] });
 };
 
-export const KEYS = { i: begin, o: end, l: toggle };
+export const LOOP_SHORTCUTS = { i: loopFromHere, o: loopToHere, l: toggleLoop };
 
 const BUTTONS = [
-  ["from", begin, "Loop from this frame (I)"],
-  ["loop", toggle, "Loop on or off (L); drag with Shift in the plot to choose the part"],
-  ["to", end, "Loop to this frame (O)"],
+  ["from", loopFromHere, "Loop from this frame (I)"],
+  ["loop", toggleLoop, "Loop on or off (L); drag with Shift in the plot to choose the part"],
+  ["to", loopToHere, "Loop to this frame (O)"],
 ];
 
 export function start(count) {
@@ -65,6 +65,6 @@ export function start(count) {
         ),
       ),
     );
-  on(["loop"], draw);
+  subscribe(["loop"], draw);
   draw();
 }

@@ -1,35 +1,38 @@
 // The left rail: diagnoses, the sequences of the open one, datasets.
 import { get, post, toast } from "./api.js";
-import { askForDataset, watchDrops } from "./bring.js";
-import { showDataset } from "./dataset.js";
+import { openImportDialog, importDroppedFiles } from "./import-dialog.js";
+import { showDataset } from "./dataset-panel.js";
 import { element, fill } from "./dom.js";
-import { mm, when, words } from "./format.js";
-import { onDone, opens, startJobs } from "./jobs.js";
+import { formatMm, formatDateTime, readableName } from "./format.js";
+import { onJobsDone, addResultOpener, startJobs } from "./jobs.js";
 import { openedPanel } from "./panels.js";
-import { registerByHand } from "./register.js";
-import { on, set, state } from "./store.js";
+import { openRegistration } from "./register.js";
+import { subscribe, set, state } from "./store.js";
 
 const TAGS = { train: "fit", validation: "val", test: "test" };
-let asked = null;
+let requestedDiagnosis = null;
 let openRun = null;
 
 export async function start(open) {
   openRun = open;
-  on(["run", "sequence", "heading"], drawSequences);
-  on(["run"], () => drawRuns());
-  opens("run", "Open the report", open);
-  opens("dataset", "Open the dataset", (name) => openDataset(name));
-  onDone(async (done) => {
+  subscribe(["run", "sequence", "heading"], drawSequences);
+  subscribe(["run"], () => drawRuns());
+  addResultOpener("run", "Open the report", open);
+  addResultOpener("dataset", "Open the dataset", (name) => openDataset(name));
+  onJobsDone(async (done) => {
     await Promise.all([
       refreshRuns(),
       done.some(({ result }) => result?.dataset) ? refreshDatasets() : null,
     ]);
     // Who has gone elsewhere meanwhile finds it among the jobs and the diagnoses.
-    if (openedPanel() === "report" && done.some(({ id }) => id === asked)) openRun(asked);
+    if (openedPanel() === "report" && done.some(({ id }) => id === requestedDiagnosis))
+      openRun(requestedDiagnosis);
   });
-  opens("registration", "See the registration", (_, __, { dataset }) => registerByHand(dataset));
-  document.getElementById("import").addEventListener("click", () => askForDataset());
-  watchDrops();
+  addResultOpener("registration", "See the registration", (_, __, { dataset }) =>
+    openRegistration(dataset),
+  );
+  document.getElementById("import").addEventListener("click", () => openImportDialog());
+  importDroppedFiles();
   startJobs();
   const [datasets] = await Promise.all([refreshDatasets(), refreshRuns()]);
   return datasets.length;
@@ -67,7 +70,7 @@ async function refreshRuns() {
   return runs;
 }
 
-export const newestRun = (wanted) => (runs.find(({ id }) => id === wanted) ?? runs[0])?.id ?? null;
+export const runToOpen = (wanted) => (runs.find(({ id }) => id === wanted) ?? runs[0])?.id ?? null;
 
 function drawRuns() {
   fill(
@@ -91,7 +94,7 @@ function drawRuns() {
                 "span",
                 { class: "name" },
                 causes.length
-                  ? causes.map(words).join(" + ")
+                  ? causes.map(readableName).join(" + ")
                   : verdict === "none"
                     ? "nothing wrong"
                     : verdict === "replay"
@@ -101,7 +104,7 @@ function drawRuns() {
               element(
                 "span",
                 { class: "sub" },
-                `${verdict === "replay" ? "replay · " : ""}${folder ?? dataset} · ${when(created)}`,
+                `${verdict === "replay" ? "replay · " : ""}${folder ?? dataset} · ${formatDateTime(created)}`,
               ),
             ),
           ),
@@ -132,7 +135,7 @@ function drawSequences() {
         element(
           "span",
           { class: "value" },
-          `${mm(entry.distance_raw, false)} → ${mm(entry.distance_extended, false)}`,
+          `${formatMm(entry.distance_raw, false)} → ${formatMm(entry.distance_extended, false)}`,
         ),
       ),
     ),
@@ -141,7 +144,7 @@ function drawSequences() {
 
 export async function diagnose(dataset, registration = null) {
   try {
-    asked = (await post("/diagnoses", { dataset, registration })).id;
+    requestedDiagnosis = (await post("/diagnoses", { dataset, registration })).id;
   } catch (problem) {
     toast(problem);
     throw problem;

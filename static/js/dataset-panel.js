@@ -1,9 +1,9 @@
 // The right panel on a dataset: what it holds, whether it is in order, and the way to its diagnosis.
 import { get, post, toast } from "./api.js";
 import { element, fill } from "./dom.js";
-import { capital, mm } from "./format.js";
+import { capitalise, formatMm } from "./format.js";
 import { openPanel } from "./panels.js";
-import { cameraChoice, registerByHand } from "./register.js";
+import { cameraSelect, openRegistration } from "./register.js";
 
 export async function showDataset(name, diagnose) {
   const panel = document.getElementById("panel");
@@ -22,11 +22,11 @@ export async function showDataset(name, diagnose) {
       panel,
       element("div", { class: "eyebrow" }, "Dataset"),
       element("h1", { class: "verdict" }, name),
-      broken(problem),
+      errorCard(problem),
     );
     return;
   }
-  const camera = await cameraChoice(name);
+  const camera = await cameraSelect(name);
   const start = element(
     "button",
     {
@@ -43,7 +43,7 @@ export async function showDataset(name, diagnose) {
     },
     "Diagnose",
   );
-  const size = summary.size.map((edge) => mm(edge, false)).join(" × ");
+  const size = summary.size.map((edge) => formatMm(edge, false)).join(" × ");
   fill(
     panel,
     element("div", { class: "eyebrow" }, "Dataset"),
@@ -56,22 +56,22 @@ export async function showDataset(name, diagnose) {
       summary.has_rest
         ? element(
             "button",
-            { class: "button", type: "button", onclick: () => registerByHand(name) },
+            { class: "button", type: "button", onclick: () => openRegistration(name) },
             "Register by hand",
           )
         : null,
       summary.has_rest
-        ? asJob("Register automatically", "Keeps the automatic registration under a name", () =>
+        ? jobButton("Register automatically", "Keeps the automatic registration under a name", () =>
             post(`/datasets/${encodeURIComponent(name)}/registrations/automatic`),
           )
         : null,
-      asJob("Replay", "All sequences as the setup is stated, seen like a diagnosis", () =>
+      jobButton("Replay", "All sequences as the setup is stated, seen like a diagnosis", () =>
         post("/replays", { dataset: name, registration: camera.value || null }),
       ),
     ),
     camera.hidden ? null : element("label", { class: "register-dataset" }, "Camera", camera),
-    notes("Doubtful", summary.warnings),
-    notes("Missing for some causes", summary.lacks),
+    noteSection("Doubtful", summary.warnings),
+    noteSection("Missing for some causes", summary.lacks),
     element(
       "section",
       {},
@@ -85,7 +85,7 @@ export async function showDataset(name, diagnose) {
           fact("Name", summary.name),
           fact("Phantom", `${size} mm`),
           fact("Mass", `${(summary.mass * 1e3).toFixed(1)} g`),
-          fact("Tool radius", mm(summary.tool_radius)),
+          fact("Tool radius", formatMm(summary.tool_radius)),
           fact("Touches", summary.touches),
           fact("Rest cloud", summary.has_rest ? "yes" : "no"),
         ),
@@ -117,7 +117,7 @@ export async function showDataset(name, diagnose) {
 }
 
 /** A button that asks for a job. */
-function asJob(label, title, ask) {
+function jobButton(label, title, ask) {
   const button = element(
     "button",
     {
@@ -143,17 +143,17 @@ function asJob(label, title, ask) {
 const fact = (label, value) =>
   element("tr", {}, element("th", {}, label), element("td", { class: "number" }, String(value)));
 
-const notes = (title, sentences) =>
+const noteSection = (title, sentences) =>
   sentences.length
     ? element(
         "section",
         {},
         element("h2", {}, title),
-        sentences.map((text) => element("div", { class: "note-card" }, capital(text))),
+        sentences.map((text) => element("div", { class: "note-card" }, capitalise(text))),
       )
     : null;
 
-const broken = ({ message, where }) =>
+const errorCard = ({ message, where }) =>
   element(
     "div",
     { class: "note-card bad" },

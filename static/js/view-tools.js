@@ -1,10 +1,10 @@
 // Looking at the scene: standard views, models side by side, and the section through the block.
 import { post, toast } from "./api.js";
-import { forget } from "./camera.js";
+import { forgetCamera } from "./camera.js";
 import { element, fill, icon } from "./dom.js";
-import { bind } from "./keys.js";
-import { order } from "./looks.js";
-import { on, set, state } from "./store.js";
+import { bindShortcuts } from "./shortcuts.js";
+import { inDrawOrder } from "./layer-styles.js";
+import { subscribe, set, state } from "./store.js";
 
 const VIEWS = [
   ["reset", "target", "Look at the phantom again (0)"],
@@ -17,42 +17,45 @@ let look = () => {};
 
 export function start(page) {
   look = (where) => {
-    forget();
+    forgetCamera();
     post(`/sessions/${page}/look?where=${where}`).catch(toast);
   };
   for (const [where, shape, title] of VIEWS)
-    button(`${where}-view`, shape, title, () => look(where));
-  button("aside", "columns", "Models side by side (B)", aside);
-  button("section", "section", "Cut the block open (X)", cut);
-  button("crop", "cloud", "Show the whole cloud, not only the points near the phantom", () =>
-    set({ crop: !state().crop }),
+    initToolButton(`${where}-view`, shape, title, () => look(where));
+  initToolButton("aside", "columns", "Models side by side (B)", toggleSideBySide);
+  initToolButton("section", "section", "Cut the block open (X)", toggleSection);
+  initToolButton(
+    "crop",
+    "cloud",
+    "Show the whole cloud, not only the points near the phantom",
+    () => set({ crop: !state().crop }),
   );
-  bind({
+  bindShortcuts({
     0: () => look("reset"),
     1: () => look("top"),
     2: () => look("front"),
     3: () => look("side"),
-    b: aside,
-    x: cut,
+    b: toggleSideBySide,
+    x: toggleSection,
   });
-  on(["side_by_side", "section", "crop"], press);
-  on(["section", "series"], drawSection);
-  press();
+  subscribe(["side_by_side", "section", "crop"], updatePressed);
+  subscribe(["section", "series"], drawSection);
+  updatePressed();
   drawSection();
 }
 
-export function button(id, shape, title, act) {
+export function initToolButton(id, shape, title, act) {
   const node = fill(id, icon(shape));
   Object.assign(node, { type: "button", title });
   node.classList.add("icon-button");
   node.addEventListener("click", act);
 }
 
-function aside() {
+function toggleSideBySide() {
   set({ side_by_side: !state().side_by_side });
 }
 
-function press() {
+function updatePressed() {
   const pressed = {
     aside: state().side_by_side,
     section: Boolean(state().section?.on),
@@ -62,20 +65,20 @@ function press() {
     document.getElementById(id).setAttribute("aria-pressed", String(value));
 }
 
-function cut() {
+function toggleSection() {
   const { section, series } = state();
   if (!series) return;
   const wanted = section
     ? { ...section, on: !section.on }
-    : { on: true, axis: "y", at: middle("y"), flip: false };
+    : { on: true, axis: "y", at: middleOf("y"), flip: false };
   // Who opens the block wants to see what was found in it.
   set({
     section: wanted,
-    layers: wanted.on && series.lumps ? order([...state().layers, "lump"]) : state().layers,
+    layers: wanted.on && series.lumps ? inDrawOrder([...state().layers, "lump"]) : state().layers,
   });
 }
 
-const middle = (axis) => {
+const middleOf = (axis) => {
   const [low, high] = state().series.box;
   const at = AXES.indexOf(axis);
   return (low[at] + high[at]) / 2;
@@ -120,7 +123,7 @@ function drawSection() {
             role: "radio",
             "aria-checked": String(axis === section.axis),
             "data-axis": axis,
-            onclick: () => set({ section: { ...section, axis, at: middle(axis) } }),
+            onclick: () => set({ section: { ...section, axis, at: middleOf(axis) } }),
           },
           axis,
         ),
@@ -146,7 +149,7 @@ function drawSection() {
         type: "button",
         title: "Close the section (X)",
         "aria-label": "Close the section",
-        onclick: cut,
+        onclick: toggleSection,
       },
       icon("close"),
     ),

@@ -2,9 +2,15 @@
 import { post, toast } from "./api.js";
 import { comparisonSection } from "./comparison.js";
 import { element, fill } from "./dom.js";
-import { capital, parameter, percent, when, words } from "./format.js";
+import {
+  capitalise,
+  formatParameter,
+  formatPercent,
+  formatDateTime,
+  readableName,
+} from "./format.js";
 import { openPanel } from "./panels.js";
-import { patternSection } from "./patterns.js";
+import { patternSection } from "./error-maps.js";
 
 const panel = () => document.getElementById("panel");
 
@@ -16,7 +22,7 @@ export function showReport(heading, report, patterns, palette) {
       "div",
       { class: "eyebrow" },
       element("span", { class: `verdict-tag ${report.verdict}` }, report.verdict),
-      `${heading.folder ?? heading.dataset} · ${when(heading.created)}`,
+      `${heading.folder ?? heading.dataset} · ${formatDateTime(heading.created)}`,
     ),
     element("h1", { class: "verdict" }, heading.sentence),
     element(
@@ -42,14 +48,14 @@ export function showReport(heading, report, patterns, palette) {
               ? "Causes"
               : "Cause",
           report.verdict === "replay" ? "" : "interval",
-          causes.map(cause),
+          causes.map(causeCard),
         )
       : null,
     report.gain
       ? section(
           "Error on sequences not fitted on",
           report.gain.unit ?? "mm",
-          gain(report.gain, causes.length > 0),
+          gainLadder(report.gain, causes.length > 0),
         )
       : null,
     heading.sequences?.length
@@ -66,14 +72,14 @@ export function showReport(heading, report, patterns, palette) {
       ? section(
           "Palpation",
           `${report.palpation.pushes} pushes`,
-          palpation(heading.id, report.palpation, causes),
+          palpationSummary(heading.id, report.palpation, causes),
         )
       : null,
     report.ranking?.length
       ? section(
           "Ranking",
           "",
-          ranking(
+          rankingTable(
             report.ranking,
             causes.map(({ effect }) => effect),
           ),
@@ -83,21 +89,25 @@ export function showReport(heading, report, patterns, palette) {
       ? section(
           "What this data can tell",
           "smallest that would be named",
-          told(report.ambiguity_map),
+          detectionLimits(report.ambiguity_map),
         )
       : null,
     report.controls?.length
-      ? section("Controls", "motions that were not made", controls(report.controls))
+      ? section("Controls", "motions that were not made", controlRows(report.controls))
       : null,
     report.next_probe?.length
-      ? section("Next probe", "would tell most", report.next_probe.map(probe))
+      ? section("Next probe", "would tell most", report.next_probe.map(probeEntry))
       : null,
-    report.unexplained ? section("Unexplained", "", unexplained(report.unexplained)) : null,
+    report.unexplained ? section("Unexplained", "", unexplainedNote(report.unexplained)) : null,
     report.identified?.length
-      ? section("Told by the forces", "interval", report.identified.map(known))
+      ? section("Told by the forces", "interval", report.identified.map(identifiedCard))
       : null,
     report.not_identifiable?.length
-      ? section("Cannot be told from this data", "", report.not_identifiable.map(blind))
+      ? section(
+          "Cannot be told from this data",
+          "",
+          report.not_identifiable.map(unidentifiableCard),
+        )
       : null,
   );
   document.getElementById("panel").scrollTop = 0;
@@ -183,20 +193,20 @@ const section = (title, aside, ...children) =>
     ...children,
   );
 
-function cause({ effect, probability, parameters }) {
+function causeCard({ effect, probability, parameters }) {
   const rows = Object.entries(parameters ?? {}).map(([name, entry]) => {
-    const shown = parameter(entry);
+    const shown = formatParameter(entry);
     return element(
       "tr",
       {},
-      element("th", {}, words(name)),
+      element("th", {}, readableName(name)),
       element(
         "td",
         { class: "number" },
         element("b", {}, shown.value),
         shown.unit ? ` ${shown.unit}` : "",
       ),
-      element("td", { class: "number interval" }, determined(entry) ?? shown.interval),
+      element("td", { class: "number interval" }, openInterval(entry) ?? shown.interval),
     );
   });
   return element(
@@ -205,9 +215,9 @@ function cause({ effect, probability, parameters }) {
     element(
       "div",
       { class: "cause-head" },
-      element("strong", {}, capital(words(effect))),
+      element("strong", {}, capitalise(readableName(effect))),
       typeof probability === "number"
-        ? element("span", {}, `probability ${percent(probability)}`)
+        ? element("span", {}, `probability ${formatPercent(probability)}`)
         : null,
     ),
     element("table", {}, element("tbody", {}, rows)),
@@ -215,7 +225,7 @@ function cause({ effect, probability, parameters }) {
 }
 
 /** Pushes and footprint as drawn by the diagnosis, and what a hand would want to know of a lump. */
-function palpation(run, { depth, force, young_modulus: modulus }, causes) {
+function palpationSummary(run, { depth, force, young_modulus: modulus }, causes) {
   const rows = [
     ["pushed", depth],
     ["resisted with", force],
@@ -242,7 +252,7 @@ function palpation(run, { depth, force, young_modulus: modulus }, causes) {
         "tbody",
         {},
         rows.map(([name, entry]) => {
-          const shown = parameter(entry);
+          const shown = formatParameter(entry);
           return element(
             "tr",
             {},
@@ -261,13 +271,15 @@ function palpation(run, { depth, force, young_modulus: modulus }, causes) {
 }
 
 /** In place of an interval that is open on a side, or none at all. */
-function determined({ identifiability, unit, low, high }) {
-  if (identifiability === "at least") return `at least ${parameter({ value: low, unit }).value}`;
-  if (identifiability === "at most") return `at most ${parameter({ value: high, unit }).value}`;
+function openInterval({ identifiability, unit, low, high }) {
+  if (identifiability === "at least")
+    return `at least ${formatParameter({ value: low, unit }).value}`;
+  if (identifiability === "at most")
+    return `at most ${formatParameter({ value: high, unit }).value}`;
   return identifiability === "not identifiable" ? "not determined" : null;
 }
 
-function gain(
+function gainLadder(
   {
     baseline,
     extended,
@@ -292,7 +304,7 @@ function gain(
   const number = (value) => (value < 10 ? value.toFixed(value < 1 ? 3 : 2) : value.toFixed(1));
   const range =
     removed && typeof removed.low === "number"
-      ? ` (${percent(removed.low)} to ${percent(removed.high)})`
+      ? ` (${formatPercent(removed.low)} to ${formatPercent(removed.high)})`
       : "";
   return element(
     "div",
@@ -319,12 +331,12 @@ function gain(
         ? "No cause was named, so the model stays as it was. "
         : removed && typeof removed.value === "number"
           ? [
-              element("b", {}, percent(removed.value)),
+              element("b", {}, formatPercent(removed.value)),
               `${range} of the error above the noise floor is gone on the ${split} sequences. `,
             ]
           : null,
       added && typeof others.tuned?.value === "number"
-        ? `The robot's pose, the tool's radius and Poisson's ratio were fitted within their accuracies along with it; that alone, with no cause, ${others.tuned.value > 0.005 ? `removes ${percent(others.tuned.value)}` : "removes nothing"}. `
+        ? `The robot's pose, the tool's radius and Poisson's ratio were fitted within their accuracies along with it; that alone, with no cause, ${others.tuned.value > 0.005 ? `removes ${formatPercent(others.tuned.value)}` : "removes nothing"}. `
         : null,
       typeof paper?.baseline === "number" && typeof paper?.extended === "number"
         ? `Mean distance as in the literature: ${number(paper.baseline)}${added ? ` → ${number(paper.extended)}` : ""} ${unit}.`
@@ -333,7 +345,7 @@ function gain(
   );
 }
 
-function ranking(entries, named) {
+function rankingTable(entries, named) {
   return element(
     "div",
     { class: "ranking" },
@@ -344,19 +356,19 @@ function ranking(entries, named) {
     entries
       .slice(0, 8)
       .flatMap(({ effect, probability, error_removed: removed }) => [
-        element("span", {}, words(effect)),
+        element("span", {}, readableName(effect)),
         element(
           "div",
           { class: named.includes(effect) ? "bar first" : "bar" },
           element("i", { style: { width: `${100 * Math.max(0, removed ?? 0)}%` } }),
         ),
-        element("span", { class: "number" }, percent(removed)),
-        element("span", { class: "number" }, percent(probability)),
+        element("span", { class: "number" }, formatPercent(removed)),
+        element("span", { class: "number" }, formatPercent(probability)),
       ]),
   );
 }
 
-function told(rows) {
+function detectionLimits(rows) {
   return element(
     "div",
     { class: "told" },
@@ -364,11 +376,11 @@ function told(rows) {
       const alike = row.alike[0];
       const like =
         alike && alike.share >= 0.3
-          ? `${percent(alike.share)} like ${words(alike.effect)}`
+          ? `${formatPercent(alike.share)} like ${readableName(alike.effect)}`
           : "like nothing else";
       return [
-        element("strong", {}, capital(words(row.effect))),
-        element("span", { class: "number" }, smallest(row)),
+        element("strong", {}, capitalise(readableName(row.effect))),
+        element("span", { class: "number" }, smallestDetectable(row)),
         element("small", {}, like),
       ];
     }),
@@ -376,51 +388,55 @@ function told(rows) {
 }
 
 /** The smallest size of an effect that this data would show: worst of each unit, best place of a lump, share of a finite cause. */
-function smallest({ limits, typical, at }) {
+function smallestDetectable({ limits, typical, at }) {
   const sizes = limits.map(({ change, factor, share }) => change ?? factor ?? share ?? null);
   if (sizes.includes(null)) return "not at any size";
   const where = Object.entries(at)
-    .map(([name, entry]) => `${words(name)} ${reading(entry)}`)
+    .map(([name, entry]) => `${readableName(name)} ${shortValue(entry)}`)
     .join(", ");
   if ("factor" in limits[0] && !("x" in at))
-    return `${round(sizes[0])} times${where ? ` at ${where}` : ""}`; // has no place
+    return `${twoDigits(sizes[0])} times${where ? ` at ${where}` : ""}`; // has no place
   if ("factor" in limits[0])
-    return `${round(sizes[0])} times at best; half of the places ${typical.factor ? `${round(typical.factor)} times` : "not at any size"}`;
-  if ("share" in limits[0]) return `${percent(sizes[0])} of ${where}`;
+    return `${twoDigits(sizes[0])} times at best; half of the places ${typical.factor ? `${twoDigits(typical.factor)} times` : "not at any size"}`;
+  if ("share" in limits[0]) return `${formatPercent(sizes[0])} of ${where}`;
   const worst = {};
   for (const { unit, change } of limits) worst[unit] = Math.max(change, worst[unit] ?? 0);
   return Object.entries(worst)
-    .map(([unit, value]) => reading({ value, unit }))
+    .map(([unit, value]) => shortValue({ value, unit }))
     .join(", ");
 }
 
-const round = (value) => Number(value.toPrecision(2));
+const twoDigits = (value) => Number(value.toPrecision(2));
 
-function reading(entry) {
-  const { value, unit } = parameter(entry);
+function shortValue(entry) {
+  const { value, unit } = formatParameter(entry);
   const number = Number(value);
-  return `${Number.isFinite(number) ? round(number) : value}${unit && unit !== "°" ? ` ${unit}` : unit}`;
+  return `${Number.isFinite(number) ? twoDigits(number) : value}${unit && unit !== "°" ? ` ${unit}` : unit}`;
 }
 
 /** One line for each cause under each falsified motion: the share of its gain that is left. */
-function controls(rows) {
+function controlRows(rows) {
   const several = new Set(rows.map(({ effect }) => effect)).size > 1;
   return element(
     "div",
     { class: "told" },
     rows.flatMap(({ control, effect, kept, passed, why }) => [
-      element("strong", {}, capital(control)),
+      element("strong", {}, capitalise(control)),
       element(
         "span",
         { class: passed === false ? "number failed" : "number" },
-        passed === null ? "says nothing" : `${percent(Math.max(0, kept))} of the gain left`,
+        passed === null ? "says nothing" : `${formatPercent(Math.max(0, kept))} of the gain left`,
       ),
       element(
         "small",
         {},
         [
-          several || passed === false ? capital(words(effect)) : "",
-          passed === false ? "it may not come of the pushes" : passed === null ? words(why) : "",
+          several || passed === false ? capitalise(readableName(effect)) : "",
+          passed === false
+            ? "it may not come of the pushes"
+            : passed === null
+              ? readableName(why)
+              : "",
         ]
           .filter(Boolean)
           .join(": "),
@@ -429,21 +445,21 @@ function controls(rows) {
   );
 }
 
-function probe({ text, separates, probability }) {
-  const names = separates.map((name) => (name === "none" ? "nothing" : words(name)));
+function probeEntry({ text, separates, probability }) {
+  const names = separates.map((name) => (name === "none" ? "nothing" : readableName(name)));
   const chance =
     typeof probability === "number"
-      ? `, ${probability > 0.99 ? "more than 99 %" : percent(probability)} likely to decide`
+      ? `, ${probability > 0.99 ? "more than 99 %" : formatPercent(probability)} likely to decide`
       : "";
   return element(
     "div",
     { class: "probe" },
-    element("span", {}, capital(text)),
-    element("small", {}, `${capital(names[0])} or ${names[1]}${chance}`),
+    element("span", {}, capitalise(text)),
+    element("small", {}, `${capitalise(names[0])} or ${names[1]}${chance}`),
   );
 }
 
-function unexplained({ fraction, where, when: time, structure, structure_bound: bound }) {
+function unexplainedNote({ fraction, where, when: time, structure, structure_bound: bound }) {
   const times =
     typeof structure === "number"
       ? `What is left is ${structure.toFixed(2)} times what chance gives, where more than ${bound.toFixed(2)} would be an error with a pattern.`
@@ -459,28 +475,28 @@ function unexplained({ fraction, where, when: time, structure, structure_bound: 
   return element(
     "p",
     { class: "gain-note" },
-    element("b", {}, percent(fraction)),
+    element("b", {}, formatPercent(fraction)),
     ` of the structured error is left${place ? `: ${place}` : ""}.`,
   );
 }
 
-const known = ({ effect, why, parameters }) =>
+const identifiedCard = ({ effect, why, parameters }) =>
   element(
     "div",
     { class: "note-card" },
-    element("strong", {}, capital(words(effect))),
+    element("strong", {}, capitalise(readableName(effect))),
     Object.entries(parameters).map(
       ([name, entry]) =>
-        `${words(name)} = ${parameter(entry).value} ${parameter(entry).unit} (${parameter(entry).interval}). `,
+        `${readableName(name)} = ${formatParameter(entry).value} ${formatParameter(entry).unit} (${formatParameter(entry).interval}). `,
     ),
-    why ? `${capital(why)}.` : "",
+    why ? `${capitalise(why)}.` : "",
   );
 
-const blind = ({ effect, why, measure_instead: instead }) =>
+const unidentifiableCard = ({ effect, why, measure_instead: instead }) =>
   element(
     "div",
     { class: "note-card" },
-    element("strong", {}, capital(words(effect))),
-    why ? `${capital(why)}. ` : "",
+    element("strong", {}, capitalise(readableName(effect))),
+    why ? `${capitalise(why)}. ` : "",
     instead ? `Measure instead: ${instead}.` : "",
   );

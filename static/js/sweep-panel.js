@@ -1,11 +1,11 @@
 // The panel of sweeps: what to move and over which clouds, the points as they come, and what they say.
-import { get, post, title } from "./api.js";
+import { get, post, errorTitle } from "./api.js";
 import { element, fill, icon } from "./dom.js";
-import { capital, words } from "./format.js";
-import { opens } from "./jobs.js";
+import { capitalise, readableName } from "./format.js";
+import { addResultOpener } from "./jobs.js";
 import { addPanel, openPanel } from "./panels.js";
-import { cameraChoice } from "./register.js";
-import { change as changed, mm4, plotOf } from "./sweep-plots.js";
+import { cameraSelect } from "./register.js";
+import { formatErrorChange as changed, formatError, sweepPlot } from "./sweep-plots.js";
 
 const METHODS = [
   ["grid", "Grid, coarse to fine"],
@@ -18,25 +18,25 @@ const PAUSE = 700;
 let effects = null;
 let axes = [];
 let box = null;
-let watched = null;
+let followedId = null;
 
 export function startSweeps() {
   box = addPanel(
     "sweep",
     "Sweep",
-    () => (watched ? null : opened()),
+    () => (followedId ? null : openForm()),
     () => {
-      watched = null;
+      followedId = null;
     },
   );
-  opens("sweep", "Open the sweep", (id) => {
-    watched = id;
+  addResultOpener("sweep", "Open the sweep", (id) => {
+    followedId = id;
     openPanel("sweep");
-    watch(id);
+    followSweep(id);
   });
 }
 
-async function opened() {
+async function openForm() {
   try {
     const [catalogue, { datasets, folder }] = await Promise.all([
       effects ?? get("/effects"),
@@ -46,11 +46,11 @@ async function opened() {
     if (!axes.length) axes = [{ name: "poisson_ratio.nu", low: 0.3, high: 0.49 }];
     await showForm(datasets, folder);
   } catch (problem) {
-    fill(box, broken(problem));
+    fill(box, errorCard(problem));
   }
 }
 
-const known = () =>
+const sweepableParameters = () =>
   effects.flatMap((effect) =>
     effect.parameters
       .filter(({ choices, low, high }) => !choices.length && low !== null && high !== null)
@@ -59,18 +59,21 @@ const known = () =>
         key: `${effect.name}.${item.name}`,
         label:
           effect.parameters.length > 1
-            ? `${capital(words(effect.name))}: ${words(item.name)}`
-            : capital(words(effect.name)),
+            ? `${capitalise(readableName(effect.name))}: ${readableName(item.name)}`
+            : capitalise(readableName(effect.name)),
       })),
   );
-const found = (name) => known().find(({ key }) => key === name);
+const parameterOf = (name) => sweepableParameters().find(({ key }) => key === name);
 const unitOf = (name) =>
-  UNITS[found(name)?.unit] ?? [1, found(name)?.unit === "1" ? "" : (found(name)?.unit ?? "")];
-const broken = (problem) =>
+  UNITS[parameterOf(name)?.unit] ?? [
+    1,
+    parameterOf(name)?.unit === "1" ? "" : (parameterOf(name)?.unit ?? ""),
+  ];
+const errorCard = (problem) =>
   element(
     "div",
     { class: "note-card bad", role: "alert" },
-    element("strong", {}, title(problem)),
+    element("strong", {}, errorTitle(problem)),
     problem.message,
   );
 
@@ -112,7 +115,7 @@ async function showForm(datasets, folder, problem = null) {
   });
   const cameras = element("div");
   const listCameras = async () => {
-    const choice = await cameraChoice(dataset.value);
+    const choice = await cameraSelect(dataset.value);
     fill(cameras, choice.hidden ? null : element("label", {}, "Camera", choice));
   };
   dataset.addEventListener("change", listCameras);
@@ -169,11 +172,11 @@ async function showForm(datasets, folder, problem = null) {
             : { points: +values.get("points") }),
         };
         try {
-          watch((await post("/sweeps", asked)).id);
+          followSweep((await post("/sweeps", asked)).id);
         } catch (refused) {
           start.disabled = false;
           form.querySelector(".note-card")?.remove();
-          form.append(broken(refused));
+          form.append(errorCard(refused));
         }
       },
     },
@@ -188,7 +191,9 @@ async function showForm(datasets, folder, problem = null) {
         class: "button",
         type: "button",
         onclick: () => {
-          const next = known().find(({ key }) => !axes.some(({ name }) => name === key));
+          const next = sweepableParameters().find(
+            ({ key }) => !axes.some(({ name }) => name === key),
+          );
           axes.push({ name: next.key, low: next.low, high: next.high });
           drawRows();
         },
@@ -213,7 +218,7 @@ async function showForm(datasets, folder, problem = null) {
       ),
     ),
     element("div", { class: "actions" }, start),
-    problem ? broken(problem) : null,
+    problem ? errorCard(problem) : null,
   );
   fill(
     box,
@@ -233,7 +238,7 @@ async function showForm(datasets, folder, problem = null) {
               .map(({ id, job }) =>
                 element(
                   "button",
-                  { type: "button", "data-sweep": id, onclick: () => watch(id) },
+                  { type: "button", "data-sweep": id, onclick: () => followSweep(id) },
                   element("span", {}, id),
                   element("span", { class: "muted" }, job?.state ?? "on disk"),
                 ),
@@ -263,12 +268,12 @@ function axisRow(axis, redraw) {
   const choice = element(
     "select",
     { "aria-label": "Parameter" },
-    known().map(({ key, label }) =>
+    sweepableParameters().map(({ key, label }) =>
       element("option", { value: key, selected: key === axis.name }, label),
     ),
   );
   choice.addEventListener("change", () => {
-    const item = found(choice.value);
+    const item = parameterOf(choice.value);
     Object.assign(axis, { name: item.key, low: item.low, high: item.high });
     redraw();
   });
@@ -296,17 +301,17 @@ function axisRow(axis, redraw) {
 }
 
 /** Follow a sweep until it has ended or the panel shows something else. */
-async function watch(id) {
-  watched = id;
+async function followSweep(id) {
+  followedId = id;
   let points = [];
   let next = 0;
-  while (watched === id) {
+  while (followedId === id) {
     try {
       const [whole, more] = await Promise.all([
         get(`/sweeps/${id}`),
         get(`/sweeps/${id}/points?after=${next}`),
       ]);
-      if (watched !== id) return;
+      if (followedId !== id) return;
       points = points.concat(more.points);
       next = more.next;
       const seen = new Map(points.map((point) => [point.number, point]));
@@ -314,22 +319,22 @@ async function watch(id) {
       const ended = !whole.job || !["queued", "running"].includes(whole.job.state);
       if (ended && !more.points.length) return;
     } catch (problem) {
-      fill(box, broken(problem), back());
+      fill(box, errorCard(problem), backButton());
       return;
     }
     await new Promise((done) => setTimeout(done, PAUSE));
   }
 }
 
-const back = () =>
+const backButton = () =>
   element(
     "button",
     {
       class: "button",
       type: "button",
       onclick: () => {
-        watched = null;
-        opened();
+        followedId = null;
+        openForm();
       },
     },
     "Another sweep",
@@ -359,9 +364,9 @@ function draw(id, { job, request, summary }, points) {
     low,
     high,
     log: low > 0 && high / low > 30,
-    label: words(name.split(".")[1]),
+    label: readableName(name.split(".")[1]),
     unit: unitOf(name)[1],
-    show: (value) => shown(name, value),
+    show: (value) => formatValue(name, value),
     plain: (value) => `${+(value * unitOf(name)[0]).toPrecision(3)}`,
   }));
   const failed = swept.filter(({ error }) => error === null);
@@ -392,7 +397,7 @@ function draw(id, { job, request, summary }, points) {
       ? element(
           "div",
           { class: "note-card bad" },
-          element("strong", {}, title(job.error)),
+          element("strong", {}, errorTitle(job.error)),
           job.error.message,
         )
       : null,
@@ -400,7 +405,7 @@ function draw(id, { job, request, summary }, points) {
       ? element(
           "section",
           {},
-          plotOf(drawn, swept, stated, best?.number),
+          sweepPlot(drawn, swept, stated, best?.number),
           element(
             "div",
             { class: "sweep-keys" },
@@ -425,7 +430,7 @@ function draw(id, { job, request, summary }, points) {
           "section",
           {},
           element("h2", {}, "What each parameter does"),
-          summary.directions.map(told),
+          summary.directions.map(directionCard),
         )
       : null,
     failed.length
@@ -438,11 +443,11 @@ function draw(id, { job, request, summary }, points) {
             .map((text) => element("div", { class: "note-card" }, text)),
         )
       : null,
-    element("div", { class: "actions" }, running ? stop : null, back()),
+    element("div", { class: "actions" }, running ? stop : null, backButton()),
   );
 }
 
-function shown(name, value) {
+function formatValue(name, value) {
   const [factor, unit] = unitOf(name);
   return `${+(value * factor).toPrecision(3)}${unit ? ` ${unit}` : ""}`;
 }
@@ -450,19 +455,19 @@ function shown(name, value) {
 function sentence(best, stated, drawn, running) {
   if (!best) return running ? "Reading the clouds …" : "No point has an error.";
   const where = drawn
-    .map(({ name, label }) => `${label} ${shown(name, best.values[name])}`)
+    .map(({ name, label }) => `${label} ${formatValue(name, best.values[name])}`)
     .join(", ");
-  return `Least error ${mm4(best.error)} at ${where}${stated === null ? "" : `; ${mm4(stated)} as stated`}.`;
+  return `Least error ${formatError(best.error)} at ${where}${stated === null ? "" : `; ${formatError(stated)} as stated`}.`;
 }
 
-const told = ({ name, flat, change, low, high }) =>
+const directionCard = ({ name, flat, change, low, high }) =>
   element(
     "div",
     { class: "note-card", "data-direction": name, "data-flat": String(flat) },
     element(
       "strong",
       {},
-      `${capital(words(name.split(".")[0]))}: ${flat ? "flat" : flat === null ? "unknown" : "matters"}`,
+      `${capitalise(readableName(name.split(".")[0]))}: ${flat ? "flat" : flat === null ? "unknown" : "matters"}`,
     ),
     flat
       ? "The error does not change along it beyond what drawing the pushes anew changes: these clouds cannot tell it. "

@@ -1,12 +1,12 @@
 // A dataset is brought: an archive dropped or chosen, or a folder on the server's disk; then its import is a job like others.
-import { Problem, post, title } from "./api.js";
+import { ApiError, post, errorTitle } from "./api.js";
 import { element, fill } from "./dom.js";
 
 const NAME = "[A-Za-z0-9][A-Za-z0-9._\\-]*";
 let box = null;
 
 /** Ask for a dataset; whoever drops an archive on the page has chosen it already. */
-export function askForDataset(file = null) {
+export function openImportDialog(file = null) {
   box ??= document.body.appendChild(
     element("dialog", { class: "ask", "aria-label": "Import a dataset" }),
   );
@@ -15,7 +15,7 @@ export function askForDataset(file = null) {
 }
 
 /** Archives dropped anywhere on the page are imported. */
-export function watchDrops() {
+export function importDroppedFiles() {
   window.addEventListener("dragover", (event) => {
     if (event.dataTransfer?.types.includes("Files")) event.preventDefault();
   });
@@ -23,7 +23,7 @@ export function watchDrops() {
     const [file] = event.dataTransfer?.files ?? [];
     if (file) {
       event.preventDefault();
-      askForDataset(file);
+      openImportDialog(file);
     }
   });
 }
@@ -39,7 +39,7 @@ function draw(file) {
     pattern: NAME,
     title: "Letters, digits, dot, dash, underscore",
     autocomplete: "off",
-    value: file ? named(file.name) : "",
+    value: file ? datasetName(file.name) : "",
   });
   const chosen = element("input", {
     type: "file",
@@ -48,7 +48,7 @@ function draw(file) {
     "aria-label": "Archive of the dataset",
   });
   chosen.addEventListener("change", () => {
-    if (chosen.files[0] && !name.value) name.value = named(chosen.files[0].name);
+    if (chosen.files[0] && !name.value) name.value = datasetName(chosen.files[0].name);
   });
   const folder = element("input", {
     name: "folder",
@@ -57,7 +57,8 @@ function draw(file) {
     "aria-label": "Folder on the server",
   });
   folder.addEventListener("input", () => {
-    if (!name.dataset.own) name.value = named(folder.value.split("/").filter(Boolean).at(-1) ?? "");
+    if (!name.dataset.own)
+      name.value = datasetName(folder.value.split("/").filter(Boolean).at(-1) ?? "");
   });
   name.addEventListener("input", () => {
     name.dataset.own = "yes";
@@ -74,7 +75,7 @@ function draw(file) {
         if (!archive && !folder.value) {
           fill(
             problem,
-            said({
+            errorCard({
               kind: "Nothing chosen",
               message: "Choose an archive, or name a folder on the server.",
             }),
@@ -91,7 +92,7 @@ function draw(file) {
           else await post("/imports/folder", { folder: folder.value, name: name.value });
           box.close();
         } catch (refused) {
-          fill(problem, said(refused));
+          fill(problem, errorCard(refused));
           start.disabled = false;
           progress.hidden = true;
         }
@@ -123,18 +124,18 @@ function draw(file) {
   );
 }
 
-const named = (file) =>
+const datasetName = (file) =>
   file
     .replace(/(\.tar)?\.(zip|tar|gz|tgz|bz2|xz)$/i, "")
     .replace(/[^A-Za-z0-9._-]+/g, "-")
     .replace(/^[^A-Za-z0-9]+/, "")
     .slice(0, 64);
 
-const said = (problem) =>
+const errorCard = (problem) =>
   element(
     "div",
     { class: "note-card bad" },
-    element("strong", {}, title(problem)),
+    element("strong", {}, errorTitle(problem)),
     problem.message,
   );
 
@@ -153,11 +154,11 @@ function upload(file, name, told) {
         /* said above */
       }
       if (request.status < 300) done(body);
-      else refused(new Problem(body));
+      else refused(new ApiError(body));
     };
     request.onerror = () =>
       refused(
-        new Problem({
+        new ApiError({
           kind: "No answer",
           message: "The connection broke while sending; try again.",
           where: {},
