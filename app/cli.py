@@ -8,10 +8,20 @@ from typing import NoReturn
 
 import typer
 
-from app.commands import blind, data, demo, diagnosis, evaluation, export, service, sweeping, training
-from app.console import errors, print_problem
-from app.stop import stop
-from core.errors import Cancelled, PalpateError
+from palpate.app.commands import (
+    blind,
+    data,
+    demo,
+    diagnosis,
+    evaluation,
+    export,
+    service,
+    sweeping,
+    training,
+)
+from palpate.app.commands.console import errors, print_problem
+from palpate.app.jobs.signals import stop
+from palpate.foundation.errors import Cancelled, PalpateError
 
 __all__ = ["app", "main"]
 
@@ -39,7 +49,9 @@ app.command()(service.serve)
 
 
 def main() -> NoReturn:
-    """Run a verb: 0 when it is done, 2 with one clear message for bad input, 130 when it was stopped."""
+    """Run a verb: 0 when it is done, 2 with one clear message for bad input, 130 when it was
+    stopped.
+    """
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     stop.listen()
@@ -53,7 +65,9 @@ def main() -> NoReturn:
     except Exception:
         if not stop.asked:
             raise
-        sys.exit(_cancelled())  # a stop in the middle of an import comes out as whatever that import makes of it
+        sys.exit(
+            _cancelled()
+        )  # a stop in the middle of an import comes out as whatever that import makes of it
     except SystemExit as end:
         if end.code == CANCELLED:
             _cancelled()

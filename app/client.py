@@ -1,9 +1,9 @@
-"""The REST service from Python: diagnoses and sweeps asked for, followed, and their results fetched.
+"""The REST service from Python: diagnoses and sweeps asked for, followed, and their results
+fetched.
 
 with Client("http://127.0.0.1:8321") as palpate:
     job = palpate.sweep("block-01", {"poisson_ratio.nu": (0.3, 0.49)}, steps=7)
-    palpate.wait(job["id"], print)
-    print(palpate.sweep_result(job["id"])["summary"]["best"])
+    palpate.wait(job["id"], print) print(palpate.sweep_result(job["id"])["summary"]["best"])
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from uuid import uuid4
 
 import httpx
 
-from core.errors import PalpateError
+from palpate.foundation.errors import PalpateError
 
 __all__ = ["ApiError", "Client", "JobError"]
 
@@ -30,7 +30,9 @@ class ApiError(PalpateError):
     """What the service refused, in its own words; `kind` and `status` say of which sort it is."""
 
     def __init__(self, status: int, kind: str, message: str, where: Mapping[str, Any]) -> None:
-        super().__init__(message, **{key: value for key, value in where.items() if key != "message"})
+        super().__init__(
+            message, **{key: value for key, value in where.items() if key != "message"}
+        )
         self.status, self.kind = status, kind
 
 
@@ -46,17 +48,25 @@ class JobError(PalpateError):
 class Client:
     """One server. `token` is what `palpate serve` printed, where it asks for one.
 
-    All methods raise ApiError for what the service refuses, and httpx.TransportError where nothing answers.
+    All methods raise ApiError for what the service refuses, and httpx.TransportError where nothing
+    answers.
     """
 
     def __init__(self, address: str, token: str | None = None, timeout: float = PATIENCE) -> None:
         headers = {"authorization": f"Bearer {token}"} if token else {}
-        self._http = httpx.Client(base_url=f"{address.rstrip('/')}/api", headers=headers, timeout=timeout)
+        self._http = httpx.Client(
+            base_url=f"{address.rstrip('/')}/api", headers=headers, timeout=timeout
+        )
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.close()
 
     def close(self) -> None:
@@ -73,9 +83,18 @@ class Client:
 
     def import_archive(self, file: Path, name: str, key: str | None = None) -> dict[str, Any]:
         """Queue the import of a dataset's folder packed as .zip or .tar, under this name."""
-        headers = {"idempotency-key": key or uuid4().hex, "content-type": "application/octet-stream"}
+        headers = {
+            "idempotency-key": key or uuid4().hex,
+            "content-type": "application/octet-stream",
+        }
         with Path(file).open("rb") as content:
-            return dict(self._answer(self._http.post("/imports", params={"name": name}, content=content, headers=headers)))
+            return dict(
+                self._answer(
+                    self._http.post(
+                        "/imports", params={"name": name}, content=content, headers=headers
+                    )
+                )
+            )
 
     def import_folder(self, folder: str, name: str, key: str | None = None) -> dict[str, Any]:
         """Queue the import of a folder on the server's own disk."""
@@ -89,24 +108,43 @@ class Client:
         """One of them."""
         return dict(self._get(f"/datasets/{dataset}/registrations/{name}"))
 
-    def register(self, dataset: str, accept: str | None = None, key: str | None = None) -> dict[str, Any]:
+    def register(
+        self, dataset: str, accept: str | None = None, key: str | None = None
+    ) -> dict[str, Any]:
         """Queue the automatic registration of a dataset, to be kept under a name."""
         return self._ask(f"/datasets/{dataset}/registrations/automatic", {"accept": accept}, key)
 
-    def register_pairs(self, dataset: str, pairs: Sequence[Mapping[str, Any]], accept: str | None = None) -> dict[str, Any]:
-        """Register by pairs of points `{"cloud": [x, y, z], "mesh": [x, y, z]}` [m], then ICP; kept under a name if given."""
+    def register_pairs(
+        self, dataset: str, pairs: Sequence[Mapping[str, Any]], accept: str | None = None
+    ) -> dict[str, Any]:
+        """Register by pairs of points `{"cloud": [x, y, z], "mesh": [x, y, z]}` [m], then ICP; kept
+        under a name if given.
+        """
         body = {"pairs": [dict(pair) for pair in pairs], "accept": accept}
         return dict(self._answer(self._http.post(f"/datasets/{dataset}/registrations", json=body)))
 
     def replay(
-        self, dataset: str, sequences: Sequence[str] = (), effects: Sequence[Mapping[str, Any]] = (), key: str | None = None,
+        self,
+        dataset: str,
+        sequences: Sequence[str] = (),
+        effects: Sequence[Mapping[str, Any]] = (),
+        key: str | None = None,
         registration: str | None = None,
-    ) -> dict[str, Any]:  # fmt: skip
-        """Queue a replay of sequences (all without) with effects of one's own; the job's id will be its run's."""
-        body = {"dataset": dataset, "sequences": list(sequences), "effects": list(effects), "registration": registration}
+    ) -> dict[str, Any]:
+        """Queue a replay of sequences (all without) with effects of one's own; the job's id will be
+        its run's.
+        """
+        body = {
+            "dataset": dataset,
+            "sequences": list(sequences),
+            "effects": list(effects),
+            "registration": registration,
+        }
         return self._ask("/replays", body, key)
 
-    def export(self, run: str, what: Sequence[str] = ("report", "model"), key: str | None = None) -> dict[str, Any]:
+    def export(
+        self, run: str, what: Sequence[str] = ("report", "model"), key: str | None = None
+    ) -> dict[str, Any]:
         """Queue the writing of parts of a run as files."""
         return self._ask("/exports", {"run": run, "what": list(what)}, key)
 
@@ -119,15 +157,30 @@ class Client:
         """The catalogue, with parameters, units and bounds (SI)."""
         return list(self._get("/effects"))
 
-    def diagnose(self, dataset: str, seed: int = 0, key: str | None = None, registration: str | None = None) -> dict[str, Any]:
-        """Queue a diagnosis, with an accepted registration if one is named; the job's id will be its run's."""
-        return self._ask("/diagnoses", {"dataset": dataset, "seed": seed, "registration": registration}, key)
+    def diagnose(
+        self, dataset: str, seed: int = 0, key: str | None = None, registration: str | None = None
+    ) -> dict[str, Any]:
+        """Queue a diagnosis, with an accepted registration if one is named; the job's id will be
+        its run's.
+        """
+        return self._ask(
+            "/diagnoses", {"dataset": dataset, "seed": seed, "registration": registration}, key
+        )
 
     def sweep(
-        self, dataset: str, parameters: Mapping[str, tuple[float, float]], key: str | None = None, **further: Any
+        self,
+        dataset: str,
+        parameters: Mapping[str, tuple[float, float]],
+        key: str | None = None,
+        **further: Any,
     ) -> dict[str, Any]:
-        """Queue a sweep of `effect.parameter` between two values each (SI); `further` as POST /api/sweeps takes it."""
-        axes = [{"parameter": name, "low": low, "high": high} for name, (low, high) in parameters.items()]
+        """Queue a sweep of `effect.parameter` between two values each (SI); `further` as POST
+        /api/sweeps takes it.
+        """
+        axes = [
+            {"parameter": name, "low": low, "high": high}
+            for name, (low, high) in parameters.items()
+        ]
         return self._ask("/sweeps", {"dataset": dataset, "parameters": axes, **further}, key)
 
     def sweep_result(self, identity: str) -> dict[str, Any]:
@@ -141,16 +194,24 @@ class Client:
             found += more
         return found
 
-    def train(self, dataset: str, run: str | None = None, key: str | None = None, **further: Any) -> dict[str, Any]:
-        """Queue a training on the stated model, or on a run's extended one; `further` as POST /api/trainings takes it."""
+    def train(
+        self, dataset: str, run: str | None = None, key: str | None = None, **further: Any
+    ) -> dict[str, Any]:
+        """Queue a training on the stated model, or on a run's extended one; `further` as POST
+        /api/trainings takes it.
+        """
         return self._ask("/trainings", {"dataset": dataset, "run": run, **further}, key)
 
     def training(self, identity: str) -> dict[str, Any]:
         """A training: what was asked, its history by epoch, and its summary once it has ended."""
         return dict(self._get(f"/trainings/{identity}"))
 
-    def evaluate(self, dataset: str, run: str | None = None, key: str | None = None, **further: Any) -> dict[str, Any]:
-        """Queue a ladder of a dataset's test sequences; `further` as POST /api/evaluations takes it."""
+    def evaluate(
+        self, dataset: str, run: str | None = None, key: str | None = None, **further: Any
+    ) -> dict[str, Any]:
+        """Queue a ladder of a dataset's test sequences; `further` as POST /api/evaluations takes
+        it.
+        """
         return self._ask("/evaluations", {"dataset": dataset, "run": run, **further}, key)
 
     def evaluation(self, identity: str) -> dict[str, Any]:
@@ -172,8 +233,12 @@ class Client:
         """One job as it is now."""
         return dict(self._get(f"/jobs/{identity}"))
 
-    def wait(self, identity: str, report: Callable[[float, str], object] = lambda *_: None) -> dict[str, Any]:
-        """The job once it is done, with `report(fraction, text)` on the way; JobError where it ends otherwise."""
+    def wait(
+        self, identity: str, report: Callable[[float, str], object] = lambda *_: None
+    ) -> dict[str, Any]:
+        """The job once it is done, with `report(fraction, text)` on the way; JobError where it ends
+        otherwise.
+        """
         while (job := self.job(identity))["state"] in ("queued", "running"):
             report(job["fraction"], job["text"])
             time.sleep(PAUSE)
@@ -209,4 +274,6 @@ class Client:
             said = answer.json()
             raise ApiError(answer.status_code, said["kind"], said["message"], said["where"])
         except (ValueError, KeyError, TypeError):
-            raise ApiError(answer.status_code, "HttpError", f"{answer.url} answered {answer.status_code}", {}) from None
+            raise ApiError(
+                answer.status_code, "HttpError", f"{answer.url} answered {answer.status_code}", {}
+            ) from None

@@ -13,12 +13,9 @@ from fastapi.responses import FileResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 from starlette.exceptions import HTTPException
 
-from app import relay
-from app.api import (
-    clicking,
+from palpate.app.api import (
     datasets,
     diagnoses,
-    disk,
     effects,
     evaluations,
     imports,
@@ -28,19 +25,22 @@ from app.api import (
     sessions,
     sweeps,
     trainings,
-    verbs,
     whatif,
 )
-from app.desk import Desk
-from app.guard import Guard
-from app.login import Login
-from app.login import router as login_router
-from app.problems import as_dict, status_code
-from app.schemas import PROBLEMS
-from app.settings import Settings
-from app.tokens import Token
-from app.work import TARGETS
-from core.errors import PalpateError
+from palpate.app.api import disk_space as disk
+from palpate.app.api import registering as clicking
+from palpate.app.api import replays_and_exports as verbs
+from palpate.app.http_errors import as_dict, status_code
+from palpate.app.jobs.tasks import TARGETS
+from palpate.app.schemas import PROBLEMS
+from palpate.app.server import viser_proxy as relay
+from palpate.app.server.login import Login
+from palpate.app.server.login import router as login_router
+from palpate.app.server.request_guard import Guard
+from palpate.app.server.tokens import Token
+from palpate.app.services import Desk
+from palpate.app.settings import Settings
+from palpate.foundation.errors import PalpateError
 
 __all__ = ["create_app"]
 
@@ -51,13 +51,28 @@ is answered with 202 and the job, and followed by GET /api/jobs/{id} or by the s
 """
 
 MODULES = (
-    datasets, imports, disk, verbs, registrations, clicking, diagnoses, jobs, runs, sessions, whatif, effects, sweeps, trainings,
+    datasets,
+    imports,
+    disk,
+    verbs,
+    registrations,
+    clicking,
+    diagnoses,
+    jobs,
+    runs,
+    sessions,
+    whatif,
+    effects,
+    sweeps,
+    trainings,
     evaluations,
-)  # fmt: skip
+)
 
 
 def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> FastAPI:
-    """The service for one folder of runs and one of datasets; `targets` names the function of each kind of job."""
+    """The service for one folder of runs and one of datasets; `targets` names the function of each
+    kind of job.
+    """
     login = Login(Token.load(settings.runs)) if settings.needs_login else None
 
     @asynccontextmanager
@@ -66,7 +81,14 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
         yield
         app.state.desk.close()
 
-    app = FastAPI(title="Palpate", version=version("palpate"), description=ABOUT, lifespan=lifespan, docs_url=None, redoc_url=None)
+    app = FastAPI(
+        title="Palpate",
+        version=version("palpate"),
+        description=ABOUT,
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+    )
     app.state.ending = threading.Event()
     app.state.settings, app.state.login = settings, login
     app.add_middleware(Guard, settings=settings, login=login)
@@ -93,15 +115,23 @@ def _answer_problems(app: FastAPI) -> None:
     def unreadable(_: Request, error: RequestValidationError) -> JSONResponse:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
-        body = {"kind": "RequestError", "message": f"{place}: {first['msg']}", "where": {"key": place}}
+        body = {
+            "kind": "RequestError",
+            "message": f"{place}: {first['msg']}",
+            "where": {"key": place},
+        }
         return JSONResponse(body, status_code=422)
 
     @app.exception_handler(Exception)
     def fault(request: Request, error: Exception) -> JSONResponse:
         message = f"{request.method} {request.url.path} stopped: {type(error).__name__}: {error}; the server's log has more"
-        return JSONResponse({"kind": "InternalError", "message": message, "where": {}}, status_code=500)
+        return JSONResponse(
+            {"kind": "InternalError", "message": message, "where": {}}, status_code=500
+        )
 
     @app.exception_handler(HTTPException)
     def http(request: Request, error: HTTPException) -> JSONResponse:
         message = f"{request.method} {request.url.path}: {error.detail}"
-        return JSONResponse({"kind": "HttpError", "message": message, "where": {}}, status_code=error.status_code)
+        return JSONResponse(
+            {"kind": "HttpError", "message": message, "where": {}}, status_code=error.status_code
+        )

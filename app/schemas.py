@@ -6,17 +6,29 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-from app.records import Job
+from palpate.app.jobs.job_records import Job
 
 __all__ = [
-    "PROBLEMS", "DiagnosisRequest", "EffectIn", "HalfPair", "JobOut", "LiveRequest", "NoteOut", "Notes", "Point", "Problem",
+    "PROBLEMS",
+    "DiagnosisRequest",
+    "EffectIn",
+    "HalfPair",
+    "JobOut",
+    "LiveRequest",
+    "NoteOut",
+    "Notes",
+    "Point",
+    "Problem",
     "Shown",
-    "WeakDirection", "WhatIfRequest",
-]  # fmt: skip
+    "WeakDirection",
+    "WhatIfRequest",
+]
 
 
 class Problem(BaseModel):
-    """What every problem looks like: its kind, a sentence that says what to do, and where it is (file, row, key, value ...)."""
+    """What every problem looks like: its kind, a sentence that says what to do, and where it is
+    (file, row, key, value ...).
+    """
 
     kind: str
     message: str
@@ -38,13 +50,17 @@ PROBLEMS: dict[int | str, dict[str, Any]] = {
 """What any operation may answer besides its result."""
 
 
-Point = Annotated[list[Annotated[FiniteFloat, Field(ge=-10.0, le=10.0)]], Field(min_length=3, max_length=3)]
+Point = Annotated[
+    list[Annotated[FiniteFloat, Field(ge=-10.0, le=10.0)]], Field(min_length=3, max_length=3)
+]
 """A place [m]."""
 Row = Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)]
 
 
 class HalfPair(BaseModel):
-    """A pair as it is being clicked: a point [m] on the cloud, camera frame, and one on the mesh, phantom frame, or not yet."""
+    """A pair as it is being clicked: a point [m] on the cloud, camera frame, and one on the mesh,
+    phantom frame, or not yet.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -53,7 +69,9 @@ class HalfPair(BaseModel):
 
 
 class WeakDirection(BaseModel):
-    """A motion that the cloud determines weakly: parts of translation and rotation along the phantom's axes, and its text."""
+    """A motion that the cloud determines weakly: parts of translation and rotation along the
+    phantom's axes, and its text.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -65,12 +83,15 @@ class WeakDirection(BaseModel):
 class Shown(BaseModel):
     """What a page shows while a person registers by hand.
 
-    `mode` is the side that clicks are for; `pose` (phantom_from_camera) is where the cloud was fitted to, if it was, `start` how it
-    is shown before: as stated in dataset.toml, levelled by its table, or as the camera sees it; `over` the phantom, or beside it.
+    `mode` is the side that clicks are for; `pose` (phantom_from_camera) is where the cloud was
+    fitted to, if it was, `start` how it is shown before: as stated in dataset.toml, levelled by its
+    table, or as the camera sees it; `over` the phantom, or beside it.
     """
 
     model_config = ConfigDict(
-        frozen=True, extra="forbid", json_schema_extra={"examples": [{"dataset": "block-01", "mode": "cloud"}]}
+        frozen=True,
+        extra="forbid",
+        json_schema_extra={"examples": [{"dataset": "block-01", "mode": "cloud"}]},
     )
 
     dataset: str
@@ -78,7 +99,11 @@ class Shown(BaseModel):
     mode: Literal["cloud", "mesh"] = "cloud"
     chosen: tuple[Annotated[int, Field(ge=0, lt=100)], Literal["cloud", "mesh"]] | None = None
     pose: (
-        Annotated[list[Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)]], Field(min_length=4, max_length=4)] | None
+        Annotated[
+            list[Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)]],
+            Field(min_length=4, max_length=4),
+        ]
+        | None
     ) = None
     start: Literal["stated", "levelled", "camera"] = "stated"
     over: bool = False
@@ -86,9 +111,15 @@ class Shown(BaseModel):
 
 
 class DiagnosisRequest(BaseModel):
-    """Which dataset to diagnose, named by its folder; with which accepted registration of the camera, if not the automatic one."""
+    """Which dataset to diagnose, named by its folder; with which accepted registration of the
+    camera, if not the automatic one.
+    """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra={"examples": [{"dataset": "block-01", "seed": 0}]})
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        json_schema_extra={"examples": [{"dataset": "block-01", "seed": 0}]},
+    )
 
     dataset: str
     seed: int = Field(default=0, ge=0, lt=2**31)
@@ -108,9 +139,17 @@ class WhatIfRequest(BaseModel):
     """A frame of a recording and the causes to solve it with; `page` shows it there."""
 
     model_config = ConfigDict(
-        frozen=True, extra="forbid",
-        json_schema_extra={"examples": [{"frame": 35, "effects": [{"effect": "tool_radius", "parameters": {"radius": 0.006}}]}]},
-    )  # fmt: skip
+        frozen=True,
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {
+                    "frame": 35,
+                    "effects": [{"effect": "tool_radius", "parameters": {"radius": 0.006}}],
+                }
+            ]
+        },
+    )
 
     frame: int = Field(ge=0)
     effects: tuple[EffectIn, ...] = Field(default=(), max_length=12)
@@ -119,13 +158,16 @@ class WhatIfRequest(BaseModel):
 
 
 class LiveRequest(BaseModel):
-    """Where a hand leads the tool's centre to [m], phantom frame, and the model that answers; `page` shows it there.
+    """Where a hand leads the tool's centre to [m], phantom frame, and the model that answers;
+    `page` shows it there.
 
     `shown` is the run's model in whose place it is drawn.
     """
 
     model_config = ConfigDict(
-        frozen=True, extra="forbid", json_schema_extra={"examples": [{"at": [0.0, 0.0, 0.038], "effects": [], "tuned": False}]}
+        frozen=True,
+        extra="forbid",
+        json_schema_extra={"examples": [{"at": [0.0, 0.0, 0.038], "effects": [], "tuned": False}]},
     )
 
     at: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
@@ -138,8 +180,8 @@ class LiveRequest(BaseModel):
 class JobOut(BaseModel):
     """A job as the page sees it: without folders of this machine.
 
-    Times are seconds since 1970; `remaining` is in seconds, if it goes on as until now; `can_retry` says whether
-    POST /api/jobs/{id}/retry would have it done once more.
+    Times are seconds since 1970; `remaining` is in seconds, if it goes on as until now; `can_retry`
+    says whether POST /api/jobs/{id}/retry would have it done once more.
     """
 
     id: str
@@ -160,7 +202,11 @@ class JobOut(BaseModel):
     @classmethod
     def of(cls, job: Job) -> JobOut:
         """The public part of a record."""
-        shown = {name: getattr(job, name) for name in cls.model_fields if name not in ("dataset", "can_retry")}
+        shown = {
+            name: getattr(job, name)
+            for name in cls.model_fields
+            if name not in ("dataset", "can_retry")
+        }
         return cls(dataset=job.request.get("name"), can_retry=job.state.can_be_retried, **shown)
 
 

@@ -1,4 +1,6 @@
-"""One frozen description of how the server runs, read once from arguments or the environment (PALPATE_...)."""
+"""One frozen description of how the server runs, read once from arguments or the environment
+(PALPATE_...).
+"""
 
 from __future__ import annotations
 
@@ -15,14 +17,19 @@ class Settings(BaseSettings):
 
     Attributes:
         runs: folder of finished diagnoses, one folder each; the job records lie beside them.
-        datasets: folder below which the datasets lie; nothing outside it is reachable from the page.
+        datasets: folder below which the datasets lie; nothing outside it is reachable from the
+            page.
         workers: processes that one diagnosis may use.
-        scheduler: address of a dask scheduler whose workers do the replays of sweeps; this machine does them without.
+        scheduler: address of a dask scheduler whose workers do the replays of sweeps; this machine
+            does them without.
         preload: modules that the worker processes import once, before the first job.
-        allow_host: names besides loopback and `host` by which browsers may call the server, for example behind a proxy.
-        import_from: folders below which those lie that may be imported by their path; without any, every folder where only this
-            machine's own users reach the server, and none where others do.
-        largest_body: bytes that a request may bring. largest_upload: the same for an archive that is imported.
+        allow_host: names besides loopback and `host` by which browsers may call the server, for
+            example behind a proxy.
+        import_from: folders below which those lie that may be imported by their path; without any,
+            every folder where only this machine's own users reach the server, and none where others
+            do.
+        largest_body: bytes that a request may bring.
+        largest_upload: the same for an archive that is imported.
         largest_dataset: bytes that a dataset may have, unpacked.
         disk_limit: bytes of the runs folder beyond which the oldest caches are dropped.
     """
@@ -36,7 +43,11 @@ class Settings(BaseSettings):
     workers: int = 2
     scheduler: str | None = None
     static: Path = Path(__file__).resolve().parent.parent / "static"
-    preload: tuple[str, ...] = ("app.work", "core.dataset", "core.diagnosis")
+    preload: tuple[str, ...] = (
+        "palpate.app.jobs.tasks",
+        "palpate.dataset",
+        "palpate.diagnosis.pipeline",
+    )
     allow_host: tuple[str, ...] = ()
     import_from: tuple[Path, ...] = ()
     largest_body: int = 2**20
@@ -46,7 +57,9 @@ class Settings(BaseSettings):
 
     @property
     def needs_login(self) -> bool:
-        """Whether others than this machine's own users can reach the server, by its address or by a name given to it."""
+        """Whether others than this machine's own users can reach the server, by its address or by a
+        name given to it.
+        """
         return not all(map(_is_loopback, (self.host, *self.allow_host)))
 
     @property

@@ -1,4 +1,6 @@
-"""Speed and accuracy of the engine: each benchmark checks its result, then prints the time. Run with `python -m benchmarks`."""
+"""Speed and accuracy of the engine: each benchmark checks its result, then prints the time. Run
+with `python -m benchmarks`.
+"""
 
 import os
 

@@ -50,7 +50,9 @@ WIDTH = 140
 
 
 def main(names: list[str]) -> int:
-    """Run benchmarks by name, print their tables; 1 when a result is wrong, 2 when a name is unknown."""
+    """Run benchmarks by name, print their tables; 1 when a result is wrong, 2 when a name is
+    unknown.
+    """
     console, outcome = Console(width=None if sys.stdout.isatty() else WIDTH), 0
     unknown = [name for name in names if name not in ALL]
     if unknown:

@@ -1,8 +1,10 @@
-"""The temperature of a diagnosis' probabilities, chosen on one half of a blind suite and judged on the other.
+"""The temperature of a diagnosis' probabilities, chosen on one half of a blind suite and judged on
+the other.
 
-`python -m benchmarks.calibrating results.jsonl`: cases by turns into either half; on each half the temperature under which the sets
-of causes that were hidden are most probable, and on the other half the calibration error and the Brier score with it, beside those
-with the temperature that is in use. Cases outside the catalogue have no set that is right, and are left out.
+`python -m benchmarks.calibrating results.jsonl`: cases by turns into either half; on each half the
+temperature under which the sets of causes that were hidden are most probable, and on the other half
+the calibration error and the Brier score with it, beside those with the temperature that is in use.
+Cases outside the catalogue have no set that is right, and are left out.
 """
 
 from __future__ import annotations
@@ -15,12 +17,12 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from core.blind.calibration import brier, calibration_error
-from core.blind.rates import Measured
-from core.blind.results import Result, read_results
-from core.diagnosis.probabilities import TEMPERATURE, probabilities
-from core.effects.material import YoungModulus
-from core.frames import FloatArray
+from palpate.blind.calibration import brier, calibration_error
+from palpate.blind.case_results import Result, read_results
+from palpate.blind.proportions import Measured
+from palpate.diagnosis.search.model_probabilities import TEMPERATURE, probabilities
+from palpate.effects.elastic_material import YoungModulus
+from palpate.foundation.arrays import FloatArray
 
 __all__ = ["first_at", "loss", "run", "warmest"]
 
@@ -37,7 +39,10 @@ def _chances(result: Result, temperature: float) -> dict[frozenset[str], float]:
     for model in result.report["models"]:
         names = tuple(effect["effect"] for effect in model["effects"])
         refused = model["asked_nats"] is None
-        surplus[names] = max(-np.inf if refused else model["gain_nats"] - model["asked_nats"], surplus.get(names, -np.inf))
+        surplus[names] = max(
+            -np.inf if refused else model["gain_nats"] - model["asked_nats"],
+            surplus.get(names, -np.inf),
+        )
     found: dict[frozenset[str], float] = {}
     for names, chance in probabilities(surplus, temperature).items():
         found[frozenset(names)] = found.get(frozenset(names), 0.0) + chance
@@ -57,7 +62,9 @@ def warmest(results: Sequence[Result]) -> float:
 
 
 def first_at(results: Sequence[Result], temperature: float) -> tuple[FloatArray, FloatArray]:
-    """Probability (n,) of the most probable effect at this temperature, and whether it is hidden (n,)."""
+    """Probability (n,) of the most probable effect at this temperature, and whether it is hidden
+    (n,).
+    """
     stated, true = [], []
     for one in results:
         of_effect: dict[str, float] = {}
@@ -73,7 +80,11 @@ def first_at(results: Sequence[Result], temperature: float) -> tuple[FloatArray,
 
 def _in_words(measured: Measured) -> str:
     ends = (measured.value, measured.low, measured.high)
-    return "–" if None in ends else "{:.3f} ({:.3f} to {:.3f})".format(*(float(one or 0.0) for one in ends))
+    return (
+        "–"
+        if None in ends
+        else "{:.3f} ({:.3f} to {:.3f})".format(*(float(one or 0.0) for one in ends))
+    )
 
 
 def _weighed(result: Result) -> bool:
@@ -83,22 +94,38 @@ def _weighed(result: Result) -> bool:
 
 def run(console: Console, file: Path) -> bool:
     """Print the table; whether there is a case in each half."""
-    results = [one for one in read_results(file) if one.report and not one.outside and _weighed(one)]
+    results = [
+        one for one in read_results(file) if one.report and not one.outside and _weighed(one)
+    ]
     halves = (results[::2], results[1::2])
     table = Table(title=f"{file.name}: temperature chosen on one half, judged on the other")
-    for name in ("chosen on", "temperature", "judged on", "loss [nats]", "calibration error", "Brier score"):
+    for name in (
+        "chosen on",
+        "temperature",
+        "judged on",
+        "loss [nats]",
+        "calibration error",
+        "Brier score",
+    ):
         table.add_column(name)
     for number, judged in enumerate(halves):
         chosen = halves[1 - number]
         if not chosen or not judged:
             console.print(f"{file}: {len(results)} cases with a report are too few for two halves")
             return False
-        for source, temperature in (("in use", TEMPERATURE), (f"{len(chosen)} cases", warmest(chosen))):
+        for source, temperature in (
+            ("in use", TEMPERATURE),
+            (f"{len(chosen)} cases", warmest(chosen)),
+        ):
             pairs = first_at(judged, temperature)
             table.add_row(
-                source, f"{temperature:.2f}", f"{len(judged)} cases", f"{loss(judged, temperature):.4f}",
-                _in_words(calibration_error(*pairs)), _in_words(brier(*pairs)),
-            )  # fmt: skip
+                source,
+                f"{temperature:.2f}",
+                f"{len(judged)} cases",
+                f"{loss(judged, temperature):.4f}",
+                _in_words(calibration_error(*pairs)),
+                _in_words(brier(*pairs)),
+            )
     console.print(table)
     return True
 

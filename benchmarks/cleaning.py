@@ -7,8 +7,9 @@ from rich.table import Table
 
 from benchmarks.reference import SETUP
 from benchmarks.stopwatch import timed
-from core.cleaning import Cleaner, ToolPose
-from core.frames import FloatArray, Transform
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.frames import Transform
+from palpate.measurement.segmentation import Cleaner, ToolPose
 
 __all__ = ["run"]
 
@@ -28,21 +29,34 @@ def _scene(rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     height = np.where(on_top, z, 0.0)
     height[on_tool] = TOOL[2] + np.sqrt(SETUP.tool.radius**2 - away[on_tool] ** 2)
     height += SIGMA * rng.standard_normal(POINTS)
-    # The camera's rays spread; points are placed where the scene is, so that depth noise is height noise here.
+    # The camera's rays spread; points are placed where the scene is, so that depth noise is height
+    # noise here.
     return POSE.inverse().apply(np.column_stack([places, height])), on_top & ~on_tool
 
 
 def run() -> list[Table]:
     """Clean one cloud again and again, check what is kept, and tabulate the time."""
     cloud, phantom = _scene(np.random.default_rng(1))
-    cleaner = Cleaner(size=SETUP.geometry.size, phantom_from_camera=POSE, tool_radius=SETUP.tool.radius, noise=SIGMA)
+    cleaner = Cleaner(
+        size=SETUP.geometry.size,
+        phantom_from_camera=POSE,
+        tool_radius=SETUP.tool.radius,
+        noise=SIGMA,
+    )
     tool = ToolPose(TOOL, np.array([0.0, 0.0, 1.0]))
     clean, seconds = timed(lambda: [cleaner.clean(cloud, tool) for _ in range(ROUNDS)][-1])
     kept = np.zeros(len(cloud), dtype=bool)
     kept[clean.indices] = True
-    recall, wrong = float((kept & phantom).sum() / phantom.sum()), float((kept & np.logical_not(phantom)).sum() / kept.sum())
+    recall, wrong = (
+        float((kept & phantom).sum() / phantom.sum()),
+        float((kept & np.logical_not(phantom)).sum() / kept.sum()),
+    )
     if recall < 0.93 or wrong > 0.01:
-        raise RuntimeError(f"{recall:.1%} of the phantom's points were kept, and {wrong:.1%} of what was kept is not phantom")
-    table = Table("points", "phantom kept", "others kept", "ms a cloud", title="Cleaning, one thread")
+        raise RuntimeError(
+            f"{recall:.1%} of the phantom's points were kept, and {wrong:.1%} of what was kept is not phantom"
+        )
+    table = Table(
+        "points", "phantom kept", "others kept", "ms a cloud", title="Cleaning, one thread"
+    )
     table.add_row(str(len(cloud)), f"{recall:.1%}", f"{wrong:.2%}", f"{1e3 * seconds / ROUNDS:.1f}")
     return [table]

@@ -1,4 +1,6 @@
-"""How the error falls and the time grows with the grid, for both elements; also drawn, to runs/convergence.png."""
+"""How the error falls and the time grows with the grid, for both elements; also drawn, to
+runs/convergence.png.
+"""
 
 from __future__ import annotations
 
@@ -11,21 +13,24 @@ from rich.table import Table
 from benchmarks.picture import picture
 from benchmarks.reference import compared, poke_frames, reference
 from benchmarks.stopwatch import timed
-from core.frames import FloatArray
-from core.mesh import GridSpec
+from palpate.foundation.arrays import FloatArray
+from palpate.mesh.box_mesh import GridSpec
 
 __all__ = ["run"]
 
 PICTURE = Path("runs/convergence.png")
 NODES = ((9, 7, 5), (13, 9, 9), (17, 13, 9), (25, 17, 13))
 SPACING = (2.4e-3, 1.6e-3, 1.2e-3, 0.8e-3)
-"""Between nodes at the tool [m], in step with the nodes' number: each grid is the one before it, refined."""
+"""Between nodes at the tool [m], in step with the nodes' number: each grid is the one before it,
+refined."""
 FRAMES = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """One grid: unknowns, spacing [m], errors of displacement and force (2,) at 4 and 8 mm [1], CPU time of a frame [s]."""
+    """One grid: unknowns, spacing [m], errors of displacement and force (2,) at 4 and 8 mm [1], CPU
+    time of a frame [s].
+    """
 
     unknowns: int
     spacing: float
@@ -48,27 +53,51 @@ def _slope(x: list[float], y: list[float]) -> float:
 
 
 def run() -> list[Table]:
-    """Solve the pokes of the reference on finer and finer grids; the finest must be nearer to it than the coarsest."""
-    table = Table("elements", "unknowns", "mm at tool", "top off by", "force off by", "ms a frame", title="Finer grids, 4 / 8 mm")
-    orders = Table("elements", "displacement ~ h^", "force ~ h^", "time ~ unknowns^", title="Fitted at 8 mm")
+    """Solve the pokes of the reference on finer and finer grids; the finest must be nearer to it
+    than the coarsest.
+    """
+    table = Table(
+        "elements",
+        "unknowns",
+        "mm at tool",
+        "top off by",
+        "force off by",
+        "ms a frame",
+        title="Finer grids, 4 / 8 mm",
+    )
+    orders = Table(
+        "elements", "displacement ~ h^", "force ~ h^", "time ~ unknowns^", title="Fitted at 8 mm"
+    )
     series = {}
     for order, name in ((1, "trilinear"), (2, "quadratic")):
-        points = [_point(order, nodes, spacing) for nodes, spacing in zip(NODES, SPACING, strict=True)]
+        points = [
+            _point(order, nodes, spacing) for nodes, spacing in zip(NODES, SPACING, strict=True)
+        ]
         series[name] = points
         if not points[-1].displacement[1] < 0.5 * points[0].displacement[1]:
-            raise RuntimeError(f"{name} elements do not converge: {[float(point.displacement[1]) for point in points]}")
+            raise RuntimeError(
+                f"{name} elements do not converge: {[float(point.displacement[1]) for point in points]}"
+            )
         for point in points:
             (near, deep), (light, heavy) = point.displacement, point.force
             table.add_row(
-                name, str(point.unknowns), f"{1e3 * point.spacing:.1f}", f"{near:.1%} / {deep:.1%}",
-                f"{light:.1%} / {heavy:.1%}", f"{1e3 * point.seconds:.0f}",
-            )  # fmt: skip
-        spacing, unknowns = [point.spacing for point in points], [float(point.unknowns) for point in points]
+                name,
+                str(point.unknowns),
+                f"{1e3 * point.spacing:.1f}",
+                f"{near:.1%} / {deep:.1%}",
+                f"{light:.1%} / {heavy:.1%}",
+                f"{1e3 * point.seconds:.0f}",
+            )
+        spacing, unknowns = (
+            [point.spacing for point in points],
+            [float(point.unknowns) for point in points],
+        )
         orders.add_row(
-            name, f"{_slope(spacing, [point.displacement[1] for point in points]):.1f}",
+            name,
+            f"{_slope(spacing, [point.displacement[1] for point in points]):.1f}",
             f"{_slope(spacing, [point.force[1] for point in points]):.1f}",
             f"{_slope(unknowns, [point.seconds for point in points]):.1f}",
-        )  # fmt: skip
+        )
     _draw(series)
     return [table, orders]
 
@@ -76,9 +105,26 @@ def run() -> list[Table]:
 def _draw(series: dict[str, list[Point]]) -> None:
     with picture(PICTURE, 2, (9, 4)) as (errors, times):
         for (name, points), colour in zip(series.items(), ("tab:blue", "tab:orange"), strict=True):
-            spacing, unknowns = [1e3 * point.spacing for point in points], [point.unknowns for point in points]
-            errors.loglog(spacing, [100 * point.displacement[1] for point in points], "o-", color=colour, label=f"{name}, top")
-            errors.loglog(spacing, [100 * point.force[1] for point in points], "s--", color=colour, label=f"{name}, force")
-            times.loglog(unknowns, [1e3 * point.seconds for point in points], "o-", color=colour, label=name)
+            spacing, unknowns = (
+                [1e3 * point.spacing for point in points],
+                [point.unknowns for point in points],
+            )
+            errors.loglog(
+                spacing,
+                [100 * point.displacement[1] for point in points],
+                "o-",
+                color=colour,
+                label=f"{name}, top",
+            )
+            errors.loglog(
+                spacing,
+                [100 * point.force[1] for point in points],
+                "s--",
+                color=colour,
+                label=f"{name}, force",
+            )
+            times.loglog(
+                unknowns, [1e3 * point.seconds for point in points], "o-", color=colour, label=name
+            )
         errors.set(xlabel="node spacing at the tool, mm", ylabel="error at 8 mm, %")
         times.set(xlabel="unknowns", ylabel="CPU time of a frame, ms")

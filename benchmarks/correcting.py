@@ -1,6 +1,8 @@
-"""What a correction is worth on the virtual bench: the volume beside the top, fed back or not, and learning on the way.
+"""What a correction is worth on the virtual bench: the volume beside the top, fed back or not, and
+learning on the way.
 
-A block that sags, and is pushed by a ball larger than stated, by another solver on another mesh. Errors are the paper's metric.
+A block that sags, and is pushed by a ball larger than stated, by another solver on another mesh.
+Errors are the paper's metric.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ import torch
 from rich.table import Table
 
 from benchmarks.stopwatch import timed
-from core.correction import (
+from palpate.correction import (
     Corrector,
     NetworkSpec,
     OnlineSpec,
@@ -30,15 +32,15 @@ from core.correction import (
     recorder_for,
     replay_corrected,
     train,
-)  # fmt: skip
-from core.correction.inference import FEEDBACKS, CorrectedFrame
-from core.correction.sampling import robot_of, tool_columns
-from core.dataset import open_dataset
-from core.diagnosis.smoothing import smooth_centres
-from core.measurement import Surface
-from core.mesh import GridSpec
-from core.metrics import paper_distance
-from core.synthetic import HiddenEffect, Scenario, make_dataset
+)
+from palpate.correction.corrected_replay import FEEDBACKS, CorrectedFrame
+from palpate.correction.samples.record_samples import robot_of, tool_columns
+from palpate.dataset import open_dataset
+from palpate.dataset.tool_smoothing import smooth_centres
+from palpate.measurement.metrics import paper_distance
+from palpate.measurement.surface_gaps import Surface
+from palpate.mesh.box_mesh import GridSpec
+from palpate.synthetic import HiddenEffect, Scenario, make_dataset
 
 __all__ = ["run"]
 
@@ -55,7 +57,9 @@ def _samples(folder: Path, weight: float, sequences: tuple[str, ...]) -> tuple[R
         HiddenEffect("tool_radius", {"radius": 6.5e-3}),
         HiddenEffect("gravity", {"specific_weight_over_stiffness": weight}),
     )
-    scenario = Scenario(effects=effects, sequences=sequences, density=1500, rate=3.0, robot_rate=200.0, fine=4e-3)
+    scenario = Scenario(
+        effects=effects, sequences=sequences, density=1500, rate=3.0, robot_rate=200.0, fine=4e-3
+    )
     make_dataset(folder / "block", scenario, 7)
     recorder = recorder_for(open_dataset(folder / "block"), grid=GRID, points=600)
     return recorder, make_samples(folder / "samples", recorder)
@@ -63,7 +67,9 @@ def _samples(folder: Path, weight: float, sequences: tuple[str, ...]) -> tuple[R
 
 def _trained(folder: Path, samples: Samples, kind: str, hold: float) -> Trained:
     network = NetworkSpec(kind=kind, features=FEATURES)  # type: ignore[arg-type]
-    spec = TrainingSpec(network=network, hold=hold, rate=1e-3, batch=16, epochs=15, patience=15, device="cpu")
+    spec = TrainingSpec(
+        network=network, hold=hold, rate=1e-3, batch=16, epochs=15, patience=15, device="cpu"
+    )
     split = Split.of(samples, train=TRAINED, validation=STOPPING, test=(TESTED,))
     return train(samples, split, spec, folder / f"{kind}-{hold:g}")
 
@@ -71,7 +77,14 @@ def _trained(folder: Path, samples: Samples, kind: str, hold: float) -> Trained:
 @torch.no_grad()
 def _kinds(samples: Samples, networks: dict[tuple[str, float], Trained]) -> Table:
     """Of the top alone and of all that was measured, and how far what is hidden was moved."""
-    table = Table("network", "hold, 1/mm", "top, mm", "all, mm", "hidden moved by, mm", title=f"top and volume, on {TESTED}")
+    table = Table(
+        "network",
+        "hold, 1/mm",
+        "top, mm",
+        "all, mm",
+        "hidden moved by, mm",
+        title=f"top and volume, on {TESTED}",
+    )
     top, rows = samples.body.upper, samples.rows([TESTED])
     batch, hidden = samples.batch(rows), samples.seen == 0
     losses = (SurfaceLoss(top, samples.seen[top.index]), SurfaceLoss(samples.body, samples.seen))
@@ -81,19 +94,32 @@ def _kinds(samples: Samples, networks: dict[tuple[str, float], Trained]) -> Tabl
         for loss, index in zip(losses, (top.index, samples.body.index), strict=True):
             apart, valid = loss.distances(vertices[:, index], batch)
             found.append(f"{float(apart[valid].mean()) * 1e3:.3f}")
-        return [*found, f"{float((vertices - batch.positions)[:, hidden].norm(dim=2).mean()) * 1e3:.3f}"]
+        return [
+            *found,
+            f"{float((vertices - batch.positions)[:, hidden].norm(dim=2).mean()) * 1e3:.3f}",
+        ]
 
     table.add_row("none", "", *told(batch.positions))
     for (kind, hold), trained in networks.items():
         vertices = batch.positions.clone()
-        vertices[:, trained.body.index] = trained.network(batch.positions[:, trained.body.index], batch.tool)
+        vertices[:, trained.body.index] = trained.network(
+            batch.positions[:, trained.body.index], batch.tool
+        )
         table.add_row(kind, f"{hold:g}", *told(vertices))
     return table
 
 
-def _feedbacks(recorder: Recorder, samples: Samples, networks: dict[tuple[str, float], Trained]) -> Table:
+def _feedbacks(
+    recorder: Recorder, samples: Samples, networks: dict[tuple[str, float], Trained]
+) -> Table:
     table = Table(
-        "network", "fed back", "error, mm", "iterations", "equilibrium changes by, mm", "ms a corrected frame", title="feedback"
+        "network",
+        "fed back",
+        "error, mm",
+        "iterations",
+        "equilibrium changes by, mm",
+        "ms a corrected frame",
+        title="feedback",
     )
     for (kind, hold), trained in networks.items():
         plain: list[CorrectedFrame] = []
@@ -102,15 +128,26 @@ def _feedbacks(recorder: Recorder, samples: Samples, networks: dict[tuple[str, f
             tools, frames = _replayed(recorder, corrector)
             plain = plain or frames
             moved = max(
-                float(np.abs(a.raw.displacement - b.raw.displacement).max()) for a, b in zip(plain, frames, strict=True)
-            )  # fmt: skip
+                float(np.abs(a.raw.displacement - b.raw.displacement).max())
+                for a, b in zip(plain, frames, strict=True)
+            )
             if not moved < 5e-5:
-                raise RuntimeError(f"{kind}, {feedback}: an equilibrium hangs on where it was solved from, by {moved * 1e3:.2g} mm")
+                raise RuntimeError(
+                    f"{kind}, {feedback}: an equilibrium hangs on where it was solved from, by {moved * 1e3:.2g} mm"
+                )
             error = np.mean(_errors(recorder, samples, frames)) * 1e3
             steps = sum(frame.raw.iterations for frame in frames)
-            spent = min(timed(partial(corrector.correct, frame.raw, tool))[1] for frame, tool in zip(frames, tools, strict=True))
+            spent = min(
+                timed(partial(corrector.correct, frame.raw, tool))[1]
+                for frame, tool in zip(frames, tools, strict=True)
+            )
             table.add_row(
-                f"{kind}, hold {hold:g}", feedback, f"{error:.3f}", str(steps), f"{moved * 1e3:.4f}", f"{spent * 1e3:.2f}"
+                f"{kind}, hold {hold:g}",
+                feedback,
+                f"{error:.3f}",
+                str(steps),
+                f"{moved * 1e3:.4f}",
+                f"{spent * 1e3:.2f}",
             )
     return table
 
@@ -118,7 +155,10 @@ def _feedbacks(recorder: Recorder, samples: Samples, networks: dict[tuple[str, f
 def _replayed(recorder: Recorder, corrector: Corrector) -> tuple[np.ndarray, list[CorrectedFrame]]:
     sequence, robot = recorder.dataset.sequence(TESTED), robot_of(recorder)
     times = np.asarray(sequence.cloud_times)
-    centres, tools = robot.apply(smooth_centres(sequence.kinematics, times)), tool_columns(sequence, times, robot, False)
+    centres, tools = (
+        robot.apply(smooth_centres(sequence.kinematics, times)),
+        tool_columns(sequence, times, robot, False),
+    )
     return tools, list(replay_corrected(corrector, recorder.setup, centres, tools, recorder.grid))
 
 
@@ -134,12 +174,26 @@ def _errors(recorder: Recorder, samples: Samples, frames: list[CorrectedFrame]) 
 def _online(samples: Samples, other: Samples, networks: dict[tuple[str, float], Trained]) -> Table:
     """Frames of the material that was trained on, then of one four times as stiff."""
     first, second = len(samples.rows([TESTED])), (TESTED,)
-    table = Table("network", "while", "without, mm", "as trained", "learning", title="a material that changes half way")
+    table = Table(
+        "network",
+        "while",
+        "without, mm",
+        "as trained",
+        "learning",
+        title="a material that changes half way",
+    )
     for (kind, _), trained in networks.items():
         stream = learn_along(trained, [(samples, second), (other, second)], OnlineSpec())
         half = first + (len(stream.raw) - first) // 2
-        for name, part in (("as trained for", slice(first)), ("just changed", slice(first, half)), ("later", slice(half, None))):
-            numbers = (f"{np.mean(values[part]):.3f}" for values in (stream.raw, stream.frozen, stream.online))
+        for name, part in (
+            ("as trained for", slice(first)),
+            ("just changed", slice(first, half)),
+            ("later", slice(half, None)),
+        ):
+            numbers = (
+                f"{np.mean(values[part]):.3f}"
+                for values in (stream.raw, stream.frozen, stream.online)
+            )
             table.add_row(kind, name, *numbers)
     return table
 
@@ -155,10 +209,15 @@ def run() -> list[Table]:
         for (kind, _), trained in networks.items():
             loss = SurfaceLoss(trained.body, samples.seen[trained.body.index])
             raw, found = (
-                float(errors_of(net, loss, trained.body, samples, samples.rows([TESTED])).mean()) for net in (None, trained.network)
+                float(errors_of(net, loss, trained.body, samples, samples.rows([TESTED])).mean())
+                for net in (None, trained.network)
             )
             if not found < raw:
                 raise RuntimeError(f"{kind}: {found:.3f} mm with the network, {raw:.3f} mm without")
         usual = {key: networks[key] for key in (("unet2d", 0.1), ("unet3d", 0.1))}
         held = {key: networks[key] for key in (("unet2d", 0.1), ("unet3d", 0.1), ("graph", 0.1))}
-        return [_kinds(samples, networks), _feedbacks(recorder, samples, usual), _online(samples, other, held)]
+        return [
+            _kinds(samples, networks),
+            _feedbacks(recorder, samples, usual),
+            _online(samples, other, held),
+        ]

@@ -1,7 +1,9 @@
-"""Training samples per second and milliseconds per corrected frame, beside the same networks and loss in plain torch.
+"""Training samples per second and milliseconds per corrected frame, beside the same networks and
+loss in plain torch.
 
-The plain network is made of `nn.Conv2d` and `nn.Conv3d` with the very same weights, the plain loss takes all distances between
-points and vertices and lets autograd find its way back through the smallest. Both must agree before any time is told.
+The plain network is made of `nn.Conv2d` and `nn.Conv3d` with the very same weights, the plain loss
+takes all distances between points and vertices and lets autograd find its way back through the
+smallest. Both must agree before any time is told.
 """
 
 from __future__ import annotations
@@ -17,33 +19,42 @@ from rich.table import Table
 from torch import Tensor, nn
 
 from benchmarks.stopwatch import timed
-from core.correction import Batch, Body, CorrectionNetwork, NetworkSpec, SurfaceLoss, build
-from core.correction.chamfer import Loss
-from core.correction.compact import Compact, has_half
-from core.correction.unet import Padded
+from palpate.correction import Batch, Body, CorrectionNetwork, NetworkSpec, SurfaceLoss, build
+from palpate.correction.networks.chamfer import Loss
+from palpate.correction.networks.unet import Padded
+from palpate.correction.networks.unet_inference import Compact, has_half
 
 __all__ = ["plain_loss", "plain_network", "run", "samples_of"]
 
 SIZE, NODES = (0.0687, 0.0393, 0.0358), (13, 5, 5)
 BATCH, POINTS, STEPS, FRAMES, CORES = 64, 1024, 4, 30, 2
 _AGREE = 2e-3
-"""Relative, between gradients in single precision; where two vertices are equally near either may be taken."""
+"""Relative, between gradients in single precision; where two vertices are equally near either may
+be taken."""
 
 
 def samples_of(body: Body, count: int, points: int = POINTS, seed: int = 0) -> Batch:
-    """Dented shapes and noisy points on a surface a millimetre lower, nothing of which was simulated."""
+    """Dented shapes and noisy points on a surface a millimetre lower, nothing of which was
+    simulated.
+    """
     rng = np.random.default_rng(seed)
-    places = np.column_stack([rng.uniform(-0.03, 0.03, count), rng.uniform(-0.015, 0.015, count), np.full(count, 0.037)])
+    places = np.column_stack(
+        [rng.uniform(-0.03, 0.03, count), rng.uniform(-0.015, 0.015, count), np.full(count, 0.037)]
+    )
     away = ((body.rest[None, :, :2] - places[:, None, :2]) ** 2).sum(axis=2)
     dent = np.exp(-away / 0.008**2) * body.rest[:, 2] / SIZE[2]
     down = np.array([0.0, 0.0, -1.0])
     positions = body.rest + 4e-3 * dent[:, :, None] * down
     surface = body.surface(positions + 1e-3 * (body.rest[:, 2:] / SIZE[2]) * down)
     chosen = rng.integers(surface.shape[1], size=(count, points))
-    cloud = np.take_along_axis(surface, chosen[:, :, None], axis=1) + rng.normal(0, 1e-3, (count, points, 3))
+    cloud = np.take_along_axis(surface, chosen[:, :, None], axis=1) + rng.normal(
+        0, 1e-3, (count, points, 3)
+    )
     tool = np.concatenate([places, np.tile([1.0, *[0.0] * 9], (count, 1))], axis=1)
     numbers = torch.full((count, 2), points, dtype=torch.int32)
-    shapes, known, measured = (torch.as_tensor(part, dtype=torch.float32) for part in (positions, tool, cloud))
+    shapes, known, measured = (
+        torch.as_tensor(part, dtype=torch.float32) for part in (positions, tool, cloud)
+    )
     return Batch(shapes, known, measured, numbers)
 
 
@@ -67,7 +78,10 @@ class _Plain(nn.Module):
             return nn.Sequential(*layers)
 
         self.down = nn.ModuleList(block(part) for part in inside.get_submodule("down").children())
-        self.bottom, self.doubled = block(inside.get_submodule("bottom")), inside.get_submodule("doubled")
+        self.bottom, self.doubled = (
+            block(inside.get_submodule("bottom")),
+            inside.get_submodule("doubled"),
+        )
         self.up = nn.ModuleList(block(part) for part in inside.get_submodule("up").children())
         self.last = inside.get_submodule("last")
 
@@ -77,11 +91,15 @@ class _Plain(nn.Module):
             values = part(values)
             skips.append(values)
             values = self.pool(values)
-        spread = known.reshape(*known.shape, *[1] * (values.dim() - 2)).expand(-1, -1, *values.shape[2:])
+        spread = known.reshape(*known.shape, *[1] * (values.dim() - 2)).expand(
+            -1, -1, *values.shape[2:]
+        )
         values = self.bottom(torch.cat([values, spread], dim=1))
         for double, part in zip(self.doubled.children(), self.up, strict=True):
             skip = skips.pop()
-            grown = double(values)[tuple(slice(length) for length in (*skip.shape[:1], None, *skip.shape[2:]))]
+            grown = double(values)[
+                tuple(slice(length) for length in (*skip.shape[:1], None, *skip.shape[2:]))
+            ]
             values = part(torch.cat([grown, skip], dim=1))
         return torch.as_tensor(self.last(values))
 
@@ -108,7 +126,9 @@ def plain_loss(loss: SurfaceLoss, vertices: Tensor, batch: Batch) -> Tensor:
 def _gradient(network: CorrectionNetwork, total: Tensor) -> Tensor:
     network.zero_grad(set_to_none=True)
     total.backward()
-    return torch.cat([part.grad.flatten() for part in network.parameters() if part.grad is not None])
+    return torch.cat(
+        [part.grad.flatten() for part in network.parameters() if part.grad is not None]
+    )
 
 
 def _row(kind: str) -> tuple[str, ...]:
@@ -127,17 +147,32 @@ def _row(kind: str) -> tuple[str, ...]:
     here, there = _gradient(network, ours().total), _gradient(network, common())
     apart = float((here - there).norm() / there.norm())
     if not apart < _AGREE:
-        raise RuntimeError(f"{kind}: gradients of both implementations differ by {apart:.2g}, under {_AGREE:g} is wanted")
-    fused, slow = (torch.optim.Adam(network.parameters(), 1e-6, fused=kept) for kept in (True, None))
+        raise RuntimeError(
+            f"{kind}: gradients of both implementations differ by {apart:.2g}, under {_AGREE:g} is wanted"
+        )
+    fused, slow = (
+        torch.optim.Adam(network.parameters(), 1e-6, fused=kept) for kept in (True, None)
+    )
     fast = _rate(fused, lambda: ours().total)
     # Neighbours of the surface as it is: the tree does not know whether it was corrected.
-    searched = min(timed(lambda: loss.distances(raw, batch))[1] for _ in range(STEPS)) * fast / BATCH
+    searched = (
+        min(timed(lambda: loss.distances(raw, batch))[1] for _ in range(STEPS)) * fast / BATCH
+    )
     times = _frame(network, plain, batch, kind)
-    return (kind, f"{apart:.1e}", f"{fast:.0f}", f"{_rate(slow, common):.0f}", f"{100 * searched:.0f} %", *times)
+    return (
+        kind,
+        f"{apart:.1e}",
+        f"{fast:.0f}",
+        f"{_rate(slow, common):.0f}",
+        f"{100 * searched:.0f} %",
+        *times,
+    )
 
 
 def _rate(optimizer: torch.optim.Optimizer, total: Callable[[], Tensor]) -> float:
-    """Samples per CPU second, the fastest of several steps: other work on the machine only ever takes time."""
+    """Samples per CPU second, the fastest of several steps: other work on the machine only ever
+    takes time.
+    """
 
     def step() -> None:
         optimizer.zero_grad(set_to_none=True)
@@ -148,15 +183,21 @@ def _rate(optimizer: torch.optim.Optimizer, total: Callable[[], Tensor]) -> floa
     return BATCH / min(timed(step)[1] for _ in range(STEPS))
 
 
-def _frame(network: CorrectionNetwork, plain: Callable[[Tensor, Tensor], Tensor], batch: Batch, kind: str) -> tuple[str, ...]:
-    """Milliseconds of one frame: by all cores (median, wall), and by one in bfloat16 if there is any, single precision, plain."""
+def _frame(
+    network: CorrectionNetwork, plain: Callable[[Tensor, Tensor], Tensor], batch: Batch, kind: str
+) -> tuple[str, ...]:
+    """Milliseconds of one frame: by all cores (median, wall), and by one in bfloat16 if there is
+    any, single precision, plain.
+    """
     vertices, tool = batch.positions[:1], batch.tool[:1]
     with torch.inference_mode():
         wanted = plain(vertices, tool)[0]
         found = Compact(network, half=False)(vertices[0], tool[0])
         apart = float((found - wanted).abs().max())
         if not apart < 1e-7:
-            raise RuntimeError(f"{kind}: the compact network is {apart * 1e3:.2g} mm off, under 1e-4 mm is wanted")
+            raise RuntimeError(
+                f"{kind}: the compact network is {apart * 1e3:.2g} mm off, under 1e-4 mm is wanted"
+            )
         kinds: list[Callable[[], object]] = [lambda: plain(vertices, tool)]
         for half in (False, True):
             compact = Compact(network, half=half)
@@ -164,8 +205,18 @@ def _frame(network: CorrectionNetwork, plain: Callable[[Tensor, Tensor], Tensor]
         times = [min(timed(work)[1] for _ in range(FRAMES)) * 1e3 for work in kinds]
         fastest = Compact(network)
         with _threads(CORES):
-            wall = statistics.median(_wall(lambda: fastest(vertices[0], tool[0])) for _ in range(4 * FRAMES)) * 1e3
-    return (f"{wall:.2f}", f"{times[2]:.2f}" if has_half() else "-", f"{times[1]:.2f}", f"{times[0]:.2f}")
+            wall = (
+                statistics.median(
+                    _wall(lambda: fastest(vertices[0], tool[0])) for _ in range(4 * FRAMES)
+                )
+                * 1e3
+            )
+    return (
+        f"{wall:.2f}",
+        f"{times[2]:.2f}" if has_half() else "-",
+        f"{times[1]:.2f}",
+        f"{times[0]:.2f}",
+    )
 
 
 def _wall(work: Callable[[], object]) -> float:
@@ -189,7 +240,12 @@ def _on_card() -> list[Table]:
     if not torch.cuda.is_available():
         return []
     table = Table(
-        "network", "batch", "gradients differ", "samples/s", "bfloat16", title=f"correction on {torch.cuda.get_device_name()}"
+        "network",
+        "batch",
+        "gradients differ",
+        "samples/s",
+        "bfloat16",
+        title=f"correction on {torch.cuda.get_device_name()}",
     )
     for kind in ("unet2d", "unet3d"):
         for count in (BATCH, 8 * BATCH):
@@ -203,13 +259,24 @@ def _card_row(kind: str, count: int) -> tuple[str, ...]:
     for place in ("cpu", "cuda"):
         network = build(NetworkSpec(kind=kind), body).to(place)  # type: ignore[arg-type]
         with torch.no_grad():
-            network.inside.last.weight.copy_(0.02 * torch.randn(network.inside.last.weight.shape, generator=_drawn()))
-        loss, here = SurfaceLoss(body, np.ones(len(body.rest)), hold=0.0, device=place), batch.to(torch.device(place))
+            network.inside.last.weight.copy_(
+                0.02 * torch.randn(network.inside.last.weight.shape, generator=_drawn())
+            )
+        loss, here = (
+            SurfaceLoss(body, np.ones(len(body.rest)), hold=0.0, device=place),
+            batch.to(torch.device(place)),
+        )
         with torch.backends.cudnn.flags(allow_tf32=False):
-            gradients.append(_gradient(network, loss(network(here.positions, here.tool), here, here.positions).total).cpu())
+            gradients.append(
+                _gradient(
+                    network, loss(network(here.positions, here.tool), here, here.positions).total
+                ).cpu()
+            )
     apart = float((gradients[1] - gradients[0]).norm() / gradients[0].norm())
     if not apart < _AGREE:
-        raise RuntimeError(f"{kind}: gradients of card and processor differ by {apart:.2g}, under {_AGREE:g} is wanted")
+        raise RuntimeError(
+            f"{kind}: gradients of card and processor differ by {apart:.2g}, under {_AGREE:g} is wanted"
+        )
     optimizer, rates = torch.optim.Adam(network.parameters(), 1e-6, fused=True), []
     for mixed in (False, True):
 
@@ -243,10 +310,17 @@ def run() -> list[Table]:
     """One thread, and frames on two as well; RuntimeError where a result is wrong."""
     with _threads(1):
         table = Table(
-            "network", "gradients differ", "samples/s", "plain", "neighbours", f"ms a frame, wall, {CORES} threads",
-            "ms a frame, bfloat16", "ms a frame", "plain",
+            "network",
+            "gradients differ",
+            "samples/s",
+            "plain",
+            "neighbours",
+            f"ms a frame, wall, {CORES} threads",
+            "ms a frame, bfloat16",
+            "ms a frame",
+            "plain",
             title=f"correction, {'x'.join(map(str, NODES))}, {POINTS} points, one thread, CPU seconds",
-        )  # fmt: skip
+        )
         for kind in ("unet2d", "unet3d"):
             table.add_row(*_row(kind))
         return [table, *_on_card()]

@@ -10,7 +10,7 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.stopwatch import timed
-from core.dataset import open_dataset
+from palpate.dataset import open_dataset
 
 __all__ = ["run", "write_recording"]
 
@@ -48,7 +48,9 @@ test = []
 
 def _ply(points: np.ndarray) -> bytes:
     axes = "".join(f"property float {axis}\n" for axis in "xyz")
-    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n{axes}end_header\n"
+    header = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n{axes}end_header\n"
+    )
     return header.encode() + points.astype("<f4").tobytes()
 
 
@@ -59,7 +61,9 @@ def write_recording(folder: Path, clouds: int, points: int) -> Path:
     (home / "clouds").mkdir(parents=True)
     (folder / "dataset.toml").write_text(MANIFEST)
     corners = [(1, 1), (1, -1), (-1, -1), (-1, 1)]
-    touches = [f"corner_{i},{0.03435 * x},{0.01965 * y},0.0358\n" for i, (x, y) in enumerate(corners)]
+    touches = [
+        f"corner_{i},{0.03435 * x},{0.01965 * y},0.0358\n" for i, (x, y) in enumerate(corners)
+    ]
     (folder / "touches.csv").write_text("landmark,x,y,z\n" + "".join(touches))
     for number in range(clouds):
         cloud = rng.uniform([-0.05, -0.05, 0.30], [0.05, 0.05, 0.34], (points, 3))
@@ -80,14 +84,22 @@ def run() -> list[Table]:
         dataset, opening = timed(lambda: open_dataset(path))
         sequence, listing = timed(lambda: dataset.sequence("long"))
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        counts, reading = timed(lambda: [len(sequence.cloud(index)) for index in range(len(sequence))])
+        counts, reading = timed(
+            lambda: [len(sequence.cloud(index)) for index in range(len(sequence))]
+        )
         grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
     if counts != [POINTS] * CLOUDS:
-        raise RuntimeError(f"{CLOUDS} clouds of {POINTS} points were written, {len(counts)} of {set(counts)} points were read")
+        raise RuntimeError(
+            f"{CLOUDS} clouds of {POINTS} points were written, {len(counts)} of {set(counts)} points were read"
+        )
     if grown > 200:
-        raise RuntimeError(f"reading cloud by cloud took {grown:.0f} MB more memory: clouds are kept")
+        raise RuntimeError(
+            f"reading cloud by cloud took {grown:.0f} MB more memory: clouds are kept"
+        )
     table = Table("step", "amount", "time", title=f"Dataset of {CLOUDS} clouds of {POINTS} points")
     table.add_row("open and validate", f"{CLOUDS} headers", f"{opening * 1e3:.0f} ms")
-    table.add_row("open the sequence", f"{len(sequence.kinematics.time)} poses", f"{listing * 1e3:.0f} ms")
+    table.add_row(
+        "open the sequence", f"{len(sequence.kinematics.time)} poses", f"{listing * 1e3:.0f} ms"
+    )
     table.add_row("read a cloud", f"{POINTS} points", f"{reading / CLOUDS * 1e3:.1f} ms")
     return [table]

@@ -1,11 +1,14 @@
-"""How much each effect moves the visible surface at one 8 mm poke into the middle of the top, beside figures measured earlier.
+"""How much each effect moves the visible surface at one 8 mm poke into the middle of the top,
+beside figures measured earlier.
 
-The reference figures come from another engine on the same block (quadratic hexahedra, E 5 kPa, nu 0.44). What they took for the
-visible surface was found by trying: the height of the top at fixed places, as a camera sees it, from 6 mm off the tool's axis on.
-So read, the undisturbed fields agree within 3 %, seven effects within 0.02 mm. Where they can differ: "the base slides" meant a
-base free to spread, while `base_slip` moves the block as a whole, and only when it is pushed sideways; the lump's place aside is
-not stated; what changes close to the tool (its radius, its place) hangs on where the visible surface begins. Friction
-under the tool was regularised there and moves a third of what stick and slip do; CalculiX has the force found here within 1 %.
+The reference figures come from another engine on the same block (quadratic hexahedra, E 5 kPa, nu
+0.44). What they took for the visible surface was found by trying: the height of the top at fixed
+places, as a camera sees it, from 6 mm off the tool's axis on. So read, the undisturbed fields agree
+within 3 %, seven effects within 0.02 mm. Where they can differ: "the base slides" meant a base free
+to spread, while `base_slip` moves the block as a whole, and only when it is pushed sideways; the
+lump's place aside is not stated; what changes close to the tool (its radius, its place) hangs on
+where the visible surface begins. Friction under the tool was regularised there and moves a third of
+what stick and slip do; CalculiX has the force found here within 1 %.
 """
 
 from __future__ import annotations
@@ -20,15 +23,15 @@ from scipy.interpolate import LinearNDInterpolator
 
 from benchmarks.reference import SETUP
 from benchmarks.stopwatch import timed
-from core.effects.base import Effect
-from core.effects.load import Gravity
-from core.effects.material import PoissonRatio, StiffInclusion
-from core.effects.support import BaseDetachment, BaseSlip
-from core.effects.tool import ToolFriction, ToolOffset, ToolRadius
-from core.frames import FloatArray
-from core.mesh import GridSpec
-from core.replay import replay, require_converged
-from core.setup import Layer, Setup
+from palpate.effects.base import Effect
+from palpate.effects.elastic_material import PoissonRatio, StiffInclusion
+from palpate.effects.load import Gravity
+from palpate.effects.support import BaseDetachment, BaseSlip
+from palpate.effects.tool import ToolFriction, ToolOffset, ToolRadius
+from palpate.foundation.arrays import FloatArray
+from palpate.mesh.box_mesh import GridSpec
+from palpate.replay.replay import replay, require_converged
+from palpate.setup.setup import Layer, Setup
 
 __all__ = ["run"]
 
@@ -63,35 +66,57 @@ ROWS = (
     Row("tool radius 3.5 mm", _with(ToolRadius(radius=3.5e-3)), (0.27, 1.2)),
     Row(
         "lump of 8 mm, 10 times, 10 mm deep and aside",
-        _with(StiffInclusion(x=8e-3, y=0.0, z=STATED.geometry.size[2] - 0.01, radius=8e-3, stiffness_ratio=10.0)),
+        _with(
+            StiffInclusion(
+                x=8e-3, y=0.0, z=STATED.geometry.size[2] - 0.01, radius=8e-3, stiffness_ratio=10.0
+            )
+        ),
         (0.17, 0.91),
     ),
     Row("tool 2 mm aside", _with(ToolOffset(dx=2e-3, dy=0.0, dz=0.0)), (0.15, 1.1)),
     Row("base slides, friction 0.1", _with(BaseSlip(friction_coefficient=0.1)), (0.14, 0.24)),
-    Row("half the base detached", _with(BaseDetachment(edge="+x", extent=STATED.geometry.size[0] / 2)), (0.10, 0.23)),
+    Row(
+        "half the base detached",
+        _with(BaseDetachment(edge="+x", extent=STATED.geometry.size[0] / 2)),
+        (0.10, 0.23),
+    ),
     Row("nu 0.35", _with(PoissonRatio(nu=0.35)), (0.07, 0.32)),
     Row("nu 0.49", _with(PoissonRatio(nu=0.49)), (0.05, 0.14)),
     Row("Gent, J_m 10", _made_of(stretch_limit=10.0), (0.04, 0.20)),
     Row("friction 0.5 under the tool", _with(ToolFriction(friction_coefficient=0.5)), (0.04, 0.28)),
-    Row("skin of 2 mm, 5 times stiffer", _made_of(layer=Layer(thickness=2e-3, stiffness_ratio=5.0)), (0.27, 1.0)),
+    Row(
+        "skin of 2 mm, 5 times stiffer",
+        _made_of(layer=Layer(thickness=2e-3, stiffness_ratio=5.0)),
+        (0.27, 1.0),
+    ),
     Row("top twice as stiff as the base", _made_of(log_ratio=float(np.log(2.0))), (0.19, 0.37)),
     Row("base twice as stiff as the top", _made_of(log_ratio=-float(np.log(2.0))), (0.19, 0.37)),
 )
 
 
 def _heights(setup: Setup, points: FloatArray) -> FloatArray:
-    """Height (m,) [m] of the surface over places (m, 3) of the top at the poke's end, led there in steps of 1 mm."""
+    """Height (m,) [m] of the surface over places (m, 3) of the top at the poke's end, led there in
+    steps of 1 mm.
+    """
     top = setup.geometry.size[2] + SETUP.tool.radius
-    frames = replay(setup, np.array([[0.0, 0.0, top - depth] for depth in np.arange(1e-3, DEPTH + 1e-6, 1e-3)]), GRID)
+    frames = replay(
+        setup,
+        np.array([[0.0, 0.0, top - depth] for depth in np.arange(1e-3, DEPTH + 1e-6, 1e-3)]),
+        GRID,
+    )
     require_converged(frames)
     moved = frames[-1].move(points)
     return np.asarray(LinearNDInterpolator(moved[:, :2], moved[:, 2])(points[:, :2]))
 
 
 def _top() -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Places (m, 3) [m] spread evenly over the top, and which (m,) of them are compared: clear of the tool and of the rim."""
+    """Places (m, 3) [m] spread evenly over the top, and which (m,) of them are compared: clear of
+    the tool and of the rim.
+    """
     x, y, z = STATED.geometry.size
-    across = np.meshgrid(np.linspace(-x / 2, x / 2, 139), np.linspace(-y / 2, y / 2, 81), indexing="ij")
+    across = np.meshgrid(
+        np.linspace(-x / 2, x / 2, 139), np.linspace(-y / 2, y / 2, 81), indexing="ij"
+    )
     points = np.stack([across[0].ravel(), across[1].ravel(), np.full(across[0].size, z)], axis=1)
     inside = (np.abs(points[:, 0]) < x / 2 - RIM) & (np.abs(points[:, 1]) < y / 2 - RIM)
     return points, inside & (np.hypot(points[:, 0], points[:, 1]) > HIDDEN)
@@ -107,9 +132,13 @@ def run() -> list[Table]:
     plain, seconds = timed(lambda: _heights(STATED, points)[seen])
     size = _rms(plain - STATED.geometry.size[2])
     if not abs(size / UNDISTURBED - 1) < WITHIN:
-        raise RuntimeError(f"the undisturbed field is {1e3 * size:.3f} mm RMS, not {1e3 * UNDISTURBED:.2f} mm")
+        raise RuntimeError(
+            f"the undisturbed field is {1e3 * size:.3f} mm RMS, not {1e3 * UNDISTURBED:.2f} mm"
+        )
     title = f"Change of the visible surface at an 8 mm poke; the undisturbed field: {1e3 * size:.2f} mm RMS, other engine 0.76"
-    table = Table("effect", "RMS, mm", "other engine", "largest, mm", "other engine", "CPU s", title=title)
+    table = Table(
+        "effect", "RMS, mm", "other engine", "largest, mm", "other engine", "CPU s", title=title
+    )
     table.add_row("none", "0", "0", "0", "0", f"{seconds:.1f}")
     for row in ROWS:
         heights, seconds = timed(lambda row=row: _heights(row.setup, points)[seen])  # type: ignore[misc]

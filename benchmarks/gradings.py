@@ -1,6 +1,8 @@
-"""What a mesh's grading is worth where the tool may be, not only amid the top: seven pushes, each on every way to spend the nodes.
+"""What a mesh's grading is worth where the tool may be, not only amid the top: seven pushes, each
+on every way to spend the nodes.
 
-`python -m benchmarks.gradings` solves them once more on a grid of 10 353 nodes, far finer than those compared, and stores that.
+`python -m benchmarks.gradings` solves them once more on a grid of 10 353 nodes, far finer than
+those compared, and stores that.
 """
 
 from __future__ import annotations
@@ -14,18 +16,19 @@ from rich.table import Table
 
 from benchmarks.reference import SETUP
 from benchmarks.stopwatch import timed
-from core.frames import FloatArray
-from core.grading import FINE_GRID, PAGE_GRID, REPLAY_GRID
-from core.mesh import GridSpec
-from core.meshing import Mesh, Meshing
-from core.replay import replay, require_converged, rest
-from core.setup import Load, Setup
+from palpate.foundation.arrays import FloatArray
+from palpate.mesh.box_mesh import GridSpec
+from palpate.mesh.graded_mesh import FINE_GRID, PAGE_GRID, REPLAY_GRID
+from palpate.mesh.protocol import Mesh, Meshing
+from palpate.replay.replay import replay, require_converged, rest
+from palpate.setup.setup import Load, Setup
 
 __all__ = ["run"]
 
 FINEST = GridSpec(nodes=(29, 21, 17), spacing=0.7e-3, order=2)
 TARGET = (0.06, 0.06)
-"""That the mesh of `palpate replay` may be off at half the way and at its end, the worst place counted [1]."""
+"""That the mesh of `palpate replay` may be off at half the way and at its end, the worst place
+counted [1]."""
 HEAVY = replace(SETUP, load=Load(specific_weight_over_stiffness=1.8))
 SMOOTH, MOST_SAG = GridSpec(nodes=(33, 21, 19), spacing=1.5e-3, order=2), 30e-6
 """A mesh that knows the sag to a few um, and by how much that of a replay may be off [m]."""
@@ -43,7 +46,9 @@ GRIDS: dict[str, Meshing] = {
 
 @dataclass(frozen=True, eq=False)
 class Pushes:
-    """Displacement (7, 2, m, 3) [m] over the free surface half way and at the end of each push, and force (7, 2, 3) [N]."""
+    """Displacement (7, 2, m, 3) [m] over the free surface half way and at the end of each push, and
+    force (7, 2, 3) [N].
+    """
 
     displacement: FloatArray
     force: FloatArray
@@ -52,13 +57,21 @@ class Pushes:
         """Relative errors (7, 2) of displacement and of force."""
         miss = np.linalg.norm(self.displacement - truth.displacement, axis=(2, 3))
         force = np.linalg.norm(self.force - truth.force, axis=2)
-        return miss / np.linalg.norm(truth.displacement, axis=(2, 3)), force / np.linalg.norm(truth.force, axis=2)
+        return miss / np.linalg.norm(truth.displacement, axis=(2, 3)), force / np.linalg.norm(
+            truth.force, axis=2
+        )
 
 
 def _ways() -> list[FloatArray]:
-    """Tool centres (f, 3) [m]: four places on the top to 8 mm, two on the sides to 6 mm, and a slanted push to 6 mm."""
+    """Tool centres (f, 3) [m]: four places on the top to 8 mm, two on the sides to 6 mm, and a
+    slanted push to 6 mm.
+    """
     x, y, z = SETUP.box.size
-    radius, deep, aside = SETUP.tool.radius, np.arange(1, 9)[:, None] * 1e-3, np.arange(1, 7)[:, None] * 1e-3
+    radius, deep, aside = (
+        SETUP.tool.radius,
+        np.arange(1, 9)[:, None] * 1e-3,
+        np.arange(1, 7)[:, None] * 1e-3,
+    )
     starts = [(0.0, 0.0), (0.012, 0.005), (-0.02, -0.008), (0.0071, -0.0113)]
     ways = [np.array([*place, z + radius]) - deep * [0, 0, 1] for place in starts]
     ways.append(np.array([x / 2 + radius, 0, 0.02]) - aside * [1, 0, 0])
@@ -102,7 +115,10 @@ def _sags() -> Table:
     table = Table("mesh", "off by at most, um", "meshes apart by, um", title=title)
     points = HEAVY.geometry.surface_points()
     truth = rest(HEAVY, SMOOTH).move(points)
-    for name, grid in {"graded by size, without a longest edge": replace(REPLAY_GRID, longest=1.0), **GRIDS}.items():
+    for name, grid in {
+        "graded by size, without a longest edge": replace(REPLAY_GRID, longest=1.0),
+        **GRIDS,
+    }.items():
         sags = [rest(HEAVY, _Still(grid, way[-1])).move(points) for way in _ways()]
         off = max(_rms(sag - truth) for sag in sags)
         apart = max(_rms(one - other) for one in sags for other in sags)
@@ -120,16 +136,31 @@ def _rms(vectors: FloatArray) -> float:
 
 
 def run() -> list[Table]:
-    """Errors and time of each way; the mesh of `palpate replay` must keep what is promised of it at every place."""
+    """Errors and time of each way; the mesh of `palpate replay` must keep what is promised of it at
+    every place.
+    """
     title = "Seven pushes (top, sides, slanted), error over the free surface half way / at the end"
-    table = Table("mesh", "nodes", "worst place", "typical", "worst force", "typical", "ms a frame", title=title)
+    table = Table(
+        "mesh",
+        "nodes",
+        "worst place",
+        "typical",
+        "worst force",
+        "typical",
+        "ms a frame",
+        title=title,
+    )
     truth, count = _truth(), sum(len(way) for way in _ways())
     for name, grid in GRIDS.items():
         _pushed(grid)  # warms up
         found, seconds = timed(partial(_pushed, grid))
         displacement, force = found.off(truth)
         nodes = len(grid.mesh(SETUP, _ways()[0][-1]).nodes)
-        both = [f"{a:.1%} / {b:.1%}" for error in (displacement, force) for a, b in (error.max(axis=0), np.median(error, axis=0))]
+        both = [
+            f"{a:.1%} / {b:.1%}"
+            for error in (displacement, force)
+            for a, b in (error.max(axis=0), np.median(error, axis=0))
+        ]
         table.add_row(name, str(nodes), *both, f"{1e3 * seconds / count:.0f}")
         if grid is REPLAY_GRID and (displacement.max(axis=0) > TARGET).any():
             raise RuntimeError(f"the mesh of a replay is off by {both[0]}")
@@ -138,4 +169,6 @@ def run() -> list[Table]:
 
 if __name__ == "__main__":
     solved = _pushed(FINEST)
-    np.savez_compressed(_FILE, displacement=solved.displacement.astype(np.float32), force=solved.force)
+    np.savez_compressed(
+        _FILE, displacement=solved.displacement.astype(np.float32), force=solved.force
+    )

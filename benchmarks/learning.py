@@ -1,9 +1,11 @@
-"""`python -m benchmarks.learning FOLDER` trains the 2D network on 15 872 samples, as many as the paper's, and times it.
+"""`python -m benchmarks.learning FOLDER` trains the 2D network on 15 872 samples, as many as the
+paper's, and times it.
 
-Twelve sequences at 30 frames a second: eight to learn from, two that stop the training, two to test on. What is simulated is the
-stated block; what is measured is a block whose tool is larger and that sags, replayed by the same engine on another mesh (the
-virtual bench makes another engine's data, but not 20 000 frames of it in minutes). FOLDER keeps the samples, and a training that
-was stopped goes on. `--device cuda` trains on a card.
+Twelve sequences at 30 frames a second: eight to learn from, two that stop the training, two to test
+on. What is simulated is the stated block; what is measured is a block whose tool is larger and that
+sags, replayed by the same engine on another mesh (the virtual bench makes another engine's data,
+but not 20 000 frames of it in minutes). FOLDER keeps the samples, and a training that was stopped
+goes on. `--device cuda` trains on a card.
 """
 
 from __future__ import annotations
@@ -21,16 +23,26 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from core.correction import Body, NetworkSpec, Samples, Split, SurfaceLoss, TrainingSpec, errors_of, open_samples, train
-from core.correction.arrays import Arrays
-from core.correction.samples import FORMAT
-from core.equilibrium import Equilibrium
-from core.fem.newton import Outcome
-from core.frames import FloatArray
-from core.mesh import GridSpec
-from core.replay import Replay
-from core.setup import Box, Load, Setup, Tool
-from core.synthetic.motion import draw_motion
+from palpate.correction import (
+    Body,
+    NetworkSpec,
+    Samples,
+    Split,
+    SurfaceLoss,
+    TrainingSpec,
+    errors_of,
+    open_samples,
+    train,
+)
+from palpate.correction.samples.sample_arrays import Arrays
+from palpate.correction.samples.sample_store import FORMAT
+from palpate.fem.newton import Outcome
+from palpate.foundation.arrays import FloatArray
+from palpate.mesh.box_mesh import GridSpec
+from palpate.replay.equilibrium import Equilibrium
+from palpate.replay.replay import Replay
+from palpate.setup.setup import Box, Load, Setup, Tool
+from palpate.synthetic.bench.motion_plan import draw_motion
 
 SIZE, NODES = (0.0687, 0.0393, 0.0358), (13, 5, 5)
 STATED = Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3))
@@ -41,7 +53,9 @@ EYE = np.array([0.15, -0.18, 0.30])
 
 
 def _names() -> dict[str, int]:
-    """Frames of each sequence: eight that add up to TRAINING, then two of HELD_OUT for validation and for test."""
+    """Frames of each sequence: eight that add up to TRAINING, then two of HELD_OUT for validation
+    and for test.
+    """
     counts, names = dict.fromkeys(KINDS, 0), []
     for number in range(12):
         kind = KINDS[number % len(KINDS)] if number < 10 else KINDS[number % 2 * 2]
@@ -55,7 +69,14 @@ def _way(name: str, frames: int) -> FloatArray:
     found: list[FloatArray] = []
     for seed in range(1000):
         kind, _, number = name.rpartition("-")
-        motion = draw_motion(name, int(number) - 1 + seed, SIZE, STATED.tool.radius, np.array([1.0, -1.0]), 17 * int(number) + seed)
+        motion = draw_motion(
+            name,
+            int(number) - 1 + seed,
+            SIZE,
+            STATED.tool.radius,
+            np.array([1.0, -1.0]),
+            17 * int(number) + seed,
+        )
         found.append(motion.centre(np.arange(0.0, motion.duration, 1 / RATE)))
         if sum(map(len, found)) >= frames:
             return np.concatenate(found)[:frames]
@@ -71,15 +92,24 @@ def _cloud(frame: Equilibrium, rng: np.random.Generator) -> tuple[FloatArray, in
     rest[:upper, 2], rest[upper : upper + right, 0], rest[upper + right :, 1] = z, x / 2, -y / 2
     points = frame.move(rest)
     rays = points - EYE
-    return points + rng.normal(0, NOISE, (POINTS, 1)) * rays / np.linalg.norm(rays, axis=1)[:, None], int(upper)
+    return points + rng.normal(0, NOISE, (POINTS, 1)) * rays / np.linalg.norm(rays, axis=1)[
+        :, None
+    ], int(upper)
 
 
 def _sequence(folder: Path, body: Body, named: tuple[str, int]) -> int:
     """Write one sequence; returns how many frames of it have an equilibrium in both blocks."""
     name, frames = named
     (folder / name).mkdir(parents=True)
-    arrays, row, rng = Arrays(folder / name, frames, len(body.rest), POINTS), 0, np.random.default_rng([5, *name.encode()])
-    blocks = [Replay(STATED, GridSpec(nodes=NODES), 1e-3), Replay(TRUE, GridSpec(nodes=(13, 7, 7), spacing=2.5e-3), 1e-3)]
+    arrays, row, rng = (
+        Arrays(folder / name, frames, len(body.rest), POINTS),
+        0,
+        np.random.default_rng([5, *name.encode()]),
+    )
+    blocks = [
+        Replay(STATED, GridSpec(nodes=NODES), 1e-3),
+        Replay(TRUE, GridSpec(nodes=(13, 7, 7), spacing=2.5e-3), 1e-3),
+    ]
     before: list[Equilibrium | None] = [None, None]
     for number, centre in enumerate(_way(name, frames)):
         now = [block.sought(centre, (last,)) for block, last in zip(blocks, before, strict=True)]
@@ -88,8 +118,16 @@ def _sequence(folder: Path, body: Body, named: tuple[str, int]) -> int:
             continue
         points, upper = _cloud(now[1], rng)
         tool = np.concatenate([centre, [1.0, *[0.0] * 6], now[0].force])
-        arrays.put(row, points, positions=now[0].move(body.rest), tool=tool, count=(upper, POINTS), time=number / RATE,
-                   frame=number, probe=1)  # fmt: skip
+        arrays.put(
+            row,
+            points,
+            positions=now[0].move(body.rest),
+            tool=tool,
+            count=(upper, POINTS),
+            time=number / RATE,
+            frame=number,
+            probe=1,
+        )
         row += 1
     arrays.close(row)
     return row
@@ -100,17 +138,33 @@ def _made(folder: Path, console: Console) -> Samples:
     if (folder / "samples.json").exists():
         return open_samples(folder)
     body, wanted = Body.block(SIZE, NODES), _names()
-    with ProcessPoolExecutor(min(len(wanted), os.cpu_count() or 1), mp_context=get_context("spawn")) as pool:
-        made = dict(zip(wanted, pool.map(partial(_sequence, folder, body), wanted.items()), strict=True))
+    with ProcessPoolExecutor(
+        min(len(wanted), os.cpu_count() or 1), mp_context=get_context("spawn")
+    ) as pool:
+        made = dict(
+            zip(wanted, pool.map(partial(_sequence, folder, body), wanted.items()), strict=True)
+        )
     for name, frames in wanted.items():
         console.print(f"{name}: {made[name]} of {frames} frames")
     names = list(made)
     about = {
-        "format": FORMAT, "dataset": "learning", "sequences": made, "grid": list(NODES), "points": POINTS, "every": 1,
-        "splits": {"train": names[:8], "validation": names[8:10], "test": names[10:]}, "force": "simulated", "mesh": str(NODES),
-        "seed": 5, "setup": STATED.as_dict(), "seen": np.ones(len(body.rest)).tolist(),
-    }  # fmt: skip
-    np.savez(folder / "body.npz", **{key: value for key, value in body.to_arrays().items() if key not in ("grid", "flat")})
+        "format": FORMAT,
+        "dataset": "learning",
+        "sequences": made,
+        "grid": list(NODES),
+        "points": POINTS,
+        "every": 1,
+        "splits": {"train": names[:8], "validation": names[8:10], "test": names[10:]},
+        "force": "simulated",
+        "mesh": str(NODES),
+        "seed": 5,
+        "setup": STATED.as_dict(),
+        "seen": np.ones(len(body.rest)).tolist(),
+    }
+    np.savez(
+        folder / "body.npz",
+        **{key: value for key, value in body.to_arrays().items() if key not in ("grid", "flat")},
+    )
     (folder / "samples.json").write_text(json.dumps(about))
     return open_samples(folder)
 
@@ -127,23 +181,36 @@ def main() -> None:
     samples = _made(asked.folder / "samples", console)
     split = Split.of(samples)
     network = NetworkSpec(kind=asked.kind)
-    spec = TrainingSpec(network=network, hold=0.0, epochs=asked.epochs, device=asked.device, threads=asked.threads)
+    spec = TrainingSpec(
+        network=network, hold=0.0, epochs=asked.epochs, device=asked.device, threads=asked.threads
+    )
     wall, cpu, told = time.monotonic(), time.process_time(), -1
 
     def report(fraction: float, text: str) -> None:
         nonlocal told
-        epoch = int(text.split(",", maxsplit=1)[0].removeprefix("epoch ")) if text.startswith("epoch ") else told
+        epoch = (
+            int(text.split(",", maxsplit=1)[0].removeprefix("epoch "))
+            if text.startswith("epoch ")
+            else told
+        )
         if epoch != told:
             told = epoch
-            console.print(f"{time.monotonic() - wall:6.0f} s, {time.process_time() - cpu:6.0f} CPU s: {text}")
+            console.print(
+                f"{time.monotonic() - wall:6.0f} s, {time.process_time() - cpu:6.0f} CPU s: {text}"
+            )
 
     trained = train(samples, split, spec, asked.folder / asked.kind, report)
-    console.print(f"trained on {len(samples.rows(split.train))} samples in {time.monotonic() - wall:.0f} s, "
-                  f"{time.process_time() - cpu:.0f} CPU s; best after epoch {trained.about['epoch']}")  # fmt: skip
+    console.print(
+        f"trained on {len(samples.rows(split.train))} samples in {time.monotonic() - wall:.0f} s, "
+        f"{time.process_time() - cpu:.0f} CPU s; best after epoch {trained.about['epoch']}"
+    )
     loss = SurfaceLoss(trained.body, samples.seen[trained.body.index], device=asked.device)
     for name in split.test:
         rows = samples.rows([name])
-        raw, found = (errors_of(net, loss, trained.body, samples, rows, asked.device).mean() for net in (None, trained.network))
+        raw, found = (
+            errors_of(net, loss, trained.body, samples, rows, asked.device).mean()
+            for net in (None, trained.network)
+        )
         console.print(f"{name}: {raw:.3f} mm without, {found:.3f} mm with the network")
 
 

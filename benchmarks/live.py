@@ -8,31 +8,42 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.reference import SETUP
-from core.effects import effect_named
-from core.fem.newton import MAX_PENETRATION
-from core.frames import FloatArray
-from core.grading import PAGE_GRID
-from core.live import Felt, Live
+from palpate.effects import effect_named
+from palpate.fem.newton import MAX_PENETRATION
+from palpate.foundation.arrays import FloatArray
+from palpate.mesh.graded_mesh import PAGE_GRID
+from palpate.recording.interactive import Felt, Live
 
 __all__ = ["run"]
 
 ANSWERS, RATE, WANTED = 240, 30.0, 20.0
-"""Places asked for, how many of them a hand passes in a second, and how many answers a second are wanted."""
+"""Places asked for, how many of them a hand passes in a second, and how many answers a second are
+wanted."""
 
 
 def hand(depth: float) -> FloatArray:
-    """Centres (n, 3) [m] of eight seconds: up and down to a depth [m], to and fro over the top at up to 60 mm/s."""
+    """Centres (n, 3) [m] of eight seconds: up and down to a depth [m], to and fro over the top at
+    up to 60 mm/s.
+    """
     t = np.arange(ANSWERS) / RATE
     x, y = 0.02 * np.sin(2 * np.pi * 0.45 * t), 0.008 * np.sin(2 * np.pi * 0.7 * t)
-    z = SETUP.geometry.size[2] + SETUP.tool.radius - depth * (0.5 - 0.5 * np.cos(2 * np.pi * 0.5 * t))
+    z = (
+        SETUP.geometry.size[2]
+        + SETUP.tool.radius
+        - depth * (0.5 - 0.5 * np.cos(2 * np.pi * 0.5 * t))
+    )
     return np.column_stack([x, y, z])
 
 
 def answers(live: Live, places: FloatArray) -> tuple[list[Felt], FloatArray, FloatArray]:
-    """What was felt at each place, and how long it took (n,) [s]: of the processor, and on the wall."""
+    """What was felt at each place, and how long it took (n,) [s]: of the processor, and on the
+    wall.
+    """
     felt, busy, wall = [], [], []
     live.at(places[0] + np.array([0.0, 0.0, 0.02]))
-    live.at(places[0] - np.array([0.0, 0.0, 1e-3]))  # the first touch factorises what all others share
+    live.at(
+        places[0] - np.array([0.0, 0.0, 1e-3])
+    )  # the first touch factorises what all others share
     for place in places:
         before, began = time.process_time(), time.perf_counter()
         felt.append(live.at(place))
@@ -42,7 +53,9 @@ def answers(live: Live, places: FloatArray) -> tuple[list[Felt], FloatArray, Flo
 
 
 def check(felt: list[Felt], places: FloatArray, radius: float) -> None:
-    """RuntimeError unless all are equilibria at the places asked for, with no point of the surface in the tool."""
+    """RuntimeError unless all are equilibria at the places asked for, with no point of the surface
+    in the tool.
+    """
     for number, (one, place) in enumerate(zip(felt, places, strict=True)):
         if not one.converged:
             raise RuntimeError(f"place {number}: {one.outcome}")
@@ -50,13 +63,25 @@ def check(felt: list[Felt], places: FloatArray, radius: float) -> None:
             raise RuntimeError(f"place {number}: the tool is at {one.tool}, asked for was {place}")
         inside = radius - float(np.linalg.norm(one.surface - one.tool, axis=1).min())
         if inside > MAX_PENETRATION:
-            raise RuntimeError(f"place {number}: a point of the surface lies {inside * 1e3:.2f} mm in the tool")
+            raise RuntimeError(
+                f"place {number}: a point of the surface lies {inside * 1e3:.2f} mm in the tool"
+            )
 
 
 def run() -> list[Table]:
-    """Answers a second of the stated block and of one with a lump; RuntimeError where one is wrong or they are too few."""
+    """Answers a second of the stated block and of one with a lump; RuntimeError where one is wrong
+    or they are too few.
+    """
     lump = effect_named("stiff_inclusion")(x=0.01, y=0.0, z=0.026, radius=7e-3, stiffness_ratio=8.0)  # type: ignore[call-arg]
-    columns = ("model", "deepest, mm", "answers", "median, ms", "95 %, ms", "answers a second", "by the processor's clock")
+    columns = (
+        "model",
+        "deepest, mm",
+        "answers",
+        "median, ms",
+        "95 %, ms",
+        "answers a second",
+        "by the processor's clock",
+    )
     table = Table(*columns, title="live: a tool led by hand")
     for name, setup in (("stated", SETUP), ("with a stiff lump", lump.apply(SETUP))):
         for depth in (4e-3, 8e-3):
@@ -65,7 +90,9 @@ def run() -> list[Table]:
             check(felt, places, setup.tool.radius)
             rate, pure = len(wall) / wall.sum(), len(busy) / busy.sum()
             spans = [f"{1e3 * value:.0f}" for value in (np.median(wall), np.quantile(wall, 0.95))]
-            table.add_row(name, f"{depth * 1e3:.0f}", str(len(felt)), *spans, f"{rate:.0f}", f"{pure:.0f}")
+            table.add_row(
+                name, f"{depth * 1e3:.0f}", str(len(felt)), *spans, f"{rate:.0f}", f"{pure:.0f}"
+            )
             if pure < WANTED:
                 raise RuntimeError(
                     f"{name}, {depth * 1e3:.0f} mm: {pure:.0f} answers a second of processor time, wanted are {WANTED:.0f}"

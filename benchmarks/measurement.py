@@ -7,10 +7,10 @@ from rich.table import Table
 
 from benchmarks.reference import SETUP
 from benchmarks.stopwatch import timed
-from core.measurement import Surface, gaps
-from core.mesh import GridSpec
-from core.patch_means import patch_means
-from core.replay import replay
+from palpate.measurement.patch_averages import patch_means
+from palpate.measurement.surface_gaps import Surface, gaps
+from palpate.mesh.box_mesh import GridSpec
+from palpate.replay.replay import replay
 
 __all__ = ["run"]
 
@@ -23,17 +23,30 @@ def run() -> list[Table]:
     x, y, z = SETUP.geometry.size
     centres = np.array([[0.0, 0.0, z + 5e-3 - depth] for depth in (2e-3, 4e-3)])
     frame = replay(SETUP, centres, GridSpec(nodes=(11, 9, 7), spacing=1.5e-3))[-1]
-    surface, camera, rng = Surface(SETUP.box), np.array([0.02, -0.05, 0.35]), np.random.default_rng(0)
+    surface, camera, rng = (
+        Surface(SETUP.box),
+        np.array([0.02, -0.05, 0.35]),
+        np.random.default_rng(0),
+    )
     rest = rng.uniform([-x / 2, -y / 2, z], [x / 2, y / 2, z], (POINTS, 3))
     points = frame.move(rest) + np.array([0.0, 0.0, OFFSET])
     rays = points - camera
-    points = points + rays / np.linalg.norm(rays, axis=1)[:, None] * rng.normal(0, SIGMA, POINTS)[:, None]
+    points = (
+        points
+        + rays / np.linalg.norm(rays, axis=1)[:, None] * rng.normal(0, SIGMA, POINTS)[:, None]
+    )
     gaps(points, camera, frame, surface)  # Open3D is loaded outside the time
-    found, casting = timed(lambda: [gaps(points, camera, frame, surface) for _ in range(ROUNDS)][-1])
-    means, averaging = timed(lambda: [patch_means(found.gap, found.patch, surface.patches) for _ in range(ROUNDS)][-1])
+    found, casting = timed(
+        lambda: [gaps(points, camera, frame, surface) for _ in range(ROUNDS)][-1]
+    )
+    means, averaging = timed(
+        lambda: [patch_means(found.gap, found.patch, surface.patches) for _ in range(ROUNDS)][-1]
+    )
     error = float(np.nanmedian(means.mean)) - OFFSET
     if abs(error) > 3e-5:
-        raise RuntimeError(f"an offset of {OFFSET * 1e3:.2f} mm was measured {error * 1e3:.3f} mm off")
+        raise RuntimeError(
+            f"an offset of {OFFSET * 1e3:.2f} mm was measured {error * 1e3:.3f} mm off"
+        )
     table = Table("step", "points", "ms a cloud", title="Measurement, one thread")
     table.add_row("gaps along the rays", str(POINTS), f"{1e3 * casting / ROUNDS:.1f}")
     table.add_row("means of patches", str(len(found.gap)), f"{1e3 * averaging / ROUNDS:.1f}")

@@ -1,8 +1,10 @@
-"""Engines that one can install, on the pokes of the reference and in the same run: MuJoCo's flex and Newton's VBD.
+"""Engines that one can install, on the pokes of the reference and in the same run: MuJoCo's flex
+and Newton's VBD.
 
-Both are dynamic, so the ball sinks by 10 mm/s and rests for a third of a second before it is looked at. Material, block, ball and
-grid are those of the reference, without friction and gravity; what else they need is as their own examples have it. They come with
-the extra `peers`: pip install -e ".[peers]" -c constraints.txt, which `make bench` does.
+Both are dynamic, so the ball sinks by 10 mm/s and rests for a third of a second before it is looked
+at. Material, block, ball and grid are those of the reference, without friction and gravity; what
+else they need is as their own examples have it. They come with the extra `peers`: pip install -e
+".[peers]" -c constraints.txt, which `make bench` does.
 """
 
 from __future__ import annotations
@@ -17,11 +19,11 @@ from scipy.interpolate import RegularGridInterpolator
 
 from benchmarks.reference import DEPTHS, SETUP, compared, reference, top_points
 from benchmarks.stopwatch import timed
-from core.frames import FloatArray
-from core.grading import REPLAY_GRID, Grading
-from core.mesh import GridSpec
-from core.meshing import Meshing
-from core.replay import replay, require_converged
+from palpate.foundation.arrays import FloatArray
+from palpate.mesh.box_mesh import GridSpec
+from palpate.mesh.graded_mesh import REPLAY_GRID, Grading
+from palpate.mesh.protocol import Meshing
+from palpate.replay.replay import replay, require_converged
 
 __all__ = ["run"]
 
@@ -50,16 +52,20 @@ class Peer(Protocol):
 
 
 class MuJoCo:
-    """Saint Venant-Kirchhoff tetrahedra; 16 steps a frame, half as many bring warnings of a singular matrix on the coarse grid."""
+    """Saint Venant-Kirchhoff tetrahedra; 16 steps a frame, half as many bring warnings of a
+    singular matrix on the coarse grid.
+    """
 
     steps = 16
 
     def __init__(self, nodes: Nodes) -> None:
-        import mujoco  # noqa: PLC0415 (an optional extra)
+        import mujoco
 
         x, y, z = SIZE / (np.array(nodes) - 1)
         self.engine = mujoco
-        mujoco.set_mju_user_warning(lambda _: None)  # counted below; otherwise they go to a file in the working directory
+        mujoco.set_mju_user_warning(
+            lambda _: None
+        )  # counted below; otherwise they go to a file in the working directory
         self.model = mujoco.MjModel.from_xml_string(f"""
             <mujoco>
               <option timestep="{1 / RATE / self.steps}" gravity="0 0 0" integrator="discrete"/>
@@ -95,28 +101,44 @@ class Newton:
     """By which the nodes are thick [m], and the ball thinner."""
 
     def __init__(self, nodes: Nodes) -> None:
-        import warp  # noqa: PLC0415 (an optional extra)
+        import warp
 
         warp.config.log_level = warp.LOG_WARNING
-        import newton  # noqa: PLC0415 (starts warp as it is set)
+        import newton
 
         cells, (x, y, z) = np.array(nodes) - 1, SIZE / (np.array(nodes) - 1)
         builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
         builder.add_soft_grid(
-            pos=warp.vec3(-SIZE[0] / 2, -SIZE[1] / 2, 0.0), rot=warp.quat_identity(), vel=warp.vec3(0.0, 0.0, 0.0),
-            dim_x=int(cells[0]), dim_y=int(cells[1]), dim_z=int(cells[2]), cell_x=x, cell_y=y, cell_z=z,
-            density=SETUP.mass / SIZE.prod(), k_mu=MODULUS / (2 * (1 + NU)), k_lambda=MODULUS * NU / ((1 + NU) * (1 - 2 * NU)),
-            k_damp=1.0, particle_radius=self.skin,
-        )  # fmt: skip
+            pos=warp.vec3(-SIZE[0] / 2, -SIZE[1] / 2, 0.0),
+            rot=warp.quat_identity(),
+            vel=warp.vec3(0.0, 0.0, 0.0),
+            dim_x=int(cells[0]),
+            dim_y=int(cells[1]),
+            dim_z=int(cells[2]),
+            cell_x=x,
+            cell_y=y,
+            cell_z=z,
+            density=SETUP.mass / SIZE.prod(),
+            k_mu=MODULUS / (2 * (1 + NU)),
+            k_lambda=MODULUS * NU / ((1 + NU) * (1 - 2 * NU)),
+            k_damp=1.0,
+            particle_radius=self.skin,
+        )
         for node in np.flatnonzero(np.array(builder.particle_q)[:, 2] < 1e-9):
             builder.particle_mass[node] = 0.0
             builder.particle_flags[node] &= ~int(newton.ParticleFlags.ACTIVE)
         place = warp.transform(warp.vec3(0.0, 0.0, SIZE[2] + RADIUS), warp.quat_identity())
         ball = newton.ModelBuilder.ShapeConfig(mu=0.0, ke=1e3)
-        builder.add_shape_sphere(builder.add_body(xform=place, is_kinematic=True), radius=RADIUS - self.skin, cfg=ball)
+        builder.add_shape_sphere(
+            builder.add_body(xform=place, is_kinematic=True), radius=RADIUS - self.skin, cfg=ball
+        )
         builder.color()
         self.model: Any = builder.finalize(device="cpu")
-        self.model.soft_contact_ke, self.model.soft_contact_kd, self.model.soft_contact_mu = 1e3, 0.0, 0.0
+        self.model.soft_contact_ke, self.model.soft_contact_kd, self.model.soft_contact_mu = (
+            1e3,
+            0.0,
+            0.0,
+        )
         self.solver = newton.solvers.SolverVBD(self.model, iterations=20)
         self.now, self.next = self.model.state(), self.model.state()
         self.control, self.contacts = self.model.control(), self.model.contacts()
@@ -151,7 +173,9 @@ PEERS: tuple[tuple[str, str, Callable[[Nodes], Peer]], ...] = (
 
 
 def _over_top(rest: FloatArray, moved: FloatArray, nodes: Nodes) -> FloatArray:
-    """Displacement (m, 3) [m] of the reference's points on the top, linear between the nodes (n, 3) there."""
+    """Displacement (m, 3) [m] of the reference's points on the top, linear between the nodes (n, 3)
+    there.
+    """
     top = np.flatnonzero(rest[:, 2] > SIZE[2] - 1e-6)
     rows = top[np.lexsort((rest[top, 1].round(7), rest[top, 0].round(7)))]
     axes = [np.linspace(-SIZE[axis] / 2, SIZE[axis] / 2, nodes[axis]) for axis in (0, 1)]
@@ -160,7 +184,9 @@ def _over_top(rest: FloatArray, moved: FloatArray, nodes: Nodes) -> FloatArray:
 
 
 def _depths(step: float) -> tuple[FloatArray, list[int]]:
-    """The ball's depth (n,) [m] every `step` seconds, and at which of them each of the two depths has been held."""
+    """The ball's depth (n,) [m] every `step` seconds, and at which of them each of the two depths
+    has been held.
+    """
     depths, held, before = np.zeros(0), [], 0.0
     for depth in DEPTHS:
         count = round((depth - before) / SPEED / step)
@@ -184,33 +210,66 @@ def _poke(peer: Peer, nodes: Nodes) -> FloatArray:
 
 def _own(grid: Meshing) -> FloatArray:
     depths, held = _depths(1 / RATE)
-    frames = replay(SETUP, np.array([[0.0, 0.0, SIZE[2] + RADIUS - depth] for depth in depths]), grid)
+    frames = replay(
+        SETUP, np.array([[0.0, 0.0, SIZE[2] + RADIUS - depth] for depth in depths]), grid
+    )
     require_converged(frames)
     return compared([frames[number] for number in held]).displacement
 
 
-def _row(table: Table, name: str, nodes: Nodes, displacement: FloatArray, seconds: float, warnings: str) -> None:
+def _row(
+    table: Table, name: str, nodes: Nodes, displacement: FloatArray, seconds: float, warnings: str
+) -> None:
     grid, ratio = "x".join(map(str, nodes)), f"{seconds * RATE / len(_depths(1 / RATE)[0]):.3f}"
     if not np.isfinite(displacement).all():
         table.add_row(name, grid, ratio, "not finite", "-", warnings)
         return
     wanted = reference().displacement
-    errors = np.linalg.norm(displacement - wanted, axis=(1, 2)) / np.linalg.norm(wanted, axis=(1, 2))
+    errors = np.linalg.norm(displacement - wanted, axis=(1, 2)) / np.linalg.norm(
+        wanted, axis=(1, 2)
+    )
     deepest = -1e3 * displacement[..., 2].min(axis=1)
-    table.add_row(name, grid, ratio, f"{errors[0]:.0%} / {errors[1]:.0%}", f"{deepest[0]:.1f} / {deepest[1]:.1f}", warnings)
+    table.add_row(
+        name,
+        grid,
+        ratio,
+        f"{errors[0]:.0%} / {errors[1]:.0%}",
+        f"{deepest[0]:.1f} / {deepest[1]:.1f}",
+        warnings,
+    )
 
 
 def run() -> list[Table]:
-    """Poke with every engine that is there, and tabulate errors and CPU seconds per simulated second."""
-    heads = ("engine", "nodes", "CPU s per s", "top off by, 4 / 8 mm", "top sunk by, mm", "solver warnings")
-    table = Table(*heads, title="Engines that one can install, one thread, the same pokes by 4 and 8 mm")
+    """Poke with every engine that is there, and tabulate errors and CPU seconds per simulated
+    second.
+    """
+    heads = (
+        "engine",
+        "nodes",
+        "CPU s per s",
+        "top off by, 4 / 8 mm",
+        "top sunk by, mm",
+        "solver warnings",
+    )
+    table = Table(
+        *heads, title="Engines that one can install, one thread, the same pokes by 4 and 8 mm"
+    )
     for name, grid in OWN:
         _own(grid)  # warms up
         displacement, seconds = timed(lambda grid=grid: _own(grid))  # type: ignore[misc]
-        _row(table, name, grid.mesh(SETUP, np.array([0.0, 0.0, SIZE[2]])).shape, displacement, seconds, "0")
+        _row(
+            table,
+            name,
+            grid.mesh(SETUP, np.array([0.0, 0.0, SIZE[2]])).shape,
+            displacement,
+            seconds,
+            "0",
+        )
     for name, package, start in PEERS:
         if find_spec(package) is None:
-            table.add_row(name, "-", "not installed", 'pip install -e ".[peers]" -c constraints.txt', "-", "-")
+            table.add_row(
+                name, "-", "not installed", 'pip install -e ".[peers]" -c constraints.txt', "-", "-"
+            )
             continue
         for nodes in GRIDS:
             peer = start(nodes)

@@ -7,19 +7,22 @@ from time import perf_counter
 import numpy as np
 from rich.table import Table
 
-from core.frames import FloatArray
-from core.registration.picking import pick_cloud
+from palpate.foundation.arrays import FloatArray
+from palpate.registration.picking import pick_cloud
 
 __all__ = ["aimed_and_picked", "run"]
 
 POINTS, HEIGHT, WIDTH, FIELD_OF_VIEW = 45_000, 700, 1000, 0.6
 RANGE, NOISE, SLANT = 0.25, 5.0e-4, np.radians(55.0)
-"""Distance to the eye [m], white noise along the line of sight [m], and how far the surface leans away."""
+"""Distance to the eye [m], white noise along the line of sight [m], and how far the surface leans
+away."""
 MOST = 3.0e-4
 
 
 def aimed_and_picked(clicks: int, seed: int = 0) -> tuple[FloatArray, FloatArray]:
-    """Aimed and picked points (clicks, 3) [m], eye frame; clicks are at integer pixels, whose rays pass through their centres."""
+    """Aimed and picked points (clicks, 3) [m], eye frame; clicks are at integer pixels, whose rays
+    pass through their centres.
+    """
     rng = np.random.default_rng(seed)
     cloud = _cloud(rng)
     focal = HEIGHT / 2 / np.tan(FIELD_OF_VIEW / 2)
@@ -44,16 +47,29 @@ def _cloud(rng: np.random.Generator) -> FloatArray:
 
 
 def run() -> list[Table]:
-    """Distance from the aimed point over 1000 clicks; RuntimeError where the median is 0.3 mm or more."""
+    """Distance from the aimed point over 1000 clicks; RuntimeError where the median is 0.3 mm or
+    more.
+    """
     start = perf_counter()
     aimed, picked = aimed_and_picked(1000)
     spent = (perf_counter() - start) / 1000
     apart = np.linalg.norm(aimed - picked, axis=1)
     middle, most = float(np.nanmedian(apart)), float(np.nanquantile(apart, 0.95))
-    table = Table("points", "noise, mm", "slant, degrees", "median, mm", "95 %, mm", "missed", "ms per click", title="picking")
+    table = Table(
+        "points",
+        "noise, mm",
+        "slant, degrees",
+        "median, mm",
+        "95 %, mm",
+        "missed",
+        "ms per click",
+        title="picking",
+    )
     missed = int(np.isnan(apart).sum())
     numbers = (f"{middle * 1e3:.2f}", f"{most * 1e3:.2f}", str(missed), f"{spent * 1e3:.1f}")
     table.add_row(f"{POINTS}", f"{NOISE * 1e3:.1f}", f"{np.degrees(SLANT):.0f}", *numbers)
     if not middle < MOST:
-        raise RuntimeError(f"the median pick is {middle * 1e3:.2f} mm from the aimed point, under {MOST * 1e3:.1f} mm is wanted")
+        raise RuntimeError(
+            f"the median pick is {middle * 1e3:.2f} mm from the aimed point, under {MOST * 1e3:.1f} mm is wanted"
+        )
     return [table]

@@ -14,9 +14,11 @@ __all__ = ["picture"]
 
 @contextmanager
 def picture(file: Path, plots: int, size: tuple[float, float]) -> Iterator[list[Any]]:
-    """Axes side by side to draw into; at the end they get grid and legend, and are written to `file`. Size in inches."""
+    """Axes side by side to draw into; at the end they get grid and legend, and are written to
+    `file`. Size in inches.
+    """
     mpl.use("Agg")
-    from matplotlib import pyplot  # noqa: PLC0415 (after the choice of a backend without a window)
+    from matplotlib import pyplot
 
     figure, rows = pyplot.subplots(1, plots, figsize=size, layout="constrained", squeeze=False)
     yield list(rows[0])

@@ -1,4 +1,6 @@
-"""A dataset of large clouds and a run over it, as a server would show them; made up, for nothing is solved to make it."""
+"""A dataset of large clouds and a run over it, as a server would show them; made up, for nothing is
+solved to make it.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from core.frames import FloatArray
-from core.mesh import GridSpec, box_mesh
+from palpate.foundation.arrays import FloatArray
+from palpate.mesh.box_mesh import GridSpec, box_mesh
 
 __all__ = ["CAMERA", "RUN", "SEQUENCE", "cloud", "write_place"]
 
@@ -46,7 +48,9 @@ test = []
 
 
 def cloud(frame: int, points: int) -> FloatArray:
-    """Points (n, 3) [m], camera frame, that differ from frame to frame: the top of the block, and the table around it."""
+    """Points (n, 3) [m], camera frame, that differ from frame to frame: the top of the block, and
+    the table around it.
+    """
     rng = np.random.default_rng(frame)
     x, y = rng.uniform(-0.06, 0.06, (2, points))
     on = (np.abs(x) < SIZE[0] / 2) & (np.abs(y) < SIZE[1] / 2)
@@ -55,21 +59,29 @@ def cloud(frame: int, points: int) -> FloatArray:
 
 
 def write_place(folder: Path, frames: int, points: int, nodes: tuple[int, int, int]) -> None:
-    """Write `folder`/datasets/large and `folder`/runs/large-1: so many frames, points in each cloud, and nodes of the mesh."""
+    """Write `folder`/datasets/large and `folder`/runs/large-1: so many frames, points in each
+    cloud, and nodes of the mesh.
+    """
     data, run = folder / "datasets" / "large", folder / "runs" / RUN
     sequence = data / "sequences" / SEQUENCE
     (sequence / "clouds").mkdir(parents=True)
     (run / "replays").mkdir(parents=True)
     (data / "dataset.toml").write_text(TOML)
-    (data / "touches.csv").write_text("landmark,x,y,z\n" + "".join(f"{name},{x},{y},{z}\n" for name, (x, y, z) in CORNERS.items()))
+    (data / "touches.csv").write_text(
+        "landmark,x,y,z\n" + "".join(f"{name},{x},{y},{z}\n" for name, (x, y, z) in CORNERS.items())
+    )
     _write_ply(data / "rest.ply", cloud(0, points))
     times = np.arange(frames) / 30
     poses = "".join(f"{t},0,0,{0.05 - 1e-4 * i},0,0,0,1\n" for i, t in enumerate(times))
     (sequence / "kinematics.csv").write_text("t,x,y,z,qx,qy,qz,qw\n" + poses)
-    (sequence / "clouds.csv").write_text("t,file\n" + "".join(f"{t},clouds/{i:06d}.ply\n" for i, t in enumerate(times)))
+    (sequence / "clouds.csv").write_text(
+        "t,file\n" + "".join(f"{t},clouds/{i:06d}.ply\n" for i, t in enumerate(times))
+    )
     for frame in range(frames):
         _write_ply(sequence / "clouds" / f"{frame:06d}.ply", cloud(frame, points))
-    (run / "report.json").write_text(json.dumps({"format": 1, "dataset": "large", "verdict": "none", "causes": []}))
+    (run / "report.json").write_text(
+        json.dumps({"format": 1, "dataset": "large", "verdict": "none", "causes": []})
+    )
     (run / "model.json").write_text(json.dumps({"format": 1}))
     (run / "origin.json").write_text(json.dumps({"dataset": str(data), "created": 1.0}))
     np.savez(run / "replays" / f"{SEQUENCE}.npz", **_arrays(frames, nodes))  # type: ignore[arg-type]
@@ -94,12 +106,21 @@ def _arrays(frames: int, nodes: tuple[int, int, int]) -> dict[str, object]:
         key: value
         for model in ("raw", "extended")
         for key, value in {
-            model: moved.astype(np.float32), f"tool_{model}": tool, f"tool_radius_{model}": RADIUS, f"error_{model}": error,
-            f"distance_{model}": 0.2 * depth, f"paper_{model}": depth, f"camera_{model}": CAMERA,
+            model: moved.astype(np.float32),
+            f"tool_{model}": tool,
+            f"tool_radius_{model}": RADIUS,
+            f"error_{model}": error,
+            f"distance_{model}": 0.2 * depth,
+            f"paper_{model}": depth,
+            f"camera_{model}": CAMERA,
         }.items()
-    }  # fmt: skip
+    }
     return {
-        "time": np.arange(frames) / 30, "cloud_index": np.arange(frames), "rest": rest, "noise_floor": 1e-5,
-        "faces": np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype(np.int32), "outcome": np.zeros(frames, np.int8),
+        "time": np.arange(frames) / 30,
+        "cloud_index": np.arange(frames),
+        "rest": rest,
+        "noise_floor": 1e-5,
+        "faces": np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype(np.int32),
+        "outcome": np.zeros(frames, np.int8),
         **models,
-    }  # fmt: skip
+    }

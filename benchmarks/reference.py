@@ -1,7 +1,9 @@
-"""The converged pokes that grids are judged by: `python -m benchmarks.reference` solves them once more and writes them anew.
+"""The converged pokes that grids are judged by: `python -m benchmarks.reference` solves them once
+more and writes them anew.
 
-Straight down in the middle of the top by 4 and 8 mm, on quadratic hexahedra with 0.6 mm between nodes at the tool. Trilinear
-elements with 0.5 mm between nodes differ from them by 1.5 and 2.1 % of the displacement and 0.9 % of the force: no claim is finer.
+Straight down in the middle of the top by 4 and 8 mm, on quadratic hexahedra with 0.6 mm between
+nodes at the tool. Trilinear elements with 0.5 mm between nodes differ from them by 1.5 and 2.1 % of
+the displacement and 0.9 % of the force: no claim is finer.
 """
 
 from __future__ import annotations
@@ -12,13 +14,22 @@ from pathlib import Path
 
 import numpy as np
 
-from core.frames import FloatArray
-from core.mesh import GridSpec
-from core.meshing import Meshing
-from core.replay import Equilibrium, replay, require_converged
-from core.setup import Box, Setup, Tool
+from palpate.foundation.arrays import FloatArray
+from palpate.mesh.box_mesh import GridSpec
+from palpate.mesh.protocol import Meshing
+from palpate.replay.replay import Equilibrium, replay, require_converged
+from palpate.setup.setup import Box, Setup, Tool
 
-__all__ = ["DEPTHS", "SETUP", "Pokes", "compared", "poke_centres", "poke_frames", "reference", "top_points"]
+__all__ = [
+    "DEPTHS",
+    "SETUP",
+    "Pokes",
+    "compared",
+    "poke_centres",
+    "poke_frames",
+    "reference",
+    "top_points",
+]
 
 SETUP = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3), mass=0.104)
 DEPTHS = (4e-3, 8e-3)
@@ -29,13 +40,16 @@ _FILE = Path(__file__).with_name("reference.npz")
 
 @dataclass(frozen=True, eq=False)
 class Pokes:
-    """Displacement (2, m, 3) [m] of points spread evenly over the top, and force (2,) [N], at the two depths."""
+    """Displacement (2, m, 3) [m] of points spread evenly over the top, and force (2,) [N], at the
+    two depths.
+    """
 
     displacement: FloatArray
     force: FloatArray
 
     def error(self, other: Pokes) -> tuple[FloatArray, FloatArray]:
-        """Relative RMS displacement error (2,) and relative force error (2,) of another solution."""
+        """Relative RMS displacement error (2,) and relative force error (2,) of another
+        solution."""
         miss = np.linalg.norm(other.displacement - self.displacement, axis=(1, 2))
         return miss / np.linalg.norm(self.displacement, axis=(1, 2)), other.force / self.force - 1
 
@@ -53,16 +67,23 @@ def poke_frames(grid: Meshing, setup: Setup = SETUP) -> list[Equilibrium]:
 
 
 def top_points() -> FloatArray:
-    """Rest positions (m, 3) [m] of the points spread over the top, at which displacements are compared."""
+    """Rest positions (m, 3) [m] of the points spread over the top, at which displacements are
+    compared.
+    """
     x, y, z = SETUP.box.size
-    across = np.meshgrid(np.linspace(-x / 2, x / 2, 49), np.linspace(-y / 2, y / 2, 29), indexing="ij")
+    across = np.meshgrid(
+        np.linspace(-x / 2, x / 2, 49), np.linspace(-y / 2, y / 2, 29), indexing="ij"
+    )
     return np.stack([across[0].ravel(), across[1].ravel(), np.full(across[0].size, z)], axis=1)
 
 
 def compared(frames: Sequence[Equilibrium]) -> Pokes:
     """What grids are compared by in the two equilibria."""
     points = top_points()
-    return Pokes(np.stack([frame.move(points) - points for frame in frames]), np.array([frame.force[2] for frame in frames]))
+    return Pokes(
+        np.stack([frame.move(points) - points for frame in frames]),
+        np.array([frame.force[2] for frame in frames]),
+    )
 
 
 def reference() -> Pokes:
@@ -73,4 +94,6 @@ def reference() -> Pokes:
 
 if __name__ == "__main__":
     found = compared(poke_frames(FINEST))
-    np.savez_compressed(_FILE, displacement=found.displacement.astype(np.float32), force=found.force)
+    np.savez_compressed(
+        _FILE, displacement=found.displacement.astype(np.float32), force=found.force
+    )

@@ -1,7 +1,7 @@
 """Replays of a minute of palpation, beside what other engines took for the same block.
 
-The problem: 68.7 x 39.3 x 35.8 mm, base held, E 5 kPa, nu 0.45, a frictionless ball of 5 mm driven by position; four pokes
-into the top by 4 to 10 mm, a push from the side and a drag, at 30 Hz.
+The problem: 68.7 x 39.3 x 35.8 mm, base held, E 5 kPa, nu 0.45, a frictionless ball of 5 mm driven
+by position; four pokes into the top by 4 to 10 mm, a push from the side and a drag, at 30 Hz.
 """
 
 from __future__ import annotations
@@ -13,31 +13,39 @@ from rich.table import Table
 
 from benchmarks.reference import SETUP, compared, poke_frames, reference
 from benchmarks.stopwatch import timed
-from core.accuracy import mesh_errors
-from core.frames import FloatArray
-from core.grading import PAGE_GRID, REPLAY_GRID
-from core.mesh import GridSpec
-from core.meshing import Meshing
-from core.replay import Equilibrium, replay, require_converged
-from core.setup import Material, Relaxation
+from palpate.foundation.arrays import FloatArray
+from palpate.mesh.box_mesh import GridSpec
+from palpate.mesh.graded_mesh import PAGE_GRID, REPLAY_GRID
+from palpate.mesh.protocol import Meshing
+from palpate.replay.mesh_convergence import mesh_errors
+from palpate.replay.replay import Equilibrium, replay, require_converged
+from palpate.setup.setup import Material, Relaxation
 
 __all__ = ["run"]
 
 RATE = 30.0
 OTHERS = {
     "SOFA 26.06, corotational tetrahedra, 200 steps a frame": ("8.5", "52", "-", "-"),
-    "SOFA 26.06, best found (preconditioned CG, 4 steps)": ("0.10", "2.8", "-", "inverts on 25x9x9"),
+    "SOFA 26.06, best found (preconditioned CG, 4 steps)": (
+        "0.10",
+        "2.8",
+        "-",
+        "inverts on 25x9x9",
+    ),
     "MuJoCo 4 flex": ("0.63 - 0.94", "6.9", "44 / 27 %", "52 % / -"),
     "Newton 1.8 VBD": ("2.8", "11", "20 / 13 %", "tool slips in"),
     "linear tetrahedra, full Newton": ("0.19", "2.5", "72 / 44 %", "76 / 47 %"),
 }
-"""CPU seconds per simulated second on 13x5x5 and 25x9x9 nodes, one thread, and the error of the top's displacement at 4 and 8 mm on
-both, measured once on the same problem; ratios of times below 1.5 mean nothing."""
+"""CPU seconds per simulated second on 13x5x5 and 25x9x9 nodes, one thread, and the error of the
+top's displacement at 4 and 8 mm on both, measured once on the same problem; ratios of times below
+1.5 mean nothing."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """One grid, the seconds of the motion it replays, and the errors that it may have at 4 and 8 mm [1]."""
+    """One grid, the seconds of the motion it replays, and the errors that it may have at 4 and 8 mm
+    [1].
+    """
 
     name: str
     grid: Meshing
@@ -56,35 +64,76 @@ REMEMBERING = {
 CASES = (
     Case("13x5x5", GridSpec(nodes=(13, 5, 5)), 0.0, 60.0, (0.33, 0.43)),
     Case("25x9x9", GridSpec(nodes=(25, 9, 9)), 2.0, 6.0, (0.29, 0.33)),
-    Case("15x11x9, 1.2 mm at tool", GridSpec(nodes=(15, 11, 9), spacing=1.2e-3), 2.0, 6.0, (0.11, 0.12)),
+    Case(
+        "15x11x9, 1.2 mm at tool",
+        GridSpec(nodes=(15, 11, 9), spacing=1.2e-3),
+        2.0,
+        6.0,
+        (0.11, 0.12),
+    ),
     Case("graded by size", REPLAY_GRID, 2.0, 6.0, (0.05, 0.08)),
     Case("graded by size, page", PAGE_GRID, 2.0, 6.0, (0.12, 0.1)),
-    Case("17x13x9, 1.2 mm at tool, quadratic", GridSpec(nodes=(17, 13, 9), spacing=1.2e-3, order=2), 2.0, 6.0, (0.05, 0.08)),
+    Case(
+        "17x13x9, 1.2 mm at tool, quadratic",
+        GridSpec(nodes=(17, 13, 9), spacing=1.2e-3, order=2),
+        2.0,
+        6.0,
+        (0.05, 0.08),
+    ),
 )
 
 
 def motion() -> FloatArray:
-    """Tool centres (1800, 3) [m] of a minute: four pokes, a side push and a drag, ten seconds each, eight in touch."""
-    top, reach = SETUP.geometry.size[2] + SETUP.tool.radius, SETUP.geometry.size[0] / 2 + SETUP.tool.radius
+    """Tool centres (1800, 3) [m] of a minute: four pokes, a side push and a drag, ten seconds each,
+    eight in touch.
+    """
+    top, reach = (
+        SETUP.geometry.size[2] + SETUP.tool.radius,
+        SETUP.geometry.size[0] / 2 + SETUP.tool.radius,
+    )
     keys: list[tuple[float, float, float, float]] = []
-    for number, (x, y, depth) in enumerate(((0.0, 0.0, 4e-3), (0.012, 5e-3, 6e-3), (-0.012, -4e-3, 8e-3), (5e-3, -2e-3, 10e-3))):
+    for number, (x, y, depth) in enumerate(
+        ((0.0, 0.0, 4e-3), (0.012, 5e-3, 6e-3), (-0.012, -4e-3, 8e-3), (5e-3, -2e-3, 10e-3))
+    ):
         begin = 10.0 * number
-        keys += [(begin + 0.5, x, y, top + 3e-3), (begin + 1, x, y, top), (begin + 5, x, y, top - depth), (begin + 9, x, y, top)]
+        keys += [
+            (begin + 0.5, x, y, top + 3e-3),
+            (begin + 1, x, y, top),
+            (begin + 5, x, y, top - depth),
+            (begin + 9, x, y, top),
+        ]
         keys += [(begin + 9.5, x, y, top + 3e-3)]
-    keys += [(40.2, 5e-3, -2e-3, 0.055), (40.5, reach + 8e-3, 0.0, 0.055), (40.8, reach + 8e-3, 0.0, 0.02), (41, reach, 0.0, 0.02)]
+    keys += [
+        (40.2, 5e-3, -2e-3, 0.055),
+        (40.5, reach + 8e-3, 0.0, 0.055),
+        (40.8, reach + 8e-3, 0.0, 0.02),
+        (41, reach, 0.0, 0.02),
+    ]
     keys += [(45, reach - 6e-3, 0.0, 0.02), (49, reach, 0.0, 0.02), (49.5, reach + 8e-3, 0.0, 0.02)]
-    keys += [(50, reach + 8e-3, 0.0, 0.055), (50.5, -0.02, 5e-3, 0.055), (51, -0.02, 5e-3, top), (52, -0.02, 5e-3, top - 3e-3)]
+    keys += [
+        (50, reach + 8e-3, 0.0, 0.055),
+        (50.5, -0.02, 5e-3, 0.055),
+        (51, -0.02, 5e-3, top),
+        (52, -0.02, 5e-3, top - 3e-3),
+    ]
     keys += [(58, 0.02, 5e-3, top - 3e-3), (59, 0.02, 5e-3, top), (60, 0.02, 5e-3, top + 6e-3)]
     table = np.array(keys)
-    return np.stack([np.interp(np.arange(1800) / RATE, table[:, 0], table[:, axis]) for axis in (1, 2, 3)], axis=1)
+    return np.stack(
+        [np.interp(np.arange(1800) / RATE, table[:, 0], table[:, axis]) for axis in (1, 2, 3)],
+        axis=1,
+    )
 
 
 def _errors(case: Case) -> tuple[FloatArray, FloatArray, float]:
-    """Errors of displacement and force (2,) each at 4 and 8 mm, and what a finer grid says of the former at 8 mm; warms up, too."""
+    """Errors of displacement and force (2,) each at 4 and 8 mm, and what a finer grid says of the
+    former at 8 mm; warms up, too.
+    """
     frames = poke_frames(case.grid)
     displacement, force = reference().error(compared(frames))
     if (displacement > case.errors).any():
-        raise RuntimeError(f"{case.name}: off by {displacement[0]:.1%} and {displacement[1]:.1%} at 4 and 8 mm")
+        raise RuntimeError(
+            f"{case.name}: off by {displacement[0]:.1%} and {displacement[1]:.1%} at 4 and 8 mm"
+        )
     (estimate,) = mesh_errors(SETUP, frames[1:], case.grid)
     return displacement, force, estimate.relative
 
@@ -99,7 +148,9 @@ def _measure(case: Case) -> tuple[list[Equilibrium], float]:
 def _remembered(material: Material) -> tuple[list[Equilibrium], float]:
     """The first 20 s of the motion on the first grid, with this material."""
     centres, setup = motion()[: round(20 * RATE)], replace(SETUP, material=material)
-    frames, seconds = timed(lambda: replay(setup, centres, CASES[0].grid, times=np.arange(len(centres)) / RATE))
+    frames, seconds = timed(
+        lambda: replay(setup, centres, CASES[0].grid, times=np.arange(len(centres)) / RATE)
+    )
     require_converged(frames)
     return frames, seconds
 
@@ -107,7 +158,17 @@ def _remembered(material: Material) -> tuple[list[Equilibrium], float]:
 def run() -> list[Table]:
     """Replay each case, check it, and tabulate errors and CPU seconds per simulated second."""
     title = "Replay, one thread; errors against a converged solution at 4 / 8 mm"
-    heads = ("grid", "frames", "in contact", "steps", "ms a frame", "CPU s per s", "top off by", "estimated", "force off by")
+    heads = (
+        "grid",
+        "frames",
+        "in contact",
+        "steps",
+        "ms a frame",
+        "CPU s per s",
+        "top off by",
+        "estimated",
+        "force off by",
+    )
     table = Table(*heads, title=title)
     for case in CASES:
         displacement, force, estimate = _errors(case)
@@ -116,17 +177,39 @@ def run() -> list[Table]:
         steps = sum(frame.iterations for frame in frames) / max(touched, 1)
         each, ratio = 1e3 * seconds / len(frames), seconds / (len(frames) / RATE)
         table.add_row(
-            case.name, str(len(frames)), str(touched), f"{steps:.1f}", f"{each:.1f}", f"{ratio:.3f}",
-            f"{displacement[0]:.1%} / {displacement[1]:.1%}", f"{estimate:.1%}", f"{force[0]:.1%} / {force[1]:.1%}",
-        )  # fmt: skip
+            case.name,
+            str(len(frames)),
+            str(touched),
+            f"{steps:.1f}",
+            f"{each:.1f}",
+            f"{ratio:.3f}",
+            f"{displacement[0]:.1%} / {displacement[1]:.1%}",
+            f"{estimate:.1%}",
+            f"{force[0]:.1%} / {force[1]:.1%}",
+        )
     for name, material in REMEMBERING.items():
         frames, seconds = _remembered(material)
         touched = sum(frame.in_contact for frame in frames)
-        steps, each = sum(frame.iterations for frame in frames) / touched, 1e3 * seconds / len(frames)
+        steps, each = (
+            sum(frame.iterations for frame in frames) / touched,
+            1e3 * seconds / len(frames),
+        )
         ratio = seconds / (len(frames) / RATE)
-        table.add_row(name, str(len(frames)), str(touched), f"{steps:.1f}", f"{each:.1f}", f"{ratio:.3f}", "-", "-", "-")
+        table.add_row(
+            name,
+            str(len(frames)),
+            str(touched),
+            f"{steps:.1f}",
+            f"{each:.1f}",
+            f"{ratio:.3f}",
+            "-",
+            "-",
+            "-",
+        )
     title = "Other engines, measured earlier on 13x5x5 / 25x9x9 nodes"
-    others = Table("engine", "CPU s per s, 13x5x5", "25x9x9", "top off at 4 mm", "at 8 mm", title=title)
+    others = Table(
+        "engine", "CPU s per s, 13x5x5", "25x9x9", "top off at 4 mm", "at 8 mm", title=title
+    )
     for name, figures in OTHERS.items():
         others.add_row(name, *figures)
     return [table, others]

@@ -1,6 +1,8 @@
-"""Scrubbing: from a position sent by a page until the arrays of that frame have arrived where its browser is.
+"""Scrubbing: from a position sent by a page until the arrays of that frame have arrived where its
+browser is.
 
-A server of its own is asked over its one port, by clients that speak as page and viewer do, but draw nothing.
+A server of its own is asked over its one port, by clients that speak as page and viewer do, but
+draw nothing.
 """
 
 from __future__ import annotations
@@ -30,11 +32,19 @@ POSITIONS, CLIENTS, EACH, THINKING = 150, 10, 25, 0.1
 FEW, MANY, GROWN = 500, 5000, 1.05
 """Frames after which the server's memory is compared, and how much more it may hold [1]."""
 VIEWER = "viser-v1.1.1"
-VIEW = {"run": RUN, "sequence": SEQUENCE, "layers": ["measured", "raw", "tool"], "colour": "raw", "crop": False}
+VIEW = {
+    "run": RUN,
+    "sequence": SEQUENCE,
+    "layers": ["measured", "raw", "tool"],
+    "colour": "raw",
+    "crop": False,
+}
 
 
 def run() -> list[Table]:
-    """Latency of one client and of ten, and memory; RuntimeError where an array is not its frame's, or memory grows."""
+    """Latency of one client and of ten, and memory; RuntimeError where an array is not its frame's,
+    or memory grows.
+    """
     with tempfile.TemporaryDirectory() as folder:
         write_place(Path(folder), FRAMES, POINTS, NODES)
         with _server(Path(folder)) as (address, process):
@@ -45,17 +55,25 @@ def run() -> list[Table]:
             asyncio.run(_one(address, MANY - FEW, check=False))
             after = _memory(process.pid)
     table = Table(
-        "", "positions", "median, ms", "95 %, ms", "most, ms",
+        "",
+        "positions",
+        "median, ms",
+        "95 %, ms",
+        "most, ms",
         title=f"scrubbing: {POINTS} points and {'x'.join(map(str, NODES))} nodes, from event to arrays",
-    )  # fmt: skip
+    )
     for name, took in (("1 client", one), (f"{CLIENTS} clients at once", ten)):
-        spans = [f"{1e3 * value:.0f}" for value in (np.median(took), np.quantile(took, 0.95), took.max())]
+        spans = [
+            f"{1e3 * value:.0f}" for value in (np.median(took), np.quantile(took, 0.95), took.max())
+        ]
         table.add_row(name, str(len(took)), *spans)
     memory = Table("frames", "memory of the server, MB", title="memory")
     memory.add_row(str(FEW), f"{before:.0f}")
     memory.add_row(str(MANY), f"{after:.0f}")
     if after > GROWN * before:
-        raise RuntimeError(f"the server holds {after:.0f} MB after {MANY} frames, {before:.0f} after {FEW}")
+        raise RuntimeError(
+            f"the server holds {after:.0f} MB after {MANY} frames, {before:.0f} after {FEW}"
+        )
     return [table, memory]
 
 
@@ -64,9 +82,11 @@ def _server(folder: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     """A server on a free port, and where it is."""
     folders = ["--runs", str(folder / "runs"), "--datasets", str(folder / "datasets")]
     process = subprocess.Popen(
-        [sys.executable, "-m", "app.cli", "serve", "--port", "0", *folders], stdout=subprocess.PIPE, text=True,
+        [sys.executable, "-m", "palpate.app.cli", "serve", "--port", "0", *folders],
+        stdout=subprocess.PIPE,
+        text=True,
         env={**os.environ, "COLUMNS": "200"},
-    )  # fmt: skip
+    )
     try:
         assert process.stdout is not None
         said = process.stdout.readline()
@@ -81,11 +101,15 @@ def _server(folder: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
 class _Client:
     """A page and its viewer."""
 
-    def __init__(self, page: websockets.ClientConnection, viewer: websockets.ClientConnection) -> None:
+    def __init__(
+        self, page: websockets.ClientConnection, viewer: websockets.ClientConnection
+    ) -> None:
         self._page, self._viewer = page, viewer
 
     async def show(self, frame: int, check: bool = True) -> float:
-        """Seconds from the event until the arrays of this frame are there; all points of its cloud are looked for."""
+        """Seconds from the event until the arrays of this frame are there; all points of its cloud
+        are looked for.
+        """
         wanted = _drawn(frame) if check else _drawn(frame)[:30]
         begin = time.perf_counter()
         await self._page.send(json.dumps({**VIEW, "frame": frame}))
@@ -101,9 +125,13 @@ class _Client:
 
 
 def _drawn(frame: int) -> np.ndarray[tuple[int, int], np.dtype[np.float32]]:
-    """The points of a frame as the viewer is to get them (n, 3) [m], phantom frame; the same arithmetic as the server's."""
+    """The points of a frame as the viewer is to get them (n, 3) [m], phantom frame; the same
+    arithmetic as the server's.
+    """
     if frame not in _KNOWN:
-        _KNOWN[frame] = (cloud(frame, POINTS).astype(float) @ CAMERA[:3, :3].T + CAMERA[:3, 3]).astype(np.float32)
+        _KNOWN[frame] = (
+            cloud(frame, POINTS).astype(float) @ CAMERA[:3, :3].T + CAMERA[:3, 3]
+        ).astype(np.float32)
     return _KNOWN[frame]
 
 
@@ -112,13 +140,20 @@ _KNOWN: dict[int, np.ndarray[tuple[int, int], np.dtype[np.float32]]] = {}
 
 @asynccontextmanager
 async def _client(address: str, name: str) -> AsyncIterator[_Client]:
-    import msgspec  # noqa: PLC0415 (comes with the viewer)
+    import msgspec
 
-    pose = {"wxyz": [1.0, 0, 0, 0], "position": [0.1, -0.1, 0.2], "look_at": [0, 0, 0], "up_direction": [0, 0, 1]}
+    pose = {
+        "wxyz": [1.0, 0, 0, 0],
+        "position": [0.1, -0.1, 0.2],
+        "look_at": [0, 0, 0],
+        "up_direction": [0, 0, 1],
+    }
     lens = {"fov": 0.6, "near": 0.001, "far": 100.0, "image_height": 555, "image_width": 784}
     options = {"max_size": None, "compression": None, "proxy": None}
     async with (
-        websockets.connect(f"ws://{address}/viser/{name}", subprotocols=[VIEWER], **options) as viewer,  # type: ignore[arg-type, list-item]
+        websockets.connect(
+            f"ws://{address}/viser/{name}", subprotocols=[VIEWER], **options
+        ) as viewer,  # type: ignore[arg-type, list-item]
         websockets.connect(f"ws://{address}/api/sessions/{name}/socket", **options) as page,  # type: ignore[arg-type]
     ):
         await viewer.send(msgspec.msgpack.encode({"type": "ViewerCameraMessage", **pose, **lens}))
@@ -126,7 +161,9 @@ async def _client(address: str, name: str) -> AsyncIterator[_Client]:
         yield _Client(page, viewer)
 
 
-async def _one(address: str, positions: int, check: bool = True) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+async def _one(
+    address: str, positions: int, check: bool = True
+) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """One position after the other, never the same twice in a row."""
     order = np.cumsum(np.random.default_rng(positions).integers(1, FRAMES, positions + 1)) % FRAMES
     async with _client(address, "page-alone") as client:

@@ -1,4 +1,5 @@
-"""Points of a sweep over REST, by two processes and by a dask cluster of two workers, against a plain loop in one process.
+"""Points of a sweep over REST, by two processes and by a dask cluster of two workers, against a
+plain loop in one process.
 
 python -m benchmarks.service [POINTS]
 """
@@ -21,15 +22,15 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from app.client import Client
-from core.dataset import open_dataset
-from core.frames import FloatArray
-from core.grading import REPLAY_GRID
-from core.sweeping import Axis, Request, Space
-from core.sweeping.measure import error_of, measure
-from core.sweeping.methods import batches
-from core.sweeping.watched import watch
-from core.synthetic import HiddenEffect, Scenario, make_dataset
+from palpate.app.client import Client
+from palpate.dataset import open_dataset
+from palpate.foundation.arrays import FloatArray
+from palpate.mesh.graded_mesh import REPLAY_GRID
+from palpate.sweep import Axis, Request, Space
+from palpate.sweep.samplers import batches
+from palpate.sweep.sweep_data import watch
+from palpate.sweep.sweep_error import error_of, measure
+from palpate.synthetic import HiddenEffect, Scenario, make_dataset
 
 __all__ = ["run"]
 
@@ -41,35 +42,53 @@ QUIET = {
     "distributed.admin.system-monitor.interval": "5s",
     "distributed.worker.memory.monitor-interval": "2s",
 }
-"""What a worker does beside its work, seldom: by default it looks at itself 160 times a second, and the solve waits each time."""
+"""What a worker does beside its work, seldom: by default it looks at itself 160 times a second, and
+the solve waits each time."""
 SAME = 1e-9
-"""Errors [m] that differ by less are the same: a registration's last digits differ from process to process."""
+"""Errors [m] that differ by less are the same: a registration's last digits differ from process to
+process."""
 
 
 def run(points: int = POINTS) -> list[Table]:
-    """Seconds and points a minute of all three; RuntimeError where an error of a point differs between them."""
+    """Seconds and points a minute of all three; RuntimeError where an error of a point differs
+    between them.
+    """
     with tempfile.TemporaryDirectory() as place:
         home = Path(place)
         hidden = HiddenEffect("tool_radius", {"radius": 6e-3})
-        make_dataset(home / "datasets" / "phantom", Scenario(effects=(hidden,), sequences=("poke-top-01",)), 3)
+        make_dataset(
+            home / "datasets" / "phantom",
+            Scenario(effects=(hidden,), sequences=("poke-top-01",)),
+            3,
+        )
         load = os.getloadavg()[0]
-        # As patient as a job's processes are, so that other work on the machine takes as much from both.
+        # As patient as a job's processes are, so that other work on the machine takes as much from
+        # both.
         with ProcessPoolExecutor(1, get_context("spawn"), os.nice, (5,)) as pool:
             pool.submit(os.getpid).result()
             alone, plain = pool.submit(_loop, home, points).result()
         rows = [("plain loop, one process", alone, plain)]
         with _served(home / "a", home, {}) as palpate:
             rows.append(("over REST, two processes", *_swept(palpate, points)))
-        with _cluster() as address, _served(home / "b", home, {"PALPATE_SCHEDULER": address}) as palpate:
+        with (
+            _cluster() as address,
+            _served(home / "b", home, {"PALPATE_SCHEDULER": address}) as palpate,
+        ):
             rows.append(("over REST, dask of two workers", *_swept(palpate, points)))
     table = Table(
-        "how", "s", "points a minute", "times the loop", title=f"{points} points of a sweep; load {load:.1f} at the start"
+        "how",
+        "s",
+        "points a minute",
+        "times the loop",
+        title=f"{points} points of a sweep; load {load:.1f} at the start",
     )
     for name, seconds, errors in rows:
         apart = float(np.abs(errors - plain).max())
         if not apart < SAME:
             raise RuntimeError(f"{name}: errors differ by {apart:g} m from those of the loop")
-        table.add_row(name, f"{seconds:.1f}", f"{60 * points / seconds:.0f}", f"{alone / seconds:.2f}")
+        table.add_row(
+            name, f"{seconds:.1f}", f"{60 * points / seconds:.0f}", f"{alone / seconds:.2f}"
+        )
     return [table]
 
 
@@ -91,15 +110,31 @@ def _swept(palpate: Client, points: int) -> tuple[float, FloatArray]:
     job = palpate.sweep("phantom", {"tool_radius.radius": (LOW, HIGH)}, steps=points, frames=FRAMES)
     palpate.wait(job["id"])
     seconds = time.monotonic() - began
-    found = sorted((row for row in palpate.points(job["id"]) if row["kind"] == "search"), key=lambda row: int(row["number"]))
+    found = sorted(
+        (row for row in palpate.points(job["id"]) if row["kind"] == "search"),
+        key=lambda row: int(row["number"]),
+    )
     return seconds, np.array([row["error"] for row in found], dtype=float)
 
 
 @contextmanager
 def _served(runs: Path, home: Path, further: dict[str, str]) -> Iterator[Client]:
-    command = [sys.executable, "-m", "app.cli", "serve", "--port", "0", "--workers", str(WORKERS), "--runs", str(runs)]
+    command = [
+        sys.executable,
+        "-m",
+        "palpate.app.cli",
+        "serve",
+        "--port",
+        "0",
+        "--workers",
+        str(WORKERS),
+        "--runs",
+        str(runs),
+    ]
     command += ["--datasets", str(home / "datasets")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "COLUMNS": "200", **further}) as server:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, env={**os.environ, "COLUMNS": "200", **further}
+    ) as server:
         assert server.stdout is not None
         address = re.search(r"http://[\d.:]+", server.stdout.readline())
         try:
@@ -113,10 +148,13 @@ def _served(runs: Path, home: Path, further: dict[str, str]) -> Iterator[Client]
 
 @contextmanager
 def _cluster() -> Iterator[str]:
-    import dask.config  # noqa: PLC0415 (optional)
-    from distributed import LocalCluster  # noqa: PLC0415 (optional)
+    import dask.config
+    from distributed import LocalCluster
 
-    with dask.config.set(QUIET), LocalCluster(n_workers=WORKERS, threads_per_worker=1, dashboard_address=None) as cluster:  # type: ignore[no-untyped-call]
+    with (
+        dask.config.set(QUIET),
+        LocalCluster(n_workers=WORKERS, threads_per_worker=1, dashboard_address=None) as cluster,
+    ):  # type: ignore[no-untyped-call]
         yield str(cluster.scheduler_address)
 
 

@@ -1,4 +1,6 @@
-"""The block of the reference given as a closed surface: quadratic tetrahedra beside quadratic hexahedra, error and time."""
+"""The block of the reference given as a closed surface: quadratic tetrahedra beside quadratic
+hexahedra, error and time.
+"""
 
 from __future__ import annotations
 
@@ -11,35 +13,46 @@ from rich.table import Table
 from benchmarks.reference import SETUP, compared, poke_centres, poke_frames, reference
 from benchmarks.replay import RATE, motion
 from benchmarks.stopwatch import timed
-from core.mesh import GridSpec
-from core.meshing import Meshing
-from core.replay import replay, require_converged
-from core.setup import Setup, Shape
-from core.shape.filling import TetSpec
+from palpate.mesh.box_mesh import GridSpec
+from palpate.mesh.gmsh_fill import TetSpec
+from palpate.mesh.protocol import Meshing
+from palpate.replay.replay import replay, require_converged
+from palpate.setup.setup import Setup, Shape
 
 __all__ = ["run"]
 
 START, STOP = 2.0, 6.0
-"""Seconds of the minute's motion that are replayed, in steps of a thirtieth: most of a poke by 4 mm."""
+"""Seconds of the minute's motion that are replayed, in steps of a thirtieth: most of a poke by 4
+mm."""
 
 
 def surface() -> Shape:
     """The block's twelve triangles."""
     low, high = SETUP.box.low, SETUP.box.high
-    vertices = np.array([np.where(np.array(list(f"{number:03b}")) == "1", high, low) for number in range(8)])
+    vertices = np.array(
+        [np.where(np.array(list(f"{number:03b}")) == "1", high, low) for number in range(8)]
+    )
     quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
     return Shape(
-        vertices, np.array([[quad[k] for k in corners] for quad in quads for corners in ((0, 1, 2), (0, 2, 3))]), name="block"
+        vertices,
+        np.array(
+            [[quad[k] for k in corners] for quad in quads for corners in ((0, 1, 2), (0, 2, 3))]
+        ),
+        name="block",
     )
 
 
 def _tets(spacing: float, coarsest: float) -> TetSpec:
-    return TetSpec.along(poke_centres(), SETUP.tool.radius, spacing=spacing, growth=0.5, coarsest=coarsest)
+    return TetSpec.along(
+        poke_centres(), SETUP.tool.radius, spacing=spacing, growth=0.5, coarsest=coarsest
+    )
 
 
 @dataclass(frozen=True)
 class Case:
-    """One mesh and the errors that it may have at 4 and 8 mm: of the top's displacement and of the force [1]."""
+    """One mesh and the errors that it may have at 4 and 8 mm: of the top's displacement and of the
+    force [1].
+    """
 
     name: str
     setup: Setup
@@ -50,8 +63,20 @@ class Case:
 
 SHAPE = replace(SETUP, geometry=surface())
 CASES = (
-    Case("hexahedra, 13x9x9, 1.5 mm", SETUP, GridSpec(nodes=(13, 9, 9), spacing=1.5e-3, order=2), (0.11, 0.1), (0.03, 0.03)),
-    Case("hexahedra, 17x13x9, 1.2 mm", SETUP, GridSpec(nodes=(17, 13, 9), spacing=1.2e-3, order=2), (0.05, 0.08), (0.03, 0.03)),
+    Case(
+        "hexahedra, 13x9x9, 1.5 mm",
+        SETUP,
+        GridSpec(nodes=(13, 9, 9), spacing=1.5e-3, order=2),
+        (0.11, 0.1),
+        (0.03, 0.03),
+    ),
+    Case(
+        "hexahedra, 17x13x9, 1.2 mm",
+        SETUP,
+        GridSpec(nodes=(17, 13, 9), spacing=1.2e-3, order=2),
+        (0.05, 0.08),
+        (0.03, 0.03),
+    ),
     Case("tetrahedra, 2 mm", SHAPE, _tets(2e-3, 6e-3), (0.09, 0.12), (0.04, 0.08)),
     Case("tetrahedra, 1.5 mm", SHAPE, _tets(1.5e-3, 5e-3), (0.065, 0.07), (0.01, 0.03)),
     Case("tetrahedra, 1.2 mm", SHAPE, _tets(1.2e-3, 5e-3), (0.04, 0.045), (0.01, 0.02)),
@@ -59,21 +84,39 @@ CASES = (
 
 
 def run() -> list[Table]:
-    """Solve the reference's pokes and replay four seconds on each mesh; errors beyond a case's own are wrong."""
-    heads = ("elements, spacing at the tool", "unknowns", "top off by", "force off by", "ms a frame", "CPU s per s")
-    table = Table(*heads, title="A block given as a surface, one thread; errors against a converged solution at 4 / 8 mm")
+    """Solve the reference's pokes and replay four seconds on each mesh; errors beyond a case's own
+    are wrong.
+    """
+    heads = (
+        "elements, spacing at the tool",
+        "unknowns",
+        "top off by",
+        "force off by",
+        "ms a frame",
+        "CPU s per s",
+    )
+    table = Table(
+        *heads,
+        title="A block given as a surface, one thread; errors against a converged solution at 4 / 8 mm",
+    )
     centres = motion()[round(START * RATE) : round(STOP * RATE)]
     for case in CASES:
         frames = poke_frames(case.mesh, case.setup)
         displacement, force = reference().error(compared(frames))
         if (displacement > case.top).any() or (np.abs(force) > case.force).any():
             found = ", ".join(f"{value:.1%}" for value in (*displacement, *force))
-            raise RuntimeError(f"{case.name}: displacement at 4 and 8 mm and force are off by {found}")
+            raise RuntimeError(
+                f"{case.name}: displacement at 4 and 8 mm and force are off by {found}"
+            )
         followed, seconds = timed(partial(replay, case.setup, centres, case.mesh))
         require_converged(followed)
         shared = frames[0].mesh.connectivity
         table.add_row(
-            case.name, str(3 * (shared.count - len(shared.base_nodes))), f"{displacement[0]:.1%} / {displacement[1]:.1%}",
-            f"{force[0]:.1%} / {force[1]:.1%}", f"{1e3 * seconds / len(centres):.1f}", f"{seconds / (STOP - START):.2f}",
-        )  # fmt: skip
+            case.name,
+            str(3 * (shared.count - len(shared.base_nodes))),
+            f"{displacement[0]:.1%} / {displacement[1]:.1%}",
+            f"{force[0]:.1%} / {force[1]:.1%}",
+            f"{1e3 * seconds / len(centres):.1f}",
+            f"{seconds / (STOP - START):.2f}",
+        )
     return [table]

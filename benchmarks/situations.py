@@ -1,8 +1,10 @@
-"""Random situations that a replay must survive: `python -m benchmarks.situations [COUNT] [SEED] [--workers N] [--by-size SHARE]`.
+"""Random situations that a replay must survive: `python -m benchmarks.situations [COUNT] [SEED]
+[--workers N] [--by-size SHARE]`.
 
-Materials up to nu = 0.49, neo-Hooke and Gent, two effects at a time, pokes into the top and the sides and over the rim by up to
-40 % of the height, jumps of up to 5 mm between frames. No frame may end with an exception, a NaN, an inverted element that is
-called converged, or a surface point inside the tool; frames without equilibrium are counted by what they say.
+Materials up to nu = 0.49, neo-Hooke and Gent, two effects at a time, pokes into the top and the
+sides and over the rim by up to 40 % of the height, jumps of up to 5 mm between frames. No frame may
+end with an exception, a NaN, an inverted element that is called converged, or a surface point
+inside the tool; frames without equilibrium are counted by what they say.
 """
 
 from __future__ import annotations
@@ -21,33 +23,41 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from core.effects import CATALOGUE, Effect, Slot
-from core.fem.model import Probe
-from core.fem.newton import Outcome
-from core.frames import FloatArray
-from core.grading import Grading
-from core.mesh import GridSpec
-from core.meshing import Meshing
-from core.replay import Equilibrium, Replay, replay
-from core.setup import Box, Material, Setup, Tool
+from palpate.effects import CATALOGUE, Effect, Slot
+from palpate.fem.model import Probe
+from palpate.fem.newton import Outcome
+from palpate.foundation.arrays import FloatArray
+from palpate.mesh.box_mesh import GridSpec
+from palpate.mesh.graded_mesh import Grading
+from palpate.mesh.protocol import Meshing
+from palpate.replay.replay import Equilibrium, Replay, replay
+from palpate.setup.setup import Box, Material, Setup, Tool
 
 __all__ = ["GRIDS", "Situation", "Trial", "attempt", "draw_situation", "faults"]
 
 SIZE = (0.0687, 0.0393, 0.0358)
-GRIDS = (GridSpec(nodes=(13, 5, 5)), GridSpec(nodes=(9, 7, 6), spacing=2e-3), GridSpec(nodes=(9, 7, 5), spacing=2e-3, order=2))
+GRIDS = (
+    GridSpec(nodes=(13, 5, 5)),
+    GridSpec(nodes=(9, 7, 6), spacing=2e-3),
+    GridSpec(nodes=(9, 7, 5), spacing=2e-3, order=2),
+)
 DEEPEST = 0.4 * SIZE[2]
 LONGEST_JUMP = 5e-3
 BY_SIZE, SIZED = 0.1, Grading(spacing=1.3e-3, along=0.8, inward=1.0, longest=0.35)
-"""Share of the situations whose mesh goes by sizes [1], and those: a little coarser than a diagnosis takes them."""
+"""Share of the situations whose mesh goes by sizes [1], and those: a little coarser than a
+diagnosis takes them."""
 DRAWN = ("geometry_scale", "landmark_mismatch", "young_modulus", "mesh_resolution")
-"""Effects that change what a situation draws anyway: stiffness, the tool's place against the block, and the grid."""
+"""Effects that change what a situation draws anyway: stiffness, the tool's place against the block,
+and the grid."""
 INSIDE = 5e-4
 """Surface points deeper inside the tool than this [m] are a fault."""
 
 
 @dataclass(frozen=True, eq=False)
 class Situation:
-    """A setup, stated tool centres (f, 3) [m] in the phantom frame and their times (f,) [s], and a grid."""
+    """A setup, stated tool centres (f, 3) [m] in the phantom frame and their times (f,) [s], and a
+    grid.
+    """
 
     setup: Setup
     centres: FloatArray
@@ -62,11 +72,18 @@ def _effect(random: np.random.Generator, kind: type[Effect], setup: Setup) -> Ef
     if starts and random.random() < 0.8:
         return starts[int(random.integers(len(starts)))]
     neutral = kind.neutral(setup)
-    return neutral.at([here + random.normal() * item.scale for item, here in zip(kind.numbers(), neutral.coordinates, strict=True)])
+    return neutral.at(
+        [
+            here + random.normal() * item.scale
+            for item, here in zip(kind.numbers(), neutral.coordinates, strict=True)
+        ]
+    )
 
 
 def _way(random: np.random.Generator, radius: float) -> FloatArray:
-    """Into the top or a side at a random place and slant, deeper at each frame, then away by a jump along the surface."""
+    """Into the top or a side at a random place and slant, deeper at each frame, then away by a jump
+    along the surface.
+    """
     half = np.array([SIZE[0] / 2, SIZE[1] / 2])
     axis, sign = int(random.integers(3)), 1.0 if random.random() < 0.5 else -1.0
     outward = np.zeros(3)
@@ -88,15 +105,21 @@ def _way(random: np.random.Generator, radius: float) -> FloatArray:
 
 
 def draw_situation(seed: int, by_size: float = BY_SIZE) -> Situation:
-    """The situation of this seed, where the share `by_size` [1] of all take a mesh whose edges go by size."""
+    """The situation of this seed, where the share `by_size` [1] of all take a mesh whose edges go
+    by size.
+    """
     random = np.random.default_rng(seed)
     radius = float(random.uniform(3.5e-3, 8e-3))
     limit = float(random.uniform(3.0, 50.0)) if random.random() < 0.3 else None
     material = Material(
-        young_modulus=float(10 ** random.uniform(1, 6)), poisson_ratio=float(random.uniform(0.0, 0.49)), stretch_limit=limit
+        young_modulus=float(10 ** random.uniform(1, 6)),
+        poisson_ratio=float(random.uniform(0.0, 0.49)),
+        stretch_limit=limit,
     )
     setup = Setup(geometry=Box(size=SIZE), tool=Tool(radius=radius), material=material, mass=0.104)
-    kinds = [kind for kind in CATALOGUE if kind.enters is not Slot.SENSOR and kind.name not in DRAWN]
+    kinds = [
+        kind for kind in CATALOGUE if kind.enters is not Slot.SENSOR and kind.name not in DRAWN
+    ]
     effects = []
     for index in random.choice(len(kinds), size=2, replace=False):
         effects.append(_effect(random, kinds[int(index)], setup))
@@ -118,10 +141,14 @@ def faults(situation: Situation, frames: list[Equilibrium]) -> list[str]:
             probe = Probe(frame.probe.centre - np.append(frame.slip, 0.0), frame.probe.radius)
             if not np.isfinite(model.energy(positions, probe)):
                 found.append(f"frame {number}: converged with an inverted element")
-            points = np.einsum("qa,fai->fqi", model.face.shapes, positions[model.topology.surface]).reshape(-1, 3)
+            points = np.einsum(
+                "qa,fai->fqi", model.face.shapes, positions[model.topology.surface]
+            ).reshape(-1, 3)
             depth = probe.radius - np.linalg.norm(points - probe.centre, axis=1).min()
             if depth > INSIDE or model.encloses(positions, probe):
-                found.append(f"frame {number}: converged with a surface point {1e3 * depth:.2f} mm inside the tool")
+                found.append(
+                    f"frame {number}: converged with a surface point {1e3 * depth:.2f} mm inside the tool"
+                )
     return found
 
 
@@ -130,7 +157,11 @@ class Trial:
     """How one situation ended.
 
     Attributes:
-        seed: of the situation. label: its effects and grid. outcomes: of its frames. found: faults, in words. cpu: seconds.
+        seed: of the situation.
+        label: its effects and grid.
+        outcomes: of its frames.
+        found: faults, in words.
+        cpu: seconds.
     """
 
     seed: int
@@ -140,7 +171,11 @@ class Trial:
     cpu: float
 
     def __str__(self) -> str:
-        unsolved = [f"{i} {outcome.name}" for i, outcome in enumerate(self.outcomes) if outcome is not Outcome.CONVERGED]
+        unsolved = [
+            f"{i} {outcome.name}"
+            for i, outcome in enumerate(self.outcomes)
+            if outcome is not Outcome.CONVERGED
+        ]
         return f"seed {self.seed} ({self.label}, {self.cpu:.1f} CPU s): {'; '.join([*self.found, *unsolved]) or 'fine'}"
 
 
@@ -157,7 +192,13 @@ def attempt(seed: int, by_size: float = BY_SIZE) -> Trial:
         found = faults(situation, frames)
     except Exception as error:
         frames, found = [], [f"{type(error).__name__}: {error}"]
-    return Trial(seed, label, tuple(frame.outcome for frame in frames), tuple(found), time.process_time() - begin)
+    return Trial(
+        seed,
+        label,
+        tuple(frame.outcome for frame in frames),
+        tuple(found),
+        time.process_time() - begin,
+    )
 
 
 def _attempts(seeds: range, workers: int, by_size: float) -> Iterator[Trial]:
@@ -171,19 +212,25 @@ def _attempts(seeds: range, workers: int, by_size: float) -> Iterator[Trial]:
 
 
 def main(count: int, seed: int, workers: int = 1, by_size: float = BY_SIZE) -> int:
-    """Try `count` situations from `seed` on in so many processes; 1 when one of them shows a fault."""
+    """Try `count` situations from `seed` on in so many processes; 1 when one of them shows a
+    fault."""
     console, outcomes, wrong, cpu = Console(), Counter[Outcome](), 0, 0.0
     for trial in _attempts(range(seed, seed + count), workers, by_size):
         if trial.found or set(trial.outcomes) - {Outcome.CONVERGED}:
             console.print(str(trial), highlight=False, soft_wrap=True)
         outcomes.update(trial.outcomes)
         wrong, cpu = wrong + bool(trial.found), cpu + trial.cpu
-    table = Table("outcome", "frames", title=f"{count} situations from seed {seed}, {cpu / count:.2f} CPU s each")
+    table = Table(
+        "outcome",
+        "frames",
+        title=f"{count} situations from seed {seed}, {cpu / count:.2f} CPU s each",
+    )
     for outcome, frequency in outcomes.most_common():
         table.add_row(outcome.value, str(frequency))
     unsolved = outcomes.total() - outcomes[Outcome.CONVERGED]
     console.print(
-        table, f"{wrong} with a fault; {1000 * unsolved / max(outcomes.total(), 1):.2f} of 1000 frames without equilibrium"
+        table,
+        f"{wrong} with a fault; {1000 * unsolved / max(outcomes.total(), 1):.2f} of 1000 frames without equilibrium",
     )
     return int(wrong > 0)
 
@@ -191,7 +238,11 @@ def main(count: int, seed: int, workers: int = 1, by_size: float = BY_SIZE) -> i
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description="Random situations that a replay must survive.")
     parser.add_argument("count", nargs="?", type=int, default=100, help="how many")
-    parser.add_argument("seed", nargs="?", type=int, default=0, help="of the first; the others follow")
+    parser.add_argument(
+        "seed", nargs="?", type=int, default=0, help="of the first; the others follow"
+    )
     parser.add_argument("--workers", type=int, default=1, help="processes that share them")
-    parser.add_argument("--by-size", type=float, default=BY_SIZE, help="share of them whose mesh's edges go by size")
+    parser.add_argument(
+        "--by-size", type=float, default=BY_SIZE, help="share of them whose mesh's edges go by size"
+    )
     sys.exit(main(**vars(parser.parse_args())))

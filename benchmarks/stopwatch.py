@@ -1,4 +1,6 @@
-"""CPU seconds of this process, which other work on the machine disturbs less than the clock on the wall."""
+"""CPU seconds of this process, which other work on the machine disturbs less than the clock on the
+wall.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Points of a sweep: two processes against a plain loop in one; how many a minute, and whether both say the same.
+"""Points of a sweep: two processes against a plain loop in one; how many a minute, and whether both
+say the same.
 
 python -m benchmarks.sweeps [POINTS]
 """
@@ -13,24 +14,28 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from core.dataset import open_dataset
-from core.grading import SCREEN_GRID
-from core.sweeping import Axis, Request, Space
-from core.sweeping.crew import Processes, outcomes
-from core.sweeping.measure import measure
-from core.sweeping.methods import batches
-from core.sweeping.watched import watch
-from core.synthetic import HiddenEffect, Scenario, make_dataset
+from palpate.dataset import open_dataset
+from palpate.mesh.graded_mesh import SCREEN_GRID
+from palpate.sweep import Axis, Request, Space
+from palpate.sweep.executors import Processes, outcomes
+from palpate.sweep.samplers import batches
+from palpate.sweep.sweep_data import watch
+from palpate.sweep.sweep_error import measure
+from palpate.synthetic import HiddenEffect, Scenario, make_dataset
 
 POINTS, WORKERS = 200, 2
 
 
 def run(points: int) -> tuple[float, float, float]:
-    """Seconds of the loop and of the processes, those that start them counted, and the largest difference of any sum."""
+    """Seconds of the loop and of the processes, those that start them counted, and the largest
+    difference of any sum.
+    """
     space = Space((Axis("tool_radius.radius", 4e-3, 8e-3), Axis("poisson_ratio.nu", 0.3, 0.49)))
     with tempfile.TemporaryDirectory() as folder:
         hidden = HiddenEffect("tool_radius", {"radius": 6e-3})
-        make_dataset(Path(folder) / "phantom", Scenario(effects=(hidden,), sequences=("poke-top-01",)), 3)
+        make_dataset(
+            Path(folder) / "phantom", Scenario(effects=(hidden,), sequences=("poke-top-01",)), 3
+        )
         stated, data = watch(open_dataset(Path(folder) / "phantom"), (), 4)
     grid = SCREEN_GRID.for_tool(stated.tool.radius)
     asked = next(batches(Request(space=space, method="random", points=points)))
@@ -44,7 +49,9 @@ def run(points: int) -> tuple[float, float, float]:
     finally:
         crew.close()
     end = time.monotonic()
-    pairs = [(np.array(one.sums), np.array(spread[number].sums)) for number, one in enumerate(plain)]
+    pairs = [
+        (np.array(one.sums), np.array(spread[number].sums)) for number, one in enumerate(plain)
+    ]
     return middle - began, end - middle, max(float(np.abs(a - b).max()) for a, b in pairs)
 
 

@@ -1,4 +1,6 @@
-"""A Newton step's two dear parts: the stiffness of a diagnosis' mesh under the tool, and its factor."""
+"""A Newton step's two dear parts: the stiffness of a diagnosis' mesh under the tool, and its
+factor.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +14,13 @@ from rich.table import Table
 
 from benchmarks.reference import SETUP
 from benchmarks.stopwatch import timed
-from core.fem.factor import Factor
-from core.fem.linear import SOLVERS, factor_of
-from core.fem.model import BlockModel
-from core.frames import FloatArray
-from core.grading import REPLAY_GRID
-from core.replay import replay
-from core.sensitivity import local_probe
+from palpate.fem.linalg.direct_solver import Factor
+from palpate.fem.linalg.sparsity import SOLVERS, factor_of
+from palpate.fem.model import BlockModel
+from palpate.foundation.arrays import FloatArray
+from palpate.gradients.forward import local_probe
+from palpate.mesh.graded_mesh import REPLAY_GRID
+from palpate.replay.replay import replay
 
 __all__ = ["run"]
 
@@ -26,11 +28,14 @@ ROUNDS, DEPTHS = 10, (1.5e-3, 3e-3, 4.5e-3)
 STEP = 1e-8
 """Of the nodes [m], for the differences of forces that the tangent is compared with."""
 OFF, DIGITS = 1e-5, {True: 1e-4, False: 1e-10}
-"""Largest error of the tangent, and of a solution by a factor of single or double precision, as shares."""
+"""Largest error of the tangent, and of a solution by a factor of single or double precision, as
+shares."""
 
 
 def _pressed() -> tuple[BlockModel, FloatArray, sp.csr_matrix, FloatArray]:
-    """The block under a push: its model, the nodes' positions (n, 3) [m], tangent there, and a load (u,)."""
+    """The block under a push: its model, the nodes' positions (n, 3) [m], tangent there, and a load
+    (u,).
+    """
     top = SETUP.geometry.height + SETUP.tool.radius
     frame = replay(SETUP, np.array([[0.0, 0.0, top - depth] for depth in DEPTHS]), REPLAY_GRID)[-1]
     model, positions = BlockModel(SETUP, frame.mesh), frame.mesh.nodes + frame.displacement
@@ -38,11 +43,17 @@ def _pressed() -> tuple[BlockModel, FloatArray, sp.csr_matrix, FloatArray]:
     upper = sp.csr_matrix((state.data, pattern.indices, pattern.indptr), shape=pattern.shape)
     along = np.random.default_rng(0).standard_normal(pattern.shape[0])
     ways = [_moved(model, positions, sign * STEP * along) for sign in (1, -1)]
-    ahead, behind = (model.assemble(way, local_probe(frame), tangent=False).residual for way in ways)
+    ahead, behind = (
+        model.assemble(way, local_probe(frame), tangent=False).residual for way in ways
+    )
     expected, diagonal = (ahead - behind) / (2 * STEP), sp.diags_array(upper.diagonal())
-    wrong = float(np.linalg.norm((upper + upper.T - diagonal) @ along - expected) / np.linalg.norm(expected))
+    wrong = float(
+        np.linalg.norm((upper + upper.T - diagonal) @ along - expected) / np.linalg.norm(expected)
+    )
     if wrong > OFF:
-        raise RuntimeError(f"the tangent is {wrong:.1g} off the differences of forces, at most {OFF:g} is allowed")
+        raise RuntimeError(
+            f"the tangent is {wrong:.1g} off the differences of forces, at most {OFF:g} is allowed"
+        )
     return model, positions, upper, expected
 
 
@@ -68,20 +79,38 @@ def run() -> list[Table]:
     model, positions, upper, right = _pressed()
     size = f"{upper.shape[0]} unknowns, {len(model.topology.elements)} elements of 27 nodes"
     table = Table("part", "ms", "wrong by", title=f"A Newton step of {size}, one thread")
-    table.add_row("stiffness of the elements", f"{_each(lambda: model.assemble(positions, None)):.1f}", "")
-    table.add_row("forces of the elements", f"{_each(lambda: model.assemble(positions, None, tangent=False)):.1f}", "")
+    table.add_row(
+        "stiffness of the elements", f"{_each(lambda: model.assemble(positions, None)):.1f}", ""
+    )
+    table.add_row(
+        "forces of the elements",
+        f"{_each(lambda: model.assemble(positions, None, tangent=False)):.1f}",
+        "",
+    )
     table.add_section()
     whole, entries = upper + upper.T - sp.diags_array(upper.diagonal()), upper.data.copy()
     for name in SOLVERS:
         for single in (True, False) if name == "pardiso" else (False,):
-            factor = factor_of(sp.csr_matrix((entries.copy(), upper.indices, upper.indptr), shape=upper.shape), name, single=single)
+            factor = factor_of(
+                sp.csr_matrix((entries.copy(), upper.indices, upper.indptr), shape=upper.shape),
+                name,
+                single=single,
+            )
             factor.factorise(entries)
             found = factor.approximate(right)
             wrong = float(np.linalg.norm(found - factor.solve(right)) / np.linalg.norm(found))
-            left = float(np.linalg.norm(whole @ factor.solve(right) - right) / np.linalg.norm(right))
+            left = float(
+                np.linalg.norm(whole @ factor.solve(right) - right) / np.linalg.norm(right)
+            )
             if wrong > DIGITS[single] or left > DIGITS[False]:
-                raise RuntimeError(f"{name}: a step is {wrong:.1g} off, and a solution leaves {left:.1g} of the load")
+                raise RuntimeError(
+                    f"{name}: a step is {wrong:.1g} off, and a solution leaves {left:.1g} of the load"
+                )
             kind = f"{name}, {'single' if single else 'double'} precision"
-            table.add_row(f"factor, {kind}", f"{_each(partial(_anew, factor, count(1), entries)):.1f}", "")
-            table.add_row(f"step, {kind}", f"{_each(partial(factor.approximate, right)):.2f}", f"{wrong:.0e}")
+            table.add_row(
+                f"factor, {kind}", f"{_each(partial(_anew, factor, count(1), entries)):.1f}", ""
+            )
+            table.add_row(
+                f"step, {kind}", f"{_each(partial(factor.approximate, right)):.2f}", f"{wrong:.0e}"
+            )
     return [table]

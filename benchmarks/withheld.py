@@ -1,7 +1,9 @@
-"""Which causes of kept blind suites are withheld because they leave most of what is wrong, by the figures in their rows.
+"""Which causes of kept blind suites are withheld because they leave most of what is wrong, by the
+figures in their rows.
 
-`python -m benchmarks.withheld FILE ...`: of every row whose report names a cause that leaves significant structure, how much of it,
-what share of the reducible error it removes on test sequences, and whether `core.diagnosis.withdrawal` withholds it today.
+`python -m benchmarks.withheld FILE ...`: of every row whose report names a cause that leaves
+significant structure, how much of it, what share of the reducible error it removes on test
+sequences, and whether `palpate.diagnosis.validation.rejection` withholds it today.
 """
 
 from __future__ import annotations
@@ -13,9 +15,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from core.blind.results import Result, read_results
-from core.diagnosis.structure import Structure
-from core.diagnosis.withdrawal import leaves_most
+from palpate.blind.case_results import Result, read_results
+from palpate.diagnosis.inference.residual_structure import Structure
+from palpate.diagnosis.validation.rejection import leaves_most
 
 __all__ = ["run", "structures"]
 
@@ -23,24 +25,33 @@ __all__ = ["run", "structures"]
 def structures(result: Result) -> tuple[Structure, Structure]:
     """Structure over what chance gives, of the stated setup and of what is named."""
     stated, left = result.report["evidence"], result.report["unexplained"]
-    before, after = (Structure(one["structure"], 1.0, one["structure_bound"]) for one in (stated, left))
+    before, after = (
+        Structure(one["structure"], 1.0, one["structure_bound"]) for one in (stated, left)
+    )
     return before, after
 
 
 def run(console: Console, files: Sequence[Path]) -> None:
     """Print one table of all files."""
     rows = [(file, one) for file in files for one in read_results(file) if one.causes]
-    table = Table(title=f"{len(rows)} rows that name a cause; those of them that leave significant structure")
+    table = Table(
+        title=f"{len(rows)} rows that name a cause; those of them that leave significant structure"
+    )
     for name in ("file", "case", "named", "right", "without", "with", "removed", "withheld"):
         table.add_column(name)
     for file, one in rows:
         before, left = structures(one)
         if left.significant:
             table.add_row(
-                file.name, one.name, ", ".join(one.named), "yes" if one.right else "no", f"{before.ratio:.2f}", f"{left.ratio:.2f}",
+                file.name,
+                one.name,
+                ", ".join(one.named),
+                "yes" if one.right else "no",
+                f"{before.ratio:.2f}",
+                f"{left.ratio:.2f}",
                 "–" if one.removed is None else f"{100 * one.removed:.0f} %",
                 "yes" if leaves_most(before, left, one.removed) else "no",
-            )  # fmt: skip
+            )
     console.print(table)
 
 

@@ -8,18 +8,22 @@ import time
 from pathlib import Path
 from typing import Any
 
-from core.blind import Case, Result
-from core.blind.running import code_digest
+from palpate.blind import Case, Result
+from palpate.foundation.source_digest import source_digest
 
 NOTHING: dict[str, Any] = {
-    "verdict": "none", "causes": [], "ranking": [], "not_identifiable": [], "gain": None,
+    "verdict": "none",
+    "causes": [],
+    "ranking": [],
+    "not_identifiable": [],
+    "gain": None,
     "evidence": {"gain_nats": 0.0, "bound_nats": 25.0},
-}  # fmt: skip
+}
 
 
 def finish(case: Case, folder: Path) -> Result:
     """A case in which nothing is found."""
-    return Result(case, report=NOTHING, code=code_digest())
+    return Result(case, report=NOTHING, code=source_digest())
 
 
 def finish_or_die(case: Case, folder: Path) -> Result:
@@ -30,7 +34,9 @@ def finish_or_die(case: Case, folder: Path) -> Result:
 
 
 def finish_or_wait(case: Case, folder: Path) -> Result:
-    """Waits for a minute, if its name says so, and leaves its process number beside the folder; others end once it does."""
+    """Waits for a minute, if its name says so, and leaves its process number beside the folder;
+    others end once it does.
+    """
     note = folder.parent / "waits.pid"
     if "waits" in case.name:
         note.with_suffix(".part").write_text(str(os.getpid()))

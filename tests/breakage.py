@@ -1,4 +1,6 @@
-"""One way to break a dataset, and the edits it is made of: each takes a file and returns a function of the folder."""
+"""One way to break a dataset, and the edits it is made of: each takes a file and returns a function
+of the folder.
+"""
 
 from __future__ import annotations
 
@@ -67,7 +69,9 @@ def replace(file: str, old: str | bytes, new: str | bytes) -> Callable[[Path], o
     return change(file, once)
 
 
-def change_rows(file: str, row: int, by: Callable[[list[str]], list[str]]) -> Callable[[Path], object]:
+def change_rows(
+    file: str, row: int, by: Callable[[list[str]], list[str]]
+) -> Callable[[Path], object]:
     """Change the cells of one row, or with row 0 of all but the header."""
 
     def breaks(folder: Path) -> None:
@@ -81,14 +85,18 @@ def change_rows(file: str, row: int, by: Callable[[list[str]], list[str]]) -> Ca
 
 def set_cell(file: str, row: int, column: int, text: str) -> Callable[[Path], object]:
     """Write another text into one cell, rows as an editor counts them."""
-    return change_rows(file, row, lambda cells: [text if i == column else cell for i, cell in enumerate(cells)])
+    return change_rows(
+        file, row, lambda cells: [text if i == column else cell for i, cell in enumerate(cells)]
+    )
 
 
 def scale_columns(file: str, columns: range, factor: float) -> Callable[[Path], object]:
     """Multiply the numbers of some columns."""
 
     def scaled(cells: list[str]) -> list[str]:
-        return [f"{float(cell) * factor:.9f}" if i in columns else cell for i, cell in enumerate(cells)]
+        return [
+            f"{float(cell) * factor:.9f}" if i in columns else cell for i, cell in enumerate(cells)
+        ]
 
     return change_rows(file, 0, scaled)
 

@@ -12,10 +12,22 @@ import pytest
 
 __all__ = ["CHROMIUM", "FLAGS", "NEEDS_CHROMIUM", "Page"]
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+CHROMIUM = (
+    shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+)
 FLAGS = [
-    *("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"),
-    *("--disable-background-timer-throttling", "--disable-renderer-backgrounding", "--disable-backgrounding-occluded-windows"),
+    *(
+        "--headless=new",
+        "--no-sandbox",
+        "--use-angle=swiftshader",
+        "--enable-unsafe-swiftshader",
+        "--disable-dev-shm-usage",
+    ),
+    *(
+        "--disable-background-timer-throttling",
+        "--disable-renderer-backgrounding",
+        "--disable-backgrounding-occluded-windows",
+    ),
 ]
 NODES = "() => Object.keys((window.__viserMutable || {}).nodeRefFromName || {})"
 VISIBLE = """() => Object.entries(window.__viserMutable.nodeRefFromName).filter(([name, node]) => {
@@ -24,7 +36,9 @@ VISIBLE = """() => Object.entries(window.__viserMutable.nodeRefFromName).filter(
 }).map(([name]) => name)"""
 NEEDS_CHROMIUM = [
     pytest.mark.browser,
-    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine: install the package chromium"),
+    pytest.mark.skipif(
+        CHROMIUM is None, reason="no Chromium on this machine: install the package chromium"
+    ),
 ]
 
 
@@ -35,7 +49,10 @@ class Page:
         self.page, self.client = page, client
         self.trouble: list[str] = []
         page.on("pageerror", lambda error: self.trouble.append(str(error)))
-        page.on("console", lambda message: self.trouble.append(message.text) if message.type == "error" else None)
+        page.on(
+            "console",
+            lambda message: self.trouble.append(message.text) if message.type == "error" else None,
+        )
 
     def until(self, true: Callable[[], bool], seconds: float = 60.0) -> None:
         end = time.monotonic() + seconds
@@ -45,7 +62,12 @@ class Page:
 
     def open(self, path: str = "/") -> None:
         self.page.goto(f"{self.client.base_url}{path.lstrip('/')}")
-        self.until(lambda: self.viewer is not None and any(name.startswith("/mesh/") for name in self.viewer.evaluate(NODES)))
+        self.until(
+            lambda: (
+                self.viewer is not None
+                and any(name.startswith("/mesh/") for name in self.viewer.evaluate(NODES))
+            )
+        )
         self.settled()
 
     @property

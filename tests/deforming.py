@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from core.effects import Effect
-from core.effects.load import Gravity
-from core.effects.material import PoissonRatio, StiffInclusion
-from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
-from core.effects.support import BaseCompliance, BaseDetachment
-from core.effects.tool import ToolCompliance, ToolOffset, ToolRadius
+from palpate.effects import Effect
+from palpate.effects.elastic_material import PoissonRatio, StiffInclusion
+from palpate.effects.heterogeneity import (
+    Anisotropy,
+    StiffnessGradient,
+    StrainStiffening,
+    SurfaceLayer,
+)
+from palpate.effects.load import Gravity
+from palpate.effects.support import BaseCompliance, BaseDetachment
+from palpate.effects.tool import ToolCompliance, ToolOffset, ToolRadius
 
 DEFORMING: dict[str, Effect] = {
     "poisson_ratio": PoissonRatio(nu=0.43),

@@ -9,12 +9,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from core.fem.elastic import Law, assemble_elastic, elastic_energy, lame
-from core.fem.elements import Quadrature, quadrature
-from core.fem.linear import factor_of, upper_pattern
-from core.frames import FloatArray
-from core.mesh import BoxMesh, GridSpec, box_mesh
-from core.meshing import IntArray, Mesh
+from palpate.fem.constitutive.elastic import Law, assemble_elastic, elastic_energy, lame
+from palpate.fem.linalg.sparsity import factor_of, upper_pattern
+from palpate.foundation.arrays import FloatArray, IntArray
+from palpate.mesh.box_mesh import BoxMesh, GridSpec, box_mesh
+from palpate.mesh.elements import Quadrature, quadrature
+from palpate.mesh.protocol import Mesh
 
 __all__ = ["FreeBody", "distorted", "grid", "stretched_bar"]
 
@@ -25,7 +25,8 @@ def grid(size: tuple[float, float, float], nodes: tuple[int, int, int], order: i
 
 
 def distorted(mesh: BoxMesh, share: float, seed: int) -> FloatArray:
-    """Nodes (n, 3) [m] whose inner ones are moved at random by up to `share` of an element's edge."""
+    """Nodes (n, 3) [m] whose inner ones are moved at random by up to `share` of an element's
+    edge."""
     nodes = mesh.nodes.copy()
     edge = np.array([np.diff(axis).min() for axis in mesh.axes])
     low, high = nodes.min(axis=0), nodes.max(axis=0)
@@ -39,7 +40,9 @@ class FreeBody:
     """Modulus one: forces are over E [m^2], energies too [m^3].
 
     Attributes:
-        mesh: which nodes form which element. nodes: (n, 3) rest positions [m]. held: (n, 3) where the displacement is given.
+        mesh: which nodes form which element.
+        nodes: (n, 3) rest positions [m].
+        held: (n, 3) where the displacement is given.
         log_stiffness: its logarithm over the stated one at the quadrature points (e, q).
     """
 
@@ -53,8 +56,12 @@ class FreeBody:
     @cached_property
     def _parts(self) -> tuple[Quadrature, IntArray, FloatArray, FloatArray]:
         mu, bulk = lame(self.law, self.poisson_ratio)
-        rule = quadrature(self.mesh.connectivity.element, self.nodes[self.mesh.connectivity.elements])
-        factor = np.exp(np.zeros(rule.weights.shape) if self.log_stiffness is None else self.log_stiffness(rule))
+        rule = quadrature(
+            self.mesh.connectivity.element, self.nodes[self.mesh.connectivity.elements]
+        )
+        factor = np.exp(
+            np.zeros(rule.weights.shape) if self.log_stiffness is None else self.log_stiffness(rule)
+        )
         return rule, self.mesh.connectivity.elements, mu * factor, bulk * factor
 
     @cached_property
@@ -68,7 +75,8 @@ class FreeBody:
         return elastic_energy(self.law, *self._parts, positions)
 
     def assemble(self, positions: FloatArray):
-        """Internal forces (n, 3) over E [m^2] and the entries of the tangent of the unknowns [m]."""
+        """Internal forces (n, 3) over E [m^2] and the entries of the tangent of the unknowns
+        [m]."""
         pattern, slots, _ = self._system
         force, data = np.zeros_like(positions), np.zeros(pattern.nnz)
         assemble_elastic(self.law, *self._parts, positions, slots, force, data)
@@ -85,13 +93,16 @@ class FreeBody:
     def equilibrium(
         self, start: FloatArray, load: FloatArray | float = 0.0, tolerance: float = 1e-11
     ) -> tuple[FloatArray, FloatArray]:
-        """Positions and internal forces (n, 3) under nodal loads over E [m^2], by Newton's method from `start`."""
+        """Positions and internal forces (n, 3) under nodal loads over E [m^2], by Newton's method
+        from `start`.
+        """
         positions, free = start.copy(), ~self.held
         factor = self._system[2]
         for _ in range(25):
             force, data = self.assemble(positions)
             residual = (force - load)[free]
-            # Forces of a hardly strained body are differences of large ones: no step takes the residual below their rounding.
+            # Forces of a hardly strained body are differences of large ones: no step takes the
+            # residual below their rounding.
             rounding = np.finfo(float).eps * np.abs(data).max() * np.abs(positions).max()
             if np.linalg.norm(residual) < tolerance * np.linalg.norm(force) + rounding:
                 return positions, force
@@ -100,8 +111,12 @@ class FreeBody:
         raise AssertionError(f"no equilibrium: residual {np.linalg.norm(residual):.2g}")
 
 
-def stretched_bar(law: Law, order: int, poisson_ratio: float, stretch: float) -> tuple[float, FloatArray]:
-    """Pull over E and cross-section [1] of a bar along x on rollers, and its transverse stretches (2,) [1], the same all along."""
+def stretched_bar(
+    law: Law, order: int, poisson_ratio: float, stretch: float
+) -> tuple[float, FloatArray]:
+    """Pull over E and cross-section [1] of a bar along x on rollers, and its transverse stretches
+    (2,) [1], the same all along.
+    """
     mesh = grid((0.04, 0.01, 0.01), (5, 3, 3), order)
     nodes = distorted(mesh, 0.2 / order, 8) - mesh.nodes.min(axis=0)
     ends = nodes[:, 0] > 0.04 - 1e-9

@@ -1,4 +1,6 @@
-"""Work for the job queue that ends, waits, warns, fails or dies as a test wants, and what to wait for."""
+"""Work for the job queue that ends, waits, warns, fails or dies as a test wants, and what to wait
+for.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +14,10 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
-from app.jobs import Jobs
-from app.records import Job
-from core.errors import Cancelled, DatasetError
-from core.progress import Report
+from palpate.app.jobs.job_queue import Jobs
+from palpate.app.jobs.job_records import Job
+from palpate.foundation.errors import Cancelled, DatasetError
+from palpate.foundation.progress import Report
 
 __all__ = ["TARGETS", "alive", "ended", "family", "gone", "reached", "scratch_is_clean"]
 
@@ -94,7 +96,8 @@ def die(request: Request, report: Report) -> Request:
 
 
 TARGETS = {
-    work.__name__: f"job_working:{work.__name__}" for work in (count, sleep_with_child, refuse, stumble, give_up, warn, litter, die)
+    work.__name__: f"job_working:{work.__name__}"
+    for work in (count, sleep_with_child, refuse, stumble, give_up, warn, litter, die)
 }
 
 

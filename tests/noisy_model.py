@@ -8,15 +8,15 @@ from contextlib import contextmanager
 import numpy as np
 from pushed_block import SETUP, prediction, registration
 
-from core.diagnosis.bench import Bench
-from core.diagnosis.columns import TOOL_COLUMNS
-from core.diagnosis.evidence import Block, gram
-from core.diagnosis.hypothesis import Model
-from core.diagnosis.workers import Workers
-from core.effects import Effect
-from core.effects.material import StiffInclusion
-from core.effects.tool import ToolRadius
-from core.mesh import GridSpec
+from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS
+from palpate.diagnosis.forward.worker_pool import Workers
+from palpate.diagnosis.inference.evidence import Block, gram
+from palpate.diagnosis.inference.hypothesis import Model
+from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.effects import Effect
+from palpate.effects.elastic_material import StiffInclusion
+from palpate.effects.tool import ToolRadius
+from palpate.mesh.box_mesh import GridSpec
 
 NUISANCES = TOOL_COLUMNS + 9
 GROUPS = 4
@@ -45,8 +45,17 @@ def noisy_model(bench: Bench, *effects: Effect, seed: int = 0) -> Model:
     setup = SETUP
     for effect in effects:
         setup = effect.apply(setup)
-    blocks = [Block("poke-01", *gram(gap, columns, weights)), Block("poke-02", *gram(2 * gap, columns, weights))]
+    blocks = [
+        Block("poke-01", *gram(gap, columns, weights)),
+        Block("poke-02", *gram(2 * gap, columns, weights)),
+    ]
     at = NUISANCES - 1
     return Model(
-        effects, setup, (prediction(gap),), tuple(blocks), tuple(range(at, at + own)), {}, (*range(at), at + own)
-    )  # fmt: skip
+        effects,
+        setup,
+        (prediction(gap),),
+        tuple(blocks),
+        tuple(range(at, at + own)),
+        {},
+        (*range(at), at + own),
+    )

@@ -1,4 +1,6 @@
-"""A block that a ball has pushed, as the diagnosis sees it: points along camera rays, grouped, and predictions made by hand."""
+"""A block that a ball has pushed, as the diagnosis sees it: points along camera rays, grouped, and
+predictions made by hand.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +8,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.dataset import Kinematics
-from core.diagnosis.comparison import Sample
-from core.diagnosis.observations import Group, Observations
-from core.diagnosis.prediction import Prediction
-from core.fem.newton import Outcome
-from core.frames import FloatArray, Transform
-from core.mesh import GridSpec
-from core.registration import Registration
-from core.replay import Equilibrium, replay, rest
-from core.setup import Box, Setup, Tool
-from core.sight import sight_of
-from core.touches import touch_correction
+from palpate.dataset import Kinematics
+from palpate.diagnosis.forward.prediction import Prediction
+from palpate.diagnosis.forward.ray_comparison import Sample
+from palpate.diagnosis.observation.frame_groups import Group, Observations
+from palpate.fem.newton import Outcome
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.frames import Transform
+from palpate.measurement.camera_model import sight_of
+from palpate.measurement.touch_correction import touch_correction
+from palpate.mesh.box_mesh import GridSpec
+from palpate.registration.registration import Registration
+from palpate.replay.replay import Equilibrium, replay, rest
+from palpate.setup.setup import Box, Setup, Tool
 
 SIZE = (0.0687, 0.0393, 0.0358)
 TOP = SIZE[2]
@@ -36,14 +39,23 @@ def looking_at(eye: FloatArray, target: FloatArray) -> Transform:
 
 POSE = looking_at(EYE, np.array([0.0, 0.0, TOP / 2]))
 SETUP = Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3), mass=0.104, phantom_from_camera=POSE)
-CORNERS = tuple((x * SIZE[0] / 2, y * SIZE[1] / 2, TOP) for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1)))
+CORNERS = tuple(
+    (x * SIZE[0] / 2, y * SIZE[1] / 2, TOP) for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1))
+)
 """Landmarks (x, y, z) [m] that are touched."""
 
 
-def seen_points(frame: Equilibrium, count: int, noise: float, seed: int, truth: Setup = SETUP) -> FloatArray:
-    """Points (n, 3) [m] of the sides that face the camera, with noise [m] along the rays, as a camera reads them; camera frame."""
+def seen_points(
+    frame: Equilibrium, count: int, noise: float, seed: int, truth: Setup = SETUP
+) -> FloatArray:
+    """Points (n, 3) [m] of the sides that face the camera, with noise [m] along the rays, as a
+    camera reads them; camera frame.
+    """
     random = np.random.default_rng(seed)
-    low, high = np.array([-SIZE[0] / 2, -SIZE[1] / 2, 0.0]), np.array([SIZE[0] / 2, SIZE[1] / 2, TOP])
+    low, high = (
+        np.array([-SIZE[0] / 2, -SIZE[1] / 2, 0.0]),
+        np.array([SIZE[0] / 2, SIZE[1] / 2, TOP]),
+    )
     sides = []
     for axis, end in ((2, high), (0, low), (1, low)):
         sample = random.uniform(low, high, (count // 3, 3))
@@ -55,19 +67,30 @@ def seen_points(frame: Equilibrium, count: int, noise: float, seed: int, truth: 
 
 
 def dwelling(centres: FloatArray) -> tuple[FloatArray, Kinematics]:
-    """Times (g,) [s] at which a tool that jumps from place to place stands at each of the centres (g, 3) [m], and its stream."""
+    """Times (g,) [s] at which a tool that jumps from place to place stands at each of the centres
+    (g, 3) [m], and its stream.
+    """
     time = np.arange(0, DWELL * len(centres), 1e-3)
     index = np.minimum((time / DWELL).astype(int), len(centres) - 1)
     stream = Kinematics(time, centres[index], np.tile([0.0, 0.0, 0.0, 1.0], (len(time), 1)))
     return np.asarray(DWELL * (np.arange(len(centres)) + 0.5)), stream
 
 
-def observed(truth: Setup, centres: FloatArray, *, count: int = 6000, noise: float = 3e-4, seed: int = 0) -> Observations:
-    """One sequence of a block that behaves like `truth`; one group per place (g, 3) [m] at which the tool is stated to be."""
+def observed(
+    truth: Setup, centres: FloatArray, *, count: int = 6000, noise: float = 3e-4, seed: int = 0
+) -> Observations:
+    """One sequence of a block that behaves like `truth`; one group per place (g, 3) [m] at which
+    the tool is stated to be.
+    """
     times, stream = dwelling(centres)
     frames = replay(truth, touch_correction(truth, GRID).apply(centres), GRID)
     groups = [
-        Group((number,), seen_points(frame, count, noise, seed + number, truth), not frame.in_contact, probe=1)
+        Group(
+            (number,),
+            seen_points(frame, count, noise, seed + number, truth),
+            not frame.in_contact,
+            probe=1,
+        )
         for number, frame in enumerate(frames)
     ]
     return Observations("poke-01", times, stream, tuple(groups))
@@ -87,21 +110,43 @@ def prediction(
     columns: FloatArray | None = None,
     failed: tuple[int, ...] = (),
 ) -> Prediction:
-    """Made by hand: gap (g, p) [m], NaN where unseen; columns (g, p, k); `failed` groups have no equilibrium."""
+    """Made by hand: gap (g, p) [m], NaN where unseen; columns (g, p, k); `failed` groups have no
+    equilibrium.
+    """
     still = rest(SETUP, GridSpec())
-    frames = [replace(still, outcome=Outcome.ITERATIONS if g in failed else Outcome.CONVERGED) for g in range(len(gap))]
+    frames = [
+        replace(still, outcome=Outcome.ITERATIONS if g in failed else Outcome.CONVERGED)
+        for g in range(len(gap))
+    ]
     none = np.zeros((*gap.shape, 0)) if columns is None else columns
     whole, real = np.zeros(0, np.int32), np.zeros(0)
     nothing = Sample(whole, whole, real, real, np.zeros((0, 3)), whole)
     full = np.where(np.isfinite(gap), count, 0.0)
-    return Prediction(name, gap, full, np.broadcast_to(spread, gap.shape), none, tuple(frames), (nothing,) * len(gap))
+    return Prediction(
+        name,
+        gap,
+        full,
+        np.broadcast_to(spread, gap.shape),
+        none,
+        tuple(frames),
+        (nothing,) * len(gap),
+    )
 
 
 def registration() -> Registration:
     """Touches good to 0.2 mm, a camera to 0.3 mm; no warnings."""
     accuracy = np.diag([2e-4] * 3 + [5e-3] * 3) ** 2
     return Registration(
-        phantom_from_robot=Transform(), robot_covariance=accuracy, robot_pivot=np.array([0.0, 0.0, TOP]),
-        touch_residuals=np.zeros((4, 3)), touch_rms=0.0, phantom_from_camera=POSE, camera_covariance=2.25 * accuracy,
-        camera_pivot=np.array([0.0, 0.0, TOP]), weak_directions=(), warnings=("the touches disagree",), proposal=None, camera=None,
-    )  # fmt: skip
+        phantom_from_robot=Transform(),
+        robot_covariance=accuracy,
+        robot_pivot=np.array([0.0, 0.0, TOP]),
+        touch_residuals=np.zeros((4, 3)),
+        touch_rms=0.0,
+        phantom_from_camera=POSE,
+        camera_covariance=2.25 * accuracy,
+        camera_pivot=np.array([0.0, 0.0, TOP]),
+        weak_directions=(),
+        warnings=("the touches disagree",),
+        proposal=None,
+        camera=None,
+    )

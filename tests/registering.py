@@ -9,7 +9,7 @@ import numpy as np
 from browsing import Page
 from small_dataset import SIZE
 
-from core.frames import Transform
+from palpate.foundation.frames import Transform
 
 __all__ = ["CORNERS", "NODES", "Bench", "X", "Y", "Z", "off"]
 
@@ -55,15 +55,28 @@ class Bench:
 
     @property
     def frame(self) -> Any:
-        return next((frame for frame in self.page.page.frames if frame.url.endswith("-register")), None)
+        return next(
+            (frame for frame in self.page.page.frames if frame.url.endswith("-register")), None
+        )
 
     def shown(self) -> Transform:
         """By which pose the cloud is drawn, as the server says it."""
         values = self.values
-        asked = {"dataset": self.dataset, "mode": values["mode"], "start": values["start"], "over": values["over"]}
-        asked["pairs"] = [{"cloud": pair["cloud"], "mesh": pair["mesh"]} for pair in values["pairs"]]
+        asked = {
+            "dataset": self.dataset,
+            "mode": values["mode"],
+            "start": values["start"],
+            "over": values["over"],
+        }
+        asked["pairs"] = [
+            {"cloud": pair["cloud"], "mesh": pair["mesh"]} for pair in values["pairs"]
+        ]
         identity = self.page.page.evaluate("sessionStorage.getItem('palpate.page')")
-        return Transform.from_matrix(self.page.client.post(f"/api/sessions/{identity}/registering", json=asked).json()["pose"])
+        return Transform.from_matrix(
+            self.page.client.post(f"/api/sessions/{identity}/registering", json=asked).json()[
+                "pose"
+            ]
+        )
 
     def click(self, place: Any) -> None:
         """A real click on a place [m] of the scene, once the camera stands still."""
@@ -94,14 +107,22 @@ class Bench:
     def pair(self, corner: Any, mesh: Any = None) -> None:
         """Click a corner on the cloud, a little inside of it, and then on the phantom."""
         count = len(self.values["pairs"])
-        self.click(self.shown().apply(self.true.inverse().apply(corner * np.array([0.97, 0.97, 1.0]))))
-        self.page.until(lambda: len(self.values["pairs"]) == count + 1 and self.values["mode"] == "mesh")
+        self.click(
+            self.shown().apply(self.true.inverse().apply(corner * np.array([0.97, 0.97, 1.0])))
+        )
+        self.page.until(
+            lambda: len(self.values["pairs"]) == count + 1 and self.values["mode"] == "mesh"
+        )
         self.click(corner if mesh is None else mesh)
         self.page.until(lambda: self.values["pairs"][-1]["mesh"] is not None)
 
 
 def off(found: Any, true: Transform) -> tuple[float, float]:
-    """How far a pose puts the middle of the top from where it is [m], and by how much it is turned [degrees]."""
+    """How far a pose puts the middle of the top from where it is [m], and by how much it is turned
+    [degrees].
+    """
     motion = true @ Transform.from_matrix(found).inverse()
     top = np.array([0.0, 0.0, Z])
-    return float(np.linalg.norm(motion.apply(top) - top)), float(np.degrees(np.linalg.norm(motion.rotation_vector)))
+    return float(np.linalg.norm(motion.apply(top) - top)), float(
+        np.degrees(np.linalg.norm(motion.rotation_vector))
+    )

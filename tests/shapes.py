@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from core.frames import FloatArray
-from core.meshing import IntArray
-from core.setup import Shape
-from core.shape.filling import TetSpec, fill
-from core.shape.fixed import FixedRegion, Plane
-from core.shape.solid import SolidMesh
+from palpate.foundation.arrays import FloatArray, IntArray
+from palpate.mesh.gmsh_fill import TetSpec, fill
+from palpate.mesh.tet_mesh import SolidMesh
+from palpate.setup.fixed_region import FixedRegion, Plane
+from palpate.setup.setup import Shape
 
 __all__ = ["box_surface", "dome", "filled_box"]
 
@@ -23,22 +22,31 @@ def box_surface(size: tuple[float, float, float]) -> tuple[FloatArray, IntArray]
 
 def filled_box(size: tuple[float, float, float], spacing: float) -> SolidMesh:
     """A block of tetrahedra, evenly spaced [m]."""
-    return fill(Shape(*box_surface(size)), TetSpec(path=(), radius=1e-3, spacing=spacing, coarsest=spacing))
+    return fill(
+        Shape(*box_surface(size)), TetSpec(path=(), radius=1e-3, spacing=spacing, coarsest=spacing)
+    )
 
 
-def dome(radii: tuple[float, float, float], fixed: FixedRegion | None = None, rings: int = 16) -> Shape:
+def dome(
+    radii: tuple[float, float, float], fixed: FixedRegion | None = None, rings: int = 16
+) -> Shape:
     """Half an ellipsoid with these semi-axes [m] on a flat base in z = 0."""
     rise = np.linspace(0, np.pi / 2, rings + 1)[:-1]
     turn = np.linspace(0, 2 * np.pi, 4 * rings, endpoint=False)
     around = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    rings_of = [np.column_stack([np.cos(up) * around, np.full(len(turn), np.sin(up))]) for up in rise]
+    rings_of = [
+        np.column_stack([np.cos(up) * around, np.full(len(turn), np.sin(up))]) for up in rise
+    ]
     vertices = np.concatenate([*rings_of, [[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]]) * np.array(radii)
     count, here = len(turn), np.arange(len(turn))
     beside, top, middle = (here + 1) % count, len(vertices) - 2, len(vertices) - 1
     triangles = []
     for ring in range(rings - 1):
         low, high = ring * count, (ring + 1) * count
-        triangles += [np.stack([low + here, low + beside, high + beside], 1), np.stack([low + here, high + beside, high + here], 1)]
+        triangles += [
+            np.stack([low + here, low + beside, high + beside], 1),
+            np.stack([low + here, high + beside, high + here], 1),
+        ]
     last = (rings - 1) * count
     triangles += [np.stack([last + here, last + beside, np.full(count, top)], 1)]
     triangles += [np.stack([beside, here, np.full(count, middle)], 1)]

@@ -48,24 +48,36 @@ test = ["drag-01"]
 def ply_bytes(points: np.ndarray) -> bytes:
     """A binary PLY of points (n, 3) [m]."""
     header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
-    return (header + "".join(f"property float {axis}\n" for axis in "xyz") + "end_header\n").encode() + points.astype(
-        "<f4"
-    ).tobytes()
+    return (
+        header + "".join(f"property float {axis}\n" for axis in "xyz") + "end_header\n"
+    ).encode() + points.astype("<f4").tobytes()
 
 
 def write_valid_dataset(folder: Path) -> Path:
-    """Write a dataset of two sequences, five clouds each, one of them with forces; returns the folder."""
+    """Write a dataset of two sequences, five clouds each, one of them with forces; returns the
+    folder.
+    """
     rotation, shift = _ROBOT_FROM_PHANTOM
-    corners = np.array([[x * SIZE[0] / 2, y * SIZE[1] / 2, SIZE[2]] for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1))])
+    corners = np.array(
+        [
+            [x * SIZE[0] / 2, y * SIZE[1] / 2, SIZE[2]]
+            for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1))
+        ]
+    )
     folder.mkdir(parents=True)
     (folder / "dataset.toml").write_text(TOML)
-    touches = [f"corner_{i},{x:.7f},{y:.7f},{z:.7f}" for i, (x, y, z) in enumerate(rotation.apply(corners) + shift)]
+    touches = [
+        f"corner_{i},{x:.7f},{y:.7f},{z:.7f}"
+        for i, (x, y, z) in enumerate(rotation.apply(corners) + shift)
+    ]
     (folder / "touches.csv").write_text("\n".join(["landmark,x,y,z", *touches]) + "\n")
     (folder / "rest.ply").write_bytes(ply_bytes(small_cloud()))
     _write_sequence(folder / "sequences" / "poke-01", start=100.0, sideways=0.0)
     _write_sequence(folder / "sequences" / "drag-01", start=200.0, sideways=0.015)
     forces = [f"{100 + i / 100:.3f},0.0,0.0,{0.01 * i:.4f}" for i in range(100)]
-    (folder / "sequences" / "poke-01" / "forces.csv").write_text("\n".join(["t,fx,fy,fz", *forces]) + "\n")
+    (folder / "sequences" / "poke-01" / "forces.csv").write_text(
+        "\n".join(["t,fx,fy,fz", *forces]) + "\n"
+    )
     return folder
 
 
@@ -79,12 +91,17 @@ def small_cloud() -> np.ndarray:
 
 
 def _write_sequence(folder: Path, start: float, sideways: float) -> None:
-    """One second at 200 Hz: down from 20 mm above the top to 3 mm into it, sideways on the way, and up again."""
+    """One second at 200 Hz: down from 20 mm above the top to 3 mm into it, sideways on the way, and
+    up again.
+    """
     (folder / "clouds").mkdir(parents=True)
     rotation, shift = _ROBOT_FROM_PHANTOM
     time = np.arange(200) / 200
     depth = 0.023 * np.sin(np.pi * time)
-    path = np.stack([sideways * np.sin(np.pi * time), 0.002 + 0 * time, SIZE[2] + 0.005 + 0.020 - depth], axis=-1)
+    path = np.stack(
+        [sideways * np.sin(np.pi * time), 0.002 + 0 * time, SIZE[2] + 0.005 + 0.020 - depth],
+        axis=-1,
+    )
     turn = rotation.as_quat()
     rows = [
         f"{start + t:.5f}," + ",".join(f"{v:.7f}" for v in (*p, *turn))

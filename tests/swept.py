@@ -1,17 +1,28 @@
-"""A small virtual phantom whose tool is larger than stated, to sweep over: quickly made, and quickly replayed."""
+"""A small virtual phantom whose tool is larger than stated, to sweep over: quickly made, and
+quickly replayed.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from core.synthetic import HiddenEffect, Scenario, make_dataset
+from palpate.synthetic import HiddenEffect, Scenario, make_dataset
 
 __all__ = ["write_swept_phantom"]
 
 
 def write_swept_phantom(folder: Path) -> Path:
-    """Pushes from above by a ball of 6 mm that is stated to have 5 mm; returns the dataset's folder."""
+    """Pushes from above by a ball of 6 mm that is stated to have 5 mm; returns the dataset's
+    folder.
+    """
     hidden = HiddenEffect("tool_radius", {"radius": 6e-3})
-    scenario = Scenario(effects=(hidden,), sequences=("poke-top-01",), fine=4e-3, density=3000, rate=5.0, robot_rate=200.0)
+    scenario = Scenario(
+        effects=(hidden,),
+        sequences=("poke-top-01",),
+        fine=4e-3,
+        density=3000,
+        rate=5.0,
+        robot_rate=200.0,
+    )
     make_dataset(folder, scenario, 3)
     return folder

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.frames import FloatArray
-from core.synthetic.bench import perform
-from core.synthetic.motion import Motion, Probe
-from core.synthetic.scenario import HiddenEffect, Scenario
-from core.synthetic.track import Track
+from palpate.foundation.arrays import FloatArray
+from palpate.synthetic.bench.motion_plan import Motion, Probe
+from palpate.synthetic.bench.solved_track import Track
+from palpate.synthetic.bench.virtual_experiment import perform
+from palpate.synthetic.scenario.scenario import HiddenEffect, Scenario
 
 COARSE = 3.6e-3
 RADIUS = Scenario().tool_radius
@@ -18,7 +18,9 @@ CLEAR = 4e-3
 
 
 def way(depth: float, side: bool = False) -> FloatArray:
-    """Stated centres (2, 3) [m] of a push: where it begins, and `depth` into the top, or into the side at +y."""
+    """Stated centres (2, 3) [m] of a push: where it begins, and `depth` into the top, or into the
+    side at +y.
+    """
     start = np.array([2e-3, Y / 2 + RADIUS, 0.023] if side else [4e-3, 2e-3, Z + RADIUS])
     inwards = np.array([0.0, -1.0, 0.0] if side else [0.0, 0.0, -1.0])
     return np.stack([start - CLEAR * inwards, start + depth * inwards])
@@ -28,9 +30,15 @@ def hide(effect: str, **parameters: float | str) -> HiddenEffect:
     return HiddenEffect(effect, parameters)
 
 
-def push(*effects: HiddenEffect, depth: float = 4e-3, side: bool = False, fine: float = COARSE) -> Track:
+def push(
+    *effects: HiddenEffect, depth: float = 4e-3, side: bool = False, fine: float = COARSE
+) -> Track:
     """In one second, held for another, and back."""
     waypoints = way(depth, side)
     length = CLEAR + depth
     probe = Probe(waypoints, np.array([1.0, 2.0, 3.0, 4.0]), np.array([0.0, length, length, 0.0]))
-    return perform(Scenario(effects=effects), Motion("poke-top-01", np.array([0.0, 0.0, -1.0]), (probe,), 5.0), fine)
+    return perform(
+        Scenario(effects=effects),
+        Motion("poke-top-01", np.array([0.0, 0.0, -1.0]), (probe,), 5.0),
+        fine,
+    )

@@ -6,9 +6,9 @@ from typing import Any
 
 from fastapi import APIRouter
 
-from app.desk import DeskOf
-from app.summaries import dataset_summary
-from core.dataset.check import check_dataset
+from palpate.app.reporting.json_values import dataset_summary
+from palpate.app.services import DeskOf
+from palpate.dataset.check import check_dataset
 
 __all__ = ["router"]
 
@@ -29,7 +29,13 @@ def one(name: str, desk: DeskOf) -> dict[str, Any]:
 
 @router.get("/{name}/check")
 def check(name: str, desk: DeskOf) -> dict[str, Any]:
-    """The same after reading every file, with what is doubtful; 422 with place and expectation if anything is off."""
+    """The same after reading every file, with what is doubtful; 422 with place and expectation if
+    anything is off.
+    """
     dataset = desk.library.open(name)
     found = check_dataset(dataset)
-    return {**dataset_summary(dataset), "warnings": list(found.warnings), "lacks": [lack.sentence for lack in found.lacks]}
+    return {
+        **dataset_summary(dataset),
+        "warnings": list(found.warnings),
+        "lacks": [lack.sentence for lack in found.lacks],
+    }

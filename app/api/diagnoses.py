@@ -6,11 +6,11 @@ from typing import Any
 
 from fastapi import APIRouter, Response
 
-from app.desk import DeskOf, KeyOf
-from app.pages import PageOf, part_of
-from app.problems import Conflict
-from app.records import JobState
-from app.schemas import DiagnosisRequest, JobOut
+from palpate.app.http_errors import Conflict
+from palpate.app.jobs.job_records import JobState
+from palpate.app.schemas import DiagnosisRequest, JobOut
+from palpate.app.server.pagination import PageOf, part_of
+from palpate.app.services import DeskOf, KeyOf
 
 __all__ = ["router"]
 
@@ -19,15 +19,21 @@ router = APIRouter(prefix="/diagnoses", tags=["diagnoses"])
 
 @router.post("", status_code=202)
 def start(request: DiagnosisRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
-    """Check the dataset completely, then queue its diagnosis; the answer's id names the job now and the run later."""
+    """Check the dataset completely, then queue its diagnosis; the answer's id names the job now and
+    the run later.
+    """
     dataset = desk.library.open(request.dataset)
     dataset.validate()
-    return JobOut.of(desk.diagnose(dataset.path, request.dataset, request.seed, key, request.registration))
+    return JobOut.of(
+        desk.diagnose(dataset.path, request.dataset, request.seed, key, request.registration)
+    )
 
 
 @router.get("")
 def listed(desk: DeskOf, response: Response, page: PageOf) -> list[JobOut]:
-    """Diagnoses that were asked for here, the newest first; the header X-Total-Count says how many there are."""
+    """Diagnoses that were asked for here, the newest first; the header X-Total-Count says how many
+    there are.
+    """
     found = [job for job in desk.jobs.all() if job.kind == "diagnosis"]
     return [JobOut.of(job) for job in part_of(found, page, response)]
 
@@ -44,5 +50,9 @@ def report(identity: str, desk: DeskOf) -> dict[str, Any]:
     job = desk.jobs.get(identity)
     if job.state is not JobState.DONE:
         reason = f": {job.error['message']}" if job.error else ""
-        raise Conflict(f"diagnosis {identity} is {job.state.value} and has no report{reason}", job=identity, state=job.state.value)
+        raise Conflict(
+            f"diagnosis {identity} is {job.state.value} and has no report{reason}",
+            job=identity,
+            state=job.state.value,
+        )
     return desk.runs.get(identity).report

@@ -7,7 +7,7 @@ from typing import Any
 
 from fastapi import APIRouter
 
-from core.effects import CATALOGUE, DIAGNOSED, Effect, Parameter
+from palpate.effects import CATALOGUE, DIAGNOSED, Effect, Parameter
 
 __all__ = ["router"]
 
@@ -16,9 +16,11 @@ router = APIRouter(prefix="/effects", tags=["effects"])
 
 @router.get("")
 def listed() -> list[dict[str, Any]]:
-    """The catalogue; bounds are SI, null where there is none. What is not `diagnosed` only a replay knows.
+    """The catalogue; bounds are SI, null where there is none. What is not `diagnosed` only a replay
+    knows.
 
-    `scale` is a step that matters, of the logarithm where `log`, of the contrast (k - 1) / (k + 3/2) where `contrast`.
+    `scale` is a step that matters, of the logarithm where `log`, of the contrast (k - 1) / (k +
+    3/2) where `contrast`.
     """
     return [_described(effect) for effect in CATALOGUE]
 
@@ -34,8 +36,17 @@ def _described(effect: type[Effect]) -> dict[str, Any]:
 
 
 def _parameter(item: Parameter) -> dict[str, Any]:
-    low, high = (None if item.choices or not math.isfinite(bound) else bound for bound in (item.low, item.high))
+    low, high = (
+        None if item.choices or not math.isfinite(bound) else bound
+        for bound in (item.low, item.high)
+    )
     return {
-        "name": item.name, "unit": item.unit, "low": low, "high": high, "choices": list(item.choices),
-        "scale": None if item.choices else item.scale, "log": item.log, "contrast": item.contrast,
-    }  # fmt: skip
+        "name": item.name,
+        "unit": item.unit,
+        "low": low,
+        "high": high,
+        "choices": list(item.choices),
+        "scale": None if item.choices else item.scale,
+        "log": item.log,
+        "contrast": item.contrast,
+    }

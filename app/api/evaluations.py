@@ -8,11 +8,11 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.config import JsonDict
 
-from app.desk import DeskOf, KeyOf
-from app.evaluations import Evaluations, networks_for
-from app.pages import PageOf, part_of
-from app.schemas import JobOut
-from app.trainings import Trainings
+from palpate.app.schemas import JobOut
+from palpate.app.server.pagination import PageOf, part_of
+from palpate.app.services import DeskOf, KeyOf
+from palpate.app.storage.evaluation_store import Evaluations, networks_for
+from palpate.app.storage.training_store import Trainings
 
 __all__ = ["EvaluationRequest", "router"]
 
@@ -21,12 +21,15 @@ EXAMPLE: JsonDict = {"dataset": "block-01"}
 
 
 class EvaluationRequest(BaseModel):
-    """Which dataset, beside which run's extended model, with which trainings; the newest ones where none is named.
+    """Which dataset, beside which run's extended model, with which trainings; the newest ones where
+    none is named.
 
     With the feedback `follow` the simulation answers for the points that a network does not see.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra={"examples": [EXAMPLE]})
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", json_schema_extra={"examples": [EXAMPLE]}
+    )
 
     dataset: str
     run: str | None = None
@@ -43,15 +46,20 @@ def start(request: EvaluationRequest, desk: DeskOf, key: KeyOf = None) -> JobOut
         desk.runs.get(request.run)
     networks_for(Trainings(settings.runs), dataset.path, request.run, request.trainings)
     said = {
-        "dataset": str(dataset.path), "name": request.dataset, "runs": str(settings.runs), "workers": settings.workers,
+        "dataset": str(dataset.path),
+        "name": request.dataset,
+        "runs": str(settings.runs),
+        "workers": settings.workers,
         **request.model_dump(include={"run", "trainings", "feedback", "seed"}),
-    }  # fmt: skip
+    }
     return JobOut.of(desk.jobs.submit("evaluation", said, f"evaluation-{request.dataset}", key))
 
 
 @router.get("")
 def listed(desk: DeskOf, response: Response, page: PageOf) -> list[dict[str, Any]]:
-    """Evaluations, the newest first, each with its job where that is still known; X-Total-Count says how many there are."""
+    """Evaluations, the newest first, each with its job where that is still known; X-Total-Count
+    says how many there are.
+    """
     return list(part_of(Evaluations(desk.settings.runs).listed(desk), page, response))
 
 

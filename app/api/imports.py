@@ -1,4 +1,6 @@
-"""Datasets that are brought: an archive as the body of a request, or a folder that the server can read."""
+"""Datasets that are brought: an archive as the body of a request, or a folder that the server can
+read.
+"""
 
 from __future__ import annotations
 
@@ -12,30 +14,33 @@ from uuid import uuid4
 from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.desk import Desk, DeskOf, KeyOf
-from app.imports import UPLOADS, check_name
-from app.problems import Conflict
-from app.records import Job
-from app.schemas import JobOut
-from app.unpacking import is_archive
-from core.errors import DatasetError
+from palpate.app.http_errors import Conflict
+from palpate.app.jobs.job_records import Job
+from palpate.app.schemas import JobOut
+from palpate.app.services import Desk, DeskOf, KeyOf
+from palpate.app.storage.archive import is_archive
+from palpate.app.storage.dataset_import import UPLOADS, check_name
+from palpate.foundation.errors import DatasetError
 
 __all__ = ["router"]
 
 router = APIRouter(prefix="/imports", tags=["datasets"])
 _BODY = {
     "requestBody": {
-        "required": True, "description": "The dataset's folder as .zip or .tar, compressed or not.",
+        "required": True,
+        "description": "The dataset's folder as .zip or .tar, compressed or not.",
         "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
     }
-}  # fmt: skip
+}
 
 
 class FolderRequest(BaseModel):
     """A folder on the server's disk, and the name that the dataset gets."""
 
     model_config = ConfigDict(
-        frozen=True, extra="forbid", json_schema_extra={"examples": [{"folder": "/data/bench/block-07", "name": "block-07"}]}
+        frozen=True,
+        extra="forbid",
+        json_schema_extra={"examples": [{"folder": "/data/bench/block-07", "name": "block-07"}]},
     )
 
     folder: str = Field(min_length=1, max_length=1000)
@@ -44,9 +49,14 @@ class FolderRequest(BaseModel):
 
 @router.post("", status_code=202, openapi_extra=_BODY)
 async def upload(
-    request: Request, desk: DeskOf, name: Annotated[str, Query(min_length=1, max_length=64)], key: KeyOf = None
+    request: Request,
+    desk: DeskOf,
+    name: Annotated[str, Query(min_length=1, max_length=64)],
+    key: KeyOf = None,
 ) -> JobOut:
-    """Take the body as an archive and queue its import: checked whole, then a dataset of this name, or nothing."""
+    """Take the body as an archive and queue its import: checked whole, then a dataset of this name,
+    or nothing.
+    """
     _free(name, desk)
     archive = await _received(request, desk)
     return JobOut.of(_queue(desk, name, {"archive": str(archive)}, key))
@@ -54,13 +64,16 @@ async def upload(
 
 @router.post("/folder", status_code=202)
 def folder(request: FolderRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
-    """Queue the import of a folder on the server's disk, from where that is allowed; it is copied, never changed."""
+    """Queue the import of a folder on the server's disk, from where that is allowed; it is copied,
+    never changed.
+    """
     _free(request.name, desk)
     path = Path(request.folder).resolve()
     allowed = desk.settings.import_roots
     if allowed is not None and not any(path.is_relative_to(root.resolve()) for root in allowed):
         raise DatasetError(
-            f"{request.folder} may not be imported from: start the server with --import-from FOLDER for one that may", key="folder"
+            f"{request.folder} may not be imported from: start the server with --import-from FOLDER for one that may",
+            key="folder",
         )
     if not path.is_dir():
         raise DatasetError(f"{request.folder} is no folder that the server can read", key="folder")
@@ -78,12 +91,19 @@ def _free(name: str, desk: Desk) -> None:
 
 def _queue(desk: Desk, name: str, source: dict[str, str], key: str | None) -> Job:
     settings = desk.settings
-    said = {**source, "name": name, "datasets": str(settings.datasets), "most": settings.largest_dataset}
+    said = {
+        **source,
+        "name": name,
+        "datasets": str(settings.datasets),
+        "most": settings.largest_dataset,
+    }
     return desk.jobs.submit("import", said, f"import-{name}", key)
 
 
 async def _received(request: Request, desk: Desk) -> Path:
-    """The body as a file below the uploads, named by its digest: the same archive sent twice is one file."""
+    """The body as a file below the uploads, named by its digest: the same archive sent twice is one
+    file.
+    """
     folder = desk.settings.runs / UPLOADS
     folder.mkdir(parents=True, exist_ok=True)
     coming, digest = folder / f".{uuid4().hex}.part", hashlib.sha256()
@@ -93,7 +113,10 @@ async def _received(request: Request, desk: Desk) -> Path:
                 digest.update(chunk)
                 await asyncio.to_thread(sink.write, chunk)
         if not await asyncio.to_thread(is_archive, coming):
-            raise DatasetError("the body is neither a zip nor a tar; send the dataset's folder packed as one of them", key="body")
+            raise DatasetError(
+                "the body is neither a zip nor a tar; send the dataset's folder packed as one of them",
+                key="body",
+            )
         whole = folder / f"{digest.hexdigest()[:32]}.archive"
         os.replace(coming, whole)
         return whole

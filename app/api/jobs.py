@@ -10,9 +10,9 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
-from app.desk import Desk, DeskOf
-from app.pages import TOTAL, PageOf
-from app.schemas import JobOut, NoteOut, Notes
+from palpate.app.schemas import JobOut, NoteOut, Notes
+from palpate.app.server.pagination import TOTAL, PageOf
+from palpate.app.services import Desk, DeskOf
 
 __all__ = ["router"]
 
@@ -32,7 +32,11 @@ def listed(desk: DeskOf, response: Response, page: PageOf) -> list[JobOut]:
 @router.get("/events")
 def events(request: Request, desk: DeskOf) -> StreamingResponse:
     """The newest jobs, at most 50, as server-sent events: at once, and after each change."""
-    return StreamingResponse(_changes(request, desk), media_type="text/event-stream", headers={"cache-control": "no-cache"})
+    return StreamingResponse(
+        _changes(request, desk),
+        media_type="text/event-stream",
+        headers={"cache-control": "no-cache"},
+    )
 
 
 @router.get("/{identity}")
@@ -49,14 +53,20 @@ def cancel(identity: str, desk: DeskOf) -> JobOut:
 
 @router.post("/{identity}/retry", status_code=202)
 def retry(identity: str, desk: DeskOf) -> JobOut:
-    """Have a job that failed, was cancelled or interrupted done once more, under its name; 409 if it runs, waits or is done."""
+    """Have a job that failed, was cancelled or interrupted done once more, under its name; 409 if
+    it runs, waits or is done.
+    """
     return JobOut.of(desk.jobs.retry(identity))
 
 
 @router.get("/{identity}/log")
 def notes(identity: str, desk: DeskOf, after: Annotated[int, Query(ge=0, le=10**9)] = 0) -> Notes:
-    """What a job did, and of what it was warned, from the `after`-th line on: at most 1000 lines."""
-    found = [NoteOut(at=note.at, level=note.level, text=note.text) for note in desk.jobs.notes(identity, after)]
+    """What a job did, and of what it was warned, from the `after`-th line on: at most 1000
+    lines."""
+    found = [
+        NoteOut(at=note.at, level=note.level, text=note.text)
+        for note in desk.jobs.notes(identity, after)
+    ]
     return Notes(notes=found, next=after + len(found))
 
 

@@ -1,4 +1,5 @@
-"""Registration by hand: pairs of points in, fit and ICP out, kept under a name where one is given."""
+"""Registration by hand: pairs of points in, fit and ICP out, kept under a name where one is
+given."""
 
 from __future__ import annotations
 
@@ -9,10 +10,10 @@ from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.config import JsonValue
 
-from app.desk import DeskOf, KeyOf
-from app.registrations import Registrations, register
-from app.schemas import JobOut, Point
-from core.registration.pairs import fit_pairs
+from palpate.app.schemas import JobOut, Point
+from palpate.app.services import DeskOf, KeyOf
+from palpate.app.storage.registration_store import Registrations, register
+from palpate.registration.point_pairs import fit_pairs
 
 __all__ = ["router"]
 
@@ -38,7 +39,9 @@ class Pair(BaseModel):
 class FitRequest(BaseModel):
     """Pairs to be fitted."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra={"examples": [{"pairs": PAIRS}]})
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", json_schema_extra={"examples": [{"pairs": PAIRS}]}
+    )
 
     pairs: list[Pair] = Field(max_length=100)
 
@@ -47,7 +50,9 @@ class RegistrationRequest(FitRequest):
     """Pairs, and the name to accept the result under; without one nothing is kept."""
 
     model_config = ConfigDict(
-        frozen=True, extra="forbid", json_schema_extra={"examples": [{"pairs": PAIRS, "accept": "by-hand-1"}]}
+        frozen=True,
+        extra="forbid",
+        json_schema_extra={"examples": [{"pairs": PAIRS, "accept": "by-hand-1"}]},
     )
 
     accept: str | None = None
@@ -69,35 +74,52 @@ def one(name: str, registration: str, desk: DeskOf) -> dict[str, Any]:
 
 @router.post("/fit")
 def fitted(name: str, request: FitRequest, desk: DeskOf) -> dict[str, Any]:
-    """The rigid fit of the pairs alone, with each pair's residual, at once: what to look at while clicking."""
+    """The rigid fit of the pairs alone, with each pair's residual, at once: what to look at while
+    clicking.
+    """
     desk.library.path(name)
     pairs = request.pairs
-    return fit_pairs(np.array([pair.cloud for pair in pairs]), np.array([pair.mesh for pair in pairs])).to_json()
+    return fit_pairs(
+        np.array([pair.cloud for pair in pairs]), np.array([pair.mesh for pair in pairs])
+    ).to_json()
 
 
 class AutomaticRequest(BaseModel):
     """The name to keep it under; a free one without."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra={"examples": [{"accept": "automatic-1"}]})
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", json_schema_extra={"examples": [{"accept": "automatic-1"}]}
+    )
 
     accept: str | None = None
 
 
 @router.post("/automatic", status_code=202)
 def automatic(name: str, request: AutomaticRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
-    """Queue the automatic registration of a dataset; what it finds is kept under a name like one made by hand."""
+    """Queue the automatic registration of a dataset; what it finds is kept under a name like one
+    made by hand.
+    """
     folder, kept = desk.library.path(name), Registrations(desk.settings.runs)
     if request.accept is not None:
         kept.check_name(name, request.accept)
-    said = {"dataset": str(folder), "name": name, "runs": str(desk.settings.runs), "accept": request.accept}
+    said = {
+        "dataset": str(folder),
+        "name": name,
+        "runs": str(desk.settings.runs),
+        "accept": request.accept,
+    }
     return JobOut.of(desk.jobs.submit("registration", said, f"register-{name}", key))
 
 
 @router.post("")
 def made(name: str, request: RegistrationRequest, desk: DeskOf) -> dict[str, Any]:
-    """Fit the pairs, lay the rest cloud against the block from there, and keep it if a name is given; a taken name is refused."""
+    """Fit the pairs, lay the rest cloud against the block from there, and keep it if a name is
+    given; a taken name is refused.
+    """
     folder, kept = desk.library.path(name), Registrations(desk.settings.runs)
     if request.accept is not None:
         kept.check_name(name, request.accept)
-    found = register(folder, [pair.cloud for pair in request.pairs], [pair.mesh for pair in request.pairs])
+    found = register(
+        folder, [pair.cloud for pair in request.pairs], [pair.mesh for pair in request.pairs]
+    )
     return found if request.accept is None else kept.save(name, request.accept, found)

@@ -9,17 +9,17 @@ import numpy as np
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse, HTMLResponse
 
-from app.colours import nice_limit
-from app.comparison import compared
-from app.course import course
-from app.desk import DeskOf
-from app.pages import PageOf, part_of
-from app.runs import Replay, Run
-from app.sentences import registration_sentences, verdict_sentence
-from app.side import NO_INSIDE
-from app.summaries import finite
-from app.view import Quantity
-from core.errors import RunError
+from palpate.app.reporting.json_values import finite
+from palpate.app.reporting.model_comparison import compared
+from palpate.app.reporting.sentences import registration_sentences, verdict_sentence
+from palpate.app.reporting.timeline_series import course
+from palpate.app.scene.colours import nice_limit
+from palpate.app.scene.model_layer import NO_INSIDE
+from palpate.app.scene.view import Quantity
+from palpate.app.server.pagination import PageOf, part_of
+from palpate.app.services import DeskOf
+from palpate.app.storage.run_store import Replay, Run
+from palpate.foundation.errors import RunError
 
 __all__ = ["router"]
 
@@ -28,13 +28,17 @@ router = APIRouter(prefix="/runs", tags=["runs"])
 
 @router.get("")
 def listed(desk: DeskOf, response: Response, page: PageOf) -> list[dict[str, Any]]:
-    """Runs, the newest first, each with its verdict; one whose report cannot be read says so. X-Total-Count: how many there are."""
+    """Runs, the newest first, each with its verdict; one whose report cannot be read says so.
+    X-Total-Count: how many there are.
+    """
     return [_listed(run) for run in part_of(desk.runs.all(), page, response)]
 
 
 @router.get("/{name}")
 def one(name: str, desk: DeskOf) -> dict[str, Any]:
-    """One run: verdict sentence, phantom and, per sequence, its split and both models' errors where the stated one is worst [m]."""
+    """One run: verdict sentence, phantom and, per sequence, its split and both models' errors where
+    the stated one is worst [m].
+    """
     run = desk.runs.get(name)
     replays = [run.replay(sequence) for sequence in run.sequences]
     size = [round(float(edge), 6) for edge in replays[0].size] if replays else None
@@ -48,7 +52,9 @@ def one(name: str, desk: DeskOf) -> dict[str, Any]:
             {
                 "name": replay.name,
                 "frames": len(replay),
-                "seconds": round(float(replay["time"][-1] - replay["time"][0]), 3) if len(replay) else 0.0,
+                "seconds": round(float(replay["time"][-1] - replay["time"][0]), 3)
+                if len(replay)
+                else 0.0,
                 "split": run.origin.get("splits", {}).get(replay.name),
                 **_worst(replay),
             }
@@ -64,19 +70,27 @@ def report(name: str, desk: DeskOf) -> dict[str, Any]:
 
 
 @router.get(
-    "/{name}/report.html", response_class=Response, responses={200: {"content": {"text/html": {"schema": {"type": "string"}}}}}
+    "/{name}/report.html",
+    response_class=Response,
+    responses={200: {"content": {"text/html": {"schema": {"type": "string"}}}}},
 )
 def page(name: str, desk: DeskOf) -> HTMLResponse:
     """The report as one HTML file that needs nothing but itself, to keep, print or send."""
-    from app.report_page import report_page  # noqa: PLC0415 (heavy)
+    from palpate.app.reporting.report_page import report_page
 
     text = report_page(desk.runs.get(name))
-    return HTMLResponse(text, headers={"content-disposition": f'attachment; filename="{name}.html"'})
+    return HTMLResponse(
+        text, headers={"content-disposition": f'attachment; filename="{name}.html"'}
+    )
 
 
 @router.get("/{name}/comparison")
-def comparison(name: str, desk: DeskOf, beside: Annotated[list[str], Query()] = []) -> dict[str, Any]:  # noqa: B006
-    """By sequence the errors [m] of this run's models, and of those `beside` it, which must be of the same dataset."""
+def comparison(
+    name: str, desk: DeskOf, beside: Annotated[tuple[str, ...], Query()] = ()
+) -> dict[str, Any]:
+    """By sequence the errors [m] of this run's models, and of those `beside` it, which must be of
+    the same dataset.
+    """
     return compared([desk.runs.get(one) for one in dict.fromkeys([name, *beside])])
 
 
@@ -88,13 +102,25 @@ def model(name: str, desk: DeskOf) -> dict[str, Any]:
 
 @router.get("/{name}/patterns")
 def patterns(name: str, desk: DeskOf) -> dict[str, Any]:
-    """Patches with the measured and predicted error pattern, all [m], null where unseen; `limit` ends their common scale."""
+    """Patches with the measured and predicted error pattern, all [m], null where unseen; `limit`
+    ends their common scale.
+    """
     arrays = desk.runs.get(name).patterns()
-    values = {key: finite(arrays[key], digits=7) for key in ("centres", "normals", "measured", "predicted")}
-    return {**values, "limit": nice_limit(np.concatenate([arrays["measured"], arrays["predicted"]]))}
+    values = {
+        key: finite(arrays[key], digits=7)
+        for key in ("centres", "normals", "measured", "predicted")
+    }
+    return {
+        **values,
+        "limit": nice_limit(np.concatenate([arrays["measured"], arrays["predicted"]])),
+    }
 
 
-@router.get("/{name}/pictures/{picture}", response_class=Response, responses={200: {"content": {"image/png": {}}}})
+@router.get(
+    "/{name}/pictures/{picture}",
+    response_class=Response,
+    responses={200: {"content": {"image/png": {}}}},
+)
 def picture(name: str, picture: str, desk: DeskOf) -> FileResponse:
     """A picture of the run."""
     return FileResponse(desk.runs.get(name).picture(picture))
@@ -102,14 +128,21 @@ def picture(name: str, picture: str, desk: DeskOf) -> FileResponse:
 
 @router.get("/{name}/sequences/{sequence}")
 def sequence(name: str, sequence: str, desk: DeskOf) -> dict[str, Any]:
-    """Times [s] and errors [m] of each frame, push depth [m], force [N], spells of touch, and what the scene can show.
+    """Times [s] and errors [m] of each frame, push depth [m], force [N], spells of touch, and what
+    the scene can show.
 
-    `limits` are the robust ends of the scales, null where the run does not hold a quantity; `inside` says why it has no inside.
+    `limits` are the robust ends of the scales, null where the run does not hold a quantity;
+    `inside` says why it has no inside.
     """
     reel = desk.sessions.reel(name, sequence)
     replay = reel.replay
     told = course(desk.runs.get(name), replay)
-    series = [f"{key}_{model}" for key in ("distance", "paper") for model in told["models"] if f"{key}_{model}" in replay.arrays]
+    series = [
+        f"{key}_{model}"
+        for key in ("distance", "paper")
+        for model in told["models"]
+        if f"{key}_{model}" in replay.arrays
+    ]
     return {
         "name": sequence,
         "time": finite(replay["time"] - replay["time"][0], digits=5),

@@ -1,4 +1,6 @@
-"""What each open page shows: a view in, what is held back; over one websocket, or request by request."""
+"""What each open page shows: a view in, what is held back; over one websocket, or request by
+request.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +11,14 @@ import numpy as np
 from fastapi import APIRouter, Query, Response, WebSocket
 from pydantic import ValidationError
 
-from app.colours import palette
-from app.desk import DeskOf
-from app.lookout import Lookout, Standpoint
-from app.problems import as_dict
-from app.relay import PageId
-from app.talk import newest_wins
-from app.view import Camera, View
-from core.errors import PalpateError
+from palpate.app.http_errors import as_dict
+from palpate.app.scene.colours import palette
+from palpate.app.scene.view import Camera, View
+from palpate.app.scene.viewpoint import Lookout, Standpoint
+from palpate.app.server.newest_wins import newest_wins
+from palpate.app.server.viser_proxy import PageId
+from palpate.app.services import DeskOf
+from palpate.foundation.errors import PalpateError
 
 __all__ = ["router"]
 
@@ -38,7 +40,9 @@ def show(page: PageId, view: View, desk: DeskOf) -> dict[str, Any]:
 
 @router.post("/sessions/{page}/look", status_code=204)
 def look(page: PageId, desk: DeskOf, where: Standpoint = "reset") -> None:
-    """Turn the camera to the phantom: the depth camera's view, or from the top, the front (along +y), the side (along -x)."""
+    """Turn the camera to the phantom: the depth camera's view, or from the top, the front (along
+    +y), the side (along -x).
+    """
     desk.sessions.get(page).look(where)
 
 
@@ -49,14 +53,24 @@ def stand(page: PageId, camera: Camera, desk: DeskOf) -> None:
     desk.sessions.open(page).stand(camera.run, Lookout(place, target, np.array([0.0, 0.0, 1.0])))
 
 
-@router.get("/sessions/{page}/still.png", response_class=Response, responses={200: {"content": {"image/png": {}}}})
+@router.get(
+    "/sessions/{page}/still.png",
+    response_class=Response,
+    responses={200: {"content": {"image/png": {}}}},
+)
 def still(page: PageId, desk: DeskOf, width: Pixels = 1280, height: Pixels = 720) -> Response:
-    """What the page's scene shows now, as its browser renders it; the background is transparent. 404 where no browser shows it."""
-    from PIL import Image  # noqa: PLC0415 (heavy)
+    """What the page's scene shows now, as its browser renders it; the background is transparent.
+    404 where no browser shows it.
+    """
+    from PIL import Image
 
     stream = BytesIO()
-    Image.fromarray(desk.sessions.get(page).still(width, height)).save(stream, "PNG", compress_level=1)
-    return Response(stream.getvalue(), media_type="image/png", headers={"cache-control": "no-store"})
+    Image.fromarray(desk.sessions.get(page).still(width, height)).save(
+        stream, "PNG", compress_level=1
+    )
+    return Response(
+        stream.getvalue(), media_type="image/png", headers={"cache-control": "no-store"}
+    )
 
 
 @router.get("/sessions/{page}/state")
@@ -67,7 +81,9 @@ def state(page: PageId, desk: DeskOf) -> dict[str, Any]:
 
 @router.websocket("/sessions/{page}/socket")
 async def socket(websocket: WebSocket, page: PageId, desk: DeskOf) -> None:
-    """Views in, states out; views that come while one is being drawn replace each other, so the newest wins."""
+    """Views in, states out; views that come while one is being drawn replace each other, so the
+    newest wins.
+    """
     await newest_wins(websocket, lambda text: _answer(desk, page, text))
 
 
@@ -75,6 +91,8 @@ def _answer(desk: DeskOf, page: str, text: str) -> dict[str, Any]:
     try:
         return desk.sessions.open(page).show(View.model_validate_json(text))
     except ValidationError as error:
-        return {"problem": {"kind": "RequestError", "message": error.errors()[0]["msg"], "where": {}}}
+        return {
+            "problem": {"kind": "RequestError", "message": error.errors()[0]["msg"], "where": {}}
+        }
     except PalpateError as error:
         return {"problem": as_dict(error)}

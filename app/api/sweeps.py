@@ -8,21 +8,27 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 from pydantic.config import JsonDict
 
-from app.desk import Desk, DeskOf, KeyOf
-from app.pages import PageOf, part_of
-from app.problems import Missing
-from app.schemas import JobOut
-from app.sweeps import Sweeps
-from core.sweeping.request import MOST_POINTS, Measure, Method, Request
+from palpate.app.http_errors import Missing
+from palpate.app.schemas import JobOut
+from palpate.app.server.pagination import PageOf, part_of
+from palpate.app.services import Desk, DeskOf, KeyOf
+from palpate.app.storage.sweep_store import Sweeps
+from palpate.sweep.sweep_request import MOST_POINTS, Measure, Method, Request
 
 __all__ = ["router"]
 
 router = APIRouter(prefix="/sweeps", tags=["sweeps"])
-EXAMPLE: JsonDict = {"dataset": "block-01", "parameters": [{"parameter": "poisson_ratio.nu", "low": 0.3, "high": 0.49}], "steps": 7}
+EXAMPLE: JsonDict = {
+    "dataset": "block-01",
+    "parameters": [{"parameter": "poisson_ratio.nu", "low": 0.3, "high": 0.49}],
+    "steps": 7,
+}
 
 
 class SweptParameter(BaseModel):
-    """One parameter by `effect.parameter` of GET /api/effects, and between which values it moves (SI)."""
+    """One parameter by `effect.parameter` of GET /api/effects, and between which values it moves
+    (SI).
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -32,9 +38,11 @@ class SweptParameter(BaseModel):
 
 
 class SweepRequest(BaseModel):
-    """What is swept, over which clouds, and how; see `core.sweeping.request.Request`."""
+    """What is swept, over which clouds, and how; see `palpate.sweep.sweep_request.Request`."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra={"examples": [EXAMPLE]})
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", json_schema_extra={"examples": [EXAMPLE]}
+    )
 
     dataset: str
     parameters: list[SweptParameter] = Field(min_length=1, max_length=12)
@@ -59,19 +67,29 @@ def start(request: SweepRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
         dataset.sequence(name)
     settings = desk.settings
     said = {
-        "dataset": str(dataset.path), "name": request.dataset, "runs": str(settings.runs), "workers": settings.workers,
-        "scheduler": settings.scheduler, "sweep": asked.to_json(), **desk.registered(request.dataset, request.registration),
-    }  # fmt: skip
+        "dataset": str(dataset.path),
+        "name": request.dataset,
+        "runs": str(settings.runs),
+        "workers": settings.workers,
+        "scheduler": settings.scheduler,
+        "sweep": asked.to_json(),
+        **desk.registered(request.dataset, request.registration),
+    }
     return JobOut.of(desk.jobs.submit("sweep", said, f"sweep-{request.dataset}", key))
 
 
 @router.get("")
 def listed(desk: DeskOf, response: Response, page: PageOf) -> list[dict[str, Any]]:
-    """Sweeps, the newest first, each with its job where that is still known; X-Total-Count says how many there are."""
+    """Sweeps, the newest first, each with its job where that is still known; X-Total-Count says how
+    many there are.
+    """
     kept = Sweeps(desk.settings.runs)
     jobs = {job.id: JobOut.of(job).model_dump() for job in desk.jobs.all() if job.kind == "sweep"}
     names = [*(name for name in jobs if not kept.begun(name)), *kept.names()]
-    return [{"id": name, "job": jobs.get(name), "begun": kept.begun(name)} for name in part_of(names, page, response)]
+    return [
+        {"id": name, "job": jobs.get(name), "begun": kept.begun(name)}
+        for name in part_of(names, page, response)
+    ]
 
 
 @router.get("/{identity}")
@@ -79,17 +97,29 @@ def one(identity: str, desk: DeskOf) -> dict[str, Any]:
     """One sweep: its job, what was asked, and what it found once it has ended."""
     kept, job = Sweeps(desk.settings.runs), _job(identity, desk)
     if job is None and not kept.begun(identity):
-        raise Missing(f"there is no sweep {identity}; GET /api/sweeps lists those there are", sweep=identity)
+        raise Missing(
+            f"there is no sweep {identity}; GET /api/sweeps lists those there are", sweep=identity
+        )
     begun = kept.begun(identity)
     asked = kept.request(identity) if begun else None
-    return {"id": identity, "job": job, "request": asked, "summary": kept.summary(identity) if begun else None}
+    return {
+        "id": identity,
+        "job": job,
+        "request": asked,
+        "summary": kept.summary(identity) if begun else None,
+    }
 
 
 @router.get("/{identity}/points")
 def points(
-    identity: str, desk: DeskOf, after: Annotated[int, Query(ge=0, le=10**9)] = 0, most: Annotated[int, Query(ge=1, le=1000)] = 1000
+    identity: str,
+    desk: DeskOf,
+    after: Annotated[int, Query(ge=0, le=10**9)] = 0,
+    most: Annotated[int, Query(ge=1, le=1000)] = 1000,
 ) -> dict[str, Any]:
-    """Points in the order in which they ended, from the `after`-th on; `next` is what to ask for next time."""
+    """Points in the order in which they ended, from the `after`-th on; `next` is what to ask for
+    next time.
+    """
     kept, job = Sweeps(desk.settings.runs), _job(identity, desk)
     if job is None:
         kept.request(identity)

@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any
 from fastapi import APIRouter, WebSocket
 from pydantic import ValidationError
 
-from app.desk import Desk, DeskOf
-from app.problems import Missing, as_dict
-from app.relay import PageId
-from app.schemas import LiveRequest, WhatIfRequest
-from app.sessions import Touch, Trial
-from app.summaries import finite
-from app.talk import newest_wins
-from app.whatif import Hand
-from core.errors import PalpateError
+from palpate.app.http_errors import Missing, as_dict
+from palpate.app.jobs.whatif_process import Hand
+from palpate.app.reporting.json_values import finite
+from palpate.app.scene.page_session import Touch, Trial
+from palpate.app.schemas import LiveRequest, WhatIfRequest
+from palpate.app.server.newest_wins import newest_wins
+from palpate.app.server.viser_proxy import PageId
+from palpate.app.services import Desk, DeskOf
+from palpate.foundation.errors import PalpateError
 
 if TYPE_CHECKING:
-    from core.live import Felt
+    from palpate.recording.interactive import Felt
 
 __all__ = ["router"]
 
@@ -29,19 +29,29 @@ router = APIRouter(tags=["what if"])
 
 @router.get("/runs/{name}/sequences/{sequence}/whatif")
 def beginnings(name: str, sequence: str, desk: DeskOf) -> dict[str, Any]:
-    """The model's effects, and a finite size of every effect of the catalogue, from which to go on by hand."""
+    """The model's effects, and a finite size of every effect of the catalogue, from which to go on
+    by hand.
+    """
     run = desk.runs.get(name)
     run.replay(sequence)
-    return {"model": run.model.get("effects", []), "beginnings": desk.whatifs.beginnings(run, sequence)}
+    return {
+        "model": run.model.get("effects", []),
+        "beginnings": desk.whatifs.beginnings(run, sequence),
+    }
 
 
 @router.post("/runs/{name}/sequences/{sequence}/whatif")
 def solve(name: str, sequence: str, request: WhatIfRequest, desk: DeskOf) -> dict[str, Any]:
-    """Solve one frame with these effects; errors [m] of it beside those of the run's models; drawn in `page` where one is given."""
+    """Solve one frame with these effects; errors [m] of it beside those of the run's models; drawn
+    in `page` where one is given.
+    """
     run = desk.runs.get(name)
     replay = run.replay(sequence)
     if request.frame >= len(replay):
-        raise Missing(f"{sequence} has the frames 0 to {len(replay) - 1}, not {request.frame}", sequence=sequence)
+        raise Missing(
+            f"{sequence} has the frames 0 to {len(replay) - 1}, not {request.frame}",
+            sequence=sequence,
+        )
     session = desk.sessions.get(request.page) if request.page else None
     effects = [one.model_dump() for one in request.effects]
     moment = desk.whatifs.solve(run, sequence, request.frame, effects, request.tuned)
@@ -60,7 +70,9 @@ def solve(name: str, sequence: str, request: WhatIfRequest, desk: DeskOf) -> dic
 
 @router.post("/runs/{name}/sequences/{sequence}/live")
 def lead(name: str, sequence: str, request: LiveRequest, desk: DeskOf) -> dict[str, Any]:
-    """Lead the tool somewhere: push depth [m] and force [N] that it feels there, from wherever it was; drawn in `page` if given."""
+    """Lead the tool somewhere: push depth [m] and force [N] that it feels there, from wherever it
+    was; drawn in `page` if given.
+    """
     session = desk.sessions.get(request.page) if request.page else None
     effects = [one.model_dump() for one in request.effects]
     hand = Hand.of(request.page or "nobody", desk.runs.get(name), sequence, effects, request.tuned)
@@ -78,9 +90,11 @@ def let_go(page: PageId, desk: DeskOf) -> None:
 
 @router.websocket("/sessions/{page}/live")
 async def led(websocket: WebSocket, page: PageId, desk: DeskOf) -> None:
-    """Places in, answers out, drawn in the page: each message is a `LiveRequest` with `run` and `sequence`.
+    """Places in, answers out, drawn in the page: each message is a `LiveRequest` with `run` and
+    `sequence`.
 
-    While one is being solved only the newest is kept. The recording is shown again when the connection ends.
+    While one is being solved only the newest is kept. The recording is shown again when the
+    connection ends.
     """
     hands: dict[str, Hand] = {}
 
@@ -88,7 +102,13 @@ async def led(websocket: WebSocket, page: PageId, desk: DeskOf) -> None:
         try:
             return _led(desk, page, hands, LedRequest.model_validate_json(text))
         except ValidationError as error:
-            return {"problem": {"kind": "RequestError", "message": error.errors()[0]["msg"], "where": {}}}
+            return {
+                "problem": {
+                    "kind": "RequestError",
+                    "message": error.errors()[0]["msg"],
+                    "where": {},
+                }
+            }
         except PalpateError as error:
             return {"problem": as_dict(error)}
 
@@ -107,16 +127,24 @@ class LedRequest(LiveRequest):
 
 
 def _led(desk: Desk, page: str, hands: dict[str, Hand], request: LedRequest) -> dict[str, Any]:
-    """Solve, draw and tell; `hands` keeps what was looked up for the connection's last request of the same kind."""
+    """Solve, draw and tell; `hands` keeps what was looked up for the connection's last request of
+    the same kind.
+    """
     key = request.model_dump_json(exclude={"at"})
     if key not in hands:
         hands.clear()
         effects = [one.model_dump() for one in request.effects]
-        hands[key] = Hand.of(page, desk.runs.get(request.run), request.sequence, effects, request.tuned)
+        hands[key] = Hand.of(
+            page, desk.runs.get(request.run), request.sequence, effects, request.tuned
+        )
     session = desk.sessions.open(page)
     felt = desk.lives.at(hands[key], request.at, session.wants_inside())
     session.touch(Touch(request.run, request.sequence, request.shown, felt))
-    return {**told(felt), "at": list(request.at), "drawn": None if session.picture is None else session.picture.scale()}
+    return {
+        **told(felt),
+        "at": list(request.at),
+        "drawn": None if session.picture is None else session.picture.scale(),
+    }
 
 
 def told(felt: Felt) -> dict[str, Any]:

@@ -13,10 +13,26 @@ from rich.box import SIMPLE
 from rich.console import Group
 from rich.table import Table
 
-from app.blind_tables import TITLES, figure_text, hidden_text, named_text, target_text
-from app.console import look_at, out, progress, write_json
-from core.blind import RESULTS_FILE, Result, all_cases, draw_cases, known_results, read_results, run_case, run_suite, summary_of
-from core.errors import RunError
+from palpate.app.commands.console import look_at, out, progress, write_json
+from palpate.app.reporting.blind_tables import (
+    TITLES,
+    figure_text,
+    hidden_text,
+    named_text,
+    target_text,
+)
+from palpate.blind import (
+    RESULTS_FILE,
+    Result,
+    all_cases,
+    draw_cases,
+    known_results,
+    read_results,
+    run_case,
+    run_suite,
+    summary_of,
+)
+from palpate.foundation.errors import RunError
 
 __all__ = ["blind"]
 
@@ -24,33 +40,64 @@ CONTROLS = 10
 
 
 def blind(
-    folder: Annotated[Path, typer.Option(help="Where the results go; what stands there is not done again.")] = Path("runs/blind"),
+    folder: Annotated[
+        Path, typer.Option(help="Where the results go; what stands there is not done again.")
+    ] = Path("runs/blind"),
     scenarios: Annotated[
-        int | None, typer.Option(min=1, help="Draw so many cases of all kinds; without it each effect is hidden once.")
+        int | None,
+        typer.Option(
+            min=1, help="Draw so many cases of all kinds; without it each effect is hidden once."
+        ),
     ] = None,
     kinds: Annotated[
-        str | None, typer.Option(help="Of --scenarios only these: control, clear, subtle, pair, outside, twins, modulus.")
+        str | None,
+        typer.Option(
+            help="Of --scenarios only these: control, clear, subtle, pair, outside, twins, modulus."
+        ),
     ] = None,
-    effects: Annotated[str | None, typer.Option(help="Hide only these, parted by commas; all that are weighed without.")] = None,
+    effects: Annotated[
+        str | None,
+        typer.Option(help="Hide only these, parted by commas; all that are weighed without."),
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="All hidden parameters follow from it.")] = 0,
     controls: Annotated[
-        int | None, typer.Option(min=0, help="Cases in which nothing is hidden; 10, or a quarter of --scenarios without.")
+        int | None,
+        typer.Option(
+            min=0, help="Cases in which nothing is hidden; 10, or a quarter of --scenarios without."
+        ),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Cases at the same time.")] = 2,
     only: Annotated[str | None, typer.Option(help="Only cases whose name contains this.")] = None,
-    short: Annotated[bool, typer.Option("--short", help="Five sequences instead of seven: sooner done, and tells less.")] = False,
-    any_version: Annotated[bool, typer.Option("--any-version", help="Take results of other versions of the code, too.")] = False,
-    score: Annotated[
-        bool, typer.Option("--score", help="Run nothing: score what is there, also of a suite that still runs.")
+    short: Annotated[
+        bool,
+        typer.Option(
+            "--short", help="Five sequences instead of seven: sooner done, and tells less."
+        ),
     ] = False,
-    again: Annotated[bool, typer.Option("--again", help="Do those again that ended in an error.")] = False,
+    any_version: Annotated[
+        bool, typer.Option("--any-version", help="Take results of other versions of the code, too.")
+    ] = False,
+    score: Annotated[
+        bool,
+        typer.Option(
+            "--score", help="Run nothing: score what is there, also of a suite that still runs."
+        ),
+    ] = False,
+    again: Annotated[
+        bool, typer.Option("--again", help="Do those again that ended in an error.")
+    ] = False,
     keep: Annotated[
-        bool, typer.Option("--keep", help="Keep dataset and run of each case in FOLDER/kept, to be looked at.")
+        bool,
+        typer.Option(
+            "--keep", help="Keep dataset and run of each case in FOLDER/kept, to be looked at."
+        ),
     ] = False,
 ) -> None:
-    """Hide effects, what no effect expresses, and nothing; say how often, and how well, a diagnosis that is not told finds it.
+    """Hide effects, what no effect expresses, and nothing; say how often, and how well, a diagnosis
+    that is not told finds it.
 
-    Writes results.jsonl, summary.json and report.html into the folder. Can be stopped and taken up again.
+    Writes results.jsonl, summary.json and report.html into the folder. Can be stopped and taken up
+    again.
     """
     wanted, kept = _parted(effects), folder / "kept"
     if scenarios is None:
@@ -67,14 +114,20 @@ def blind(
     else:
         with progress("blind suite") as report:
             run = partial(run_case, kept=kept) if keep else None
-            results = run_suite(folder, cases, workers, report, any_version=any_version, again=again, run=run)
+            results = run_suite(
+                folder, cases, workers, report, any_version=any_version, again=again, run=run
+            )
     summary = summary_of(results, seed, missing=len(cases) - len(results))
     _write(folder, summary, results)
     out.print(_cases(results))
     out.print(_targets(summary["targets"]))
     for kind, counted in summary["kinds"].items():
         right, false = counted["right"], counted["false_name"]
-        named = f", a cause falsely named in {false['hits']}" if kind in ("control", "outside", "modulus") else ""
+        named = (
+            f", a cause falsely named in {false['hits']}"
+            if kind in ("control", "outside", "modulus")
+            else ""
+        )
         out.print(f"{TITLES[kind]}: {right['hits']} of {right['n']} right{named}", highlight=False)
     out.print(f"{folder / 'report.html'}", highlight=False, soft_wrap=True)
     if kept.exists():
@@ -86,9 +139,7 @@ def _nothing_of(folder: Path, wanted: int) -> str:
     others = len(read_results(folder / RESULTS_FILE))
     if not others:
         return f"{folder} holds no {RESULTS_FILE} with results to score"
-    return (
-        f"{folder / RESULTS_FILE}: none of its {others} results is of these {wanted} cases; give the options that it was made with"
-    )
+    return f"{folder / RESULTS_FILE}: none of its {others} results is of these {wanted} cases; give the options that it was made with"
 
 
 def _parted(text: str | None) -> list[str] | None:
@@ -96,7 +147,7 @@ def _parted(text: str | None) -> list[str] | None:
 
 
 def _write(folder: Path, summary: dict[str, Any], results: Sequence[Result]) -> None:
-    from app.blind_page import blind_page  # noqa: PLC0415 (heavy)
+    from palpate.app.reporting.blind_page import blind_page
 
     write_json(folder / "summary.json", summary)
     aside = folder / ".report.html.part"
@@ -105,8 +156,12 @@ def _write(folder: Path, summary: dict[str, Any], results: Sequence[Result]) -> 
 
 
 def _cases(results: Sequence[Result]) -> Table:
-    """A line for each case, and below it what was hidden and what was named: parameters need the whole width."""
-    table = Table(title="blind suite", header_style="bold", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
+    """A line for each case, and below it what was hidden and what was named: parameters need the
+    whole width.
+    """
+    table = Table(
+        title="blind suite", header_style="bold", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False
+    )
     table.add_column("")
     table.add_column("case", overflow="fold")
     table.add_column("verdict")
@@ -118,9 +173,14 @@ def _cases(results: Sequence[Result]) -> Table:
         told.add_row("[dim]hidden[/]", hidden_text(result))
         told.add_row("[dim]named[/]", named_text(result))
         table.add_row(
-            "[green]✓[/]" if result.right else "[red]✗[/]", Group(result.name, told), result.verdict,
-            f"{result.gain:.0f} ({result.bound:.0f}) nats", removed, f"{result.seconds:.0f} s", end_section=True,
-        )  # fmt: skip
+            "[green]✓[/]" if result.right else "[red]✗[/]",
+            Group(result.name, told),
+            result.verdict,
+            f"{result.gain:.0f} ({result.bound:.0f}) nats",
+            removed,
+            f"{result.seconds:.0f} s",
+            end_section=True,
+        )
     return table
 
 
@@ -132,5 +192,7 @@ def _targets(targets: Sequence[dict[str, Any]]) -> Table:
     for one in targets:
         if one["met"] is not None:
             mark = "[green]✓[/]" if one["met"] else "[red]✗[/]"
-            table.add_row(one["text"], target_text(one), *figure_text(one["reached"], one["unit"]), mark)
+            table.add_row(
+                one["text"], target_text(one), *figure_text(one["reached"], one["unit"]), mark
+            )
     return table

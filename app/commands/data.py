@@ -1,4 +1,6 @@
-"""`palpate check`, `register` and `replay`: what is there, how the frames relate, what the simulation says."""
+"""`palpate check`, `register` and `replay`: what is there, how the frames relate, what the
+simulation says.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +14,15 @@ from rich.box import SIMPLE
 from rich.markup import escape
 from rich.table import Table
 
-from app.console import Registration as Registered
-from app.console import out, print_problem, print_warnings, progress
-from core.errors import DatasetError, PalpateError, RegistrationError
-from core.progress import part
+from palpate.app.commands.console import Registration as Registered
+from palpate.app.commands.console import out, print_problem, print_warnings, progress
+from palpate.foundation.errors import DatasetError, PalpateError, RegistrationError
+from palpate.foundation.progress import part
 
 if TYPE_CHECKING:
-    from core.dataset import Dataset
-    from core.dataset.check import DatasetSummary
-    from core.registration import Registration
+    from palpate.dataset import Dataset
+    from palpate.dataset.check import DatasetSummary
+    from palpate.registration.registration import Registration
 
 __all__ = ["check", "register", "replay"]
 
@@ -31,11 +33,18 @@ _SHOWN = (25, 9, 9)
 
 def check(
     datasets: Annotated[list[Path], typer.Argument(help="Dataset folders.", show_default=False)],
-    picture: Annotated[Path | None, typer.Option(help="Write a picture of where the tool touched (one dataset only).")] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(help="Write a picture of where the tool touched (one dataset only)."),
+    ] = None,
 ) -> None:
-    """Read everything in a dataset and say what it holds, what is doubtful, and what it cannot tell."""
+    """Read everything in a dataset and say what it holds, what is doubtful, and what it cannot
+    tell.
+    """
     if picture is not None and len(datasets) != 1:
-        raise DatasetError(f"--picture shows one dataset, {len(datasets)} were named; check them one by one")
+        raise DatasetError(
+            f"--picture shows one dataset, {len(datasets)} were named; check them one by one"
+        )
     broken = 0
     for path in datasets:
         try:
@@ -49,8 +58,8 @@ def check(
 
 def register(dataset: Folder) -> None:
     """Relate robot, camera and phantom, each with its uncertainty."""
-    from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
-    from core.registration import register as relate  # noqa: PLC0415 (heavy)
+    from palpate.dataset import open_dataset
+    from palpate.registration.registration import register as relate
 
     with progress("register") as report:
         found = relate(open_dataset(dataset), report)
@@ -60,7 +69,9 @@ def register(dataset: Folder) -> None:
     table.add_row("phantom from robot", *_pose(found.phantom_from_robot, found.robot_covariance))
     table.add_row("phantom from camera", *_pose(found.phantom_from_camera, found.camera_covariance))
     out.print(table)
-    out.print(f"touches miss their landmarks by {1e3 * found.touch_rms:.2f} mm RMS", highlight=False)
+    out.print(
+        f"touches miss their landmarks by {1e3 * found.touch_rms:.2f} mm RMS", highlight=False
+    )
     if found.weak_directions:
         out.print(f"weakly determined: {', '.join(found.weak_directions)}", highlight=False)
     print_warnings(found.warnings)
@@ -69,24 +80,34 @@ def register(dataset: Folder) -> None:
 def replay(
     dataset: Folder,
     sequence: Annotated[str, typer.Option(help="Which sequence.", show_default=False)],
-    file: Annotated[Path, typer.Option("--out", dir_okay=False, help="Where the frames go (.npz).", show_default=False)],
-    grid: Annotated[str, typer.Option(help="Even nodes along x, y, z, as in 13x5x5; or finest at the tool.")] = "graded",
+    file: Annotated[
+        Path,
+        typer.Option(
+            "--out", dir_okay=False, help="Where the frames go (.npz).", show_default=False
+        ),
+    ],
+    grid: Annotated[
+        str, typer.Option(help="Even nodes along x, y, z, as in 13x5x5; or finest at the tool.")
+    ] = "graded",
     registration: Registered = None,
-    runs: Annotated[Path, typer.Option(help="Accepted registrations are looked for below this folder.")] = Path("runs"),
+    runs: Annotated[
+        Path, typer.Option(help="Accepted registrations are looked for below this folder.")
+    ] = Path("runs"),
 ) -> None:
-    """Simulate one sequence as the setup states it: one equilibrium per cloud, written to an .npz file.
+    """Simulate one sequence as the setup states it: one equilibrium per cloud, written to an .npz
+    file.
 
     Frames without equilibrium are named, marked in the file, and make the exit code 1.
     """
-    import core.registration as relating  # noqa: PLC0415 (heavy)
-    import core.replay as simulation  # noqa: PLC0415 (heavy)
-    from app.registrations import accepted_for  # noqa: PLC0415 (heavy)
-    from core.accuracy import hardest_frames, mesh_errors  # noqa: PLC0415 (heavy)
-    from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
-    from core.fem.newton import Outcome  # noqa: PLC0415 (heavy)
-    from core.grading import REPLAY_GRID  # noqa: PLC0415 (heavy)
-    from core.mesh import GridSpec, box_mesh  # noqa: PLC0415 (heavy)
-    from core.meshing import Meshing  # noqa: PLC0415 (heavy)
+    import palpate.registration.registration as relating
+    import palpate.replay.replay as simulation
+    from palpate.app.storage.registration_store import accepted_for
+    from palpate.dataset import open_dataset
+    from palpate.fem.newton import Outcome
+    from palpate.mesh.box_mesh import GridSpec, box_mesh
+    from palpate.mesh.graded_mesh import REPLAY_GRID
+    from palpate.mesh.protocol import Meshing
+    from palpate.replay.mesh_convergence import hardest_frames, mesh_errors
 
     even = None if grid == "graded" else GridSpec.parse(grid)
     opened = open_dataset(dataset).registered(accepted_for(dataset, registration, runs))
@@ -103,33 +124,52 @@ def replay(
     used, quads = np.unique(mesh.free_surface, return_inverse=True)
     rest = mesh.nodes[used]
     _save(
-        file, time=times, tool=centres, rest=rest, faces=quads.reshape(-1, 4),
-        vertices=np.stack([frame.move(rest) for frame in frames]), force=np.stack([frame.force for frame in frames]),
-        residual=np.array([frame.residual for frame in frames]), outcome=np.array([frame.outcome.name for frame in frames]),
-        mesh_error=np.array([(miss.frame, miss.displacement, miss.relative, miss.force) for miss in misses]).reshape(-1, 4),
-    )  # fmt: skip
-    failed = [number for number, frame in enumerate(frames) if frame.outcome is not Outcome.CONVERGED]
+        file,
+        time=times,
+        tool=centres,
+        rest=rest,
+        faces=quads.reshape(-1, 4),
+        vertices=np.stack([frame.move(rest) for frame in frames]),
+        force=np.stack([frame.force for frame in frames]),
+        residual=np.array([frame.residual for frame in frames]),
+        outcome=np.array([frame.outcome.name for frame in frames]),
+        mesh_error=np.array(
+            [(miss.frame, miss.displacement, miss.relative, miss.force) for miss in misses]
+        ).reshape(-1, 4),
+    )
+    failed = [
+        number for number, frame in enumerate(frames) if frame.outcome is not Outcome.CONVERGED
+    ]
     where = f"{grid} nodes" if even else "a mesh that follows the tool"
-    out.print(f"{len(frames)} frames on {where}, {len(frames) - len(failed)} converged: {file}", highlight=False)
+    out.print(
+        f"{len(frames)} frames on {where}, {len(frames) - len(failed)} converged: {file}",
+        highlight=False,
+    )
     if misses:
         worst = max(misses, key=lambda miss: miss.displacement)
         size = f"{1e3 * worst.displacement:.2f} mm RMS ({worst.relative:.0%}) and {worst.force:.0%} of the force"
-        out.print(f"the grid's own error, by a finer one: {size} at frame {worst.frame}, the worst of {len(misses)} touches")
+        out.print(
+            f"the grid's own error, by a finer one: {size} at frame {worst.frame}, the worst of {len(misses)} touches"
+        )
     for number in sorted(set(hardest_frames(frames)) - {miss.frame for miss in misses}):
-        out.print(f"[yellow]frame {number}[/] no equilibrium on the finer grid, so its mesh error is unknown", highlight=False)
+        out.print(
+            f"[yellow]frame {number}[/] no equilibrium on the finer grid, so its mesh error is unknown",
+            highlight=False,
+        )
     for number in failed:
         out.print(
-            f"[yellow]frame {number}[/] {frames[number].outcome.value} (residual {frames[number].residual:.2g})", highlight=False
+            f"[yellow]frame {number}[/] {frames[number].outcome.value} (residual {frames[number].residual:.2g})",
+            highlight=False,
         )
     if failed:
         raise typer.Exit(1)
 
 
 def _check_one(path: Path, picture: Path | None) -> None:
-    from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
-    from core.dataset.check import check_dataset  # noqa: PLC0415 (heavy)
-    from core.registration import register as relate  # noqa: PLC0415 (heavy)
-    from core.standing import as_it_stood  # noqa: PLC0415 (heavy)
+    from palpate.dataset import open_dataset
+    from palpate.dataset.check import check_dataset
+    from palpate.measurement.phantom_drift import as_it_stood
+    from palpate.registration.registration import register as relate
 
     dataset = open_dataset(path)
     found: Registration | None = None
@@ -140,11 +180,13 @@ def _check_one(path: Path, picture: Path | None) -> None:
             warnings = as_it_stood(dataset, found)[1].warnings
         except RegistrationError as error:
             warnings = (error.message,)
-        summary = check_dataset(dataset, found.phantom_from_robot if found else None, part(report, 0.6, 1.0))
+        summary = check_dataset(
+            dataset, found.phantom_from_robot if found else None, part(report, 0.6, 1.0)
+        )
     _print_summary(dataset, summary, found)
     print_warnings((*summary.warnings, *warnings))
     if picture is not None and found is not None:
-        from core.dataset.coverage import coverage_picture  # noqa: PLC0415 (heavy)
+        from palpate.dataset.coverage_figure import coverage_picture
 
         coverage_picture(dataset, found.phantom_from_robot, picture)
         out.print(f"coverage: {picture}", highlight=False)
@@ -152,27 +194,44 @@ def _check_one(path: Path, picture: Path | None) -> None:
 
 def _print_summary(dataset: Dataset, summary: DatasetSummary, found: Registration | None) -> None:
     title = f"{dataset.path.name} · {summary.name}"
-    table = Table(title=title, header_style="bold", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
+    table = Table(
+        title=title, header_style="bold", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False
+    )
     for column in ("sequence", "split", "length", "robot", "clouds", "lost", "points", "motion"):
         table.add_column(
-            column, justify="left" if column in ("sequence", "split", "motion") else "right", no_wrap=column == "sequence"
+            column,
+            justify="left" if column in ("sequence", "split", "motion") else "right",
+            no_wrap=column == "sequence",
         )
     for one in summary.sequences:
         table.add_row(
-            one.name, one.split, f"{one.duration:.1f} s", f"{one.kinematics.rate:.0f} Hz",
-            f"{one.clouds.count}, {one.clouds.rate:.1f} Hz" if one.clouds.count else "–", str(one.clouds.dropouts),
-            "–" if one.points is None else str(one.points[1]), _motion(one.motion),
-        )  # fmt: skip
+            one.name,
+            one.split,
+            f"{one.duration:.1f} s",
+            f"{one.kinematics.rate:.0f} Hz",
+            f"{one.clouds.count}, {one.clouds.rate:.1f} Hz" if one.clouds.count else "–",
+            str(one.clouds.dropouts),
+            "–" if one.points is None else str(one.points[1]),
+            _motion(one.motion),
+        )
     out.print(table)
     size = " × ".join(f"{1e3 * edge:.1f}" for edge in summary.size)
     touches = f", missing their landmarks by {1e3 * found.touch_rms:.2f} mm RMS" if found else ""
     tool = f"tool radius {1e3 * summary.tool_radius:.1f} mm"
-    out.print(f"phantom {size} mm, {tool}, {len(summary.touches)} touches{touches}", highlight=False)
+    out.print(
+        f"phantom {size} mm, {tool}, {len(summary.touches)} touches{touches}", highlight=False
+    )
     felt = [one for one in summary.sequences if one.forces]
     if felt:
         fitted = any(one.split in ("train", "validation") for one in felt)
-        told = "so that Young's modulus can be told" if fitted else "but in none to fit on, so that Young's modulus cannot be told"
-        out.print(f"forces in {len(felt)} of {len(summary.sequences)} sequences, {told}", highlight=False)
+        told = (
+            "so that Young's modulus can be told"
+            if fitted
+            else "but in none to fit on, so that Young's modulus cannot be told"
+        )
+        out.print(
+            f"forces in {len(felt)} of {len(summary.sequences)} sequences, {told}", highlight=False
+        )
     for lack in summary.lacks:
         out.print(f"[yellow]lacks[/] {escape(lack.sentence)}", highlight=False)
 

@@ -10,27 +10,36 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from app.commands.diagnosis import print_report, run_diagnosis
-from app.commands.service import announce
-from app.console import look_at, out, progress, verdict_cells, verdict_table
-from app.settings import Settings
+from palpate.app.commands.console import look_at, out, progress, verdict_cells, verdict_table
+from palpate.app.commands.diagnosis import print_report, run_diagnosis
+from palpate.app.commands.service import announce
+from palpate.app.settings import Settings
 
 __all__ = ["demo"]
 
 
 def demo(
-    seed: Annotated[int | None, typer.Option(min=0, help="What is hidden follows from it; drawn at random if not given.")] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(min=0, help="What is hidden follows from it; drawn at random if not given."),
+    ] = None,
     effects: Annotated[int, typer.Option(min=0, max=2, help="How many effects to hide.")] = 1,
     palpation: Annotated[
         str | None,
-        typer.Option(help="Palpate by force alone, without a camera: a box or an organ, with a lump or with --effects 0."),
+        typer.Option(
+            help="Palpate by force alone, without a camera: a box or an organ, with a lump or with --effects 0."
+        ),
     ] = None,
-    show: Annotated[bool, typer.Option("--serve/--no-serve", help="Open the page afterwards.")] = True,
+    show: Annotated[
+        bool, typer.Option("--serve/--no-serve", help="Open the page afterwards.")
+    ] = True,
     folder: Annotated[Path, typer.Option(help="Where dataset and run go.")] = Path("runs/demo"),
     port: Annotated[int, typer.Option(min=0, max=65535)] = 8321,
     workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
 ) -> None:
-    """Make a virtual phantom with a hidden effect, run the whole loop, and compare the verdict with the truth."""
+    """Make a virtual phantom with a hidden effect, run the whole loop, and compare the verdict with
+    the truth.
+    """
     if palpation not in (None, "box", "organ"):
         raise typer.BadParameter(f"--palpation is box or organ, not {palpation!r}")
     if palpation and effects > 1:
@@ -47,18 +56,23 @@ def demo(
     table.add_row(*verdict_cells(dataset.name, report, seconds, truth, True))
     out.print(table)
     if show:
-        from app.serve import serve  # noqa: PLC0415 (heavy)
+        from palpate.app.server.serve import serve
 
-        settings = Settings(port=port, runs=folder / "runs", datasets=folder / "datasets", workers=workers)
+        settings = Settings(
+            port=port, runs=folder / "runs", datasets=folder / "datasets", workers=workers
+        )
         serve(settings, lambda address: announce(address, f"/?run={run.name}"))
     else:
         look_at(folder)
 
 
-def _make(dataset: Path, seed: int, effects: int, workers: int, palpation: str | None) -> dict[str, Any]:
-    """The dataset of this seed with its truth; one that is there already is the same and is kept."""
-    from app.commands.diagnosis import truth_beside  # noqa: PLC0415
-    from core.synthetic import (  # noqa: PLC0415 (heavy)
+def _make(
+    dataset: Path, seed: int, effects: int, workers: int, palpation: str | None
+) -> dict[str, Any]:
+    """The dataset of this seed with its truth; one that is there already is the same and is
+    kept."""
+    from palpate.app.commands.diagnosis import truth_beside
+    from palpate.synthetic import (
         SHORT_PROTOCOL,
         draw_palpation,
         draw_scenario,
@@ -72,6 +86,8 @@ def _make(dataset: Path, seed: int, effects: int, workers: int, palpation: str |
     with progress("make the phantom") as report:
         if palpation:
             body: Literal["box", "organ"] = "box" if palpation == "box" else "organ"
-            return make_palpation(dataset, draw_palpation(body, effects, seed), seed, workers, report).as_dict()
+            return make_palpation(
+                dataset, draw_palpation(body, effects, seed), seed, workers, report
+            ).as_dict()
         scenario = replace(draw_scenario(seed, effects), sequences=SHORT_PROTOCOL)
         return make_dataset(dataset, scenario, seed, workers, report).as_dict()

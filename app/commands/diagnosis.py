@@ -17,9 +17,17 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from app.console import Registration, out, print_warnings, progress, verdict_cells, verdict_table, write_json
-from app.quantities import between
-from app.sentences import (
+from palpate.app.commands.console import (
+    Registration,
+    out,
+    print_warnings,
+    progress,
+    verdict_cells,
+    verdict_table,
+    write_json,
+)
+from palpate.app.reporting.quantities import between
+from palpate.app.reporting.sentences import (
     control_sentences,
     determined_sentences,
     left_sentences,
@@ -29,28 +37,39 @@ from app.sentences import (
     registration_sentences,
     verdict_sentence,
 )
-from core.errors import DatasetError, RunError
+from palpate.foundation.errors import DatasetError, RunError
 
 if TYPE_CHECKING:
-    from core.dataset.accepted import Accepted
+    from palpate.dataset.accepted_registration import Accepted
 
 __all__ = ["diagnose", "print_report", "run_diagnosis", "true_effects", "truth_beside"]
 
 ALIKE = 0.3
-"""Share of a pattern from which on a rival that imitates so much of it is mentioned [1]; the page has the same."""
+"""Share of a pattern from which on a rival that imitates so much of it is mentioned [1]; the page
+has the same."""
 
 
 def diagnose(
     datasets: Annotated[list[Path], typer.Argument(help="Dataset folders.", show_default=False)],
-    file: Annotated[Path | None, typer.Option("--out", help="The report (JSON); of several datasets a folder of them.")] = None,
-    run: Annotated[Path | None, typer.Option(help="Keep the run folder here; of several datasets a folder of them.")] = None,
+    file: Annotated[
+        Path | None,
+        typer.Option("--out", help="The report (JSON); of several datasets a folder of them."),
+    ] = None,
+    run: Annotated[
+        Path | None,
+        typer.Option(help="Keep the run folder here; of several datasets a folder of them."),
+    ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
     seed: Annotated[int, typer.Option(min=0, help="Seed of all random draws.")] = 0,
     registration: Registration = None,
-    runs: Annotated[Path, typer.Option(help="Accepted registrations are looked for below this folder.")] = Path("runs"),
+    runs: Annotated[
+        Path, typer.Option(help="Accepted registrations are looked for below this folder.")
+    ] = Path("runs"),
 ) -> None:
-    """Name what the simulation of each dataset misses, and what naming it gains on sequences nothing was fitted on."""
-    from app.registrations import accepted_for  # noqa: PLC0415 (heavy)
+    """Name what the simulation of each dataset misses, and what naming it gains on sequences
+    nothing was fitted on.
+    """
+    from palpate.app.storage.registration_store import accepted_for
 
     several = len(datasets) > 1
     _refuse_place(file, run, several)
@@ -76,22 +95,27 @@ def diagnose(
 def run_diagnosis(
     dataset: Path, run: Path, workers: int, seed: int, accepted: Accepted | None = None
 ) -> tuple[dict[str, Any], float]:
-    """Diagnose with a progress bar; the run folder is whole at `run`, or not there at all. Returns report and seconds."""
-    from app.work import diagnose_into  # noqa: PLC0415 (heavy)
+    """Diagnose with a progress bar; the run folder is whole at `run`, or not there at all. Returns
+    report and seconds.
+    """
+    from palpate.app.jobs.tasks import diagnose_into
 
     began = time.monotonic()
     run.parent.mkdir(parents=True, exist_ok=True)
     scratch = Path(tempfile.mkdtemp(prefix=".making-", dir=run.parent))
     try:
         with progress(f"diagnose {dataset.name}") as report:
-            result = diagnose_into(dataset, run, scratch, workers=workers, seed=seed, report=report, accepted=accepted)
+            result = diagnose_into(
+                dataset, run, scratch, workers=workers, seed=seed, report=report, accepted=accepted
+            )
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
     return result, time.monotonic() - began
 
 
 def truth_beside(dataset: Path) -> dict[str, Any] | None:
-    """What is known to be hidden, from `<dataset>.truth.json`; only ever compared with, never used."""
+    """What is known to be hidden, from `<dataset>.truth.json`; only ever compared with, never
+    used."""
     path = dataset.resolve().with_name(f"{dataset.resolve().name}.truth.json")
     try:
         truth = json.loads(path.read_text())
@@ -101,12 +125,17 @@ def truth_beside(dataset: Path) -> dict[str, Any] | None:
 
 
 def true_effects(dataset: Path) -> list[dict[str, Any]]:
-    """What is hidden in a virtual dataset, as `Effect.to_json` has it; RunError where nothing is known of it."""
+    """What is hidden in a virtual dataset, as `Effect.to_json` has it; RunError where nothing is
+    known of it.
+    """
     truth, file = truth_beside(dataset), f"{dataset.resolve().name}.truth.json"
     if truth is None:
         raise RunError(f"{dataset} has no {file} beside it; leave --truth out", file=file)
     return [
-        {"effect": one["effect"], "parameters": {key: entry["value"] for key, entry in one["parameters"].items()}}
+        {
+            "effect": one["effect"],
+            "parameters": {key: entry["value"] for key, entry in one["parameters"].items()},
+        }
         for one in truth["effects"]
     ]
 
@@ -115,23 +144,34 @@ def print_report(report: dict[str, Any]) -> None:
     """The verdict in one sentence, then what it rests on."""
     lines: list[Any] = [Text(verdict_sentence(report), style="bold")]
     gain = report.get("gain") or {}
-    steps = {key.replace("_", " "): gain.get(key) for key in ("baseline", "extended", "noise_floor")}
+    steps = {
+        key.replace("_", " "): gain.get(key) for key in ("baseline", "extended", "noise_floor")
+    }
     shown = ", ".join(
-        f"{value:.3g} {gain.get('unit', 'mm')} {name}" for name, value in steps.items() if isinstance(value, (int, float))
+        f"{value:.3g} {gain.get('unit', 'mm')} {name}"
+        for name, value in steps.items()
+        if isinstance(value, (int, float))
     )
     if shown:
         lines.append(Text(f"error on the {gain.get('split', 'test')} sequences: {shown}"))
     for one in report.get("identified", []):
         shown = ", ".join(f"{name} {between(entry)}" for name, entry in one["parameters"].items())
-        lines.append(Text(f"identified: {one['effect']}: {shown}; {one.get('why', '')}", style="dim"))
+        lines.append(
+            Text(f"identified: {one['effect']}: {shown}; {one.get('why', '')}", style="dim")
+        )
     for one in report.get("not_identifiable", []):
         lines.append(Text(f"not identifiable: {one['effect']}: {one.get('why', '')}", style="dim"))
     lines += [Text(" ".join(said)) for said in [left_sentences(report)] if said]
     lines += [Text(said, style="dim") for said in registration_sentences(report)]
     lines += [Text(said) for said in palpation_sentences(report)]
     lines += [Text(said, style="dim") for said in determined_sentences(report.get("causes", []))]
-    lines += [Text(f"control: {said}", style="dim") for said in control_sentences(report.get("controls") or [])]
-    lines += [Text(f"next probe: {probe_sentence(row)}") for row in (report.get("next_probe") or [])[:1]]
+    lines += [
+        Text(f"control: {said}", style="dim")
+        for said in control_sentences(report.get("controls") or [])
+    ]
+    lines += [
+        Text(f"next probe: {probe_sentence(row)}") for row in (report.get("next_probe") or [])[:1]
+    ]
     out.print(Panel(Group(*lines), expand=False))
     print_warnings(report.get("warnings", []))
     if report.get("ranking"):
@@ -147,7 +187,10 @@ def _ranking(entries: list[dict[str, Any]]) -> Table:
     table.add_column("probability", justify="right")
     for entry in entries[:8]:
         removed, probability = entry.get("error_removed"), entry.get("probability")
-        table.add_row(entry["effect"], *("–" if value is None else f"{100 * value:.1f} %" for value in (removed, probability)))
+        table.add_row(
+            entry["effect"],
+            *("–" if value is None else f"{100 * value:.1f} %" for value in (removed, probability)),
+        )
     return table
 
 
@@ -168,24 +211,34 @@ def _refuse_place(file: Path | None, run: Path | None, several: bool) -> None:
     if file is None:
         return
     if several and file.is_file():
-        raise typer.BadParameter(f"--out {file} is a file; of several datasets it is a folder of their reports")
+        raise typer.BadParameter(
+            f"--out {file} is a file; of several datasets it is a folder of their reports"
+        )
     if not several and file.is_dir():
-        raise typer.BadParameter(f"--out {file} is a folder; name a file, such as {file / 'report.json'}")
+        raise typer.BadParameter(
+            f"--out {file} is a folder; name a file, such as {file / 'report.json'}"
+        )
     if not several and run is not None and file.resolve() == run.resolve():
-        raise typer.BadParameter(f"--out and --run are both {file}: the one is a file, the other a folder that has the report, too")
+        raise typer.BadParameter(
+            f"--out and --run are both {file}: the one is a file, the other a folder that has the report, too"
+        )
 
 
 def _refuse_broken(datasets: list[Path]) -> None:
-    from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
+    from palpate.dataset import open_dataset
 
     names = [path.name for path in datasets]
     if len(set(names)) < len(names):
-        raise DatasetError(f"two of the datasets have the same folder name: {', '.join(sorted(names))}; diagnose them one by one")
+        raise DatasetError(
+            f"two of the datasets have the same folder name: {', '.join(sorted(names))}; diagnose them one by one"
+        )
     for path in datasets:
         try:
             open_dataset(path).validate()
         except DatasetError as error:
-            raise DatasetError(f"{path}: {error.message}", **{"dataset": path.name, **error.where}) from error
+            raise DatasetError(
+                f"{path}: {error.message}", **{"dataset": path.name, **error.where}
+            ) from error
 
 
 @contextmanager
@@ -193,7 +246,9 @@ def _kept(run: Path | None, name: str) -> Iterator[Path]:
     """The run folder to be kept, or one in a temporary place that is gone afterwards."""
     if run is not None:
         if run.exists():
-            raise RunError(f"{run} exists already; name another folder or move it away", file=str(run))
+            raise RunError(
+                f"{run} exists already; name another folder or move it away", file=str(run)
+            )
         yield run
         return
     with tempfile.TemporaryDirectory(prefix="palpate-") as folder:

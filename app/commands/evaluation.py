@@ -10,9 +10,9 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from app.commands.diagnosis import true_effects
-from app.console import out, progress, write_json
-from app.quantities import quantity
+from palpate.app.commands.console import out, progress, write_json
+from palpate.app.commands.diagnosis import true_effects
+from palpate.app.reporting.quantities import quantity
 
 __all__ = ["evaluate"]
 
@@ -20,51 +20,97 @@ SHOWN = {"all": "all pushes", "seen": "kinds trained on", "unseen": "kinds never
 
 
 def evaluate(
-    dataset: Annotated[Path, typer.Argument(help="A dataset folder; --paper makes it if it is not there.", show_default=False)],
-    run: Annotated[str | None, typer.Option(help="A diagnosis below RUNS whose extended model stands on the ladder.")] = None,
-    training: Annotated[list[str] | None, typer.Option(help="Trainings below RUNS/trainings; the newest ones without.")] = None,
+    dataset: Annotated[
+        Path,
+        typer.Argument(
+            help="A dataset folder; --paper makes it if it is not there.", show_default=False
+        ),
+    ],
+    run: Annotated[
+        str | None,
+        typer.Option(help="A diagnosis below RUNS whose extended model stands on the ladder."),
+    ] = None,
+    training: Annotated[
+        list[str] | None,
+        typer.Option(help="Trainings below RUNS/trainings; the newest ones without."),
+    ] = None,
     feedback: Annotated[
-        str, typer.Option(help="none, or follow: the simulation answers for what a network does not see.")
+        str,
+        typer.Option(
+            help="none, or follow: the simulation answers for what a network does not see."
+        ),
     ] = "none",
     truth: Annotated[
-        bool, typer.Option("--truth", help="Also the true effects of a virtual dataset, from DATASET.truth.json.")
+        bool,
+        typer.Option(
+            "--truth", help="Also the true effects of a virtual dataset, from DATASET.truth.json."
+        ),
     ] = False,
-    paper: Annotated[bool, typer.Option("--paper", help="The three tables of Wu, Kazanzides and Unberath (2020) instead.")] = False,
+    paper: Annotated[
+        bool,
+        typer.Option(
+            "--paper", help="The three tables of Wu, Kazanzides and Unberath (2020) instead."
+        ),
+    ] = False,
     size: Annotated[
-        str, typer.Option(help="Of the virtual dataset that --paper makes: short, medium or full (14 minutes).")
+        str,
+        typer.Option(
+            help="Of the virtual dataset that --paper makes: short, medium or full (14 minutes)."
+        ),
     ] = "full",
     epochs: Annotated[int, typer.Option(help="At most, of each network that --paper trains.")] = 40,
     features: Annotated[str, typer.Option(help="Of the blocks of these networks.")] = "64,128,256",
-    every: Annotated[int, typer.Option(help="Each how many clouds these networks learn from one.")] = 1,
-    file: Annotated[Path | None, typer.Option("--out", dir_okay=False, help="The result (JSON).")] = None,
+    every: Annotated[
+        int, typer.Option(help="Each how many clouds these networks learn from one.")
+    ] = 1,
+    file: Annotated[
+        Path | None, typer.Option("--out", dir_okay=False, help="The result (JSON).")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of all draws.")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
     runs: Annotated[Path, typer.Option(help="Results go to RUNS/evaluations.")] = Path("runs"),
 ) -> None:
-    """Say what a network, a named cause and both are worth on the test sequences: from the stated model to the noise floor.
+    """Say what a network, a named cause and both are worth on the test sequences: from the stated
+    model to the noise floor.
 
-    With --paper: the paper's searches for the modulus, and its corrections at 5e3, 1e4 and 1e1 Pa, in 2D and 3D.
+    With --paper: the paper's searches for the modulus, and its corrections at 5e3, 1e4 and 1e1 Pa,
+    in 2D and 3D.
     """
     if feedback not in ("none", "follow"):
         raise typer.BadParameter(f"--feedback is none or follow, not {feedback!r}")
     if paper:
         _make(dataset, size, workers)
-        found = _paper(dataset, [int(one) for one in features.split(",")], epochs, every, seed, workers, runs)
+        found = _paper(
+            dataset, [int(one) for one in features.split(",")], epochs, every, seed, workers, runs
+        )
     else:
         found = _ladder(
-            dataset, {"run": run, "trainings": training or [], "feedback": feedback, "seed": seed}, truth, workers, runs
+            dataset,
+            {"run": run, "trainings": training or [], "feedback": feedback, "seed": seed},
+            truth,
+            workers,
+            runs,
         )
     if file is not None:
         write_json(file, found)
 
 
-def _ladder(dataset: Path, asked: dict[str, Any], truth: bool, workers: int, runs: Path) -> dict[str, Any]:
-    from app.evaluations import Evaluations  # noqa: PLC0415 (heavy)
-    from app.evaluations import evaluate as climb  # noqa: PLC0415 (heavy)
+def _ladder(
+    dataset: Path, asked: dict[str, Any], truth: bool, workers: int, runs: Path
+) -> dict[str, Any]:
+    from palpate.app.jobs.tasks import evaluate as climb
+    from palpate.app.storage.evaluation_store import Evaluations
 
     name = f"{dataset.resolve().name}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(2)}"
     hidden = true_effects(dataset) if truth else None
-    request = {**asked, "dataset": str(dataset), "runs": str(runs), "workers": workers, "truth": hidden, "folder": name}
+    request = {
+        **asked,
+        "dataset": str(dataset),
+        "runs": str(runs),
+        "workers": workers,
+        "truth": hidden,
+        "folder": name,
+    }
     with progress(f"evaluate {dataset.name}") as report:
         climb(request, report)
     kept = Evaluations(runs)
@@ -78,7 +124,9 @@ def _ladder(dataset: Path, asked: dict[str, Any], truth: bool, workers: int, run
 
 
 def _rungs(rungs: list[dict[str, Any]], one: dict[str, Any]) -> Table:
-    title = f"{SHOWN.get(one['part'], one['name'])}: {', '.join(one['kinds'])}; {one['probes']} pushes"
+    title = (
+        f"{SHOWN.get(one['part'], one['name'])}: {', '.join(one['kinds'])}; {one['probes']} pushes"
+    )
     table = Table(title=title, title_justify="left", header_style="bold")
     table.add_column("model")
     for name in ("error", "removed", "of the moving part", "mean distance", "nearer"):
@@ -86,8 +134,17 @@ def _rungs(rungs: list[dict[str, Any]], one: dict[str, Any]) -> Table:
     for rung in rungs:
         own = one["errors"][rung["name"]]
         shares = (own["removed"], own["moving"]["removed"], own["paper"]["improvement"])
-        removed, moving, nearer = ("–" if rung["name"] == "baseline" else _share(share) for share in shares)
-        table.add_row(rung["label"], f"{own['error']:.3f} mm", removed, moving, f"{own['paper']['error']:.3f} mm", nearer)
+        removed, moving, nearer = (
+            "–" if rung["name"] == "baseline" else _share(share) for share in shares
+        )
+        table.add_row(
+            rung["label"],
+            f"{own['error']:.3f} mm",
+            removed,
+            moving,
+            f"{own['paper']['error']:.3f} mm",
+            nearer,
+        )
     table.add_row("noise floor", f"{one['noise_floor']:.3f} mm", "", "", "", "")
     return table
 
@@ -98,7 +155,7 @@ def _share(share: dict[str, float]) -> str:
 
 def _make(dataset: Path, size: str, workers: int) -> None:
     """The virtual dataset of the paper's protocol, unless it is there."""
-    from core.synthetic import PAPER_SEED, PAPER_SIZES, make_dataset, paper_scenario  # noqa: PLC0415 (heavy)
+    from palpate.synthetic import PAPER_SEED, PAPER_SIZES, make_dataset, paper_scenario
 
     wanted = next((one for one in PAPER_SIZES if one == size), None)
     if wanted is None:
@@ -108,20 +165,30 @@ def _make(dataset: Path, size: str, workers: int) -> None:
             make_dataset(dataset, paper_scenario(wanted), PAPER_SEED, workers, report)
 
 
-def _paper(dataset: Path, features: list[int], epochs: int, every: int, seed: int, workers: int, runs: Path) -> dict[str, Any]:
-    from app.sweeps import Sweeps  # noqa: PLC0415 (heavy)
-    from app.trainings import Trainings  # noqa: PLC0415 (heavy)
-    from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
-    from core.evaluation.paper import PaperRequest, run_paper  # noqa: PLC0415 (heavy)
-    from core.evaluation.training import Wanted  # noqa: PLC0415 (heavy)
+def _paper(
+    dataset: Path, features: list[int], epochs: int, every: int, seed: int, workers: int, runs: Path
+) -> dict[str, Any]:
+    from palpate.app.storage.sweep_store import Sweeps
+    from palpate.app.storage.training_store import Trainings
+    from palpate.dataset import open_dataset
+    from palpate.evaluation.paper_tables import PaperRequest, run_paper
+    from palpate.evaluation.train_network import Wanted
 
-    training = Wanted(spec={"network": {"features": features}, "epochs": epochs, "seed": seed}, every=every)
+    training = Wanted(
+        spec={"network": {"features": features}, "epochs": epochs, "seed": seed}, every=every
+    )
     folder = runs / "paper" / dataset.resolve().name
     with progress(f"the paper's tables on {dataset.name}") as report:
         found = run_paper(
-            open_dataset(dataset), folder, store=Sweeps(runs).store, samples=Trainings(runs).store,
-            request=PaperRequest(training=training), workers=workers, seed=seed, report=report,
-        )  # fmt: skip
+            open_dataset(dataset),
+            folder,
+            store=Sweeps(runs).store,
+            samples=Trainings(runs).store,
+            request=PaperRequest(training=training),
+            workers=workers,
+            seed=seed,
+            report=report,
+        )
     for title, key in (("Table 1: coarse search", "coarse"), ("Table 2: fine search", "fine")):
         out.print(_moduli(title, found[key]))
     out.print(found["what_the_search_shows"], highlight=False)
@@ -141,7 +208,11 @@ def _moduli(title: str, rows: list[dict[str, Any]]) -> Table:
 
 
 def _corrections(rows: list[dict[str, Any]]) -> Table:
-    table = Table(title="Table 3: correction on test sequences, mean distance in mm", title_justify="left", header_style="bold")
+    table = Table(
+        title="Table 3: correction on test sequences, mean distance in mm",
+        title_justify="left",
+        header_style="bold",
+    )
     table.add_column("Young's modulus", justify="right")
     table.add_column("motion")
     for name in ("simulation", "2D network", "nearer by", "3D network", "nearer by", "3D over 2D"):
@@ -151,5 +222,10 @@ def _corrections(rows: list[dict[str, Any]]) -> Table:
             cells = [f"{one['simulation']['error']:.3f}"]
             for kind in ("unet2d", "unet3d"):
                 cells += [f"{one[kind]['error']:.3f}", _share(one[kind]["improvement"])]
-            table.add_row(quantity(row["young_modulus"], "Pa", 3), one["name"], *cells, _share(one["unet3d_beyond_unet2d"]))
+            table.add_row(
+                quantity(row["young_modulus"], "Pa", 3),
+                one["name"],
+                *cells,
+                _share(one["unet3d_beyond_unet2d"]),
+            )
     return table

@@ -7,22 +7,35 @@ from typing import Annotated
 
 import typer
 
-from app.console import out
-from core.errors import RunError
+from palpate.app.commands.console import out
+from palpate.foundation.errors import RunError
 
 __all__ = ["export"]
 
 
 def export(
-    run: Annotated[Path, typer.Argument(help="Folder of a run, as `palpate diagnose --run` keeps it.", show_default=False)],
-    file: Annotated[Path | None, typer.Option("--out", dir_okay=False, help="The page; RUN.html where you are without it.")] = None,
+    run: Annotated[
+        Path,
+        typer.Argument(
+            help="Folder of a run, as `palpate diagnose --run` keeps it.", show_default=False
+        ),
+    ],
+    file: Annotated[
+        Path | None,
+        typer.Option("--out", dir_okay=False, help="The page; RUN.html where you are without it."),
+    ] = None,
 ) -> None:
-    """Write the report of a run as one HTML page that needs nothing but itself: to keep, print or send."""
-    from app.report_page import report_page  # noqa: PLC0415 (heavy)
-    from app.runs import Run  # noqa: PLC0415 (heavy)
+    """Write the report of a run as one HTML page that needs nothing but itself: to keep, print or
+    send.
+    """
+    from palpate.app.reporting.report_page import report_page
+    from palpate.app.storage.run_store import Run
 
     if not (run / "report.json").is_file():
-        raise RunError(f"{run} is no run: it has no report.json; keep one by palpate diagnose DATASET --run {run}", file=str(run))
+        raise RunError(
+            f"{run} is no run: it has no report.json; keep one by palpate diagnose DATASET --run {run}",
+            file=str(run),
+        )
     path = file or Path(f"{run.resolve().name}.html")
     if path.suffix != ".html":
         raise RunError(f"{path}: the page is written as .html; name such a file", file=str(path))

@@ -7,39 +7,62 @@ from typing import Annotated
 
 import typer
 
-from app.console import out
-from app.settings import Settings
-from app.tokens import FILE, Token
+from palpate.app.commands.console import out
+from palpate.app.server.tokens import FILE, Token
+from palpate.app.settings import Settings
 
 __all__ = ["serve"]
 
 
 def serve(
-    host: Annotated[str, typer.Option(help="Address to listen on; any but a loopback one asks for a token.")] = "127.0.0.1",
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; any but a loopback one asks for a token.")
+    ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 takes a free one.")] = 8321,
     runs: Annotated[Path, typer.Option(help="Folder of finished diagnoses.")] = Path("runs"),
-    datasets: Annotated[Path, typer.Option(help="Folder below which the datasets lie.")] = Path("datasets"),
+    datasets: Annotated[Path, typer.Option(help="Folder below which the datasets lie.")] = Path(
+        "datasets"
+    ),
     workers: Annotated[int, typer.Option(min=1, help="Processes one diagnosis may use.")] = 2,
     allow_host: Annotated[
-        list[str] | None, typer.Option(help="Another name by which browsers call this server; asks for a token.")
+        list[str] | None,
+        typer.Option(help="Another name by which browsers call this server; asks for a token."),
     ] = None,
     import_from: Annotated[
-        list[Path] | None, typer.Option(help="Folder below which datasets may be imported by path; any, where there is no login.")
+        list[Path] | None,
+        typer.Option(
+            help="Folder below which datasets may be imported by path; any, where there is no login."
+        ),
     ] = None,
-    disk_limit: Annotated[float, typer.Option(min=0.1, help="GiB of RUNS beyond which the oldest caches are dropped.")] = 20.0,
+    disk_limit: Annotated[
+        float, typer.Option(min=0.1, help="GiB of RUNS beyond which the oldest caches are dropped.")
+    ] = 20.0,
     new_token: Annotated[
-        bool, typer.Option("--new-token", help="Make a new token; the one before opens nothing any more.")
+        bool,
+        typer.Option(
+            "--new-token", help="Make a new token; the one before opens nothing any more."
+        ),
     ] = False,
 ) -> None:
     """Serve the page and the REST service on one port."""
-    from app.serve import serve as run  # noqa: PLC0415 (heavy)
+    from palpate.app.server.serve import serve as run
 
     settings = Settings(
-        host=host, port=port, runs=runs, datasets=datasets, workers=workers, allow_host=tuple(allow_host or ()),
-        import_from=tuple(import_from or ()), disk_limit=int(disk_limit * 2**30),
-    )  # fmt: skip
+        host=host,
+        port=port,
+        runs=runs,
+        datasets=datasets,
+        workers=workers,
+        allow_host=tuple(allow_host or ()),
+        import_from=tuple(import_from or ()),
+        disk_limit=int(disk_limit * 2**30),
+    )
     if new_token or (settings.needs_login and not (runs / FILE).exists()):
-        out.print(f"The token, shown only now: [bold]{Token.make(runs)}[/]", highlight=False, soft_wrap=True)
+        out.print(
+            f"The token, shown only now: [bold]{Token.make(runs)}[/]",
+            highlight=False,
+            soft_wrap=True,
+        )
     run(settings, announce)
 
 

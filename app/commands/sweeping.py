@@ -10,9 +10,9 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from app.console import Registration, out, progress
-from app.quantities import quantity
-from core.errors import EffectError
+from palpate.app.commands.console import Registration, out, progress
+from palpate.app.reporting.quantities import quantity
+from palpate.foundation.errors import EffectError
 
 __all__ = ["sweep"]
 
@@ -21,38 +21,60 @@ def sweep(
     dataset: Annotated[Path, typer.Argument(help="A dataset folder.", show_default=False)],
     parameter: Annotated[
         list[str],
-        typer.Option("--parameter", "-p", help="EFFECT.PARAMETER=LOW:HIGH, SI; may be repeated.", show_default=False),
+        typer.Option(
+            "--parameter",
+            "-p",
+            help="EFFECT.PARAMETER=LOW:HIGH, SI; may be repeated.",
+            show_default=False,
+        ),
     ],
-    fix: Annotated[list[str] | None, typer.Option(help="EFFECT.PARAMETER=VALUE that all points have.")] = None,
+    fix: Annotated[
+        list[str] | None, typer.Option(help="EFFECT.PARAMETER=VALUE that all points have.")
+    ] = None,
     method: Annotated[str, typer.Option(help="grid, random, tpe or cmaes.")] = "grid",
     steps: Annotated[int, typer.Option(help="Of a grid along each parameter.")] = 7,
     levels: Annotated[int, typer.Option(help="Of a grid from coarse to fine.")] = 1,
     points: Annotated[int, typer.Option(help="Of the other methods.")] = 40,
     sequence: Annotated[list[str] | None, typer.Option(help="Which; all without.")] = None,
-    frames: Annotated[int, typer.Option(help="Touched clouds of each sequence, evenly spread.")] = 8,
-    measure: Annotated[str, typer.Option(help="distance (RMS of patch averages) or paper (mean distance).")] = "distance",
+    frames: Annotated[
+        int, typer.Option(help="Touched clouds of each sequence, evenly spread.")
+    ] = 8,
+    measure: Annotated[
+        str, typer.Option(help="distance (RMS of patch averages) or paper (mean distance).")
+    ] = "distance",
     seed: Annotated[int, typer.Option(min=0, help="Of all draws.")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
-    scheduler: Annotated[str | None, typer.Option(help="Address of a dask scheduler whose workers replay instead.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a dask scheduler whose workers replay instead.")
+    ] = None,
     registration: Registration = None,
-    runs: Annotated[Path, typer.Option(help="Points go to RUNS/sweeps; what is known there is not done again.")] = Path("runs"),
+    runs: Annotated[
+        Path, typer.Option(help="Points go to RUNS/sweeps; what is known there is not done again.")
+    ] = Path("runs"),
 ) -> None:
-    """Replay a dataset over a range of parameters, and say where the error is least and along which parameters it says nothing.
+    """Replay a dataset over a range of parameters, and say where the error is least and along which
+    parameters it says nothing.
 
     Can be stopped at any time: the same command goes on where it was.
     """
-    from app.registrations import accepted_for  # noqa: PLC0415 (heavy)
-    from app.sweeps import Sweeps  # noqa: PLC0415 (heavy)
-    from core.dataset import open_dataset  # noqa: PLC0415 (heavy)
-    from core.sweeping.request import Request  # noqa: PLC0415 (heavy)
-    from core.sweeping.running import run_sweep  # noqa: PLC0415 (heavy)
+    from palpate.app.storage.registration_store import accepted_for
+    from palpate.app.storage.sweep_store import Sweeps
+    from palpate.dataset import open_dataset
+    from palpate.sweep.run_sweep import run_sweep
+    from palpate.sweep.sweep_request import Request
 
     asked = {
-        "parameters": [_axis(text) for text in parameter], "fixed": dict(_fixed(text) for text in fix or ()),
+        "parameters": [_axis(text) for text in parameter],
+        "fixed": dict(_fixed(text) for text in fix or ()),
         "method": method,
-        "steps": steps, "levels": levels, "points": points, "sequences": sequence or (),
-        "frames": frames, "measure": measure, "seed": seed,
-    }  # fmt: skip
+        "steps": steps,
+        "levels": levels,
+        "points": points,
+        "sequences": sequence or (),
+        "frames": frames,
+        "measure": measure,
+        "seed": seed,
+    }
     request = Request.from_json(asked)
     accepted = accepted_for(dataset, registration, runs)
     opened, sweeps = open_dataset(dataset).registered(accepted), Sweeps(runs)
@@ -60,8 +82,20 @@ def sweep(
     digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()[:8]
     folder = sweeps.folder / f"{dataset.resolve().name}-{digest}"
     with progress(f"sweep {dataset.name}") as report:
-        found = run_sweep(opened, request, folder, store=sweeps.store, workers=workers, scheduler=scheduler, report=report)
-    _print(found, sweeps.points(folder.name), {axis.name: axis.parameter.unit for axis in request.space.axes})
+        found = run_sweep(
+            opened,
+            request,
+            folder,
+            store=sweeps.store,
+            workers=workers,
+            scheduler=scheduler,
+            report=report,
+        )
+    _print(
+        found,
+        sweeps.points(folder.name),
+        {axis.name: axis.parameter.unit for axis in request.space.axes},
+    )
     out.print(f"{folder}", highlight=False, soft_wrap=True)
 
 
@@ -71,7 +105,9 @@ def _axis(text: str) -> dict[str, Any]:
     try:
         return {"parameter": name, "low": float(low), "high": float(high)}
     except ValueError:
-        raise EffectError(f"{text!r} is no range; expected EFFECT.PARAMETER=LOW:HIGH, as in poisson_ratio.nu=0.3:0.49") from None
+        raise EffectError(
+            f"{text!r} is no range; expected EFFECT.PARAMETER=LOW:HIGH, as in poisson_ratio.nu=0.3:0.49"
+        ) from None
 
 
 def _fixed(text: str) -> tuple[str, float | str]:
@@ -90,13 +126,19 @@ def _print(found: dict[str, Any], rows: list[dict[str, Any]], units: dict[str, s
         table.add_column(name, justify="right")
     for name in ("error", "paper's distance"):
         table.add_column(name, justify="right")
-    known = sorted((row for row in rows if row["error"] is not None and row["values"]), key=lambda row: float(row["error"]))
+    known = sorted(
+        (row for row in rows if row["error"] is not None and row["values"]),
+        key=lambda row: float(row["error"]),
+    )
     for row in known[:8]:
         values = (quantity(row["values"][name], unit) for name, unit in units.items())
         table.add_row(*values, *(f"{1e3 * row[key]:.4f} mm" for key in ("error", "paper")))
     out.print(table)
     if found["stated"] is not None:
-        out.print(f"as stated: {1e3 * found['stated']:.4f} mm; {found['points']} points, {found['failed']} failed", highlight=False)
+        out.print(
+            f"as stated: {1e3 * found['stated']:.4f} mm; {found['points']} points, {found['failed']} failed",
+            highlight=False,
+        )
     for one in found["directions"]:
         change = f"{1e3 * one['change']:.4f} mm ({1e3 * one['low']:.4f} to {1e3 * one['high']:.4f})"
         verdict = {
@@ -104,6 +146,8 @@ def _print(found: dict[str, Any], rows: list[dict[str, Any]], units: dict[str, s
             False: "matters",
             None: "one push only, so nobody knows whether it matters",
         }
-        out.print(f"{one['name']}: {verdict[one['flat']]}; the error changes by {change}", highlight=False)
+        out.print(
+            f"{one['name']}: {verdict[one['flat']]}; the error changes by {change}", highlight=False
+        )
     for row in [row for row in rows if row["failure"]][:5]:
         out.print(f"[yellow]point {row['number']} failed[/]: {row['failure']}", highlight=False)

@@ -1,4 +1,6 @@
-"""`palpate train`: the correction network of a dataset, on the stated model or on the extended one of a run."""
+"""`palpate train`: the correction network of a dataset, on the stated model or on the extended one
+of a run.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +11,8 @@ from typing import Annotated
 
 import typer
 
-from app.commands.diagnosis import true_effects
-from app.console import out, progress
+from palpate.app.commands.console import out, progress
+from palpate.app.commands.diagnosis import true_effects
 
 __all__ = ["train"]
 
@@ -18,44 +20,83 @@ __all__ = ["train"]
 def train(
     dataset: Annotated[Path, typer.Argument(help="A dataset folder.", show_default=False)],
     run: Annotated[
-        str | None, typer.Option(help="Train on the extended model of this run below RUNS, not on the stated one.")
+        str | None,
+        typer.Option(
+            help="Train on the extended model of this run below RUNS, not on the stated one."
+        ),
     ] = None,
-    truth: Annotated[bool, typer.Option("--truth", help="Train on a virtual dataset's true effects instead.")] = False,
-    kind: Annotated[str, typer.Option(help="unet2d (top layer), unet3d (volume) or graph (any mesh).")] = "unet2d",
-    features: Annotated[str, typer.Option(help="Of the blocks, from fine to coarse.")] = "64,128,256",
-    trust: Annotated[float, typer.Option(help="How far the simulation may be corrected along each axis, in voxels.")] = 0.5,
-    inputs: Annotated[str, typer.Option(help="What the network is told of the tool: pose, velocity, force.")] = "pose",
+    truth: Annotated[
+        bool, typer.Option("--truth", help="Train on a virtual dataset's true effects instead.")
+    ] = False,
+    kind: Annotated[
+        str, typer.Option(help="unet2d (top layer), unet3d (volume) or graph (any mesh).")
+    ] = "unet2d",
+    features: Annotated[
+        str, typer.Option(help="Of the blocks, from fine to coarse.")
+    ] = "64,128,256",
+    trust: Annotated[
+        float,
+        typer.Option(help="How far the simulation may be corrected along each axis, in voxels."),
+    ] = 0.5,
+    inputs: Annotated[
+        str, typer.Option(help="What the network is told of the tool: pose, velocity, force.")
+    ] = "pose",
     distance: Annotated[str, typer.Option(help="chamfer, symmetric or hausdorff.")] = "chamfer",
-    hold: Annotated[float, typer.Option(help="Weight that keeps hidden vertices near the simulation, 1/mm.")] = 1.0,
+    hold: Annotated[
+        float, typer.Option(help="Weight that keeps hidden vertices near the simulation, 1/mm.")
+    ] = 1.0,
     epochs: Annotated[int, typer.Option(help="At most.")] = 40,
-    patience: Annotated[int, typer.Option(help="Epochs without a better validation error after which it ends.")] = 6,
+    patience: Annotated[
+        int, typer.Option(help="Epochs without a better validation error after which it ends.")
+    ] = 6,
     batch: Annotated[int, typer.Option(help="Samples in a step.")] = 64,
     rate: Annotated[float, typer.Option(help="Of learning.")] = 5e-4,
     every: Annotated[int, typer.Option(help="Each how many clouds one is learned from.")] = 1,
     device: Annotated[str, typer.Option(help="auto, cpu or cuda.")] = "auto",
-    seed: Annotated[int, typer.Option(min=0, help="Of first weights and order; the same gives the same weights.")] = 0,
+    seed: Annotated[
+        int,
+        typer.Option(min=0, help="Of first weights and order; the same gives the same weights."),
+    ] = 0,
     workers: Annotated[int, typer.Option(min=1, help="Processes that replay.")] = 2,
     runs: Annotated[Path, typer.Option(help="The training goes to RUNS/trainings.")] = Path("runs"),
 ) -> None:
-    """Train the network that corrects what a model's replay leaves, on the dataset's train sequences; validation stops it.
+    """Train the network that corrects what a model's replay leaves, on the dataset's train
+    sequences; validation stops it.
 
     Can be stopped at any time: the same command goes on where it was.
     """
-    from app.trainings import train as learn  # noqa: PLC0415 (heavy)
+    from palpate.app.jobs.tasks import train as learn
 
-    network = {"kind": kind, "features": _numbers(features), "trust": trust, "inputs": inputs.split(",")}
+    network = {
+        "kind": kind,
+        "features": _numbers(features),
+        "trust": trust,
+        "inputs": inputs.split(","),
+    }
     spec = {
-        "network": network, "distance": distance, "hold": hold, "rate": rate, "batch": batch, "epochs": epochs,
-        "patience": patience, "device": device, "seed": seed,
-    }  # fmt: skip
+        "network": network,
+        "distance": distance,
+        "hold": hold,
+        "rate": rate,
+        "batch": batch,
+        "epochs": epochs,
+        "patience": patience,
+        "device": device,
+        "seed": seed,
+    }
     asked = {"spec": spec, "every": every}
     hidden = true_effects(dataset) if truth else None
     said = json.dumps([str(dataset.resolve()), run, hidden, asked], sort_keys=True)
     digest = hashlib.sha256(said.encode()).hexdigest()[:8]
     request = {
-        "dataset": str(dataset), "runs": str(runs), "workers": workers, "run": run, "truth": hidden, "training": asked,
+        "dataset": str(dataset),
+        "runs": str(runs),
+        "workers": workers,
+        "run": run,
+        "truth": hidden,
+        "training": asked,
         "folder": f"{dataset.resolve().name}-{kind}-{digest}",
-    }  # fmt: skip
+    }
     with progress(f"train {dataset.name}") as report:
         found = learn(request, report)
     gain = 100 * (1 - found["error"] / found["without"])

@@ -1,4 +1,6 @@
-"""Whether the probabilities of a report are what they say: reliability curve, Brier score, calibration error."""
+"""Whether the probabilities of a report are what they say: reliability curve, Brier score,
+calibration error.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from core.blind.rates import CONFIDENCE, Measured, rate
-from core.blind.results import Result
-from core.frames import FloatArray
+from palpate.blind.case_results import Result
+from palpate.blind.proportions import CONFIDENCE, Measured, rate
+from palpate.foundation.arrays import FloatArray
 
 __all__ = ["brier", "calibration_error", "every_effect", "first_effect", "reliability"]
 
@@ -18,39 +20,63 @@ _DRAWS = 1000
 
 
 def first_effect(results: Sequence[Result]) -> tuple[FloatArray, FloatArray]:
-    """Probability (n,) of the effect that a report thinks most probable, named or not, and whether it is hidden (n,) (0 or 1).
+    """Probability (n,) of the effect that a report thinks most probable, named or not, and whether
+    it is hidden (n,) (0 or 1).
 
     One pair for each case with a report. Nothing that is improbable and absent flatters it.
     """
-    best = [(max(chances.items(), key=lambda row: row[1]), result.truth) for result in results if (chances := result.probabilities)]
-    return np.array([chance for (_, chance), _ in best]), np.array([float(effect in truth) for (effect, _), truth in best])
+    best = [
+        (max(chances.items(), key=lambda row: row[1]), result.truth)
+        for result in results
+        if (chances := result.probabilities)
+    ]
+    return np.array([chance for (_, chance), _ in best]), np.array(
+        [float(effect in truth) for (effect, _), truth in best]
+    )
 
 
 def every_effect(results: Sequence[Result]) -> tuple[FloatArray, FloatArray]:
     """The same of every effect that is weighed in every case: mostly zeros that are right."""
-    pairs = [(chance, effect in result.truth) for result in results for effect, chance in result.probabilities.items()]
-    return np.array([chance for chance, _ in pairs]), np.array([float(hidden) for _, hidden in pairs])
+    pairs = [
+        (chance, effect in result.truth)
+        for result in results
+        for effect, chance in result.probabilities.items()
+    ]
+    return np.array([chance for chance, _ in pairs]), np.array(
+        [float(hidden) for _, hidden in pairs]
+    )
 
 
 def reliability(stated: FloatArray, true: FloatArray) -> list[dict[str, Any]]:
-    """By tenths of the stated probability: their mean, and the share that is true with its interval; empty tenths are left out."""
+    """By tenths of the stated probability: their mean, and the share that is true with its
+    interval; empty tenths are left out.
+    """
     which, rows = _bins(stated), []
     for number in np.unique(which):
         here = which == number
         share = rate(int(true[here].sum()), int(here.sum()))
         rows.append(
-            {"low": number / BINS, "high": (number + 1) / BINS, "stated": float(stated[here].mean()), "true": share.to_json()}
+            {
+                "low": number / BINS,
+                "high": (number + 1) / BINS,
+                "stated": float(stated[here].mean()),
+                "true": share.to_json(),
+            }
         )
     return rows
 
 
 def brier(stated: FloatArray, true: FloatArray) -> Measured:
-    """Mean squared difference of stated probability and truth (Brier 1950), with a bootstrap interval."""
+    """Mean squared difference of stated probability and truth (Brier 1950), with a bootstrap
+    interval.
+    """
     return _resampled(stated, true, lambda p, y: float(((p - y) ** 2).mean()))
 
 
 def calibration_error(stated: FloatArray, true: FloatArray) -> Measured:
-    """Expected calibration error: |mean stated - share true| over tenths, weighted by how many are in each; bootstrap interval."""
+    """Expected calibration error: |mean stated - share true| over tenths, weighted by how many are
+    in each; bootstrap interval.
+    """
     return _resampled(stated, true, _expected_error)
 
 

@@ -1,4 +1,6 @@
-"""What is hidden in which case: kinds of cases, their mix, and the scenario that follows from a case's seed."""
+"""What is hidden in which case: kinds of cases, their mix, and the scenario that follows from a
+case's seed.
+"""
 
 from __future__ import annotations
 
@@ -9,23 +11,38 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from core.errors import RunError
+from palpate.foundation.errors import RunError
 
 if TYPE_CHECKING:
-    from core.synthetic import Scenario
+    from palpate.synthetic import Scenario
 
 __all__ = ["ALIKE", "KINDS", "MIX", "Case", "all_cases", "draw_cases", "scenario_of"]
 
 KINDS = ("control", "clear", "subtle", "pair", "outside", "twins", "modulus")
-"""Nothing hidden; one effect at a clear size, or at a share of it; two effects; what no effect expresses; one effect of the family
-that looks alike; another Young's modulus alone, which without a measured force does not show."""
+"""Nothing hidden; one effect at a clear size, or at a share of it; two effects; what no effect
+expresses; one effect of the family that looks alike; another Young's modulus alone, which without a
+measured force does not show."""
 
 MIX: Mapping[str, float] = {
-    "control": 0.25, "clear": 0.30, "subtle": 0.15, "pair": 0.125, "outside": 0.075, "twins": 0.05, "modulus": 0.05,
-}  # fmt: skip
-"""Shares of a drawn suite: of 200 scenarios 50 hide nothing, so that one false alarm in 50 can be seen."""
+    "control": 0.25,
+    "clear": 0.30,
+    "subtle": 0.15,
+    "pair": 0.125,
+    "outside": 0.075,
+    "twins": 0.05,
+    "modulus": 0.05,
+}
+"""Shares of a drawn suite: of 200 scenarios 50 hide nothing, so that one false alarm in 50 can be
+seen."""
 
-ALIKE = ("tool_radius", "tool_offset", "tool_compliance", "surface_layer", "stiffness_gradient", "strain_stiffening")
+ALIKE = (
+    "tool_radius",
+    "tool_offset",
+    "tool_compliance",
+    "surface_layer",
+    "stiffness_gradient",
+    "strain_stiffening",
+)
 """Effects that all press deeper: each imitates most of the others' pattern on a push from above."""
 
 _KIND_SEEDS, _SUITE_SEEDS = 100_000, 1_000_000
@@ -36,8 +53,11 @@ class Case:
     """One dataset to be made.
 
     Attributes:
-        name: also says what is hidden. seed: of everything random in it. kind: one of KINDS.
-        hidden: names of the effects, or of the disturbance. short: whether only five sequences are recorded, not seven.
+        name: also says what is hidden.
+        seed: of everything random in it.
+        kind: one of KINDS.
+        hidden: names of the effects, or of the disturbance.
+        short: whether only five sequences are recorded, not seven.
     """
 
     name: str
@@ -56,22 +76,29 @@ class Case:
         return cls(**{**data, "hidden": tuple(data["hidden"])})
 
 
-def all_cases(seed: int, controls: int = 10, effects: Sequence[str] | None = None, short: bool = False) -> list[Case]:
+def all_cases(
+    seed: int, controls: int = 10, effects: Sequence[str] | None = None, short: bool = False
+) -> list[Case]:
     """Each effect once, each disturbance once, and the controls; every case has a seed of its own.
 
-    Effects are those of `core.synthetic.WEIGHED`, or the ones named, of which the virtual bench can also hide Young's modulus; an
-    unknown one is a RunError.
+    Effects are those of `palpate.synthetic.WEIGHED`, or the ones named, of which the virtual bench
+    can also hide Young's modulus; an unknown one is a RunError.
     """
-    from core.synthetic import DISTURBANCES, HIDDEN  # noqa: PLC0415 (heavy)
+    from palpate.synthetic import DISTURBANCES, HIDDEN
 
     wanted, known = _checked_effects(effects), list(HIDDEN)
-    cases = [Case(f"{effect}-{seed}", 1000 * seed + 1 + known.index(effect), "clear", (effect,), short) for effect in wanted]
+    cases = [
+        Case(f"{effect}-{seed}", 1000 * seed + 1 + known.index(effect), "clear", (effect,), short)
+        for effect in wanted
+    ]
     if effects is None:
         cases += [
-            Case(f"{name}-{seed}", 1000 * seed + 401 + place, "outside", (name,), short) for place, name in enumerate(DISTURBANCES)
+            Case(f"{name}-{seed}", 1000 * seed + 401 + place, "outside", (name,), short)
+            for place, name in enumerate(DISTURBANCES)
         ]
     return cases + [
-        Case(f"control-{seed}-{place:02d}", 1000 * seed + 500 + place, "control", (), short) for place in range(controls)
+        Case(f"control-{seed}-{place:02d}", 1000 * seed + 500 + place, "control", (), short)
+        for place in range(controls)
     ]
 
 
@@ -83,19 +110,24 @@ def draw_cases(
     controls: int | None = None,
     short: bool = False,
 ) -> list[Case]:
-    """A suite of `count` cases in the proportions of MIX; with more of them the first stay the same.
+    """A suite of `count` cases in the proportions of MIX; with more of them the first stay the
+    same.
 
     Args:
-        seed: everything that is hidden follows from it. kinds: those wanted, all without it.
-        effects: to be hidden, those of `core.synthetic.WEIGHED` without it. controls: so many of the cases hide nothing; as MIX has
-            it without.
+        seed: everything that is hidden follows from it.
+        kinds: those wanted, all without it.
+        effects: to be hidden, those of `palpate.synthetic.WEIGHED` without it.
+        controls: so many of the cases hide nothing; as MIX has it without.
 
-    Within a kind each effect (pair, disturbance) comes once before any comes again. Raises RunError for unknown names.
+    Within a kind each effect (pair, disturbance) comes once before any comes again. Raises RunError
+    for unknown names.
     """
     wanted = _checked_kinds(kinds)
     effects = _checked_effects(effects)
     if controls is not None and controls > count:
-        raise RunError(f"{controls} controls are more than the {count} scenarios asked for", controls=controls)
+        raise RunError(
+            f"{controls} controls are more than the {count} scenarios asked for", controls=controls
+        )
     drawn = [kind for kind in wanted if kind != "control"] if controls is not None else wanted
     order = [*_interleaved(drawn, count - (controls or 0)), *["control"] * (controls or 0)]
     met: dict[str, int] = {}
@@ -111,15 +143,21 @@ def draw_cases(
 
 
 def scenario_of(case: Case) -> Scenario:
-    """What the virtual bench is to make of a case: follows from its kind, its hidden names and its seed alone."""
-    from core.synthetic import SHORT_PROTOCOL, Scenario, draw_disturbance, draw_scenario  # noqa: PLC0415 (heavy)
+    """What the virtual bench is to make of a case: follows from its kind, its hidden names and its
+    seed alone.
+    """
+    from palpate.synthetic import SHORT_PROTOCOL, Scenario, draw_disturbance, draw_scenario
 
     if case.kind == "control":
         scenario = Scenario()
     elif case.kind == "outside":
-        scenario = Scenario(disturbances=tuple(draw_disturbance(name, case.seed) for name in case.hidden))
+        scenario = Scenario(
+            disturbances=tuple(draw_disturbance(name, case.seed) for name in case.hidden)
+        )
     else:
-        scenario = draw_scenario(case.seed, effects=len(case.hidden), clear=case.kind != "subtle", among=case.hidden)
+        scenario = draw_scenario(
+            case.seed, effects=len(case.hidden), clear=case.kind != "subtle", among=case.hidden
+        )
     if case.kind == "twins":
         scenario = _pressing(scenario)
     # Nobody sees that a block has slid by a millimetre, and it is pushed on where it lies.
@@ -128,29 +166,39 @@ def scenario_of(case: Case) -> Scenario:
 
 
 def _pressing(scenario: Scenario) -> Scenario:
-    """An offset of the tool looks like the others of the family only along the vertical: all of its length goes there."""
-    from core.synthetic import HiddenEffect  # noqa: PLC0415 (heavy)
+    """An offset of the tool looks like the others of the family only along the vertical: all of its
+    length goes there.
+    """
+    from palpate.synthetic import HiddenEffect
 
     offset = scenario.hidden("tool_offset")
     if offset is None:
         return scenario
     length = float(np.linalg.norm([offset.value(name) for name in ("dx", "dy", "dz")]))
     deeper = round(float(np.copysign(length, offset.value("dz"))), 5)
-    return replace(scenario, effects=(HiddenEffect("tool_offset", {"dx": 0.0, "dy": 0.0, "dz": deeper}),))
+    return replace(
+        scenario, effects=(HiddenEffect("tool_offset", {"dx": 0.0, "dy": 0.0, "dz": deeper}),)
+    )
 
 
 def _checked_kinds(kinds: Sequence[str] | None) -> list[str]:
     if strange := [kind for kind in kinds or () if kind not in KINDS]:
-        raise RunError(f"no kind of case is called {strange[0]!r}; known are {', '.join(KINDS)}", kind=strange[0])
+        raise RunError(
+            f"no kind of case is called {strange[0]!r}; known are {', '.join(KINDS)}",
+            kind=strange[0],
+        )
     return [kind for kind in KINDS if kinds is None or kind in kinds]
 
 
 def _checked_effects(effects: Sequence[str] | None) -> tuple[str, ...]:
-    from core.synthetic import HIDDEN, WEIGHED  # noqa: PLC0415 (heavy)
+    from palpate.synthetic import HIDDEN, WEIGHED
 
     wanted = tuple(WEIGHED if effects is None else dict.fromkeys(effects))
     if strange := [effect for effect in wanted if effect not in HIDDEN]:
-        raise RunError(f"the virtual bench cannot hide {', '.join(strange)}; it knows {', '.join(HIDDEN)}", effect=strange[0])
+        raise RunError(
+            f"the virtual bench cannot hide {', '.join(strange)}; it knows {', '.join(HIDDEN)}",
+            effect=strange[0],
+        )
     return wanted
 
 
@@ -171,12 +219,14 @@ def _interleaved(kinds: Sequence[str], count: int) -> list[str]:
 def _hidden(kind: str, seed: int, number: int, effects: Sequence[str]) -> tuple[str, ...]:
     choices = _choices(kind, effects)
     turn, place = divmod(number, len(choices))
-    order = np.random.default_rng([seed, 15485863, KINDS.index(kind), turn]).permutation(len(choices))
+    order = np.random.default_rng([seed, 15485863, KINDS.index(kind), turn]).permutation(
+        len(choices)
+    )
     return choices[int(order[place])]
 
 
 def _choices(kind: str, effects: Sequence[str]) -> list[tuple[str, ...]]:
-    from core.synthetic import DISTURBANCES  # noqa: PLC0415 (heavy)
+    from palpate.synthetic import DISTURBANCES
 
     choices: dict[str, list[tuple[str, ...]]] = {
         "control": [()],
@@ -188,6 +238,7 @@ def _choices(kind: str, effects: Sequence[str]) -> list[tuple[str, ...]]:
     found = choices.get(kind, [(effect,) for effect in effects])
     if not found:
         raise RunError(
-            f"{', '.join(effects) or 'no effect'} gives no case of the kind {kind}; name other effects, or leave it out", kind=kind
+            f"{', '.join(effects) or 'no effect'} gives no case of the kind {kind}; name other effects, or leave it out",
+            kind=kind,
         )
     return found

@@ -1,4 +1,6 @@
-"""The suite in one JSON: targets, rates by kind, parameters, calibration, what was named for what, and the gain."""
+"""The suite in one JSON: targets, rates by kind, parameters, calibration, what was named for what,
+and the gain.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +8,24 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from core.blind.calibration import brier, calibration_error, every_effect, first_effect, reliability
-from core.blind.cases import KINDS
-from core.blind.parameters import SCORED_LEVEL, coverage, parameter_errors, said_of, words_right
-from core.blind.rates import CONFIDENCE, median_of, share_of
-from core.blind.results import Result
-from core.blind.targets import grade, judged
+from palpate.blind.calibration import (
+    brier,
+    calibration_error,
+    every_effect,
+    first_effect,
+    reliability,
+)
+from palpate.blind.case_results import Result
+from palpate.blind.cases import KINDS
+from palpate.blind.parameter_errors import (
+    SCORED_LEVEL,
+    coverage,
+    parameter_errors,
+    said_of,
+    words_right,
+)
+from palpate.blind.proportions import CONFIDENCE, median_of, share_of
+from palpate.blind.targets import grade, judged
 
 __all__ = ["confusion", "summary_of"]
 
@@ -22,29 +36,48 @@ def summary_of(results: Sequence[Result], seed: int, missing: int = 0) -> dict[s
     """Everything that is scored, as plain values.
 
     Args:
-        seed: from which the cases were drawn. missing: cases without a result.
+        seed: from which the cases were drawn.
+        missing: cases without a result.
     """
     return {
-        "format": 1, "seed": seed, "cases": len(results), "missing": missing, "confidence": CONFIDENCE,
-        "code": dict(Counter(result.code for result in results)), "targets": judged(results),
-        "kinds": {kind: _kind(own) for kind in KINDS if (own := [one for one in results if one.case.kind == kind])},
-        "sizes": dict(Counter(grade(result) or "not given" for result in results if len(result.truth) == 1)),
+        "format": 1,
+        "seed": seed,
+        "cases": len(results),
+        "missing": missing,
+        "confidence": CONFIDENCE,
+        "code": dict(Counter(result.code for result in results)),
+        "targets": judged(results),
+        "kinds": {
+            kind: _kind(own)
+            for kind in KINDS
+            if (own := [one for one in results if one.case.kind == kind])
+        },
+        "sizes": dict(
+            Counter(grade(result) or "not given" for result in results if len(result.truth) == 1)
+        ),
         "parameters": parameter_errors(said_of(results)),
         "words": {key: found.to_json() for key, found in words_right(results).items()},
         "coverage": _coverage(results),
-        "calibration": {"first_effect": _calibration(*first_effect(results)), "every_effect": _calibration(*every_effect(results))},
-        "confusion": confusion(results), "pairs": _pairs(results), "gain": _gain(results),
+        "calibration": {
+            "first_effect": _calibration(*first_effect(results)),
+            "every_effect": _calibration(*every_effect(results)),
+        },
+        "confusion": confusion(results),
+        "pairs": _pairs(results),
+        "gain": _gain(results),
         "seconds": _seconds(results),
         "errors": {result.name: result.error for result in results if result.error},
-    }  # fmt: skip
+    }
 
 
 def _coverage(results: Sequence[Result]) -> dict[str, Any]:
     said = said_of(results)
     return {
-        "level_stated": sorted({result.level for result in results if result.report}), "at_stated_level": coverage(said).to_json(),
-        "level_scored": SCORED_LEVEL, "at_scored_level": coverage(said, SCORED_LEVEL).to_json(),
-    }  # fmt: skip
+        "level_stated": sorted({result.level for result in results if result.report}),
+        "at_stated_level": coverage(said).to_json(),
+        "level_scored": SCORED_LEVEL,
+        "at_scored_level": coverage(said, SCORED_LEVEL).to_json(),
+    }
 
 
 def _seconds(results: Sequence[Result]) -> dict[str, Any]:
@@ -53,7 +86,9 @@ def _seconds(results: Sequence[Result]) -> dict[str, Any]:
 
 
 def _kind(results: Sequence[Result]) -> dict[str, Any]:
-    """What holds in how many cases of a kind; of those with something hidden also whether it is first and among what is named."""
+    """What holds in how many cases of a kind; of those with something hidden also whether it is
+    first and among what is named.
+    """
     counted = {
         "right": share_of(results, lambda one: one.right),
         "false_name": share_of(results, lambda one: one.false_name),
@@ -66,20 +101,27 @@ def _kind(results: Sequence[Result]) -> dict[str, Any]:
             "exact": share_of(results, lambda one: one.exact),
         }
     verdicts = dict(Counter(result.verdict for result in results))
-    return {"n": len(results), "verdicts": verdicts, **{name: found.to_json() for name, found in counted.items()}}
+    return {
+        "n": len(results),
+        "verdicts": verdicts,
+        **{name: found.to_json() for name, found in counted.items()},
+    }
 
 
 def _calibration(stated: Any, true: Any) -> dict[str, Any]:
     return {
-        "n": len(stated), "brier": brier(stated, true).to_json(), "calibration_error": calibration_error(stated, true).to_json(),
+        "n": len(stated),
+        "brier": brier(stated, true).to_json(),
+        "calibration_error": calibration_error(stated, true).to_json(),
         "curve": reliability(stated, true),
-    }  # fmt: skip
+    }
 
 
 def confusion(results: Sequence[Result]) -> dict[str, dict[str, int]]:
     """What is hidden (rows) by what is named (columns), of all cases but pairs.
 
-    Columns beside the effects: `several` for a found set of more than one, and the verdicts that name no single cause.
+    Columns beside the effects: `several` for a found set of more than one, and the verdicts that
+    name no single cause.
     """
     table: dict[str, Counter[str]] = {}
     for result in results:
@@ -107,11 +149,17 @@ def _pairs(results: Sequence[Result]) -> dict[str, int]:
 
 
 def _gain(results: Sequence[Result]) -> dict[str, Any]:
-    """Share of the reducible error removed, and the error that is left over the noise floor, by kind (medians)."""
+    """Share of the reducible error removed, and the error that is left over the noise floor, by
+    kind (medians).
+    """
     table: dict[str, Any] = {}
     for kind in ("clear", "subtle", "pair", "twins"):
         own = [result for result in results if result.case.kind == kind]
-        left = [gain["extended"] / gain["noise_floor"] for one in own if (gain := one.report.get("gain")) and gain["noise_floor"]]
+        left = [
+            gain["extended"] / gain["noise_floor"]
+            for one in own
+            if (gain := one.report.get("gain")) and gain["noise_floor"]
+        ]
         if own:
             table[kind] = {
                 "removed": median_of([one.removed or 0.0 for one in own]).to_json(),

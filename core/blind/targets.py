@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from core.blind.calibration import calibration_error, first_effect
-from core.blind.parameters import SCORED_LEVEL, coverage, distances, said_of, words_right
-from core.blind.rates import Measured, median_of, share_of
-from core.blind.results import Result
+from palpate.blind.calibration import calibration_error, first_effect
+from palpate.blind.case_results import Result
+from palpate.blind.parameter_errors import SCORED_LEVEL, coverage, distances, said_of, words_right
+from palpate.blind.proportions import Measured, median_of, share_of
 
 __all__ = ["TARGETS", "Target", "grade", "judged"]
 
@@ -21,7 +21,9 @@ Measure = Callable[[Sequence[Result]], Measured]
 
 
 def grade(result: Result) -> str:
-    """`clear`, `subtle` or `faint` by the size over the detection limit where it is given, of two the fainter's; else ``."""
+    """`clear`, `subtle` or `faint` by the size over the detection limit where it is given, of two
+    the fainter's; else ``.
+    """
     if result.size is None:
         return ""
     return "clear" if result.size >= CLEAR else "subtle" if result.size >= SUBTLE else "faint"
@@ -32,8 +34,11 @@ class Target:
     """A figure that must lie within its bounds.
 
     Attributes:
-        key: for machines. text: what is counted, for people. measure: the figure from all results.
-        low, high: bounds, None where there is none. unit: of the figure; `1` for a share.
+        key: for machines.
+        text: what is counted, for people.
+        measure: the figure from all results.
+        low, high: bounds, None where there is none.
+        unit: of the figure; `1` for a share.
     """
 
     key: str
@@ -44,23 +49,39 @@ class Target:
     unit: str = "1"
 
     def judge(self, results: Sequence[Result]) -> dict[str, Any]:
-        """Plain values: bounds, figure, `met`, and `sure` where the whole interval lies on one side; None without cases."""
+        """Plain values: bounds, figure, `met`, and `sure` where the whole interval lies on one
+        side; None without cases.
+        """
         found = self.measure(results)
         met = None if found.value is None else self._within(found.value)
         ends = [end for end in (found.low, found.high) if end is not None]
-        agree = len(ends) == 2 and all(self._within(end) == met for end in ends) and not self._straddles(ends)
+        agree = (
+            len(ends) == 2
+            and all(self._within(end) == met for end in ends)
+            and not self._straddles(ends)
+        )
         return {
-            "key": self.key, "text": self.text, "unit": self.unit, "at_least": self.low, "at_most": self.high,
-            "reached": found.to_json(), "met": met,
+            "key": self.key,
+            "text": self.text,
+            "unit": self.unit,
+            "at_least": self.low,
+            "at_most": self.high,
+            "reached": found.to_json(),
+            "met": met,
             "sure": None if met is None else agree,
-        }  # fmt: skip
+        }
 
     def _within(self, value: float) -> bool:
         return (self.low is None or value >= self.low) and (self.high is None or value <= self.high)
 
     def _straddles(self, ends: Sequence[float]) -> bool:
         """Both bounds between the ends: each end is out, and yet the figure may be within."""
-        return self.low is not None and self.high is not None and ends[0] < self.low and ends[1] > self.high
+        return (
+            self.low is not None
+            and self.high is not None
+            and ends[0] < self.low
+            and ends[1] > self.high
+        )
 
 
 def judged(results: Sequence[Result]) -> list[dict[str, Any]]:
@@ -74,15 +95,23 @@ def _of(kind: str) -> Callable[[Sequence[Result]], list[Result]]:
 
 def _graded(wanted: str) -> Callable[[Sequence[Result]], list[Result]]:
     """Single effects of this size over their limit, however they were drawn."""
-    return lambda results: [result for result in results if len(result.truth) == 1 and grade(result) == wanted]
+    return lambda results: [
+        result for result in results if len(result.truth) == 1 and grade(result) == wanted
+    ]
 
 
 def _told_pairs(results: Sequence[Result]) -> list[Result]:
     """Two effects that each by itself the experiment could tell."""
-    return [result for result in results if result.case.kind == "pair" and grade(result) in ("clear", "subtle")]
+    return [
+        result
+        for result in results
+        if result.case.kind == "pair" and grade(result) in ("clear", "subtle")
+    ]
 
 
-def _share(chosen: Callable[[Sequence[Result]], list[Result]], holds: Callable[[Result], bool]) -> Measure:
+def _share(
+    chosen: Callable[[Sequence[Result]], list[Result]], holds: Callable[[Result], bool]
+) -> Measure:
     return lambda results: share_of(chosen(results), holds)
 
 
@@ -91,7 +120,9 @@ def _median(effect: str, *names: str) -> Measure:
 
 
 def _word(effect: str, name: str) -> Measure:
-    return lambda results: words_right(_of("clear")(results)).get(f"{effect}.{name}", share_of([], bool))
+    return lambda results: words_right(_of("clear")(results)).get(
+        f"{effect}.{name}", share_of([], bool)
+    )
 
 
 def _covered(results: Sequence[Result]) -> Measured:
@@ -106,35 +137,141 @@ _ALONE, _AMONG = "it is named first", "it is among what is named"
 _FAMILY = "One of a family that looks alike: first, or in an ambiguous set"
 
 TARGETS = (
-    Target("clear.first", f"One clear effect, as drawn: {_ALONE}", _share(_of("clear"), lambda r: r.first), 0.95),
-    Target("clear.inside", f"One clear effect, as drawn: {_AMONG}", _share(_of("clear"), lambda r: r.inside), 0.99),
-    Target("subtle.first", f"One subtle effect, as drawn: {_ALONE}", _share(_of("subtle"), lambda r: r.first), 0.85),
-    Target("limit_clear.first", f"One of 5 detection limits or more: {_ALONE}", _share(_graded("clear"), lambda r: r.first), 0.95),
     Target(
-        "limit_clear.inside", f"One of 5 detection limits or more: {_AMONG}", _share(_graded("clear"), lambda r: r.inside), 0.99
+        "clear.first",
+        f"One clear effect, as drawn: {_ALONE}",
+        _share(_of("clear"), lambda r: r.first),
+        0.95,
     ),
-    Target("limit_subtle.first", f"One of 2 to 5 detection limits: {_ALONE}", _share(_graded("subtle"), lambda r: r.first), 0.85),
-    Target("control.named", "Nothing hidden: a cause is named", _share(_of("control"), lambda r: bool(r.named)), high=0.02),
-    Target("pair.exact", "Two effects: both and only both are named", _share(_of("pair"), lambda r: r.exact), 0.80),
-    Target("limit_pair.exact", "Two of 2 detection limits or more: both, only both", _share(_told_pairs, lambda r: r.exact), 0.80),
-    Target("outside.right", "Outside the catalogue: unexplained or ambiguous", _share(_of("outside"), lambda r: r.right), 0.90),
+    Target(
+        "clear.inside",
+        f"One clear effect, as drawn: {_AMONG}",
+        _share(_of("clear"), lambda r: r.inside),
+        0.99,
+    ),
+    Target(
+        "subtle.first",
+        f"One subtle effect, as drawn: {_ALONE}",
+        _share(_of("subtle"), lambda r: r.first),
+        0.85,
+    ),
+    Target(
+        "limit_clear.first",
+        f"One of 5 detection limits or more: {_ALONE}",
+        _share(_graded("clear"), lambda r: r.first),
+        0.95,
+    ),
+    Target(
+        "limit_clear.inside",
+        f"One of 5 detection limits or more: {_AMONG}",
+        _share(_graded("clear"), lambda r: r.inside),
+        0.99,
+    ),
+    Target(
+        "limit_subtle.first",
+        f"One of 2 to 5 detection limits: {_ALONE}",
+        _share(_graded("subtle"), lambda r: r.first),
+        0.85,
+    ),
+    Target(
+        "control.named",
+        "Nothing hidden: a cause is named",
+        _share(_of("control"), lambda r: bool(r.named)),
+        high=0.02,
+    ),
+    Target(
+        "pair.exact",
+        "Two effects: both and only both are named",
+        _share(_of("pair"), lambda r: r.exact),
+        0.80,
+    ),
+    Target(
+        "limit_pair.exact",
+        "Two of 2 detection limits or more: both, only both",
+        _share(_told_pairs, lambda r: r.exact),
+        0.80,
+    ),
+    Target(
+        "outside.right",
+        "Outside the catalogue: unexplained or ambiguous",
+        _share(_of("outside"), lambda r: r.right),
+        0.90,
+    ),
     Target("twins.right", _FAMILY, _share(_of("twins"), lambda r: r.right), 0.95),
-    Target("modulus.right", "Another modulus alone: said to be untold", _share(_of("modulus"), lambda r: r.right), 0.95),
+    Target(
+        "modulus.right",
+        "Another modulus alone: said to be untold",
+        _share(_of("modulus"), lambda r: r.right),
+        0.95,
+    ),
     Target("coverage", "90 % intervals of parameters that hold the truth", _covered, 0.85, 0.95),
-    Target("calibration", "Calibration error, most probable effect", lambda r: calibration_error(*first_effect(r)), high=0.05),
-    Target("inclusion.plane", "Inclusion, centre in the plane", _median("stiff_inclusion", "x", "y"), high=2.5e-3, unit="m"),
-    Target("inclusion.depth", "Inclusion, depth", _median("stiff_inclusion", "z"), high=3e-3, unit="m"),
+    Target(
+        "calibration",
+        "Calibration error, most probable effect",
+        lambda r: calibration_error(*first_effect(r)),
+        high=0.05,
+    ),
+    Target(
+        "inclusion.plane",
+        "Inclusion, centre in the plane",
+        _median("stiff_inclusion", "x", "y"),
+        high=2.5e-3,
+        unit="m",
+    ),
+    Target(
+        "inclusion.depth", "Inclusion, depth", _median("stiff_inclusion", "z"), high=3e-3, unit="m"
+    ),
     Target("tool_radius", "Tool radius", _median("tool_radius", "radius"), high=0.3e-3, unit="m"),
     Target("time_offset", "Clock", _median("time_offset", "offset"), high=5e-3, unit="s"),
-    Target("poisson_ratio", "Poisson's ratio", _median("poisson_ratio", "nu"), high=0.02, unit="nu"),
-    Target("camera.shift", "Camera, shift", _median("camera_registration", "tx", "ty", "tz"), high=0.3e-3, unit="m"),
-    Target("camera.turn", "Camera, turn", _median("camera_registration", "rx", "ry", "rz"), high=math.radians(0.3), unit="rad"),
+    Target(
+        "poisson_ratio", "Poisson's ratio", _median("poisson_ratio", "nu"), high=0.02, unit="nu"
+    ),
+    Target(
+        "camera.shift",
+        "Camera, shift",
+        _median("camera_registration", "tx", "ty", "tz"),
+        high=0.3e-3,
+        unit="m",
+    ),
+    Target(
+        "camera.turn",
+        "Camera, turn",
+        _median("camera_registration", "rx", "ry", "rz"),
+        high=math.radians(0.3),
+        unit="rad",
+    ),
     Target("depth_bias.scale", "Misread depth, scale", _median("depth_bias", "scale"), high=5e-3),
-    Target("geometry_scale.height", "Another size, height", _median("geometry_scale", "scale_z"), high=0.01),
-    Target("landmark_mismatch.scale", "Touches of other places, scale", _median("landmark_mismatch", "scale"), high=0.02),
-    Target("landmark_mismatch.pairing", "Touches of other places, pairing", _word("landmark_mismatch", "pairing"), 0.95),
-    Target("removed", "One clear effect, as drawn: reducible error removed, median", _removed(_of("clear")), 0.85),
-    Target("limit_clear.removed", "One of 5 detection limits or more: reducible error removed", _removed(_graded("clear")), 0.85),
+    Target(
+        "geometry_scale.height",
+        "Another size, height",
+        _median("geometry_scale", "scale_z"),
+        high=0.01,
+    ),
+    Target(
+        "landmark_mismatch.scale",
+        "Touches of other places, scale",
+        _median("landmark_mismatch", "scale"),
+        high=0.02,
+    ),
+    Target(
+        "landmark_mismatch.pairing",
+        "Touches of other places, pairing",
+        _word("landmark_mismatch", "pairing"),
+        0.95,
+    ),
+    Target(
+        "removed",
+        "One clear effect, as drawn: reducible error removed, median",
+        _removed(_of("clear")),
+        0.85,
+    ),
+    Target(
+        "limit_clear.removed",
+        "One of 5 detection limits or more: reducible error removed",
+        _removed(_graded("clear")),
+        0.85,
+    ),
 )
-"""Errors are medians over clear cases. Look-alikes and the modulus alone are asked for without a figure: they have 95 %.
-What is hidden only where it is asked for (depth, size, touches) has a step that matters of each parameter as its figure."""
+"""Errors are medians over clear cases. Look-alikes and the modulus alone are asked for without a
+figure: they have 95 %. What is hidden only where it is asked for (depth, size, touches) has a step
+that matters of each parameter as its figure."""

@@ -5,17 +5,17 @@ samples = make_samples(target, recorder)                 # replayed once, stream
 trained = train(samples, Split.of(samples), TrainingSpec(network=NetworkSpec(kind="unet2d")), run)
 """
 
-from core.correction.body import Body
-from core.correction.chamfer import SurfaceLoss
-from core.correction.inference import CorrectedFrame, Corrector, replay_corrected
-from core.correction.networks import CorrectionNetwork, NetworkSpec, build
-from core.correction.online import Learner, OnlineSpec, learn_along
-from core.correction.request import TrainingSpec
-from core.correction.samples import Batch, Samples, open_samples
-from core.correction.sampling import Recorder, make_samples, recorder_for
-from core.correction.splitting import Split
-from core.correction.trained import Trained
-from core.correction.training import body_for, errors_of, train
+from palpate.correction.corrected_replay import CorrectedFrame, Corrector, replay_corrected
+from palpate.correction.networks.architectures import CorrectionNetwork, NetworkSpec, build
+from palpate.correction.networks.chamfer import SurfaceLoss
+from palpate.correction.online import Learner, OnlineSpec, learn_along
+from palpate.correction.samples.corrected_points import Body
+from palpate.correction.samples.record_samples import Recorder, make_samples, recorder_for
+from palpate.correction.samples.sample_splits import Split
+from palpate.correction.samples.sample_store import Batch, Samples, open_samples
+from palpate.correction.train import body_for, errors_of, train
+from palpate.correction.trained_network import Trained
+from palpate.correction.training_spec import TrainingSpec
 
 __all__ = [
     "Batch",

@@ -1,4 +1,6 @@
-"""A training on disk: everything it needs to go on as if it had never been stopped, written aside and renamed into place."""
+"""A training on disk: everything it needs to go on as if it had never been stopped, written aside
+and renamed into place.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from uuid import uuid4
 
 import torch
 
-from core.errors import RunError
+from palpate.foundation.errors import RunError
 
 __all__ = ["load", "note", "random_state", "restore_random_state", "save"]
 
@@ -36,21 +38,30 @@ def note(path: Path, value: Any) -> None:
 
 
 def load(path: Path, device: torch.device | str = "cpu") -> dict[str, Any]:
-    """What `save` wrote; only tensors and plain values are read, no code. RunError where it is missing or damaged."""
+    """What `save` wrote; only tensors and plain values are read, no code. RunError where it is
+    missing or damaged.
+    """
     try:
         content = torch.load(path, map_location=device, weights_only=True)
     except FileNotFoundError:
         raise RunError(f"{path} is not there; train first", path=str(path)) from None
     except Exception as error:  # torch raises whatever its unpickler does
-        raise RunError(f"{path} cannot be read ({type(error).__name__}: {error}); train again", path=str(path)) from None
+        raise RunError(
+            f"{path} cannot be read ({type(error).__name__}: {error}); train again", path=str(path)
+        ) from None
     if not isinstance(content, dict):
-        raise RunError(f"{path} holds a {type(content).__name__}; expected a checkpoint", path=str(path))
+        raise RunError(
+            f"{path} holds a {type(content).__name__}; expected a checkpoint", path=str(path)
+        )
     return content
 
 
 def random_state() -> dict[str, Any]:
     """Of torch, on the processor and all CUDA devices."""
-    return {"cpu": torch.get_rng_state(), "cuda": torch.cuda.get_rng_state_all() if torch.cuda.is_available() else []}
+    return {
+        "cpu": torch.get_rng_state(),
+        "cuda": torch.cuda.get_rng_state_all() if torch.cuda.is_available() else [],
+    }
 
 
 def restore_random_state(state: dict[str, Any]) -> None:

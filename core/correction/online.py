@@ -1,7 +1,9 @@
-"""A network that keeps learning as frames arrive: each is predicted first, then learned from, so that its error is an honest one.
+"""A network that keeps learning as frames arrive: each is predicted first, then learned from, so
+that its error is an honest one.
 
-Steps are small and mix the newest frame with some of those before it, or the network would forget what it knew of other places. Of
-these the last `memory` are kept: when the material changes, what was true of the old one leaves with them.
+Steps are small and mix the newest frame with some of those before it, or the network would forget
+what it knew of other places. Of these the last `memory` are kept: when the material changes, what
+was true of the old one leaves with them.
 """
 
 from __future__ import annotations
@@ -14,13 +16,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from core.correction.chamfer import Distance, SurfaceLoss
-from core.correction.devices import device_of
-from core.correction.samples import Batch, Samples
-from core.correction.trained import Trained
-from core.errors import CorrectionError
-from core.frames import FloatArray
-from core.progress import Report, silent
+from palpate.correction.networks.chamfer import Distance, SurfaceLoss
+from palpate.correction.networks.devices import device_of
+from palpate.correction.samples.sample_store import Batch, Samples
+from palpate.correction.trained_network import Trained
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import CorrectionError
+from palpate.foundation.progress import Report, silent
 
 __all__ = ["Learner", "OnlineSpec", "Stream", "learn_along"]
 
@@ -30,8 +32,13 @@ class OnlineSpec:
     """How a network learns on the way.
 
     Attributes:
-        rate: of Adam. batch: frames in a step, the newest among them. steps: after each frame. memory: frames that are kept.
-        distance, hold: as in a training. device: of torch, or "auto". seed: of which frames are drawn.
+        rate: of Adam.
+        batch: frames in a step, the newest among them.
+        steps: after each frame.
+        memory: frames that are kept.
+        distance, hold: as in a training.
+        device: of torch, or "auto".
+        seed: of which frames are drawn.
     """
 
     rate: float = 1e-3
@@ -44,25 +51,39 @@ class OnlineSpec:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        bounds = {"rate": (0.0, 1.0), "batch": (1, 4096), "steps": (0, 1000), "memory": (1, 100_000)}
+        bounds = {
+            "rate": (0.0, 1.0),
+            "batch": (1, 4096),
+            "steps": (0, 1000),
+            "memory": (1, 100_000),
+        }
         for key, (low, high) in bounds.items():
             value = getattr(self, key)
             if not low <= value <= high:
-                raise CorrectionError(f"{key} = {value:g}; expected {low:g} to {high:g}", key=key, value=value, low=low, high=high)
+                raise CorrectionError(
+                    f"{key} = {value:g}; expected {low:g} to {high:g}",
+                    key=key,
+                    value=value,
+                    low=low,
+                    high=high,
+                )
 
 
 class Learner:
     """A copy of a trained network that learns; the one it was made from stays as it is.
 
     Args:
-        trained: the network. spec: how it learns.
+        trained: the network.
+        spec: how it learns.
     """
 
     def __init__(self, trained: Trained, spec: OnlineSpec) -> None:
         self.spec, self.body, self._device = spec, trained.body, device_of(spec.device)
         self.network = deepcopy(trained.network).to(self._device)
         seen = np.asarray(trained.about["seen"], dtype=float)[self.body.index]
-        self._loss = SurfaceLoss(self.body, seen, distance=spec.distance, hold=spec.hold, device=self._device)
+        self._loss = SurfaceLoss(
+            self.body, seen, distance=spec.distance, hold=spec.hold, device=self._device
+        )
         self._optimizer = torch.optim.Adam(self.network.parameters(), lr=spec.rate, fused=True)
         self._random = np.random.default_rng(spec.seed)
         self._kept: list[Batch] = []
@@ -77,7 +98,9 @@ class Learner:
 
     @torch.no_grad()
     def error(self, vertices: Tensor, batch: Batch) -> float:
-        """Mean distance [mm] of one frame's measured points to the surface of vertices (1, v, 3) [m]; NaN where there are none."""
+        """Mean distance [mm] of one frame's measured points to the surface of vertices (1, v, 3)
+        [m]; NaN where there are none.
+        """
         apart, valid = self._loss.distances(vertices, batch.to(self._device))
         return float((apart[valid].sum() / valid.sum()).cpu()) * 1e3
 
@@ -88,7 +111,9 @@ class Learner:
         for _ in range(self.spec.steps):
             others = min(self.spec.batch - 1, len(self._kept))
             batch = newest
-            for number in self._random.choice(len(self._kept), others, replace=False) if others else ():
+            for number in (
+                self._random.choice(len(self._kept), others, replace=False) if others else ()
+            ):
                 batch = batch.joined(self._kept[int(number)])
             raw = batch.positions[:, self.body.index]
             loss = self._loss(self.network(raw, batch.tool), batch, raw)
@@ -104,7 +129,9 @@ class Learner:
 
 @dataclass(frozen=True, eq=False)
 class Stream:
-    """Errors [mm] of frames in the order in which they came (f,): learning, of the network as it was, and without one."""
+    """Errors [mm] of frames in the order in which they came (f,): learning, of the network as it
+    was, and without one.
+    """
 
     online: FloatArray
     frozen: FloatArray
@@ -112,13 +139,17 @@ class Stream:
 
 
 def learn_along(
-    trained: Trained, streams: Sequence[tuple[Samples, Sequence[str]]], spec: OnlineSpec, report: Report = silent
+    trained: Trained,
+    streams: Sequence[tuple[Samples, Sequence[str]]],
+    spec: OnlineSpec,
+    report: Report = silent,
 ) -> Stream:
     """Predict each frame, then learn from it.
 
     Args:
-        trained: the network at the beginning. streams: samples and names of their sequences, in the order in which they come; a
-            second set of samples is how a change of the material half way is told.
+        trained: the network at the beginning.
+        streams: samples and names of their sequences, in the order in which they come; a second set
+            of samples is how a change of the material half way is told.
     """
     learner, frozen = Learner(trained, spec), Learner(trained, spec)
     total, done, rows = sum(len(samples.rows(names)) for samples, names in streams), 0, []

@@ -1,4 +1,6 @@
-"""`palpate check`: what a dataset holds, how regular its clocks are, what is doubtful in it and what it lacks."""
+"""`palpate check`: what a dataset holds, how regular its clocks are, what is doubtful in it and
+what it lacks.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +9,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from core.dataset.folder import Dataset
-from core.dataset.motion import Motion, motion_of
-from core.dataset.protocol import Lack, lacks
-from core.dataset.sequence import Sequence
-from core.frames import FloatArray, Transform
-from core.progress import Report, part, silent
+from palpate.dataset.folder import Dataset
+from palpate.dataset.motion_coverage import Lack, lacks
+from palpate.dataset.sequence import Sequence
+from palpate.dataset.tool_motion import Motion, motion_of
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.frames import Transform
+from palpate.foundation.progress import Report, part, silent
 
 __all__ = ["ClockSummary", "DatasetSummary", "SequenceSummary", "check_dataset"]
 
@@ -46,7 +49,8 @@ class SequenceSummary:
     Attributes:
         split: where dataset.toml puts it; "none" is nowhere.
         duration: of the kinematics [s].
-        clouds_outside: clouds stamped before or after the kinematics, where the tool's place is unknown.
+        clouds_outside: clouds stamped before or after the kinematics, where the tool's place is
+            unknown.
         points: fewest, median and most per cloud; None without clouds.
         motion: None where robot and phantom have not been related.
     """
@@ -64,7 +68,9 @@ class SequenceSummary:
 
 @dataclass(frozen=True, kw_only=True)
 class DatasetSummary:
-    """A whole dataset; `warnings` are sentences for a person, `lacks` say which cause could not be told from it."""
+    """A whole dataset; `warnings` are sentences for a person, `lacks` say which cause could not be
+    told from it.
+    """
 
     name: str
     path: str
@@ -81,7 +87,9 @@ class DatasetSummary:
         return asdict(self)
 
 
-def check_dataset(dataset: Dataset, phantom_from_robot: Transform | None = None, report: Report = silent) -> DatasetSummary:
+def check_dataset(
+    dataset: Dataset, phantom_from_robot: Transform | None = None, report: Report = silent
+) -> DatasetSummary:
     """Read all of it once and sum it up; with a registration also what the motions do and lack."""
     dataset.validate(part(report, 0.0, 0.9))
     summaries = []
@@ -101,11 +109,20 @@ def check_dataset(dataset: Dataset, phantom_from_robot: Transform | None = None,
         rest_points=len(dataset.rest_cloud()) if dataset.has_rest else None,
         sequences=tuple(summaries),
         lacks=lacks(motions, observed, forces),
-        warnings=(*_doubts(dataset), *(f"{one.name}: {text}" for one in summaries for text in _sequence_doubts(dataset, one))),
+        warnings=(
+            *_doubts(dataset),
+            *(
+                f"{one.name}: {text}"
+                for one in summaries
+                for text in _sequence_doubts(dataset, one)
+            ),
+        ),
     )
 
 
-def _summary(dataset: Dataset, sequence: Sequence, phantom_from_robot: Transform | None) -> SequenceSummary:
+def _summary(
+    dataset: Dataset, sequence: Sequence, phantom_from_robot: Transform | None
+) -> SequenceSummary:
     clock, times = sequence.kinematics.time, sequence.cloud_times
     counts = [sequence.count(index) for index in range(len(sequence))]
     return SequenceSummary(
@@ -129,8 +146,12 @@ def _clock(times: FloatArray, harmless: float = 0.0) -> ClockSummary:
     lost = intervals > max(DROPOUT * median, harmless)
     jitter = float(intervals[~lost].std())
     return ClockSummary(
-        count=len(times), rate=1 / median, jitter=jitter, dropouts=int(lost.sum()), longest=float(intervals.max())
-    )  # fmt: skip
+        count=len(times),
+        rate=1 / median,
+        jitter=jitter,
+        dropouts=int(lost.sum()),
+        longest=float(intervals.max()),
+    )
 
 
 def _split(dataset: Dataset, name: str) -> Literal["train", "validation", "test", "none"]:
@@ -143,11 +164,18 @@ def _split(dataset: Dataset, name: str) -> Literal["train", "validation", "test"
 def _doubts(dataset: Dataset) -> list[str]:
     doubts = []
     if not dataset.config.test:
-        doubts.append("no sequence is kept for the test, so no gain can be shown: name one in splits.test")
+        doubts.append(
+            "no sequence is kept for the test, so no gain can be shown: name one in splits.test"
+        )
     listed = {file for name in dataset.sequences for file in dataset.sequence(name).cloud_files}
-    present = {path.relative_to(dataset.path).as_posix() for path in dataset.path.glob("sequences/*/clouds/*.ply")}
+    present = {
+        path.relative_to(dataset.path).as_posix()
+        for path in dataset.path.glob("sequences/*/clouds/*.ply")
+    }
     if stray := len(present - listed):
-        doubts.append(f"{stray} clouds lie in clouds folders without a row in clouds.csv: they are left out")
+        doubts.append(
+            f"{stray} clouds lie in clouds folders without a row in clouds.csv: they are left out"
+        )
     return doubts
 
 
@@ -155,7 +183,9 @@ def _sequence_doubts(dataset: Dataset, summary: SequenceSummary) -> list[str]:
     """Sentences about one sequence."""
     doubts = []
     if summary.split == "none":
-        doubts.append("is in no split, so it is neither fitted nor tested: add it to one in dataset.toml")
+        doubts.append(
+            "is in no split, so it is neither fitted nor tested: add it to one in dataset.toml"
+        )
     if summary.clouds_outside:
         doubts.append(
             f"{summary.clouds_outside} of {summary.clouds.count} clouds are stamped outside the kinematics, where the tool's place "
@@ -168,18 +198,28 @@ def _sequence_doubts(dataset: Dataset, summary: SequenceSummary) -> list[str]:
         )
     extent = float(np.ptp(dataset.sequence(summary.name).kinematics.position, axis=0).max())
     if extent < 1e-3:
-        doubts.append(f"the tool moves by {1e3 * extent:.3f} mm only: is the unit of kinematics.csv the metre?")
+        doubts.append(
+            f"the tool moves by {1e3 * extent:.3f} mm only: is the unit of kinematics.csv the metre?"
+        )
     return doubts + _motion_doubts(dataset, summary.motion)
 
 
 def _clock_doubts(summary: SequenceSummary) -> list[str]:
     doubts = []
-    for name, clock in (("clouds", summary.clouds), ("kinematics", summary.kinematics), ("forces", summary.forces)):
+    for name, clock in (
+        ("clouds", summary.clouds),
+        ("kinematics", summary.kinematics),
+        ("forces", summary.forces),
+    ):
         if clock and clock.dropouts:
             times = "once" if clock.dropouts == 1 else f"{clock.dropouts} times"
-            doubts.append(f"the {name} pause {times}, at most {clock.longest:.2f} s: frames were lost there")
+            doubts.append(
+                f"the {name} pause {times}, at most {clock.longest:.2f} s: frames were lost there"
+            )
     if summary.kinematics.rate < summary.clouds.rate:
-        doubts.append(f"kinematics at {summary.kinematics.rate:.1f} Hz are slower than the clouds at {summary.clouds.rate:.1f} Hz")
+        doubts.append(
+            f"kinematics at {summary.kinematics.rate:.1f} Hz are slower than the clouds at {summary.clouds.rate:.1f} Hz"
+        )
     return doubts
 
 
@@ -191,5 +231,7 @@ def _motion_doubts(dataset: Dataset, motion: Motion | None) -> list[str]:
             f"the tool never touches the phantom, it stays {1e3 * motion.nearest:.1f} mm away: are touches and tool radius right?"
         ]
     if -motion.nearest > 0.6 * min(dataset.config.size):
-        return [f"the tool goes {-1e3 * motion.nearest:.1f} mm into the phantom as stated: are touches, size and radius right?"]
+        return [
+            f"the tool goes {-1e3 * motion.nearest:.1f} mm into the phantom as stated: are touches, size and radius right?"
+        ]
     return []

@@ -1,6 +1,8 @@
-"""Point clouds as PLY: a strict reader, because the usual ones return an empty or shortened cloud where a file is broken.
+"""Point clouds as PLY: a strict reader, because the usual ones return an empty or shortened cloud
+where a file is broken.
 
-Binary in either byte order and ascii; x, y, z are float or double among any other vertex properties.
+Binary in either byte order and ascii; x, y, z are float or double among any other vertex
+properties.
 """
 
 from __future__ import annotations
@@ -13,20 +15,32 @@ from typing import Any, Literal
 
 import numpy as np
 
-from core.dataset.files import open_inside, problem
-from core.dataset.table import check_coordinates
-from core.errors import DatasetError
-from core.frames import FloatArray
+from palpate.dataset.csv_table import check_coordinates
+from palpate.dataset.files import open_inside, problem
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import DatasetError
 
 __all__ = ["PlyHeader", "read_cloud", "read_header"]
 
 _LARGEST_HEADER = 2**14
 _TYPES = {
-    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
-    "short": "i2", "int16": "i2", "ushort": "u2", "uint16": "u2",
-    "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
-    "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
-}  # fmt: skip
+    "char": "i1",
+    "int8": "i1",
+    "uchar": "u1",
+    "uint8": "u1",
+    "short": "i2",
+    "int16": "i2",
+    "ushort": "u2",
+    "uint16": "u2",
+    "int": "i4",
+    "int32": "i4",
+    "uint": "u4",
+    "uint32": "u4",
+    "float": "f4",
+    "float32": "f4",
+    "double": "f8",
+    "float64": "f8",
+}
 _ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": "="}
 _BARE = tuple(tuple((axis, kind) for axis in "xyz") for kind in ("f4", "f8"))
 _Order = Literal["<", ">", "="]
@@ -69,7 +83,9 @@ class _Element:
 def read_header(root: Path, file: str, within: str = "") -> PlyHeader:
     """The header of a cloud, checked against the size of the file without reading its points."""
     with open_inside(root, file, within) as stream:
-        return _header(file, _read(file, stream, _LARGEST_HEADER), os.fstat(stream.fileno()).st_size)
+        return _header(
+            file, _read(file, stream, _LARGEST_HEADER), os.fstat(stream.fileno()).st_size
+        )
 
 
 def read_cloud(root: Path, file: str, within: str = "") -> FloatArray:
@@ -78,9 +94,15 @@ def read_cloud(root: Path, file: str, within: str = "") -> FloatArray:
         size = os.fstat(stream.fileno()).st_size
         header = _header(file, _read(file, stream, _LARGEST_HEADER), size)
         stream.seek(header.start)
-        length = size - header.start if header.order == "=" else header.count * header.layout.itemsize
+        length = (
+            size - header.start if header.order == "=" else header.count * header.layout.itemsize
+        )
         data = _read(file, stream, length)
-    points = _ascii_points(file, header, data) if header.order == "=" else _binary_points(file, header, data)
+    points = (
+        _ascii_points(file, header, data)
+        if header.order == "="
+        else _binary_points(file, header, data)
+    )
     check_coordinates(file, points, first_row=1)
     return points
 
@@ -89,7 +111,9 @@ def _read(file: str, stream: Any, length: int) -> bytes:
     try:
         return bytes(stream.read(length))
     except OSError as error:
-        raise problem(file, f"cannot be read ({error.strerror}); check the disk and copy the file again") from error
+        raise problem(
+            file, f"cannot be read ({error.strerror}); check the disk and copy the file again"
+        ) from error
 
 
 def _header(file: str, data: bytes, size: int) -> PlyHeader:
@@ -103,24 +127,43 @@ def _header(file: str, data: bytes, size: int) -> PlyHeader:
             _check_size(file, header, size, elements[index + 1 :])
             return header
         if element.has_list or (order == "=" and element.count):
-            raise problem(file, f"element {element.name} comes before the points; expected vertex first: write it first")
+            raise problem(
+                file,
+                f"element {element.name} comes before the points; expected vertex first: write it first",
+            )
         skipped += element.count * element.record
-    raise problem(file, "has no element vertex; expected the points there: export the cloud as a PLY of vertices", key="vertex")
+    raise problem(
+        file,
+        "has no element vertex; expected the points there: export the cloud as a PLY of vertices",
+        key="vertex",
+    )
 
 
 def _header_text(file: str, data: bytes) -> tuple[list[str], int]:
     if not data.startswith((b"ply\n", b"ply\r\n")):
         found = "is empty" if not data else f"starts with {data[:8]!r}"
-        raise problem(file, f"{found}; expected a PLY file ('ply' in its first line): export the cloud again as PLY", row=1)
+        raise problem(
+            file,
+            f"{found}; expected a PLY file ('ply' in its first line): export the cloud again as PLY",
+            row=1,
+        )
     newline = b"\r\n" if data.startswith(b"ply\r\n") else b"\n"
     end = data.find(newline + b"end_header" + newline)
     if end < 0:
-        raise problem(file, "has no end_header line; expected a whole PLY header: the file is cut off or damaged, export it again")
+        raise problem(
+            file,
+            "has no end_header line; expected a whole PLY header: the file is cut off or damaged, export it again",
+        )
     try:
         text = data[:end].decode("ascii")
     except UnicodeDecodeError:
-        raise problem(file, "has more than plain characters in its header; expected ASCII there: export it again") from None
-    return text.split("\r\n" if newline == b"\r\n" else "\n"), end + len(newline) * 2 + len(b"end_header")
+        raise problem(
+            file,
+            "has more than plain characters in its header; expected ASCII there: export it again",
+        ) from None
+    return text.split("\r\n" if newline == b"\r\n" else "\n"), end + len(newline) * 2 + len(
+        b"end_header"
+    )
 
 
 def _elements(file: str, lines: list[str]) -> tuple[_Order, list[_Element]]:
@@ -133,7 +176,9 @@ def _elements(file: str, lines: list[str]) -> tuple[_Order, list[_Element]]:
                     pass
                 case ["format", name, "1.0"] if name in _ORDERS and order is None:
                     order = _ORDERS[name]  # type: ignore[assignment]
-                case ["element", name, count] if _is_count(count) and name not in (element.name for element in elements):
+                case ["element", name, count] if _is_count(count) and name not in (
+                    element.name for element in elements
+                ):
                     elements.append(_Element(name, int(count), []))
                 case ["property", "list", _, _, _] if elements:
                     elements[-1].has_list = True
@@ -146,7 +191,10 @@ def _elements(file: str, lines: list[str]) -> tuple[_Order, list[_Element]]:
             raise problem(file, text, row=row, value=line[:60]) from None
     if order is None:
         raise problem(
-            file, f"has no format line; expected one of {', '.join(_ORDERS)}: export the cloud again", row=2, key="format"
+            file,
+            f"has no format line; expected one of {', '.join(_ORDERS)}: export the cloud again",
+            row=2,
+            key="format",
         )
     return order, elements
 
@@ -159,12 +207,27 @@ def _check_vertex(file: str, element: _Element) -> None:
     kinds = dict(element.fields)
     for axis in "xyz":
         if kinds.get(axis) not in ("f4", "f8"):
-            found = f"has no vertex property {axis}" if axis not in kinds else f"{axis} is an integer"
-            raise problem(file, f"{found}; expected float or double x, y, z in metres: export the cloud again", key=axis)
+            found = (
+                f"has no vertex property {axis}" if axis not in kinds else f"{axis} is an integer"
+            )
+            raise problem(
+                file,
+                f"{found}; expected float or double x, y, z in metres: export the cloud again",
+                key=axis,
+            )
     if element.has_list:
-        raise problem(file, "a point has a list property; expected numbers only: export the cloud without it", key="vertex")
+        raise problem(
+            file,
+            "a point has a list property; expected numbers only: export the cloud without it",
+            key="vertex",
+        )
     if element.count == 0:
-        raise problem(file, "is an empty cloud (element vertex 0); expected points: leave this frame out", key="vertex", value=0)
+        raise problem(
+            file,
+            "is an empty cloud (element vertex 0); expected points: leave this frame out",
+            key="vertex",
+            value=0,
+        )
 
 
 def _check_size(file: str, header: PlyHeader, size: int, rest: list[_Element]) -> None:
@@ -188,7 +251,9 @@ def _check_size(file: str, header: PlyHeader, size: int, rest: list[_Element]) -
 def _binary_points(file: str, header: PlyHeader, data: bytes) -> FloatArray:
     records = np.frombuffer(data, dtype=header.layout, count=header.count)
     points = np.empty((header.count, 3))
-    with np.errstate(invalid="ignore"):  # a NaN may be of the signalling kind; it is found afterwards
+    with np.errstate(
+        invalid="ignore"
+    ):  # a NaN may be of the signalling kind; it is found afterwards
         if header.fields in _BARE:
             points[:] = records.view(header.layout["x"]).reshape(-1, 3)
         else:
@@ -215,7 +280,9 @@ def _ascii_points(file: str, header: PlyHeader, data: bytes) -> FloatArray:
             points[row] = [float(cells[column]) for column in columns]
         except ValueError:
             found = line[:40].decode("ascii", "replace")
-            raise problem(file, f"'{found}' are not numbers; export the cloud again", row=row + 1, value=found) from None
+            raise problem(
+                file, f"'{found}' are not numbers; export the cloud again", row=row + 1, value=found
+            ) from None
     return points
 
 

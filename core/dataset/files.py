@@ -1,4 +1,6 @@
-"""Safe reading inside a dataset folder: regular files only, never outside of it, never larger than a file of its kind can be."""
+"""Safe reading inside a dataset folder: regular files only, never outside of it, never larger than
+a file of its kind can be.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +9,16 @@ import stat
 from pathlib import Path
 from typing import BinaryIO
 
-from core.errors import DatasetError
+from palpate.foundation.errors import DatasetError
 
 __all__ = ["open_inside", "problem", "read_text"]
 
 
-def problem(file: str, text: str, *, row: int | None = None, key: str | None = None, value: object = None) -> DatasetError:
-    """The error for a place in a dataset; `file` is relative to the dataset, `row` is the line in it (the header is row 1).
+def problem(
+    file: str, text: str, *, row: int | None = None, key: str | None = None, value: object = None
+) -> DatasetError:
+    """The error for a place in a dataset; `file` is relative to the dataset, `row` is the line in
+    it (the header is row 1).
 
     The text names the key itself, where that reads best.
     """
@@ -28,30 +33,47 @@ def open_inside(root: Path, file: str, within: str = "") -> BinaryIO:
     try:
         kind = path.stat().st_mode
     except FileNotFoundError:
-        raise problem(file, "not found; expected this file: add it, or correct the name that refers to it") from None
+        raise problem(
+            file, "not found; expected this file: add it, or correct the name that refers to it"
+        ) from None
     except (OSError, ValueError) as error:
-        raise problem(file, f"cannot be looked at ({_reason(error)}); check the name and the rights of this file") from error
+        raise problem(
+            file,
+            f"cannot be looked at ({_reason(error)}); check the name and the rights of this file",
+        ) from error
     if not stat.S_ISREG(kind):
         found = "a folder" if stat.S_ISDIR(kind) else "not a regular file"
         raise problem(file, f"is {found}; expected a plain file: put the file itself here")
     home = os.path.realpath(root / within)
     if os.path.commonpath([home, os.path.realpath(path)]) != home:
-        raise problem(file, "leads out of its folder through a link; expected a file inside: copy the file itself here")
+        raise problem(
+            file,
+            "leads out of its folder through a link; expected a file inside: copy the file itself here",
+        )
     try:
         return path.open("rb")
     except OSError as error:
-        raise problem(file, f"cannot be opened ({_reason(error)}); check the rights of this file") from error
+        raise problem(
+            file, f"cannot be opened ({_reason(error)}); check the rights of this file"
+        ) from error
 
 
 def read_text(root: Path, file: str, limit: int) -> str:
-    """The text of a UTF-8 file of at most `limit` bytes, with plain line ends and without a byte order mark."""
+    """The text of a UTF-8 file of at most `limit` bytes, with plain line ends and without a byte
+    order mark.
+    """
     with open_inside(root, file) as stream:
         try:
             data = stream.read(limit + 1)
         except OSError as error:
-            raise problem(file, f"cannot be read ({_reason(error)}); check the disk and copy the file again") from error
+            raise problem(
+                file, f"cannot be read ({_reason(error)}); check the disk and copy the file again"
+            ) from error
     if len(data) > limit:
-        raise problem(file, f"is larger than {limit // 2**20} MiB; expected far less of such a file: check what was exported")
+        raise problem(
+            file,
+            f"is larger than {limit // 2**20} MiB; expected far less of such a file: check what was exported",
+        )
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

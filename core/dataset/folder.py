@@ -1,4 +1,6 @@
-"""A dataset folder: opened once and checked, clouds read one at a time. Nothing in it is ever written to."""
+"""A dataset folder: opened once and checked, clouds read one at a time. Nothing in it is ever
+written to.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
-from core.dataset.accepted import Accepted
-from core.dataset.cloud import read_cloud, read_header
-from core.dataset.files import problem
-from core.dataset.schema import FILE, DatasetConfig, nearest, read_config
-from core.dataset.sequence import Sequence, read_sequence
-from core.dataset.surface import read_shape
-from core.dataset.table import FIRST_ROW, check_coordinates, read_labelled
-from core.errors import DatasetError
-from core.frames import FloatArray
-from core.progress import Report, silent
-from core.setup import Box, Shape
+from palpate.dataset.accepted_registration import Accepted
+from palpate.dataset.cloud import read_cloud, read_header
+from palpate.dataset.csv_table import FIRST_ROW, check_coordinates, read_labelled
+from palpate.dataset.files import problem
+from palpate.dataset.schema import FILE, DatasetConfig, nearest, read_config
+from palpate.dataset.sequence import Sequence, read_sequence
+from palpate.dataset.shape_from_file import read_shape
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import DatasetError
+from palpate.foundation.progress import Report, silent
+from palpate.setup.setup import Box, Shape
 
 __all__ = [
     "Dataset",
@@ -38,7 +40,8 @@ _BAGS = (".bag", ".db3", ".mcap")
 
 @dataclass(frozen=True, eq=False)
 class Touches:
-    """Tool centres (n, 3) [m], robot frame, while the tool touched the landmark of the same index."""
+    """Tool centres (n, 3) [m], robot frame, while the tool touched the landmark of the same
+    index."""
 
     names: tuple[str, ...]
     positions: FloatArray
@@ -46,9 +49,11 @@ class Touches:
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
-    """One phantom in one setup with its sequences; `sequences` are their names, sorted. `geometry` is as stated.
+    """One phantom in one setup with its sequences; `sequences` are their names, sorted. `geometry`
+    is as stated.
 
-    `accepted` is a registration of the camera that is used in place of the automatic one; None for that.
+    `accepted` is a registration of the camera that is used in place of the automatic one; None for
+    that.
     """
 
     path: Path
@@ -79,10 +84,16 @@ class Dataset:
         for sequence in self.loaded:
             if sequence.name == name:
                 return sequence
-        raise problem(f"sequences/{name}", f"there is no such sequence; {nearest(name, self.sequences)}", value=name)
+        raise problem(
+            f"sequences/{name}",
+            f"there is no such sequence; {nearest(name, self.sequences)}",
+            value=name,
+        )
 
     def registered(self, accepted: Accepted | None) -> Dataset:
-        """The same with an accepted registration of the camera; RegistrationError where it is of another rest cloud."""
+        """The same with an accepted registration of the camera; RegistrationError where it is of
+        another rest cloud.
+        """
         if accepted is not None:
             accepted.check(self.path)
         return replace(self, accepted=accepted)
@@ -101,7 +112,9 @@ class Dataset:
         done = 0
         for sequence in self.loaded:
             for index, file in enumerate(sequence.cloud_files):
-                report(done / total, f"reading {sequence.name}, cloud {index + 1} of {len(sequence)}")
+                report(
+                    done / total, f"reading {sequence.name}, cloud {index + 1} of {len(sequence)}"
+                )
                 self._check_span(file, sequence.cloud(index))
                 done += 1
         report(1.0, f"read {total} clouds")
@@ -120,7 +133,9 @@ def check_span(file: str, points: FloatArray, size: tuple[float, float, float]) 
 
 
 def open_dataset(path: Path | str) -> Dataset:
-    """Open a dataset folder and check all but the points of its clouds; those are checked when read, or by `validate`."""
+    """Open a dataset folder and check all but the points of its clouds; those are checked when
+    read, or by `validate`.
+    """
     root = Path(path)
     check_folder(root)
     config, geometry = stated(root)
@@ -129,7 +144,11 @@ def open_dataset(path: Path | str) -> Dataset:
     check_splits(config, [sequence.name for sequence in sequences])
     observed = any(len(sequence) for sequence in sequences)
     if observed and not config.has_camera:
-        raise problem(FILE, "camera is missing, yet there are clouds; expected this table: add it", key="camera")
+        raise problem(
+            FILE,
+            "camera is missing, yet there are clouds; expected this table: add it",
+            key="camera",
+        )
     has_rest = observed or (root / "rest.ply").exists()
     if has_rest:
         read_header(root, "rest.ply")
@@ -154,7 +173,9 @@ def check_folder(root: Path) -> None:
         found = "is a file" if root.exists() else "does not exist"
     except (OSError, ValueError) as error:
         found = f"cannot be opened ({getattr(error, 'strerror', None) or error})"
-    raise DatasetError(f"{root} {found}; expected the folder of a dataset, with dataset.toml in it", file=str(root))
+    raise DatasetError(
+        f"{root} {found}; expected the folder of a dataset, with dataset.toml in it", file=str(root)
+    )
 
 
 def read_touches(root: Path, config: DatasetConfig) -> Touches:
@@ -164,7 +185,11 @@ def read_touches(root: Path, config: DatasetConfig) -> Touches:
     for row, name in enumerate(names, FIRST_ROW):
         if name not in config.landmarks:
             raise problem(
-                file, f"unknown landmark '{name}'; {nearest(name, config.landmarks)}", row=row, key="landmark", value=name
+                file,
+                f"unknown landmark '{name}'; {nearest(name, config.landmarks)}",
+                row=row,
+                key="landmark",
+                value=name,
             )
         if (first := names.index(name) + FIRST_ROW) != row:
             text = f"landmark '{name}' was touched in row {first} already; expected each once: keep one of them"
@@ -181,9 +206,16 @@ def read_touches(root: Path, config: DatasetConfig) -> Touches:
 
 
 def _check_touch_scale(file: str, positions: FloatArray, landmarks: FloatArray) -> None:
-    touched, stated = (float(np.linalg.norm(points - points.mean(0), axis=1).max()) for points in (positions, landmarks))
+    touched, stated = (
+        float(np.linalg.norm(points - points.mean(0), axis=1).max())
+        for points in (positions, landmarks)
+    )
     if stated == 0:
-        raise problem(FILE, "landmarks: all touched ones are the same point; expected distinct ones: correct them", key="landmarks")
+        raise problem(
+            FILE,
+            "landmarks: all touched ones are the same point; expected distinct ones: correct them",
+            key="landmarks",
+        )
     if not 0.1 < touched / stated < 10:
         text = f"the touches reach {touched:.3g} m from their centre, the landmarks {stated:.3g} m; expected the same unit, metres"
         raise problem(file, text + ": convert one of them", row=FIRST_ROW, value=f"{touched:.3g}")
@@ -192,18 +224,31 @@ def _check_touch_scale(file: str, positions: FloatArray, landmarks: FloatArray) 
 def sequence_names(root: Path) -> list[str]:
     """The names of the sequences' folders, sorted."""
     try:
-        entries = sorted((entry.name, entry.is_dir()) for entry in (root / "sequences").iterdir() if not entry.name.startswith("."))
+        entries = sorted(
+            (entry.name, entry.is_dir())
+            for entry in (root / "sequences").iterdir()
+            if not entry.name.startswith(".")
+        )
     except OSError as error:
         text = f"is no folder that can be read ({error.strerror}); expected one folder per sequence in it: add it"
         raise problem("sequences", text) from None
     for name, _ in entries:
         if name.endswith(_BAGS):
-            raise problem(f"sequences/{name}", "bags are not read yet; expected a folder: export it to csv and ply")
+            raise problem(
+                f"sequences/{name}",
+                "bags are not read yet; expected a folder: export it to csv and ply",
+            )
         if not name.isprintable():
-            raise problem("sequences", f"the name {name!a} cannot be printed; expected letters and digits: rename it")
+            raise problem(
+                "sequences",
+                f"the name {name!a} cannot be printed; expected letters and digits: rename it",
+            )
     names = [name for name, is_folder in entries if is_folder]
     if not names:
-        raise problem("sequences", "holds no sequence; expected at least one folder with kinematics.csv: add one")
+        raise problem(
+            "sequences",
+            "holds no sequence; expected at least one folder with kinematics.csv: add one",
+        )
     return names
 
 

@@ -1,4 +1,6 @@
-"""The keys of dataset.toml, format 1: what the experimenter states about phantom, tool, landmarks, camera and splits."""
+"""The keys of dataset.toml, format 1: what the experimenter states about phantom, tool, landmarks,
+camera and splits.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from core.dataset.files import problem, read_text
-from core.errors import DatasetError, SetupError
-from core.frames import Transform
+from palpate.dataset.files import problem, read_text
+from palpate.foundation.errors import DatasetError, SetupError
+from palpate.foundation.frames import Transform
 
 __all__ = ["FILE", "DatasetConfig", "nearest", "read_config"]
 
@@ -27,7 +29,8 @@ class DatasetConfig:
     """What dataset.toml states, SI units.
 
     Attributes:
-        size: edge lengths of the box (x, y, z) [m]; of a mesh its extent, once its surface was read.
+        size: edge lengths of the box (x, y, z) [m]; of a mesh its extent, once its surface was
+            read.
         surface: file of a mesh, phantom frame, metres; empty for a box.
         mass: of the phantom [kg].
         fixed: what is believed to be held, always "base".
@@ -67,7 +70,11 @@ def read_config(root: Path) -> DatasetConfig:
     if (version := top.take("format")) != 1 or isinstance(version, bool):
         raise top.wrong("format", version, "1, the only version there is: convert the dataset")
     if "topics" in top.values:
-        raise top.wrong("topics", None, "a dataset without it: bags are not read yet, export them to csv and ply")
+        raise top.wrong(
+            "topics",
+            None,
+            "a dataset without it: bags are not read yet, export them to csv and ply",
+        )
     return DatasetConfig(
         name=top.name("name"),
         **_phantom(top.table("phantom")),
@@ -82,7 +89,9 @@ def nearest(name: str, known: Iterable[str]) -> str:
     """A sentence naming what may have been meant, and all that is known."""
     known = sorted(known)
     close = difflib.get_close_matches(name, known, n=1)
-    return (f"did you mean '{close[0]}'? " if close else "") + "Known: " + (", ".join(known) or "none")
+    return (
+        (f"did you mean '{close[0]}'? " if close else "") + "Known: " + (", ".join(known) or "none")
+    )
 
 
 def _toml(root: Path) -> dict[str, Any]:
@@ -93,7 +102,9 @@ def _toml(root: Path) -> dict[str, Any]:
         # tomllib ends its sentence with "(at line 3, column 8)"
         tail = str(error).rpartition("at line ")[2].partition(",")[0]
         row = int(tail) if tail.isdecimal() else None
-        raise problem(FILE, f"is not valid TOML: {error}; correct the syntax there", row=row) from None
+        raise problem(
+            FILE, f"is not valid TOML: {error}; correct the syntax there", row=row
+        ) from None
 
 
 class _Keys:
@@ -106,16 +117,29 @@ class _Keys:
     def wrong(self, key: str, value: object, expected: str) -> DatasetError:
         shown = None if value is None else _shown(value)
         found = "" if shown is None else f" = {shown}"
-        return problem(FILE, f"{self.prefix}{key}{found}; expected {expected}", key=self.prefix + key, value=shown)
+        return problem(
+            FILE,
+            f"{self.prefix}{key}{found}; expected {expected}",
+            key=self.prefix + key,
+            value=shown,
+        )
 
     def only(self, known: tuple[str, ...]) -> None:
         for key in self.values:
             if key not in known:
-                raise problem(FILE, f"{self.prefix}{key} is an unknown key; {nearest(key, known)}", key=self.prefix + key)
+                raise problem(
+                    FILE,
+                    f"{self.prefix}{key} is an unknown key; {nearest(key, known)}",
+                    key=self.prefix + key,
+                )
 
     def take(self, key: str) -> Any:
         if key not in self.values:
-            raise problem(FILE, f"{self.prefix}{key} is missing; expected this key: add it", key=self.prefix + key)
+            raise problem(
+                FILE,
+                f"{self.prefix}{key} is missing; expected this key: add it",
+                key=self.prefix + key,
+            )
         return self.values[key]
 
     def table(self, key: str) -> _Keys:
@@ -126,7 +150,12 @@ class _Keys:
 
     def text(self, key: str) -> str:
         value = self.take(key)
-        if not isinstance(value, str) or not value.strip() or not value.isprintable() or len(value) > 200:
+        if (
+            not isinstance(value, str)
+            or not value.strip()
+            or not value.isprintable()
+            or len(value) > 200
+        ):
             raise self.wrong(key, value, "a name in quotes: write one")
         return value
 
@@ -142,7 +171,9 @@ class _Keys:
             raise self.wrong(key, value, f"'{only}': {why}")
         return only
 
-    def number(self, key: str, low: float, high: float, unit: str, default: float | None = None) -> float:
+    def number(
+        self, key: str, low: float, high: float, unit: str, default: float | None = None
+    ) -> float:
         if default is not None and key not in self.values:
             return default
         return self.finite(key, self.take(key), low, high, unit)
@@ -151,7 +182,10 @@ class _Keys:
         value = self.take(key)
         if not isinstance(value, list) or len(value) != 3:
             raise self.wrong(key, value, "three numbers [x, y, z] in metres: write all three")
-        return cast(Vector, tuple(self.finite(f"{key}[{i}]", one, low, high, "m") for i, one in enumerate(value)))
+        return cast(
+            Vector,
+            tuple(self.finite(f"{key}[{i}]", one, low, high, "m") for i, one in enumerate(value)),
+        )
 
     def names(self, key: str) -> tuple[str, ...]:
         value = self.values.get(key, [])
@@ -178,7 +212,9 @@ def _shown(value: object) -> str:
 
 def _unit_hint(value: float, low: float, high: float, unit: str) -> str:
     """Ask about the unit where a factor of 1000 would bring the value into its bounds."""
-    down, up = {"m": ("millimetres", ""), "kg": ("grams", ""), "Pa": ("", "kilopascals")}.get(unit, ("", ""))
+    down, up = {"m": ("millimetres", ""), "kg": ("grams", ""), "Pa": ("", "kilopascals")}.get(
+        unit, ("", "")
+    )
     for name, factor in ((down, 1e-3), (up, 1e3)):
         if name and low <= value * factor <= high:
             return f": did you write {name}? That would be {value * factor:g} {unit}"
@@ -200,13 +236,21 @@ def _geometry(keys: _Keys) -> dict[str, Any]:
     """Size of a box, or the surface of a mesh, whose size is that of its surface."""
     geometry = keys.take("geometry")
     if geometry not in ("box", "mesh"):
-        raise keys.wrong("geometry", geometry, "'box', or 'mesh' with surface = \"phantom.stl\": name one of the two")
+        raise keys.wrong(
+            "geometry",
+            geometry,
+            "'box', or 'mesh' with surface = \"phantom.stl\": name one of the two",
+        )
     if geometry == "box":
         if "surface" in keys.values:
-            raise keys.wrong("surface", keys.values["surface"], "no surface for a box: remove this key")
+            raise keys.wrong(
+                "surface", keys.values["surface"], "no surface for a box: remove this key"
+            )
         return {"size": keys.vector("size", 1e-3, 2.0), "surface": ""}
     if "size" in keys.values:
-        raise keys.wrong("size", keys.values["size"], "no size for a mesh, whose surface has it: remove this key")
+        raise keys.wrong(
+            "size", keys.values["size"], "no size for a mesh, whose surface has it: remove this key"
+        )
     return {"size": (0.0, 0.0, 0.0), "surface": keys.name("surface")}
 
 
@@ -219,7 +263,10 @@ def _tool(keys: _Keys) -> float:
 def _landmarks(keys: _Keys) -> dict[str, Any]:
     offset = keys.number("touch_offset", -0.2, 0.2, "m", default=0.0)
     names = [name for name in keys.values if name != "touch_offset"]
-    return {"landmarks": {name: keys.vector(name, -2.0, 2.0) for name in names}, "touch_offset": offset}
+    return {
+        "landmarks": {name: keys.vector(name, -2.0, 2.0) for name in names},
+        "touch_offset": offset,
+    }
 
 
 def _camera(keys: _Keys | None) -> dict[str, Any]:
@@ -236,10 +283,17 @@ def _camera(keys: _Keys | None) -> dict[str, Any]:
 
 def _pose(keys: _Keys, key: str) -> Transform:
     rows = keys.take(key)
-    if not isinstance(rows, list) or len(rows) != 4 or any(not isinstance(row, list) or len(row) != 4 for row in rows):
+    if (
+        not isinstance(rows, list)
+        or len(rows) != 4
+        or any(not isinstance(row, list) or len(row) != 4 for row in rows)
+    ):
         raise keys.wrong(key, rows, "a 4x4 matrix, row major: four rows of four numbers")
     units = ("", "", "", "m")
-    matrix = [[keys.finite(f"{key}[{i}][{j}]", row[j], -10.0, 10.0, units[j]) for j in range(4)] for i, row in enumerate(rows)]
+    matrix = [
+        [keys.finite(f"{key}[{i}][{j}]", row[j], -10.0, 10.0, units[j]) for j in range(4)]
+        for i, row in enumerate(rows)
+    ]
     if matrix[3] != [0.0, 0.0, 0.0, 1.0]:
         raise keys.wrong(key, matrix[3], "0, 0, 0, 1 in the last row: write the matrix row by row")
     try:
@@ -260,6 +314,8 @@ def _splits(keys: _Keys) -> dict[str, Any]:
         for name in names:
             if name in home:
                 where = "twice" if home[name] == split else f"in {home[name]} too"
-                raise keys.wrong(split, name, f"each sequence in one split, it is {where}: remove one")
+                raise keys.wrong(
+                    split, name, f"each sequence in one split, it is {where}: remove one"
+                )
             home[name] = split
     return dict(splits)

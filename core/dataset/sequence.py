@@ -7,11 +7,17 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from core.dataset.cloud import read_cloud, read_header
-from core.dataset.files import problem
-from core.dataset.table import FIRST_ROW, check_coordinates, check_increasing, read_labelled, read_numbers
-from core.errors import DatasetError
-from core.frames import FloatArray
+from palpate.dataset.cloud import read_cloud, read_header
+from palpate.dataset.csv_table import (
+    FIRST_ROW,
+    check_coordinates,
+    check_increasing,
+    read_labelled,
+    read_numbers,
+)
+from palpate.dataset.files import problem
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import DatasetError
 
 __all__ = [
     "CLOUDS",
@@ -35,15 +41,21 @@ SLOWEST_STEP = 0.5  # s between rows of the kinematics; slower is another unit
 
 @dataclass(frozen=True, eq=False)
 class Kinematics:
-    """The tool's path: time (n,) [s], position (n, 3) [m] and quaternion (n, 4) (x, y, z, w), robot frame."""
+    """The tool's path: time (n,) [s], position (n, 3) [m] and quaternion (n, 4) (x, y, z, w), robot
+    frame.
+    """
 
     time: FloatArray
     position: FloatArray
     quaternion: FloatArray
 
     def position_at(self, times: FloatArray) -> FloatArray:
-        """Tool centres (m, 3) [m], robot frame, at these times (m,) [s]; linear between rows, beyond the ends the end itself."""
-        return np.stack([np.interp(times, self.time, self.position[:, axis]) for axis in range(3)], axis=-1)
+        """Tool centres (m, 3) [m], robot frame, at these times (m,) [s]; linear between rows,
+        beyond the ends the end itself.
+        """
+        return np.stack(
+            [np.interp(times, self.time, self.position[:, axis]) for axis in range(3)], axis=-1
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +89,9 @@ class Sequence:
 
     def count(self, index: int) -> int:
         """Number of points of a cloud, from its header."""
-        return read_header(self.root, self.cloud_files[index], within=f"sequences/{self.name}").count
+        return read_header(
+            self.root, self.cloud_files[index], within=f"sequences/{self.name}"
+        ).count
 
     def cloud(self, index: int) -> FloatArray:
         """The raw cloud (k, 3) [m], camera frame, read from disk at each call."""
@@ -85,9 +99,13 @@ class Sequence:
         return points if self.shift is None else points + self.shift
 
     def moved(self, camera: FloatArray, robot: FloatArray) -> Sequence:
-        """The same with clouds and tool moved by one vector, (3,) [m] in the camera's and in the robot's frame."""
+        """The same with clouds and tool moved by one vector, (3,) [m] in the camera's and in the
+        robot's frame.
+        """
         path = replace(self.kinematics, position=self.kinematics.position + robot)
-        return replace(self, kinematics=path, shift=camera if self.shift is None else self.shift + camera)
+        return replace(
+            self, kinematics=path, shift=camera if self.shift is None else self.shift + camera
+        )
 
 
 def read_sequence(root: Path, name: str) -> Sequence:
@@ -100,22 +118,29 @@ def read_sequence(root: Path, name: str) -> Sequence:
     if (root / clouds).exists() or (root / home / "clouds").exists():
         times, files = read_cloud_list(root, home, clouds, kinematics.time)
     elif not has_forces:
-        raise problem(home, "has neither clouds.csv nor forces.csv; expected at least one: add what was measured")
-    return Sequence(root, name, kinematics, times, files, read_forces(root, forces) if has_forces else None)
+        raise problem(
+            home,
+            "has neither clouds.csv nor forces.csv; expected at least one: add what was measured",
+        )
+    return Sequence(
+        root, name, kinematics, times, files, read_forces(root, forces) if has_forces else None
+    )
 
 
 def read_kinematics(root: Path, file: str) -> Kinematics:
     """The tool's path from a table below the dataset `root`."""
     table = read_numbers(root, file, KINEMATICS)
     if len(table) < 2:
-        raise problem(file, "has one row; expected a motion of at least two: export this sequence again", row=FIRST_ROW + 1)
+        raise problem(
+            file,
+            "has one row; expected a motion of at least two: export this sequence again",
+            row=FIRST_ROW + 1,
+        )
     time, position, quaternion = table[:, 0].copy(), table[:, 1:4], table[:, 4:]
     check_increasing(file, time)
     check_coordinates(file, position)
     if (step := float(np.median(np.diff(time)))) > SLOWEST_STEP:
-        text = (
-            f"t steps by {step:g} s; expected a stream of at least {1 / SLOWEST_STEP:g} Hz in seconds: did you write milliseconds?"
-        )
+        text = f"t steps by {step:g} s; expected a stream of at least {1 / SLOWEST_STEP:g} Hz in seconds: did you write milliseconds?"
         raise problem(file, text, row=FIRST_ROW + 1, key="t", value=f"{step:g}")
     with np.errstate(over="ignore"):
         norms = np.linalg.norm(quaternion, axis=1)
@@ -126,8 +151,12 @@ def read_kinematics(root: Path, file: str) -> Kinematics:
     return Kinematics(time, position, quaternion)
 
 
-def read_cloud_list(root: Path, home: str, file: str, clock: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
-    """Stamps (m,) [s] and files of the clouds of the sequence at `home`; `clock` (n,) [s] is that of its kinematics."""
+def read_cloud_list(
+    root: Path, home: str, file: str, clock: FloatArray
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """Stamps (m,) [s] and files of the clouds of the sequence at `home`; `clock` (n,) [s] is that
+    of its kinematics.
+    """
     names, numbers = read_labelled(root, file, CLOUDS, label=1)
     times = numbers[:, 0]
     check_increasing(file, times)
@@ -135,9 +164,7 @@ def read_cloud_list(root: Path, home: str, file: str, clock: FloatArray) -> tupl
     for row, name in enumerate(names, FIRST_ROW):
         path = PurePosixPath(name)
         if path.is_absolute() or ".." in path.parts or "\\" in name or not name.isprintable():
-            text = (
-                f"file = '{name[:80]}' leads out of the sequence; expected a path inside such as clouds/000000.ply: move it there"
-            )
+            text = f"file = '{name[:80]}' leads out of the sequence; expected a path inside such as clouds/000000.ply: move it there"
             raise problem(file, text, row=row, key="file", value=name[:80])
         if str(path) in seen:
             text = f"file = '{name}' is in row {seen[str(path)]} already; expected one cloud per frame: remove one row"

@@ -1,27 +1,49 @@
 """The catalogue of causes. A new one is one class in a file of this folder and one entry here.
 
-The engine replays all of them. A diagnosis weighs those in `DIAGNOSED`: those that the virtual bench can hide and whose signature
-it can screen, relaxation, permanent set and friction of the tool among them by traces (`core.diagnosis.traces`), and what other
-packages bring (`OUTSIDE`; how is in the README beside this file).
+The engine replays all of them. A diagnosis weighs those in `DIAGNOSED`: those that the virtual
+bench can hide and whose signature it can screen, relaxation, permanent set and friction of the tool
+among them by traces (`palpate.diagnosis.forward.history_columns`), and what other packages bring
+(`OUTSIDE`; how is in the README beside this file).
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from core.effects.base import Effect, Parameter, Slot, parameter
-from core.effects.geometry import GeometryScale, MeshResolution
-from core.effects.load import Gravity
-from core.effects.material import PoissonRatio, StiffInclusion, YoungModulus
-from core.effects.memory import PermanentSet, Viscoelasticity
-from core.effects.outside import outside_effects
-from core.effects.sensor import CameraRegistration, DepthBias, TimeOffset
-from core.effects.structure import Anisotropy, StiffnessGradient, StrainStiffening, SurfaceLayer
-from core.effects.support import BaseCompliance, BaseDetachment, BaseSlip
-from core.effects.tool import LandmarkMismatch, ToolCompliance, ToolFriction, ToolOffset, ToolRadius
-from core.errors import EffectError
+from palpate.effects.base import Effect, Parameter, Slot, parameter
+from palpate.effects.elastic_material import PoissonRatio, StiffInclusion, YoungModulus
+from palpate.effects.geometry import GeometryScale, MeshResolution
+from palpate.effects.heterogeneity import (
+    Anisotropy,
+    StiffnessGradient,
+    StrainStiffening,
+    SurfaceLayer,
+)
+from palpate.effects.load import Gravity
+from palpate.effects.plugins import outside_effects
+from palpate.effects.sensor import CameraRegistration, DepthBias, TimeOffset
+from palpate.effects.support import BaseCompliance, BaseDetachment, BaseSlip
+from palpate.effects.time_dependence import PermanentSet, Viscoelasticity
+from palpate.effects.tool import (
+    LandmarkMismatch,
+    ToolCompliance,
+    ToolFriction,
+    ToolOffset,
+    ToolRadius,
+)
+from palpate.foundation.errors import EffectError
 
-__all__ = ["CATALOGUE", "DIAGNOSED", "OUTSIDE", "Effect", "Parameter", "Slot", "effect_named", "from_json", "parameter"]
+__all__ = [
+    "CATALOGUE",
+    "DIAGNOSED",
+    "OUTSIDE",
+    "Effect",
+    "Parameter",
+    "Slot",
+    "effect_named",
+    "from_json",
+    "parameter",
+]
 
 _COUNTED: tuple[type[Effect], ...] = (
     PoissonRatio,
@@ -58,7 +80,10 @@ def effect_named(name: str) -> type[Effect]:
     for effect in CATALOGUE:
         if effect.name == name:
             return effect
-    raise EffectError(f"no effect is called {name!r}; known are {', '.join(e.name for e in CATALOGUE)}", parameter=name)
+    raise EffectError(
+        f"no effect is called {name!r}; known are {', '.join(e.name for e in CATALOGUE)}",
+        parameter=name,
+    )
 
 
 def from_json(data: dict[str, Any]) -> Effect:

@@ -1,4 +1,6 @@
-"""What an effect is: parameters with unit, bounds and prior, and one pure function from setup to setup."""
+"""What an effect is: parameters with unit, bounds and prior, and one pure function from setup to
+setup.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +12,10 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, ClassVar, Self
 
-from core.errors import EffectError
-from core.setup import Setup
+from palpate.foundation.errors import EffectError
+from palpate.setup.setup import Setup
 
-__all__ = ["LOG_PER_CONTRAST", "Effect", "Parameter", "Slot", "parameter"]
+__all__ = ["LOG_PER_CONTRAST", "Effect", "Parameter", "Slot", "parameter", "with_effects"]
 
 _SHORT = 1e-3
 _MATRIX = 1.5
@@ -22,7 +24,9 @@ LOG_PER_CONTRAST = 1.0 + _MATRIX
 
 
 class Slot(Enum):
-    """The part of the experiment an effect enters; SENSOR changes only the observation, so nothing is solved anew."""
+    """The part of the experiment an effect enters; SENSOR changes only the observation, so nothing
+    is solved anew.
+    """
 
     GEOMETRY = "geometry"
     MATERIAL = "material"
@@ -37,13 +41,18 @@ class Parameter:
     """What fit, REST, slider and report need to know of a parameter.
 
     Attributes:
-        name, unit: as in effects.md, SI. low, high: bounds. scale: a step that matters, for trust regions and differences.
-        choices: allowed words, for a parameter that is not a number. log: whether it is searched by its logarithm; then
-            `scale` and `accuracy` are of the logarithm. contrast: whether a ratio k of stiffness is searched by
-            (k - 1) / (k + 3/2), and `scale` and `accuracy` are of that: in proportion to it a ball in an incompressible matrix
-            moves what surrounds it (Eshelby 1957), so that k = 10 and k = 50 are next to each other, as they are in data.
-            accuracy: standard deviation that the replay's own error leaves, however good the data. periodic: whether it comes
-            round, as an axis does: its upper bound is its lower one.
+        name, unit: as in effects.md, SI.
+        low, high: bounds.
+        scale: a step that matters, for trust regions and differences.
+        choices: allowed words, for a parameter that is not a number.
+        log: whether it is searched by its logarithm; then `scale` and `accuracy` are of the
+            logarithm.
+        contrast: whether a ratio k of stiffness is searched by (k - 1) / (k + 3/2), and `scale` and
+            `accuracy` are of that: in proportion to it a ball in an incompressible matrix moves
+            what surrounds it (Eshelby 1957), so that k = 10 and k = 50 are next to each other, as
+            they are in data.
+        accuracy: standard deviation that the replay's own error leaves, however good the data.
+        periodic: whether it comes round, as an axis does: its upper bound is its lower one.
     """
 
     name: str
@@ -68,7 +77,9 @@ class Parameter:
         return self.bounded(self._free(coordinate))
 
     def bounded(self, value: float) -> float:
-        """The value in its bounds that is next to this one; of a periodic parameter the one that is the same."""
+        """The value in its bounds that is next to this one; of a periodic parameter the one that is
+        the same.
+        """
         if self.periodic:
             return self.low + (value - self.low) % (self.high - self.low)
         return min(max(value, self.low), self.high)
@@ -76,10 +87,16 @@ class Parameter:
     @property
     def ends(self) -> tuple[float, float]:
         """Search coordinates of the bounds; infinite where the parameter comes round."""
-        return (-math.inf, math.inf) if self.periodic else (self.coordinate(self.low), self.coordinate(self.high))
+        return (
+            (-math.inf, math.inf)
+            if self.periodic
+            else (self.coordinate(self.low), self.coordinate(self.high))
+        )
 
     def interval(self, coordinate: float, width: float) -> tuple[float, float]:
-        """Values at so much to either side; of a periodic parameter they may pass its bounds, as -3 to 5 degrees do."""
+        """Values at so much to either side; of a periodic parameter they may pass its bounds, as -3
+        to 5 degrees do.
+        """
         if self.periodic:
             width = min(width, (self.high - self.low) / 2)
             return self.bounded(coordinate) - width, self.bounded(coordinate) + width
@@ -91,12 +108,16 @@ class Parameter:
         return self.value(min(max(coordinate, low + short), high - short))
 
     def factor(self, size: float) -> float | None:
-        """That to which one grows with a coordinate's change by `size`; None of a parameter that is searched as it is."""
+        """That to which one grows with a coordinate's change by `size`; None of a parameter that is
+        searched as it is.
+        """
         return self._free(self.coordinate(1.0) + size) if self.log or self.contrast else None
 
     def _free(self, coordinate: float) -> float:
         if self.contrast:
-            return (1.0 + _MATRIX * coordinate) / (1.0 - coordinate) if coordinate < 1.0 else math.inf
+            return (
+                (1.0 + _MATRIX * coordinate) / (1.0 - coordinate) if coordinate < 1.0 else math.inf
+            )
         return math.exp(min(coordinate, 700.0)) if self.log else coordinate
 
 
@@ -115,21 +136,31 @@ def parameter(
     """A dataclass field that carries a Parameter."""
     return dataclasses.field(
         metadata={
-            "unit": unit, "low": low, "high": high, "scale": scale, "choices": choices, "log": log, "contrast": contrast,
-            "accuracy": accuracy, "periodic": periodic,
+            "unit": unit,
+            "low": low,
+            "high": high,
+            "scale": scale,
+            "choices": choices,
+            "log": log,
+            "contrast": contrast,
+            "accuracy": accuracy,
+            "periodic": periodic,
         }
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Effect(ABC):
-    """One cause. A subclass is a frozen dataclass whose fields are made by `parameter`, and `apply`."""
+    """One cause. A subclass is a frozen dataclass whose fields are made by `parameter`, and
+    `apply`.
+    """
 
     name: ClassVar[str]
     enters: ClassVar[Slot]
     summary: ClassVar[str]
     kinked: ClassVar[bool] = False
-    """Whether something begins or ends with its numbers, as a slide does: a fit then looks beyond what derivatives show."""
+    """Whether something begins or ends with its numbers, as a slide does: a fit then looks beyond
+    what derivatives show."""
 
     def __post_init__(self) -> None:
         for item in self.parameters():
@@ -144,13 +175,18 @@ class Effect(ABC):
             elif not (math.isfinite(value) and item.low <= value <= item.high):
                 raise EffectError(
                     f"{self.name}: {item.name} = {value:g} {item.unit} is outside {item.low:g} to {item.high:g} {item.unit}",
-                    parameter=item.name, value=value, low=item.low, high=item.high,
-                )  # fmt: skip
+                    parameter=item.name,
+                    value=value,
+                    low=item.low,
+                    high=item.high,
+                )
 
     @classmethod
     def parameters(cls) -> tuple[Parameter, ...]:
         """The parameters in the order of the fields."""
-        return tuple(Parameter(name=field.name, **field.metadata) for field in dataclasses.fields(cls))
+        return tuple(
+            Parameter(name=field.name, **field.metadata) for field in dataclasses.fields(cls)
+        )
 
     @classmethod
     def numbers(cls) -> tuple[Parameter, ...]:
@@ -159,7 +195,9 @@ class Effect(ABC):
 
     @classmethod
     def at_rest(cls) -> bool:
-        """Whether the rest cloud or the touches show it, so that a diagnosis asks what it changes there."""
+        """Whether the rest cloud or the touches show it, so that a diagnosis asks what it changes
+        there.
+        """
         return cls.enters in (Slot.LOAD, Slot.GEOMETRY)
 
     @classmethod
@@ -181,7 +219,9 @@ class Effect(ABC):
         return {item.name: getattr(self, item.name) for item in self.parameters()}
 
     def reported(self, setup: Setup) -> dict[str, tuple[float | str, str]]:
-        """Name to (value, unit) as a report states them of this setup; more than the fields where that helps the reader."""
+        """Name to (value, unit) as a report states them of this setup; more than the fields where
+        that helps the reader.
+        """
         return {item.name: (getattr(self, item.name), item.unit) for item in self.parameters()}
 
     def moved(self, values: Sequence[float]) -> Self:
@@ -197,10 +237,20 @@ class Effect(ABC):
     def at(self, coordinates: Sequence[float]) -> Self:
         """The same effect at other search coordinates, brought back to just within the bounds.
 
-        At a bound an effect can be absent, as a base is rigid there: what is absent has no first-order changes.
+        At a bound an effect can be absent, as a base is rigid there: what is absent has no
+        first-order changes.
         """
-        return self.moved([item.within(float(c)) for item, c in zip(self.numbers(), coordinates, strict=True)])
+        return self.moved(
+            [item.within(float(c)) for item, c in zip(self.numbers(), coordinates, strict=True)]
+        )
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values from which `core.effects.from_json` makes the same effect."""
+        """Plain values from which `palpate.effects.from_json` makes the same effect."""
         return {"effect": self.name, "parameters": self.values()}
+
+
+def with_effects(setup: Setup, effects: Sequence[Effect]) -> Setup:
+    """The setup with all of them in it, one after another."""
+    for effect in effects:
+        setup = effect.apply(setup)
+    return setup

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
-from core.effects.base import Effect, Slot, parameter
-from core.setup import Box, Setup
+from palpate.effects.base import Effect, Slot, parameter
+from palpate.setup.setup import Box, Setup
 
 __all__ = ["GeometryScale", "MeshResolution"]
 
@@ -19,8 +19,9 @@ _FINEST = 2e-3
 class GeometryScale(Effect):
     """The phantom is not the stated size: its true lengths over the stated ones.
 
-    The registrations took it for the stated size. With the true one the same touches and the same rest cloud put robot and camera
-    elsewhere (see `core.touches` and `core.sight`).
+    The registrations took it for the stated size. With the true one the same touches and the same
+    rest cloud put robot and camera elsewhere (see `palpate.measurement.touch_correction` and
+    `palpate.measurement.camera_model`).
     """
 
     name, enters = "geometry_scale", Slot.GEOMETRY
@@ -50,7 +51,9 @@ class GeometryScale(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class MeshResolution(Effect):
-    """Nothing in the world: the simulation's own grid is too coarse. An even grid of trilinear hexahedra of this size."""
+    """Nothing in the world: the simulation's own grid is too coarse. An even grid of trilinear
+    hexahedra of this size.
+    """
 
     name, enters = "mesh_resolution", Slot.GEOMETRY
     summary = "the simulation's own grid is too coarse"
@@ -63,11 +66,17 @@ class MeshResolution(Effect):
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
-        return cls(element_size=_FINEST if setup.element_size is None else min(max(setup.element_size, _FINEST), 2e-2))
+        return cls(
+            element_size=_FINEST
+            if setup.element_size is None
+            else min(max(setup.element_size, _FINEST), 2e-2)
+        )
 
     @classmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:
         return [cls(element_size=size) for size in (5e-3, 9e-3)]
 
     def apply(self, setup: Setup) -> Setup:
-        return replace(setup, element_size=None if self.element_size <= _FINEST else self.element_size)
+        return replace(
+            setup, element_size=None if self.element_size <= _FINEST else self.element_size
+        )

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
-from core.effects.base import Effect, Slot, parameter
-from core.setup import Setup
+from palpate.effects.base import Effect, Slot, parameter
+from palpate.setup.setup import Setup
 
 __all__ = ["Gravity"]
 
@@ -18,7 +18,9 @@ class Gravity(Effect):
 
     name, enters = "gravity", Slot.LOAD
     summary = "the block sags under its own weight"
-    specific_weight_over_stiffness: float = parameter("1/m", low=0.0, high=8.0, scale=0.5, accuracy=0.15)
+    specific_weight_over_stiffness: float = parameter(
+        "1/m", low=0.0, high=8.0, scale=0.5, accuracy=0.15
+    )
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
@@ -29,4 +31,9 @@ class Gravity(Effect):
         return [cls(specific_weight_over_stiffness=1.5)]
 
     def apply(self, setup: Setup) -> Setup:
-        return replace(setup, load=replace(setup.load, specific_weight_over_stiffness=self.specific_weight_over_stiffness))
+        return replace(
+            setup,
+            load=replace(
+                setup.load, specific_weight_over_stiffness=self.specific_weight_over_stiffness
+            ),
+        )

@@ -8,9 +8,9 @@ from typing import Self
 
 import numpy as np
 
-from core.effects.base import Effect, Slot, parameter
-from core.frames import Transform
-from core.setup import Setup
+from palpate.effects.base import Effect, Slot, parameter
+from palpate.foundation.frames import Transform
+from palpate.setup.setup import Setup
 
 __all__ = ["CameraRegistration", "DepthBias", "TimeOffset"]
 
@@ -39,7 +39,8 @@ class TimeOffset(Effect):
 class CameraRegistration(Effect):
     """The camera moved after its registration, or was registered wrongly.
 
-    Fitted as a rigid motion about the middle of the block (see `centre`), so that turning and shifting stay apart.
+    Fitted as a rigid motion about the middle of the block (see `centre`), so that turning and
+    shifting stay apart.
     """
 
     name, enters = "camera_registration", Slot.SENSOR
@@ -63,15 +64,24 @@ class CameraRegistration(Effect):
         """Stated to true position of a measured point, phantom frame."""
         middle = np.array([0.0, 0.0, setup.stated_geometry.size[2] / 2])
         turn = Transform.from_vector(np.zeros(3), [self.rx, self.ry, self.rz])
-        return Transform(turn.rotation, middle - turn.rotation @ middle + np.array([self.tx, self.ty, self.tz]))
+        return Transform(
+            turn.rotation, middle - turn.rotation @ middle + np.array([self.tx, self.ty, self.tz])
+        )
 
     def apply(self, setup: Setup) -> Setup:
-        return replace(setup, sensor=replace(setup.sensor, camera_shift=self.shift(setup) @ setup.sensor.camera_shift))
+        return replace(
+            setup,
+            sensor=replace(
+                setup.sensor, camera_shift=self.shift(setup) @ setup.sensor.camera_shift
+            ),
+        )
 
     def reported(self, setup: Setup) -> dict[str, tuple[float | str, str]]:
-        """Magnitudes of the motion in the phantom frame first, then the full pose about the block's middle.
+        """Magnitudes of the motion in the phantom frame first, then the full pose about the block's
+        middle.
 
-        The translation is that of the frame's origin, the middle of the base: a turn about the block's middle moves it, too.
+        The translation is that of the frame's origin, the middle of the base: a turn about the
+        block's middle moves it, too.
         """
         shift = self.shift(setup)
         return {
@@ -83,10 +93,12 @@ class CameraRegistration(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class DepthBias(Effect):
-    """The camera reads too near or far, or stretches depth: a depth z along its axis is read as scale z + offset.
+    """The camera reads too near or far, or stretches depth: a depth z along its axis is read as
+    scale z + offset.
 
-    It read so already when it was registered. A registration makes up for all of it that is a rigid motion, which is nearly all of
-    an offset; a scale makes the block look larger or smaller (see `core.sight`).
+    It read so already when it was registered. A registration makes up for all of it that is a rigid
+    motion, which is nearly all of an offset; a scale makes the block look larger or smaller (see
+    `palpate.measurement.camera_model`).
     """
 
     name, enters = "depth_bias", Slot.SENSOR
@@ -108,4 +120,6 @@ class DepthBias(Effect):
         return [cls(offset=setup.sensor.depth_offset, scale=scale) for scale in (0.97, 1.03)]
 
     def apply(self, setup: Setup) -> Setup:
-        return replace(setup, sensor=replace(setup.sensor, depth_offset=self.offset, depth_scale=self.scale))
+        return replace(
+            setup, sensor=replace(setup.sensor, depth_offset=self.offset, depth_scale=self.scale)
+        )

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self, cast
 
-from core.effects.base import Effect, Slot, parameter
-from core.setup import Detachment, Edge, Setup
+from palpate.effects.base import Effect, Slot, parameter
+from palpate.setup.setup import Detachment, Edge, Setup
 
 __all__ = ["BaseCompliance", "BaseDetachment", "BaseSlip"]
 
@@ -18,13 +18,18 @@ _RIGID = 1e5
 
 @dataclass(frozen=True, kw_only=True)
 class BaseSlip(Effect):
-    """The base slides on the table as a whole, with Coulomb friction against its weight and the push."""
+    """The base slides on the table as a whole, with Coulomb friction against its weight and the
+    push.
+    """
 
     name, enters = "base_slip", Slot.SUPPORT
     summary = "the base slides on the table"
     kinked = True  # a push that slides at one friction holds at the next
-    # Friction is told from the sideways force, which a replay on the grid for diagnosis has to some percent only.
-    friction_coefficient: float = parameter("1", low=0.01, high=3.0, scale=0.2, log=True, accuracy=0.04)
+    # Friction is told from the sideways force, which a replay on the grid for diagnosis has to some
+    # percent only.
+    friction_coefficient: float = parameter(
+        "1", low=0.01, high=3.0, scale=0.2, log=True, accuracy=0.04
+    )
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
@@ -36,7 +41,9 @@ class BaseSlip(Effect):
         return [cls(friction_coefficient=mu) for mu in (0.08, 0.14, 0.22)]
 
     def apply(self, setup: Setup) -> Setup:
-        return replace(setup, support=replace(setup.support, friction_coefficient=self.friction_coefficient))
+        return replace(
+            setup, support=replace(setup.support, friction_coefficient=self.friction_coefficient)
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,18 +61,24 @@ class BaseDetachment(Effect):
 
     @classmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:
-        return [cls(edge=edge, extent=0.35 * setup.box.size["xy".index(edge[1])]) for edge in _EDGES]
+        return [
+            cls(edge=edge, extent=0.35 * setup.box.size["xy".index(edge[1])]) for edge in _EDGES
+        ]
 
     def apply(self, setup: Setup) -> Setup:
         if self.extent == 0:
             return setup
         strip = Detachment(edge=cast(Edge, self.edge), extent=self.extent)
-        return replace(setup, support=replace(setup.support, detached=(*setup.support.detached, strip)))
+        return replace(
+            setup, support=replace(setup.support, detached=(*setup.support.detached, strip))
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
 class BaseCompliance(Effect):
-    """An elastic support instead of a rigid one: springs per area in all directions, over Young's modulus."""
+    """An elastic support instead of a rigid one: springs per area in all directions, over Young's
+    modulus.
+    """
 
     name, enters = "base_compliance", Slot.SUPPORT
     summary = "the support under the base gives way"
@@ -74,7 +87,9 @@ class BaseCompliance(Effect):
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
         stiffness = setup.support.stiffness_over_E
-        return cls(stiffness_over_E=_RIGID if stiffness is None else min(max(stiffness, 5.0), _RIGID))
+        return cls(
+            stiffness_over_E=_RIGID if stiffness is None else min(max(stiffness, 5.0), _RIGID)
+        )
 
     @classmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:

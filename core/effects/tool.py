@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
-from core.effects.base import Effect, Slot, parameter
-from core.setup import PAIRINGS, Setup
+from palpate.effects.base import Effect, Slot, parameter
+from palpate.setup.setup import PAIRINGS, Setup
 
 __all__ = ["LandmarkMismatch", "ToolCompliance", "ToolFriction", "ToolOffset", "ToolRadius"]
 
@@ -34,7 +34,9 @@ class ToolRadius(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class ToolOffset(Effect):
-    """The tool's centre is not where the kinematics say, though the touches were right: true minus stated, phantom frame."""
+    """The tool's centre is not where the kinematics say, though the touches were right: true minus
+    stated, phantom frame.
+    """
 
     name, enters = "tool_offset", Slot.TOOL
     summary = "the tool's centre is not where the kinematics say"
@@ -53,7 +55,12 @@ class ToolOffset(Effect):
 
     def apply(self, setup: Setup) -> Setup:
         offset = setup.tool.offset
-        return replace(setup, tool=replace(setup.tool, offset=(offset[0] + self.dx, offset[1] + self.dy, offset[2] + self.dz)))
+        return replace(
+            setup,
+            tool=replace(
+                setup.tool, offset=(offset[0] + self.dx, offset[1] + self.dy, offset[2] + self.dz)
+            ),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +80,10 @@ class ToolCompliance(Effect):
         return [cls(compliance_times_stiffness=20.0)]
 
     def apply(self, setup: Setup) -> Setup:
-        return replace(setup, tool=replace(setup.tool, compliance_times_stiffness=self.compliance_times_stiffness))
+        return replace(
+            setup,
+            tool=replace(setup.tool, compliance_times_stiffness=self.compliance_times_stiffness),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +92,8 @@ class ToolFriction(Effect):
 
     name, enters = "tool_friction", Slot.TOOL
     summary = "the tool drags the surface along"
-    # Of a coefficient of 0.5 on two engines and two grids the surface is dragged as far within 3 %, as far as one of 0.515 does.
+    # Of a coefficient of 0.5 on two engines and two grids the surface is dragged as far within 3 %,
+    # as far as one of 0.515 does.
     friction_coefficient: float = parameter("1", low=0.0, high=3.0, scale=0.1, accuracy=0.02)
 
     @classmethod
@@ -94,16 +105,19 @@ class ToolFriction(Effect):
         return [cls(friction_coefficient=friction) for friction in (0.15, 0.5)]
 
     def apply(self, setup: Setup) -> Setup:
-        return replace(setup, tool=replace(setup.tool, friction_coefficient=self.friction_coefficient))
+        return replace(
+            setup, tool=replace(setup.tool, friction_coefficient=self.friction_coefficient)
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
 class LandmarkMismatch(Effect):
     """Touches paired with the wrong landmarks, or made beside them.
 
-    The tool then is where the same touches, laid on the right places, put it (see `core.touches`). A polygon of another size about
-    the same middle puts it where it was: `scale`, and `inset` at corners that lie evenly around, show in what the touches miss by,
-    and in no replay.
+    The tool then is where the same touches, laid on the right places, put it (see
+    `palpate.measurement.touch_correction`). A polygon of another size about the same middle puts it
+    where it was: `scale`, and `inset` at corners that lie evenly around, show in what the touches
+    miss by, and in no replay.
     """
 
     name, enters = "landmark_mismatch", Slot.TOOL
@@ -126,7 +140,11 @@ class LandmarkMismatch(Effect):
     def starts(cls, setup: Setup) -> Sequence[Self]:
         """Every other pairing as it is, and the stated one with touches inside the corners."""
         others = [cls(pairing=pairing, scale=1.0, inset=0.0) for pairing in PAIRINGS[1:]]
-        return [*others, cls(pairing=PAIRINGS[0], scale=0.85, inset=0.0), cls(pairing=PAIRINGS[0], scale=1.0, inset=3e-3)]
+        return [
+            *others,
+            cls(pairing=PAIRINGS[0], scale=0.85, inset=0.0),
+            cls(pairing=PAIRINGS[0], scale=1.0, inset=3e-3),
+        ]
 
     def apply(self, setup: Setup) -> Setup:
         touching = replace(setup.touching, pairing=self.pairing, scale=self.scale, inset=self.inset)

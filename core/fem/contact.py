@@ -1,9 +1,10 @@
 """A rigid, frictionless sphere against the free surface, and the table under a detached base.
 
-Both are penalties at the surface's quadrature points, not at nodes: a ball pushed deep would slip between nodes. Stiffness is
-given over E, so that the shape does not depend on the modulus. A point is only pushed when its outward normal faces the
-sphere's centre; without that test the far side of the block can come to rest inside the ball. The test may be made at every
-evaluation, or once before: then the energy does not jump where a point turns away while an equilibrium is sought.
+Both are penalties at the surface's quadrature points, not at nodes: a ball pushed deep would slip
+between nodes. Stiffness is given over E, so that the shape does not depend on the modulus. A point
+is only pushed when its outward normal faces the sphere's centre; without that test the far side of
+the block can come to rest inside the ball. The test may be made at every evaluation, or once
+before: then the energy does not jump where a point turns away while an equilibrium is sought.
 """
 
 from __future__ import annotations
@@ -13,14 +14,24 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-__all__ = ["assemble_contact", "contact_energy", "turns_around"]
+__all__ = ["assemble_contact", "contact_energy"]
 
 
 @njit(cache=True)
 def _gap(
-    positions: Any, face: Any, shapes: Any, gradients: Any, centre: Any, radius: float, flat: bool, facing: bool, direction: Any
+    positions: Any,
+    face: Any,
+    shapes: Any,
+    gradients: Any,
+    centre: Any,
+    radius: float,
+    flat: bool,
+    facing: bool,
+    direction: Any,
 ) -> float:
-    """Signed gap of a surface point [m], negative inside the obstacle; `direction` gets the unit vector that opens the gap."""
+    """Signed gap of a surface point [m], negative inside the obstacle; `direction` gets the unit
+    vector that opens the gap.
+    """
     x, s, t = np.zeros(3), np.zeros(3), np.zeros(3)
     for a in range(face.shape[0]):
         for i in range(3):
@@ -73,9 +84,11 @@ def contact_energy(
     facing: bool,
     stiffness: float,
 ) -> float:
-    """Penalty energy over E [m^3]: stiffness/2 gap^2 over the touched area; stiffness over E [1/m]. `flat` is the plane z = 0.
+    """Penalty energy over E [m^3]: stiffness/2 gap^2 over the touched area; stiffness over E [1/m].
+    `flat` is the plane z = 0.
 
-    With `facing` only points that face the sphere's centre are pushed, otherwise all that have an area.
+    With `facing` only points that face the sphere's centre are pushed, otherwise all that have an
+    area.
     """
     direction, total = np.empty(3), 0.0
     for f in range(faces.shape[0]):
@@ -84,7 +97,17 @@ def contact_energy(
         for q in range(shapes.shape[0]):
             if areas[f, q] == 0.0:
                 continue
-            gap = _gap(positions, faces[f], shapes[q], gradients[q], centre, radius, flat, facing, direction)
+            gap = _gap(
+                positions,
+                faces[f],
+                shapes[q],
+                gradients[q],
+                centre,
+                radius,
+                flat,
+                facing,
+                direction,
+            )
             if gap < 0:
                 total += 0.5 * stiffness * areas[f, q] * gap * gap
     return total
@@ -108,17 +131,29 @@ def assemble_contact(
     data: Any,
     resultant: Any,
 ) -> float:
-    """Add the penalty's gradient over E to `force` (n, 3) [m^2], its tangent to `data` [m], the push on the body to `resultant`.
+    """Add the penalty's gradient over E to `force` (n, 3) [m^2], its tangent to `data` [m], the
+    push on the body to `resultant`.
 
-    `facing` as in `contact_energy`, `slots` (f, 3 b, 3 b) as in `assemble_elastic`; an empty `data` leaves the tangent out,
-    `bending` False the part from the sphere's curvature, which is not positive. Returns the deepest penetration [m].
+    `facing` as in `contact_energy`, `slots` (f, 3 b, 3 b) as in `assemble_elastic`; an empty `data`
+    leaves the tangent out, `bending` False the part from the sphere's curvature, which is not
+    positive. Returns the deepest penetration [m].
     """
     direction, deepest = np.empty(3), 0.0
     for f in range(faces.shape[0]):
         if not _in_reach(positions, faces[f], centre, radius, flat):
             continue
         for q in range(shapes.shape[0]):
-            gap = _gap(positions, faces[f], shapes[q], gradients[q], centre, radius, flat, facing, direction)
+            gap = _gap(
+                positions,
+                faces[f],
+                shapes[q],
+                gradients[q],
+                centre,
+                radius,
+                flat,
+                facing,
+                direction,
+            )
             if gap >= 0 or areas[f, q] == 0.0:
                 continue
             deepest = max(deepest, -gap)
@@ -132,32 +167,12 @@ def assemble_contact(
             bend = gap / (gap + radius) if bending else 0.0
             for i in range(3):
                 for j in range(3):
-                    value = weight * (1 - bend) * direction[i] * direction[j] + (weight * bend if i == j else 0.0)
+                    value = weight * (1 - bend) * direction[i] * direction[j] + (
+                        weight * bend if i == j else 0.0
+                    )
                     for a in range(faces.shape[1]):
                         for b in range(faces.shape[1]):
                             slot = slots[f, 3 * a + i, 3 * b + j]
                             if slot >= 0:
                                 data[slot] += value * shapes[q, a] * shapes[q, b]
     return deepest
-
-
-@njit(cache=True)
-def turns_around(faces: Any, positions: Any, point: Any) -> float:
-    """How often flat polygons (f, 3) or (f, 4) wind around a point (3,): over a closed surface 1 inside and 0 outside.
-
-    Sum of the triangles' solid angles (van Oosterom and Strackee 1983) over that of the sphere.
-    """
-    total, arms, lengths = 0.0, np.empty((3, 3)), np.empty(3)
-    for f in range(faces.shape[0]):
-        for second in range(1, faces.shape[1] - 1):
-            for corner, a in enumerate((0, second, second + 1)):
-                for i in range(3):
-                    arms[corner, i] = positions[faces[f, a], i] - point[i]
-                lengths[corner] = np.sqrt(arms[corner, 0] ** 2 + arms[corner, 1] ** 2 + arms[corner, 2] ** 2)
-            a, b, c = arms[0], arms[1], arms[2]
-            across = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
-            along = lengths[0] * lengths[1] * lengths[2]
-            for i in range(3):
-                along += a[i] * b[i] * lengths[2] + b[i] * c[i] * lengths[0] + c[i] * a[i] * lengths[1]
-            total += 2 * np.arctan2(across, along)
-    return total / (4 * np.pi)

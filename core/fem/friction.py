@@ -1,9 +1,12 @@
-"""Coulomb's friction between the tool and the surface, with stick and slip: a return mapping at the contact's quadrature points.
+"""Coulomb's friction between the tool and the surface, with stick and slip: a return mapping at the
+contact's quadrature points.
 
-A touched point sticks to an anchor that travels with the tool. Its tangential traction is k_t d, d the tangential way from the
-anchor, for as long as that is below mu p, with p the contact's pressure; beyond, the anchor is dragged along (Simo and Laursen
-1992; Wriggers 2006, ch. 5). Pressure and normals are kept while an equilibrium is sought, and renewed after it, until nothing
-changes: so each search is for the minimum of an energy (Tresca's friction as a fixed point: Haslinger 1983), as it is without.
+A touched point sticks to an anchor that travels with the tool. Its tangential traction is k_t d, d
+the tangential way from the anchor, for as long as that is below mu p, with p the contact's
+pressure; beyond, the anchor is dragged along (Simo and Laursen 1992; Wriggers 2006, ch. 5).
+Pressure and normals are kept while an equilibrium is sought, and renewed after it, until nothing
+changes: so each search is for the minimum of an energy (Tresca's friction as a fixed point:
+Haslinger 1983), as it is without.
 """
 
 from __future__ import annotations
@@ -15,24 +18,28 @@ import numpy as np
 from numba import njit
 from scipy.spatial import cKDTree
 
-from core.fem.elements import Face
-from core.frames import FloatArray
-from core.mesh import IntArray
+from palpate.foundation.arrays import FloatArray, IntArray
+from palpate.mesh.elements import Face
 
 __all__ = ["STICK_STIFFNESS", "Grip", "Hold"]
 
 STICK_STIFFNESS = 5e4
-"""Tangential traction over E per way from the anchor [1/m], times the surface's stiffness over E."""
+"""Tangential traction over E per way from the anchor [1/m], times the surface's stiffness over
+E."""
 _NEIGHBOURS = 4
 
 
 @dataclass(frozen=True, eq=False)
 class Grip:
-    """What holds the surface while one equilibrium is sought, at the quadrature points (g, p) of those faces that touch.
+    """What holds the surface while one equilibrium is sought, at the quadrature points (g, p) of
+    those faces that touch.
 
     Attributes:
-        faces: (g,) numbers of the faces. anchors: (g, p, 3) seen from the tool's centre [m]. normals: (g, p, 3) from it.
-        limits: (g, p) largest tangential force over E [m^2]. stiffness: (g, p) of the stick over E [m].
+        faces: (g,) numbers of the faces.
+        anchors: (g, p, 3) seen from the tool's centre [m].
+        normals: (g, p, 3) from it.
+        limits: (g, p) largest tangential force over E [m^2].
+        stiffness: (g, p) of the stick over E [m].
     """
 
     faces: IntArray
@@ -49,8 +56,12 @@ class Grip:
         points = (self.anchors[own], self.normals[own], self.limits[own], self.stiffness[own])
         return type(self)(number[self.faces[own]], *points)
 
-    def energy(self, surface: IntArray, face: Face, positions: FloatArray, centre: FloatArray) -> float:
-        """Over E [m^3], with the tool's centre here (3,) [m]; `surface` (f, b) are all faces' nodes."""
+    def energy(
+        self, surface: IntArray, face: Face, positions: FloatArray, centre: FloatArray
+    ) -> float:
+        """Over E [m^3], with the tool's centre here (3,) [m]; `surface` (f, b) are all faces'
+        nodes.
+        """
         points = (self.anchors, self.normals, self.limits, self.stiffness)
         return float(_energy(surface[self.faces], face.shapes, *points, positions, centre))
 
@@ -65,18 +76,32 @@ class Grip:
         data: FloatArray,
         push: FloatArray,
     ) -> None:
-        """Add the energy's gradient over E to `force` (n, 3) [m^2], its tangent to `data` [m], the drag on the body to `push`.
+        """Add the energy's gradient over E to `force` (n, 3) [m^2], its tangent to `data` [m], the
+        drag on the body to `push`.
 
-        `slots` (f, 3 b, 3 b) of all faces as in `assemble_elastic`; an empty `data` leaves the tangent out.
+        `slots` (f, 3 b, 3 b) of all faces as in `assemble_elastic`; an empty `data` leaves the
+        tangent out.
         """
         points = (self.anchors, self.normals, self.limits, self.stiffness)
-        _assemble(surface[self.faces], face.shapes, *points, positions, centre, slots[self.faces], force, data, push)
+        _assemble(
+            surface[self.faces],
+            face.shapes,
+            *points,
+            positions,
+            centre,
+            slots[self.faces],
+            force,
+            data,
+            push,
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Hold:
-    """What one frame leaves to the next: points of the surface at rest (m, 3) [m], tangential ways from their anchors (m, 3) [m],
-    which of them (m,) are touched, and what friction holds at most, over E and area (m,) [1]; none touched is a fresh start."""
+    """What one frame leaves to the next: points of the surface at rest (m, 3) [m], tangential ways
+    from their anchors (m, 3) [m], which of them (m,) are touched, and what friction holds at most,
+    over E and area (m,) [1]; none touched is a fresh start.
+    """
 
     places: FloatArray
     ways: FloatArray
@@ -92,26 +117,40 @@ class Hold:
         """The same at other points of the surface (..., 3) [m], as a grid that moved has them."""
         shape = places.shape[:-1]
         if not self.touched.any():
-            return type(self)(places, np.zeros_like(places), np.zeros(shape, dtype=bool), np.zeros(shape))
+            return type(self)(
+                places, np.zeros_like(places), np.zeros(shape, dtype=bool), np.zeros(shape)
+            )
         near, weights, touched = self._near(places.reshape(-1, 3))
         ways = np.einsum("mk,mki->mi", weights, self.ways[near])
         limits = np.einsum("mk,mk->m", weights, self.limits[near])
-        return type(self)(places, ways.reshape(places.shape), touched.reshape(shape), limits.reshape(shape))
+        return type(self)(
+            places, ways.reshape(places.shape), touched.reshape(shape), limits.reshape(shape)
+        )
 
     def on(self, faces: IntArray) -> Self:
         """The part of it on these faces (g,), where the points lie face by face."""
-        return type(self)(self.places[faces], self.ways[faces], self.touched[faces], self.limits[faces])
+        return type(self)(
+            self.places[faces], self.ways[faces], self.touched[faces], self.limits[faces]
+        )
 
-    def _near(self, places: FloatArray) -> tuple[IntArray, FloatArray, np.ndarray[Any, np.dtype[np.bool_]]]:
-        """Own points next to each place (m, k), their weights, none where the nearest was not touched, and whether it was (m,)."""
-        distance, near = (np.asarray(part) for part in cKDTree(self.places).query(places, k=_NEIGHBOURS))
+    def _near(
+        self, places: FloatArray
+    ) -> tuple[IntArray, FloatArray, np.ndarray[Any, np.dtype[np.bool_]]]:
+        """Own points next to each place (m, k), their weights, none where the nearest was not
+        touched, and whether it was (m,).
+        """
+        distance, near = (
+            np.asarray(part) for part in cKDTree(self.places).query(places, k=_NEIGHBOURS)
+        )
         weights = 1 / (distance + 1e-9) ** 2
         touched = self.touched[near[:, 0]]
         return near, weights / weights.sum(axis=1, keepdims=True) * touched[:, None], touched
 
 
 @njit(cache=True)
-def _way(positions: Any, face: Any, shapes: Any, centre: Any, anchor: Any, normal: Any, way: Any) -> float:
+def _way(
+    positions: Any, face: Any, shapes: Any, centre: Any, anchor: Any, normal: Any, way: Any
+) -> float:
     """Fill the tangential way from the anchor (3,) [m] and return its length."""
     along = 0.0
     for i in range(3):
@@ -127,8 +166,19 @@ def _way(positions: Any, face: Any, shapes: Any, centre: Any, anchor: Any, norma
 
 
 @njit(cache=True)
-def _energy(faces: Any, shapes: Any, anchors: Any, normals: Any, limits: Any, stiffness: Any, positions: Any, centre: Any) -> float:
-    """Of sticking points k/2 d^2, of slipping ones limit (d - limit / 2 k), over E [m^3]; faces (g, b)."""
+def _energy(
+    faces: Any,
+    shapes: Any,
+    anchors: Any,
+    normals: Any,
+    limits: Any,
+    stiffness: Any,
+    positions: Any,
+    centre: Any,
+) -> float:
+    """Of sticking points k/2 d^2, of slipping ones limit (d - limit / 2 k), over E [m^3]; faces (g,
+    b).
+    """
     way, total = np.empty(3), 0.0
     for f in range(faces.shape[0]):
         for q in range(shapes.shape[0]):
@@ -136,7 +186,11 @@ def _energy(faces: Any, shapes: Any, anchors: Any, normals: Any, limits: Any, st
             if limit <= 0.0:
                 continue
             length = _way(positions, faces[f], shapes[q], centre, anchors[f, q], normals[f, q], way)
-            total += 0.5 * stick * length * length if stick * length <= limit else limit * (length - 0.5 * limit / stick)
+            total += (
+                0.5 * stick * length * length
+                if stick * length <= limit
+                else limit * (length - 0.5 * limit / stick)
+            )
     return total
 
 
@@ -155,7 +209,9 @@ def _assemble(
     data: Any,
     resultant: Any,
 ) -> None:
-    """As `Grip.assemble`, for the faces (g, b) and slots (g, 3 b, 3 b) of the grip; the tangent is never negative."""
+    """As `Grip.assemble`, for the faces (g, b) and slots (g, 3 b, 3 b) of the grip; the tangent is
+    never negative.
+    """
     way = np.empty(3)
     for f in range(faces.shape[0]):
         for q in range(shapes.shape[0]):
@@ -174,7 +230,9 @@ def _assemble(
             along = straight / length**2 if slips else 0.0
             for i in range(3):
                 for j in range(3):
-                    value = -straight * normals[f, q, i] * normals[f, q, j] - along * way[i] * way[j]
+                    value = (
+                        -straight * normals[f, q, i] * normals[f, q, j] - along * way[i] * way[j]
+                    )
                     if i == j:
                         value += straight
                     for a in range(faces.shape[1]):

@@ -1,6 +1,8 @@
-"""The potential of a block under a tool: elastic energy, own weight, bonded or detached base, contact.
+"""The potential of a block under a tool: elastic energy, own weight, bonded or detached base,
+contact.
 
-Everything is over E, so stiffness cancels where only positions are given; forces are multiplied by E when they leave.
+Everything is over E, so stiffness cancels where only positions are given; forces are multiplied by
+E when they leave.
 """
 
 from __future__ import annotations
@@ -11,24 +13,35 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from core.fem.contact import assemble_contact, contact_energy, turns_around
-from core.fem.elastic import Law, assemble_elastic, elastic_energy, lame
-from core.fem.elements import Face, Quadrature, face_weights, quadrature
-from core.fem.friction import Grip
-from core.fem.linear import face_slots, factor_of, upper_pattern
-from core.fem.stiffness import SurfaceSpots, log_stiffness, surface_stiffness
-from core.frames import FloatArray
-from core.meshing import Connectivity, Mesh
-from core.setup import Box, Detachment, Setup, Shape, Support
+from palpate.fem.constitutive.elastic import Law, assemble_elastic, elastic_energy, lame
+from palpate.fem.constitutive.stiffness_field import SurfaceSpots, log_stiffness, surface_stiffness
+from palpate.fem.contact import assemble_contact, contact_energy
+from palpate.fem.friction import Grip
+from palpate.fem.linalg.sparsity import face_slots, factor_of, upper_pattern
+from palpate.foundation.arrays import FloatArray
+from palpate.mesh.elements import Face, Quadrature, face_weights, quadrature
+from palpate.mesh.protocol import Connectivity, Mesh
+from palpate.setup.closest_point import turns_around
+from palpate.setup.setup import Box, Detachment, Setup, Shape, Support
 
-__all__ = ["CONTACT_STIFFNESS", "Assembly", "BlockModel", "Probe", "Topology", "rule_of", "surface_spots", "topology"]
+__all__ = [
+    "CONTACT_STIFFNESS",
+    "Assembly",
+    "BlockModel",
+    "Probe",
+    "Topology",
+    "rule_of",
+    "surface_spots",
+    "topology",
+]
 
 CONTACT_STIFFNESS = 5e4
 """Contact pressure over E per penetration [1/m]: 0.02 mm at a pressure equal to E."""
 BOND_STIFFNESS = 2e4
 """The same for a bonded base that is not simply held [1/m]."""
 _BOND_EDGE = 1e-3
-"""Width over which a bond ends at a detached strip's edge [m]: the result changes smoothly with the strip's extent."""
+"""Width over which a bond ends at a detached strip's edge [m]: the result changes smoothly with the
+strip's extent."""
 _EMPTY = np.empty(0)
 
 BoolArray = np.ndarray[Any, np.dtype[np.bool_]]
@@ -43,7 +56,9 @@ class Probe:
 
 
 class Carried(Protocol):
-    """A quadratic potential of the unknowns' displacements that one step in time adds (`core.fem.memory`)."""
+    """A quadratic potential of the unknowns' displacements that one step in time adds
+    (`palpate.fem.history_stress`).
+    """
 
     @property
     def data(self) -> FloatArray:
@@ -58,7 +73,9 @@ class Carried(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """Residual (u,) [m^2], entries of the tangent [m], push of the tool on the body (3,) [m^2] (all over E), penetration [m]."""
+    """Residual (u,) [m^2], entries of the tangent [m], push of the tool on the body (3,) [m^2] (all
+    over E), penetration [m].
+    """
 
     residual: FloatArray
     data: FloatArray
@@ -67,12 +84,18 @@ class Assembly:
 
 
 class Topology:
-    """What meshes of one connectivity share wherever their nodes lie: numbering, matrix pattern, symbolic factorisation."""
+    """What meshes of one connectivity share wherever their nodes lie: numbering, matrix pattern,
+    symbolic factorisation.
+    """
 
     def __init__(self, connectivity: Connectivity, held: bool) -> None:
         self.element = connectivity.element
         self.elements = connectivity.elements
-        self.surface, self.base, self.hull = connectivity.surface, connectivity.base, connectivity.hull
+        self.surface, self.base, self.hull = (
+            connectivity.surface,
+            connectivity.base,
+            connectivity.hull,
+        )
         free = np.ones((connectivity.count, 3), dtype=bool)
         if held:
             free[connectivity.base_nodes] = False
@@ -89,11 +112,15 @@ class Topology:
 
 @lru_cache(maxsize=5)
 def topology(connectivity: Connectivity, held: bool) -> Topology:
-    """The shared part of all meshes with this connectivity; `held` leaves the base nodes out of the unknowns."""
+    """The shared part of all meshes with this connectivity; `held` leaves the base nodes out of the
+    unknowns.
+    """
     return Topology(connectivity, held)
 
 
-def _held_share(detached: tuple[Detachment, ...], body: Box | Shape, points: FloatArray) -> FloatArray:
+def _held_share(
+    detached: tuple[Detachment, ...], body: Box | Shape, points: FloatArray
+) -> FloatArray:
     """Share of the bond (0 to 1) left at base points (..., 3) [m]."""
     held = np.ones(points.shape[:-1])
     for strip in detached:
@@ -119,34 +146,45 @@ def rule_of(mesh: Mesh) -> Quadrature:
 def surface_spots(mesh: Mesh, face: Face) -> SurfaceSpots:
     """The free surface's points in this quadrature of the elements' sides."""
     corners = mesh.nodes[mesh.connectivity.surface]
-    return SurfaceSpots(np.einsum("qa,fai->fqi", face.shapes, corners), np.sqrt(face_weights(face, corners)))
+    return SurfaceSpots(
+        np.einsum("qa,fai->fqi", face.shapes, corners), np.sqrt(face_weights(face, corners))
+    )
 
 
 class BlockModel:
-    """One block on one mesh: energy, residual and tangent as functions of the node positions (n, 3) [m] and the probe.
+    """One block on one mesh: energy, residual and tangent as functions of the node positions (n, 3)
+    [m] and the probe.
 
     Attributes:
-        mu, bulk: (e, q) over E at the quadrature points [1]. unrelaxed: mu before a step in time changes it (`core.memory`).
-        areas: (f, p) of the free surface's quadrature points, times the stiffness there over E and the hardness [m^2], with which
-            contact goes. hardness: of the contact, one unless `harden` was called [1].
+        mu, bulk: (e, q) over E at the quadrature points [1].
+        unrelaxed: mu before a step in time changes it (`palpate.replay.material_history`).
+        areas: (f, p) of the free surface's quadrature points, times the stiffness there over E and
+            the hardness [m^2], with which contact goes.
+        hardness: of the contact, one unless `harden` was called [1].
         face: where the free surface feels the tool.
     """
 
     def __init__(self, setup: Setup, mesh: Mesh, *, dense: bool = False) -> None:
-        """`dense` feels the tool at so many points that none fits between them (see `core.fem.elements.Element`)."""
+        """`dense` feels the tool at so many points that none fits between them (see
+        `palpate.mesh.elements.Element`).
+        """
         self.mesh, self.setup = mesh, setup
         self.topology = topology(mesh.connectivity, held=not _sprung(setup.support))
         element, height = self.topology.element, setup.geometry.height
         self.law, self.dense = Law.of(setup.material), dense
         self.face, self._base_face = element.dense_face if dense else element.face, element.face
         self.rule, spots = rule_of(mesh), surface_spots(mesh, self.face)
-        self.areas, self.hardness = spots.edges**2 * surface_stiffness(setup.material, spots, height), 1.0
+        self.areas, self.hardness = (
+            spots.edges**2 * surface_stiffness(setup.material, spots, height),
+            1.0,
+        )
         self._all_areas = self.areas
         mu, bulk = lame(self.law, setup.material.poisson_ratio)
         factor = np.exp(log_stiffness(setup.material, self.rule, height))
         self.mu, self.bulk = mu * factor, bulk * factor
         self.unrelaxed = self.mu
-        # Sums of squares near three lose their last digits when three is taken off, in proportion to this stiffness times volume.
+        # Sums of squares near three lose their last digits when three is taken off, in proportion
+        # to this stiffness times volume.
         self.rounding = 4e-16 * float(np.vdot(self.mu, self.rule.weights))
         self.carried: Carried | None = None
         self.grip: Grip | None = None
@@ -164,13 +202,17 @@ class BlockModel:
             self.areas, self.hardness = self.areas * (hardness / self.hardness), hardness
 
     def expect(self, positions: FloatArray, probes: tuple[Probe, ...]) -> None:
-        """Feel these tools at all points that face one of them from positions (n, 3) [m], however they turn; only if dense."""
+        """Feel these tools at all points that face one of them from positions (n, 3) [m], however
+        they turn; only if dense.
+        """
         if self.dense:
             facing = np.any([self.facing(positions, probe)[0] for probe in probes], axis=0)
             self.areas = np.where(facing, self._all_areas * self.hardness, 0.0)
 
     def notice(self, positions: FloatArray, probe: Probe) -> bool:
-        """Feel the tool also at points that have come to face it from within; whether there are any."""
+        """Feel the tool also at points that have come to face it from within; whether there are
+        any.
+        """
         if not self.dense:
             return False
         facing, depth = self.facing(positions, probe)
@@ -203,7 +245,9 @@ class BlockModel:
         points = np.einsum("qa,fai->fqi", shapes, corners)
         self.base_areas = areas
         held = areas * _held_share(setup.support.detached, setup.geometry, points)
-        softness = 1 / BOND_STIFFNESS + (1 / setup.support.stiffness_over_E if setup.support.stiffness_over_E else 0.0)
+        softness = 1 / BOND_STIFFNESS + (
+            1 / setup.support.stiffness_over_E if setup.support.stiffness_over_E else 0.0
+        )
         self.bond = 1 / softness * np.einsum("fq,qa,qb->fab", held, shapes, shapes)
 
     def _bond_gradient(self, positions: FloatArray) -> FloatArray:
@@ -222,9 +266,17 @@ class BlockModel:
             total += self.carried.energy((positions - self.mesh.nodes)[top.free])
         if probe is not None:
             total += contact_energy(
-                top.surface, self.areas, self.face.shapes, self.face.gradients, positions, probe.centre, probe.radius, False,
-                not self.dense, CONTACT_STIFFNESS,
-            )  # fmt: skip
+                top.surface,
+                self.areas,
+                self.face.shapes,
+                self.face.gradients,
+                positions,
+                probe.centre,
+                probe.radius,
+                False,
+                not self.dense,
+                CONTACT_STIFFNESS,
+            )
             if self.grip is not None:
                 total += self.grip.energy(top.surface, self.face, positions, probe.centre)
         if self.sprung:
@@ -245,21 +297,54 @@ class BlockModel:
             )
         return total
 
-    def assemble(self, positions: FloatArray, probe: Probe | None, *, tangent: bool = True, bending: bool = True) -> Assembly:
-        """Residual and, if wanted, tangent at these positions; without `bending` the contact's tangent is positive."""
+    def assemble(
+        self,
+        positions: FloatArray,
+        probe: Probe | None,
+        *,
+        tangent: bool = True,
+        bending: bool = True,
+    ) -> Assembly:
+        """Residual and, if wanted, tangent at these positions; without `bending` the contact's
+        tangent is positive.
+        """
         top = self.topology
         force = np.zeros_like(positions)
         data = np.zeros(top.pattern.nnz) if tangent else _EMPTY
         push, penetration = np.zeros(3), 0.0
-        assemble_elastic(self.law, self.rule, top.elements, self.mu, self.bulk, positions, top.slots, force, data)
+        assemble_elastic(
+            self.law, self.rule, top.elements, self.mu, self.bulk, positions, top.slots, force, data
+        )
         force[:, 2] += self.weight_force
         if probe is not None:
             penetration = assemble_contact(
-                top.surface, self.areas, self.face.shapes, self.face.gradients, positions, probe.centre, probe.radius, False,
-                not self.dense, CONTACT_STIFFNESS, bending, top.surface_slots, force, data, push,
-            )  # fmt: skip
+                top.surface,
+                self.areas,
+                self.face.shapes,
+                self.face.gradients,
+                positions,
+                probe.centre,
+                probe.radius,
+                False,
+                not self.dense,
+                CONTACT_STIFFNESS,
+                bending,
+                top.surface_slots,
+                force,
+                data,
+                push,
+            )
             if self.grip is not None:
-                self.grip.assemble(top.surface, self.face, positions, probe.centre, top.surface_slots, force, data, push)
+                self.grip.assemble(
+                    top.surface,
+                    self.face,
+                    positions,
+                    probe.centre,
+                    top.surface_slots,
+                    force,
+                    data,
+                    push,
+                )
         if self.sprung:
             self._assemble_base(positions, force, data)
         residual = force[top.free]
@@ -273,21 +358,39 @@ class BlockModel:
         np.add.at(force, top.base, self._bond_gradient(positions))
         if len(data):
             size = 3 * self.bond.shape[1]
-            blocks = np.einsum("fab,ij->faibj", self.bond, np.eye(3)).reshape(len(self.bond), size, size)
+            blocks = np.einsum("fab,ij->faibj", self.bond, np.eye(3)).reshape(
+                len(self.bond), size, size
+            )
             used = top.base_slots >= 0
             np.add.at(data, top.base_slots[used], blocks[used])
         if not self.detached:
             return
         assemble_contact(
-            top.base, self.base_areas, self._base_face.shapes, self._base_face.gradients, positions, np.zeros(3), 0.0, True,
-            True, CONTACT_STIFFNESS, False, top.base_slots, force, data, np.zeros(3),
-        )  # fmt: skip
+            top.base,
+            self.base_areas,
+            self._base_face.shapes,
+            self._base_face.gradients,
+            positions,
+            np.zeros(3),
+            0.0,
+            True,
+            True,
+            CONTACT_STIFFNESS,
+            False,
+            top.base_slots,
+            force,
+            data,
+            np.zeros(3),
+        )
 
     def depth_inside(self, positions: FloatArray, probe: Probe) -> float:
-        """How deep the deepest node of the free surface lies inside the tool [m], whichever way it faces."""
+        """How deep the deepest node of the free surface lies inside the tool [m], whichever way it
+        faces.
+        """
         distance = np.linalg.norm(positions[self.topology.surface.ravel()] - probe.centre, axis=1)
         return max(0.0, probe.radius - float(distance.min()))
 
     def encloses(self, positions: FloatArray, probe: Probe) -> bool:
-        """Whether the tool's centre lies within the deformed block, where no contact would be felt."""
+        """Whether the tool's centre lies within the deformed block, where no contact would be
+        felt."""
         return bool(turns_around(self.topology.hull, positions, probe.centre) > 0.5)

@@ -1,4 +1,6 @@
-"""Equilibrium by Newton's method with a line search on the energy; a motion that is too much at once is split."""
+"""Equilibrium by Newton's method with a line search on the energy; a motion that is too much at
+once is split.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +9,15 @@ from enum import Enum
 
 import numpy as np
 
-from core.fem.factor import NotPositiveDefinite
-from core.fem.model import Assembly, BlockModel, Probe
-from core.frames import FloatArray
+from palpate.fem.linalg.direct_solver import NotPositiveDefinite
+from palpate.fem.model import Assembly, BlockModel, Probe
+from palpate.foundation.arrays import FloatArray
 
 __all__ = ["MAX_PENETRATION", "Outcome", "Solution", "blocked", "misfit", "solve", "verdict"]
 
 RELATIVE_TOLERANCE = 1e-6
-"""Converged: the residual's norm is below this share of the tool's push and of the body's internal forces."""
+"""Converged: the residual's norm is below this share of the tool's push and of the body's internal
+forces."""
 MAX_ITERATIONS = 40
 MAX_SPLITS, _MOST_ITERATIONS = 6, 400
 """Of a motion that is split: how often it is halved, and Newton steps in all its parts."""
@@ -28,9 +31,13 @@ class Outcome(Enum):
 
     CONVERGED = "converged"
     ITERATIONS = "no equilibrium within the allowed iterations; the motion between frames is too large or the load too high"
-    INDEFINITE = "the stiffness stayed indefinite: the block buckles or an element is almost inverted"
+    INDEFINITE = (
+        "the stiffness stayed indefinite: the block buckles or an element is almost inverted"
+    )
     INVERTED = "an element is inverted at the start of the solve"
-    TOOL_SWINGS = "the tool gives way so much that no place was found where its spring balances the block"
+    TOOL_SWINGS = (
+        "the tool gives way so much that no place was found where its spring balances the block"
+    )
     BASE_SLIDES = "the base slides on and on and finds no place where friction holds it"
     GRIP_SWINGS = "pressure and friction under the tool do not come to agree; the motion between frames is too large"
     BASE_IN_TOOL = "the tool reaches into the base, which is held: nothing can make way for it"
@@ -39,7 +46,9 @@ class Outcome(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Equilibrium positions (n, 3) [m], push of the tool on the body over E (3,) [m^2], and how it was reached."""
+    """Equilibrium positions (n, 3) [m], push of the tool on the body over E (3,) [m^2], and how it
+    was reached.
+    """
 
     positions: FloatArray
     push: FloatArray
@@ -62,32 +71,49 @@ def misfit(model: BlockModel, state: Assembly) -> float:
 
 
 def verdict(model: BlockModel, probe: Probe | None, positions: FloatArray) -> Outcome:
-    """What a balance of forces is worth: it must not be with the material on the wrong side of the tool."""
+    """What a balance of forces is worth: it must not be with the material on the wrong side of the
+    tool.
+    """
     if probe is None:
         return Outcome.CONVERGED
-    inside = model.depth_inside(positions, probe) > MAX_PENETRATION or _unfelt_depth(model, positions, probe) > MAX_PENETRATION
+    inside = (
+        model.depth_inside(positions, probe) > MAX_PENETRATION
+        or _unfelt_depth(model, positions, probe) > MAX_PENETRATION
+    )
     return Outcome.INSIDE_TOOL if inside or model.encloses(positions, probe) else Outcome.CONVERGED
 
 
 def _unfelt_depth(model: BlockModel, positions: FloatArray, probe: Probe) -> float:
-    """How deep the deepest point of the surface lies inside the tool [m] that does not feel it, such as one in a fold."""
+    """How deep the deepest point of the surface lies inside the tool [m] that does not feel it,
+    such as one in a fold.
+    """
     apart = model.face.shapes @ positions[model.topology.surface] - probe.centre
-    if np.einsum("fqi,fqi->fq", apart, apart).min() > max(0.0, probe.radius - MAX_PENETRATION) ** 2:  # the usual, and cheap
+    if (
+        np.einsum("fqi,fqi->fq", apart, apart).min() > max(0.0, probe.radius - MAX_PENETRATION) ** 2
+    ):  # the usual, and cheap
         return 0.0
     facing, depth = model.facing(positions, probe)
     return float(depth[~(model.areas > 0 if model.dense else facing)].max(initial=0.0))
 
 
 def blocked(model: BlockModel, positions: FloatArray, probe: Probe) -> Solution | None:
-    """What there is to say where the tool reaches into nodes that are held: no equilibrium, at these positions (n, 3) [m]."""
+    """What there is to say where the tool reaches into nodes that are held: no equilibrium, at
+    these positions (n, 3) [m].
+    """
     held = model.mesh.nodes[~model.topology.free.any(axis=1)]
     depth = probe.radius - float(np.linalg.norm(held - probe.centre, axis=1).min(initial=np.inf))
-    return Solution(positions, np.zeros(3), Outcome.BASE_IN_TOOL, 0, np.inf, depth) if depth > MAX_PENETRATION else None
+    return (
+        Solution(positions, np.zeros(3), Outcome.BASE_IN_TOOL, 0, np.inf, depth)
+        if depth > MAX_PENETRATION
+        else None
+    )
 
 
-def _direction(model: BlockModel, probe: Probe | None, positions: FloatArray, state: Assembly) -> tuple[FloatArray, bool] | None:
-    """Newton step of the unknowns, and whether it is exact: an indefinite tangent loses the contact's curvature, then is shifted
-    until it has a factor.
+def _direction(
+    model: BlockModel, probe: Probe | None, positions: FloatArray, state: Assembly
+) -> tuple[FloatArray, bool] | None:
+    """Newton step of the unknowns, and whether it is exact: an indefinite tangent loses the
+    contact's curvature, then is shifted until it has a factor.
     """
     top = model.topology
     data = state.data
@@ -106,30 +132,54 @@ def _direction(model: BlockModel, probe: Probe | None, positions: FloatArray, st
 
 
 def _search(
-    model: BlockModel, probe: Probe | None, positions: FloatArray, step: FloatArray, slope: float, energy: float, exact: bool
+    model: BlockModel,
+    probe: Probe | None,
+    positions: FloatArray,
+    step: FloatArray,
+    slope: float,
+    energy: float,
+    exact: bool,
 ) -> tuple[FloatArray, float]:
-    """Halve the step until the energy falls as it should (Armijo), rounding allowed for; the same positions when it never does.
+    """Halve the step until the energy falls as it should (Armijo), rounding allowed for; the same
+    positions when it never does.
 
-    A step that is not exact is too short where the block gives way, and is doubled for as long as that pays.
+    A step that is not exact is too short where the block gives way, and is doubled for as long as
+    that pays.
     """
     move = np.zeros_like(positions)
     move[model.topology.free] = step
-    # Nothing moves by more than half the tool's radius at once: beyond its centre no contact would be felt.
-    longest = np.inf if probe is None else _LONGEST * probe.radius / max(float(np.abs(step).max()), 1e-300)
+    # Nothing moves by more than half the tool's radius at once: beyond its centre no contact would
+    # be felt.
+    longest = (
+        np.inf
+        if probe is None
+        else _LONGEST * probe.radius / max(float(np.abs(step).max()), 1e-300)
+    )
     length = min(1.0, longest)
     for halvings in range(12):
         trial = positions + length * move
         value = model.energy(trial, probe)
         if value <= energy + 1e-4 * length * slope + model.rounding:
-            return (trial, value) if exact or halvings else _stretched(model, probe, positions, move, (length, longest), value)
+            return (
+                (trial, value)
+                if exact or halvings
+                else _stretched(model, probe, positions, move, (length, longest), value)
+            )
         length /= 2
     return positions, energy
 
 
 def _stretched(
-    model: BlockModel, probe: Probe | None, positions: FloatArray, move: FloatArray, lengths: tuple[float, float], energy: float
+    model: BlockModel,
+    probe: Probe | None,
+    positions: FloatArray,
+    move: FloatArray,
+    lengths: tuple[float, float],
+    energy: float,
 ) -> tuple[FloatArray, float]:
-    """Double a step of the first of these lengths, which leads to this energy, while that pays and it is below the second."""
+    """Double a step of the first of these lengths, which leads to this energy, while that pays and
+    it is below the second.
+    """
     length, longest = lengths
     while 2 * length < longest:
         value = model.energy(positions + 2 * length * move, probe)
@@ -139,18 +189,24 @@ def _stretched(
     return positions + length * move, energy
 
 
-def _step(model: BlockModel, probe: Probe | None, positions: FloatArray, energy: float) -> tuple[FloatArray, float, Outcome | None]:
+def _step(
+    model: BlockModel, probe: Probe | None, positions: FloatArray, energy: float
+) -> tuple[FloatArray, float, Outcome | None]:
     """One Newton step with a line search; an outcome when there is none."""
     state = model.assemble(positions, probe)
     found = _direction(model, probe, positions, state)
     if found is None:
         return positions, energy, Outcome.INDEFINITE
     step, exact = found
-    trial, value = _search(model, probe, positions, step, float(state.residual @ step), energy, exact)
+    trial, value = _search(
+        model, probe, positions, step, float(state.residual @ step), energy, exact
+    )
     return trial, value, Outcome.ITERATIONS if trial is positions else None
 
 
-def _newton(model: BlockModel, probe: Probe | None, start: FloatArray, tolerance: float) -> Solution:
+def _newton(
+    model: BlockModel, probe: Probe | None, start: FloatArray, tolerance: float
+) -> Solution:
     positions, energy = start, model.energy(start, probe)
     if not np.isfinite(energy):
         return Solution(start, np.zeros(3), Outcome.INVERTED, 0, np.inf, 0.0)
@@ -183,9 +239,11 @@ def solve(
     """Find the equilibrium next to `start` with the tool at `probe`.
 
     Args:
-        model: the block. probe: the tool, or None without one.
+        model: the block.
+        probe: the tool, or None without one.
         start: (n, 3) positions [m] to begin from, usually those of the frame before.
-        before: the tool in that frame; when the whole motion at once finds no equilibrium, it is split between the two.
+        before: the tool in that frame; when the whole motion at once finds no equilibrium, it is
+            split between the two.
         tolerance: residual at which to stop, over the push of the tool.
 
     Returns:
@@ -197,17 +255,35 @@ def solve(
     return _split(model, (before, probe), start, tolerance, solution)
 
 
-def _split(model: BlockModel, probes: tuple[Probe, Probe], start: FloatArray, tolerance: float, solution: Solution) -> Solution:
-    """The motion between two places of the tool in parts, halved where one fails and doubled after two that do not."""
+def _split(
+    model: BlockModel,
+    probes: tuple[Probe, Probe],
+    start: FloatArray,
+    tolerance: float,
+    solution: Solution,
+) -> Solution:
+    """The motion between two places of the tool in parts, halved where one fails and doubled after
+    two that do not.
+    """
     before, probe = probes
     done, part, eased, iterations = 0.0, 0.5, False, solution.iterations
     while done < 1.0 and part >= 0.5**MAX_SPLITS and iterations < _MOST_ITERATIONS:
         share = min(done + part, 1.0)
         centre = before.centre + share * (probe.centre - before.centre)
-        solution = _newton(model, Probe(centre, before.radius + share * (probe.radius - before.radius)), start, tolerance)
+        solution = _newton(
+            model,
+            Probe(centre, before.radius + share * (probe.radius - before.radius)),
+            start,
+            tolerance,
+        )
         iterations += solution.iterations
         if solution.converged:
-            start, done, part, eased = solution.positions, share, 2 * part if eased else part, not eased
+            start, done, part, eased = (
+                solution.positions,
+                share,
+                2 * part if eased else part,
+                not eased,
+            )
         else:
             part, eased = part / 2, False
     if solution.converged and done < 1.0:

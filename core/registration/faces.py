@@ -1,4 +1,6 @@
-"""The planes that a rest cloud can be laid against: the block's top, the sides that the camera sees, and the table."""
+"""The planes that a rest cloud can be laid against: the block's top, the sides that the camera
+sees, and the table.
+"""
 
 from __future__ import annotations
 
@@ -7,24 +9,39 @@ from typing import Any
 
 import numpy as np
 
-from core.frames import FloatArray, lengths
+from palpate.foundation.arrays import FloatArray, lengths
 
 IndexArray = np.ndarray[Any, np.dtype[np.int64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
-__all__ = ["EDGE", "FACES", "NORMALS", "TABLE_REACH", "Assignment", "Planes", "assign", "box_distance", "camera_planes"]
+__all__ = [
+    "EDGE",
+    "FACES",
+    "NORMALS",
+    "TABLE_REACH",
+    "Assignment",
+    "Planes",
+    "assign",
+    "box_distance",
+    "camera_planes",
+]
 
 FACES = ("top", "-x", "+x", "-y", "+y", "table")
-NORMALS = np.array([[0, 0, 1], [-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+NORMALS = np.array(
+    [[0, 0, 1], [-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, 1]], dtype=float
+)
 EDGE = 2.0e-3
-"""Points nearer to an edge than this [m] are left out: noise carries them over it, and a real edge is round."""
+"""Points nearer to an edge than this [m] are left out: noise carries them over it, and a real edge
+is round."""
 TABLE_REACH = 0.08
 GRAZING = 0.2
 
 
 @dataclass(frozen=True, eq=False)
 class Planes:
-    """The six planes n.x = d of a block of `size` [m] on its table; `visible` (6,) tells which the camera sees from its front."""
+    """The six planes n.x = d of a block of `size` [m] on its table; `visible` (6,) tells which the
+    camera sees from its front.
+    """
 
     size: FloatArray
     offsets: FloatArray
@@ -40,7 +57,8 @@ class Assignment:
         face: (k,) index into FACES.
         points: (k, 3) [m].
         distance: (k,) [m] signed, positive outside.
-        slant: (k,) cosine between normal and line of sight, at least 0.2; depth noise shows times this in `distance`.
+        slant: (k,) cosine between normal and line of sight, at least 0.2; depth noise shows times
+            this in `distance`.
     """
 
     rows: IndexArray
@@ -56,7 +74,13 @@ class Assignment:
 
     def only(self, keep: Mask) -> Assignment:
         """The points for which `keep` (k,) is true."""
-        return Assignment(self.rows[keep], self.face[keep], self.points[keep], self.distance[keep], self.slant[keep])
+        return Assignment(
+            self.rows[keep],
+            self.face[keep],
+            self.points[keep],
+            self.distance[keep],
+            self.slant[keep],
+        )
 
 
 def camera_planes(size: tuple[float, float, float], camera: FloatArray) -> Planes:
@@ -68,7 +92,9 @@ def camera_planes(size: tuple[float, float, float], camera: FloatArray) -> Plane
 
 
 def assign(points: FloatArray, planes: Planes, camera: FloatArray, gate: float) -> Assignment:
-    """Give points (n, 3) [m], phantom frame, the plane they lie on within `gate` [m], away from edges; leave the others out."""
+    """Give points (n, 3) [m], phantom frame, the plane they lie on within `gate` [m], away from
+    edges; leave the others out.
+    """
     half = planes.size[:2] / 2
     distance = points @ NORMALS.T - planes.offsets
     across = np.abs(points[:, :2]) - half
@@ -97,12 +123,18 @@ def _populated(found: Assignment, planes: Planes) -> Mask:
     seen = np.bincount(found.face, weights=1 / found.slant, minlength=6)
     seen[5] = 0.0
     counts = np.bincount(found.face, minlength=6)
-    return np.asarray((counts >= 20) & ((seen / areas > 0.1 * (seen / areas).max()) | (np.arange(6) == 5)))
+    return np.asarray(
+        (counts >= 20) & ((seen / areas > 0.1 * (seen / areas).max()) | (np.arange(6) == 5))
+    )
 
 
 def box_distance(points: FloatArray, size: FloatArray) -> FloatArray:
-    """Signed distance (n,) [m] of points (n, 3), phantom frame, to the surface of the block, positive outside."""
+    """Signed distance (n,) [m] of points (n, 3), phantom frame, to the surface of the block,
+    positive outside.
+    """
     half = np.asarray(size) / 2
     outside = np.abs(points - np.array([0.0, 0.0, half[2]])) - half
     x, y, z = outside.T
-    return np.asarray(lengths(np.maximum(outside, 0.0)) + np.minimum(np.maximum(np.maximum(x, y), z), 0.0))
+    return np.asarray(
+        lengths(np.maximum(outside, 0.0)) + np.minimum(np.maximum(np.maximum(x, y), z), 0.0)
+    )

@@ -1,12 +1,15 @@
-"""A first guess of camera to phantom without any help: table plane, the top at the block's height over it, its rectangle."""
+"""A first guess of camera to phantom without any help: table plane, the top at the block's height
+over it, its rectangle.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from core.errors import RegistrationError
-from core.frames import FloatArray, Transform
-from core.table import Table, find_table
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import RegistrationError
+from palpate.foundation.frames import Transform
+from palpate.registration.table_plane import Table, find_table
 
 __all__ = ["automatic_guess", "half_turn"]
 
@@ -18,7 +21,9 @@ def half_turn() -> Transform:
     return Transform(np.diag([-1.0, -1.0, 1.0]))
 
 
-def automatic_guess(cloud: FloatArray, size: tuple[float, float, float], depth_sigma: float) -> Transform:
+def automatic_guess(
+    cloud: FloatArray, size: tuple[float, float, float], depth_sigma: float
+) -> Transform:
     """phantom_from_camera from a rest cloud (n, 3) [m], camera frame, and the block's size [m].
 
     One of two headings half a turn apart: a plain block looks the same from both.
@@ -43,7 +48,9 @@ def _level(table: Table) -> Transform:
     return Transform(np.stack([x, np.cross(z, x), z]), np.array([0.0, 0.0, -table.offset]))
 
 
-def _block_top(points: FloatArray, size: tuple[float, float, float], thickness: float) -> FloatArray:
+def _block_top(
+    points: FloatArray, size: tuple[float, float, float], thickness: float
+) -> FloatArray:
     """The largest cluster (k, 3) at the block's height among levelled points (n, 3)."""
     import open3d as o3d
 
@@ -55,18 +62,28 @@ def _block_top(points: FloatArray, size: tuple[float, float, float], thickness: 
         )
     flat = layer * np.array([1.0, 1.0, 0.0])
     spacing = np.sqrt(size[0] * size[1] / len(layer))
-    labels = np.asarray(o3d.geometry.PointCloud(o3d.utility.Vector3dVector(flat)).cluster_dbscan(eps=3.0 * spacing, min_points=8))
+    labels = np.asarray(
+        o3d.geometry.PointCloud(o3d.utility.Vector3dVector(flat)).cluster_dbscan(
+            eps=3.0 * spacing, min_points=8
+        )
+    )
     if labels.max() < 0:
-        raise RegistrationError("the points at the height of the phantom's top do not hang together: give [camera] to_phantom")
+        raise RegistrationError(
+            "the points at the height of the phantom's top do not hang together: give [camera] to_phantom"
+        )
     return np.asarray(layer[labels == np.bincount(labels[labels >= 0]).argmax()])
 
 
 def _rectangle(points: FloatArray, length: float, width: float) -> tuple[float, FloatArray]:
-    """Heading [rad] and centre (2,) [m] of the rectangle of known sides whose robust extents fit points (n, 2) best."""
+    """Heading [rad] and centre (2,) [m] of the rectangle of known sides whose robust extents fit
+    points (n, 2) best.
+    """
     headings = np.arange(0.0, np.pi, HEADING_STEP)
     axes = np.stack([np.cos(headings), np.sin(headings)])
     low, high = np.percentile(points @ axes, [1.0, 99.0], axis=0)
-    low_across, high_across = np.percentile(points @ np.stack([-axes[1], axes[0]]), [1.0, 99.0], axis=0)
+    low_across, high_across = np.percentile(
+        points @ np.stack([-axes[1], axes[0]]), [1.0, 99.0], axis=0
+    )
     misfit = (high - low - length) ** 2 + (high_across - low_across - width) ** 2
     # The extents change slowest at the right heading: the smallest area breaks near ties.
     best = int(np.argmin(misfit + 0.05 * (high - low) * (high_across - low_across)))

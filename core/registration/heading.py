@@ -1,4 +1,6 @@
-"""Which way round a plain block lies: the tool, seen by the camera and known from the kinematics, tells."""
+"""Which way round a plain block lies: the tool, seen by the camera and known from the kinematics,
+tells.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.dataset import Dataset
-from core.frames import FloatArray, Transform
-from core.registration.camera import CameraFit
-from core.registration.faces import box_distance
-from core.registration.uncertainty import weak_directions
+from palpate.dataset import Dataset
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.frames import Transform
+from palpate.registration.camera_fit import CameraFit
+from palpate.registration.faces import box_distance
+from palpate.registration.uncertainty import weak_directions
 
 __all__ = ["tool_misfit", "turned_fit"]
 
@@ -19,20 +22,26 @@ FRAMES = 12
 FARTHEST = 0.03
 
 
-def tool_misfit(dataset: Dataset, phantom_from_robot: Transform, headings: list[Transform]) -> FloatArray:
-    """Mean distance [m] between where the kinematics put the tool and where the camera sees it, for each phantom_from_camera.
+def tool_misfit(
+    dataset: Dataset, phantom_from_robot: Transform, headings: list[Transform]
+) -> FloatArray:
+    """Mean distance [m] between where the kinematics put the tool and where the camera sees it, for
+    each phantom_from_camera.
 
     NaN where no frame shows a tool. Distances beyond 30 mm count as 30 mm.
     """
     distances = [
-        _frame_misfits(cloud, centre, dataset.config.size, headings) for cloud, centre in _frames(dataset, phantom_from_robot)
+        _frame_misfits(cloud, centre, dataset.config.size, headings)
+        for cloud, centre in _frames(dataset, phantom_from_robot)
     ]
     known = [row for row in distances if np.isfinite(row).all()]
     return np.mean(known, axis=0) if known else np.full(len(headings), np.nan)
 
 
 def _frames(dataset: Dataset, phantom_from_robot: Transform) -> list[tuple[FloatArray, FloatArray]]:
-    """Clouds (n, 3), camera frame, and tool centres (3,), phantom frame [m], of frames with the tool far from the block's axis."""
+    """Clouds (n, 3), camera frame, and tool centres (3,), phantom frame [m], of frames with the
+    tool far from the block's axis.
+    """
     places: list[tuple[float, str, int, FloatArray]] = []
     for name in dataset.sequences:
         sequence = dataset.sequence(name)
@@ -44,11 +53,16 @@ def _frames(dataset: Dataset, phantom_from_robot: Transform) -> list[tuple[Float
         index = int(np.argmax(np.where(near, aside, -1.0)))
         places.append((float(aside[index]), name, index, centres[index]))
     places.sort(key=lambda place: -place[0])
-    return [(dataset.sequence(name).cloud(index), centre) for _, name, index, centre in places[:FRAMES]]
+    return [
+        (dataset.sequence(name).cloud(index), centre) for _, name, index, centre in places[:FRAMES]
+    ]
 
 
 def _frame_misfits(
-    cloud: FloatArray, centre: FloatArray, size: tuple[float, float, float], headings: list[Transform]
+    cloud: FloatArray,
+    centre: FloatArray,
+    size: tuple[float, float, float],
+    headings: list[Transform],
 ) -> FloatArray:
     found = []
     for heading in headings:
@@ -64,7 +78,9 @@ def _frame_misfits(
 
 
 def turned_fit(fit: CameraFit) -> CameraFit:
-    """The same fit with the block half a turn about z away: every statement about x and y changes sides."""
+    """The same fit with the block half a turn about z away: every statement about x and y changes
+    sides.
+    """
     half = np.diag([-1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
     swap = {"-x": "+x", "+x": "-x", "-y": "+y", "+y": "-y"}
     covariance = half @ fit.covariance @ half

@@ -1,20 +1,26 @@
-"""A raw cloud set upright: its table flat at z = 0, seen from the camera's side. No registration, only easier to look at."""
+"""A raw cloud set upright: its table flat at z = 0, seen from the camera's side. No registration,
+only easier to look at.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from core.frames import FloatArray, Transform
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.frames import Transform
 
 __all__ = ["as_seen", "levelled"]
 
 DRAWS, SUBSET = 400, 1500
 INLIER, LEAST_SHARE, BEHIND = 3.0e-3, 0.08, 6.0e-3
-"""Distance of a point from its plane [m], share of the points that make a plane [1], and what counts as behind it [m]."""
+"""Distance of a point from its plane [m], share of the points that make a plane [1], and what
+counts as behind it [m]."""
 
 
 def as_seen(cloud: FloatArray) -> Transform:
-    """The camera's axes turned so that its up is z and its view is y; the middle of the cloud (n, 3) [m] lies over the origin."""
+    """The camera's axes turned so that its up is z and its view is y; the middle of the cloud (n,
+    3) [m] lies over the origin.
+    """
     turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     points = cloud @ turn.T
     low = np.percentile(points, 2, axis=0)
@@ -23,9 +29,11 @@ def as_seen(cloud: FloatArray) -> Transform:
 
 
 def levelled(cloud: FloatArray, seed: int = 0) -> Transform:
-    """A pose of the camera in which the table of its cloud (n, 3) [m] is z = 0 and the camera stands on the -y side.
+    """A pose of the camera in which the table of its cloud (n, 3) [m] is z = 0 and the camera
+    stands on the -y side.
 
-    The table is the large plane with least behind it, by RANSAC (Fischler and Bolles 1981); `as_seen` where there is none.
+    The table is the large plane with least behind it, by RANSAC (Fischler and Bolles 1981);
+    `as_seen` where there is none.
     """
     rng = np.random.default_rng(seed)
     points = cloud[rng.permutation(len(cloud))[:SUBSET]]
@@ -37,7 +45,9 @@ def levelled(cloud: FloatArray, seed: int = 0) -> Transform:
         if length < 1e-6:
             continue
         normal = normal / length
-        normal = normal if normal @ corner[0] < 0 else -normal  # towards the camera, which is the origin
+        normal = (
+            normal if normal @ corner[0] < 0 else -normal
+        )  # towards the camera, which is the origin
         height = (points - corner[0]) @ normal
         share = float((np.abs(height) < INLIER).mean())
         score = share - 4.0 * float((height < -BEHIND).mean())
@@ -46,7 +56,9 @@ def levelled(cloud: FloatArray, seed: int = 0) -> Transform:
     if best is None:
         return as_seen(cloud)
     _, up, offset = best
-    away = -up * (up @ np.array([0.0, 0.0, 1.0])) + np.array([0.0, 0.0, 1.0])  # the line of sight, laid on the table
+    away = -up * (up @ np.array([0.0, 0.0, 1.0])) + np.array(
+        [0.0, 0.0, 1.0]
+    )  # the line of sight, laid on the table
     away = away if np.linalg.norm(away) > 1e-3 else np.array([0.0, -1.0, 0.0]) + up * up[1]
     away = away / np.linalg.norm(away)
     turn = np.stack([np.cross(away, up), away, up])

@@ -1,15 +1,17 @@
 """Small rigid motions about a pivot: the parameters that fits and covariances speak in.
 
-A vector (tx, ty, tz, rx, ry, rz), translation [m] first, then rotation vector [rad], both along the axes of the phantom frame,
-moves x to pivot + R(r) (x - pivot) + t. A covariance (6, 6) of a registration is that of this vector in
-true = small_motion(vector, pivot) @ stated, so translation errors are those of the pivot itself.
+A vector (tx, ty, tz, rx, ry, rz), translation [m] first, then rotation vector [rad], both along the
+axes of the phantom frame, moves x to pivot + R(r) (x - pivot) + t. A covariance (6, 6) of a
+registration is that of this vector in true = small_motion(vector, pivot) @ stated, so translation
+errors are those of the pivot itself.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from core.frames import FloatArray, Transform
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.frames import Transform
 
 __all__ = ["motion_jacobian", "small_motion"]
 
@@ -21,7 +23,8 @@ def small_motion(vector: FloatArray, pivot: FloatArray) -> Transform:
 
 
 def motion_jacobian(points: FloatArray, pivot: FloatArray) -> FloatArray:
-    """How points (n, 3) [m] move with the six parameters at rest, (n, 3, 6): [1, -[x - pivot]_x]."""
+    """How points (n, 3) [m] move with the six parameters at rest, (n, 3, 6): [1, -[x -
+    pivot]_x]."""
     arm = points - pivot
     jacobian = np.zeros((len(points), 3, 6))
     jacobian[:, :, :3] = np.eye(3)

@@ -1,13 +1,17 @@
-"""How well a pose is determined by points on planes when the sensor's error is smooth, not only white.
+"""How well a pose is determined by points on planes when the sensor's error is smooth, not only
+white.
 
-A depth camera's error is white noise plus a bias that changes smoothly over the picture. Neighbouring points share the bias, so
-counting them as independent gives a pose that is several times too sure. Here patch averages are fitted by generalised least
-squares with covariance sigma^2 / n + b^2 exp(-d^2 / 2 L^2) along the line of sight; the bias' size b and reach L are averaged over,
-weighted by how well each explains the averages (Rasmussen and Williams 2006, section 2.7: explicit basis functions, wide prior).
+A depth camera's error is white noise plus a bias that changes smoothly over the picture.
+Neighbouring points share the bias, so counting them as independent gives a pose that is several
+times too sure. Here patch averages are fitted by generalised least squares with covariance sigma^2
+/ n + b^2 exp(-d^2 / 2 L^2) along the line of sight; the bias' size b and reach L are averaged over,
+weighted by how well each explains the averages (Rasmussen and Williams 2006, section 2.7: explicit
+basis functions, wide prior).
 
-A soft block sags and bulges, and a table does not. So the block's faces may as a whole lie off their stated planes: by nothing, a
-little or much, weighted in the same way. Where top and table agree this costs little; where they do not, the table holds the pose.
-Without a table the block itself is all there is to refer to.
+A soft block sags and bulges, and a table does not. So the block's faces may as a whole lie off
+their stated planes: by nothing, a little or much, weighted in the same way. Where top and table
+agree this costs little; where they do not, the table holds the pose. Without a table the block
+itself is all there is to refer to.
 """
 
 from __future__ import annotations
@@ -17,15 +21,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from core.frames import FloatArray
-from core.registration.faces import EDGE, FACES, Assignment, IndexArray
-from core.registration.pose import motion_jacobian
+from palpate.foundation.arrays import FloatArray
+from palpate.registration.faces import EDGE, FACES, Assignment, IndexArray
+from palpate.registration.pose import motion_jacobian
 
 __all__ = ["PRIOR", "Patches", "PoseEstimate", "estimate", "make_patches", "weak_directions"]
 
 CELL = 8.0e-3
 PRIOR = np.array([0.01] * 3 + [np.radians(10.0)] * 3)
-"""What is known of a direction that the data do not touch: standard deviations [m, rad] about the first guess."""
+"""What is known of a direction that the data do not touch: standard deviations [m, rad] about the
+first guess."""
 BIAS_SIZES = np.array([0.02, 0.06, 0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.0]) * 1e-3
 BIAS_USUAL = 0.5e-3
 TOP_OFFSETS, OFFSET_ODDS = (0.0, 0.5e-3, 2.0e-3), 0.15
@@ -68,15 +73,21 @@ class Patches:
 
 @dataclass(frozen=True, eq=False)
 class PoseEstimate:
-    """Motion (6,) [m, rad] that remains, its covariance (6, 6), and the size of the sensor's smooth bias [m]."""
+    """Motion (6,) [m, rad] that remains, its covariance (6, 6), and the size of the sensor's smooth
+    bias [m].
+    """
 
     motion: FloatArray
     covariance: FloatArray
     bias: float
 
 
-def make_patches(found: Assignment, weights: FloatArray, camera: FloatArray, pivot: FloatArray) -> Patches:
-    """Average points with robust `weights` (k,), seen from `camera` (3,) [m], phantom frame, for motions about `pivot` (3,) [m]."""
+def make_patches(
+    found: Assignment, weights: FloatArray, camera: FloatArray, pivot: FloatArray
+) -> Patches:
+    """Average points with robust `weights` (k,), seen from `camera` (3,) [m], phantom frame, for
+    motions about `pivot` (3,) [m].
+    """
     patch = _patch_of(found)
     total = np.maximum(np.bincount(patch, weights), 1e-9)
     sight = found.points - camera
@@ -84,13 +95,22 @@ def make_patches(found: Assignment, weights: FloatArray, camera: FloatArray, piv
 
     def mean(values: FloatArray) -> FloatArray:
         columns = values.reshape(len(values), -1)
-        return np.column_stack([np.bincount(patch, weights * column) / total for column in columns.T])
+        return np.column_stack(
+            [np.bincount(patch, weights * column) / total for column in columns.T]
+        )
 
     jacobian = np.einsum("ki,kij->kj", found.normals, motion_jacobian(found.points, pivot))
     slant, distance = mean(found.slant)[:, 0], mean(found.distance)[:, 0]
     # The scatter within patches is free of bias and of faces that lie off their planes.
-    local = (found.distance - distance[patch]) / found.slant * np.sqrt(total / np.maximum(total - 1, 0.5))[patch]
-    noise = max(1.0e-5, 1.4826 * float(np.median(np.abs(local[total[patch] > 3]))) if (total > 3).any() else 1.0e-3)
+    local = (
+        (found.distance - distance[patch])
+        / found.slant
+        * np.sqrt(total / np.maximum(total - 1, 0.5))[patch]
+    )
+    noise = max(
+        1.0e-5,
+        1.4826 * float(np.median(np.abs(local[total[patch] > 3]))) if (total > 3).any() else 1.0e-3,
+    )
     heavy = total > 2.0
     return Patches(
         np.round(mean(found.face.astype(float))[heavy, 0]).astype(np.int64),
@@ -105,7 +125,9 @@ def make_patches(found: Assignment, weights: FloatArray, camera: FloatArray, piv
 
 def _patch_of(found: Assignment) -> IndexArray:
     """Which patch (k,) each point belongs to."""
-    cells = np.column_stack([found.face, np.floor((found.points + EDGE) / _cell_sizes(found.face)[:, None])]).astype(int)
+    cells = np.column_stack(
+        [found.face, np.floor((found.points + EDGE) / _cell_sizes(found.face)[:, None])]
+    ).astype(int)
     cells[found.face == 0, 3] = cells[found.face == 5, 3] = 0
     for first, axis in ((1, 1), (3, 2)):
         cells[(found.face == first) | (found.face == first + 1), axis] = 0
@@ -117,33 +139,53 @@ def _cell_sizes(face: IndexArray) -> FloatArray:
 
 
 def estimate(patches: Patches) -> PoseEstimate:
-    """The motion that remains after a fit, with a covariance that counts smooth sensor bias and a block off its stated shape."""
+    """The motion that remains after a fit, with a covariance that counts smooth sensor bias and a
+    block off its stated shape.
+    """
     distance = np.linalg.norm(patches.place[:, None] - patches.place[None], axis=2)
     has_table = bool((patches.face == FACES.index("table")).any())
     models = []
     for offset in TOP_OFFSETS if has_table else TOP_OFFSETS[:1]:
         fixed = np.diag(patches.variance) + _shape_covariance(patches.face, offset)
         for reach in BIAS_REACHES:
-            kernel = np.exp(-0.5 * (distance / reach) ** 2) * patches.slant[:, None] * patches.slant[None]
-            models += [(*_fit_patches(patches, fixed + bias**2 * kernel, bias), bias, offset) for bias in BIAS_SIZES]
+            kernel = (
+                np.exp(-0.5 * (distance / reach) ** 2)
+                * patches.slant[:, None]
+                * patches.slant[None]
+            )
+            models += [
+                (*_fit_patches(patches, fixed + bias**2 * kernel, bias), bias, offset)
+                for bias in BIAS_SIZES
+            ]
     evidence = np.array([model[0] + (np.log(OFFSET_ODDS) if model[4] else 0.0) for model in models])
     weights = np.exp(evidence - evidence.max())
     weights /= weights.sum()
     motions = np.array([model[1] for model in models])
     motion = weights @ motions
     spread = motions - motion
-    covariance = np.einsum("m,mij->ij", weights, np.array([model[2] for model in models])) + (spread.T * weights) @ spread
-    return PoseEstimate(motion, covariance, float(weights @ np.array([model[3] for model in models])))
+    covariance = (
+        np.einsum("m,mij->ij", weights, np.array([model[2] for model in models]))
+        + (spread.T * weights) @ spread
+    )
+    return PoseEstimate(
+        motion, covariance, float(weights @ np.array([model[3] for model in models]))
+    )
 
 
 def _shape_covariance(face: IndexArray, top_offset: float) -> FloatArray:
-    """Covariance (p, p) [m^2] of patches whose faces lie off their planes as a whole; the table does not."""
+    """Covariance (p, p) [m^2] of patches whose faces lie off their planes as a whole; the table
+    does not.
+    """
     sizes = np.array([1.0, *[SIDE_OFFSET] * 4, 0.0])[face] * top_offset
     return np.where(face[:, None] == face[None], sizes[:, None] * sizes[None], 0.0)
 
 
-def _fit_patches(patches: Patches, noise: FloatArray, bias: float) -> tuple[float, FloatArray, FloatArray]:
-    """Log evidence of one model of the errors (p, p), the motion (6,) it gives, and its covariance (6, 6)."""
+def _fit_patches(
+    patches: Patches, noise: FloatArray, bias: float
+) -> tuple[float, FloatArray, FloatArray]:
+    """Log evidence of one model of the errors (p, p), the motion (6,) it gives, and its covariance
+    (6, 6).
+    """
     a, r = patches.jacobian, patches.distance
     factor = cho_factor(noise)
     weighted = cho_solve(factor, np.column_stack([a, r]))
@@ -155,21 +197,35 @@ def _fit_patches(patches: Patches, noise: FloatArray, bias: float) -> tuple[floa
     return -0.5 * (misfit + float(log_determinants)), motion, covariance
 
 
-def weak_directions(covariance: FloatArray, counts: dict[str, int], lever: float) -> tuple[str, ...]:
-    """Say which directions of a pose are weak, from its covariance (6, 6) [m, rad]; rotations count by what they do at `lever` [m].
+def weak_directions(
+    covariance: FloatArray, counts: dict[str, int], lever: float
+) -> tuple[str, ...]:
+    """Say which directions of a pose are weak, from its covariance (6, 6) [m, rad]; rotations count
+    by what they do at `lever` [m].
 
-    Weak is a standard deviation over 0.5 mm; open is one that the data hardly improved on a first guess.
+    Weak is a standard deviation over 0.5 mm; open is one that the data hardly improved on a first
+    guess.
     """
     scale = np.array([1.0] * 3 + [lever] * 3)
     values, vectors = np.linalg.eigh(covariance * np.outer(scale, scale))
     sentences = []
     for value, vector in zip(values[::-1], vectors.T[::-1], strict=True):
         if np.sqrt(value) > WEAK:
-            sentences.append(_weak_sentence(float(np.sqrt(value)), vector, counts, lever, float(np.abs(vector) @ (PRIOR * scale))))
+            sentences.append(
+                _weak_sentence(
+                    float(np.sqrt(value)),
+                    vector,
+                    counts,
+                    lever,
+                    float(np.abs(vector) @ (PRIOR * scale)),
+                )
+            )
     return tuple(sentences)
 
 
-def _weak_sentence(sigma: float, vector: FloatArray, counts: dict[str, int], lever: float, known: float) -> str:
+def _weak_sentence(
+    sigma: float, vector: FloatArray, counts: dict[str, int], lever: float, known: float
+) -> str:
     main = [k for k in np.argsort(-np.abs(vector)) if abs(vector[k]) > 0.4]
     what = " with ".join(NAMES[k] for k in main)
     amount = f"{sigma * 1e3:.1f} mm" if main[0] < 3 else f"{np.degrees(sigma / lever):.1f} degrees"

@@ -20,16 +20,20 @@ from browsing import CHROMIUM, FLAGS, Page
 from scipy.spatial.transform import Rotation
 from small_dataset import SIZE, write_valid_dataset
 
-from app.main import create_app
-from app.serve import Server
-from app.settings import Settings
-from app.work import TARGETS
-from core.frames import Transform
-from core.mesh import GridSpec, box_mesh
+from palpate.app.jobs.tasks import TARGETS
+from palpate.app.main import create_app
+from palpate.app.server.serve import Server
+from palpate.app.settings import Settings
+from palpate.foundation.frames import Transform
+from palpate.mesh.box_mesh import GridSpec, box_mesh
 
 RUN = "small-block-1"
 FRAMES = 5
-CAMERA = Transform(Rotation.from_euler("xyz", [2.5, 0.1, 0.2]).as_matrix(), np.array([0.01, 0.02, 0.35])).inverse().matrix
+CAMERA = (
+    Transform(Rotation.from_euler("xyz", [2.5, 0.1, 0.2]).as_matrix(), np.array([0.01, 0.02, 0.35]))
+    .inverse()
+    .matrix
+)
 """phantom_from_camera of the small dataset"""
 REPORT: dict[str, Any] = {
     "format": 1,
@@ -51,54 +55,95 @@ REPORT: dict[str, Any] = {
     "ranking": [{"effect": "poisson_ratio", "probability": 0.01, "error_removed": 0.22}],
     "ambiguity_map": [
         {
-            "effect": "tool_radius", "limits": [{"parameter": "radius", "unit": "m", "change": 1.2e-4}],
-            "typical": {"parameter": "radius", "unit": "m", "change": 1.2e-4}, "at": {},
-            "alike": [{"effect": "tool_offset", "share": 0.83}, {"effect": "gravity", "share": 0.1}],
+            "effect": "tool_radius",
+            "limits": [{"parameter": "radius", "unit": "m", "change": 1.2e-4}],
+            "typical": {"parameter": "radius", "unit": "m", "change": 1.2e-4},
+            "at": {},
+            "alike": [
+                {"effect": "tool_offset", "share": 0.83},
+                {"effect": "gravity", "share": 0.1},
+            ],
         },
         {
-            "effect": "stiff_inclusion", "limits": [{"parameter": "stiffness_ratio", "unit": "1", "factor": 1.42}],
-            "typical": {"parameter": "stiffness_ratio", "unit": "1", "factor": None}, "at": {"x": {"value": 0.01, "unit": "m"}},
+            "effect": "stiff_inclusion",
+            "limits": [{"parameter": "stiffness_ratio", "unit": "1", "factor": 1.42}],
+            "typical": {"parameter": "stiffness_ratio", "unit": "1", "factor": None},
+            "at": {"x": {"value": 0.01, "unit": "m"}},
             "alike": [{"effect": "tool_radius", "share": 0.2}],
         },
         {
-            "effect": "base_detachment", "limits": [{"share": 0.454}], "typical": {"share": 0.6},
-            "at": {"edge": {"value": "-x", "unit": ""}, "extent": {"value": 0.014, "unit": "m"}}, "alike": [],
+            "effect": "base_detachment",
+            "limits": [{"share": 0.454}],
+            "typical": {"share": 0.6},
+            "at": {"edge": {"value": "-x", "unit": ""}, "extent": {"value": 0.014, "unit": "m"}},
+            "alike": [],
         },
     ],
     "controls": [
         {
-            "control": "clock shifted", "effect": "stiff_inclusion",
-            "gain_nats": 1.2, "true_nats": 90.0, "kept": 0.0133, "alike": 0.01,
+            "control": "clock shifted",
+            "effect": "stiff_inclusion",
+            "gain_nats": 1.2,
+            "true_nats": 90.0,
+            "kept": 0.0133,
+            "alike": 0.01,
             "passed": True,
         },
         {
-            "control": "geometry mirrored", "effect": "stiff_inclusion",
-            "gain_nats": 63.0, "true_nats": 90.0, "kept": 0.7, "alike": 0.2,
+            "control": "geometry mirrored",
+            "effect": "stiff_inclusion",
+            "gain_nats": 63.0,
+            "true_nats": 90.0,
+            "kept": 0.7,
+            "alike": 0.2,
             "passed": False,
         },
         {
-            "control": "paths swapped", "effect": "stiff_inclusion",
-            "gain_nats": 80.0, "true_nats": 90.0, "kept": 0.8889, "alike": 0.9,
-            "passed": None, "why": "with these motions stiff_inclusion would look 90 % as it does with the true ones",
+            "control": "paths swapped",
+            "effect": "stiff_inclusion",
+            "gain_nats": 80.0,
+            "true_nats": 90.0,
+            "kept": 0.8889,
+            "alike": 0.9,
+            "passed": None,
+            "why": "with these motions stiff_inclusion would look 90 % as it does with the true ones",
         },
     ],
     "next_probe": [
         {
-            "kind": "top", "place": [0.012, -0.008, 0.0358], "direction": [0.0, 0.0, -1.0], "depth": 0.006,
-            "separates": ["stiff_inclusion", "tool_radius"], "nats": 17.2, "probability": 0.94,
+            "kind": "top",
+            "place": [0.012, -0.008, 0.0358],
+            "direction": [0.0, 0.0, -1.0],
+            "depth": 0.006,
+            "separates": ["stiff_inclusion", "tool_radius"],
+            "nats": 17.2,
+            "probability": 0.94,
             "text": "press 6 mm deep on the top at (12, -8) mm",
         },
         {
-            "kind": "measurement", "separates": ["gravity", "geometry_scale"], "text": "measure the block with a calliper",
+            "kind": "measurement",
+            "separates": ["gravity", "geometry_scale"],
+            "text": "measure the block with a calliper",
         },
     ],
-    "not_identifiable": [{"effect": "young_modulus", "why": "the shape does not depend on it", "measure_instead": "a force"}],
+    "not_identifiable": [
+        {
+            "effect": "young_modulus",
+            "why": "the shape does not depend on it",
+            "measure_instead": "a force",
+        }
+    ],
     "unexplained": {"fraction": 0.04, "where": "nowhere", "when": "never"},
     "gain": {
-        "split": "test", "unit": "mm", "baseline": 0.4, "extended": 0.21, "noise_floor": 0.19,
-        "reducible_removed": {"value": 0.93, "low": 0.9, "high": 0.96}, "paper_metric": {"baseline": 2.4, "extended": 1.3},
+        "split": "test",
+        "unit": "mm",
+        "baseline": 0.4,
+        "extended": 0.21,
+        "noise_floor": 0.19,
+        "reducible_removed": {"value": 0.93, "low": 0.9, "high": 0.96},
+        "paper_metric": {"baseline": 2.4, "extended": 1.3},
     },
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -162,7 +207,9 @@ def running(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Iterato
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
         thread.start()
         try:
-            with httpx.Client(base_url=f"http://127.0.0.1:{listener.getsockname()[1]}", timeout=60) as client:
+            with httpx.Client(
+                base_url=f"http://127.0.0.1:{listener.getsockname()[1]}", timeout=60
+            ) as client:
                 wait_for(lambda: server.started or not thread.is_alive())
                 yield client
         finally:
@@ -196,7 +243,9 @@ def report() -> dict[str, Any]:
 
 
 def write_run(folder: Path, dataset: Path) -> None:
-    """A run folder by its contract: a block that is pressed in at the middle, and misses a bump beside it."""
+    """A run folder by its contract: a block that is pressed in at the middle, and misses a bump
+    beside it.
+    """
     (folder / "replays").mkdir(parents=True)
     (folder / "pictures").mkdir()
     (folder / "pictures" / "patterns.png").write_bytes(b"\x89PNG\r\n\x1a\n")
@@ -212,18 +261,35 @@ def write_run(folder: Path, dataset: Path) -> None:
     (folder / "origin.json").write_text(json.dumps(origin))
     np.savez(folder / "replays" / "poke-01.npz", **replay_arrays())
     np.savez(folder / "replays" / "drag-01.npz", **replay_arrays(), **solver_arrays())
-    centres = np.array([[x, y, SIZE[2]] for x in np.linspace(-0.03, 0.03, 9) for y in np.linspace(-0.015, 0.015, 5)])
+    centres = np.array(
+        [
+            [x, y, SIZE[2]]
+            for x in np.linspace(-0.03, 0.03, 9)
+            for y in np.linspace(-0.015, 0.015, 5)
+        ]
+    )
     measured = 5e-4 * np.exp(-((centres[:, 0] / 0.01) ** 2))
     measured[0] = np.nan
     normals = np.tile([0.0, 0.0, 1.0], (len(centres), 1))
-    np.savez(folder / "patterns.npz", centres=centres, normals=normals, measured=measured, predicted=0.9 * measured)
+    np.savez(
+        folder / "patterns.npz",
+        centres=centres,
+        normals=normals,
+        measured=measured,
+        predicted=0.9 * measured,
+    )
 
 
 def solver_arrays() -> dict[str, Any]:
-    """What newer recordings say of the solver: forces, iterations, and a frame in which the stated model found no equilibrium."""
+    """What newer recordings say of the solver: forces, iterations, and a frame in which the stated
+    model found no equilibrium.
+    """
     count = np.arange(FRAMES)
     forces = {"force_raw": 0.1 * count, "force_extended": 0.2 * count}
-    failed = {"outcome_raw": (count == 3).astype(np.int8), "outcome_extended": np.zeros(FRAMES, np.int8)}
+    failed = {
+        "outcome_raw": (count == 3).astype(np.int8),
+        "outcome_extended": np.zeros(FRAMES, np.int8),
+    }
     return {**forces, **failed, "iterations_raw": 3 + count, "iterations_extended": 5 + count}
 
 
@@ -241,11 +307,24 @@ def replay_arrays() -> dict[str, Any]:
     error[:, rest[:, 1] < -0.019] = np.nan
     tool = np.column_stack([np.zeros(FRAMES), np.zeros(FRAMES), SIZE[2] + 0.005 - depth])
     return {
-        "time": 100.1 + 0.2 * np.arange(FRAMES), "cloud_index": np.arange(FRAMES), "rest": rest,
+        "time": 100.1 + 0.2 * np.arange(FRAMES),
+        "cloud_index": np.arange(FRAMES),
+        "rest": rest,
         "faces": np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype(np.int32),
-        "raw": raw.astype(np.float32), "extended": extended.astype(np.float32), "tool_raw": tool, "tool_extended": tool,
-        "tool_radius_raw": 0.005, "tool_radius_extended": 0.004,
-        "error_raw": error.astype(np.float32), "error_extended": (0.1 * error).astype(np.float32),
-        "distance_raw": 0.2 * depth, "distance_extended": 0.02 * depth, "paper_raw": depth, "paper_extended": depth,
-        "noise_floor": 1e-5, "camera_raw": CAMERA, "camera_extended": CAMERA, "outcome": np.zeros(FRAMES, np.int8),
-    }  # fmt: skip
+        "raw": raw.astype(np.float32),
+        "extended": extended.astype(np.float32),
+        "tool_raw": tool,
+        "tool_extended": tool,
+        "tool_radius_raw": 0.005,
+        "tool_radius_extended": 0.004,
+        "error_raw": error.astype(np.float32),
+        "error_extended": (0.1 * error).astype(np.float32),
+        "distance_raw": 0.2 * depth,
+        "distance_extended": 0.02 * depth,
+        "paper_raw": depth,
+        "paper_extended": depth,
+        "noise_floor": 1e-5,
+        "camera_raw": CAMERA,
+        "camera_extended": CAMERA,
+        "outcome": np.zeros(FRAMES, np.int8),
+    }

@@ -17,12 +17,19 @@ import numpy as np
 import pytest
 from broken_datasets import BREAKAGES, write_valid_dataset
 
-from app import console
-from app.cli import main
-from app.commands.diagnosis import print_report
-from app.console import agrees, parameters_text, progress, verdict_cells, verdict_table, write_json
-from app.stop import Stop
-from core.errors import Cancelled
+from palpate.app.cli import main
+from palpate.app.commands import console
+from palpate.app.commands.console import (
+    agrees,
+    parameters_text,
+    progress,
+    verdict_cells,
+    verdict_table,
+    write_json,
+)
+from palpate.app.commands.diagnosis import print_report
+from palpate.app.jobs.signals import Stop
+from palpate.foundation.errors import Cancelled
 
 Palpate = Callable[..., tuple[int, str, str]]
 
@@ -56,18 +63,24 @@ def files(folder: Path) -> dict[str, int]:
 def test_help_names_every_verb(palpate: Palpate) -> None:
     code, out, _ = palpate("--help")
     assert code == 0
-    assert all(verb in out for verb in ("demo", "check", "register", "replay", "diagnose", "blind", "serve"))
+    assert all(
+        verb in out
+        for verb in ("demo", "check", "register", "replay", "diagnose", "blind", "serve")
+    )
 
 
 @pytest.mark.parametrize(
-    "arguments", [("nonsense",), ("check",), ("diagnose", "x", "--workers", "0"), ("serve", "--port", "99999")]
+    "arguments",
+    [("nonsense",), ("check",), ("diagnose", "x", "--workers", "0"), ("serve", "--port", "99999")],
 )
 def test_wrong_arguments_are_exit_code_2(palpate: Palpate, arguments: tuple[str, ...]) -> None:
     assert palpate(*arguments)[0] == 2
 
 
 @pytest.mark.parametrize("kind", sorted(BREAKAGES))
-def test_broken_dataset_is_one_clear_message_and_exit_code_2(palpate: Palpate, dataset: Path, kind: str) -> None:
+def test_broken_dataset_is_one_clear_message_and_exit_code_2(
+    palpate: Palpate, dataset: Path, kind: str
+) -> None:
     BREAKAGES[kind](dataset)
     before = files(dataset.parent)
     for verb in ("check", "diagnose"):
@@ -80,7 +93,9 @@ def test_broken_dataset_is_one_clear_message_and_exit_code_2(palpate: Palpate, d
     assert files(dataset.parent) == before
 
 
-def test_check_goes_on_after_a_broken_dataset_and_says_so_in_the_end(palpate: Palpate, dataset: Path, tmp_path: Path) -> None:
+def test_check_goes_on_after_a_broken_dataset_and_says_so_in_the_end(
+    palpate: Palpate, dataset: Path, tmp_path: Path
+) -> None:
     code, out, err = palpate("check", tmp_path / "nothing", dataset)
     assert code == 2
     assert "nothing does not exist" in err
@@ -89,13 +104,17 @@ def test_check_goes_on_after_a_broken_dataset_and_says_so_in_the_end(palpate: Pa
     assert "forces in 1 of 2 sequences, so that Young's modulus can be told" in out
 
 
-def test_two_datasets_of_one_name_are_refused_before_any_computing(palpate: Palpate, dataset: Path, tmp_path: Path) -> None:
+def test_two_datasets_of_one_name_are_refused_before_any_computing(
+    palpate: Palpate, dataset: Path, tmp_path: Path
+) -> None:
     code, _, err = palpate("diagnose", dataset, write_valid_dataset(tmp_path / "other" / "small"))
     assert code == 2
     assert "same folder name" in err
 
 
-def test_run_folder_that_exists_is_not_overwritten(palpate: Palpate, dataset: Path, tmp_path: Path) -> None:
+def test_run_folder_that_exists_is_not_overwritten(
+    palpate: Palpate, dataset: Path, tmp_path: Path
+) -> None:
     (tmp_path / "run").mkdir()
     code, _, err = palpate("diagnose", dataset, "--run", tmp_path / "run")
     assert code == 2
@@ -109,15 +128,31 @@ def test_result_that_a_folder_is_in_the_way_of_is_refused_before_any_computing(
 ) -> None:
     (tmp_path / "there").mkdir()
     code, _, err = palpate(verb, dataset, "--out", tmp_path / "there")
-    assert code == 2 and re.search("is a (folder|directory)", re.sub(r"[\s│]+", " ", err)) and "Traceback" not in err
+    assert (
+        code == 2
+        and re.search("is a (folder|directory)", re.sub(r"[\s│]+", " ", err))
+        and "Traceback" not in err
+    )
     assert not list((tmp_path / "there").iterdir())
 
 
-def test_reports_of_several_datasets_need_a_folder_and_one_no_run_folder(palpate: Palpate, dataset: Path, tmp_path: Path) -> None:
+def test_reports_of_several_datasets_need_a_folder_and_one_no_run_folder(
+    palpate: Palpate, dataset: Path, tmp_path: Path
+) -> None:
     (tmp_path / "there.json").write_text("{}")
-    code, _, err = palpate("diagnose", dataset, write_valid_dataset(tmp_path / "more"), "--out", tmp_path / "there.json")
-    assert code == 2 and "is a file; of several datasets it is a folder" in re.sub(r"[\s│]+", " ", err)
-    code, _, err = palpate("diagnose", dataset, "--out", tmp_path / "new", "--run", tmp_path / "new")
+    code, _, err = palpate(
+        "diagnose",
+        dataset,
+        write_valid_dataset(tmp_path / "more"),
+        "--out",
+        tmp_path / "there.json",
+    )
+    assert code == 2 and "is a file; of several datasets it is a folder" in re.sub(
+        r"[\s│]+", " ", err
+    )
+    code, _, err = palpate(
+        "diagnose", dataset, "--out", tmp_path / "new", "--run", tmp_path / "new"
+    )
     assert code == 2 and "--out and --run are both" in err and not (tmp_path / "new").exists()
     assert (tmp_path / "there.json").read_text() == "{}"
 
@@ -130,11 +165,17 @@ def test_serve_refuses_a_token_that_others_may_read(palpate: Any, tmp_path: Path
     assert "others may read it" in err.replace("\n", " ")
 
 
-@pytest.mark.parametrize(("grid", "told"), [(["--grid", "7x5x4"], "7x5x4 nodes"), ([], "follows the tool")], ids=["even", "graded"])
+@pytest.mark.parametrize(
+    ("grid", "told"),
+    [(["--grid", "7x5x4"], "7x5x4 nodes"), ([], "follows the tool")],
+    ids=["even", "graded"],
+)
 def test_replay_writes_one_equilibrium_per_cloud(
     palpate: Palpate, dataset: Path, tmp_path: Path, grid: list[str], told: str
 ) -> None:
-    code, out, err = palpate("replay", dataset, "--sequence", "poke-01", *grid, "--out", tmp_path / "frames.npz")
+    code, out, err = palpate(
+        "replay", dataset, "--sequence", "poke-01", *grid, "--out", tmp_path / "frames.npz"
+    )
     assert code == 0, err
     assert told in out
     assert "5 converged" in out
@@ -147,12 +188,15 @@ def test_replay_writes_one_equilibrium_per_cloud(
 
 
 @pytest.mark.parametrize(
-    ("option", "value", "words"), [("--grid", "13x5", "13x5x5"), ("--sequence", "poke-99", "no such sequence")]
+    ("option", "value", "words"),
+    [("--grid", "13x5", "13x5x5"), ("--sequence", "poke-99", "no such sequence")],
 )
 def test_replay_tells_what_it_cannot_replay(
     palpate: Palpate, dataset: Path, tmp_path: Path, option: str, value: str, words: str
 ) -> None:
-    code, _, err = palpate("replay", dataset, "--sequence", "poke-01", "--out", tmp_path / "frames.npz", option, value)
+    code, _, err = palpate(
+        "replay", dataset, "--sequence", "poke-01", "--out", tmp_path / "frames.npz", option, value
+    )
     assert code == 2
     assert words in err
     assert not (tmp_path / "frames.npz").exists()
@@ -163,17 +207,25 @@ def test_stop_that_an_import_swallowed_is_remembered() -> None:
     with contextlib.suppress(KeyboardInterrupt):
         stop(signal.SIGINT, None)
     assert stop.asked
-    with pytest.MonkeyPatch.context() as patch, pytest.raises(Cancelled), progress("a long verb") as report:
-        patch.setattr("app.console.stop", stop)
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        pytest.raises(Cancelled),
+        progress("a long verb") as report,
+    ):
+        patch.setattr("palpate.app.commands.console.stop", stop)
         report(0.5, "going on")
 
 
-def test_log_gets_a_line_of_progress_now_and_then(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_log_gets_a_line_of_progress_now_and_then(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     with progress("a long verb") as report:
         report(0.1, "not yet")
-        monkeypatch.setattr("app.console.BETWEEN_LINES", 0.0)
+        monkeypatch.setattr("palpate.app.commands.console.BETWEEN_LINES", 0.0)
         report(0.5, "fitting [one] effect")
-    assert re.fullmatch(r"a long verb: 50 % after \d+ s, fitting \[one\] effect\n", capsys.readouterr().err)
+    assert re.fullmatch(
+        r"a long verb: 50 % after \d+ s, fitting \[one\] effect\n", capsys.readouterr().err
+    )
 
 
 def _wait_until_at_work(process: subprocess.Popen[str], seconds: float) -> None:
@@ -186,27 +238,47 @@ def _wait_until_at_work(process: subprocess.Popen[str], seconds: float) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_stopped_verb_ends_with_130_and_leaves_nothing(dataset: Path, tmp_path: Path, number: signal.Signals) -> None:
+def test_stopped_verb_ends_with_130_and_leaves_nothing(
+    dataset: Path, tmp_path: Path, number: signal.Signals
+) -> None:
     for index in range(400):
         name = f"{index + 5:06d}.ply"
-        (dataset / "sequences" / "poke-01" / "clouds" / name).write_bytes((dataset / "rest.ply").read_bytes())
+        (dataset / "sequences" / "poke-01" / "clouds" / name).write_bytes(
+            (dataset / "rest.ply").read_bytes()
+        )
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", "app.cli", "replay", str(dataset), "--sequence", "poke-01", "--grid", "41x25x25", "--out"]
-    with subprocess.Popen([*command, str(tmp_path / "frames.npz")], stderr=subprocess.PIPE, text=True, env=environment) as process:
+    command = [
+        sys.executable,
+        "-m",
+        "palpate.app.cli",
+        "replay",
+        str(dataset),
+        "--sequence",
+        "poke-01",
+        "--grid",
+        "41x25x25",
+        "--out",
+    ]
+    with subprocess.Popen(
+        [*command, str(tmp_path / "frames.npz")], stderr=subprocess.PIPE, text=True, env=environment
+    ) as process:
         _wait_until_at_work(process, seconds=6.0)
         process.send_signal(number)
         _, err = process.communicate(timeout=60)
-    # Python itself ends by SIGINT, which a shell shows as 130, too, when the stop fell into certain parts of an import.
+    # Python itself ends by SIGINT, which a shell shows as 130, too, when the stop fell into certain
+    # parts of an import.
     assert process.returncode in (130, -signal.SIGINT)
     assert "nothing was left half done" in err
     assert not list(tmp_path.glob("*frames*"))
 
 
-def test_served_page_ends_with_ctrl_c_though_somebody_is_listening(tmp_path: Path, place: Any) -> None:
+def test_served_page_ends_with_ctrl_c_though_somebody_is_listening(
+    tmp_path: Path, place: Any
+) -> None:
     command = [
         sys.executable,
         "-m",
-        "app.cli",
+        "palpate.app.cli",
         "serve",
         "--port",
         "0",
@@ -221,7 +293,10 @@ def test_served_page_ends_with_ctrl_c_though_somebody_is_listening(tmp_path: Pat
             assert process.stdout is not None
             address = re.search(r"http://127\.0\.0\.1:\d+", process.stdout.readline())
             assert address is not None
-            with httpx.Client(base_url=address[0], timeout=30) as client, client.stream("GET", "/api/jobs/events") as events:
+            with (
+                httpx.Client(base_url=address[0], timeout=30) as client,
+                client.stream("GET", "/api/jobs/events") as events,
+            ):
                 assert next(events.iter_lines()) == "data: []"
                 began = time.monotonic()
                 process.send_signal(signal.SIGINT)
@@ -273,8 +348,19 @@ def test_report_is_printed_with_what_is_left_and_with_its_warnings(
 ) -> None:
     monkeypatch.setattr(console.out, "width", 200)
     left = {"fraction": 0.3, "where": "all over rest.ply", "when": "always"}
-    print_report({**report, "verdict": "unexplained", "unexplained": left, "warnings": ["rest.ply: depth waves [by 0.2 mm]"]})
-    shown = capsys.readouterr().out.replace("\N{NO-BREAK SPACE}", " ").replace("\N{NARROW NO-BREAK SPACE}", " ")
+    print_report(
+        {
+            **report,
+            "verdict": "unexplained",
+            "unexplained": left,
+            "warnings": ["rest.ply: depth waves [by 0.2 mm]"],
+        }
+    )
+    shown = (
+        capsys.readouterr()
+        .out.replace("\N{NO-BREAK SPACE}", " ")
+        .replace("\N{NARROW NO-BREAK SPACE}", " ")
+    )
     assert "30 % of the structured error is left. Where: all over rest.ply. When: always." in shown
     assert "warning rest.ply: depth waves [by 0.2 mm]" in shown
 
@@ -286,4 +372,6 @@ def test_report_is_printed_with_its_controls_and_the_next_probe(
     print_report(report)
     shown = capsys.readouterr().out.replace("\N{NO-BREAK SPACE}", " ")
     assert "control: with the clock shifted, stiff inclusion keeps 1 % of its gain at most" in shown
-    assert "next probe: press 6 mm deep on the top at (12, -8) mm" in shown and "calliper" not in shown
+    assert (
+        "next probe: press 6 mm deep on the top at (12, -8) mm" in shown and "calliper" not in shown
+    )

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from app.client import ApiError, Client, JobError
+from palpate.app.client import ApiError, Client, JobError
 
 TARGETS = {"diagnosis": "job_working:refuse", "sweep": "job_working:warn"}
 
@@ -28,8 +28,14 @@ def test_what_there_is_is_read(palpate: Client, run_name: str) -> None:
 def test_a_job_is_followed_to_its_end_and_the_same_key_is_the_same_job(palpate: Client) -> None:
     seen: list[tuple[float, str]] = []
     job = palpate.sweep("small", {"poisson_ratio.nu": (0.3, 0.4)}, key="mine", steps=3)
-    assert palpate.sweep("small", {"poisson_ratio.nu": (0.3, 0.4)}, key="mine", steps=3)["id"] == job["id"]
-    assert palpate.wait(job["id"], lambda fraction, text: seen.append((fraction, text)))["state"] == "done"
+    assert (
+        palpate.sweep("small", {"poisson_ratio.nu": (0.3, 0.4)}, key="mine", steps=3)["id"]
+        == job["id"]
+    )
+    assert (
+        palpate.wait(job["id"], lambda fraction, text: seen.append((fraction, text)))["state"]
+        == "done"
+    )
     assert seen[-1] == (1.0, "done")
     assert job["id"] in [one["id"] for one in palpate.jobs()]
     with pytest.raises(ApiError, match="another request") as refused:

@@ -1,4 +1,6 @@
-"""A depth camera looking at a block on a table, by ray casting: each point comes with what it really belongs to."""
+"""A depth camera looking at a block on a table, by ray casting: each point comes with what it
+really belongs to.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.frames import FloatArray, Transform
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.frames import Transform
 
 SIZE = (0.0687, 0.0393, 0.0358)
 TABLE, BLOCK, SPHERE, SHAFT, STRAY = range(5)
@@ -41,15 +44,25 @@ class Scene:
     pixels: int = 110
 
     def look(self, seed: int) -> View:
-        """One frame: white noise and a smooth bias along the line of sight, strays anywhere in front of the camera."""
+        """One frame: white noise and a smooth bias along the line of sight, strays anywhere in
+        front of the camera.
+        """
         rng = np.random.default_rng(seed)
-        pose = _looking_at(np.array(self.camera), np.array([0.0, 0.0, self.size[2] / 2]), roll=rng.uniform(-0.5, 0.5))
+        pose = _looking_at(
+            np.array(self.camera),
+            np.array([0.0, 0.0, self.size[2] / 2]),
+            roll=rng.uniform(-0.5, 0.5),
+        )
         rays = _rays(self.pixels)
         sight = pose.rotate(rays)
         depth, label = self._cast(pose.translation, sight)
         seen = np.isfinite(depth)
         rays, depth, label = rays[seen], depth[seen], label[seen]
-        depth = depth + self.noise * rng.standard_normal(len(depth)) + self.bias * _smooth(rays * depth.mean(), rng)
+        depth = (
+            depth
+            + self.noise * rng.standard_normal(len(depth))
+            + self.bias * _smooth(rays * depth.mean(), rng)
+        )
         stray = rng.choice(len(depth), self.strays, replace=False)
         depth[stray] *= rng.uniform(0.6, 1.1, self.strays)
         label[stray] = STRAY
@@ -68,11 +81,15 @@ class Scene:
 
     def _cast(self, origin: FloatArray, sight: FloatArray) -> tuple[FloatArray, Any]:
         hits = np.full((len(sight), 4), np.inf)
-        hits[:, TABLE] = np.where(sight[:, 2] < 0, -origin[2] / np.minimum(sight[:, 2], -1e-9), np.inf)
+        hits[:, TABLE] = np.where(
+            sight[:, 2] < 0, -origin[2] / np.minimum(sight[:, 2], -1e-9), np.inf
+        )
         hits[:, BLOCK] = self._cast_block(origin, sight)
         if self.tool is not None:
             hits[:, SPHERE] = _cast_sphere(origin, sight, np.array(self.tool), self.tool_radius)
-            hits[:, SHAFT] = _cast_shaft(origin, sight, np.array(self.tool), np.array(self.shaft), self.shaft_radius)
+            hits[:, SHAFT] = _cast_shaft(
+                origin, sight, np.array(self.tool), np.array(self.shaft), self.shaft_radius
+            )
         depth = hits.min(axis=1)
         depth[depth > 0.6] = np.inf
         return depth, hits.argmin(axis=1)
@@ -87,7 +104,12 @@ class Scene:
         depth = np.where(hit, enter, np.inf)
         for _ in range(200 if self.tool is not None else 0):
             points = origin + np.where(hit, depth, 0.0)[:, None] * sight
-            depth = np.where(hit, depth + np.maximum(points[:, 2] - self.surface(points[:, 0], points[:, 1]), 0.0) * 0.3, depth)
+            depth = np.where(
+                hit,
+                depth
+                + np.maximum(points[:, 2] - self.surface(points[:, 0], points[:, 1]), 0.0) * 0.3,
+                depth,
+            )
             depth = np.where(depth > leave, np.inf, depth)
             hit = np.isfinite(depth)
         return depth
@@ -109,19 +131,28 @@ def _rays(pixels: int) -> FloatArray:
     return np.asarray(rays / np.linalg.norm(rays, axis=1)[:, None])
 
 
-def _smooth(places: FloatArray, rng: np.random.Generator, reach: float = 0.025, waves: int = 200) -> FloatArray:
+def _smooth(
+    places: FloatArray, rng: np.random.Generator, reach: float = 0.025, waves: int = 200
+) -> FloatArray:
     """A smooth random field of unit variance, by random Fourier features."""
     frequency = rng.normal(0, 1 / reach, (3, waves))
-    return np.asarray(np.sqrt(2 / waves) * np.cos(places @ frequency + rng.uniform(0, 2 * np.pi, waves)).sum(axis=1))
+    return np.asarray(
+        np.sqrt(2 / waves)
+        * np.cos(places @ frequency + rng.uniform(0, 2 * np.pi, waves)).sum(axis=1)
+    )
 
 
-def _cast_sphere(origin: FloatArray, sight: FloatArray, centre: FloatArray, radius: float) -> FloatArray:
+def _cast_sphere(
+    origin: FloatArray, sight: FloatArray, centre: FloatArray, radius: float
+) -> FloatArray:
     along = sight @ (centre - origin)
     inside = radius**2 - ((centre - origin) @ (centre - origin) - along**2)
     return np.where(inside > 0, along - np.sqrt(np.maximum(inside, 0.0)), np.inf)
 
 
-def _cast_shaft(origin: FloatArray, sight: FloatArray, tip: FloatArray, shaft: FloatArray, radius: float) -> FloatArray:
+def _cast_shaft(
+    origin: FloatArray, sight: FloatArray, tip: FloatArray, shaft: FloatArray, radius: float
+) -> FloatArray:
     across = sight - np.outer(sight @ shaft, shaft)
     start = (origin - tip) - ((origin - tip) @ shaft) * shaft
     a, b, c = (across**2).sum(axis=1), 2 * across @ start, start @ start - radius**2
@@ -140,8 +171,14 @@ def scene() -> type[Scene]:
 @pytest.fixture
 def measured_datasets() -> list[Path]:
     """Datasets of another solver, beside the checkout or where PALPATE_DATASETS says."""
-    folder = Path(os.environ.get("PALPATE_DATASETS", Path(__file__).parents[3] / "shared" / "datasets"))
-    found = sorted(path for path in folder.glob("*/") if (folder / f"{path.name}.truth.json").exists())
+    folder = Path(
+        os.environ.get("PALPATE_DATASETS", Path(__file__).parents[3] / "shared" / "datasets")
+    )
+    found = sorted(
+        path for path in folder.glob("*/") if (folder / f"{path.name}.truth.json").exists()
+    )
     if not found:
-        pytest.skip(f"no datasets with truth in {folder}: set PALPATE_DATASETS to a folder that has some")
+        pytest.skip(
+            f"no datasets with truth in {folder}: set PALPATE_DATASETS to a folder that has some"
+        )
     return found

@@ -1,4 +1,6 @@
-"""The whole loop: an effect is hidden by another solver, and the diagnosis has to name it; and nothing where nothing is hidden."""
+"""The whole loop: an effect is hidden by another solver, and the diagnosis has to name it; and
+nothing where nothing is hidden.
+"""
 
 from __future__ import annotations
 
@@ -8,18 +10,21 @@ import numpy as np
 import pytest
 from looping import LATE_CLOCK, Loop
 
-from app.blind_page import blind_page
-from core.blind import summary_of
-from core.blind.cases import scenario_of
-from core.effects import DIAGNOSED, from_json
+from palpate.app.reporting.blind_page import blind_page
+from palpate.blind import summary_of
+from palpate.blind.cases import scenario_of
+from palpate.effects import DIAGNOSED, from_json
 
 pytestmark = pytest.mark.timeout(2400)
-"""The first test waits for both diagnoses: on two busy cores that are slow, too, one takes a quarter of an hour."""
+"""The first test waits for both diagnoses: on two busy cores that are slow, too, one takes a
+quarter of an hour."""
 
 
 def test_effect_that_was_drawn_is_named(loop: Loop) -> None:
     found = loop.found
-    assert found.right, f"seed {loop.seed}: {found.verdict}, {found.named} where {found.hidden} is hidden"
+    assert found.right, (
+        f"seed {loop.seed}: {found.verdict}, {found.named} where {found.hidden} is hidden"
+    )
     assert found.report["gain"]["noise_floor"] > 0 and found.probabilities[found.named[0]] > 0.5
 
 
@@ -45,10 +50,15 @@ def test_late_clock_is_named_with_its_size(loop: Loop) -> None:
 
 
 def test_the_map_of_what_can_be_told_is_whole_and_sees_the_hidden_clock(loop: Loop) -> None:
-    rows = {row["effect"]: row for row in json.loads((loop.run / "report.json").read_text())["ambiguity_map"]}
+    rows = {
+        row["effect"]: row
+        for row in json.loads((loop.run / "report.json").read_text())["ambiguity_map"]
+    }
     assert set(rows) == {effect.name for effect in DIAGNOSED}
     if loop.seed == LATE_CLOCK:
-        assert 0.5e-3 < rows["time_offset"]["limits"][0]["change"] < 0.05  # a third of what is hidden at most
+        assert (
+            0.5e-3 < rows["time_offset"]["limits"][0]["change"] < 0.05
+        )  # a third of what is hidden at most
     for name, row in rows.items():
         assert {one["effect"] for one in row["alike"]} == set(rows) - {name}
         assert all(0.0 <= one["share"] <= 1.0 for one in row["alike"])
@@ -69,7 +79,11 @@ def test_run_folder_holds_everything_that_the_page_needs(loop: Loop) -> None:
     assert (loop.run / "pictures" / "patterns.png").stat().st_size > 5000
     for name in scenario_of(loop.found.case).sequences:
         with np.load(loop.run / "replays" / f"{name}.npz") as replay:
-            assert replay["raw"].shape == replay["extended"].shape == (len(replay["time"]), len(replay["rest"]), 3)
+            assert (
+                replay["raw"].shape
+                == replay["extended"].shape
+                == (len(replay["time"]), len(replay["rest"]), 3)
+            )
             assert np.isfinite(replay["raw"]).all()
             assert (replay["outcome"] == 0).all()
             assert np.nanmean(replay["distance_extended"]) < np.nanmean(replay["distance_raw"])

@@ -40,7 +40,9 @@ def wait(client: httpx.Client, identity: str, *states: str) -> dict[str, Any]:
     return dict(job)
 
 
-def test_diagnosis_goes_from_request_to_report(client: httpx.Client, report: dict[str, Any]) -> None:
+def test_diagnosis_goes_from_request_to_report(
+    client: httpx.Client, report: dict[str, Any]
+) -> None:
     answer = client.post("/api/diagnoses", json={"dataset": "small"})
     assert answer.status_code == 202
     identity = answer.json()["id"]
@@ -61,7 +63,11 @@ def test_cancelled_diagnosis_leaves_nothing_behind(client: httpx.Client, place: 
     while any((place.runs / ".making").iterdir()) and time.monotonic() < end:
         time.sleep(0.05)
     assert not any((place.runs / ".making").iterdir())
-    assert [path.name for path in place.runs.iterdir() if path.is_dir() and not path.name.startswith(".")] == ["small-block-1"]
+    assert [
+        path.name
+        for path in place.runs.iterdir()
+        if path.is_dir() and not path.name.startswith(".")
+    ] == ["small-block-1"]
 
 
 def test_jobs_tell_their_progress_while_they_run(client: httpx.Client) -> None:
@@ -86,7 +92,15 @@ def test_jobs_tell_their_progress_while_they_run(client: httpx.Client) -> None:
 
 
 @pytest.mark.parametrize(
-    "body", [{}, {"dataset": 3}, {"dataset": "small", "seed": -1}, {"dataset": "small", "folder": "/etc"}, [], {"dataset": None}]
+    "body",
+    [
+        {},
+        {"dataset": 3},
+        {"dataset": "small", "seed": -1},
+        {"dataset": "small", "folder": "/etc"},
+        [],
+        {"dataset": None},
+    ],
 )
 def test_requests_that_make_no_sense_are_told_why(client: httpx.Client, body: Any) -> None:
     answer = client.post("/api/diagnoses", json=body)
@@ -94,7 +108,10 @@ def test_requests_that_make_no_sense_are_told_why(client: httpx.Client, body: An
     assert answer.json()["kind"] == "RequestError"
 
 
-@pytest.mark.parametrize("path", ["jobs/nothing", "diagnoses/nothing", "diagnoses/nothing/report", "runs/nothing", "nothing"])
+@pytest.mark.parametrize(
+    "path",
+    ["jobs/nothing", "diagnoses/nothing", "diagnoses/nothing/report", "runs/nothing", "nothing"],
+)
 def test_what_is_not_there_is_404_with_a_message(client: httpx.Client, path: str) -> None:
     answer = client.get(f"/api/{path}")
     assert answer.status_code == 404

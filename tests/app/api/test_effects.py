@@ -2,13 +2,15 @@ from __future__ import annotations
 
 import httpx
 
-from core.effects import CATALOGUE, DIAGNOSED
+from palpate.effects import CATALOGUE, DIAGNOSED
 
 
 def test_catalogue_is_served_with_units_and_bounds(client: httpx.Client) -> None:
     effects = {effect["name"]: effect for effect in client.get("/api/effects").json()}
     assert list(effects) == [effect.name for effect in CATALOGUE]
-    assert [name for name, effect in effects.items() if effect["diagnosed"]] == [effect.name for effect in DIAGNOSED]
+    assert [name for name, effect in effects.items() if effect["diagnosed"]] == [
+        effect.name for effect in DIAGNOSED
+    ]
     radius = effects["tool_radius"]["parameters"][0]
     assert (radius["name"], radius["unit"]) == ("radius", "m")
     assert 0 < radius["low"] < 0.005 < radius["high"]

@@ -11,7 +11,9 @@ def base(run_name: str) -> str:
     return f"/api/runs/{run_name}"
 
 
-def test_run_says_its_verdict_in_a_sentence_and_lists_its_sequences(client: httpx.Client, base: str) -> None:
+def test_run_says_its_verdict_in_a_sentence_and_lists_its_sequences(
+    client: httpx.Client, base: str
+) -> None:
     run = client.get(base).json()
     assert run["sentence"].startswith("The simulation misses a stiff lump")
     assert run["size"] == [0.0687, 0.0393, 0.0358]
@@ -29,7 +31,9 @@ def test_sequence_states_both_errors_of_its_worst_frame(client: httpx.Client, ba
         assert one["distance_extended"] == pytest.approx(0.02 * deepest)
 
 
-def test_report_and_model_are_as_written(client: httpx.Client, base: str, report: dict[str, Any]) -> None:
+def test_report_and_model_are_as_written(
+    client: httpx.Client, base: str, report: dict[str, Any]
+) -> None:
     assert client.get(f"{base}/report").json() == report
     assert client.get(f"{base}/model").json() == {"format": 1}
 
@@ -37,14 +41,25 @@ def test_report_and_model_are_as_written(client: httpx.Client, base: str, report
 def test_patterns_have_null_where_unseen(client: httpx.Client, base: str) -> None:
     patterns = client.get(f"{base}/patterns").json()
     assert patterns["measured"][0] is None
-    assert len(patterns["measured"]) == len(patterns["predicted"]) == len(patterns["centres"]) == len(patterns["normals"]) == 45
+    assert (
+        len(patterns["measured"])
+        == len(patterns["predicted"])
+        == len(patterns["centres"])
+        == len(patterns["normals"])
+        == 45
+    )
     assert patterns["limit"] > 0
 
 
 def test_frames_of_a_sequence_start_at_zero_seconds(client: httpx.Client, base: str) -> None:
     frames = client.get(f"{base}/sequences/poke-01").json()
     assert frames["time"] == pytest.approx([0, 0.2, 0.4, 0.6, 0.8])
-    assert len(frames["distance_raw"]) == len(frames["distance_extended"]) == len(frames["outcome"]) == 5
+    assert (
+        len(frames["distance_raw"])
+        == len(frames["distance_extended"])
+        == len(frames["outcome"])
+        == 5
+    )
     assert frames["noise_floor"] == pytest.approx(1e-5)
 
 
@@ -54,7 +69,9 @@ def test_picture_is_served_and_nothing_beside_it(client: httpx.Client, base: str
         assert client.get(f"{base}/pictures/{name}").status_code == 404
 
 
-def test_broken_run_is_409_and_does_not_hide_the_others(client: httpx.Client, shared_place: Any, base: str) -> None:
+def test_broken_run_is_409_and_does_not_hide_the_others(
+    client: httpx.Client, shared_place: Any, base: str
+) -> None:
     (shared_place.runs / "torn").mkdir()
     (shared_place.runs / "torn" / "report.json").write_text("{")
     assert client.get("/api/runs/torn").status_code == 409

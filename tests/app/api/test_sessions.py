@@ -19,14 +19,19 @@ def view(run: str, **changes: Any) -> dict[str, Any]:
 
 
 def test_view_is_held_and_can_be_asked_for(client: httpx.Client, page: str, run_name: str) -> None:
-    shown = client.post(f"/api/sessions/{page}/view", json=view(run_name, frame=2, layers=["raw", "tool"], colour="raw")).json()
+    shown = client.post(
+        f"/api/sessions/{page}/view",
+        json=view(run_name, frame=2, layers=["raw", "tool"], colour="raw"),
+    ).json()
     state = client.get(f"/api/sessions/{page}/state").json()
     assert state == shown
     assert (state["view"]["frame"], state["view"]["layers"]) == (2, ["raw", "tool"])
     assert sum(state["drawn"]["triangles"].values()) > 1000
 
 
-def test_newest_of_many_views_is_the_one_that_stays(client: httpx.Client, page: str, run_name: str) -> None:
+def test_newest_of_many_views_is_the_one_that_stays(
+    client: httpx.Client, page: str, run_name: str
+) -> None:
     address = f"ws://{client.base_url.host}:{client.base_url.port}/api/sessions/{page}/socket"
     with connect(address) as socket:
         for frame in (*range(5), *range(4, -1, -1)):
@@ -66,7 +71,16 @@ def test_page_that_never_showed_anything_is_404(client: httpx.Client, page: str)
 
 def test_palette_is_complete(client: httpx.Client) -> None:
     palette = client.get("/api/palette").json()
-    assert {"measured", "raw", "extended", "corrected", "tool", "floor", "unseen", "landmark"} == set(palette["things"])
+    assert {
+        "measured",
+        "raw",
+        "extended",
+        "corrected",
+        "tool",
+        "floor",
+        "unseen",
+        "landmark",
+    } == set(palette["things"])
     assert len(palette["signed"]) == 15
 
 
@@ -79,9 +93,10 @@ def test_a_page_without_a_browser_has_no_still_and_unknown_views_are_refused(
     assert answer.status_code == 404 and "no browser shows this page" in answer.json()["message"]
     for size in (0, 5000, "wide"):
         assert client.get(f"{page}/still.png", params={"width": size}).status_code == 422
-    assert [client.post(f"{page}/look", params={"where": where}).status_code for where in ("top", "front", "side", "reset")] == [
-        204
-    ] * 4
+    assert [
+        client.post(f"{page}/look", params={"where": where}).status_code
+        for where in ("top", "front", "side", "reset")
+    ] == [204] * 4
     assert client.post(f"{page}/look", params={"where": "below"}).status_code == 422
 
 
@@ -106,15 +121,27 @@ def test_a_camera_is_a_place_and_a_target(client: httpx.Client, page: str, run_n
 def test_views_that_cannot_be_drawn_are_refused_by_name(
     client: httpx.Client, page: str, run_name: str, wrong: dict[str, Any]
 ) -> None:
-    answer = client.post(f"/api/sessions/{page}/view", json={"run": run_name, "sequence": "poke-01", **wrong})
+    answer = client.post(
+        f"/api/sessions/{page}/view", json={"run": run_name, "sequence": "poke-01", **wrong}
+    )
     assert answer.status_code == 422
     assert next(iter(wrong)) in answer.json()["where"]["key"]
 
 
-def test_one_scale_serves_all_sequences_of_a_run(client: httpx.Client, page: str, run_name: str) -> None:
-    view = {"run": run_name, "layers": ["raw"], "colour": "raw", "quantity": "displacement", "scale": "fixed"}
+def test_one_scale_serves_all_sequences_of_a_run(
+    client: httpx.Client, page: str, run_name: str
+) -> None:
+    view = {
+        "run": run_name,
+        "layers": ["raw"],
+        "colour": "raw",
+        "quantity": "displacement",
+        "scale": "fixed",
+    }
     limits = {
-        client.post(f"/api/sessions/{page}/view", json={**view, "sequence": name}).json()["drawn"]["limit"]
+        client.post(f"/api/sessions/{page}/view", json={**view, "sequence": name}).json()["drawn"][
+            "limit"
+        ]
         for name in ("poke-01", "drag-01")
     }
     assert len(limits) == 1 and limits.pop() > 1e-3

@@ -1,4 +1,6 @@
-"""Sweeps over REST: what is refused, what is shown while one runs, and a whole one on a virtual phantom."""
+"""Sweeps over REST: what is refused, what is shown while one runs, and a whole one on a virtual
+phantom.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +13,14 @@ import httpx
 import pytest
 from swept import write_swept_phantom
 
-from app.settings import Settings
+from palpate.app.settings import Settings
 
 ASKED: dict[str, Any] = {
     "dataset": "phantom",
     "parameters": [{"parameter": "tool_radius.radius", "low": 4e-3, "high": 8e-3}],
-    "steps": 5, "frames": 2,
-}  # fmt: skip
+    "steps": 5,
+    "frames": 2,
+}
 
 
 @pytest.fixture(scope="module")
@@ -46,8 +49,14 @@ def ended(client: httpx.Client, identity: str) -> dict[str, Any]:
     ("change", "said"),
     [
         ({"parameters": []}, "parameters"),
-        ({"parameters": [{"parameter": "poisson_ratio.nu", "low": 0.4, "high": 0.9}]}, "leaves 0 to 0.495"),
-        ({"parameters": [{"parameter": "nothing.at_all", "low": 0.4, "high": 0.9}]}, "no effect is called"),
+        (
+            {"parameters": [{"parameter": "poisson_ratio.nu", "low": 0.4, "high": 0.9}]},
+            "leaves 0 to 0.495",
+        ),
+        (
+            {"parameters": [{"parameter": "nothing.at_all", "low": 0.4, "high": 0.9}]},
+            "no effect is called",
+        ),
         ({"method": "cmaes"}, "two parameters"),
         ({"steps": 1}, "steps"),
         ({"sequences": ["poke-99"]}, "no such sequence"),
@@ -55,7 +64,9 @@ def ended(client: httpx.Client, identity: str) -> dict[str, Any]:
         ({"scheduler": "tcp://elsewhere:1"}, "scheduler"),
     ],
 )
-def test_what_cannot_be_swept_is_refused(client: httpx.Client, change: dict[str, Any], said: str) -> None:
+def test_what_cannot_be_swept_is_refused(
+    client: httpx.Client, change: dict[str, Any], said: str
+) -> None:
     answer = client.post("/api/sweeps", json={**ASKED, "dataset": "small", **change})
     assert answer.status_code == 422
     assert set(answer.json()) == {"kind", "message", "where"}
@@ -76,7 +87,9 @@ def test_a_sweep_runs_and_its_points_come(home: Path, serve: Any) -> None:
         identity = started.json()["id"]
         found = ended(client, identity)
         assert found["job"]["state"] == "done", found
-        assert found["summary"]["best"]["values"]["tool_radius.radius"] == pytest.approx(6e-3, abs=1e-9)
+        assert found["summary"]["best"]["values"]["tool_radius.radius"] == pytest.approx(
+            6e-3, abs=1e-9
+        )
         first = client.get(f"/api/sweeps/{identity}/points", params={"most": 2}).json()
         rest = client.get(f"/api/sweeps/{identity}/points", params={"after": first["next"]}).json()
         numbers = [row["number"] for row in (*first["points"], *rest["points"])]
@@ -100,4 +113,7 @@ def test_a_sweep_that_is_stopped_keeps_its_points(home: Path, serve: Any) -> Non
         assert kept[: len(known)] == known and len(kept) < 300
     with serve(settings(home)) as client:
         assert client.get(f"/api/sweeps/{identity}/points").json()["points"][: len(known)] == known
-        assert json.loads((home / "runs" / "sweeps" / identity / "request.json").read_text())["points"] == 300
+        assert (
+            json.loads((home / "runs" / "sweeps" / identity / "request.json").read_text())["points"]
+            == 300
+        )

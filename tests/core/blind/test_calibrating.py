@@ -9,26 +9,40 @@ import pytest
 from blind_results import result
 
 from benchmarks.calibrating import first_at, loss, warmest
-from core.blind.results import Result
-from core.diagnosis.probabilities import probabilities
+from palpate.blind.case_results import Result
+from palpate.diagnosis.search.model_probabilities import probabilities
 
 NAMES = ("tool_radius", "gravity", "poisson_ratio", "stiff_inclusion")
 TRUE = 6.0
 
 
 def _model(gain: float, *names: str) -> dict[str, object]:
-    return {"effects": [{"effect": name} for name in names], "gain_nats": gain, "asked_nats": 25.0 * len(names)}
+    return {
+        "effects": [{"effect": name} for name in names],
+        "gain_nats": gain,
+        "asked_nats": 25.0 * len(names),
+    }
 
 
 def _drawn(seed: int) -> Result:
-    """Of gains that are over-sure by a factor of six: the truth is drawn from their softmax at that temperature."""
+    """Of gains that are over-sure by a factor of six: the truth is drawn from their softmax at that
+    temperature.
+    """
     random = np.random.default_rng(seed)
-    surplus: dict[tuple[str, ...], float] = {(name,): 20.0 * random.standard_normal() for name in NAMES}
+    surplus: dict[tuple[str, ...], float] = {
+        (name,): 20.0 * random.standard_normal() for name in NAMES
+    }
     chances = probabilities(surplus, TRUE)
     names = list(chances)
     hidden = names[int(random.choice(len(names), p=list(chances.values())))]
     found = result("clear" if hidden else "control", " ".join(hidden))
-    return replace(found, report={**found.report, "models": [_model(gain + 25.0, *key) for key, gain in surplus.items()]})
+    return replace(
+        found,
+        report={
+            **found.report,
+            "models": [_model(gain + 25.0, *key) for key, gain in surplus.items()],
+        },
+    )
 
 
 def test_temperature_is_found_again() -> None:
@@ -47,4 +61,7 @@ def test_of_equal_temperatures_the_highest_claims_least() -> None:
 
 def test_modulus_alone_is_nothing_hidden() -> None:
     alone = result("modulus", "young_modulus")
-    assert loss([replace(alone, report={**alone.report, "models": [_model(-5.0, "gravity")]})], 1.0) < 1e-6
+    assert (
+        loss([replace(alone, report={**alone.report, "models": [_model(-5.0, "gravity")]})], 1.0)
+        < 1e-6
+    )

@@ -4,25 +4,31 @@ from collections import Counter
 
 import pytest
 
-from core.blind import KINDS, MIX, Case, all_cases, draw_cases, scenario_of
-from core.blind.cases import ALIKE
-from core.effects import DIAGNOSED
-from core.errors import RunError
-from core.synthetic import DISTURBANCES, HIDDEN, QUICK, SHORT_PROTOCOL, WEIGHED
+from palpate.blind import KINDS, MIX, Case, all_cases, draw_cases, scenario_of
+from palpate.blind.cases import ALIKE
+from palpate.effects import DIAGNOSED
+from palpate.foundation.errors import RunError
+from palpate.synthetic import DISTURBANCES, HIDDEN, QUICK, SHORT_PROTOCOL, WEIGHED
 
 
 def effects_of(cases: list[Case]) -> list[str]:
     return [case.hidden[0] for case in cases if case.kind == "clear"]
 
 
-def test_small_suite_hides_every_effect_that_is_weighed_and_every_disturbance_once_and_nothing_ten_times() -> None:
+def test_small_suite_hides_every_effect_that_is_weighed_and_every_disturbance_once_and_nothing_ten_times() -> (
+    None
+):
     cases = all_cases(seed=3)
-    assert [case.hidden for case in cases if case.hidden] == [(name,) for name in (*WEIGHED, *DISTURBANCES)]
+    assert [case.hidden for case in cases if case.hidden] == [
+        (name,) for name in (*WEIGHED, *DISTURBANCES)
+    ]
     assert sum(case.kind == "control" for case in cases) == 10
     assert len({case.name for case in cases}) == len({case.seed for case in cases}) == len(cases)
 
 
-def test_other_effects_are_hidden_where_they_are_asked_for_and_leave_the_cases_of_the_rest_alone() -> None:
+def test_other_effects_are_hidden_where_they_are_asked_for_and_leave_the_cases_of_the_rest_alone() -> (
+    None
+):
     everything = all_cases(seed=3, effects=list(HIDDEN))
     assert effects_of(everything) == list(HIDDEN)
     assert {case for case in all_cases(seed=3) if case.kind != "outside"} <= set(everything)
@@ -40,7 +46,9 @@ def test_drawn_suite_has_its_mix() -> None:
     assert sum(MIX.values()) == pytest.approx(1.0) and set(MIX) == set(KINDS)
     cases = draw_cases(5, 200)
     counted = Counter(case.kind for case in cases)
-    assert {kind: counted[kind] for kind in KINDS} == {kind: round(200 * MIX[kind]) for kind in KINDS}
+    assert {kind: counted[kind] for kind in KINDS} == {
+        kind: round(200 * MIX[kind]) for kind in KINDS
+    }
     assert counted["control"] == 50
     assert len({case.name for case in cases}) == len({case.seed for case in cases}) == 200
 
@@ -61,7 +69,10 @@ def test_kinds_effects_and_controls_are_as_asked_for() -> None:
     cases = draw_cases(5, 20, kinds=["pair", "clear"], effects=["gravity", "tool_radius"])
     assert {case.kind for case in cases} == {"pair", "clear"}
     assert {name for case in cases for name in case.hidden} == {"gravity", "tool_radius"}
-    assert Counter(case.kind for case in draw_cases(5, 20, kinds=["clear"], controls=5)) == {"clear": 15, "control": 5}
+    assert Counter(case.kind for case in draw_cases(5, 20, kinds=["clear"], controls=5)) == {
+        "clear": 15,
+        "control": 5,
+    }
     assert {case.hidden[0] for case in draw_cases(5, 10, kinds=["twins"])} <= set(ALIKE)
 
 
@@ -93,11 +104,17 @@ def test_case_hides_its_effect_and_the_same_one_each_time(effect: str) -> None:
 def test_case_hides_the_same_whatever_else_is_weighed() -> None:
     cases = all_cases(7, 0, ["gravity", "poisson_ratio"])
     drawn = {case.hidden[0]: dict(scenario_of(case).effects[0].parameters) for case in cases}
-    assert drawn == {"gravity": {"specific_weight_over_stiffness": 2.92}, "poisson_ratio": {"nu": 0.121}}
+    assert drawn == {
+        "gravity": {"specific_weight_over_stiffness": 2.92},
+        "poisson_ratio": {"nu": 0.121},
+    }
 
 
 def test_subtle_case_hides_a_share_of_a_clear_one() -> None:
-    clear, subtle = (scenario_of(Case("case", 7, kind, ("time_offset",))).effects[0] for kind in ("clear", "subtle"))
+    clear, subtle = (
+        scenario_of(Case("case", 7, kind, ("time_offset",))).effects[0]
+        for kind in ("clear", "subtle")
+    )
     assert subtle.value("offset") == pytest.approx(0.4 * clear.value("offset"), abs=1e-6)
 
 
@@ -118,10 +135,15 @@ def test_case_outside_the_catalogue_hides_no_effect(name: str) -> None:
 
 
 def test_offset_among_look_alikes_is_vertical_and_as_long() -> None:
-    clear, twin = (scenario_of(Case("case", 7, kind, ("tool_offset",))).effects[0] for kind in ("clear", "twins"))
+    clear, twin = (
+        scenario_of(Case("case", 7, kind, ("tool_offset",))).effects[0]
+        for kind in ("clear", "twins")
+    )
     length = sum(clear.value(name) ** 2 for name in ("dx", "dy", "dz")) ** 0.5
     assert (twin.value("dx"), twin.value("dy")) == (0.0, 0.0)
-    assert twin.value("dz") * clear.value("dz") > 0 and abs(twin.value("dz")) == pytest.approx(length, abs=1e-5)
+    assert twin.value("dz") * clear.value("dz") > 0 and abs(twin.value("dz")) == pytest.approx(
+        length, abs=1e-5
+    )
 
 
 def test_modulus_alone_differs_from_what_is_believed_by_a_quarter_or_more() -> None:

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from blind_results import cause, result
 
-from core.blind import Result, summary_of
-from core.blind.calibration import brier, calibration_error, first_effect, reliability
-from core.blind.parameters import Said, coverage, distances, parameter_errors, said_of
-from core.blind.rates import median_of, rate
-from core.blind.targets import TARGETS, grade, judged
-from core.effects import DIAGNOSED, Parameter, effect_named
-from core.synthetic import HIDDEN
+from palpate.blind import Result, summary_of
+from palpate.blind.calibration import brier, calibration_error, first_effect, reliability
+from palpate.blind.parameter_errors import Said, coverage, distances, parameter_errors, said_of
+from palpate.blind.proportions import median_of, rate
+from palpate.blind.targets import TARGETS, grade, judged
+from palpate.effects import DIAGNOSED, Parameter, effect_named
+from palpate.synthetic import HIDDEN
 
 
 def target(key: str, results: list[Result]) -> dict[str, object]:
@@ -24,7 +24,9 @@ def target(key: str, results: list[Result]) -> dict[str, object]:
 
 def test_share_has_the_interval_of_clopper_and_pearson() -> None:
     none, all_of_them = rate(0, 50), rate(50, 50)
-    assert none.value == 0.0 and none.low == 0.0 and none.high == pytest.approx(1 - 0.025 ** (1 / 50))
+    assert (
+        none.value == 0.0 and none.low == 0.0 and none.high == pytest.approx(1 - 0.025 ** (1 / 50))
+    )
     assert all_of_them.low == pytest.approx(0.025 ** (1 / 50)) and all_of_them.high == 1.0
     assert rate(0, 0).value is None
 
@@ -32,11 +34,24 @@ def test_share_has_the_interval_of_clopper_and_pearson() -> None:
 def test_median_has_an_interval_between_order_statistics() -> None:
     found = median_of([float(one) for one in range(1, 101)])
     assert found.value == 50.5
-    assert found.low is not None and found.high is not None and 40 <= found.low <= 41 and 60 <= found.high <= 61
+    assert (
+        found.low is not None
+        and found.high is not None
+        and 40 <= found.low <= 41
+        and 60 <= found.high <= 61
+    )
     assert median_of([3.0, 1.0]).low is None and median_of([]).value is None
 
 
-def said(effect: str, name: str, true: float, value: float, low: float, high: float, item: Parameter | None = None) -> Said:
+def said(
+    effect: str,
+    name: str,
+    true: float,
+    value: float,
+    low: float,
+    high: float,
+    item: Parameter | None = None,
+) -> Said:
     return Said("case", "clear", effect, name, "1", true, value, low, high, 0.95, item)
 
 
@@ -49,30 +64,51 @@ def test_interval_is_narrowed_as_a_normal_distribution_has_it() -> None:
 
 
 def test_interval_of_a_parameter_that_is_searched_by_its_logarithm_is_narrowed_there() -> None:
-    wide = said("surface_layer", "stiffness_ratio", 4.0, 4.0, 1.0, 16.0, effect_named("surface_layer").numbers()[1])
+    wide = said(
+        "surface_layer",
+        "stiffness_ratio",
+        4.0,
+        4.0,
+        1.0,
+        16.0,
+        effect_named("surface_layer").numbers()[1],
+    )
     narrowed = 4.0 ** (1.6449 / 1.96)
-    assert replace(wide, true=4.0 * narrowed * 0.99).covers(0.9) and not replace(wide, true=4.0 * narrowed * 1.01).covers(0.9)
-    assert replace(wide, true=4.0 / narrowed * 1.01).covers(0.9) and not replace(wide, true=4.0 / narrowed * 0.99).covers(0.9)
+    assert replace(wide, true=4.0 * narrowed * 0.99).covers(0.9) and not replace(
+        wide, true=4.0 * narrowed * 1.01
+    ).covers(0.9)
+    assert replace(wide, true=4.0 / narrowed * 1.01).covers(0.9) and not replace(
+        wide, true=4.0 / narrowed * 0.99
+    ).covers(0.9)
 
 
 AXIS = effect_named("anisotropy").numbers()[0]
 
 
 def test_direction_comes_round_at_half_a_turn() -> None:
-    fibres = said("anisotropy", "direction", 0.02, math.pi - 0.01, math.pi - 0.1, math.pi + 0.1, AXIS)
+    fibres = said(
+        "anisotropy", "direction", 0.02, math.pi - 0.01, math.pi - 0.1, math.pi + 0.1, AXIS
+    )
     assert fibres.error == pytest.approx(-0.03) and fibres.covers()
-    assert said("time_offset", "offset", 0.02, math.pi - 0.01, 3.0, 3.3).error == pytest.approx(math.pi - 0.03)
+    assert said("time_offset", "offset", 0.02, math.pi - 0.01, 3.0, 3.3).error == pytest.approx(
+        math.pi - 0.03
+    )
 
 
 def inclusion(x: float, y: float, z: float, at: tuple[float, float, float], name: str) -> Result:
-    said = {key: (value, value - 1e-3, value + 1e-3) for key, value in zip("xyz", (x, y, z), strict=True)}
+    said = {
+        key: (value, value - 1e-3, value + 1e-3)
+        for key, value in zip("xyz", (x, y, z), strict=True)
+    }
     named = cause("stiff_inclusion", 0.99, **said)
     truth = dict(zip("xyz", at, strict=True))
     return result("clear", "stiff_inclusion", "found", [named], name=name, truth=truth)
 
 
 def test_errors_are_of_what_is_named_and_hidden_alone() -> None:
-    missed = result("clear", "stiff_inclusion", "found", [cause("gravity", x=(1.0, 0.9, 1.1))], truth={"x": 0.0})
+    missed = result(
+        "clear", "stiff_inclusion", "found", [cause("gravity", x=(1.0, 0.9, 1.1))], truth={"x": 0.0}
+    )
     found = inclusion(3e-3, 4e-3, 0.02, (0.0, 0.0, 0.022), "a")
     table = parameter_errors(said_of([found, missed]))
     assert list(table) == ["stiff_inclusion.x", "stiff_inclusion.y", "stiff_inclusion.z"]
@@ -84,14 +120,19 @@ def test_errors_are_of_what_is_named_and_hidden_alone() -> None:
 def test_median_of_an_inclusions_place_is_judged() -> None:
     off = [inclusion(size, 0.0, 0.02, (0.0, 0.0, 0.02), str(size)) for size in (1e-3, 2e-3, 9e-3)]
     judgement = target("inclusion.plane", off)
-    assert judgement["met"] is True and judgement["at_most"] == 2.5e-3 and judgement["sure"] is False
+    assert (
+        judgement["met"] is True and judgement["at_most"] == 2.5e-3 and judgement["sure"] is False
+    )
     assert target("inclusion.plane", off[2:])["met"] is False
 
 
 def test_word_is_right_or_wrong() -> None:
     named = cause("base_detachment")
     named["parameters"]["edge"] = {"value": "+x", "unit": ""}
-    rows = [result("clear", "base_detachment", "found", [named], truth={"edge": edge}) for edge in ("+x", "+x", "-y")]
+    rows = [
+        result("clear", "base_detachment", "found", [named], truth={"edge": edge})
+        for edge in ("+x", "+x", "-y")
+    ]
     assert summary_of(rows, 0)["words"]["base_detachment.edge"]["hits"] == 2
 
 
@@ -104,7 +145,10 @@ def test_numbers_that_were_never_written_cover_as_those_of_a_file_do() -> None:
     one = inclusion(0.0, 0.0, 0.02, (0.0, 0.0, 0.02), "a")
     (cause,) = one.causes
     numbers = cause["parameters"].items()
-    fresh = {name: {key: np.float64(v) if isinstance(v, float) else v for key, v in entry.items()} for name, entry in numbers}
+    fresh = {
+        name: {key: np.float64(v) if isinstance(v, float) else v for key, v in entry.items()}
+        for name, entry in numbers
+    }
     said = replace(one, report=one.report | {"causes": [cause | {"parameters": fresh}]})
     assert (coverage(said_of([said])).hits, coverage(said_of([one])).hits) == (3, 3)
 
@@ -121,7 +165,12 @@ def test_calibrated_probabilities_have_no_error_and_overconfident_ones_have_it()
     assert calibration_error(np.full(10, 0.95), true).value == pytest.approx(0.15)
     assert brier(np.full(10, 0.8), true).value == pytest.approx(0.16)
     (row,) = reliability(np.full(10, 0.8), true)
-    assert (row["low"], row["stated"], row["true"]["hits"], row["true"]["n"]) == (0.8, pytest.approx(0.8), 8, 10)
+    assert (row["low"], row["stated"], row["true"]["hits"], row["true"]["n"]) == (
+        0.8,
+        pytest.approx(0.8),
+        8,
+        10,
+    )
 
 
 def test_most_probable_effect_counts_whether_it_is_named_or_not() -> None:
@@ -139,13 +188,25 @@ def test_size_over_the_limit_grades_a_case() -> None:
     sizes = (None, 1.9, 2.0, 4.9, 5.0)
     rows = [result("subtle", "gravity", "found", [cause("gravity")], size=size) for size in sizes]
     assert [grade(row) for row in rows] == ["", "faint", "subtle", "subtle", "clear"]
-    reached = {key: target(key, rows)["reached"] for key in ("limit_clear.first", "limit_subtle.first")}
+    reached = {
+        key: target(key, rows)["reached"] for key in ("limit_clear.first", "limit_subtle.first")
+    }
     assert [one["n"] for one in reached.values()] == [1, 2]  # type: ignore[index]
 
 
-@pytest.mark.parametrize(("named", "met", "sure"), [(0, True, False), (1, True, False), (2, False, False), (20, False, True)])
-def test_of_fifty_controls_one_false_alarm_is_let_through(named: int, met: bool, sure: bool) -> None:
-    rows = [result("control", "", "found" if one < named else "none", [cause("gravity")] * (one < named)) for one in range(50)]
+@pytest.mark.parametrize(
+    ("named", "met", "sure"),
+    [(0, True, False), (1, True, False), (2, False, False), (20, False, True)],
+)
+def test_of_fifty_controls_one_false_alarm_is_let_through(
+    named: int, met: bool, sure: bool
+) -> None:
+    rows = [
+        result(
+            "control", "", "found" if one < named else "none", [cause("gravity")] * (one < named)
+        )
+        for one in range(50)
+    ]
     judgement = target("control.named", rows)
     assert (judgement["met"], judgement["sure"]) == (met, sure)
 
@@ -181,11 +242,21 @@ def test_summary_says_what_was_named_for_what() -> None:
     ]
     found = summary_of(rows, seed=3)
     assert found["confusion"] == {
-        "gravity": {"gravity": 1, "several": 1, "ambiguous": 1}, "nothing": {"error": 1}, "camera_drift": {"unexplained": 1},
-    }  # fmt: skip
+        "gravity": {"gravity": 1, "several": 1, "ambiguous": 1},
+        "nothing": {"error": 1},
+        "camera_drift": {"unexplained": 1},
+    }
     assert found["pairs"] == {"one named": 1, "both named": 1, "one named, and another": 1}
-    assert (found["seed"], found["cases"], found["code"], found["errors"]) == (3, 8, {"abc": 8}, {"case": "x"})
-    assert found["kinds"]["pair"]["exact"]["hits"] == 1 and found["kinds"]["clear"]["false_name"]["hits"] == 1
+    assert (found["seed"], found["cases"], found["code"], found["errors"]) == (
+        3,
+        8,
+        {"abc": 8},
+        {"case": "x"},
+    )
+    assert (
+        found["kinds"]["pair"]["exact"]["hits"] == 1
+        and found["kinds"]["clear"]["false_name"]["hits"] == 1
+    )
 
 
 def test_summary_of_nothing_has_no_figures() -> None:
@@ -194,7 +265,12 @@ def test_summary_of_nothing_has_no_figures() -> None:
 
 
 def test_targets_on_parameters_name_what_the_catalogue_has() -> None:
-    names = {"stiff_inclusion": "xyz", "tool_radius": ["radius"], "time_offset": ["offset"], "poisson_ratio": ["nu"]}
+    names = {
+        "stiff_inclusion": "xyz",
+        "tool_radius": ["radius"],
+        "time_offset": ["offset"],
+        "poisson_ratio": ["nu"],
+    }
     assert all(set(own) <= set(HIDDEN[effect]) for effect, own in names.items())
     camera = next(effect for effect in DIAGNOSED if effect.name == "camera_registration")
     assert [item.name for item in camera.numbers()] == ["tx", "ty", "tz", "rx", "ry", "rz"]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from core.blind import read_results, summary_of
+from palpate.blind import read_results, summary_of
 
 ROOT = Path(__file__).parents[3]
 SEED = 1400

@@ -1,4 +1,6 @@
-"""The rule that withholds a cause which leaves most of what is wrong, by rows of suites that were run and kept."""
+"""The rule that withholds a cause which leaves most of what is wrong, by rows of suites that were
+run and kept.
+"""
 
 from __future__ import annotations
 

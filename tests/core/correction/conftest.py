@@ -1,4 +1,6 @@
-"""A virtual block that sags under its weight, which nobody states; pushed from above in three places. One that sags less."""
+"""A virtual block that sags under its weight, which nobody states; pushed from above in three
+places. One that sags less.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from core.correction import Recorder, Samples, make_samples, recorder_for
-from core.dataset import Dataset, open_dataset
-from core.mesh import GridSpec
-from core.synthetic import HiddenEffect, Scenario, make_dataset
+from palpate.correction import Recorder, Samples, make_samples, recorder_for
+from palpate.dataset import Dataset, open_dataset
+from palpate.mesh.box_mesh import GridSpec
+from palpate.synthetic import HiddenEffect, Scenario, make_dataset
 
 PUSHES = ("poke-top-01", "poke-top-02", "poke-top-03")
 
@@ -26,7 +28,9 @@ class Bench:
 
 def _bench(folder: Path, weight: float, sequences: tuple[str, ...]) -> Bench:
     hidden = HiddenEffect("gravity", {"specific_weight_over_stiffness": weight})
-    scenario = Scenario(effects=(hidden,), sequences=sequences, density=900, rate=2.0, robot_rate=200.0, fine=6e-3)
+    scenario = Scenario(
+        effects=(hidden,), sequences=sequences, density=900, rate=2.0, robot_rate=200.0, fine=6e-3
+    )
     make_dataset(folder / "block", scenario, seed=7)
     dataset = open_dataset(folder / "block")
     recorder = recorder_for(dataset, grid=GridSpec(nodes=(13, 5, 5)), points=400)

@@ -9,16 +9,32 @@ import pytest
 import torch
 from learned_samples import write_samples
 
-from core.correction import NetworkSpec, Samples, Split, SurfaceLoss, Trained, TrainingSpec, build, errors_of, train
-from core.correction.chamfer import nearest
-from core.correction.devices import reproducible
-from core.correction.training import body_for
-from core.errors import Cancelled
+from palpate.correction import (
+    NetworkSpec,
+    Samples,
+    Split,
+    SurfaceLoss,
+    Trained,
+    TrainingSpec,
+    build,
+    errors_of,
+    train,
+)
+from palpate.correction.networks.chamfer import nearest
+from palpate.correction.networks.devices import reproducible
+from palpate.correction.train import body_for
+from palpate.foundation.errors import Cancelled
 
 pytestmark = pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA here")
 KINDS = ("unet2d", "unet3d", "graph")
 SPEC = TrainingSpec(
-    network=NetworkSpec(kind="unet3d", features=(4, 6)), rate=5e-3, batch=8, epochs=5, keep_every=2, device="cuda", threads=1
+    network=NetworkSpec(kind="unet3d", features=(4, 6)),
+    rate=5e-3,
+    batch=8,
+    epochs=5,
+    keep_every=2,
+    device="cuda",
+    threads=1,
 )
 
 
@@ -28,13 +44,18 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> Samples:
 
 
 def _same(one: Trained, other: Trained) -> bool:
-    weights = zip(one.network.state_dict().values(), other.network.state_dict().values(), strict=True)
+    weights = zip(
+        one.network.state_dict().values(), other.network.state_dict().values(), strict=True
+    )
     return all(torch.equal(a.cpu(), b.cpu()) for a, b in weights)
 
 
 def test_nearest_is_exact():
     generator = torch.Generator().manual_seed(1)
-    points, others = torch.randn(5, 900, 3, generator=generator), torch.randn(5, 700, 3, generator=generator)
+    points, others = (
+        torch.randn(5, 900, 3, generator=generator),
+        torch.randn(5, 700, 3, generator=generator),
+    )
     everything = torch.ones(5, 900, dtype=torch.bool)
     found = nearest(points.cuda(), others.cuda(), everything.cuda())
     assert torch.equal(found.cpu(), nearest(points, others, everything))
@@ -45,16 +66,29 @@ def test_nearest_is_exact():
 def test_gradient_is_the_processors(samples, kind, distance):
     body, gradients = body_for(samples, kind), []
     for place in ("cpu", "cuda"):
-        # Of shortened products a card is allowed for convolutions Hausdorff's distance may take another, almost as distant point.
+        # Of shortened products a card is allowed for convolutions Hausdorff's distance may take
+        # another, almost as distant point.
         with reproducible(torch.device(place), 0), torch.backends.cudnn.flags(allow_tf32=False):
             network = build(NetworkSpec(kind=kind, features=(8, 16)), body, 3).to(place)
             for number, weight in enumerate(network.parameters()):
-                weight.data += 0.02 * torch.randn(weight.shape, generator=torch.Generator().manual_seed(number)).to(place)
-            loss = SurfaceLoss(body, samples.seen[body.index], distance=distance, hold=0.5, device=place)
+                weight.data += 0.02 * torch.randn(
+                    weight.shape, generator=torch.Generator().manual_seed(number)
+                ).to(place)
+            loss = SurfaceLoss(
+                body, samples.seen[body.index], distance=distance, hold=0.5, device=place
+            )
             batch = samples.batch(samples.rows(["one"])).to(torch.device(place))
             raw = batch.positions[:, body.index]
             loss(network(raw, batch.tool), batch, raw).total.backward()
-        gradients.append(torch.cat([weight.grad.flatten().cpu() for weight in network.parameters() if weight.grad is not None]))
+        gradients.append(
+            torch.cat(
+                [
+                    weight.grad.flatten().cpu()
+                    for weight in network.parameters()
+                    if weight.grad is not None
+                ]
+            )
+        )
     assert gradients[0].norm() > 0
     assert (gradients[1] - gradients[0]).norm() < 2e-3 * gradients[0].norm()
 
@@ -62,7 +96,9 @@ def test_gradient_is_the_processors(samples, kind, distance):
 @pytest.mark.parametrize("kind", KINDS)
 def test_same_seed_gives_the_same_weights_bit_for_bit(samples, kind, tmp_path):
     spec = replace(SPEC, network=NetworkSpec(kind=kind, features=(8, 16)))
-    assert _same(*(train(samples, Split.of(samples), spec, tmp_path / name) for name in ("first", "second")))
+    assert _same(
+        *(train(samples, Split.of(samples), spec, tmp_path / name) for name in ("first", "second"))
+    )
 
 
 @pytest.mark.parametrize("step", [1, 5])
@@ -83,7 +119,10 @@ def test_cancelled_training_goes_on_as_if_nothing_had_been(samples, tmp_path, st
 def test_training_ends_where_a_processors_ends(samples, tmp_path, mixed):
     spec = replace(SPEC, epochs=30, patience=30)
     here, there = (
-        train(samples, Split.of(samples), replace(spec, device=place, mixed=mixed), tmp_path / place) for place in ("cpu", "cuda")
+        train(
+            samples, Split.of(samples), replace(spec, device=place, mixed=mixed), tmp_path / place
+        )
+        for place in ("cpu", "cuda")
     )
     assert there.about["error"] < 0.5 * there.about["raw_error"]
     assert there.about["error"] == pytest.approx(here.about["error"], rel=0.05)

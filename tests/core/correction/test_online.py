@@ -7,8 +7,16 @@ import pytest
 import torch
 from learned_samples import write_samples
 
-from core.correction import Learner, NetworkSpec, OnlineSpec, Split, TrainingSpec, learn_along, train
-from core.errors import Cancelled, CorrectionError
+from palpate.correction import (
+    Learner,
+    NetworkSpec,
+    OnlineSpec,
+    Split,
+    TrainingSpec,
+    learn_along,
+    train,
+)
+from palpate.foundation.errors import Cancelled, CorrectionError
 
 
 def test_learning_on_the_way_follows_a_material_that_changes_half_way(bench, stiffer, tmp_path):
@@ -16,11 +24,20 @@ def test_learning_on_the_way_follows_a_material_that_changes_half_way(bench, sti
     spec = TrainingSpec(network=network, rate=2e-3, batch=8, epochs=8, device="cpu")
     trained = train(bench.samples, Split.of(bench.samples), spec, tmp_path)
     before, after = bench.samples.rows(["poke-top-03"]), stiffer.samples.rows(["poke-top-01"])
-    stream = learn_along(trained, [(bench.samples, ["poke-top-03"]), (stiffer.samples, ["poke-top-01"])], OnlineSpec())
+    stream = learn_along(
+        trained,
+        [(bench.samples, ["poke-top-03"]), (stiffer.samples, ["poke-top-01"])],
+        OnlineSpec(),
+    )
     assert len(stream.online) == len(before) + len(after)
     first, second = slice(None, len(before)), slice(len(before), None)
-    # What it was trained for it still does; of the other material the frozen network is worse than none.
-    assert np.mean(stream.online[first]) < 1.02 * np.mean(stream.frozen[first]) < np.mean(stream.raw[first])
+    # What it was trained for it still does; of the other material the frozen network is worse than
+    # none.
+    assert (
+        np.mean(stream.online[first])
+        < 1.02 * np.mean(stream.frozen[first])
+        < np.mean(stream.raw[first])
+    )
     assert np.mean(stream.frozen[second]) > np.mean(stream.raw[second])
     late = slice(-len(after) // 2, None)
     assert np.mean(stream.online[late]) < 0.95 * np.mean(stream.frozen[late])
@@ -29,8 +46,12 @@ def test_learning_on_the_way_follows_a_material_that_changes_half_way(bench, sti
 @pytest.fixture(scope="module")
 def known(tmp_path_factory):
     samples = write_samples(tmp_path_factory.mktemp("online") / "samples", rows=10)
-    spec = TrainingSpec(network=NetworkSpec(kind="unet3d", features=(4, 6)), batch=8, epochs=1, device="cpu")
-    return samples, train(samples, Split.of(samples), spec, tmp_path_factory.mktemp("online") / "run")
+    spec = TrainingSpec(
+        network=NetworkSpec(kind="unet3d", features=(4, 6)), batch=8, epochs=1, device="cpu"
+    )
+    return samples, train(
+        samples, Split.of(samples), spec, tmp_path_factory.mktemp("online") / "run"
+    )
 
 
 def test_each_frame_is_predicted_before_it_is_learned_from(known):
@@ -49,7 +70,10 @@ def test_network_it_was_made_from_stays_as_it_is(known):
     samples, trained = known
     before = [value.clone() for value in trained.network.state_dict().values()]
     learn_along(trained, [(samples, ["two"])], OnlineSpec())
-    assert all(torch.equal(a, b) for a, b in zip(before, trained.network.state_dict().values(), strict=True))
+    assert all(
+        torch.equal(a, b)
+        for a, b in zip(before, trained.network.state_dict().values(), strict=True)
+    )
 
 
 def test_without_steps_nothing_is_learned(known):
@@ -60,7 +84,10 @@ def test_without_steps_nothing_is_learned(known):
 
 def test_same_seed_learns_the_same(known):
     samples, trained = known
-    runs = [learn_along(trained, [(samples, ["two"])], OnlineSpec(seed=seed, memory=4)).online for seed in (0, 0, 1)]
+    runs = [
+        learn_along(trained, [(samples, ["two"])], OnlineSpec(seed=seed, memory=4)).online
+        for seed in (0, 0, 1)
+    ]
     assert np.array_equal(runs[0], runs[1])
     assert not np.array_equal(runs[0], runs[2])
 
@@ -76,7 +103,9 @@ def test_stream_can_be_cancelled(known):
         learn_along(trained, [(samples, ["two"])], OnlineSpec(), stop)
 
 
-@pytest.mark.parametrize(("key", "value"), [("rate", 2.0), ("batch", 0), ("steps", -1), ("memory", 0)])
+@pytest.mark.parametrize(
+    ("key", "value"), [("rate", 2.0), ("batch", 0), ("steps", -1), ("memory", 0)]
+)
 def test_impossible_learning_is_refused(key, value):
     with pytest.raises(CorrectionError, match=key):
         replace(OnlineSpec(), **{key: value})

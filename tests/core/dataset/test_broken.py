@@ -1,4 +1,6 @@
-"""Broken datasets: each gives one error with its place and what was expected, and is left as it was."""
+"""Broken datasets: each gives one error with its place and what was expected, and is left as it
+was.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +11,8 @@ from pathlib import Path
 import pytest
 from broken_datasets import BREAKAGES, write_valid_dataset
 
-from core.dataset import open_dataset
-from core.errors import DatasetError
+from palpate.dataset import open_dataset
+from palpate.foundation.errors import DatasetError
 
 
 def content(folder: Path) -> dict[str, object]:
@@ -19,7 +21,11 @@ def content(folder: Path) -> dict[str, object]:
     for path in [folder, *sorted(folder.rglob("*"))]:
         if path.is_symlink() or path.exists():
             state = path.lstat()
-            found[str(path)] = (state.st_mode, state.st_mtime_ns, path.read_bytes() if stat.S_ISREG(state.st_mode) else b"")
+            found[str(path)] = (
+                state.st_mode,
+                state.st_mtime_ns,
+                path.read_bytes() if stat.S_ISREG(state.st_mode) else b"",
+            )
     return found
 
 
@@ -35,7 +41,9 @@ def test_the_dataset_is_whole_before_it_is_broken(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", BREAKAGES)
-def test_broken_dataset_gives_one_error_that_names_place_and_expectation(name: str, tmp_path: Path) -> None:
+def test_broken_dataset_gives_one_error_that_names_place_and_expectation(
+    name: str, tmp_path: Path
+) -> None:
     folder = write_valid_dataset(tmp_path / "block")
     breakage = BREAKAGES[name]
     breakage(folder)

@@ -11,11 +11,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 from small_dataset import ply_bytes, small_cloud, write_valid_dataset
 
-from core.dataset import open_dataset
-from core.dataset.check import DatasetSummary, check_dataset
-from core.dataset.coverage import coverage_picture
-from core.errors import DatasetError
-from core.frames import Transform
+from palpate.dataset import open_dataset
+from palpate.dataset.check import DatasetSummary, check_dataset
+from palpate.dataset.coverage_figure import coverage_picture
+from palpate.foundation.errors import DatasetError
+from palpate.foundation.frames import Transform
 
 POKE = "sequences/poke-01"
 
@@ -44,7 +44,9 @@ def test_rates_counts_and_motions_of_a_whole_dataset(folder: Path) -> None:
     assert (poke.name, poke.split, drag.split) == ("poke-01", "train", "test")
     assert poke.points == (192, 192, 192)
     assert summary.rest_points == 192
-    np.testing.assert_allclose([poke.kinematics.rate, poke.clouds.rate, poke.duration], [200, 5, 0.995], rtol=1e-6)
+    np.testing.assert_allclose(
+        [poke.kinematics.rate, poke.clouds.rate, poke.duration], [200, 5, 0.995], rtol=1e-6
+    )
     assert poke.kinematics.jitter < 1e-5
     assert poke.kinematics.dropouts == poke.clouds.dropouts == poke.clouds_outside == 0
     assert poke.motion is not None
@@ -76,7 +78,9 @@ def test_missing_kinds_of_motion_are_told_with_the_effects_they_would_show(folde
 
 def test_without_forces_the_modulus_is_told_to_be_unseen(folder: Path) -> None:
     (folder / POKE / "forces.csv").unlink()
-    assert [lack.effects for lack in check(folder).lacks if "forces" in lack.sentence] == [("young_modulus",)]
+    assert [lack.effects for lack in check(folder).lacks if "forces" in lack.sentence] == [
+        ("young_modulus",)
+    ]
 
 
 def test_lost_clouds_and_a_pause_of_the_robot_are_counted(folder: Path) -> None:
@@ -88,7 +92,9 @@ def test_lost_clouds_and_a_pause_of_the_robot_are_counted(folder: Path) -> None:
     summary = check(folder)
     poke = summary.sequences[1]
     assert (poke.clouds.dropouts, poke.kinematics.dropouts) == (1, 1)
-    np.testing.assert_allclose([poke.clouds.longest, poke.kinematics.longest], [0.4, 0.155], atol=1e-6)
+    np.testing.assert_allclose(
+        [poke.clouds.longest, poke.kinematics.longest], [0.4, 0.155], atol=1e-6
+    )
     text = "\n".join(summary.warnings)
     assert "poke-01: the clouds pause once, at most 0.40 s" in text
     assert "poke-01: the kinematics pause once, at most 0.15 s" in text or "at most 0.16 s" in text
@@ -100,12 +106,17 @@ def test_clouds_stamped_beyond_the_motion_are_counted(folder: Path) -> None:
     path.write_text(path.read_text().replace("100.90000", "101.90000"))
     summary = check(folder)
     assert summary.sequences[1].clouds_outside == 1
-    assert any("1 of 5 clouds are stamped outside the kinematics" in text for text in summary.warnings)
+    assert any(
+        "1 of 5 clouds are stamped outside the kinematics" in text for text in summary.warnings
+    )
 
 
 def test_a_blocked_view_is_noticed(folder: Path) -> None:
     (folder / POKE / "clouds/000002.ply").write_bytes(ply_bytes(small_cloud()[:40]))
-    assert any("the smallest cloud has 40 points, the median one 192" in text for text in check(folder).warnings)
+    assert any(
+        "the smallest cloud has 40 points, the median one 192" in text
+        for text in check(folder).warnings
+    )
 
 
 def test_sequences_outside_the_splits_and_an_empty_test_are_told(folder: Path) -> None:
@@ -119,14 +130,24 @@ def test_sequences_outside_the_splits_and_an_empty_test_are_told(folder: Path) -
 def test_a_tool_that_never_touches_is_told_with_its_distance(folder: Path) -> None:
     raised = Transform(translation=np.array([0, 0, 0.02])) @ registration(folder)
     summary = check_dataset(open_dataset(folder), raised)
-    assert any("poke-01: the tool never touches the phantom, it stays 17." in text for text in summary.warnings)
+    assert any(
+        "poke-01: the tool never touches the phantom, it stays 17." in text
+        for text in summary.warnings
+    )
 
 
 def test_a_tool_that_hardly_moves_is_told_with_its_path(folder: Path) -> None:
     path = folder / POKE / "kinematics.csv"
     header, *rows = path.read_text().splitlines()
-    path.write_text("\n".join([header, *(f"{row.partition(',')[0]},{rows[0].partition(',')[2]}" for row in rows)]) + "\n")
-    assert any("poke-01: the tool moves by 0.000 mm only" in text for text in check(folder).warnings)
+    path.write_text(
+        "\n".join(
+            [header, *(f"{row.partition(',')[0]},{rows[0].partition(',')[2]}" for row in rows)]
+        )
+        + "\n"
+    )
+    assert any(
+        "poke-01: the tool moves by 0.000 mm only" in text for text in check(folder).warnings
+    )
 
 
 def test_a_broken_cloud_is_found_by_the_check(folder: Path) -> None:
@@ -137,7 +158,9 @@ def test_a_broken_cloud_is_found_by_the_check(folder: Path) -> None:
         check(folder)
 
 
-def test_the_coverage_picture_is_a_picture_and_the_only_new_file(folder: Path, tmp_path: Path) -> None:
+def test_the_coverage_picture_is_a_picture_and_the_only_new_file(
+    folder: Path, tmp_path: Path
+) -> None:
     out = tmp_path / "out"
     out.mkdir()
     coverage_picture(open_dataset(folder), registration(folder), out / "coverage.png")

@@ -10,8 +10,8 @@ import open3d
 import pytest
 from small_dataset import ply_bytes
 
-from core.dataset.cloud import read_cloud, read_header
-from core.errors import DatasetError
+from palpate.dataset.cloud import read_cloud, read_header
+from palpate.foundation.errors import DatasetError
 
 POINTS = np.random.default_rng(0).uniform(-0.3, 0.3, (57, 3))
 
@@ -23,7 +23,9 @@ def write(folder: Path, header: str, body: bytes, newline: str = "\n") -> None:
 
 @pytest.mark.parametrize(("order", "sign"), [("little", "<"), ("big", ">")])
 @pytest.mark.parametrize(("kind", "code"), [("float", "f4"), ("float64", "f8")])
-def test_binary_clouds_of_either_byte_order_and_precision(order: str, sign: str, kind: str, code: str, tmp_path: Path) -> None:
+def test_binary_clouds_of_either_byte_order_and_precision(
+    order: str, sign: str, kind: str, code: str, tmp_path: Path
+) -> None:
     header = f"format binary_{order}_endian 1.0|element vertex 57|property {kind} x|property {kind} y|property {kind} z"
     write(tmp_path, header, POINTS.astype(sign + code).tobytes())
     found = read_cloud(tmp_path, "cloud.ply")
@@ -37,7 +39,11 @@ def test_coordinates_are_found_by_name_among_other_properties(tmp_path: Path) ->
     for axis, name in enumerate("xyz"):
         records[name] = POINTS[:, axis]
     kinds = "property uchar red|property float z|property double x|property ushort quality|property float y"
-    write(tmp_path, f"format binary_little_endian 1.0|comment by a camera|element vertex 57|{kinds}", records.tobytes())
+    write(
+        tmp_path,
+        f"format binary_little_endian 1.0|comment by a camera|element vertex 57|{kinds}",
+        records.tobytes(),
+    )
     np.testing.assert_allclose(read_cloud(tmp_path, "cloud.ply"), POINTS, atol=1e-7)
 
 
@@ -49,7 +55,10 @@ def test_ascii_with_other_properties_and_other_line_ends(tmp_path: Path) -> None
 
 
 def test_elements_before_and_after_the_points_are_stepped_over(tmp_path: Path) -> None:
-    camera, faces = np.arange(4, dtype="<f4").tobytes(), b"\x03" + np.arange(3, dtype="<i4").tobytes()
+    camera, faces = (
+        np.arange(4, dtype="<f4").tobytes(),
+        b"\x03" + np.arange(3, dtype="<i4").tobytes(),
+    )
     header = (
         "format binary_little_endian 1.0|element camera 2|property float a|property float b|element vertex 57|property float x"
         "|property float y|property float z|element face 1|property list uchar int vertex_indices"
@@ -67,7 +76,9 @@ def test_what_open3d_writes_is_read(tmp_path: Path) -> None:
 
 
 def test_a_header_of_ten_gigabytes_is_refused_before_memory_is_taken(tmp_path: Path) -> None:
-    (tmp_path / "cloud.ply").write_bytes(ply_bytes(POINTS).replace(b"vertex 57", b"vertex 900000000"))
+    (tmp_path / "cloud.ply").write_bytes(
+        ply_bytes(POINTS).replace(b"vertex 57", b"vertex 900000000")
+    )
     tracemalloc.start()
     with pytest.raises(DatasetError, match="10800000000 bytes"):
         read_cloud(tmp_path, "cloud.ply")

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from small_dataset import SIZE, ply_bytes, small_cloud, write_valid_dataset
 
-from core.dataset import Dataset, open_dataset
-from core.errors import Cancelled, DatasetError
+from palpate.dataset import Dataset, open_dataset
+from palpate.foundation.errors import Cancelled, DatasetError
 
 
 @pytest.fixture
@@ -22,10 +22,18 @@ def folder(tmp_path: Path) -> Path:
 
 def test_everything_stated_is_read_back(folder: Path) -> None:
     dataset = open_dataset(folder)
-    assert (dataset.name, dataset.sequences, dataset.has_rest) == ("small-block", ("drag-01", "poke-01"), True)
+    assert (dataset.name, dataset.sequences, dataset.has_rest) == (
+        "small-block",
+        ("drag-01", "poke-01"),
+        True,
+    )
     assert dataset.config.size == SIZE
     assert (dataset.config.young_modulus, dataset.config.poisson_ratio) == (5.0e3, 0.45)
-    assert (dataset.config.train, dataset.config.validation, dataset.config.test) == (("poke-01",), (), ("drag-01",))
+    assert (dataset.config.train, dataset.config.validation, dataset.config.test) == (
+        ("poke-01",),
+        (),
+        ("drag-01",),
+    )
     assert dataset.touches.names == ("corner_0", "corner_1", "corner_2", "corner_3")
     np.testing.assert_allclose(dataset.rest_cloud(), small_cloud(), atol=1e-7)
 
@@ -34,7 +42,9 @@ def test_touches_keep_the_distances_of_their_landmarks(folder: Path) -> None:
     dataset = open_dataset(folder)
     landmarks = np.array([dataset.config.landmarks[name] for name in dataset.touches.names])
     for points in (dataset.touches.positions, landmarks):
-        np.testing.assert_allclose(np.linalg.norm(points[0] - points[2]), np.hypot(SIZE[0], SIZE[1]), atol=1e-6)
+        np.testing.assert_allclose(
+            np.linalg.norm(points[0] - points[2]), np.hypot(SIZE[0], SIZE[1]), atol=1e-6
+        )
 
 
 def test_a_sequence_has_motion_clouds_and_forces(folder: Path) -> None:
@@ -50,8 +60,15 @@ def test_a_sequence_has_motion_clouds_and_forces(folder: Path) -> None:
 def test_tool_position_is_linear_between_rows_and_stays_at_the_ends(folder: Path) -> None:
     motion = open_dataset(folder).sequence("poke-01").kinematics
     middle = (motion.time[10] + motion.time[11]) / 2
-    found = motion.position_at(np.array([motion.time[10], middle, motion.time[0] - 5, motion.time[-1] + 5]))
-    expected = [motion.position[10], (motion.position[10] + motion.position[11]) / 2, motion.position[0], motion.position[-1]]
+    found = motion.position_at(
+        np.array([motion.time[10], middle, motion.time[0] - 5, motion.time[-1] + 5])
+    )
+    expected = [
+        motion.position[10],
+        (motion.position[10] + motion.position[11]) / 2,
+        motion.position[0],
+        motion.position[-1],
+    ]
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
@@ -88,7 +105,9 @@ def test_without_clouds_no_camera_and_no_rest_cloud_are_needed(folder: Path) -> 
     (folder / "sequences/drag-01/forces.csv").write_text("t,fx,fy,fz\n200.0,0,0,0.1\n")
     (folder / "rest.ply").unlink()
     text = (folder / "dataset.toml").read_text()
-    (folder / "dataset.toml").write_text(text.replace('[camera]\nname = "test camera"\ndepth_sigma = 0.002\n', ""))
+    (folder / "dataset.toml").write_text(
+        text.replace('[camera]\nname = "test camera"\ndepth_sigma = 0.002\n', "")
+    )
     dataset = open_dataset(folder)
     dataset.validate()
     assert not dataset.has_rest
@@ -123,7 +142,9 @@ def test_reading_everything_reports_and_can_be_cancelled(folder: Path) -> None:
 
 def test_a_hundred_thousand_rows_of_kinematics_open_in_a_second(folder: Path) -> None:
     time_column = 100 + np.arange(100_000) / 1e3
-    row = (folder / "sequences/poke-01/kinematics.csv").read_text().splitlines()[1].partition(",")[2]
+    row = (
+        (folder / "sequences/poke-01/kinematics.csv").read_text().splitlines()[1].partition(",")[2]
+    )
     lines = ["t,x,y,z,qx,qy,qz,qw", *(f"{t:.4f},{row}" for t in time_column)]
     (folder / "sequences/poke-01/kinematics.csv").write_text("\n".join(lines) + "\n")
     start = time.process_time()

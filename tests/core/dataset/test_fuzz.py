@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from small_dataset import write_valid_dataset
 
-from core.dataset import open_dataset
-from core.errors import DatasetError
+from palpate.dataset import open_dataset
+from palpate.foundation.errors import DatasetError
 
 FILES = (
     "dataset.toml",
@@ -43,7 +43,11 @@ SNIPPETS = (
 
 Edit = tuple[float, int, bytes]
 edits = st.lists(
-    st.tuples(st.floats(0, 1), st.integers(0, 40), st.one_of(st.binary(max_size=12), st.sampled_from(SNIPPETS))),
+    st.tuples(
+        st.floats(0, 1),
+        st.integers(0, 40),
+        st.one_of(st.binary(max_size=12), st.sampled_from(SNIPPETS)),
+    ),
     min_size=1,
     max_size=4,
 )
@@ -62,7 +66,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def read_with(folder: Path, file: str, change: Callable[[bytes], bytes]) -> DatasetError | None:
-    """What reading says of the folder while one of its files is changed; anything but a DatasetError goes through."""
+    """What reading says of the folder while one of its files is changed; anything but a
+    DatasetError goes through.
+    """
     path = folder / file
     whole = path.read_bytes()
     path.write_bytes(change(whole))
@@ -80,17 +86,31 @@ def names_its_file(error: DatasetError) -> bool:
 
 
 @pytest.mark.parametrize("file", FILES)
-@settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=60,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @example(changes=[(0.0, 10**6, b"")])
 @given(changes=edits)
-def test_changed_bytes_raise_nothing_but_a_dataset_error(folder: Path, file: str, changes: list[Edit]) -> None:
+def test_changed_bytes_raise_nothing_but_a_dataset_error(
+    folder: Path, file: str, changes: list[Edit]
+) -> None:
     error = read_with(folder, file, lambda data: edited(data, changes))
     assert error is None or names_its_file(error)
 
 
 @pytest.mark.parametrize("file", FILES)
-@settings(max_examples=25, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=25,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(content=st.binary(max_size=200))
-def test_any_bytes_in_the_place_of_a_file_raise_nothing_but_a_dataset_error(folder: Path, file: str, content: bytes) -> None:
+def test_any_bytes_in_the_place_of_a_file_raise_nothing_but_a_dataset_error(
+    folder: Path, file: str, content: bytes
+) -> None:
     error = read_with(folder, file, lambda data: content)
     assert error is None or names_its_file(error)

@@ -9,25 +9,30 @@ import numpy as np
 import pytest
 from pushed_block import looking_at
 
-from core.diagnosis.tangent import SMALL
-from core.effects import CATALOGUE, Effect, Slot, effect_named, from_json
-from core.effects.material import StiffInclusion, YoungModulus
-from core.effects.sensor import CameraRegistration, TimeOffset
-from core.effects.structure import Anisotropy
-from core.effects.tool import ToolOffset
-from core.errors import EffectError
-from core.mesh import GridSpec
-from core.replay import Equilibrium, replay
-from core.setup import Box, Setup, Tool
-from core.sight import sight_of
-from core.touches import touch_correction
+from palpate.diagnosis.inference.effect_derivative import SMALL
+from palpate.effects import CATALOGUE, Effect, Slot, effect_named, from_json
+from palpate.effects.elastic_material import StiffInclusion, YoungModulus
+from palpate.effects.heterogeneity import Anisotropy
+from palpate.effects.sensor import CameraRegistration, TimeOffset
+from palpate.effects.tool import ToolOffset
+from palpate.foundation.errors import EffectError
+from palpate.measurement.camera_model import sight_of
+from palpate.measurement.touch_correction import touch_correction
+from palpate.mesh.box_mesh import GridSpec
+from palpate.replay.replay import Equilibrium, replay
+from palpate.setup.setup import Box, Setup, Tool
 
 SIZE = (0.0687, 0.0393, 0.0358)
-CORNERS = tuple((x * SIZE[0] / 2, y * SIZE[1] / 2, SIZE[2]) for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1)))
+CORNERS = tuple(
+    (x * SIZE[0] / 2, y * SIZE[1] / 2, SIZE[2]) for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1))
+)
 SETUP = Setup(
-    geometry=Box(size=SIZE), tool=Tool(radius=5e-3), mass=0.104, landmarks=CORNERS,
+    geometry=Box(size=SIZE),
+    tool=Tool(radius=5e-3),
+    mass=0.104,
+    landmarks=CORNERS,
     phantom_from_camera=looking_at(np.array([-0.19, -0.16, 0.28]), np.array([0.0, 0.0, 0.018])),
-)  # fmt: skip
+)
 GRID = GridSpec(nodes=(9, 7, 6), spacing=2e-3)
 POKE = np.array([[5e-3, 2e-3, 0.0358 + 5e-3 - depth] for depth in (1e-3, 3e-3, 5e-3)])
 RELEASE = np.concatenate([POKE, POKE[:1] + np.array([0.0, 0.0, 4e-3])])
@@ -132,26 +137,39 @@ def test_search_coordinates_lead_back_to_the_values_and_grow_with_them(effect):
         values = np.linspace(item.low, item.high, 7)[1:-1]
         coordinates = [item.coordinate(value) for value in values]
         assert np.all(np.diff(coordinates) > 0)
-        assert [item.value(coordinate) for coordinate in coordinates] == pytest.approx(values.tolist())
+        assert [item.value(coordinate) for coordinate in coordinates] == pytest.approx(
+            values.tolist()
+        )
 
 
 def test_contrast_of_a_lump_says_how_strongly_it_acts_in_a_matrix():
     ratio = StiffInclusion.numbers()[4]
-    # Eshelby: a rigid ball acts 2.5 times as strongly as a small difference in stiffness suggests, a hole 5/3 of that less.
-    assert ratio.coordinate(1.0) == 0.0 and ratio.coordinate(1.001) == pytest.approx(1e-3 / 2.5, rel=1e-3)
-    assert ratio.coordinate(50.0) == pytest.approx(1.0, abs=0.05) and ratio.coordinate(0.02) == pytest.approx(-2 / 3, abs=0.03)
+    # Eshelby: a rigid ball acts 2.5 times as strongly as a small difference in stiffness suggests,
+    # a hole 5/3 of that less.
+    assert ratio.coordinate(1.0) == 0.0 and ratio.coordinate(1.001) == pytest.approx(
+        1e-3 / 2.5, rel=1e-3
+    )
+    assert ratio.coordinate(50.0) == pytest.approx(1.0, abs=0.05) and ratio.coordinate(
+        0.02
+    ) == pytest.approx(-2 / 3, abs=0.03)
     assert ratio.value(2.0) == ratio.high and ratio.value(-5.0) == ratio.low
     assert ratio.factor(0.4) == pytest.approx(1.6 / 0.6) and ratio.factor(1.0) == np.inf
 
 
 def test_direction_has_no_end():
     turn, _ = Anisotropy.numbers()
-    assert turn.value(-0.1) == pytest.approx(np.pi - 0.1) and turn.value(np.pi + 0.1) == pytest.approx(0.1)
+    assert turn.value(-0.1) == pytest.approx(np.pi - 0.1) and turn.value(
+        np.pi + 0.1
+    ) == pytest.approx(0.1)
     assert turn.ends == (-np.inf, np.inf) and turn.within(0.0) == 0.0
     assert turn.interval(0.02, 0.05) == pytest.approx((-0.03, 0.07))
     assert turn.interval(np.pi + 0.02, 9.0) == pytest.approx((0.02 - np.pi / 2, 0.02 + np.pi / 2))
     fibres = Anisotropy(direction=0.05, stiffness_ratio=3.0)
-    assert fibres.at([-0.1, 1.0]).direction == fibres.moved([-0.1, 3.0]).direction == pytest.approx(np.pi - 0.1)
+    assert (
+        fibres.at([-0.1, 1.0]).direction
+        == fibres.moved([-0.1, 3.0]).direction
+        == pytest.approx(np.pi - 0.1)
+    )
 
 
 @EACH
@@ -159,9 +177,13 @@ def test_neutral_changes_nothing_in_a_replay(effect, baseline):
     setup = effect.neutral(SETUP).apply(SETUP)
     for frame, wanted in zip(replay(setup, POKE, GRID, times=TIMES[:3]), baseline, strict=True):
         assert np.allclose(frame.displacement, wanted.displacement, atol=1e-9)
-        assert np.allclose(frame.slip, wanted.slip) and np.allclose(frame.force, wanted.force, rtol=1e-6, atol=1e-9)
+        assert np.allclose(frame.slip, wanted.slip) and np.allclose(
+            frame.force, wanted.force, rtol=1e-6, atol=1e-9
+        )
     assert setup.sensor.time_offset == SETUP.sensor.time_offset
-    assert sight_of(setup).same(sight_of(SETUP)) and np.array_equal(touch_correction(setup, GRID).matrix, np.eye(4))
+    assert sight_of(setup).same(sight_of(SETUP)) and np.array_equal(
+        touch_correction(setup, GRID).matrix, np.eye(4)
+    )
 
 
 @EACH
@@ -175,7 +197,8 @@ def test_example_changes_replay_or_sensor(effect):
         return
     way = side if effect.enters is Slot.SUPPORT else RELEASE if setup.material.remembers else POKE
     found, without = (
-        replay(one, touch_correction(one, GRID).apply(way), GRID, times=TIMES[: len(way)])[-1] for one in (setup, SETUP)
+        replay(one, touch_correction(one, GRID).apply(way), GRID, times=TIMES[: len(way)])[-1]
+        for one in (setup, SETUP)
     )
     point = np.array([[3e-3, 1e-3, 0.0358]])
     moved = np.linalg.norm(found.move(point * setup.scale) - without.move(point))
@@ -198,7 +221,11 @@ def test_value_out_of_bounds_is_an_error_that_names_everything(effect):
         wrong = "up" if item.choices else item.high + 1
         with pytest.raises(EffectError) as caught:
             from_json({"effect": effect.name, "parameters": {**values, item.name: wrong}})
-        told = [effect.name, item.name, *(item.choices or (f"{item.high + 1:g}", f"{item.low:g}", f"{item.high:g}", item.unit))]
+        told = [
+            effect.name,
+            item.name,
+            *(item.choices or (f"{item.high + 1:g}", f"{item.low:g}", f"{item.high:g}", item.unit)),
+        ]
         assert all(part in caught.value.message for part in told), caught.value.message
         assert caught.value.where["parameter"] == item.name and caught.value.where["value"] == wrong
     for item in effect.numbers():
@@ -241,19 +268,30 @@ def test_moved_keeps_words_and_stays_within_bounds(effect):
     assert [getattr(far, item.name) for item in effect.numbers()] == [
         item.low + 1 if item.periodic else item.high for item in effect.numbers()
     ]
-    assert all(getattr(far, item.name) == getattr(example, item.name) for item in effect.parameters() if item.choices)
+    assert all(
+        getattr(far, item.name) == getattr(example, item.name)
+        for item in effect.parameters()
+        if item.choices
+    )
 
 
 def _kinds(setup: Setup) -> tuple[bool, ...]:
     """What a setup has or has not, and no small change gives or takes."""
     support, material = setup.support, setup.material
     moves = bool(support.detached) or support.stiffness_over_E is not None
-    return moves, support.friction_coefficient is not None, setup.remembers, material.fibres is not None
+    return (
+        moves,
+        support.friction_coefficient is not None,
+        setup.remembers,
+        material.fibres is not None,
+    )
 
 
 @EACH
 def test_small_step_from_the_end_of_what_a_search_reaches_gives_and_takes_nothing(effect):
-    """A search that stepped to the bound where a base is rigid had no first-order changes there, and broke off."""
+    """A search that stepped to the bound where a base is rigid had no first-order changes there,
+    and broke off.
+    """
     start = effect.starts(SETUP)[0]
     for number, item in enumerate(effect.numbers()):
         for far, back in ((item.low, 1.0), (item.high, -1.0)):
@@ -266,5 +304,7 @@ def test_small_step_from_the_end_of_what_a_search_reaches_gives_and_takes_nothin
 
 
 def test_unknown_effect_is_an_error_that_lists_the_known():
-    with pytest.raises(EffectError, match=r"no effect is called 'magic'.*poisson_ratio.*camera_registration"):
+    with pytest.raises(
+        EffectError, match=r"no effect is called 'magic'.*poisson_ratio.*camera_registration"
+    ):
         effect_named("magic")

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from deforming import DEFORMING
 
-from core.effects import CATALOGUE, Slot, from_json
-from core.effects.memory import PermanentSet, Viscoelasticity
-from core.effects.tool import ToolFriction
-from core.errors import SetupError
-from core.mesh import GridSpec
-from core.replay import Equilibrium, Replay
-from core.sensitivity import displacement_changes, force_changes
-from core.setup import Box, Load, Material, Setup, Support, Tool
+from palpate.effects import CATALOGUE, Slot, from_json
+from palpate.effects.time_dependence import PermanentSet, Viscoelasticity
+from palpate.effects.tool import ToolFriction
+from palpate.foundation.errors import SetupError
+from palpate.gradients.forward import displacement_changes, force_changes
+from palpate.mesh.box_mesh import GridSpec
+from palpate.replay.replay import Replay
+from palpate.setup.setup import Box, Load, Material, Setup, Support, Tool
 
 SETUP = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3), mass=0.104)
 GRID = GridSpec(nodes=(9, 7, 6), spacing=2e-3)
@@ -63,7 +63,10 @@ CHANGES = {
         _with("surface_layer", thickness=3.003e-3, stiffness_ratio=4.0),
     ),
     "stiffness_gradient from none": (SETUP, _with("stiffness_gradient", log_ratio=1e-3)),
-    "strain_stiffening": (_with("strain_stiffening", J_m=4.0), _with("strain_stiffening", J_m=4.004)),
+    "strain_stiffening": (
+        _with("strain_stiffening", J_m=4.0),
+        _with("strain_stiffening", J_m=4.004),
+    ),
     "anisotropy direction": (
         _with("anisotropy", direction=0.4, stiffness_ratio=3.0),
         _with("anisotropy", direction=0.401, stiffness_ratio=3.0),
@@ -76,20 +79,34 @@ CHANGES = {
     "tool_compliance from none": (SETUP, _with("tool_compliance", compliance_times_stiffness=0.02)),
     "offset of a tool that gives way": (
         _with("tool_compliance", compliance_times_stiffness=20.0),
-        replace(SETUP, tool=Tool(radius=5e-3, offset=(0.0, 0.0, 5e-7), compliance_times_stiffness=20.0)),
+        replace(
+            SETUP, tool=Tool(radius=5e-3, offset=(0.0, 0.0, 5e-7), compliance_times_stiffness=20.0)
+        ),
     ),
     "stiffness under a tool that gives way": (
         _with("tool_compliance", compliance_times_stiffness=20.0),
-        replace(_with("tool_compliance", compliance_times_stiffness=20.0), material=Material(poisson_ratio=0.4501)),
+        replace(
+            _with("tool_compliance", compliance_times_stiffness=20.0),
+            material=Material(poisson_ratio=0.4501),
+        ),
     ),
-    "base_compliance": (_with("base_compliance", stiffness_over_E=60.0), _with("base_compliance", stiffness_over_E=60.06)),
-    **{f"geometry_scale {axis}": (_scaled({}), _scaled({f"scale_{axis}": LARGER})) for axis in "xyz"},
+    "base_compliance": (
+        _with("base_compliance", stiffness_over_E=60.0),
+        _with("base_compliance", stiffness_over_E=60.06),
+    ),
+    **{
+        f"geometry_scale {axis}": (_scaled({}), _scaled({f"scale_{axis}": LARGER}))
+        for axis in "xyz"
+    },
     "geometry_scale of a heavy block": (
         replace(SETUP, load=Load(specific_weight_over_stiffness=1.5)),
         replace(_scaled({"scale_z": LARGER}), load=Load(specific_weight_over_stiffness=1.5)),
     ),
     "young_modulus": (SETUP, _with("young_modulus", E=7e3)),
-    "landmark_mismatch": (SETUP, _with("landmark_mismatch", pairing="as-paired", scale=0.9, inset=1e-3)),
+    "landmark_mismatch": (
+        SETUP,
+        _with("landmark_mismatch", pairing="as-paired", scale=0.9, inset=1e-3),
+    ),
 }
 STILL = ("base_slip", "young_modulus", "landmark_mismatch")
 """What moves nothing while the tool stays where it is against the block."""
@@ -108,7 +125,10 @@ def test_sensitivity_is_the_difference_of_two_solves(name):
     wanted = solved.displacement - frame.displacement
     moved = displacement_changes(block, frame, [(changed, np.zeros(3))])
     found, pressed = moved[0], force_changes(block, frame, [(changed, np.zeros(3))], moved)[0]
-    assert np.linalg.norm(pressed - (solved.force - frame.force)) < 0.02 * np.linalg.norm(solved.force - frame.force) + 1e-9
+    assert (
+        np.linalg.norm(pressed - (solved.force - frame.force))
+        < 0.02 * np.linalg.norm(solved.force - frame.force) + 1e-9
+    )
     if name in STILL:
         assert np.abs(found).max() < 1e-9 and np.abs(wanted).max() < 1e-9
         return
@@ -125,7 +145,8 @@ REMEMBERING = (
 
 @pytest.mark.parametrize("effect", REMEMBERING, ids=lambda effect: effect.name)
 def test_effect_that_remembers_has_no_change_of_one_frame_to_first_order(effect):
-    """What it remembers changes in every frame before, so that asking for one alone is an error ."""
+    """What it remembers changes in every frame before, so that asking for one alone is an error
+    ."""
     block = Replay(SETUP, GRID)
     frame, setup = block.step(POKE[0]), effect.apply(SETUP)
     with pytest.raises(SetupError, match="of the whole replay"):

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from learned_samples import write_samples
 
-from core.errors import CorrectionError
-from core.evaluation.training import Wanted, whole_samples
+from palpate.evaluation.train_network import Wanted, whole_samples
+from palpate.foundation.errors import CorrectionError
 
 
 def test_whole_samples_are_taken_and_what_is_left_of_others_is_removed(tmp_path: Path):
@@ -26,7 +26,9 @@ def test_request_goes_to_json_and_back():
     assert Wanted.from_json(wanted.to_json()) == wanted
 
 
-@pytest.mark.parametrize(("asked", "said"), [({"every": 0}, "every = 0"), ({"points": 3}, "points = 3")])
+@pytest.mark.parametrize(
+    ("asked", "said"), [({"every": 0}, "every = 0"), ({"points": 3}, "points = 3")]
+)
 def test_values_out_of_bounds_are_named(asked: dict[str, int], said: str):
     with pytest.raises(CorrectionError, match=said):
         Wanted(**asked)  # type: ignore[arg-type]

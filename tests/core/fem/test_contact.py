@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.fem.contact import assemble_contact, contact_energy
-from core.fem.elements import HEXAHEDRA
-from core.fem.model import CONTACT_STIFFNESS, BlockModel, Probe
-from core.mesh import GridSpec, box_mesh
-from core.replay import replay
-from core.setup import Box, Detachment, Layer, Material, Setup, Support, Tool
+from palpate.fem.contact import assemble_contact, contact_energy
+from palpate.fem.model import CONTACT_STIFFNESS, BlockModel, Probe
+from palpate.mesh.box_mesh import GridSpec, box_mesh
+from palpate.mesh.elements import HEXAHEDRA
+from palpate.replay.replay import replay
+from palpate.setup.setup import Box, Detachment, Layer, Material, Setup, Support, Tool
 
 SIZE = (0.0687, 0.0393, 0.0358)
 SETUP = Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3))
@@ -21,7 +21,9 @@ def _model(setup: Setup = SETUP, nodes: tuple[int, int, int] = (9, 7, 4)) -> Blo
 
 
 def _dented(model: BlockModel, seed: int) -> tuple[np.ndarray, Probe]:
-    """The top sunk in a little irregularly, and a ball that reaches 2 mm into where it was, so that some points lie inside."""
+    """The top sunk in a little irregularly, and a ball that reaches 2 mm into where it was, so that
+    some points lie inside.
+    """
     nodes = model.mesh.nodes
     distance = np.hypot(nodes[:, 0] - 1e-3, nodes[:, 1])
     sunk = np.zeros_like(nodes)
@@ -32,17 +34,34 @@ def _dented(model: BlockModel, seed: int) -> tuple[np.ndarray, Probe]:
 
 @pytest.mark.parametrize("order", HEXAHEDRA)
 def test_areas_of_the_quadrature_points_add_up_to_the_surface(order):
-    areas = BlockModel(SETUP, box_mesh(SIZE, GridSpec(nodes=(9, 7, 5), spacing=1e-3, order=order))).areas
+    areas = BlockModel(
+        SETUP, box_mesh(SIZE, GridSpec(nodes=(9, 7, 5), spacing=1e-3, order=order))
+    ).areas
     x, y, z = SIZE
     assert areas.sum() == pytest.approx(x * y + 2 * x * z + 2 * y * z, rel=1e-12)
 
 
-def _contact_force(model: BlockModel, positions: np.ndarray, probe: Probe) -> tuple[np.ndarray, np.ndarray]:
+def _contact_force(
+    model: BlockModel, positions: np.ndarray, probe: Probe
+) -> tuple[np.ndarray, np.ndarray]:
     force, push = np.zeros_like(positions), np.zeros(3)
     assemble_contact(
-        model.topology.surface, model.areas, model.face.shapes, model.face.gradients, positions, probe.centre, probe.radius, False,
-        True, CONTACT_STIFFNESS, True, model.topology.surface_slots, force, np.empty(0), push,
-    )  # fmt: skip
+        model.topology.surface,
+        model.areas,
+        model.face.shapes,
+        model.face.gradients,
+        positions,
+        probe.centre,
+        probe.radius,
+        False,
+        True,
+        CONTACT_STIFFNESS,
+        True,
+        model.topology.surface_slots,
+        force,
+        np.empty(0),
+        push,
+    )
     return force, push
 
 
@@ -66,14 +85,18 @@ def test_contact_force_is_the_gradient_of_its_energy_and_pushes_back_on_the_tool
         )
 
     direction, step = np.random.default_rng(1).normal(size=positions.shape), 1e-9
-    slope = (energy(positions + step * direction) - energy(positions - step * direction)) / (2 * step)
+    slope = (energy(positions + step * direction) - energy(positions - step * direction)) / (
+        2 * step
+    )
     assert energy(positions) > 0
     assert slope == pytest.approx(np.vdot(force, direction), rel=1e-6)
     assert np.allclose(force.sum(axis=0), -push, atol=1e-12 * np.abs(push).max())
     assert push[2] < 0
 
 
-@pytest.mark.parametrize("detached", [(), (Detachment(edge="+x", extent=0.02),)], ids=["held", "detached"])
+@pytest.mark.parametrize(
+    "detached", [(), (Detachment(edge="+x", extent=0.02),)], ids=["held", "detached"]
+)
 def test_tangent_with_the_ball_s_curvature_is_the_derivative_of_the_residual(detached):
     model = _model(replace(SETUP, support=Support(detached=detached)))
     positions, probe = _dented(model, 2)
@@ -88,15 +111,26 @@ def test_tangent_with_the_ball_s_curvature_is_the_derivative_of_the_residual(det
     assert np.abs((ahead - behind) / (2 * step) - wanted).max() < 1e-5 * np.abs(wanted).max()
 
 
-@pytest.mark.parametrize("detached", [(), (Detachment(edge="+x", extent=0.02),)], ids=["held", "detached"])
+@pytest.mark.parametrize(
+    "detached", [(), (Detachment(edge="+x", extent=0.02),)], ids=["held", "detached"]
+)
 def test_residual_of_the_whole_block_is_the_gradient_of_its_energy(detached):
-    setup = replace(SETUP, support=Support(detached=detached), load=replace(SETUP.load, specific_weight_over_stiffness=2.0))
+    setup = replace(
+        SETUP,
+        support=Support(detached=detached),
+        load=replace(SETUP.load, specific_weight_over_stiffness=2.0),
+    )
     model = _model(setup)
     positions, probe = _dented(model, 4)
     direction = np.random.default_rng(5).normal(size=positions.shape) * model.topology.free
     step = 1e-9
-    slope = (model.energy(positions + step * direction, probe) - model.energy(positions - step * direction, probe)) / (2 * step)
-    assert slope == pytest.approx(model.assemble(positions, probe).residual @ direction[model.topology.free], rel=1e-5)
+    slope = (
+        model.energy(positions + step * direction, probe)
+        - model.energy(positions - step * direction, probe)
+    ) / (2 * step)
+    assert slope == pytest.approx(
+        model.assemble(positions, probe).residual @ direction[model.topology.free], rel=1e-5
+    )
 
 
 def test_a_surface_that_faces_away_from_the_centre_is_not_pushed():
@@ -110,7 +144,11 @@ def test_a_surface_that_faces_away_from_the_centre_is_not_pushed():
 
 
 def test_ball_on_a_large_block_presses_as_hertz_says():
-    setup = Setup(geometry=Box(size=(0.08, 0.08, 0.06)), tool=Tool(radius=5e-3), material=Material(poisson_ratio=0.45))
+    setup = Setup(
+        geometry=Box(size=(0.08, 0.08, 0.06)),
+        tool=Tool(radius=5e-3),
+        material=Material(poisson_ratio=0.45),
+    )
     depths = np.array([0.25e-3, 0.5e-3, 1.0e-3])
     centres = np.stack([np.zeros(3), np.zeros(3), 0.06 + 5e-3 - depths], axis=1)
     frames = replay(setup, centres, GridSpec(nodes=(19, 19, 14), spacing=3.5e-4))

@@ -1,26 +1,36 @@
-"""Friction's energy, force and tangent under a fixed grip; what a hold carries from one grid to another."""
+"""Friction's energy, force and tangent under a fixed grip; what a hold carries from one grid to
+another.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from core.fem.friction import STICK_STIFFNESS, Grip, Hold
-from core.fem.model import BlockModel, Probe
-from core.mesh import GridSpec, box_mesh
-from core.setup import Box, Setup, Tool
+from palpate.fem.friction import STICK_STIFFNESS, Grip, Hold
+from palpate.fem.model import BlockModel, Probe
+from palpate.mesh.box_mesh import GridSpec, box_mesh
+from palpate.setup.setup import Box, Setup, Tool
 
 SETUP = Setup(geometry=Box(size=(0.03, 0.03, 0.02)), tool=Tool(radius=5e-3))
 PROBE = Probe(np.array([1e-3, -5e-4, 0.024]), 5e-3)
 
 
 def _gripped(order: int) -> tuple[BlockModel, np.ndarray]:
-    """A block whose top is held by points of which some stick and some slip, and places of its nodes somewhat off rest."""
+    """A block whose top is held by points of which some stick and some slip, and places of its
+    nodes somewhat off rest.
+    """
     random = np.random.default_rng(5)
     model = BlockModel(SETUP, box_mesh(SETUP.geometry.size, GridSpec(nodes=(7, 7, 5), order=order)))
-    positions = model.mesh.nodes + 1e-4 * random.standard_normal(model.mesh.nodes.shape) * model.topology.free
+    positions = (
+        model.mesh.nodes
+        + 1e-4 * random.standard_normal(model.mesh.nodes.shape) * model.topology.free
+    )
     faces = np.arange(6)
-    seen = np.einsum("qa,fai->fqi", model.face.shapes, positions[model.topology.surface[faces]]) - PROBE.centre
+    seen = (
+        np.einsum("qa,fai->fqi", model.face.shapes, positions[model.topology.surface[faces]])
+        - PROBE.centre
+    )
     normals = seen / np.linalg.norm(seen, axis=2, keepdims=True)
     areas = model.areas[faces]
     anchors = seen + 1e-4 * random.standard_normal(seen.shape)
@@ -37,14 +47,24 @@ def test_force_is_the_slope_of_the_energy_and_tangent_that_of_the_force(order):
     drag = grip.stiffness * 1e-4
     assert (drag > grip.limits).any() and (drag < grip.limits).any()
     direction = np.random.default_rng(2).standard_normal(positions.shape) * free
-    away = Probe(np.array([0.0, 0.0, 0.1]), 5e-3)  # far from the block, so that nothing but the grip feels it
-    model.grip = Grip(grip.faces, grip.anchors + PROBE.centre - away.centre, grip.normals, grip.limits, grip.stiffness)
+    away = Probe(
+        np.array([0.0, 0.0, 0.1]), 5e-3
+    )  # far from the block, so that nothing but the grip feels it
+    model.grip = Grip(
+        grip.faces,
+        grip.anchors + PROBE.centre - away.centre,
+        grip.normals,
+        grip.limits,
+        grip.stiffness,
+    )
     step = 1e-8
     ahead, behind = positions + step * direction, positions - step * direction
     state = model.assemble(positions, away)
     slope = (model.energy(ahead, away) - model.energy(behind, away)) / (2 * step)
     assert slope == pytest.approx(float(state.residual @ direction[free]), rel=1e-6)
-    change = (model.assemble(ahead, away).residual - model.assemble(behind, away).residual) / (2 * step)
+    change = (model.assemble(ahead, away).residual - model.assemble(behind, away).residual) / (
+        2 * step
+    )
     model.topology.factor.factorise(state.data)
     assert np.allclose(model.topology.factor.solve(change), direction[free], atol=1e-4)
 
@@ -69,7 +89,10 @@ def test_a_hold_is_read_at_its_own_points_and_between_them():
     ways = np.where(touched[:, None], 0.01 * places, 0.0)
     hold = Hold(places, ways, touched, np.where(touched, 2.0, 0.0))
     found = hold.at(places.reshape(20, 20, 3))
-    assert np.allclose(found.ways.reshape(-1, 3), ways, atol=1e-8) and (found.touched.ravel() == touched).all()
+    assert (
+        np.allclose(found.ways.reshape(-1, 3), ways, atol=1e-8)
+        and (found.touched.ravel() == touched).all()
+    )
     assert np.allclose(found.limits.ravel(), 2.0 * touched, atol=1e-3)
     between = hold.at(np.array([[2e-3, 4e-3, 0.0]]))
     assert np.allclose(between.ways, 0.01 * np.array([2e-3, 4e-3, 0.0]), atol=5e-6)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.fem.memory import cauchy_green, from_log_strain, log_strain
+from palpate.fem.history_stress import cauchy_green, from_log_strain, log_strain
 
 
 def test_logarithmic_strain_is_that_of_the_stretches_and_back():
@@ -32,7 +32,9 @@ def test_small_strains_have_the_logarithm_and_exponential_of_their_eigenvalues()
         rows = [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]
         found = log_strain(c[rows][None])
         assert found[0] == pytest.approx(((axes * logs) @ axes.T)[rows], abs=2e-14)
-        assert from_log_strain(found)[0] == pytest.approx(((axes * np.exp(2 * logs)) @ axes.T)[rows], abs=2e-14)
+        assert from_log_strain(found)[0] == pytest.approx(
+            ((axes * np.exp(2 * logs)) @ axes.T)[rows], abs=2e-14
+        )
 
 
 def test_strain_that_is_surely_no_longer_than_asked_for_is_left_out_and_no_other():

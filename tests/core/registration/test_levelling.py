@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 from small_dataset import SIZE
 
-from core.frames import Transform
-from core.registration.levelling import as_seen, levelled
+from palpate.foundation.frames import Transform
+from palpate.registration.levelling import as_seen, levelled
 
 POSE = Transform.from_vector([0.01, -0.2, 0.3], [-2.3, 0.15, 0.1])
 """phantom_from_camera"""

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.picking import aimed_and_picked
-from core.registration.picking import pick_cloud, pick_mesh, slide_on_cloud
+from palpate.registration.picking import pick_cloud, pick_mesh, slide_on_cloud
 
 
 def test_on_a_noisy_slanted_cloud_the_median_pick_is_within_three_tenths_of_a_millimetre():
@@ -23,11 +23,21 @@ def test_of_one_surface_the_point_nearest_to_the_ray_is_picked():
 
 
 def test_a_click_beside_the_cloud_picks_nothing():
-    assert pick_cloud(np.array([[0.1, 0.0, 0.2], [0.0, 0.0, -0.2]]), np.zeros(3), np.array([0.0, 0.0, 1.0]), pixel=0.001) is None
+    assert (
+        pick_cloud(
+            np.array([[0.1, 0.0, 0.2], [0.0, 0.0, -0.2]]),
+            np.zeros(3),
+            np.array([0.0, 0.0, 1.0]),
+            pixel=0.001,
+        )
+        is None
+    )
 
 
 def test_a_ray_meets_the_nearest_triangle_and_its_edges():
-    vertices = np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1], [0, 0, 2], [1, 0, 2], [0, 1, 2]], dtype=float)
+    vertices = np.array(
+        [[0, 0, 1], [1, 0, 1], [0, 1, 1], [0, 0, 2], [1, 0, 2], [0, 1, 2]], dtype=float
+    )
     faces = np.array([[3, 4, 5], [0, 2, 1]])
     up = np.array([0.0, 0.0, 1.0])
     for start, place in (([0.2, 0.3, 0.0], 1.0), ([0.0, 0.0, 0.0], 1.0), ([0.2, 0.3, 1.5], 2.0)):

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from core.dataset import Dataset, Touches, open_dataset
-from core.frames import Transform
-from core.registration import register, setup_from
+from palpate.dataset import Dataset, Touches, open_dataset
+from palpate.foundation.frames import Transform
+from palpate.registration.registration import register, setup_from
 
 
 def off(stated: Transform, true: Transform, point: np.ndarray) -> np.ndarray:
@@ -20,17 +20,23 @@ def off(stated: Transform, true: Transform, point: np.ndarray) -> np.ndarray:
 def truth_of(path: Path) -> tuple[Transform, Transform]:
     """True phantom_from_robot and phantom_from_camera."""
     truth = json.loads((path.parent / f"{path.name}.truth.json").read_text())["registration"]
-    robot = Transform(np.array(truth["robot_from_phantom_R"]), np.array(truth["robot_from_phantom_t"]))
+    robot = Transform(
+        np.array(truth["robot_from_phantom_R"]), np.array(truth["robot_from_phantom_t"])
+    )
     return robot.inverse(), Transform.from_matrix(truth["phantom_from_camera"])
 
 
 def relabelled(dataset: Dataset, order: list[int]) -> Dataset:
     names = dataset.touches.names
-    return replace(dataset, touches=Touches(tuple(names[k] for k in order), dataset.touches.positions))
+    return replace(
+        dataset, touches=Touches(tuple(names[k] for k in order), dataset.touches.positions)
+    )
 
 
 @pytest.mark.parametrize("guessed", [True, False])
-def test_both_poses_of_measured_datasets_are_found_within_their_uncertainty(measured_datasets, guessed):
+def test_both_poses_of_measured_datasets_are_found_within_their_uncertainty(
+    measured_datasets, guessed
+):
     squares = []
     for path in measured_datasets:
         dataset = open_dataset(path)
@@ -40,8 +46,13 @@ def test_both_poses_of_measured_datasets_are_found_within_their_uncertainty(meas
         robot, camera = truth_of(path)
         camera_off = off(found.phantom_from_camera, camera, found.camera_pivot)
         robot_off = off(found.phantom_from_robot, robot, found.robot_pivot)
-        assert np.linalg.norm(camera_off[:3]) < 3e-4 and np.degrees(np.linalg.norm(camera_off[3:])) < 0.3
-        assert np.linalg.norm(robot_off[:3]) < 5e-4 and np.degrees(np.linalg.norm(robot_off[3:])) < 1.0
+        assert (
+            np.linalg.norm(camera_off[:3]) < 3e-4
+            and np.degrees(np.linalg.norm(camera_off[3:])) < 0.3
+        )
+        assert (
+            np.linalg.norm(robot_off[:3]) < 5e-4 and np.degrees(np.linalg.norm(robot_off[3:])) < 1.0
+        )
         squares.append(camera_off @ np.linalg.solve(found.camera_covariance, camera_off) / 6)
         squares.append(robot_off @ np.linalg.solve(found.robot_covariance, robot_off) / 6)
         assert found.warnings == () and found.proposal is None and found.weak_directions == ()
@@ -62,7 +73,9 @@ def test_wrong_pairings_are_proposed_and_never_applied(measured_datasets, order)
     assert found.proposal is not None
     assert found.proposal.sentence in found.warnings
     assert found.touch_rms == pytest.approx(found.proposal.rms_as_stated)
-    corrected = register(replace(stated, touches=Touches(found.proposal.pairing, stated.touches.positions)))
+    corrected = register(
+        replace(stated, touches=Touches(found.proposal.pairing, stated.touches.positions))
+    )
     assert corrected.touch_rms < 5e-4 and corrected.proposal is None
 
 

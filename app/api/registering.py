@@ -1,0 +1,122 @@
+"""Manual registration in the scene of a page: what it shows, and which points its clicks mean."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+from palpate.app.scene.registration_scene import Ray
+from palpate.app.schemas import Point, Shown
+from palpate.app.server.viser_proxy import PageId
+from palpate.app.services import DeskOf
+
+__all__ = ["router"]
+
+router = APIRouter(prefix="/sessions/{page}/registering", tags=["registrations"])
+Step = Annotated[FiniteFloat, Field(ge=-0.1, le=0.1)]
+
+
+class Nudge(BaseModel):
+    """A point of one side, and how far it is to go [m], to the right and upwards as the person sees
+    it.
+    """
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        json_schema_extra={
+            "examples": [{"side": "mesh", "point": [0.01, 0.0, 0.0358], "right": 2e-4}]
+        },
+    )
+
+    side: Literal["cloud", "mesh"]
+    point: Point
+    right: Step = 0.0
+    up: Step = 0.0
+
+
+class Aim(BaseModel):
+    """A ray in the frame of the scene [m], as a click makes it; `pixel` is the angle of a pixel
+    [rad].
+    """
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        json_schema_extra={
+            "examples": [{"origin": [0.0, 0.0, 0.3], "direction": [0.0, 0.0, -1.0]}]
+        },
+    )
+
+    origin: Point
+    direction: Point
+    pixel: FiniteFloat = Field(default=1e-3, gt=0.0, le=0.1)
+
+
+@router.post("")
+def show(page: PageId, shown: Shown, desk: DeskOf) -> dict[str, Any]:
+    """Show rest cloud and phantom with these pairs; says how many points and ends are drawn, and by
+    which pose the cloud is [m].
+    """
+    return desk.clickings.open(page).show(shown)
+
+
+@router.post("/look", status_code=204)
+def look(page: PageId, desk: DeskOf) -> None:
+    """Turn the camera to cloud and phantom."""
+    desk.clickings.open(page).look()
+
+
+@router.post("/nudge")
+def nudge(page: PageId, asked: Nudge, desk: DeskOf) -> dict[str, Any]:
+    """A point moved a little on its surface, as an arrow key asks for it; 404 while no scene is
+    open.
+    """
+    return {
+        "point": desk.clickings.open(page).nudge(asked.side, asked.point, asked.right, asked.up)
+    }
+
+
+@router.post("/pick")
+def pick(page: PageId, aim: Aim, desk: DeskOf) -> dict[str, Any]:
+    """The point that a ray means on the side that is picked on: what a click in the scene would
+    give.
+    """
+    return desk.clickings.open(page).pick(
+        Ray(np.array(aim.origin), np.array(aim.direction), aim.pixel)
+    )
+
+
+@router.websocket("/clicks")
+async def clicks(websocket: WebSocket, page: PageId, desk: DeskOf) -> None:
+    """Each click of a person in the scene, as the point that it means."""
+    await websocket.accept()
+    loop, waiting = asyncio.get_running_loop(), asyncio.Queue[dict[str, Any]]()
+
+    def told(said: dict[str, Any]) -> None:
+        loop.call_soon_threadsafe(waiting.put_nowait, said)
+
+    stop = desk.clickings.open(page).listen(told)
+
+    async def send() -> None:
+        while True:
+            await websocket.send_json(await waiting.get())
+
+    async def hear() -> None:
+        async for _ in websocket.iter_text():
+            pass
+
+    tasks = [asyncio.create_task(send()), asyncio.create_task(hear())]
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        stop()
+        for task in tasks:
+            task.cancel()
+        with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
+            await asyncio.gather(*tasks)

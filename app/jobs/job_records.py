@@ -1,0 +1,223 @@
+"""Job records in SQLite: what was asked, how far it is, how it ended."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import threading
+import time
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+from palpate.app.http_errors import Missing
+
+__all__ = ["Job", "JobState", "Note", "Records"]
+
+SCHEMA = """
+create table if not exists jobs (
+    id text primary key, kind text not null, request text not null, state text not null, fraction real not null,
+    text text not null, created real not null, started real, finished real, error text, result text
+);
+create table if not exists log (job text not null, at real not null, level text not null, text text not null);
+create index if not exists log_of_job on log (job);
+"""
+LATER = {"attempt": "integer not null default 1", "key": "text"}
+"""Columns that files of earlier versions lack."""
+FORESEEN = 0.03
+"""Share of a job that must be done before its end is foretold."""
+MOST_NOTES = 5000
+"""Lines that are kept of one job; of a longer log the first ones."""
+
+
+class JobState(StrEnum):
+    """Where a job stands; the last four are final until somebody has it tried again."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    DONE = "done"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+    INTERRUPTED = "interrupted"
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether nothing will change by itself any more."""
+        return self not in (JobState.QUEUED, JobState.RUNNING)
+
+    @property
+    def can_be_retried(self) -> bool:
+        """Whether it ended without what it was to make."""
+        return self.is_finished and self is not JobState.DONE
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """A copy of one record; times are seconds since 1970, `fraction` runs from 0 to 1.
+
+    `attempt` counts from 1; `key` is what its asker calls the request, so that asking twice is
+    doing once.
+    """
+
+    id: str
+    kind: str
+    request: dict[str, Any]
+    state: JobState = JobState.QUEUED
+    fraction: float = 0.0
+    text: str = "waiting for its turn"
+    created: float = field(default_factory=time.time)
+    started: float | None = None
+    finished: float | None = None
+    error: dict[str, Any] | None = None
+    result: dict[str, Any] | None = None
+    attempt: int = 1
+    key: str | None = None
+
+    @property
+    def remaining(self) -> float | None:
+        """Seconds that are left if it goes on as it went until now; None where that cannot be told
+        yet.
+        """
+        if self.state is not JobState.RUNNING or self.started is None or self.fraction < FORESEEN:
+            return None
+        return (time.time() - self.started) / self.fraction * (1.0 - self.fraction)
+
+
+@dataclass(frozen=True)
+class Note:
+    """One line of a job's log: when [s since 1970], how grave (info, warning, error), what."""
+
+    at: float
+    level: str
+    text: str
+
+
+COLUMNS = tuple(Job.__dataclass_fields__)
+JSON_COLUMNS = ("request", "error", "result")
+
+
+class Records:
+    """The table of jobs; every method may be called from any thread."""
+
+    def __init__(self, path: Path) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._lock = threading.Lock()
+        self._database = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
+        self._database.execute("pragma journal_mode=wal")
+        self._database.execute("pragma synchronous=normal")
+        self._database.executescript(SCHEMA)
+        there = {row[1] for row in self._database.execute("pragma table_info(jobs)")}
+        for name, kind in LATER.items():
+            if name not in there:
+                self._database.execute(f"alter table jobs add column {name} {kind}")
+        self._database.execute("create unique index if not exists jobs_by_key on jobs (key)")
+        self.version = 0
+
+    def add(self, job: Job) -> bool:
+        """A new record; False, and nothing added, where its key is taken."""
+        values = [_stored(name, getattr(job, name)) for name in COLUMNS]
+        columns = f"({', '.join(COLUMNS)}) values ({', '.join('?' * len(COLUMNS))})"
+        return self._change(f"insert into jobs {columns} on conflict (key) do nothing", values)
+
+    def update(self, identity: str, **values: Any) -> bool:
+        """New values for some columns; False, and nothing changed, where the job has already
+        finished.
+        """
+        assignments = ", ".join(f"{name} = ?" for name in values)
+        stored = [_stored(name, value) for name, value in values.items()]
+        return self._change(
+            f"update jobs set {assignments} where id = ? and state in ('queued', 'running')",
+            [*stored, identity],
+        )
+
+    def reopen(self, identity: str) -> bool:
+        """Have a job that ended without a result wait anew; False where it is open or done."""
+        return self._change(
+            "update jobs set state = 'queued', fraction = 0, text = 'waiting for its turn', started = null, finished = null, "
+            "error = null, result = null, attempt = attempt + 1 where id = ? and state in ('failed', 'cancelled', 'interrupted')",
+            [identity],
+        )
+
+    def interrupt_running(self, message: str) -> None:
+        """Close every record that was running when a server ended; what waited still waits."""
+        for job in self._select("where state = 'running'", []):
+            error = {"kind": "Interrupted", "message": message, "where": {}}
+            if self.update(
+                job.id,
+                state=JobState.INTERRUPTED,
+                error=error,
+                finished=time.time(),
+                text="interrupted",
+            ):
+                self.note(job.id, "error", message)
+
+    def waiting(self) -> list[Job]:
+        """Those in the queue, the oldest first."""
+        return self._select("where state = 'queued' order by created", [])
+
+    def by_key(self, key: str) -> Job | None:
+        """The job that was asked for under this key."""
+        return next(iter(self._select("where key = ?", [key])), None)
+
+    def note(self, identity: str, level: str, text: str) -> None:
+        """A line for a job's log."""
+        self._change(
+            "insert into log select ?, ?, ?, ? where (select count(*) from log where job = ?) < ?",
+            [identity, time.time(), level, text, identity, MOST_NOTES],
+        )
+
+    def notes(self, identity: str, after: int = 0, most: int = 1000) -> list[Note]:
+        """Lines of a job's log from the `after`-th on."""
+        self.get(identity)
+        with self._lock:
+            rows = self._database.execute(
+                "select at, level, text from log where job = ? order by rowid limit ? offset ?",
+                [identity, most, after],
+            ).fetchall()
+        return [Note(*row) for row in rows]
+
+    def get(self, identity: str) -> Job:
+        """One job, or Missing."""
+        for job in self._select("where id = ?", [identity]):
+            return job
+        raise Missing(f"there is no job {identity}", job=identity)
+
+    def all(self, most: int = -1, after: int = 0) -> list[Job]:
+        """Jobs, the newest first: at most so many from the `after`-th on, or all."""
+        return self._select("order by created desc, id limit ? offset ?", [most, after])
+
+    def count(self) -> int:
+        """Number of jobs."""
+        with self._lock:
+            return int(self._database.execute("select count(*) from jobs").fetchone()[0])
+
+    def close(self) -> None:
+        """Close the file."""
+        with self._lock:
+            self._database.close()
+
+    def _select(self, rest: str, values: list[Any]) -> list[Job]:
+        with self._lock:
+            rows = self._database.execute(
+                f"select {', '.join(COLUMNS)} from jobs {rest}", values
+            ).fetchall()
+        return [_job(row) for row in rows]
+
+    def _change(self, statement: str, values: list[Any]) -> bool:
+        with self._lock:
+            changed = self._database.execute(statement, values).rowcount
+            self.version += 1
+        return changed > 0
+
+
+def _stored(name: str, value: Any) -> Any:
+    return json.dumps(value) if name in JSON_COLUMNS and value is not None else value
+
+
+def _job(row: tuple[Any, ...]) -> Job:
+    values = dict(zip(COLUMNS, row, strict=True))
+    for name in JSON_COLUMNS:
+        values[name] = None if values[name] is None else json.loads(values[name])
+    values["state"] = JobState(values["state"])
+    return Job(**values)

@@ -1,0 +1,147 @@
+"""The shorter verbs as worker functions: register, replay, and export."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from palpate.app.http_errors import Conflict
+from palpate.app.storage.registration_store import Registrations
+from palpate.app.storage.run_store import Run, Runs
+from palpate.foundation.errors import RegistrationError
+from palpate.foundation.progress import Report, part
+
+if TYPE_CHECKING:
+    from palpate.dataset import Dataset
+
+__all__ = ["EXPORTS", "export", "register", "replay"]
+
+EXPORTS = "exports"
+"""Folder below the runs in which exported files lie, a folder for each job."""
+
+
+def register(request: dict[str, Any], report: Report) -> dict[str, Any]:
+    """The job: relate robot, camera and phantom of `request["dataset"]`, and keep the camera's
+    registration under a name.
+    """
+    from palpate.dataset import open_dataset
+    from palpate.dataset.accepted_registration import rest_digest
+    from palpate.registration.registration import register as relate
+
+    dataset = open_dataset(Path(request["dataset"]))
+    found = relate(dataset, report)
+    camera = found.camera
+    if camera is None:
+        raise RegistrationError(
+            "the dataset has no clouds, so that there is no camera to register", file="rest.ply"
+        )
+    pose = {
+        "phantom_from_camera": camera.phantom_from_camera.matrix.tolist(),
+        "covariance": camera.covariance.tolist(),
+        "pivot": camera.pivot.tolist(),
+        "residual_after": camera.rms,
+        "weak_directions": list(camera.weak_directions),
+        "warnings": list(found.warnings),
+        "phantom_from_robot": found.phantom_from_robot.matrix.tolist(),
+        "touch_rms": found.touch_rms,
+    }
+    stored = {"points": [], "registration": pose, "rest": rest_digest(dataset.path)}
+    kept, name = Registrations(Path(request["runs"])), str(request["name"])
+    if request.get("accept"):
+        accepted = str(request["accept"])
+        kept.save(name, accepted, stored)
+    else:
+        accepted = _first_free(kept, name, stored)
+    return {
+        "dataset": name,
+        "registration": accepted,
+        "weak_directions": list(camera.weak_directions),
+    }
+
+
+def _first_free(kept: Registrations, dataset: str, stored: dict[str, Any]) -> str:
+    for number in range(1, 10_000):
+        try:
+            kept.save(dataset, f"automatic-{number}", stored)
+        except Conflict:
+            continue
+        return f"automatic-{number}"
+    raise Conflict(
+        f"{dataset} has too many registrations called automatic-...: name this one", dataset=dataset
+    )
+
+
+def replay(request: dict[str, Any], report: Report) -> dict[str, Any]:
+    """The job: replay chosen sequences as stated and with effects of one's own choice; kept as a
+    run, for the page.
+    """
+    from palpate.dataset import open_dataset
+    from palpate.dataset.accepted_registration import Accepted
+    from palpate.recording.replay_run import replay_into
+    from palpate.recording.saved_model import effects_from
+
+    registered, scratch = request.get("registration"), Path(request["scratch"])
+    dataset = open_dataset(Path(request["dataset"])).registered(
+        Accepted.from_json(registered) if registered else None
+    )
+    began, run = time.time(), Path(request["runs"]) / scratch.name
+    made = scratch / run.name
+    failed = replay_into(
+        dataset,
+        made,
+        request["sequences"],
+        effects_from(request["effects"]),
+        workers=int(request["workers"]),
+        report=report,
+    )
+    (made / "origin.json").write_text(
+        json.dumps({**_origin(dataset), "created": began, "seconds": time.time() - began}, indent=1)
+    )
+    os.rename(made, run)
+    return {"run": run.name, "frames_without_equilibrium": failed}
+
+
+def _origin(dataset: Dataset) -> dict[str, Any]:
+    splits = {
+        name: split
+        for split in ("train", "validation", "test")
+        for name in getattr(dataset.config, split)
+    }
+    return {"dataset": str(dataset.path.resolve()), "seed": 0, "splits": splits}
+
+
+def export(request: dict[str, Any], report: Report) -> dict[str, Any]:
+    """The job: what was chosen of a run or of a registration as files to take away."""
+    runs, scratch = Path(request["runs"]), Path(request["scratch"])
+    made = scratch / "files"
+    made.mkdir(parents=True)
+    if request.get("registration"):
+        stored = Registrations(runs).get(request["name"], request["registration"])
+        (made / f"{request['name']}-{request['registration']}.json").write_text(
+            json.dumps(stored, indent=1)
+        )
+    if request.get("run"):
+        _export_run(Runs(runs).get(request["run"]), request["what"], made, part(report, 0.1, 0.9))
+    folder = runs / EXPORTS / scratch.name
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    files = sorted(path.name for path in made.iterdir())
+    os.rename(made, folder)
+    return {"export": scratch.name, "files": files}
+
+
+def _export_run(run: Run, what: list[str], made: Path, report: Report) -> None:
+    from palpate.app.reporting.report_page import report_page
+
+    if "report" in what:
+        report(0.0, "writing the report")
+        (made / f"{run.name}.html").write_text(report_page(run))
+        (made / f"{run.name}-report.json").write_text(json.dumps(run.report, indent=1))
+    if "model" in what:
+        (made / f"{run.name}-model.json").write_text(json.dumps(run.model, indent=1))
+    if "replays" in what:
+        report(0.3, "packing the replays")
+        shutil.make_archive(str(made / f"{run.name}-replays"), "zip", run.path, "replays")

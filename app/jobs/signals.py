@@ -1,0 +1,29 @@
+"""Ctrl-C and a polite kill: raised at once, and remembered, since an import may swallow what is
+raised inside it.
+"""
+
+from __future__ import annotations
+
+import signal
+from types import FrameType
+from typing import NoReturn
+
+__all__ = ["Stop", "stop"]
+
+
+class Stop:
+    """The handler of both signals; `asked` says whether one came."""
+
+    asked = False
+
+    def listen(self) -> None:
+        """Handle the signals from now on."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self)
+
+    def __call__(self, number: int, frame: FrameType | None) -> NoReturn:
+        self.asked = True
+        raise KeyboardInterrupt
+
+
+stop = Stop()

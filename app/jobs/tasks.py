@@ -1,0 +1,249 @@
+"""The long verbs as worker functions: a plain request in, progress out, a plain result back."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from palpate.app.storage.archive import copy_folder, dataset_root, unpack
+from palpate.app.storage.dataset_import import STAGING, check_name
+from palpate.app.storage.evaluation_store import Evaluations, networks_for
+from palpate.app.storage.run_store import CORRECTIONS, Run, Runs
+from palpate.app.storage.sweep_store import Sweeps
+from palpate.app.storage.training_store import Trainings
+from palpate.foundation.errors import DatasetError, RunError
+from palpate.foundation.progress import Report, part
+
+if TYPE_CHECKING:
+    from palpate.dataset.accepted_registration import Accepted
+
+__all__ = ["TARGETS", "bring", "diagnose", "diagnose_into", "evaluate", "sweep", "train"]
+
+TARGETS = {
+    "diagnosis": "palpate.app.jobs.tasks:diagnose",
+    "sweep": "palpate.app.jobs.tasks:sweep",
+    "training": "palpate.app.jobs.tasks:train",
+    "import": "palpate.app.jobs.tasks:bring",
+    "registration": "palpate.app.jobs.short_tasks:register",
+    "replay": "palpate.app.jobs.short_tasks:replay",
+    "export": "palpate.app.jobs.short_tasks:export",
+    "evaluation": "palpate.app.jobs.tasks:evaluate",
+}
+
+
+def diagnose(request: dict[str, Any], report: Report) -> dict[str, Any]:
+    """Diagnose `request["dataset"]`; the run folder gets the name of the scratch folder, below
+    `request["runs"]`.
+    """
+    from palpate.dataset.accepted_registration import Accepted
+
+    registered = request.get("registration")
+    scratch = Path(request["scratch"])
+    run = Path(request["runs"]) / scratch.name
+    result = diagnose_into(
+        Path(request["dataset"]),
+        run,
+        scratch,
+        workers=int(request["workers"]),
+        seed=int(request["seed"]),
+        report=report,
+        accepted=Accepted.from_json(registered) if registered else None,
+    )
+    return {"run": run.name, "verdict": result["verdict"]}
+
+
+def diagnose_into(
+    dataset: Path,
+    run: Path,
+    scratch: Path,
+    *,
+    workers: int,
+    seed: int,
+    report: Report,
+    accepted: Accepted | None = None,
+) -> dict[str, Any]:
+    """Diagnose into `scratch`, note the origin, and rename the whole to `run`; returns the report.
+
+    `accepted` is a registration of the camera that is used in place of the automatic one.
+    """
+    from palpate.dataset import open_dataset
+    from palpate.diagnosis.pipeline import diagnose as find_cause
+
+    if run.exists():
+        raise RunError(f"{run} exists already; name another folder or move it away", file=str(run))
+    began = time.time()
+    made = scratch / run.name
+    opened = open_dataset(dataset).registered(accepted)
+    result = find_cause(opened, made, workers=workers, report=report, seed=seed)
+    splits = {
+        name: split
+        for split in ("train", "validation", "test")
+        for name in getattr(opened.config, split)
+    }
+    origin = {
+        "dataset": str(dataset.resolve()),
+        "created": began,
+        "seconds": time.time() - began,
+        "seed": seed,
+        "splits": splits,
+    }
+    (made / "origin.json").write_text(json.dumps(origin, indent=1))
+    run.parent.mkdir(parents=True, exist_ok=True)
+    os.rename(made, run)
+    return dict(result)
+
+
+def sweep(request: dict[str, Any], report: Report) -> dict[str, Any]:
+    """The job: sweep `request["dataset"]` as `request["sweep"]` asks; the folder has the name of
+    the job.
+    """
+    from palpate.dataset import open_dataset
+    from palpate.dataset.accepted_registration import Accepted
+    from palpate.sweep.run_sweep import run_sweep
+    from palpate.sweep.sweep_request import Request
+
+    registered = request.get("registration")
+    dataset = open_dataset(Path(request["dataset"])).registered(
+        Accepted.from_json(registered) if registered else None
+    )
+    sweeps, name = Sweeps(Path(request["runs"])), Path(request["scratch"]).name
+    found = run_sweep(
+        dataset,
+        Request.from_json(request["sweep"]),
+        sweeps.folder / name,
+        store=sweeps.store,
+        workers=int(request["workers"]),
+        scheduler=request["scheduler"],
+        report=report,
+    )
+    return {"sweep": name, "points": found["points"], "failed": found["failed"]}
+
+
+def train(request: dict[str, Any], report: Report) -> dict[str, Any]:
+    """The job: train on `request["dataset"]` as `request["training"]` asks; the folder has the name
+    of the job.
+
+    A job that is done once more goes on where it was.
+    """
+    from palpate.dataset import open_dataset
+    from palpate.evaluation.train_network import Wanted, train_network
+
+    runs, name = Path(request["runs"]), str(request.get("folder") or Path(request["scratch"]).name)
+    trainings, dataset = Trainings(runs), open_dataset(Path(request["dataset"]))
+    run = Runs(runs).get(request["run"]) if request.get("run") else None
+    summary = train_network(
+        dataset,
+        Wanted.from_json(request["training"]),
+        trainings.folder / name,
+        store=trainings.store,
+        model=None if run is None else run.model,
+        run=None if run is None else run.name,
+        truth=request.get("truth"),
+        workers=int(request["workers"]),
+        report=part(report, 0.0, 1.0 if run is None else 0.85),
+    )
+    if run is not None:
+        _show(run, dataset, trainings.folder / name, runs, part(report, 0.85, 1.0))
+    return {
+        "training": name,
+        "error": summary["validation_error_mm"],
+        "without": summary["validation_error_without_mm"],
+    }
+
+
+def _show(run: Run, dataset: Any, training: Path, runs: Path, report: Report) -> None:
+    """The corrected model beside the others of a run."""
+    from palpate.evaluation.loaded_network import Network
+    from palpate.evaluation.record_corrections import record_corrections
+
+    frames = {name: run.replay(name)["cloud_index"] for name in run.sequences}
+    if frames:
+        model = json.loads((run.path / "model.json").read_text())
+        record_corrections(
+            dataset, model, Network.load(training), frames, runs / CORRECTIONS / run.name, report
+        )
+
+
+def evaluate(request: Mapping[str, Any], report: Report) -> dict[str, Any]:
+    """The job: the ladder of `request["dataset"]`; the folder has the name of the job."""
+    from palpate.dataset import open_dataset
+    from palpate.evaluation.run_evaluation import Asked
+    from palpate.evaluation.run_evaluation import evaluate as climb
+
+    runs = Path(request["runs"])
+    name, dataset = (
+        str(request.get("folder") or Path(request["scratch"]).name),
+        Path(request["dataset"]),
+    )
+    run = Runs(runs).get(request["run"]) if request.get("run") else None
+    networks = networks_for(
+        Trainings(runs),
+        dataset,
+        request.get("run"),
+        list(request.get("trainings", ())),
+        request.get("truth") is not None,
+    )
+    asked = Asked(
+        model=None if run is None else run.model,
+        truth=request.get("truth"),
+        networks=networks,
+        feedback=request.get("feedback", "none"),
+    )
+    out = Evaluations(runs).folder / name
+    found = climb(
+        open_dataset(dataset),
+        asked,
+        out,
+        workers=int(request["workers"]),
+        seed=int(request["seed"]),
+        report=report,
+    )
+    return {"evaluation": name, "sentence": found["sentence"]}
+
+
+def bring(request: dict[str, Any], report: Report) -> dict[str, Any]:
+    """The job: unpack `request["archive"]`, or copy `request["folder"]`, check every file, and make
+    it the dataset `name`.
+
+    An archive is kept until it was taken or refused, so that an interrupted import can be done once
+    more.
+    """
+    from palpate.dataset import open_dataset
+    from palpate.dataset.dataset_problems import refuse_problems
+
+    datasets, name = Path(request["datasets"]), str(request["name"])
+    check_name(name, datasets)
+    aside = datasets / STAGING / Path(request["scratch"]).name
+    aside.mkdir(parents=True, exist_ok=True)
+    archive = Path(request["archive"]) if request.get("archive") else None
+    try:
+        if archive is not None:
+            if not archive.is_file():
+                raise DatasetError(
+                    "the archive is no longer there: upload it again", file=archive.name
+                )
+            unpack(archive, aside, int(request["most"]), part(report, 0.0, 0.4))
+        else:
+            copy_folder(
+                Path(request["folder"]), aside, int(request["most"]), part(report, 0.0, 0.4)
+            )
+        root = dataset_root(aside)
+        refuse_problems(root, part(report, 0.4, 1.0))
+    except DatasetError:
+        if archive is not None:
+            archive.unlink(missing_ok=True)
+        raise
+    opened = open_dataset(root)
+    check_name(name, datasets)
+    os.rename(root, datasets / name)
+    if archive is not None:
+        archive.unlink(missing_ok=True)
+    return {
+        "dataset": name,
+        "sequences": len(opened.sequences),
+        "clouds": sum(map(len, opened.loaded)),
+    }

@@ -1,0 +1,76 @@
+"""Numbers as people read them: their unit, and no more digits than are known."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+__all__ = ["NARROW", "SHOWN", "between", "measured", "quantity"]
+
+NARROW = "\N{NO-BREAK SPACE}"
+SHOWN = {
+    "m": (1e3, "mm"),
+    "Pa": (1e-3, "kPa"),
+    "s": (1e3, "ms"),
+    "rad": (180.0 / math.pi, "°"),
+    "1": (1.0, ""),
+    "": (1.0, ""),
+}
+
+
+def quantity(value: Any, unit: str, digits: int = 2) -> str:
+    """A number in the unit people read, with sensible digits: 0.00043 m is 0.43 mm."""
+    if not isinstance(value, (int, float)):
+        return str(value)
+    factor, shown = SHOWN.get(unit, (1.0, unit))
+    scaled = float(f"{float(value) * factor:.{digits}g}")
+    places = (
+        max(0, digits - 1 - math.floor(math.log10(abs(scaled))))
+        if scaled and math.isfinite(scaled)
+        else 0
+    )
+    return _with_unit(f"{scaled:.{min(places, 4)}f}", shown)
+
+
+def _with_unit(text: str, shown: str) -> str:
+    return f"{text}{'' if shown in ('', '°') else NARROW}{shown}"
+
+
+def measured(entry: dict[str, Any]) -> tuple[str, str, str]:
+    """Value, low and high end of a report's parameter, with as many decimals as tell the ends
+    apart: 1.043, 1.038, 1.048.
+
+    Two digits of the interval's width and of the value at least; of a value that its interval
+    dwarfs, of the width alone. An end that is not known is an empty text.
+    """
+    value, unit = entry["value"], entry.get("unit", "1")
+    if not isinstance(value, (int, float)):
+        return str(value), "", ""
+    factor, shown = SHOWN.get(unit, (1.0, unit))
+    low, high = (
+        end if isinstance(end, (int, float)) and math.isfinite(end) else None
+        for end in map(entry.get, ("low", "high"))
+    )
+    width = abs(value) / 5 if low is None or high is None else high - low
+    sizes = (abs(value) if abs(value) > width / 100 else 0.0, width)
+    places = max(
+        (1 - math.floor(math.log10(size * factor)) for size in sizes if 0 < size < math.inf),
+        default=0,
+    )
+
+    def told(number: float | None) -> str:
+        return (
+            ""
+            if number is None
+            else _with_unit(f"{number * factor:z.{min(4, max(0, places))}f}", shown)
+        )
+
+    return told(value), told(low), told(high)
+
+
+def between(entry: dict[str, Any]) -> str:
+    """A parameter of a report with its interval: 5.1 kPa (4.8 to 5.4); with the value alone where
+    there is none.
+    """
+    value, low, high = measured(entry)
+    return f"{value} ({low.split(NARROW)[0]} to {high.split(NARROW)[0]})" if low and high else value

@@ -1,0 +1,59 @@
+"""Plots of a report that is one file: the error of each frame, sequence by sequence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from palpate.app.reporting.html_document import INK, figure, themed
+from palpate.app.storage.run_store import Replay
+
+__all__ = ["drawn_errors", "error_plots"]
+
+_COLUMNS, _HEADROOM = 3, 1.06
+
+
+def error_plots(replays: Sequence[Replay], splits: dict[str, str]) -> str:
+    """RMS distance [mm] over time [s], one panel for each sequence on a common scale: stated and
+    extended model, noise floor.
+    """
+    return themed(drawn_errors(replays, splits)) if replays else ""
+
+
+def drawn_errors(replays: Sequence[Replay], splits: dict[str, str]) -> Any:
+    """The same as a figure; at least one replay."""
+    columns = min(_COLUMNS, len(replays))
+    rows = math.ceil(len(replays) / columns)
+    drawn = figure(3.0 * columns, 1.9 * rows)
+    panels = drawn.subplots(rows, columns, squeeze=False, sharey=True).ravel()
+    for axes, replay in zip(panels, replays, strict=False):
+        time = np.asarray(replay["time"]) - replay["time"][0]
+        axes.axhline(1e3 * float(replay["noise_floor"]), color=INK["floor"], linewidth=2)
+        for model in ("raw", "extended"):
+            axes.plot(
+                time, 1e3 * np.asarray(replay[f"distance_{model}"]), color=INK[model], linewidth=1.3
+            )
+        split = splits.get(replay.name)
+        axes.set_title(
+            f"{replay.name}{f' ({split})' if split else ''}",
+            fontsize=9,
+            color=INK["text"],
+            loc="left",
+        )
+        axes.locator_params(nbins=4)
+    # Once all are drawn: a limit that is set before holds for those that come after.
+    panels[0].set_ylim(0.0, _HEADROOM * 1e3 * max(_largest(replay) for replay in replays))
+    for axes in panels[len(replays) :]:
+        axes.set_visible(False)
+    drawn.supxlabel("time [s]", fontsize=9, color=INK["text-3"])
+    drawn.supylabel("error [mm]", fontsize=9, color=INK["text-3"])
+    return drawn
+
+
+def _largest(replay: Replay) -> float:
+    """Of errors and floor [m]; NaN is a frame without a comparison."""
+    curves = [np.asarray(replay[f"distance_{model}"]) for model in ("raw", "extended")]
+    return float(np.nanmax(np.concatenate([*curves, [float(replay["noise_floor"]), 1e-6]])))

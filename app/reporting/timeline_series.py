@@ -1,0 +1,137 @@
+"""What happens in each frame of a replayed sequence beside its errors: how deep the tool is, when
+it touches, where it is worst.
+"""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.app.reporting.json_values import finite
+from palpate.app.storage.run_store import Replay, Run
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import PalpateError
+
+__all__ = [
+    "by_model",
+    "contact_force",
+    "course",
+    "models_of",
+    "push_depth",
+    "touching",
+    "worst_frames",
+]
+
+log = logging.getLogger(__name__)
+MODELS = ("raw", "extended", "corrected")
+MOST_WORST = 3
+FLAT = 2.0e-4
+"""How far a vertex of a box may lie from its faces [m]."""
+
+
+def course(run: Run, replay: Replay) -> dict[str, Any]:
+    """All series of a sequence for the timeline; null where the data or the run do not hold them.
+
+    `depth` [m], `force` as measured [N], and by model `forces` [N] and `iterations` have one number
+    for each frame; `touching` holds first and last frames, `worst` frames in the order of their raw
+    error, `failed` by model those that found no equilibrium.
+    """
+    depth, force = push_depth(replay), contact_force(run, replay)
+    iterations, forces = by_model(replay, "iterations"), by_model(replay, "force")
+    return {
+        "models": list(models_of(replay)),
+        "depth": None if depth is None else finite(depth, digits=7),
+        "touching": [] if depth is None else touching(depth),
+        "force": None if force is None else finite(force, digits=5),
+        "forces": {name: finite(values, digits=5) for name, values in forces.items()} or None,
+        "iterations": {
+            name: [int(count) for count in counts] for name, counts in iterations.items()
+        }
+        or None,
+        "failed": {
+            name: [int(at) for at in np.flatnonzero(codes)]
+            for name, codes in by_model(replay, "outcome").items()
+        },
+        "worst": worst_frames(replay["distance_raw"]),
+    }
+
+
+def by_model(replay: Replay, key: str) -> dict[str, Any]:
+    """A series (f,) of each model that has it in the run."""
+    return {
+        name: replay.arrays[f"{key}_{name}"] for name in MODELS if f"{key}_{name}" in replay.arrays
+    }
+
+
+def models_of(replay: Replay) -> tuple[str, ...]:
+    """The models whose surface and errors the run holds: `corrected` is in few of them."""
+    return tuple(
+        name
+        for name in MODELS
+        if all(f"{key}{name}" in replay.arrays for key in ("", "error_", "distance_"))
+    )
+
+
+def push_depth(replay: Replay) -> FloatArray | None:
+    """How far the tool as the stated model has it reaches into the block at rest (f,) [m], 0 apart
+    from it; None if it is no box.
+
+    The depth is radius minus the signed distance of the tool's centre to the box; the base lies on
+    the table and is no way out.
+    """
+    rest = np.asarray(replay["rest"], dtype=float)
+    low, high = rest.min(axis=0), rest.max(axis=0)
+    apart = np.minimum(np.abs(rest - low), np.abs(rest - high)).min(axis=1)
+    if apart.max() > FLAT:
+        return None
+    low[2] -= 1.0
+    beyond = np.abs(np.asarray(replay["tool_raw"]) - (low + high) / 2) - (high - low) / 2
+    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+    distance = outside + np.minimum(beyond.max(axis=1), 0.0)
+    return np.asarray(np.maximum(float(replay["tool_radius_raw"]) - distance, 0.0))
+
+
+def touching(depth: FloatArray) -> list[list[int]]:
+    """First and last frame of each spell with a depth (f,) [m] above zero."""
+    edges = np.diff(np.concatenate([[0], (depth > 0).astype(int), [0]]))
+    return [
+        [int(first), int(after) - 1]
+        for first, after in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True)
+    ]
+
+
+def contact_force(run: Run, replay: Replay) -> FloatArray | None:
+    """Size of the measured force on the tool (f,) [N] at the frames, NaN where none was recorded;
+    None without any.
+    """
+    from palpate.dataset import open_dataset
+
+    folder = run.origin.get("dataset")
+    if folder is None or not Path(folder).is_dir():
+        return None
+    try:
+        forces = open_dataset(Path(folder)).sequence(replay.name).forces
+    except PalpateError as error:
+        log.warning("run %s: the measured forces are not shown: %s", run.name, error.message)
+        return None
+    if forces is None:
+        return None
+    size = np.linalg.norm(forces.force, axis=1)
+    return np.asarray(np.interp(replay["time"], forces.time, size, left=np.nan, right=np.nan))
+
+
+def worst_frames(errors: FloatArray, most: int = MOST_WORST) -> list[int]:
+    """The peaks of an error (f,), the highest first, none within a twelfth of the sequence of a
+    higher one.
+    """
+    seen = np.where(np.isfinite(errors), errors, -np.inf)
+    around = np.concatenate([[-np.inf], seen, [-np.inf]])
+    peaks = np.flatnonzero((seen >= around[:-2]) & (seen >= around[2:]) & np.isfinite(seen))
+    chosen: list[int] = []
+    for frame in peaks[np.argsort(-seen[peaks], kind="stable")]:
+        if all(abs(int(frame) - other) > len(seen) // 12 for other in chosen):
+            chosen.append(int(frame))
+    return chosen[:most]

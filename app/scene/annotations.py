@@ -1,0 +1,192 @@
+"""What stands around the models: the touched landmarks, the fixed base, a lump that was found, the
+tool's path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from palpate.app.scene import colours
+from palpate.app.scene.figures import Figure, Lines, Mesh
+from palpate.app.scene.model_layer import Side
+from palpate.app.scene.surface_bands import IntArray, lattice
+from palpate.app.storage.run_store import Run
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import RunError
+
+__all__ = ["Furniture", "Lump", "furniture_of", "path_lines"]
+
+CROSS, TOUCH = 2.5e-3, 7e-4
+TICK, TICKS_APART = 2.6e-3, 3.2e-3
+AHEAD = (196, 201, 208)
+
+
+@dataclass(frozen=True)
+class Lump:
+    """A stiff inclusion that was found: centre (x, y, z) and radius, each as low, value, high
+    [m]."""
+
+    centre: tuple[tuple[float, float, float], ...]
+    radius: tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Furniture:
+    """Of one run, phantom frame.
+
+    Attributes:
+        landmarks: (n, 3) stated places [m].
+        touches: (n, 3) where the tool was when it touched them [m].
+        loose: edge (as "-x") and extent [m] of each strip of the base that the extended model does
+            not hold.
+        lumps: that were found.
+    """
+
+    landmarks: FloatArray
+    touches: FloatArray
+    loose: tuple[tuple[str, float], ...] = ()
+    lumps: tuple[Lump, ...] = ()
+
+    def touched(self) -> dict[str, Figure]:
+        """A cross at each landmark, a bead where it was touched, and a line for what lies
+        between."""
+        if not len(self.landmarks):
+            return {}
+        arms = CROSS / 2 * np.stack([-np.eye(3), np.eye(3)], axis=1)
+        crosses = (self.landmarks[:, None, None] + arms).reshape(-1, 2, 3)
+        misses = np.stack([self.landmarks, self.touches], axis=1)
+        ball, faces = sphere(8, 6)
+        beads = (self.touches[:, None] + TOUCH * ball).reshape(-1, 3)
+        turns = (faces + len(ball) * np.arange(len(self.touches))[:, None, None]).reshape(-1, 3)
+        return {
+            "landmarks-crosses": Lines(_single(crosses), colours.LANDMARK, 1.8),
+            "landmarks-misses": Lines(_single(misses), colours.TOOL, 1.0),
+            "landmarks-touches": Mesh(_single(beads), turns, colours.TOOL),
+        }
+
+    def base(self, low: FloatArray, high: FloatArray, extended: bool) -> dict[str, Figure]:
+        """The sign for a fixed support around the foot of a block between these corners (3,):
+        hatched where it is held.
+        """
+        corners = np.array(
+            [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]]
+        )
+        ticks = []
+        for begin, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            along = (end - begin) / np.linalg.norm(end - begin)
+            count = int(np.linalg.norm(end - begin) / TICKS_APART)
+            for at in begin + along * TICKS_APART * (np.arange(count)[:, None] + 0.5):
+                if not (extended and self._is_loose(at, low, high)):
+                    outwards = np.array([along[1], -along[0]])
+                    ticks.append([at, at + TICK * (outwards - along) / np.sqrt(2)])
+        outline = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+        flat = np.concatenate([outline, np.array(ticks).reshape(-1, 2, 2)])
+        return {
+            "base": Lines(
+                _single(np.dstack([flat, np.full(flat.shape[:2], 2e-4)])), colours.SUPPORT, 1.6
+            )
+        }
+
+    def _is_loose(self, at: FloatArray, low: FloatArray, high: FloatArray) -> bool:
+        for edge, extent in self.loose:
+            axis = "xy".index(edge[1])
+            away = at[axis] - low[axis] if edge[0] == "-" else high[axis] - at[axis]
+            if away <= extent:
+                return True
+        return False
+
+    def found(self, side: Side, frame: int, opacity: float) -> dict[str, Figure]:
+        """Each lump as a ball, and around it the ellipsoid that holds it wherever it may lie within
+        its intervals.
+        """
+        figures: dict[str, Figure] = {}
+        ball, faces = sphere(28, 18)
+        for number, lump in enumerate(self.lumps):
+            centre = np.array([value for _, value, _ in lump.centre])
+            moved = side.moved(frame, centre[None])
+            at = centre if moved is None else moved[0]
+            figures[f"lump-{number}"] = Mesh(
+                _single(at + lump.radius[1] * ball), faces, colours.EXTENDED, 0.55 * opacity
+            )
+            middle = at - centre + np.array([(low + high) / 2 for low, _, high in lump.centre])
+            reach = lump.radius[2] + np.array([(high - low) / 2 for low, _, high in lump.centre])
+            figures[f"lump-{number}-interval"] = Mesh(
+                _single(middle + reach * ball), faces, colours.EXTENDED, 0.2 * opacity
+            )
+        return figures
+
+
+def furniture_of(run: Run) -> Furniture:
+    """From what the run says of its model and causes; what it does not say is not there."""
+    try:
+        setup = run.model.get("setup", {})
+    except RunError:
+        setup = {}
+    landmarks = np.array(setup.get("landmarks") or np.zeros((0, 3)), dtype=float).reshape(-1, 3)
+    touching = setup.get("touching") or {}
+    misses = np.array(touching.get("misses") or np.zeros_like(landmarks), dtype=float).reshape(
+        -1, 3
+    )
+    touches = (
+        landmarks + misses + [0.0, 0.0, float(touching.get("lift", 0.0))]
+        if len(misses) == len(landmarks)
+        else landmarks
+    )
+    strips = (setup.get("support") or {}).get("detached") or []
+    loose = tuple((str(strip["edge"]), float(strip["extent"])) for strip in strips)
+    return Furniture(landmarks, touches, loose, tuple(_lumps(run.report.get("causes", []))))
+
+
+def _lumps(causes: Sequence[dict[str, Any]]) -> list[Lump]:
+    found = []
+    for cause in causes:
+        parameters = cause.get("parameters", {})
+        if cause.get("effect") != "stiff_inclusion" or not {"x", "y", "z", "radius"} <= set(
+            parameters
+        ):
+            continue
+        spans = {name: _span(parameters[name]) for name in ("x", "y", "z", "radius")}
+        found.append(Lump((spans["x"], spans["y"], spans["z"]), spans["radius"]))
+    return found
+
+
+def _span(parameter: dict[str, Any]) -> tuple[float, float, float]:
+    value = float(parameter["value"])
+    low, high = (
+        value if parameter.get(end) is None else float(parameter[end]) for end in ("low", "high")
+    )
+    return low, value, high
+
+
+def path_lines(side: Side, frame: int) -> dict[str, Figure]:
+    """The way of the tool's centre through the sequence: dark until this frame, light from
+    there."""
+    places = side.path
+    if len(places) < 2:
+        return {}
+    segments = np.stack([places[:-1], places[1:]], axis=1)
+    shades = np.where((np.arange(len(segments)) < frame)[:, None, None], colours.TOOL, AHEAD)
+    return {
+        "path": Lines(
+            _single(segments), np.broadcast_to(shades, segments.shape).astype(np.uint8), 1.8
+        )
+    }
+
+
+@lru_cache(maxsize=4)
+def sphere(around: int, down: int) -> tuple[FloatArray, IntArray]:
+    """Vertices (n, 3) and triangles of a ball of radius one."""
+    turn, fall = np.meshgrid(np.linspace(0, 2 * np.pi, around + 1), np.linspace(0, np.pi, down + 1))
+    points = np.stack(
+        [np.sin(fall) * np.cos(turn), np.sin(fall) * np.sin(turn), np.cos(fall)], axis=-1
+    )
+    return points.reshape(-1, 3), lattice(down + 1, around + 1)
+
+
+def _single(values: Any) -> Any:
+    return np.ascontiguousarray(values, dtype=np.float32)

@@ -1,0 +1,93 @@
+"""What a picture is made of: plain arrays with colours, in the phantom frame [m]; nothing here
+knows how it is drawn.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from palpate.app.scene.surface_bands import IntArray
+from palpate.foundation.arrays import FloatArray
+
+__all__ = ["Cloud", "Figure", "Label", "Lines", "Mesh", "PointArray", "Rgb", "Tool", "checksum"]
+
+PointArray = np.ndarray[Any, np.dtype[np.float32]]
+Rgb = tuple[int, int, int]
+Place = tuple[float, float, float]
+HERE: Place = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A surface of one colour: vertices (n, 3) [m], faces (m, 3); `at` is how far it is shifted
+    [m], as of all figures.
+    """
+
+    vertices: PointArray
+    faces: IntArray
+    colour: Rgb
+    opacity: float = 1.0
+    at: Place = HERE
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """Points (n, 3) [m]."""
+
+    points: PointArray
+    colour: Rgb
+    at: Place = HERE
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Segments (k, 2, 3) [m] of one colour, or with a colour (k, 2, 3) at each end; `width` in
+    pixels.
+    """
+
+    segments: PointArray
+    colour: Rgb | np.ndarray[Any, np.dtype[np.uint8]]
+    width: float = 1.2
+    at: Place = HERE
+
+
+@dataclass(frozen=True, eq=False)
+class Tool:
+    """A sphere with a short shaft upwards; centre (3,) and radius [m]."""
+
+    centre: FloatArray
+    radius: float
+    opacity: float = 1.0
+    at: Place = HERE
+
+
+@dataclass(frozen=True, eq=False)
+class Label:
+    """Words at a place (3,) [m]."""
+
+    text: str
+    place: FloatArray
+    at: Place = HERE
+
+
+Figure = Mesh | Cloud | Lines | Tool | Label
+
+
+def checksum(frame: int, figures: Mapping[str, Figure]) -> str:
+    """A short digest of everything in a picture, for comparing what two places hold."""
+    digest = hashlib.sha256(str(frame).encode())
+    for name in sorted(figures):
+        digest.update(name.encode())
+        for field in fields(figures[name]):
+            value = getattr(figures[name], field.name)
+            digest.update(
+                np.ascontiguousarray(value, dtype=np.float32).tobytes()
+                if isinstance(value, np.ndarray)
+                else repr(value).encode()
+            )
+    return digest.hexdigest()[:16]

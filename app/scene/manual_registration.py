@@ -1,0 +1,345 @@
+"""Manual registration as it is clicked: what a page wants shown goes in, points under its clicks
+come out.
+
+The page keeps the pairs, with undo and over reloads; here is only what is drawn of them, and which
+point a ray means.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.app.http_errors import Missing
+from palpate.app.scene.registration_picture import Arrow, Mark, PairPicture, middle_of
+from palpate.app.scene.registration_scene import PairScene, Ray
+from palpate.app.schemas import Shown, WeakDirection
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import PalpateError
+from palpate.foundation.frames import Transform
+from palpate.registration.faces import IndexArray
+from palpate.registration.levelling import as_seen, levelled
+from palpate.registration.picking import pick_cloud, pick_mesh, slide_on_cloud
+
+__all__ = ["Clicking", "Clickings", "Phantom"]
+
+SESSIONS = 32
+APART = 0.03
+"""Gap [m] between phantom and cloud side by side."""
+SNAP = 14.0
+"""A landmark within so many pixels of a click is meant by it."""
+ARROW = 0.022
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class Phantom:
+    """What is to be registered: the rest cloud (n, 3) [m], camera frame, and the phantom as stated,
+    phantom frame.
+
+    `stated` is the first guess of phantom_from_camera in dataset.toml, None where there is none.
+    """
+
+    cloud: FloatArray
+    size: tuple[float, float, float]
+    landmarks: dict[str, tuple[float, float, float]]
+    stated: Transform | None
+
+    @property
+    def vertices(self) -> FloatArray:
+        """(8, 3) corners of the block [m]."""
+        x, y, z = self.size
+        return np.array(
+            [[i * x / 2, j * y / 2, k * z] for i in (-1, 1) for j in (-1, 1) for k in (0, 1)]
+        )
+
+    @property
+    def faces(self) -> IndexArray:
+        """(12, 3) triangles of the block, turned outwards."""
+        quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+        return np.array(
+            [[a, b, c] for q in quads for a, b, c in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))],
+            dtype=np.int64,
+        )
+
+    def start(self, kind: str) -> Transform:
+        """phantom_from_camera by which the cloud is shown before any pair is clicked."""
+        if kind == "stated" and self.stated is not None:
+            return self.stated
+        return as_seen(self.cloud) if kind == "camera" else levelled(self.cloud)
+
+
+class Clicking:
+    """One page: what it shows, and the browsers' scenes that show it."""
+
+    def __init__(self, phantom_of: Callable[[str], Phantom]) -> None:
+        self._phantom_of = phantom_of
+        self._scenes: list[PairScene] = []
+        self._lock = threading.RLock()
+        self._told: list[Callable[[dict[str, Any]], None]] = []
+        self._shown: Shown | None = None
+        self._phantom: tuple[str, Phantom] | None = None
+        self._start: tuple[tuple[str, str], Transform] | None = None
+        self._looked: tuple[str, str, bool] | None = None
+
+    def listen(self, told: Callable[[dict[str, Any]], None]) -> Callable[[], None]:
+        """Have `told` called with each pick, from any thread; returns what ends that."""
+        self._told.append(told)
+        return lambda: self._told.remove(told)
+
+    def show(self, shown: Shown) -> dict[str, Any]:
+        """Draw this in all scenes of the page; says what is drawn."""
+        with self._lock:
+            phantom = self._open(shown.dataset)
+            self._shown = shown
+            picture = self._picture(phantom, shown)
+            for scene in self._scenes:
+                scene.draw(picture)
+            now = (shown.dataset, shown.start, shown.over)
+            if now != self._looked:
+                self._look(picture)
+            self._looked = now
+            return self._summary(phantom, shown, picture)
+
+    def look(self) -> None:
+        """Turn the cameras to cloud and phantom."""
+        with self._lock:
+            phantom, shown = self._asked()
+            self._look(self._picture(phantom, shown))
+
+    def join(self, scene: PairScene) -> None:
+        """A browser's scene was opened."""
+        with self._lock:
+            self._scenes.append(scene)
+            if self._shown is not None:
+                phantom, shown = self._asked()
+                picture = self._picture(phantom, shown)
+                scene.draw(picture)
+                scene.look(picture)
+
+    def leave(self, scene: PairScene) -> None:
+        """A browser's scene was closed."""
+        with self._lock:
+            self._scenes = [other for other in self._scenes if other is not scene]
+
+    def click(self, ray: Ray) -> None:
+        """A click in a scene: tells the page which point it means, or why none."""
+        try:
+            with self._lock:
+                said = self.pick(ray) if self._shown is not None else None
+        except PalpateError as error:
+            said = {"problem": error.message}
+        except Exception:
+            log.exception("a click came to nothing")
+            return
+        for told in list(self._told) if said else []:
+            told(said or {})
+
+    def pick(self, ray: Ray) -> dict[str, Any]:
+        """The point under a ray on the side that is picked on, or the end of a pair that is there
+        already.
+        """
+        with self._lock:
+            phantom, shown = self._asked()
+            side = ray.mark[1] if ray.mark else shown.mode
+            if (
+                ray.mark is None
+                and (chosen := self._mark_under(phantom, shown, ray, side)) is not None
+            ):
+                return {"chosen": {"pair": chosen, "side": side}}
+            found = (
+                self._on_cloud(phantom, shown, ray)
+                if side == "cloud"
+                else self._on_mesh(phantom, ray)
+            )
+            if found is None:
+                other = "the phantom" if side == "mesh" else "the cloud"
+                return {
+                    "problem": f"There is nothing of {other} under this click, and clicks are for {other} now."
+                }
+            point, landmark = found
+            pair = None if ray.mark is None else ray.mark[0]
+            return {
+                "picked": {
+                    "side": side,
+                    "point": [float(x) for x in point],
+                    "landmark": landmark,
+                    "pair": pair,
+                }
+            }
+
+    def nudge(self, side: str, point: list[float], right: float, up: float) -> list[float]:
+        """The point moved on its surface by so much [m] to the right and upwards as the person sees
+        it; itself at an edge.
+        """
+        with self._lock:
+            phantom, shown = self._asked()
+            if not self._scenes:
+                raise Missing("no scene is open for this page", session=shown.dataset)
+            pose = self._pose(phantom, shown)
+            start = pose.apply(np.array(point)) if side == "cloud" else np.array(point)
+            eye, rightwards, upwards = self._scenes[-1].eye()
+            direction = start + right * rightwards + up * upwards - eye
+            if side == "mesh":
+                found = pick_mesh(phantom.vertices, phantom.faces, eye, direction)
+                return point if found is None else [float(x) for x in found]
+            moved = slide_on_cloud(pose.apply(phantom.cloud), start, eye, direction)
+            return point if moved is None else [float(x) for x in pose.inverse().apply(moved)]
+
+    def _asked(self) -> tuple[Phantom, Shown]:
+        if self._shown is None:
+            raise Missing("this page shows no registration yet")
+        return self._open(self._shown.dataset), self._shown
+
+    def _open(self, dataset: str) -> Phantom:
+        if self._phantom is None or self._phantom[0] != dataset:
+            self._phantom = (dataset, self._phantom_of(dataset))
+        return self._phantom[1]
+
+    def _pose(self, phantom: Phantom, shown: Shown) -> Transform:
+        """By which the cloud is drawn: the fit, else the start, and beside the phantom where that
+        is wanted.
+        """
+        key = (shown.dataset, shown.start)
+        if self._start is None or self._start[0] != key:
+            self._start = (key, phantom.start(shown.start))
+        pose = self._start[1] if shown.pose is None else Transform.from_matrix(shown.pose)
+        if shown.over:
+            return pose
+        low, high = middle_of(pose.apply(phantom.cloud), 0.8 * max(phantom.size))
+        aside = np.array([phantom.size[0] / 2 + APART - low[0], -(low[1] + high[1]) / 2, 0.0])
+        return Transform(np.eye(3), aside) @ pose
+
+    def _picture(self, phantom: Phantom, shown: Shown) -> PairPicture:
+        pose = self._pose(phantom, shown)
+        marks, lines = [], []
+        for number, pair in enumerate(shown.pairs):
+            ends = {}
+            for side, point in (("cloud", pair.cloud), ("mesh", pair.mesh)):
+                if point is not None:
+                    ends[side] = (
+                        pose.apply(np.array(point))
+                        if side == "cloud"
+                        else np.array(point, dtype=float)
+                    )
+                    marks.append(Mark(number, side, ends[side], shown.chosen == (number, side)))
+            if len(ends) == 2:
+                lines.append((ends["cloud"], ends["mesh"], number))
+        names = tuple(phantom.landmarks)
+        return PairPicture(
+            cloud=pose.apply(phantom.cloud),
+            vertices=phantom.vertices,
+            faces=phantom.faces,
+            landmarks=np.array([phantom.landmarks[name] for name in names]).reshape(-1, 3),
+            names=names,
+            marks=tuple(marks),
+            arrows=tuple(_arrow(one, np.array([0.0, 0.0, phantom.size[2]])) for one in shown.weak)
+            if shown.over
+            else (),
+            over=shown.over,
+            lines=tuple(lines),
+        )
+
+    def _look(self, picture: PairPicture) -> None:
+        for scene in self._scenes:
+            scene.look(picture)
+
+    def _mark_under(self, phantom: Phantom, shown: Shown, ray: Ray, side: str) -> int | None:
+        """Which pair's end on this side lies under the ray."""
+        direction = ray.direction / np.linalg.norm(ray.direction)
+        for mark in self._picture(phantom, shown).marks:
+            arm = mark.place - ray.origin
+            if mark.side == side and np.linalg.norm(arm - (arm @ direction) * direction) < 1.2e-3:
+                return mark.pair
+        return None
+
+    def _on_cloud(self, phantom: Phantom, shown: Shown, ray: Ray) -> tuple[FloatArray, None] | None:
+        back = self._pose(phantom, shown).inverse()
+        row = pick_cloud(
+            phantom.cloud, back.apply(ray.origin), back.rotation @ ray.direction, ray.pixel
+        )
+        if row is None or (
+            not shown.over
+            and self._behind(phantom, ray, self._pose(phantom, shown).apply(phantom.cloud[row]))
+        ):
+            return None
+        return phantom.cloud[row], None
+
+    def _behind(self, phantom: Phantom, ray: Ray, place: FloatArray) -> bool:
+        """Whether the phantom, beside which the cloud is shown, hides a place."""
+        hit = pick_mesh(phantom.vertices, phantom.faces, ray.origin, ray.direction)
+        return hit is not None and float(np.linalg.norm(hit - ray.origin)) < float(
+            np.linalg.norm(place - ray.origin)
+        )
+
+    def _on_mesh(self, phantom: Phantom, ray: Ray) -> tuple[FloatArray, str | None] | None:
+        hit = pick_mesh(phantom.vertices, phantom.faces, ray.origin, ray.direction)
+        direction = ray.direction / np.linalg.norm(ray.direction)
+        near: list[tuple[float, str]] = []
+        for name, place in phantom.landmarks.items():
+            arm = np.array(place) - ray.origin
+            along = float(arm @ direction)
+            beside = float(np.linalg.norm(arm - along * direction)) / max(along, 1e-9)
+            hidden = hit is not None and np.linalg.norm(hit - ray.origin) < along - 6.0e-3
+            if beside < SNAP * ray.pixel and not hidden:
+                near.append((beside, name))
+        if near:
+            name = min(near)[1]
+            return np.array(phantom.landmarks[name], dtype=float), name
+        return None if hit is None else (hit, None)
+
+    def _summary(self, phantom: Phantom, shown: Shown, picture: PairPicture) -> dict[str, Any]:
+        return {
+            "points": len(phantom.cloud),
+            "marks": len(picture.marks),
+            "arrows": len(picture.arrows),
+            "scenes": len(self._scenes),
+            "stated": phantom.stated is not None,
+            "landmarks": {name: list(place) for name, place in phantom.landmarks.items()},
+            "pose": self._pose(phantom, shown).matrix.tolist(),
+        }
+
+
+def _arrow(weak: WeakDirection, pivot: FloatArray) -> Arrow:
+    """An arrow of its main part, as long as can be seen."""
+    motion, turn = np.array(weak.translation), np.array(weak.rotation)
+    turns = float(np.linalg.norm(turn)) > float(np.linalg.norm(motion))
+    axis = turn if turns else motion
+    axis = axis / max(float(np.linalg.norm(axis)), 1e-12)
+    return Arrow(pivot - ARROW * axis, pivot + ARROW * axis, turns, weak.text)
+
+
+class Clickings:
+    """The registrations that pages are clicking, the oldest forgotten beyond a few dozen."""
+
+    def __init__(self, phantom_of: Callable[[str], Phantom]) -> None:
+        self._phantom_of = phantom_of
+        self._sessions: OrderedDict[str, Clicking] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def open(self, page: str) -> Clicking:
+        """That of a page, made if need be."""
+        with self._lock:
+            found = self._sessions.pop(page, None) or Clicking(self._phantom_of)
+            self._sessions[page] = found
+            while len(self._sessions) > SESSIONS:
+                self._sessions.popitem(last=False)
+            return found
+
+    def join(self, page: str, scene: PairScene) -> None:
+        """A browser's scene belongs to this page."""
+        self.open(page).join(scene)
+
+    def leave(self, page: str, scene: PairScene) -> None:
+        """A browser's scene is gone."""
+        self.open(page).leave(scene)
+
+    def click(self, page: str, ray: Ray) -> None:
+        """Somebody clicked in a scene of this page."""
+        self.open(page).click(ray)

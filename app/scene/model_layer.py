@@ -1,0 +1,153 @@
+"""One model's side of a replayed sequence: where its surface, tool and inside are in a frame, and
+what can be shown on them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from palpate.app.scene.colours import nice_end, nice_limit
+from palpate.app.scene.view import MODELS, Model, Quantity
+from palpate.app.storage.run_store import Replay
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.frames import Transform
+from palpate.recording.interior_fields import Inside
+
+__all__ = ["NO_INSIDE", "Found", "Side", "end_of_scale", "sides_of"]
+
+NO_INSIDE = "this diagnosis was made before the inside was recorded: make it again to see it"
+MOST_OF_ALL = {"error": 0.95, "displacement": 0.998, "energy": 0.9}
+"""Share of what occurs that a robust scale holds; errors are noise at most places, the others next
+to nothing."""
+
+
+class Found(Protocol):
+    """A frame solved again, in place of a recorded one: arrays as in
+    `palpate.recording.resolve_frame.Moment`.
+    """
+
+    @property
+    def surface(self) -> FloatArray: ...
+
+    @property
+    def error(self) -> FloatArray: ...
+
+    @property
+    def tool(self) -> FloatArray: ...
+
+    @property
+    def radius(self) -> float: ...
+
+    @property
+    def camera(self) -> FloatArray: ...
+
+    @property
+    def inside(self) -> Inside | None: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """A model in a sequence; `found` stands in the place of the recorded frame `instead`."""
+
+    replay: Replay
+    model: Model
+    inside: Inside | None
+    instead: int | None = None
+    found: Found | None = None
+
+    def surface(self, frame: int) -> FloatArray:
+        """(v, 3) moved vertices [m]."""
+        return np.asarray(
+            self._found(frame).surface if frame == self.instead else self.replay[self.model][frame],
+            dtype=float,
+        )
+
+    def tool(self, frame: int) -> tuple[FloatArray, float]:
+        """Centre (3,) and radius [m]."""
+        if frame == self.instead:
+            return np.asarray(self._found(frame).tool, dtype=float), float(
+                self._found(frame).radius
+            )
+        return np.asarray(self._own("tool")[frame], dtype=float), float(self._own("tool_radius"))
+
+    @property
+    def path(self) -> FloatArray:
+        """(f, 3) the tool's centres in all frames [m]."""
+        return np.asarray(self._own("tool"), dtype=float)
+
+    def camera(self, frame: int) -> Transform:
+        """phantom_from_camera."""
+        return Transform.from_matrix(
+            np.asarray(self._found(frame).camera if frame == self.instead else self._own("camera"))
+        )
+
+    def values(self, quantity: Quantity, frame: int) -> FloatArray | None:
+        """The quantity at the vertices (v,), NaN where unknown; None where the run does not hold
+        it.
+        """
+        if quantity == "error":
+            return np.asarray(
+                self._found(frame).error
+                if frame == self.instead
+                else self.replay[f"error_{self.model}"][frame]
+            )
+        if quantity == "displacement":
+            return np.asarray(np.linalg.norm(self.surface(frame) - self.replay["rest"], axis=1))
+        return self.within(quantity, frame, self.replay["rest"])
+
+    def within(self, quantity: Quantity, frame: int, places: FloatArray) -> FloatArray | None:
+        """The quantity (m,) at places (m, 3) [m] in the block at rest; None where that is
+        unknown."""
+        inside, at = self._inside(frame)
+        if inside is None or quantity == "error":
+            return None
+        if quantity == "displacement":
+            return np.asarray(np.linalg.norm(inside.displacement(at, places), axis=1))
+        return inside.energy_density(at, places)
+
+    def moved(self, frame: int, places: FloatArray) -> FloatArray | None:
+        """Where the material from places (m, 3) [m] at rest is; None where the run does not hold
+        the inside.
+        """
+        inside, at = self._inside(frame)
+        return None if inside is None else places + inside.displacement(at, places)
+
+    def _inside(self, frame: int) -> tuple[Inside | None, int]:
+        return (self._found(frame).inside, 0) if frame == self.instead else (self.inside, frame)
+
+    def _found(self, frame: int) -> Found:
+        if self.found is None:
+            raise ValueError(f"nothing was found for frame {frame}")
+        return self.found
+
+    def _own(self, key: str) -> Any:
+        """What is this model's own, or, where a correction stands on another model, that one's."""
+        names = (f"{key}_{model}" for model in (self.model, "extended", "raw"))
+        return next(self.replay[name] for name in names if name in self.replay.arrays)
+
+
+def sides_of(replay: Replay) -> dict[Model, Side]:
+    """The models that a run holds."""
+    held = [
+        model for model in MODELS if model in replay.arrays and f"error_{model}" in replay.arrays
+    ]
+    return {model: Side(replay, model, Inside.read(replay.arrays, model)) for model in held}
+
+
+def end_of_scale(replay: Replay, quantity: Quantity) -> float | None:
+    """A round end of the scale for a whole sequence, of the stated model; None where the run does
+    not hold the quantity.
+    """
+    share = MOST_OF_ALL[quantity]
+    if quantity == "error":
+        return nice_limit(replay["error_raw"])
+    if quantity == "displacement":
+        return nice_end(np.linalg.norm(replay["raw"] - replay["rest"], axis=2), share, 1e-4, 1e-3)
+    inside = Inside.read(replay.arrays, "raw")
+    if inside is None:
+        return None
+    energy = np.asarray(inside.energy, dtype=float)
+    return nice_end(inside.modulus * energy[energy > 0], share, 1e-2, 1.0)

@@ -1,0 +1,194 @@
+"""Where pictures are drawn: `Scene` is the vocabulary, ViserScene draws in one browser, NullScene
+keeps them for tests.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from palpate.app.scene import colours
+from palpate.app.scene.figures import Cloud, Figure, Label, Lines, Mesh, Tool
+from palpate.app.scene.picture import Picture
+from palpate.app.scene.viewpoint import FIELD_OF_VIEW, Lookout
+
+if TYPE_CHECKING:
+    from viser import ClientHandle
+
+__all__ = ["NullScene", "Scene", "ViserScene"]
+
+POINT_SIZE = 0.00026
+SHAFT = 0.022
+PLACES = {Cloud: "/{}", Mesh: "/mesh/{}", Lines: "/lines/{}", Tool: "/{}", Label: "/names/{}"}
+
+
+class Scene(Protocol):
+    """Draws pictures and looks at the phantom."""
+
+    def draw(self, picture: Picture) -> None:
+        """Show this picture and nothing else."""
+
+    def look(self, lookout: Lookout) -> None:
+        """Look from there."""
+
+    def still(self, width: int, height: int) -> np.ndarray[Any, Any] | None:
+        """What is seen now, (height, width, 4) with the background transparent; None where no
+        browser answers.
+        """
+
+
+class NullScene:
+    """Draws nothing and remembers all."""
+
+    def __init__(self) -> None:
+        self.pictures: list[Picture] = []
+        self.looked_from: list[Lookout] = []
+
+    def draw(self, picture: Picture) -> None:
+        """Keep the picture."""
+        self.pictures.append(picture)
+
+    def look(self, lookout: Lookout) -> None:
+        """Keep the place."""
+        self.looked_from.append(lookout)
+
+    def still(self, width: int, height: int) -> np.ndarray[Any, Any] | None:
+        """Nothing is to be seen."""
+        return np.zeros((height, width, 4), dtype=np.uint8)
+
+
+class ViserScene:
+    """The scene of one browser; nodes are made once and then only given new arrays."""
+
+    def __init__(self, client: ClientHandle) -> None:
+        self._client = client
+        self._nodes: dict[str, Any] = {}
+        self._made: dict[str, tuple[Any, ...]] = {}
+
+    def draw(self, picture: Picture) -> None:
+        """Show this picture: all changes reach the browser at once."""
+        shown = {
+            PLACES[type(figure)].format(name): figure for name, figure in picture.figures.items()
+        }
+        with self._client.atomic():
+            for name, figure in shown.items():
+                self._put(name, figure)
+            for name, node in self._nodes.items():
+                node.visible = name in shown
+
+    def look(self, lookout: Lookout) -> None:
+        """Turn the camera."""
+        camera = self._client.camera
+        with self._client.atomic():
+            camera.fov = FIELD_OF_VIEW
+            camera.near = 0.001
+            camera.up_direction = lookout.up
+            camera.position = lookout.position
+            camera.look_at = lookout.target
+
+    def still(self, width: int, height: int) -> np.ndarray[Any, Any] | None:
+        """Rendered by the browser, which may take a second; None where it does not answer in
+        time."""
+        try:
+            return np.asarray(
+                self._client.get_render(height, width, transport_format="png", timeout=20.0)
+            )
+        except TimeoutError:
+            return None
+
+    def _put(self, name: str, figure: Figure) -> None:
+        """Make the node, or give it what is new; another kind or size of arrays takes a new one."""
+        made = _mould(figure)
+        if self._made.get(name) != made:
+            self._nodes[name] = self._make(name, figure)
+            self._made[name] = made
+        node = self._nodes[name]
+        if isinstance(figure, Tool):
+            node.position = figure.centre + figure.at
+            return
+        node.position = figure.place + figure.at if isinstance(figure, Label) else figure.at
+        if isinstance(figure, Cloud):
+            node.points = figure.points
+        elif isinstance(figure, Mesh):
+            node.vertices, node.faces = figure.vertices, figure.faces.astype(np.uint32)
+        elif isinstance(figure, Lines):
+            node.points = figure.segments
+            if isinstance(figure.colour, np.ndarray):
+                node.colors = figure.colour
+
+    def _make(self, name: str, figure: Figure) -> Any:
+        scene = self._client.scene
+        if isinstance(figure, Cloud):
+            return scene.add_point_cloud(
+                name,
+                figure.points,
+                figure.colour,
+                point_size=POINT_SIZE,
+                point_shape="circle",
+                precision="float32",
+                point_shading="flat",
+            )
+        if isinstance(figure, Mesh):
+            return scene.add_mesh_simple(
+                name,
+                figure.vertices,
+                figure.faces.astype(np.uint32),
+                color=figure.colour,
+                side="double",
+                cast_shadow=False,
+                receive_shadow=False,
+                opacity=None if figure.opacity >= 1 else figure.opacity,
+            )
+        if isinstance(figure, Lines):
+            return scene.add_line_segments(
+                name,
+                figure.segments,
+                figure.colour,
+                thickness=figure.width,
+                thickness_units="screen",
+            )
+        if isinstance(figure, Label):
+            return scene.add_label(name, figure.text, anchor="bottom-center", font_screen_scale=0.9)
+        return self._make_tool(name, figure)
+
+    def _make_tool(self, name: str, tool: Tool) -> Any:
+        scene, opacity = self._client.scene, None if tool.opacity >= 1 else tool.opacity
+        root = scene.add_frame(name, show_axes=False)
+        scene.add_icosphere(
+            f"{name}/ball",
+            tool.radius,
+            colours.TOOL,
+            subdivisions=4,
+            cast_shadow=False,
+            opacity=opacity,
+        )
+        scene.add_cylinder(
+            f"{name}/shaft",
+            0.36 * tool.radius,
+            SHAFT,
+            colours.TOOL,
+            radial_segments=24,
+            cast_shadow=False,
+            opacity=opacity,
+            position=(0.0, 0.0, SHAFT / 2),
+        )
+        return root
+
+
+def _mould(figure: Figure) -> tuple[Any, ...]:
+    """What cannot be changed in a node that is there: where it differs, the node is made anew."""
+    if isinstance(figure, Cloud):
+        return (Cloud, figure.points.shape, figure.colour)
+    if isinstance(figure, Mesh):
+        return (Mesh, figure.colour, figure.opacity)
+    if isinstance(figure, Lines):
+        return (
+            Lines,
+            figure.segments.shape,
+            figure.width,
+            figure.colour if isinstance(figure.colour, tuple) else None,
+        )
+    if isinstance(figure, Label):
+        return (Label, figure.text)
+    return (Tool, figure.radius, figure.opacity)

@@ -1,0 +1,122 @@
+"""The inner viser server: listens on a free loopback port only, and tells which page each browser
+connection belongs to.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+from palpate.app.scene.registration_scene import PairScene, Ray, ViserPairScene
+from palpate.app.scene.viewer_scene import Scene, ViserScene
+from palpate.app.scene.viewpoint import FIELD_OF_VIEW
+
+if TYPE_CHECKING:
+    from viser import ClientHandle, ViserServer
+
+__all__ = ["BY_HAND", "Audience", "Stage"]
+
+BY_HAND = "-register"
+"""Ends the name under which a page's scene of manual registration connects."""
+S = TypeVar("S")
+
+
+@dataclass(frozen=True)
+class Audience(Generic[S]):
+    """Whom to tell of a scene of a page that opened, and that closed; from the viewer's threads."""
+
+    joined: Callable[[str, S], None]
+    gone: Callable[[str, S], None]
+
+    def join(self, page: str, scene: S) -> Callable[[], None]:
+        """Tell of a scene; what is returned tells of its end."""
+        self.joined(page, scene)
+        return lambda: self.gone(page, scene)
+
+
+class Stage:
+    """Owns the viser server: tells `show` of scenes of a page's replays, and `pairs` of those in
+    which it registers by hand.
+    """
+
+    def __init__(
+        self, show: Audience[Scene], pairs: Audience[PairScene], clicked: Callable[[str, Ray], None]
+    ) -> None:
+        import viser
+
+        with contextlib.redirect_stdout(
+            io.StringIO()
+        ):  # it prints its inner address, which is of no use to anybody
+            self._server: ViserServer = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        # A browser may close while its scene is drawn: nothing is lost, and nobody need read of it.
+        warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
+        self._server.request_share_url = lambda *_, **__: None  # type: ignore[method-assign]
+        self._left: dict[int, Callable[[], None]] = {}
+        self._furnish()
+
+        @self._server.on_client_connect
+        def _(client: ClientHandle) -> None:
+            page = self._page_of(client.client_id)
+            if page.endswith(BY_HAND):
+                page = page.removesuffix(BY_HAND)
+                self._left[client.client_id] = pairs.join(
+                    page, ViserPairScene(client, lambda ray: clicked(page, ray))
+                )
+            else:
+                self._left[client.client_id] = show.join(page, ViserScene(client))
+
+        @self._server.on_client_disconnect
+        def _(client: ClientHandle) -> None:
+            left = self._left.pop(client.client_id, None)
+            if left is not None:
+                left()
+
+    @property
+    def port(self) -> int:
+        """The inner port; only the relay knows it."""
+        return int(self._server.get_port())
+
+    def close(self) -> None:
+        """Stop the server."""
+        self._server.stop()
+
+    def _page_of(self, client_id: int) -> str:
+        """The last part of the path the relay connected with (private attributes: pinned to viser
+        1.1.1).
+        """
+        connection = self._server._websock_server._live_connections[client_id]
+        return connection.request.path.strip("/") if connection.request is not None else ""
+
+    def _furnish(self) -> None:
+        server = self._server
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        server.scene.set_up_direction("+z")
+        server.scene.configure_environment_map(hdri=None)
+        # Mostly ambient light, so that every side shows the colours of the legend; two soft lamps
+        # give the shape.
+        server.scene.configure_default_lights(False)
+        server.scene.add_light_ambient("/lamps/around", intensity=1.9)
+        server.scene.add_light_directional("/lamps/above", intensity=1.2, position=(0.1, -0.2, 1.0))
+        server.scene.add_light_directional("/lamps/side", intensity=0.7, position=(-1.0, 0.6, 0.4))
+        server.scene.add_grid(
+            "/table",
+            0.24,
+            0.24,
+            cell_size=0.01,
+            section_size=0.05,
+            cell_color=(138, 145, 156),
+            section_color=(128, 135, 146),
+            cell_thickness=0.35,
+            section_thickness=0.7,
+            fade_distance=0.6,
+            position=(0.0, 0.0, -0.0004),
+            shadow_opacity=0.0,
+        )
+        server.initial_camera.position = (0.09, -0.17, 0.15)
+        server.initial_camera.look_at = (0.0, 0.0, 0.02)
+        server.initial_camera.fov = FIELD_OF_VIEW
+        server.initial_camera.near = 0.001

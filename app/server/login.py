@@ -1,0 +1,158 @@
+"""Who is logged in: session cookies, bearer tokens, and how often a wrong token may be tried."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import hmac
+import secrets
+import time
+from collections.abc import Callable, Mapping
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import parse_qs
+
+from fastapi import APIRouter, Request
+from fastapi.responses import FileResponse, JSONResponse, RedirectResponse, Response
+
+from palpate.app.server.tokens import Token
+
+__all__ = ["Login", "router"]
+
+COOKIE = "palpate_session"
+INSIDE = "palpate_inside"  # tells the page that there is something to log out of; opens nothing
+LASTS = 12 * 3600.0  # [s] that a session is good for
+TRIES, WINDOW = 5, 60.0  # so many wrong tokens from one address within so many seconds
+router = APIRouter(include_in_schema=False)
+
+
+class Login:
+    """The sessions of one server. They live in memory: a restart logs everybody out."""
+
+    def __init__(self, token: Token, clock: Callable[[], float] = time.monotonic) -> None:
+        self._token = token
+        self._clock = clock
+        self._sessions: dict[str, float] = {}
+        self._wrong: dict[str, list[float]] = {}
+        self._key = secrets.token_bytes(32)
+        self._known = b""  # keyed digest of the right token once it was shown, so that a bearer costs no scrypt each time
+
+    async def welcome(self, headers: Mapping[str, str], peer: str) -> bool:
+        """Whether a request with these headers comes from somebody who is logged in."""
+        if self._sessions.get(_digest(session_of(headers)), -1.0) > self._clock():
+            return True
+        scheme, _, text = headers.get("authorization", "").partition(" ")
+        return scheme.lower() == "bearer" and await self.right(text.strip(), peer)
+
+    async def right(self, text: str, peer: str) -> bool:
+        """Whether this is the token; while an address is throttled no new token of it is even
+        looked at.
+        """
+        fingerprint = hmac.digest(self._key, text.encode(), "sha256")
+        if hmac.compare_digest(fingerprint, self._known):
+            return True
+        if self.wait(peer):
+            return False
+        tried = self._wrong.setdefault(peer, [])
+        tried.append(
+            self._clock()
+        )  # counted before it is compared, so that many at once are not let through
+        if not await asyncio.to_thread(self._token.matches, text):
+            return False
+        self._known = fingerprint
+        self._wrong.pop(peer, None)
+        return True
+
+    def wait(self, peer: str) -> float:
+        """For how long [s] tokens from this address are refused."""
+        now = self._clock()
+        self._wrong = {
+            who: [when for when in times if when > now - WINDOW]
+            for who, times in self._wrong.items()
+            if times
+        }
+        times = self._wrong.get(peer, [])
+        return times[-TRIES] + WINDOW - now if len(times) >= TRIES else 0.0
+
+    def begin(self) -> str:
+        """A new session; its name goes to the browser, only its digest stays here."""
+        now, name = self._clock(), secrets.token_urlsafe(32)
+        self._sessions = {kept: end for kept, end in self._sessions.items() if end > now}
+        self._sessions[_digest(name)] = now + LASTS
+        return name
+
+    def end(self, name: str) -> None:
+        """Forget a session."""
+        self._sessions.pop(_digest(name), None)
+
+
+def session_of(headers: Mapping[str, str]) -> str:
+    """The session that the cookie names, empty if none."""
+    try:
+        found = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
+    except CookieError:
+        return ""
+    return found.value if found else ""
+
+
+@router.get("/login")
+def page(request: Request) -> FileResponse:
+    """The page that asks for the token."""
+    return FileResponse(
+        request.app.state.settings.static / "login.html", headers={"cache-control": "no-store"}
+    )
+
+
+@router.post("/login")
+async def enter(request: Request) -> Response:
+    """The token for a session. It always leads to the page and nowhere else: there is no address to
+    be led to.
+    """
+    login: Login | None = request.app.state.login
+    if login is None:
+        return RedirectResponse("/", status_code=303)
+    peer = request.client.host if request.client else ""
+    form = parse_qs((await request.body()).decode("utf-8", "replace"))
+    if wait := login.wait(peer):
+        return _refused(
+            request,
+            429,
+            f"too many wrong tokens; try again in {wait:.0f} s",
+            {"retry-after": f"{wait:.0f}"},
+        )
+    if not await login.right(form.get("token", [""])[0].strip(), peer):
+        return _refused(
+            request,
+            401,
+            "this is not the token that palpate serve printed; --new-token makes another",
+            {},
+        )
+    answer = RedirectResponse("/", status_code=303)
+    secure = request.url.scheme == "https"
+    answer.set_cookie(
+        COOKIE, login.begin(), max_age=int(LASTS), httponly=True, samesite="strict", secure=secure
+    )
+    answer.set_cookie(INSIDE, "1", max_age=int(LASTS), samesite="strict", secure=secure)
+    return answer
+
+
+@router.post("/logout")
+def leave(request: Request) -> Response:
+    """End the session."""
+    if request.app.state.login is not None:
+        request.app.state.login.end(session_of(request.headers))
+    answer = RedirectResponse("/login", status_code=303)
+    answer.delete_cookie(COOKIE, httponly=True, samesite="strict")
+    answer.delete_cookie(INSIDE, samesite="strict")
+    return answer
+
+
+def _refused(request: Request, status: int, message: str, headers: dict[str, str]) -> Response:
+    if "text/html" in request.headers.get("accept", ""):
+        return RedirectResponse(f"/login?{'wait' if status == 429 else 'wrong'}", status_code=303)
+    return JSONResponse(
+        {"kind": "LoginError", "message": message, "where": {}}, status_code=status, headers=headers
+    )
+
+
+def _digest(name: str) -> str:
+    return hashlib.sha256(name.encode()).hexdigest()

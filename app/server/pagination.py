@@ -1,0 +1,40 @@
+"""Long lists by pages: `after` and `most` in the query, the whole number in a header, since a list
+stays a plain list.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, TypeVar
+
+from fastapi import Depends, Query, Response
+
+__all__ = ["TOTAL", "Page", "PageOf", "part_of"]
+
+TOTAL = "X-Total-Count"
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Page:
+    """Which part of a list: at most `most` rows from the `after`-th on."""
+
+    after: int
+    most: int
+
+
+def _page(
+    after: Annotated[int, Query(ge=0, le=10**9)] = 0,
+    most: Annotated[int, Query(ge=1, le=1000)] = 200,
+) -> Page:
+    return Page(after, most)
+
+
+PageOf = Annotated[Page, Depends(_page)]
+
+
+def part_of(rows: Sequence[T], page: Page, response: Response) -> Sequence[T]:
+    """The wanted part of a list, and in the answer's header of how many."""
+    response.headers[TOTAL] = str(len(rows))
+    return rows[page.after : page.after + page.most]

@@ -1,0 +1,184 @@
+"""How large a hidden effect is in units of what the experiment could just tell, by the report's own
+map.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.effects import Effect, effect_named
+from palpate.foundation.errors import EffectError
+from palpate.foundation.frames import Transform
+from palpate.setup.setup import Box, Material, Setup, Tool
+
+if TYPE_CHECKING:
+    from palpate.synthetic import HiddenEffect, Scenario
+
+__all__ = ["camera_pose", "size_over_limit"]
+
+_PROPORTIONAL = (
+    "specific_weight_over_stiffness",
+    "compliance_times_stiffness",
+    "log_ratio",
+    "relaxed_fraction",
+    "retained_fraction",
+)
+"""Parameters in proportion to which the surface moves, so that a share of what one size does is
+that share of the size."""
+_INVERSE = ("J_m", "stiffness_over_E")
+"""The same of their inverse: they are nothing where they are infinite."""
+_POWERS = {"extent": 5 / 3}
+"""Of the size in which the surface moves where it is not one: replays of a block pushed at four
+places, with a strip of a tenth to nine twentieths of its length detached along one edge, follow
+this power (1.5 to 1.8)."""
+_BESIDE = ("time_constant",)
+"""Parameters that say when something shows and not how strongly: a limit is stated at one of
+them."""
+
+
+def size_over_limit(
+    hidden: Sequence[HiddenEffect],
+    told: Sequence[Mapping[str, Any]],
+    scenario: Scenario,
+    camera_shift: Transform,
+) -> float | None:
+    """Size of what is hidden over its detection limit [1]; of two effects that of the fainter one.
+
+    Of several parameters the root of the squares' sum: each alone gains the bound at its limit, and
+    gains grow with the square. A lump's limit is that of the nearest place that was screened, for
+    the radius that was screened there, and a lump acts in proportion to its volume (Eshelby 1957);
+    a detached strip's is that of its edge; of other candidates the one that half of them reach.
+
+    Args:
+        told: the report's ambiguity map.
+        camera_shift: as the truth has it, phantom frame.
+
+    Returns:
+        None where nothing is hidden, where a word of it (a pairing) is not the believed one, which
+        has no size, or where the map gives no limit in terms of its parameters.
+    """
+    sizes = [_size(one, told, scenario, camera_shift) for one in hidden]
+    known = [size for size in sizes if size is not None]
+    return min(known) if known and len(known) == len(sizes) else None
+
+
+def _size(
+    hidden: HiddenEffect,
+    told: Sequence[Mapping[str, Any]],
+    scenario: Scenario,
+    camera_shift: Transform,
+) -> float | None:
+    row = next((row for row in told if row["effect"] == hidden.effect), None)
+    if row is None:
+        return None
+    try:
+        effect = effect_named(hidden.effect)
+    except EffectError:
+        return None
+    true, neutral = (
+        _true_values(hidden, scenario, camera_shift),
+        effect.neutral(_believed(scenario)).values(),
+    )
+    if any(
+        isinstance(value, str) and name != "edge" and value != neutral[name]
+        for name, value in hidden.parameters.items()
+    ):
+        return None
+    first, at = _nearest(row, hidden)
+    parts = [_part(limit, at, effect, true, neutral) for limit in [first, *row["limits"][1:]]]
+    known = [part for part in parts if part is not None]
+    return round(math.hypot(*known), 3) if len(known) == len(parts) else None
+
+
+def camera_pose(shift: Transform, size: Sequence[float]) -> dict[str, float]:
+    """A camera's shift in the phantom frame as the motion about the middle of a block of this size
+    [m] that a diagnosis fits.
+
+    A turn about the base's centre moves the middle, too: by half a millimetre where it is 0.03.
+    """
+    middle = np.array([0.0, 0.0, size[2] / 2])
+    step = shift.apply(middle) - middle
+    return dict(
+        zip(
+            ("tx", "ty", "tz", "rx", "ry", "rz"),
+            [*step.tolist(), *shift.rotation_vector.tolist()],
+            strict=True,
+        )
+    )
+
+
+def _nearest(
+    row: Mapping[str, Any], hidden: HiddenEffect
+) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+    """The first limit of the place or edge that is nearest to what is hidden, and the fixed
+    parameters there.
+    """
+
+    def far(at: Mapping[str, Any]) -> float:
+        if "edge" in at:
+            return float(at["edge"]["value"] != hidden.parameters["edge"])
+        return math.dist(
+            [at[name]["value"] for name in "xyz"], [hidden.value(name) for name in "xyz"]
+        )
+
+    each = [one for one in row.get("each", []) if "x" in one["at"] or "edge" in one["at"]]
+    best = min(
+        each, key=lambda one: far(one["at"]), default={"limit": row["typical"], "at": row["at"]}
+    )
+    return best["limit"], best["at"]
+
+
+def _part(
+    limit: Mapping[str, Any],
+    at: Mapping[str, Any],
+    effect: type[Effect],
+    true: Mapping[str, float],
+    neutral: Mapping[str, float | str],
+) -> float | None:
+    if "share" in limit:
+        strengths = [name for name in at if name not in (*_BESIDE, "edge")]
+        name = strengths[0] if len(strengths) == 1 else ""
+        if name not in (*_PROPORTIONAL, *_INVERSE, *_POWERS) or limit["share"] is None:
+            return None
+        if name in _INVERSE:
+            return float(at[name]["value"] / true[name]) / float(limit["share"])
+        here, there = true[name] - float(neutral[name]), at[name]["value"] - float(neutral[name])
+        return float(abs(here / there) ** _POWERS.get(name, 1.0)) / float(limit["share"])
+    item = next(item for item in effect.numbers() if item.name == limit["parameter"])
+    far = abs(item.coordinate(true[item.name]) - item.coordinate(float(neutral[item.name])))
+    least = limit["factor"] if "factor" in limit else limit["change"]
+    if least is None:
+        return 0.0
+    volume = (true["radius"] / at["radius"]["value"]) ** 3 if "radius" in at else 1.0
+    return float(
+        volume
+        * far
+        / (item.coordinate(least) - item.coordinate(1.0) if "factor" in limit else least)
+    )
+
+
+def _believed(scenario: Scenario) -> Setup:
+    material = Material(young_modulus=scenario.young_modulus, poisson_ratio=scenario.poisson_ratio)
+    return Setup(
+        geometry=Box(size=scenario.size),
+        tool=Tool(radius=scenario.tool_radius),
+        material=material,
+        mass=scenario.mass,
+    )
+
+
+def _true_values(
+    hidden: HiddenEffect, scenario: Scenario, camera_shift: Transform
+) -> dict[str, float]:
+    """Numbers of the truth by the names of the parameters that are fitted."""
+    if hidden.effect == "camera_registration":
+        return camera_pose(camera_shift, scenario.size)
+    return {
+        name: float(value)
+        for name, value in hidden.parameters.items()
+        if not isinstance(value, str)
+    }

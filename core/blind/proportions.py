@@ -1,0 +1,75 @@
+"""Shares and medians with their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from scipy.stats import binomtest, quantile_test
+
+__all__ = ["CONFIDENCE", "Measured", "median_of", "rate", "share_of"]
+
+T = TypeVar("T")
+CONFIDENCE = 0.95
+"""Of all intervals of the summary; those of parameters have the level that the report states."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A figure from n cases with its interval, which is None where there are too few; `hits` of a
+    share.
+    """
+
+    value: float | None
+    low: float | None
+    high: float | None
+    n: int
+    hits: int | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        counted = {"hits": self.hits} if self.hits is not None else {}
+        return {
+            "value": _plain(self.value),
+            "low": _plain(self.low),
+            "high": _plain(self.high),
+            **counted,
+            "n": self.n,
+        }
+
+
+def rate(hits: int, n: int) -> Measured:
+    """A share [1] with the interval of Clopper and Pearson (1934)."""
+    if n == 0:
+        return Measured(None, None, None, 0, 0)
+    ends = binomtest(hits, n).proportion_ci(CONFIDENCE, method="exact")
+    return Measured(hits / n, float(ends.low), float(ends.high), n, hits)
+
+
+def share_of(results: Iterable[T], holds: Callable[[T], bool]) -> Measured:
+    """In how many of the results it holds."""
+    answers = [holds(result) for result in results]
+    return rate(sum(answers), len(answers))
+
+
+def median_of(values: Sequence[float]) -> Measured:
+    """A median with the interval between two order statistics (binomial, no assumption on the
+    distribution).
+    """
+    if not values:
+        return Measured(None, None, None, 0)
+    middle = float(np.median(values))
+    ends: Any = quantile_test(values, p=0.5, q=middle).confidence_interval(
+        CONFIDENCE
+    )  # the stubs call it a float
+    return Measured(middle, _finite(ends.low), _finite(ends.high), len(values))
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _plain(value: float | None) -> float | None:
+    return None if value is None else float(f"{value:.6g}")

@@ -1,0 +1,216 @@
+"""The suite at work: one process for each case, results on disk as they come, nothing left behind
+when it is stopped.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from palpate.blind.case_results import RESULTS_FILE, Result, add_result, read_results
+from palpate.blind.cases import Case, scenario_of
+from palpate.foundation.errors import RunError
+from palpate.foundation.processes import bound_to
+from palpate.foundation.progress import Report, silent
+from palpate.foundation.source_digest import source_digest
+
+__all__ = ["source_digest", "known_results", "run_case", "run_suite"]
+
+Run = Callable[[Case, Path], Result]
+_PATIENCE = 5.0
+"""A process that was told to end gets this long [s] before it is killed."""
+
+
+def run_suite(
+    folder: Path,
+    cases: Sequence[Case],
+    workers: int,
+    report: Report = silent,
+    *,
+    any_version: bool = False,
+    again: bool = False,
+    run: Run | None = None,
+) -> list[Result]:
+    """The results of all cases, in their order; those in `folder`/results.jsonl are taken from
+    there, new ones are added to it.
+
+    Args:
+        workers: cases at the same time.
+        any_version: whether results of other versions of the code are taken, too; without it they
+            are a RunError.
+        again: whether cases that ended in an error are done again.
+        run: what does one case.
+
+    Raises RunError where a result of the same name is of another case.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / RESULTS_FILE
+    read_results(file, mend=True)
+    known = {
+        one.name: one
+        for one in known_results(folder, cases, any_version)
+        if not (again and one.error)
+    }
+    wanted = [case for case in cases if case.name not in known]
+    done = len(cases) - len(wanted)
+    report(done / max(1, len(cases)), f"{done} of {len(cases)} were there already")
+    place = Path(tempfile.mkdtemp(prefix=".making-", dir=folder))
+    try:
+        for result in _outcomes(wanted, place, workers, run or run_case):
+            known[result.name] = result
+            add_result(file, result)
+            done += 1
+            report(done / len(cases), f"{result.name}: {result.verdict}")
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+    return [known[case.name] for case in cases]
+
+
+def known_results(folder: Path, cases: Sequence[Case], any_version: bool = False) -> list[Result]:
+    """Those of these cases that are done, in their order; of two of one name the later. RunError as
+    from `run_suite`.
+    """
+    file = folder / RESULTS_FILE
+    wanted, digest = {case.name: case for case in cases}, source_digest()
+    known: dict[str, Result] = {}
+    for result in read_results(file):
+        case = wanted.get(result.name)
+        if case is None:
+            continue
+        if result.case != case:
+            text = f"{file}: {result.name} was {result.case}, now it is {case}; name another folder, or remove the row"
+            raise RunError(text, case=result.name)
+        if result.code != digest and not any_version:
+            text = (
+                f"{file}: {result.name} was made by version {result.code or 'unknown'} of the code, this is {digest}; "
+                "name another folder, or allow any version: the summary then says which there are"
+            )
+            raise RunError(text, case=result.name)
+        known[result.name] = result
+    return [known[case.name] for case in cases if case.name in known]
+
+
+def run_case(case: Case, folder: Path, kept: Path | None = None) -> Result:
+    """Make the dataset, diagnose it without a look at the truth, and compare; nothing but the
+    result is kept.
+
+    In `kept`, where it is given, datasets/CASE and runs/CASE stay instead, the run with replays and
+    controls as of any diagnosis.
+
+    Whatever goes wrong on the way is a result, too: with the error, and counted as wrong.
+    """
+    from palpate.dataset import open_dataset
+    from palpate.diagnosis.pipeline import diagnose
+    from palpate.synthetic import make_dataset
+
+    place, doing, began, seconds = (
+        kept or folder / case.name,
+        "making the dataset",
+        time.monotonic(),
+        0.0,
+    )
+    dataset, run, whole = (
+        place / "datasets" / case.name,
+        place / "runs" / case.name,
+        kept is not None,
+    )
+    hidden: list[dict[str, Any]] = []
+    outside: list[dict[str, Any]] = []
+    try:
+        scenario = scenario_of(case)
+        for older in (dataset, run):
+            shutil.rmtree(older, ignore_errors=True)
+        made = make_dataset(dataset, scenario, case.seed)
+        hidden, outside = _truth(made, scenario.size)
+        doing, began = "diagnosing it", time.monotonic()
+        said = diagnose(open_dataset(dataset), run, workers=1, replays=whole, assurance=whole)
+        seconds = round(time.monotonic() - began, 1)
+    except Exception as error:  # any one: 200 cases must not end with it
+        return Result(
+            case,
+            hidden,
+            outside=outside,
+            seconds=seconds,
+            code=source_digest(),
+            error=f"{doing}: {type(error).__name__}: {error}",
+        )
+    finally:
+        if not whole:
+            shutil.rmtree(place, ignore_errors=True)
+    from palpate.blind.effect_sizes import size_over_limit
+
+    told = said.pop("ambiguity_map", [])
+    size = size_over_limit(made.effects, told, scenario, made.camera_shift)
+    said["ambiguity_map"] = [row for row in told if row["effect"] in case.hidden]
+    return Result(case, hidden, said, outside, size, seconds, source_digest())
+
+
+def _truth(made: Any, size: Sequence[float]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Hidden effects and disturbances; a camera's pose in the terms of a report."""
+    from palpate.blind.effect_sizes import camera_pose
+
+    described = made.as_dict()
+    for entry in described["effects"]:
+        if entry["effect"] == "camera_registration":
+            pose = camera_pose(made.camera_shift, size)
+            entry["parameters"] |= {
+                name: {"value": value, "unit": "m" if name[0] == "t" else "rad"}
+                for name, value in pose.items()
+            }
+    return described["effects"], described.get("disturbances", [])
+
+
+def _outcomes(cases: Sequence[Case], place: Path, workers: int, run: Run) -> Iterator[Result]:
+    """Results as they come. Each case has a process of its own, so that one that dies takes no
+    other along.
+    """
+    context, waiting = get_context("forkserver"), deque(cases)
+    context.set_forkserver_preload(["palpate.blind"])
+    running: dict[Future[Result], tuple[Case, ProcessPoolExecutor]] = {}
+    try:
+        while waiting or running:
+            while waiting and len(running) < workers:
+                case, pool = (
+                    waiting.popleft(),
+                    ProcessPoolExecutor(1, context, bound_to, (os.getpid(),)),
+                )
+                running[pool.submit(run, case, place)] = (case, pool)
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                case, pool = running.pop(future)
+                result = _result(future, case)
+                pool.shutdown()
+                yield result
+    finally:
+        for _, pool in running.values():
+            _end(pool)
+
+
+def _result(future: Future[Result], case: Case) -> Result:
+    try:
+        return future.result()
+    except BrokenProcessPool:
+        error = "its process was ended from outside, or by running out of memory"
+    except Exception as problem:
+        error = f"{type(problem).__name__}: {problem}"
+    return Result(case, code=source_digest(), error=error)
+
+
+def _end(pool: ProcessPoolExecutor) -> None:
+    """Stop what still runs, and wait until it has."""
+    processes = list((pool._processes or {}).values())
+    pool.shutdown(wait=False, cancel_futures=True)
+    for process in processes:
+        process.terminate()
+    for process in processes:
+        process.join(_PATIENCE)
+        if process.is_alive():
+            process.kill()

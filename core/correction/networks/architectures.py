@@ -1,0 +1,260 @@
+"""The networks: a U-Net over the top layer or the volume (Wu, Kazanzides and Unberath 2020), and a
+graph network on any mesh.
+
+All take vertices (b, v, 3) [m] and what is known of the tool (b, t), and return corrected vertices.
+What a network says is squashed by tanh and bounded to `trust` voxels along each axis, so that it
+can only correct the simulation and never replace it. The last layer begins at zero: an untrained
+network leaves the simulation as it is.
+
+The graph network is in plain torch. It needs one gather and one sum over neighbours (`index_add_`),
+which torch has on all devices and, where asked for, deterministically; torch-geometric would bring
+four packages for these two lines.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, Self, get_args
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from palpate.correction.networks.unet import UNet
+from palpate.correction.samples.corrected_points import Body
+from palpate.foundation.errors import CorrectionError
+
+__all__ = ["TOOL_INPUTS", "CorrectionNetwork", "GraphNet", "NetworkSpec", "build"]
+
+Kind = Literal["unet2d", "unet3d", "graph"]
+TOOL_INPUTS: dict[str, tuple[int, ...]] = {
+    "pose": tuple(range(7)),
+    "velocity": (7, 8, 9),
+    "force": (10, 11, 12),
+}
+"""Columns of what samples hold of the tool: position [m] and quaternion, velocity [m/s], contact
+force [N]; phantom frame."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NetworkSpec:
+    """A network by its numbers.
+
+    Attributes:
+        kind: unet2d over the top layer, unet3d over the volume, graph over the neighbours of any
+            mesh.
+        features: of the blocks from fine to coarse; a graph network has the last one, in as many
+            rounds of messages as there are blocks.
+        trust: how far the simulation may be corrected along each axis, in voxels.
+        inputs: of TOOL_INPUTS.
+    """
+
+    kind: Kind = "unet2d"
+    features: tuple[int, ...] = (64, 128, 256)
+    trust: float = 0.5
+    inputs: tuple[str, ...] = ("pose",)
+
+    def __post_init__(self) -> None:
+        if self.kind not in get_args(Kind):
+            raise CorrectionError(
+                f"kind = {self.kind!r}; expected one of {', '.join(get_args(Kind))}",
+                key="kind",
+                value=self.kind,
+            )
+        if not self.features or min(self.features) < 1:
+            raise CorrectionError(
+                f"features = {self.features}; expected positive numbers", key="features"
+            )
+        if not 0 < self.trust <= 10:
+            raise CorrectionError(
+                f"trust = {self.trust:g} voxels; expected 0 to 10", key="trust", value=self.trust
+            )
+        for name in self.inputs:
+            if name not in TOOL_INPUTS:
+                raise CorrectionError(
+                    f"input {name!r}; expected one of {', '.join(TOOL_INPUTS)}",
+                    key="inputs",
+                    value=name,
+                )
+
+    @property
+    def columns(self) -> list[int]:
+        """Of the tool's description, those that are seen."""
+        return [column for name in self.inputs for column in TOOL_INPUTS[name]]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return {**asdict(self), "features": list(self.features), "inputs": list(self.inputs)}
+
+    @classmethod
+    def from_json(cls, data: dict[str, Any]) -> Self:
+        """The inverse; what is left out has its default."""
+        plain: dict[str, Any] = {
+            **data,
+            **{key: tuple(data[key]) for key in ("features", "inputs") if key in data},
+        }
+        return cls(**plain)
+
+
+class GraphNet(nn.Module):
+    """Rounds of messages along edges (Battaglia et al. 2018).
+
+    A message is what both ends and the edge add up to, rectified; what a vertex hears is their mean
+    through one more layer. All products of matrices are so on the vertices, of which there are a
+    fifth as many as edges.
+
+    Args:
+        vertex, edge: numbers that describe each at the beginning.
+        features: of a state.
+        rounds: of messages.
+    """
+
+    def __init__(self, vertex: int, edge: int, features: int, rounds: int) -> None:
+        super().__init__()
+        self.first = nn.Sequential(nn.Linear(vertex, features), nn.ReLU())
+        self.rounds = nn.ModuleList(_Round(features, edge) for _ in range(rounds))
+        self.last = nn.Linear(features, 3)
+
+    def forward(self, vertices: Tensor, along: Tensor, edges: Tensor, share: Tensor) -> Tensor:
+        """(b, v, 3) from vertices (b, v, n), edges' own numbers (b, e, m), their ends (2, e) and 1
+        / neighbours (v, 1).
+        """
+        state = self.first(vertices)
+        for step in self.rounds:
+            state = state + step(state, along, edges, share)
+        return torch.as_tensor(self.last(state))
+
+
+class _Round(nn.Module):
+    def __init__(self, features: int, edge: int) -> None:
+        super().__init__()
+        self.source, self.target = (
+            nn.Linear(features, features),
+            nn.Linear(features, features, bias=False),
+        )
+        self.edge = nn.Linear(edge, features, bias=False)
+        self.update = nn.Sequential(
+            nn.Linear(2 * features, features), nn.ReLU(), nn.Linear(features, features)
+        )
+
+    def forward(self, state: Tensor, along: Tensor, edges: Tensor, share: Tensor) -> Tensor:
+        source, target = (
+            part(state).index_select(1, end)
+            for part, end in zip((self.source, self.target), edges, strict=True)
+        )
+        sent = torch.relu(source + target + self.edge(along))
+        heard = torch.zeros_like(state).index_add(1, edges[1], sent.to(state.dtype)) * share
+        return torch.as_tensor(self.update(torch.cat([state, heard], dim=2)))
+
+
+class CorrectionNetwork(nn.Module):
+    """Vertices and tool in, corrected vertices out, for one body.
+
+    The tool's place is seen as a share of the body's extent, and displacements, velocity and force
+    by what is usual in the samples (`measure_by`), which is kept with the weights. The place is
+    not: pushes in one spot have next to no spread, and any other spot would lie a hundred
+    deviations away.
+    """
+
+    rest: Tensor
+    bound: Tensor
+    tool_middle: Tensor
+    tool_scale: Tensor
+    spread: Tensor
+    place: Tensor
+    extent: Tensor
+    edges: Tensor
+    share: Tensor
+    along: Tensor
+
+    def __init__(self, spec: NetworkSpec, body: Body) -> None:
+        super().__init__()
+        self.spec, self.grid, self._columns = spec, body.grid, spec.columns
+        count = len(spec.columns)
+        middle, half = body.rest.mean(axis=0), np.maximum(np.ptp(body.rest, axis=0) / 2, body.voxel)
+        self._keep("rest", body.rest)
+        self._keep("bound", spec.trust * body.voxel)
+        self._keep("place", (body.rest - middle) / half)
+        self._keep("extent", half)
+        self._keep("tool_middle", np.concatenate([middle, np.zeros(10)])[spec.columns])
+        self._keep(
+            "tool_scale",
+            np.concatenate([half, np.ones(4), np.full(3, 0.01), np.ones(3)])[spec.columns],
+        )
+        self._keep("spread", np.array(float(body.voxel.mean()) / 4))
+        self.inside: UNet | GraphNet
+        if spec.kind == "graph":
+            neighbours = np.bincount(body.edges[1], minlength=len(body.rest))
+            self.register_buffer(
+                "edges", torch.as_tensor(body.edges.astype(np.int64)), persistent=False
+            )
+            self._keep("share", 1.0 / np.maximum(neighbours, 1)[:, None])
+            lengths = np.linalg.norm(body.rest[body.edges[0]] - body.rest[body.edges[1]], axis=1)
+            self._keep("along", lengths[:, None] / half.mean())
+            # Displacement, place at rest, the way to the tool, and the tool itself.
+            self.inside = GraphNet(3 + 3 + 3 + count, 4, spec.features[-1], len(spec.features))
+        else:
+            self.inside = UNet(body.grid or (), 3, count, spec.features)
+        for parameter in self.inside.last.parameters():
+            nn.init.zeros_(parameter)
+
+    def _keep(self, name: str, values: Any) -> None:
+        self.register_buffer(name, torch.as_tensor(np.asarray(values, dtype=np.float32)))
+
+    def measure_by(self, velocity: float, force: float, displacement: float) -> None:
+        """What is usual, RMS along an axis: the tool's velocity [m/s], its force [N], displacements
+        of the points [m].
+        """
+        scale = self.tool_scale.new_ones(13)
+        scale[self._columns] = self.tool_scale
+        scale[7:10], scale[10:] = max(velocity, 1e-4), max(force, 1e-9)
+        self.tool_scale.copy_(scale[self._columns])
+        self.spread.fill_(max(displacement, 1e-5))
+
+    def forward(self, vertices: Tensor, tool: Tensor) -> Tensor:
+        """Corrected vertices (b, v, 3) [m] of simulated ones (b, v, 3) [m], and the tool (b, 13) of
+        TOOL_INPUTS.
+        """
+        moved = (vertices - self.rest) / self.spread
+        known = (tool[:, self._columns] - self.tool_middle) / self.tool_scale
+        said = (
+            self._graph(vertices, moved, tool, known)
+            if self.grid is None or self.spec.kind == "graph"
+            else self._grid(moved, known)
+        )
+        return vertices + torch.tanh(said.to(vertices.dtype)) * self.bound
+
+    def _grid(self, moved: Tensor, known: Tensor) -> Tensor:
+        axes = len(self.grid or ())
+        volume = moved.reshape(len(moved), *reversed(self.grid or ()), 3)
+        order = (0, axes + 1, *range(axes, 0, -1))
+        back = (0, *range(axes + 1, 1, -1), 1)
+        said: Tensor = self.inside(volume.permute(order), known)
+        return said.permute(back).reshape(moved.shape)
+
+    def _graph(self, vertices: Tensor, moved: Tensor, tool: Tensor, known: Tensor) -> Tensor:
+        to_tool = (tool[:, None, :3] - vertices) / self.extent
+        everywhere = known[:, None].expand(-1, vertices.shape[1], -1)
+        place = self.place.expand(len(vertices), -1, -1)
+        strain = moved.index_select(1, self.edges[0]) - moved.index_select(1, self.edges[1])
+        along = torch.cat([strain, self.along.expand(len(vertices), -1, -1)], dim=2)
+        said: Tensor = self.inside(
+            torch.cat([moved, place, to_tool, everywhere], dim=2), along, self.edges, self.share
+        )
+        return said
+
+
+def build(spec: NetworkSpec, body: Body, seed: int = 0) -> CorrectionNetwork:
+    """A network, its first weights by this seed whatever was drawn before; CorrectionError where
+    the kind does not fit the body.
+    """
+    axes = {"unet2d": 2, "unet3d": 3}.get(spec.kind)
+    if axes is not None and (body.grid is None or len(body.grid) != axes):
+        shape = "no grid" if body.grid is None else f"a grid of {len(body.grid)} axes"
+        raise CorrectionError(
+            f"{spec.kind} corrects a grid of {axes} axes, this body is {shape}; take kind graph",
+            key="kind",
+        )
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        return CorrectionNetwork(spec, body)

@@ -1,0 +1,64 @@
+"""The arrays of one sequence's samples while they are written: row by row, none held whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.foundation.arrays import FloatArray
+
+__all__ = ["ARRAYS", "Arrays"]
+
+ARRAYS: dict[str, Any] = {
+    "positions": np.float32,
+    "tool": np.float32,
+    "points": np.float32,
+    "count": np.int32,
+    "time": np.float64,
+    "frame": np.int64,
+    "probe": np.int64,
+}
+"""By name, with the type of their numbers; what they hold says
+`palpate.correction.samples.sample_store`."""
+_CHUNK = 256
+
+
+class Arrays:
+    """Of one sequence in a folder that is there: `rows` at most, cut to their number at the end."""
+
+    def __init__(self, folder: Path, rows: int, vertices: int, points: int) -> None:
+        shapes: dict[str, tuple[int, ...]] = {
+            "positions": (vertices, 3),
+            "tool": (13,),
+            "points": (points, 3),
+            "count": (2,),
+        }
+        self._folder, self._arrays = folder, {}
+        for name, kind in ARRAYS.items():
+            shape = (rows, *shapes.get(name, ()))
+            self._arrays[name] = np.lib.format.open_memmap(
+                folder / f"{name}.part.npy", "w+", kind, shape
+            )
+
+    def put(self, row: int, points: FloatArray, **values: Any) -> None:
+        """Fill a row; what there are no points for is NaN."""
+        self._arrays["points"][row, : len(points)], self._arrays["points"][row, len(points) :] = (
+            points,
+            np.nan,
+        )
+        for name, value in values.items():
+            self._arrays[name][row] = value
+
+    def close(self, rows: int) -> None:
+        """Keep the first rows, under the arrays' own names."""
+        for name, array in self._arrays.items():
+            whole = np.lib.format.open_memmap(
+                self._folder / f"{name}.npy", "w+", array.dtype, (rows, *array.shape[1:])
+            )
+            for start in range(0, rows, _CHUNK):
+                whole[start : start + _CHUNK] = array[start : min(start + _CHUNK, rows)]
+            whole.flush()
+            (self._folder / f"{name}.part.npy").unlink()
+        self._arrays = {}

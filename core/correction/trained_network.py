@@ -1,0 +1,76 @@
+"""A network that was trained, with the body it corrects and where both come from; one file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import torch
+
+from palpate.correction.checkpoint import load, save
+from palpate.correction.networks.architectures import CorrectionNetwork, NetworkSpec, build
+from palpate.correction.samples.corrected_points import Body
+from palpate.foundation.errors import RunError
+
+__all__ = ["FILE", "Trained"]
+
+FILE = "network.pt"
+_FORMAT = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Trained:
+    """A network in evaluation mode.
+
+    Attributes:
+        network: takes vertices and tool.
+        body: what it corrects.
+        about: plain values: dataset, setup, split, training, history, and validation errors [mm]
+            before and after.
+    """
+
+    network: CorrectionNetwork
+    body: Body
+    about: dict[str, Any]
+
+    def save(self, folder: Path) -> Path:
+        """Write it to `folder`, whole or not at all."""
+        arrays = {
+            name: torch.as_tensor(value) if hasattr(value, "dtype") else value
+            for name, value in self.body.to_arrays().items()
+        }
+        content = {
+            "format": _FORMAT,
+            "spec": self.network.spec.to_json(),
+            "body": arrays,
+            "about": self.about,
+            "weights": {name: value.cpu() for name, value in self.network.state_dict().items()},
+        }
+        folder.mkdir(parents=True, exist_ok=True)
+        save(folder / FILE, content)
+        return folder / FILE
+
+    @classmethod
+    def load(cls, folder: Path, device: torch.device | str = "cpu") -> Self:
+        """From a folder or its file; RunError where there is none, or one of another format."""
+        path = folder if folder.suffix == ".pt" else folder / FILE
+        content = load(path, device)
+        if content.get("format") != _FORMAT:
+            raise RunError(
+                f"{path} is of format {content.get('format')}; expected {_FORMAT}: train again",
+                path=str(path),
+            )
+        arrays = {
+            name: value.numpy(force=True) if isinstance(value, torch.Tensor) else value
+            for name, value in content["body"].items()
+        }
+        body = Body.from_arrays(arrays)
+        network = build(NetworkSpec.from_json(content["spec"]), body).to(device)
+        try:
+            network.load_state_dict(content["weights"])
+        except RuntimeError as error:
+            raise RunError(
+                f"{path} was trained by another version ({error}); train again", path=str(path)
+            ) from None
+        return cls(network.eval(), body, content["about"])

@@ -1,0 +1,200 @@
+"""Tables of numbers as csv: fast where all is well, exact about the row where it is not.
+
+Rows are counted as an editor does: the header is row 1, the first numbers are row 2.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from palpate.dataset.files import problem, read_text
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import DatasetError
+
+__all__ = [
+    "FIRST_ROW",
+    "LARGEST_COORDINATE",
+    "check_coordinates",
+    "check_increasing",
+    "read_labelled",
+    "read_numbers",
+    "row_problems",
+]
+
+FIRST_ROW = 2
+LARGEST_COORDINATE = 10.0  # m; a bench is a metre across, so more is another unit
+LATEST = 1e11  # s; since 1970 it is 1.8e9 s, so more is another unit
+_LIMIT = 2**29
+_CHUNK = 20_000
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+
+def read_numbers(root: Path, file: str, header: str) -> FloatArray:
+    """All rows (n, columns), n >= 1, under exactly this header; every number finite."""
+    lines = _body(root, file, header)
+    columns = header.count(",") + 1
+    blocks = [
+        _block(file, lines[start : start + _CHUNK], header, FIRST_ROW + start)
+        for start in range(0, len(lines), _CHUNK)
+    ]
+    numbers = np.concatenate(blocks).reshape(-1, columns)
+    numbers.setflags(write=False)
+    return numbers
+
+
+def read_labelled(root: Path, file: str, header: str, label: int) -> tuple[list[str], FloatArray]:
+    """A table with one column of words (index `label`): the words, and the numbers (n, columns -
+    1).
+    """
+    names = header.split(",")
+    words: list[str] = []
+    numbers: list[list[float]] = []
+    for row, line in enumerate(_body(root, file, header), FIRST_ROW):
+        cells = _cells(file, line, header, row)
+        word = cells.pop(label)
+        if not word:
+            raise problem(
+                file,
+                f"an empty {names[label]}; expected a name: fill it in",
+                row=row,
+                key=names[label],
+            )
+        words.append(word)
+        keys = names[:label] + names[label + 1 :]
+        numbers.append(
+            [_number(file, cell, row, key) for cell, key in zip(cells, keys, strict=True)]
+        )
+    array = np.array(numbers)
+    array.setflags(write=False)
+    return words, array
+
+
+def row_problems(
+    root: Path, file: str, header: str, label: int | None = None, most: int = 20
+) -> list[DatasetError]:
+    """What is wrong with the rows of a table by themselves, one problem a row, at most so many;
+    `label` is a column of words.
+    """
+    found: list[DatasetError] = []
+    names = header.split(",")
+    try:
+        lines = _body(root, file, header)
+    except DatasetError as error:
+        return [error]
+    for row, line in enumerate(lines, FIRST_ROW):
+        try:
+            for place, cell in enumerate(_cells(file, line, header, row)):
+                if place != label:
+                    _number(file, cell, row, names[place])
+        except DatasetError as error:
+            found.append(error)
+        if len(found) == most:
+            break
+    return found
+
+
+def check_increasing(file: str, time: FloatArray) -> None:
+    """Refuse a time column (n,) [s] that stands still or goes back, or is not in seconds."""
+    if len(late := np.flatnonzero(np.abs(time) > LATEST)):
+        value = f"{time[late[0]]:g}"
+        text = f"t = {value} s; expected seconds, since any start: did you write milliseconds or nanoseconds?"
+        raise problem(file, text, row=int(late[0]) + FIRST_ROW, key="t", value=value)
+    bad = np.flatnonzero(np.diff(time) <= 0)
+    if len(bad):
+        at = int(bad[0])
+        before, after = repr(float(time[at])), repr(float(time[at + 1]))
+        text = f"t = {after} s does not increase (row {at + FIRST_ROW}: {before} s); sort the rows by time and keep each stamp once"
+        raise problem(file, text, row=at + 1 + FIRST_ROW, key="t", value=after)
+
+
+def check_coordinates(file: str, points: FloatArray, first_row: int = FIRST_ROW) -> None:
+    """Refuse positions (n, 3) [m] with a number that is not finite or lies further out than any
+    bench reaches.
+    """
+    within = np.abs(points) <= LARGEST_COORDINATE
+    if not within.all():
+        at, axis = (int(number) for number in np.argwhere(~within)[0])
+        value = float(points[at, axis])
+        found = f"{'xyz'[axis]} = {value:g}"
+        if math.isfinite(value):
+            advice = f" m; expected metres, at most {LARGEST_COORDINATE:g} m from the origin: did you write millimetres?"
+        else:
+            advice = "; expected a finite number of metres: leave out points and rows without a measurement"
+        raise problem(file, found + advice, row=at + first_row, key="xyz"[axis], value=f"{value:g}")
+
+
+def _body(root: Path, file: str, header: str) -> list[str]:
+    lines = read_text(root, file, _LIMIT).rstrip("\n ").split("\n")
+    found = ",".join(cell.strip() for cell in lines[0].split(","))
+    if found != header:
+        text = f"the header is '{found[:80]}'; expected '{header}': name and order the columns like this"
+        raise problem(file, text, row=1, value=found[:80])
+    if len(lines) == 1:
+        raise problem(
+            file,
+            "has a header but no rows; expected at least one: export this file again",
+            row=FIRST_ROW,
+        )
+    return lines[1:]
+
+
+def _block(file: str, lines: list[str], header: str, first_row: int) -> FloatArray:
+    commas = header.count(",")
+    text = "".join(lines)
+    if text.isascii() and "_" not in text and all(line.count(",") == commas for line in lines):
+        try:
+            numbers = np.fromiter(
+                map(float, chain.from_iterable(line.split(",") for line in lines)), dtype=float
+            )
+        except ValueError:
+            pass
+        else:
+            if np.isfinite(numbers).all():
+                return numbers
+    return _slow_block(file, lines, header, first_row)
+
+
+def _slow_block(file: str, lines: list[str], header: str, first_row: int) -> FloatArray:
+    names = header.split(",")
+    numbers: list[float] = []
+    for row, line in enumerate(lines, first_row):
+        cells = _cells(file, line, header, row)
+        numbers.extend(
+            _number(file, cell, row, key) for cell, key in zip(cells, names, strict=True)
+        )
+    return np.array(numbers)
+
+
+def _cells(file: str, line: str, header: str, row: int) -> list[str]:
+    cells = [cell.strip() for cell in line.split(",")]
+    columns = header.count(",") + 1
+    if len(cells) != columns:
+        found = "an empty line" if not line.strip() else f"{len(cells)} columns"
+        raise problem(
+            file,
+            f"{found}; expected {columns} columns ({header}): complete or remove this row",
+            row=row,
+            value=line[:80],
+        )
+    return cells
+
+
+def _number(file: str, cell: str, row: int, key: str) -> float:
+    if not _NUMBER.fullmatch(cell):
+        text = f"{key} = '{cell[:40]}'; expected a finite number with a decimal point: correct or remove this row"
+        raise problem(file, text, row=row, key=key, value=cell[:40])
+    number = float(cell)
+    if not math.isfinite(number):
+        raise problem(
+            file,
+            f"{key} = '{cell[:40]}' is too large for a number; correct this row",
+            row=row,
+            key=key,
+            value=cell[:40],
+        )
+    return number

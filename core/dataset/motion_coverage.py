@@ -1,0 +1,124 @@
+"""What a set of motions cannot show: for which causes a dataset lacks a motion, and which one to
+add.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from palpate.dataset.tool_motion import ContactKind, Motion
+
+__all__ = ["Lack", "lacks"]
+
+FEW_UNTOUCHED = 3  # clouds; fewer say nothing about the noise
+LONG_REST = 2.0  # s; several time constants of the quicker soft materials
+OTHER_DEPTH = 1.25  # ratio that makes two depths different
+OTHER_SPEED = 2.0  # ratio that makes two speeds different
+OTHER_PLACE = 0.010  # m, between two places
+FEW_PUSHES = 12  # without clouds; fewer leave most of a phantom untouched
+SHALLOW = 0.002  # m; half of what a hand presses
+
+
+@dataclass(frozen=True)
+class Lack:
+    """A motion or measurement that is not there, the effects it would tell, and the sentence for a
+    person.
+    """
+
+    effects: tuple[str, ...]
+    sentence: str
+
+
+def lacks(motions: dict[str, Motion], observed: bool, forces: bool) -> tuple[Lack, ...]:
+    """What these motions (by sequence), with or without any cloud and force, do not show."""
+    found = [*_of_measurements(observed, forces)]
+    if motions and observed:
+        found += [
+            *_of_kinds(list(motions.values())),
+            *_of_variety(list(motions.values())),
+            *_of_rests(motions),
+        ]
+    elif motions:
+        found += _of_palpation(list(motions.values()))
+    return tuple(found)
+
+
+def _of_measurements(observed: bool, forces: bool) -> Iterable[Lack]:
+    if not observed:
+        yield Lack(
+            ("base_slip", "camera_registration", "time_offset"),
+            "no clouds: the surface is not seen, only forces are compared; what the camera alone would show is not weighed",
+        )
+    if not forces:
+        yield Lack(
+            ("young_modulus",),
+            "no forces: the stiffness of a homogeneous block does not show; add forces.csv",
+        )
+
+
+def _of_kinds(motions: list[Motion]) -> Iterable[Lack]:
+    needed: dict[ContactKind, tuple[str, tuple[str, ...]]] = {
+        "top": ("poke from above", ("stiff_inclusion", "tool_radius", "poisson_ratio")),
+        "side": ("push from the side", ("base_slip", "base_detachment")),
+        "drag": ("drag along the surface", ("tool_friction", "time_offset")),
+    }
+    for kind, (name, effects) in needed.items():
+        count = sum(motion.has(kind) for motion in motions)
+        if count == 0:
+            yield Lack(effects, f"no {name}: add two, elsewhere each")
+        elif count == 1:
+            yield Lack(
+                effects,
+                f"only one sequence with a {name}: repeat it elsewhere, so that one can be kept for the test",
+            )
+
+
+def _of_palpation(motions: list[Motion]) -> Iterable[Lack]:
+    """Of pushes that are felt and not seen."""
+    pushes = [contact for motion in motions for contact in motion.contacts]
+    if len(pushes) < FEW_PUSHES:
+        text = f"{len(pushes)} pushes in all: a lump between them is not felt, add more, none over {1e3 * OTHER_PLACE:.0f} mm away"
+        yield Lack(("stiff_inclusion",), text)
+    shallow = [contact for contact in pushes if contact.depth < SHALLOW]
+    if pushes and len(shallow) > len(pushes) / 2:
+        text = f"{len(shallow)} of {len(pushes)} pushes are less than {1e3 * SHALLOW:.0f} mm deep: deeper ones reach farther"
+        yield Lack(("stiff_inclusion", "young_modulus"), text)
+
+
+def _of_variety(motions: list[Motion]) -> Iterable[Lack]:
+    pushes = [
+        contact for motion in motions for contact in motion.contacts if contact.kind != "drag"
+    ]
+    if len(pushes) < 2:
+        return
+    depths, speeds = ([getattr(motion, name) for motion in pushes] for name in ("depth", "speed"))
+    if max(depths) < OTHER_DEPTH * max(min(depths), 1e-6):
+        text = f"all pushes are about {1e3 * max(depths):.1f} mm deep: add a clearly shallower and a deeper one"
+        yield Lack(("tool_radius", "tool_offset", "surface_layer", "strain_stiffening"), text)
+    if max(speeds) < OTHER_SPEED * max(min(speeds), 1e-6):
+        text = f"all pushes go at about {1e3 * max(speeds):.1f} mm/s: add a slow and a fast one"
+        yield Lack(("time_offset", "viscoelasticity"), text)
+    apart = max(
+        float(np.linalg.norm(np.subtract(one.place, other.place)))
+        for one, other in combinations(pushes, 2)
+    )
+    if apart < OTHER_PLACE:
+        text = f"all pushes lie within {1e3 * apart:.1f} mm: add one more than {1e3 * OTHER_PLACE:.0f} mm away"
+        yield Lack(("stiff_inclusion", "stiffness_gradient", "anisotropy"), text)
+
+
+def _of_rests(motions: dict[str, Motion]) -> Iterable[Lack]:
+    touching = {name: motion for name, motion in motions.items() if motion.contacts}
+    if early := [
+        name for name, motion in touching.items() if motion.untouched_before < FEW_UNTOUCHED
+    ]:
+        text = f"fewer than {FEW_UNTOUCHED} untouched clouds before the first contact in {', '.join(early)}: start recording earlier"
+        yield Lack(("camera_registration", "time_offset"), text)
+    longest = max((motion.rest_after for motion in touching.values()), default=LONG_REST)
+    if longest < LONG_REST:
+        text = f"after release the longest rest is {longest:.1f} s: record a few time constants, at least {LONG_REST:.0f} s"
+        yield Lack(("viscoelasticity", "permanent_set"), text)

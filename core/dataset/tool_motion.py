@@ -1,0 +1,146 @@
+"""What a tool path does to the phantom as stated: pushes from above and from the side, drags; how
+deep, where, how fast.
+
+The stated phantom is rigid here, so that a depth is how far the sphere would overlap it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from palpate.dataset.folder import Dataset
+from palpate.dataset.sequence import Sequence
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.frames import Transform
+
+__all__ = ["Contact", "ContactKind", "Motion", "box_gap", "motion_of", "smooth_path"]
+
+ContactKind = Literal["top", "side", "drag"]
+
+TOUCHING = 0.0005  # m; about what touches are good for, so nearer counts as touching
+RELEASED = 0.001  # m; two contacts are one unless the tool leaves this far in between
+_LEVEL = 0.7  # cosine; a surface that is less level is a side
+_STEP = 0.05  # s; positions are averaged over it, or their noise would be taken for speed
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contact:
+    """One time from touch to release.
+
+    Attributes:
+        kind: "top" and "side" are pushes into that face, "drag" travels along it.
+        start, end: on the robot's clock [s].
+        depth: deepest overlap of the sphere with the phantom at rest [m].
+        place: tool centre at first touch, phantom frame [m].
+        travel: how far it moves along the touched face [m].
+        speed: that three quarters of the time stay below [m/s].
+    """
+
+    kind: ContactKind
+    start: float
+    end: float
+    depth: float
+    place: tuple[float, float, float]
+    travel: float
+    speed: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """One sequence in the phantom frame.
+
+    Attributes:
+        nearest: smallest gap between sphere and phantom at rest [m]; negative is the depth reached.
+        untouched_before, untouched_after: clouds before the first and after the last contact.
+        rest_after: time from the last contact to the last cloud, or row where there are no clouds
+            [s].
+    """
+
+    contacts: tuple[Contact, ...]
+    nearest: float
+    untouched_before: int
+    untouched_after: int
+    rest_after: float
+
+    def has(self, kind: ContactKind) -> bool:
+        """Whether any contact is of this kind."""
+        return any(contact.kind == kind for contact in self.contacts)
+
+
+def box_gap(points: FloatArray, size: tuple[float, float, float], radius: float) -> FloatArray:
+    """Gap (n,) [m] between a sphere centred at points (n, 3), phantom frame, and the box at rest;
+    negative inside.
+    """
+    beyond = _beyond(points, size)
+    return np.asarray(
+        np.linalg.norm(np.maximum(beyond, 0), axis=-1) + np.minimum(beyond.max(axis=-1), 0) - radius
+    )
+
+
+def motion_of(dataset: Dataset, sequence: Sequence, phantom_from_robot: Transform) -> Motion:
+    """What this sequence does, by the stated size, radius and registration."""
+    time, path = smooth_path(sequence, phantom_from_robot)
+    distance, normals = dataset.geometry.facing(path)
+    gap = distance - dataset.config.tool_radius
+    contacts = tuple(
+        _contact(time[part], path[part], gap[part], normals[part.start]) for part in _episodes(gap)
+    )
+    last_seen = float(sequence.cloud_times[-1] if len(sequence) else time[-1])
+    return Motion(
+        contacts=contacts,
+        nearest=float(gap.min()),
+        untouched_before=int((sequence.cloud_times < contacts[0].start).sum())
+        if contacts
+        else len(sequence),
+        untouched_after=int((sequence.cloud_times > contacts[-1].end).sum()) if contacts else 0,
+        rest_after=max(0.0, last_seen - contacts[-1].end) if contacts else 0.0,
+    )
+
+
+def smooth_path(sequence: Sequence, phantom_from_robot: Transform) -> tuple[FloatArray, FloatArray]:
+    """Time (n,) [s] and tool centre (n, 3) [m], phantom frame, averaged over short steps."""
+    time, points = sequence.kinematics.time, phantom_from_robot.apply(sequence.kinematics.position)
+    _, index, counts = np.unique(
+        np.floor((time - time[0]) / _STEP), return_inverse=True, return_counts=True
+    )
+    means = [np.bincount(index, weights=column) / counts for column in (time, *points.T)]
+    return means[0], np.stack(means[1:], axis=-1)
+
+
+def _beyond(points: FloatArray, size: tuple[float, float, float]) -> FloatArray:
+    # The base is no face to be touched: below the top, only the sides count.
+    across = np.abs(points[..., :2]) - np.array(size[:2]) / 2
+    return np.concatenate([across, points[..., 2:] - size[2]], axis=-1)
+
+
+def _episodes(gap: FloatArray) -> list[slice]:
+    """From touch to release: runs of touching rows, joined unless the tool leaves in between."""
+    touching = np.flatnonzero(gap < TOUCHING)
+    found: list[slice] = []
+    for at in map(int, touching):
+        if found and gap[found[-1].stop : at + 1].max() < RELEASED:
+            found[-1] = slice(found[-1].start, at + 1)
+        else:
+            found.append(slice(at, at + 1))
+    return found
+
+
+def _contact(time: FloatArray, path: FloatArray, gap: FloatArray, normal: FloatArray) -> Contact:
+    along = path - (path @ normal)[:, None] * normal
+    travel, depth = float(np.linalg.norm(np.ptp(along, axis=0))), -float(gap.min())
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1) / np.diff(time)
+    kind: ContactKind = "top" if normal[2] > _LEVEL else "side"
+    x, y, z = (float(value) for value in path[0])
+    return Contact(
+        # A slanted push wanders by about its own depth; a drag goes on for several times that.
+        kind="drag" if travel > max(2 * depth, 0.005) else kind,
+        start=float(time[0]),
+        end=float(time[-1]),
+        depth=depth,
+        place=(x, y, z),
+        travel=travel,
+        speed=float(np.percentile(steps, 75)) if len(steps) else 0.0,
+    )

@@ -1,0 +1,50 @@
+"""A stream's average over a few hundredths of a second: where the tool was, and what it felt
+there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from palpate.dataset import Kinematics
+from palpate.foundation.arrays import FloatArray
+
+__all__ = ["SMOOTHING", "averaged", "smooth_centres"]
+
+SMOOTHING = 0.02
+"""Half the time [s] over which the robot's pose is averaged: streams carry noise of some hundredths
+of a millimetre."""
+
+
+def averaged(time: FloatArray, values: FloatArray, times: FloatArray) -> FloatArray:
+    """Means (m, d) of values (n, d) at stamps (n,) [s] over SMOOTHING to both sides of `times` (m,)
+    [s], linear between stamps.
+    """
+    integral = np.concatenate(
+        [
+            np.zeros((1, values.shape[1])),
+            np.cumsum((values[1:] + values[:-1]) / 2 * np.diff(time)[:, None], axis=0),
+        ]
+    )
+
+    def until(at: FloatArray) -> FloatArray:
+        return np.stack(
+            [np.interp(at, time, integral[:, axis]) for axis in range(values.shape[1])], axis=-1
+        )
+
+    low, high = (
+        np.clip(times - SMOOTHING, time[0], time[-1]),
+        np.clip(times + SMOOTHING, time[0], time[-1]),
+    )
+    width = (high - low)[..., None]
+    mean = (until(high) - until(low)) / np.maximum(width, 1e-9)
+    nearest = np.stack(
+        [np.interp(times, time, values[:, axis]) for axis in range(values.shape[1])], axis=-1
+    )
+    return np.where(width > 1e-6, mean, nearest)
+
+
+def smooth_centres(kinematics: Kinematics, times: FloatArray) -> FloatArray:
+    """Tool centres (m, 3) [m] in the robot frame at `times` (m,) [s], averaged over a few
+    hundredths of a second.
+    """
+    return averaged(kinematics.time, kinematics.position, times)

@@ -1,0 +1,184 @@
+"""Pushes that could be made next: places on the top and the sides, straight in or along, as deep as
+those that were made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from palpate.dataset.tool_motion import ContactKind, box_gap
+from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.foundation.arrays import FloatArray
+from palpate.setup.setup import Setup
+
+__all__ = ["Push", "depth_reached", "pushes", "speed_reached"]
+
+_APART = 0.016
+"""Distance between places that are tried [m], about."""
+_MARGIN = 1.2
+"""Of a place from the edges of its side, in radii of the tool."""
+_HEIGHT = 0.6
+"""Where sides are pushed, over the block's height [1]."""
+_DRAGGED = 0.012
+_SIDES = {"top": (2, 1.0), "-x": (0, -1.0), "+x": (0, 1.0), "-y": (1, -1.0), "+y": (1, 1.0)}
+_NAMED = {
+    "top": "on the top",
+    "-x": "into the -x side",
+    "+x": "into the +x side",
+    "-y": "into the -y side",
+    "+y": "into the +y side",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Push:
+    """One push, straight into a side from where the tool touches it.
+
+    Attributes:
+        kind: "top", "side" or "drag".
+        side: that is touched.
+        place: (x, y, z) of the first touch [m], phantom frame.
+        depth: of the ball in the block [m].
+        along: way of a drag at that depth, (x, y, z) [m].
+        speed: going in [m/s]; a cloud at half the depth is taken in passing.
+        hold: rest at full depth and again after the release [s].
+    """
+
+    kind: ContactKind
+    side: str
+    place: tuple[float, float, float]
+    depth: float
+    along: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    speed: float = 0.0
+    hold: float = 0.0
+
+    @property
+    def direction(self) -> FloatArray:
+        """Unit vector into the block (3,)."""
+        axis, sign = _SIDES[self.side]
+        return np.asarray(-sign * np.eye(3)[axis])
+
+    def centres(self, radius: float, late: float = 0.0) -> FloatArray:
+        """The tool's centre (4, 3) [m] when clouds are taken: passing half the depth, in all its
+        depth, dragged, and released.
+
+        `late` [s] is how much earlier than stated a cloud was taken.
+        """
+        touch, inward = np.array(self.place) - radius * self.direction, self.direction
+        passing = touch + (0.5 * self.depth - late * self.speed) * inward
+        deep = touch + self.depth * inward
+        return np.array([passing, deep, deep + np.array(self.along), touch - 2 * radius * inward])
+
+    def half(self) -> Push:
+        """Half as deep."""
+        return replace(self, depth=self.depth / 2)
+
+    @property
+    def times(self) -> FloatArray:
+        """When these clouds are taken (4,) [s]; only a material with memory asks."""
+        down = self.depth / max(self.speed, 1e-3)
+        return (
+            np.array([0.5 * down, down, down + self.hold + 0.5, down + 2 * self.hold + 1.5]) + 1.0
+        )
+
+    def text(self) -> str:
+        """What to do, in words."""
+        shown = ", ".join(
+            f"{1e3 * value:.0f}" for value in self.place[: 2 if self.side == "top" else 3]
+        )
+        words = f"press {1e3 * self.depth:.2g} mm deep {_NAMED[self.side]} at ({shown}) mm"
+        if self.kind == "drag":
+            axis = int(np.abs(self.along).argmax())
+            words += f" and drag {1e3 * abs(self.along[axis]):.0f} mm along {'+' if self.along[axis] > 0 else '-'}{'xyz'[axis]}"
+        if self.speed and not self.hold:
+            words += f", going in at {1e3 * self.speed:.0f} mm/s"
+        return (
+            f"{words}, hold for {self.hold:.0f} s and look again {self.hold:.0f} s after the release"
+            if self.hold
+            else words
+        )
+
+
+def depth_reached(data: Sequence[Observations], setup: Setup) -> float:
+    """The median of how deep the sequences' pushes went [m]: what the bench was made for, but never
+    a third of the block.
+    """
+    deepest = [
+        -box_gap(item.centres(setup), setup.box.size, setup.tool.radius).min() for item in data
+    ]
+    return float(np.clip(np.median(deepest), 1e-3, 0.3 * min(setup.box.size)))
+
+
+def speed_reached(data: Sequence[Observations], setup: Setup) -> float:
+    """How fast the tool goes while it is near the block [m/s]: a high quantile of all sequences."""
+    found = []
+    for item in data:
+        path = setup.phantom_from_robot.apply(item.kinematics.position_at(item.times))
+        near = box_gap(path, setup.box.size, setup.tool.radius) < 0
+        speed = np.linalg.norm(np.gradient(path, axis=0), axis=1) / np.maximum(
+            np.gradient(item.times), 1e-6
+        )
+        found.append(speed[near])
+    fast = np.concatenate(found)
+    return float(np.quantile(fast, 0.9)) if len(fast) else 0.0
+
+
+def pushes(
+    setup: Setup, depth: float, *, drags: bool, speed: float = 0.0, holds: Sequence[float] = (0.0,)
+) -> list[Push]:
+    """Candidates all over the reachable sides of the stated block.
+
+    Args:
+        depth: of each [m].
+        drags: whether something drags or slides.
+        speed: of all [m/s], where clocks or memory matter.
+        holds: rests that are tried [s].
+    """
+    straight = [
+        Push(
+            kind="top" if side == "top" else "side",
+            side=side,
+            place=place,
+            depth=depth,
+            speed=speed,
+            hold=hold,
+        )
+        for side in _SIDES
+        for place in _places(setup, side)
+        for hold in holds
+    ]
+    if not drags:
+        return straight
+    low, high = np.array(setup.box.size[:2]) / -2, np.array(setup.box.size[:2]) / 2
+    dragged = []
+    for push in straight:
+        for way in np.vstack([np.eye(3)[:2], -np.eye(3)[:2]]) * _DRAGGED:
+            end = np.array(push.place)[:2] + way[:2]
+            if (
+                push.side == "top"
+                and np.all(end > low + setup.tool.radius)
+                and np.all(end < high - setup.tool.radius)
+            ):
+                x, y, z = way.tolist()
+                dragged.append(replace(push, kind="drag", along=(x, y, z)))
+    return straight + dragged[:: max(1, len(dragged) // 8)]
+
+
+def _places(setup: Setup, side: str) -> list[tuple[float, float, float]]:
+    """Where a side is tried: the top on a grid, the others along one line."""
+    size, margin = np.array(setup.box.size), _MARGIN * setup.tool.radius
+
+    def spread(axis: int) -> FloatArray:
+        half = max(size[axis] / 2 - margin, 0.0)
+        return np.linspace(-half, half, max(1, int(np.ceil(2 * half / _APART)) + (half > 0)))
+
+    axis, sign = _SIDES[side]
+    if axis == 2:
+        return [(float(x), float(y), float(size[2])) for x in spread(0) for y in spread(1)]
+    end, height = float(sign * size[axis] / 2), float(_HEIGHT * size[2])
+    return [
+        (end, float(v), height) if axis == 0 else (float(v), end, height) for v in spread(1 - axis)
+    ]

@@ -1,0 +1,282 @@
+"""The next probe: the push that best tells the surviving causes apart (step 12 of the method).
+
+T-optimal in the sense of Atkinson and Fedorov (1975): each candidate is replayed under both models
+as they were fitted to the data so far, and what tells them apart is weighed against all that could
+blur it: the camera's noise with as many points per patch as it has had, the engine's own error, and
+what is still open in the nuisances and in both models' parameters. With squared distance 2 d the
+log density ratio after the push is Gaussian with mean d (the Kullback-Leibler divergence) and
+variance 2 d, so the chance that it exceeds a bound is known before anything is pushed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import norm
+
+from palpate.diagnosis.design.candidate_pushes import Push, depth_reached, pushes, speed_reached
+from palpate.diagnosis.design.predictive_distance import Scene, Survivor, nats_of, survivor
+from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.noise_model import patch_variance
+from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.diagnosis.search.candidates import lump_places
+from palpate.diagnosis.search.findings import RIVAL, Findings, Trial
+from palpate.diagnosis.search.identifiability import Told
+from palpate.effects import Effect
+from palpate.measurement.camera_model import sight_of
+
+__all__ = ["Advice", "Pair", "next_probe", "pairs_of"]
+
+SHOWN = 3
+_FAST = 3.0
+"""Of the speed that was usual, where clocks are in question."""
+_ENOUGH = 0.9
+"""Half the depth will do where it gives this share of the nats [1]."""
+_TOLD = 200.0
+"""What is this far behind the best [nats] is no longer asked about: what grew so far apart in one
+visit no push need separate."""
+_IMAGINED = 2
+"""Effects that are imagined at their detection limits where no cause was named."""
+_INSTEAD = {
+    frozenset(
+        {"viscoelasticity", "permanent_set"}
+    ): "let the block rest for several time constants after a release and record it",
+    frozenset(
+        {"gravity", "camera_registration"}
+    ): "record the untouched block again from another side, or turned on its side",
+    frozenset({"gravity", "geometry_scale"}): "measure the block with a calliper",
+    frozenset({"depth_bias", "geometry_scale"}): "measure the block with a calliper",
+    frozenset({"landmark_mismatch", "geometry_scale"}): "measure the block with a calliper",
+    frozenset(
+        {"camera_registration", "depth_bias"}
+    ): "record the untouched block from nearer and from farther away",
+}
+"""What tells families apart that no push does."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two models to tell apart.
+
+    Attributes:
+        names: of both.
+        needed: [nats] by which the first must win if it is true, and the second.
+        part: of what the second does that is asked for [1]; its nats go with the square.
+    """
+
+    models: tuple[Survivor, Survivor]
+    names: tuple[str, str]
+    needed: tuple[float, float]
+    part: float = 1.0
+
+    def chance(self, nats: float) -> float:
+        """That the new data decide, either model being true as often as the other."""
+        deviation = np.sqrt(2 * max(nats, 1e-9))
+        return float(np.mean(norm.cdf((nats - np.array(self.needed)) / deviation)))
+
+
+@dataclass(frozen=True, eq=False)
+class Advice:
+    """A push and what it would tell."""
+
+    push: Push
+    pair: Pair
+    nats: float
+    chances: float
+
+    def to_json(self) -> dict[str, Any]:
+        """As the report has it."""
+        return {
+            "kind": self.push.kind,
+            "place": [round(value, 5) for value in self.push.place],
+            "direction": (self.push.direction + 0.0).tolist(),
+            "depth": round(self.push.depth, 5),
+            "separates": list(self.pair.names),
+            "nats": round(self.nats, 2),
+            "probability": round(self.pair.chance(self.nats), 4),
+            "text": self.push.text(),
+        }
+
+
+def next_probe(
+    bench: Bench, data: Sequence[Observations], findings: Findings
+) -> list[dict[str, Any]]:
+    """Rows of the report, best first: up to three pushes, and before them what no push but another
+    measurement would tell.
+    """
+    pairs = pairs_of(bench, findings)
+    if not pairs:
+        return []
+    bench.tell("which push would tell most")
+    setups = [model.setup for pair in pairs for model in pair.models]
+    clocks = len({setup.sensor.time_offset for setup in setups}) > 1
+    memory = any(setup.material.remembers for setup in setups)
+    drags = any(
+        setup.support.friction_coefficient is not None or setup.tool.friction_coefficient
+        for setup in setups
+    )
+    speed = (
+        speed_reached(data, bench.setup) * (_FAST if clocks else 1.0) if clocks or memory else 0.0
+    )
+    tried = pushes(
+        bench.setup,
+        depth_reached(data, bench.setup),
+        drags=drags,
+        speed=speed,
+        holds=(0.0, 10.0) if memory else (0.0,),
+    )
+    scene = _scene(bench, findings)
+    pending = [
+        bench.workers.run(nats_of, scene, [pair.models for pair in pairs], push) for push in tried
+    ]
+    found = [
+        _advice(push, pairs, future.result()) for push, future in zip(tried, pending, strict=True)
+    ]
+    return [
+        *_instead(pairs),
+        *(one.to_json() for one in _choices(sorted(found, key=lambda one: -one.chances))),
+    ]
+
+
+def _scene(bench: Bench, findings: Findings) -> Scene:
+    """What the camera sees, as it has seen it so far."""
+    predictions, surface = (
+        [item for item in findings.baseline.predictions if not item.unseen],
+        bench.surface,
+    )
+    counts = [item.count[[frame.in_contact for frame in item.equilibria]] for item in predictions]
+    return Scene(
+        stated=survivor(bench, findings.baseline),
+        lumps=lump_places(bench),
+        centres=surface.patch_centres,
+        normals=surface.patch_normals,
+        count=np.concatenate(counts).mean(axis=0),
+        variance=patch_variance(predictions),
+        eye=sight_of(bench.setup).pose.translation,
+        pivot=bench.registration.robot_pivot,
+        grid=bench.rough,
+        temperature=bench.temperature,
+    )
+
+
+def _advice(push: Push, pairs: Sequence[Pair], nats: list[tuple[float, float]]) -> Advice:
+    """The push at the least depth that will do, for the pair that it tells apart best."""
+    full = [pair.part**2 * both[1] for pair, both in zip(pairs, nats, strict=True)]
+    half = [pair.part**2 * both[0] for pair, both in zip(pairs, nats, strict=True)]
+    chances = [pair.chance(value) for pair, value in zip(pairs, full, strict=True)]
+    best = int(np.argmax(full))
+    if half[best] >= _ENOUGH * full[best] and push.kind != "drag" and not push.speed:
+        push, full = push.half(), half
+    return Advice(
+        push, pairs[best], full[best], float(np.sum(chances)) + 1e-6 * float(np.sum(full))
+    )
+
+
+def _choices(found: Sequence[Advice]) -> list[Advice]:
+    """The first few, each of its own kind and side: not every place can be reached in every
+    laboratory.
+    """
+    chosen: list[Advice] = []
+    for one in found:
+        same = any(
+            (other.push.kind, other.push.side) == (one.push.kind, one.push.side) for other in chosen
+        )
+        if not same and one.nats > 0:
+            chosen.append(one)
+    return chosen[:SHOWN]
+
+
+def _instead(pairs: Sequence[Pair]) -> list[dict[str, Any]]:
+    """Measurements that are no push, where the models differ in a family that only these tell
+    apart.
+    """
+    rows = []
+    for pair in pairs:
+        names = [set(name.split(" + ")) for name in pair.names]
+        differing = frozenset(names[0] ^ names[1])
+        rows += [
+            {"kind": "measurement", "separates": list(pair.names), "text": text}
+            for family, text in _INSTEAD.items()
+            if differing == family
+        ]
+    return rows
+
+
+def pairs_of(bench: Bench, findings: Findings) -> list[Pair]:
+    """What is still to be told apart: rivals; else the cause found and those that came next; else
+    nothing and what hides best.
+    """
+    best = findings.best
+    if best is None:
+        return [] if findings.structure.significant else _imagined(bench, findings)
+    others: list[Trial] = findings.rivals() or _next_best(findings, best)
+    mine, name = survivor(bench, best.model), " + ".join(best.model.names)
+    pairs = []
+    for trial in others:
+        lead = max(best.gain - trial.gain, 0.0) if best.gain - trial.gain < RIVAL else 0.0
+        names = (name, " + ".join(trial.model.names))
+        pairs.append(
+            Pair((mine, survivor(bench, trial.model)), names, (RIVAL - lead, RIVAL + lead))
+        )
+    return pairs or [
+        Pair(
+            (mine, survivor(bench, findings.baseline)),
+            (name, "none"),
+            (findings.bound, findings.bound),
+        )
+    ]
+
+
+def _next_best(findings: Findings, best: Trial) -> list[Trial]:
+    """The refitted set that came closest to the best, of other causes; none where all were told
+    from it long ago.
+    """
+    others = [
+        trial
+        for trial in findings.trials
+        if trial.model.names != best.model.names and trial.model.effects
+    ]
+    return [trial for trial in others[:1] if best.gain - trial.gain < _TOLD]
+
+
+def _imagined(bench: Bench, findings: Findings) -> list[Pair]:
+    """Nothing against the effects that would stay unseen longest, each as large as it may be
+    without being named.
+    """
+    nothing, needed = survivor(bench, findings.baseline), (findings.bound, findings.bound)
+    told = [
+        one for one in findings.told if one.candidate.start.enters.value not in ("load", "sensor")
+    ]
+    pairs = []
+    for one in sorted(told, key=lambda one: -_hidden(one))[:_IMAGINED]:
+        effect, part = _at_limit(one)
+        pairs.append(
+            Pair((nothing, Survivor(effect.apply(bench.setup))), ("none", one.effect), needed, part)
+        )
+    return pairs
+
+
+def _hidden(told: Told) -> float:
+    """The detection limit over what is plausible for the effect [1]."""
+    spread = [*told.candidate.widened.values(), *told.candidate.spread]
+    return max(limit.size / deviation for limit, deviation in zip(told.limits, spread, strict=True))
+
+
+def _at_limit(told: Told) -> tuple[Effect, float]:
+    """The effect as large as it may be unseen, or a finite one and the share of it."""
+    start, limit = told.candidate.start, told.limits[0]
+    if limit.item is None:
+        return start, min(limit.size, 1.0)
+    number = [item.name for item in start.numbers()].index(limit.item.name)
+    coordinates, item = start.coordinates, start.numbers()[number]
+    above, below = (
+        item.coordinate(item.high) - coordinates[number],
+        coordinates[number] - item.coordinate(item.low),
+    )
+    coordinates[number] += (
+        min(limit.size, above) if above >= min(limit.size, below) else -min(limit.size, below)
+    )
+    return start.at(coordinates), 1.0

@@ -1,0 +1,308 @@
+"""How far apart two models are under a push that was not made yet, over all that blurs what the
+camera would see of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from palpate.diagnosis.design.candidate_pushes import Push
+from palpate.diagnosis.forward.history_replay import TRACED
+from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS
+from palpate.diagnosis.inference.evidence import fit
+from palpate.diagnosis.inference.hypothesis import Model
+from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.noise_model import (
+    DISPLACEMENT_ERROR,
+    FIELD_LENGTH,
+    STIFFNESS_ERROR,
+    smooth_basis,
+)
+from palpate.effects.base import with_effects
+from palpate.effects.elastic_material import PoissonRatio
+from palpate.effects.support import BaseSlip
+from palpate.effects.tool import ToolRadius
+from palpate.fem.constitutive.stiffness_field import lump_share
+from palpate.fem.model import rule_of
+from palpate.fem.newton import Outcome
+from palpate.foundation.arrays import FloatArray
+from palpate.gradients.forward import TOOL_STEP, displacement_changes
+from palpate.gradients.stiffness_derivatives import stiffness_changes
+from palpate.measurement.touch_correction import touch_correction
+from palpate.mesh.protocol import Meshing
+from palpate.replay.replay import Equilibrium, Replay
+from palpate.setup.setup import Inclusion, Setup
+
+__all__ = ["Scene", "Survivor", "nats_of", "survivor"]
+
+_SMALL = 1e-3
+_FLOOR = 2e-5
+_TOLERANCE = 1e-3
+"""Residual of an imagined push [1], over the push itself."""
+_LEAST_POINTS = 2
+_SHAFT = np.linspace(0.0, 0.08, 9)
+"""Where along the shaft [m] spheres of the tool's radius stand for it: it leaves the block the way
+the tool came."""
+
+
+@dataclass(frozen=True, eq=False)
+class Survivor:
+    """A model that the data so far leave, and how well they know it.
+
+    Attributes:
+        varied: its setup with one search coordinate a little changed, and the step.
+        covariance: (8 + k, 8 + k) of the tool's six motions, its radius, Poisson's ratio, and the
+            `varied` coordinates; None for one that is imagined and not fitted.
+    """
+
+    setup: Setup
+    varied: tuple[tuple[Setup, float], ...] = ()
+    covariance: FloatArray | None = None
+
+    @property
+    def ways(self) -> list[tuple[Setup, float]]:
+        """Setups that differ a little, in the order of the covariance after the tool's motions, and
+        the steps.
+        """
+        radius, ratio = self.setup.tool.radius, self.setup.material.poisson_ratio
+        change = -2e-4 if ratio > 0.494 else 2e-4
+        return [
+            (ToolRadius(radius=radius + TOOL_STEP).apply(self.setup), TOOL_STEP),
+            (PoissonRatio(nu=ratio + change).apply(self.setup), change),
+            *self.varied,
+        ]
+
+
+def survivor(bench: Bench, model: Model) -> Survivor:
+    """From a fitted model, with what the data leave open in its nuisances and parameters."""
+    covariance = fit(
+        bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model)
+    ).covariance
+    kept, varied, at = list(range(TOOL_COLUMNS + 2)), [], len(model.nuisance)
+    for index, effect in enumerate(model.effects):
+        for number, item in enumerate(effect.numbers()):
+            coordinates, step = effect.coordinates, _SMALL * item.scale
+            if item.coordinate(item.high) - coordinates[number] < step:
+                step = -step
+            coordinates[number] += step
+            changed = [*model.effects[:index], effect.at(coordinates), *model.effects[index + 1 :]]
+            # What hangs on all that was done before has no derivative here.
+            if not isinstance(effect, (BaseSlip, *TRACED)):
+                varied.append((with_effects(bench.setup, changed), step))
+                kept.append(at)
+            at += 1
+    return Survivor(model.setup, tuple(varied), covariance[np.ix_(kept, kept)])
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What every candidate shares.
+
+    Attributes:
+        stated: the baseline.
+        lumps: spots whose stiffness the engine has only so well.
+        centres, normals: (p, 3) of the patches.
+        count: (p,) points a patch has had in a cloud.
+        variance: (p,) of one [m^2].
+        eye: the camera's place (3,) [m].
+        pivot: (3,) [m] about which the robot's registration turns.
+        temperature: by which nats are divided.
+    """
+
+    stated: Survivor
+    lumps: tuple[Inclusion, ...]
+    centres: FloatArray
+    normals: FloatArray
+    count: FloatArray
+    variance: FloatArray
+    eye: FloatArray
+    pivot: FloatArray
+    grid: Meshing
+    temperature: float
+
+    @cached_property
+    def basis(self) -> FloatArray:
+        """Smooth errors of displacement (p, b)."""
+        return smooth_basis(self.centres, FIELD_LENGTH)
+
+
+class _Replayed:
+    """One model under one push; its equilibria begin from those of another model `like` it, where
+    there is one.
+    """
+
+    def __init__(
+        self, scene: Scene, model: Survivor, push: Push, like: _Replayed | None = None
+    ) -> None:
+        self.scene, self.model, self.block = (
+            scene,
+            model,
+            Replay(model.setup, scene.grid, _TOLERANCE),
+        )
+        stated = scene.stated.setup
+        late = model.setup.sensor.time_offset - stated.sensor.time_offset
+        centres = touch_correction(model.setup, scene.grid).apply(
+            push.centres(stated.tool.radius, late)
+        )
+        slides = model.setup.support.friction_coefficient is not None or model.setup.remembers
+        self.late = [(0.0 if row else -push.speed) * push.direction for row in range(len(centres))]
+        used = [
+            0,
+            1,
+            *([2] if any(push.along) or model.setup.material.remembers else []),
+            *([3] if slides else []),
+        ]
+        self.frames: dict[int, Equilibrium] = {}
+        previous: Equilibrium | None = None
+        for row in used:
+            near = None if like is None or model.setup.remembers else like.frames.get(row)
+            previous = self.frames[row] = self.block.sought(
+                centres[row], (near, previous), float(push.times[row])
+            )
+        self._engine: dict[int, FloatArray] = {}
+
+    def moved(self, row: int) -> FloatArray:
+        """How far patches (p, 3) [m] are from where they rest; zero where nothing is left of the
+        push.
+        """
+        if row not in self.frames:
+            return np.zeros_like(self.scene.centres) if row == 3 else self.moved(1)
+        return np.asarray(
+            self.frames[row].move(self.scene.centres) - self.block.free.move(self.scene.centres)
+        )
+
+    @property
+    def failed(self) -> bool:
+        """Whether some frame found no equilibrium."""
+        return any(frame.outcome is not Outcome.CONVERGED for frame in self.frames.values())
+
+    @property
+    def has_columns(self) -> bool:
+        """Whether a frame hangs on nothing but itself, so that it has derivatives of its own."""
+        return not self.model.setup.remembers
+
+    def _along_normals(self, frame: Equilibrium, fields: FloatArray) -> FloatArray:
+        changed = [frame.mesh.interpolate(field, self.scene.centres) for field in fields]
+        return np.asarray(
+            np.einsum(
+                "kpi,pi->pk", np.array(changed).reshape(len(fields), -1, 3), self.scene.normals
+            )
+        )
+
+    def open(self, row: int) -> FloatArray:
+        """What is open in the model (p, k) [m], as independent columns of unit variance."""
+        frame, covariance, ways = self.frames.get(row), self.model.covariance, self.model.ways
+        if frame is None or covariance is None or not frame.in_contact or not self.has_columns:
+            return np.zeros((len(self.scene.centres), 0 if covariance is None else len(covariance)))
+        setup, steps = (
+            self.model.setup,
+            [(self.model.setup, TOOL_STEP * axis) for axis in np.eye(3)],
+        )
+        steps += [
+            (other, (other.sensor.time_offset - setup.sensor.time_offset) * self.late[row])
+            for other, _ in ways
+        ]
+        changed = displacement_changes(self.block, frame, steps)
+        tool = changed[:3] / TOOL_STEP
+        turned = [
+            np.tensordot(np.cross(axis, frame.probe.centre - self.scene.pivot), tool, axes=1)
+            for axis in np.eye(3)
+        ]
+        scaled = changed[3:] / np.array([step for _, step in ways])[:, None, None]
+        fields = np.concatenate([tool, np.array(turned), scaled])
+        return np.asarray(self._along_normals(frame, fields) @ _root(covariance))
+
+    def engine(self, row: int) -> FloatArray:
+        """The engine's own error (p, k) [m], likewise."""
+        if row not in self._engine:
+            self._engine[row] = self._errors(row)
+        return self._engine[row]
+
+    def _errors(self, row: int) -> FloatArray:
+        size = np.linalg.norm(self.moved(row), axis=1)[:, None]
+        found = [DISPLACEMENT_ERROR * size * self.scene.basis]
+        frame = self.frames.get(row)
+        if frame is None or not frame.in_contact or not self.has_columns or not self.scene.lumps:
+            return np.concatenate([*found, np.zeros((len(size), len(self.scene.lumps)))], axis=1)
+        factors = np.array([lump_share(lump, rule_of(frame.mesh)) for lump in self.scene.lumps])
+        found.append(
+            STIFFNESS_ERROR
+            * self._along_normals(frame, stiffness_changes(self.block, frame, factors))
+        )
+        return np.concatenate(found, axis=1)
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def _weights(scene: Scene, push: Push, moved: FloatArray, centre: FloatArray) -> FloatArray:
+    """Inverse variances (p,) [1/m^2]; zero where a patch is not seen, or behind the tool."""
+    seen = scene.count >= _LEAST_POINTS
+    places = scene.centres + moved
+    ray = places - scene.eye
+    for stands in centre - _SHAFT[:, None] * push.direction:
+        along = np.clip(ray @ (stands - scene.eye) / np.einsum("pi,pi->p", ray, ray), 0.0, 1.0)
+        past = np.linalg.norm(scene.eye + along[:, None] * ray - stands, axis=1)
+        seen &= (past > scene.stated.setup.tool.radius) | (along >= 1.0)
+    return np.where(seen, 1 / (scene.variance / np.maximum(scene.count, 1) + _FLOOR**2), 0.0)
+
+
+def nats_of(
+    scene: Scene, pairs: Sequence[tuple[Survivor, Survivor]], push: Push
+) -> list[tuple[float, float]]:
+    """For each pair the divergence [nats] of half the push and of all of it; zero where a model
+    finds no equilibrium.
+    """
+    known: dict[int, _Replayed] = {}
+
+    def replayed(model: Survivor) -> _Replayed:
+        if id(model) not in known:
+            known[id(model)] = _Replayed(scene, model, push, next(iter(known.values()), None))
+        return known[id(model)]
+
+    found = []
+    for one, other in pairs:
+        both = replayed(one), replayed(other)
+        engine = next((side for side in both if side.has_columns), None) or replayed(scene.stated)
+        if any(side.failed for side in (*both, engine)):
+            found.append((0.0, 0.0))
+            continue
+        rows = sorted({row for side in both for row in side.frames})
+        parts = [_part(scene, push, both, engine, row) for row in rows]
+        found.append(
+            (_divergence(parts[:1]) / scene.temperature, _divergence(parts) / scene.temperature)
+        )
+    return found
+
+
+_Part = tuple[FloatArray, FloatArray, FloatArray]
+
+
+def _part(
+    scene: Scene, push: Push, both: tuple[_Replayed, _Replayed], engine: _Replayed, row: int
+) -> _Part:
+    """Difference (p,), what blurs it (p, k), and weights (p,) of one cloud."""
+    moved = [side.moved(row) for side in both]
+    difference = np.einsum("pi,pi->p", moved[1] - moved[0], scene.normals)
+    # The mean of both models' predictive covariances stands for each.
+    blur = np.concatenate(
+        [engine.engine(row), *(side.open(row) / np.sqrt(2) for side in both)], axis=1
+    )
+    centre = push.centres(scene.stated.setup.tool.radius)[row]
+    return difference, blur, _weights(scene, push, moved[0], centre)
+
+
+def _divergence(parts: Sequence[_Part]) -> float:
+    """Half the squared distance of two Gaussians with one covariance, noise and blur (Woodbury)."""
+    difference, blur, weights = (np.concatenate(values) for values in zip(*parts, strict=True))
+    inner = np.eye(blur.shape[1]) + (blur.T * weights) @ blur
+    right = (blur.T * weights) @ difference
+    return float(
+        0.5 * (difference @ (weights * difference) - right @ np.linalg.solve(inner, right))
+    )

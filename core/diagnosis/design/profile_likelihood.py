@@ -1,0 +1,177 @@
+"""Which parameters of a named cause the data determine, and which they only bound or tie to others
+(step 11 of the method).
+
+The Fisher information with the nuisances integrated out is the screen: a parameter that it knows to
+within a step that matters has its interval. The others get a profile likelihood (Raue et al. 2009):
+the evidence a few deviations to either side, replayed there, with the other parameters moved to
+where the linearised fit has them. Where it does not fall, that side is open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.diagnosis.inference.evidence import fit
+from palpate.diagnosis.inference.hypothesis import Model
+from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.noise_model import rows_of
+from palpate.effects import Parameter
+from palpate.effects.base import with_effects
+from palpate.foundation.arrays import FloatArray
+
+__all__ = ["Profile", "combination", "profile", "profiles", "vague"]
+
+FALL = 1.92
+"""Fall of the evidence [nats] that ends a 95 % interval: half the quantile of chi squared with one
+degree of freedom."""
+NEAR, FAR = 2.5, 6.0
+"""Deviations of the linearised fit at which it is looked for: a parabola falls by 3.1 and 18 nats
+there."""
+MOST_EVALUATIONS = 6
+"""Of all parameters of a model together: each replays every sequence."""
+_VAGUE = 1.0
+"""Half width of the linearised interval, in search steps that matter, from which on a parameter is
+profiled."""
+_TAKES_PART = 0.3
+
+
+@dataclass(frozen=True)
+class Profile:
+    """What the data say of one parameter: "interval", "at least", "at most" or "not identifiable",
+    after so many evaluations.
+    """
+
+    told: str
+    evaluations: int
+
+
+def profile(
+    evidence: Callable[[FloatArray], float],
+    at: FloatArray,
+    covariance: FloatArray,
+    index: int,
+    item: Parameter,
+) -> Profile:
+    """Look to both sides of one coordinate.
+
+    Args:
+        evidence: of search coordinates (n,) [nats].
+        at: (n,) the best.
+        covariance: (n, n) of the linearised fit there.
+        index: of the coordinate.
+        item: the parameter, with its bounds.
+    """
+    best, deviation = evidence(at), float(np.sqrt(covariance[index, index]))
+    along, used = covariance[:, index] / covariance[index, index], 0
+    closed = []
+    for sign, end in zip((-1.0, 1.0), item.ends, strict=True):
+        # What comes round is farthest off at half a turn.
+        room = (item.high - item.low) / 2 if item.periodic else abs(end - at[index])
+        falls = False
+        for far in dict.fromkeys(min(reach * deviation, room) for reach in (NEAR, FAR)):
+            used += 1
+            falls = best - evidence(at + sign * far * along) >= FALL
+            if falls:
+                break
+        closed.append(falls)
+    told = {(True, True): "interval", (True, False): "at least", (False, True): "at most"}
+    return Profile(told.get((closed[0], closed[1]), "not identifiable"), used)
+
+
+def vague(covariance: FloatArray, items: Sequence[Parameter]) -> list[int]:
+    """Which coordinates the linearised fit knows to no step that matters, the worst first."""
+    widths = 1.96 * np.sqrt(np.diag(covariance)) / np.array([item.scale for item in items])
+    return [int(index) for index in np.argsort(-widths) if widths[index] > _VAGUE]
+
+
+def combination(covariance: FloatArray, items: Sequence[Parameter], index: int) -> str:
+    """The direction, through one coordinate, in which the data know least, in words; empty where it
+    is that coordinate alone.
+    """
+    scales = np.array([item.scale for item in items])
+    values, vectors = np.linalg.eigh(covariance / np.outer(scales, scales))
+    weights = values * vectors[index] ** 2
+    weakest = vectors[:, int(weights.argmax())]
+    weakest = weakest * np.sign(weakest[index])
+    parts = [
+        n for n in np.argsort(-np.abs(weakest)) if abs(weakest[n]) > _TAKES_PART and n != index
+    ]
+    if not parts:
+        return ""
+    ways = [f"{items[n].name} {'grows' if weakest[n] > 0 else 'falls'}" for n in parts]
+    return f"the data look the same while {items[index].name} grows and {' and '.join(ways)}"
+
+
+def _settled(bench: Bench, model: Model) -> tuple[FloatArray, FloatArray]:
+    """Prior precision of the nuisances, and the covariance (n, n) of the model's own
+    coordinates."""
+    nuisances = bench.nuisances.beside(model.effects)
+    solution = fit(
+        bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model, nuisances)
+    )
+    return nuisances, solution.covariance[len(model.nuisance) :, len(model.nuisance) :]
+
+
+def _evidence(bench: Bench, model: Model, nuisances: FloatArray) -> Callable[[FloatArray], float]:
+    """Of the model's coordinates; the nuisances' columns are those at the model."""
+
+    def value(coordinates: FloatArray) -> float:
+        effects, at = [], 0
+        for effect in model.effects:
+            number = len(effect.numbers())
+            effects.append(effect.at(coordinates[at : at + number].tolist()))
+            at += number
+        if np.array_equal(coordinates, model.coordinates):
+            return bench.objective(model, nuisances)
+        replayed = [future.result() for future in bench.predict(effects, None, model.predictions)]
+        moved = [
+            there.with_rows(rows_of(here)[1])
+            for here, there in zip(model.predictions, replayed, strict=True)
+        ]
+        return bench.objective(
+            bench.assemble(tuple(effects), with_effects(bench.setup, effects), moved, (), 0),
+            nuisances,
+        )
+
+    return value
+
+
+def profiles(bench: Bench, model: Model) -> tuple[list[dict[str, str]], list[dict[str, Any]]]:
+    """For each effect: parameter to verdict; and rows of the report for those that no data of this
+    kind determine.
+    """
+    nuisances, covariance = _settled(bench, model)
+    items = [item for effect in model.effects for item in effect.numbers()]
+    names = [
+        (place, effect.name) for place, effect in enumerate(model.effects) for _ in effect.numbers()
+    ]
+    told: list[dict[str, str]] = [{} for _ in model.effects]
+    unsure, left, rows = vague(covariance, items), MOST_EVALUATIONS, []
+    for index, (place, item) in enumerate(zip((place for place, _ in names), items, strict=True)):
+        if index not in unsure:
+            told[place][item.name] = "interval"
+    evidence = _evidence(bench, model, nuisances)
+    for index in unsure:
+        if left < 2:
+            break
+        place, effect = names[index]
+        bench.tell(f"how far {items[index].name} of {effect} may be off")
+        found = profile(evidence, model.coordinates, covariance, index, items[index])
+        left -= found.evaluations
+        told[place][items[index].name] = found.told
+        if found.told == "not identifiable":
+            tied = combination(covariance, items, index)
+            rows.append(
+                {
+                    "effect": effect,
+                    "why": f"{items[index].name}: {tied or 'the data do not change with it'}",
+                    "measure_instead": "one of the parameters that are tied to it"
+                    if tied
+                    else "it by other means",
+                }
+            )
+    return told, rows

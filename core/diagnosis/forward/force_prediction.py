@@ -1,0 +1,69 @@
+"""Forces of a sequence without clouds under one setup, and how they would change with anything that
+might be wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from palpate.diagnosis.forward.history_replay import forgetful
+from palpate.diagnosis.forward.jacobian import Columns, Wanted
+from palpate.diagnosis.forward.prediction import Prediction
+from palpate.diagnosis.forward.tool_path import led
+from palpate.diagnosis.observation.force_record import Felt
+from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.fem.newton import Outcome
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import DiagnosisError
+from palpate.mesh.protocol import Meshing
+from palpate.replay.replay import Equilibrium, Replay
+from palpate.setup.setup import Setup
+
+__all__ = ["predict_forces"]
+
+
+def predict_forces(
+    data: Observations,
+    setup: Setup,
+    grid: Meshing,
+    wanted: Wanted | None = None,
+    starts: Sequence[Equilibrium] | None = None,
+    tolerance: float = 3e-4,
+) -> Prediction:
+    """Replay a sequence's pushes and compare the forces; of the surface nothing is predicted, as
+    nothing of it was seen.
+
+    Each push begins from rest. What hangs on all that was done before is left out: between short
+    pushes a body recovers.
+
+    Args:
+        starts: equilibria of a similar setup, one per group, to begin from.
+        wanted: changes to state; none without it.
+    """
+    setup = forgetful(setup)
+    block, way = Replay(setup, grid, tolerance), led(data, setup, grid, wanted)
+    if way.measured is None:
+        raise DiagnosisError(f"{data.name}: has neither clouds nor forces")
+    columns = None if wanted is None else Columns(block, wanted, felt=True)
+    frames: list[Equilibrium] = []
+    changes: list[FloatArray] = []
+    for number, (group, centre) in enumerate(zip(data.groups, way.centres, strict=True)):
+        same = bool(number) and data.groups[number - 1].probe == group.probe
+        begin = [frames[-1]] if same and frames[-1].outcome is Outcome.CONVERGED else []
+        if starts is not None and starts[number].in_contact:
+            begin.insert(0, starts[number])
+        frame = block.sought(centre, begin or [None])
+        frames.append(frame)
+        if columns is not None:
+            changed = columns.of_group(frame, way.moves[:, number])
+            changes.append(
+                columns.of_force(changed, way.measured[0][number], way.turned).astype(np.float32)
+            )
+    rows, count = len(frames), columns.count if columns is not None else 0
+    nothing = np.zeros((rows, 0))
+    felt = Felt.of(way.measured, frames, changes, np.array([group.probe for group in data.groups]))
+    return Prediction(
+        data.name, nothing, nothing, nothing, np.zeros((rows, 0, count)), tuple(frames), (), felt
+    )

@@ -1,0 +1,105 @@
+"""What friction under the tool would do, to first order, by the plain replay alone.
+
+The contact is one spot that sticks to the tool until the tool pulls it by more than friction holds.
+How far it gives to a pull is told by the frame's own factor: tractions spread over the contact like
+its pressure, one linear solve for each direction. Along the tool's way between the groups pull and
+hold are integrated, as `palpate.diagnosis.forward.loading_history` has it: the hold goes with the
+depth to the power of Hertz.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.diagnosis.forward.loading_history import Timeline
+from palpate.effects.tool import ToolFriction
+from palpate.fem.model import CONTACT_STIFFNESS, BlockModel
+from palpate.foundation.arrays import FloatArray
+from palpate.gradients.forward import local_probe
+from palpate.replay.friction_step import pressed, seen_from
+from palpate.replay.replay import Equilibrium
+
+__all__ = ["Spot", "pulls", "spot_of"]
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """The contact of one group.
+
+    Attributes:
+        answer: (u, 3) displacement of the unknowns under a pull of one over E along each axis
+            [1/m].
+        gives: (3, 3) how far the spot goes under it [1/m].
+        normal: (3,) from the tool's centre.
+        held: normal force over E [m^2].
+    """
+
+    answer: FloatArray
+    gives: FloatArray
+    normal: FloatArray
+    held: float
+
+
+def spot_of(model: BlockModel, frame: Equilibrium) -> Spot | None:
+    """Of a frame whose tangent is factorised; None where nothing is felt."""
+    positions, probe = frame.mesh.nodes + frame.displacement, local_probe(frame)
+    seen = seen_from(model, positions, probe)
+    pushes = CONTACT_STIFFNESS * model.areas * pressed(model, positions, probe)
+    held = float(pushes.sum())
+    faces = np.flatnonzero(pushes.any(axis=1))
+    if held <= 0.0 or not len(faces):
+        return None
+    shares, here = pushes[faces] / held, seen[faces]
+    normals = here / np.linalg.norm(here, axis=2, keepdims=True)
+    along = np.eye(3) - normals[..., :, None] * normals[..., None, :]
+    loads = np.einsum("fq,qa,fqij->faij", shares, model.face.shapes, along)
+    spread = np.zeros((len(positions), 3, 3))
+    np.add.at(spread, model.topology.surface[faces], loads)
+    pull = spread[model.topology.free]
+    answer = model.topology.factor.solve(pull)
+    normal = np.einsum("fq,fqi->i", shares, normals)
+    return Spot(answer, pull.T @ answer, normal / np.linalg.norm(normal), held)
+
+
+def pulls(effect: ToolFriction, time: Timeline, spots: Sequence[Spot | None]) -> FloatArray:
+    """The drag on the block over E (k, 3) [m^2] at each of the groups in contact, whose spots these
+    are.
+    """
+    found = np.zeros((len(spots), 3))
+    usable = [number for number, spot in enumerate(spots) if spot is not None]
+    if not usable:
+        return found
+    stiff = {
+        number: np.linalg.pinv(_required(spots[number]).gives, rcond=0.05) for number in usable
+    }
+    instants = np.array([time.instants[group] for group in time.touched])
+    upcoming = np.searchsorted(time.times, instants)
+    drag, last = np.zeros(3), time.places[0]
+    for row, (place, shares) in enumerate(zip(time.places, time.shares, strict=True)):
+        moved, last = place - last, place
+        nearest = max(usable, key=lambda number: shares[number])
+        if shares[nearest] <= 0.0:
+            drag = np.zeros(3)
+        else:
+            spot = _required(spots[nearest])
+            moved = moved - spot.normal * (moved @ spot.normal)
+            drag = drag + stiff[nearest] @ moved
+            drag -= spot.normal * (drag @ spot.normal)
+            hold = (
+                sum(shares[number] * _required(spots[number]).held ** (2 / 3) for number in usable)
+                ** 1.5
+            )
+            drag *= min(
+                1.0, effect.friction_coefficient * hold / max(float(np.linalg.norm(drag)), 1e-300)
+            )
+        for number in np.flatnonzero(upcoming == row):
+            found[number] = drag
+    return found
+
+
+def _required(spot: Spot | None) -> Spot:
+    assert spot is not None
+    return spot

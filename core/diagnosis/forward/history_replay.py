@@ -1,0 +1,107 @@
+"""Replays in which a group hangs on all that was done before it: the tool drags the surface, or the
+material remembers.
+
+Groups are few and lie far apart in time. Between two of them the replay is led along the way that
+the tool took, by places so near to one another that a drag is followed, and a hold, or the rest
+after a release, is lived through.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from palpate.diagnosis.observation.frame_groups import FAR, Observations
+from palpate.effects import Effect
+from palpate.effects.time_dependence import PermanentSet, Viscoelasticity
+from palpate.effects.tool import ToolFriction
+from palpate.fem.newton import Outcome
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.frames import Transform
+from palpate.replay.replay import Equilibrium, Replay
+from palpate.setup.box import CLEARANCE, clear_of
+from palpate.setup.setup import Setup
+
+__all__ = ["TRACED", "Past", "forgetful", "travel"]
+
+TRACED: tuple[type[Effect], ...] = (Viscoelasticity, PermanentSet, ToolFriction)
+"""Effects whose replays are led along the tool's whole way; what they do is screened by traces of
+the plain replay."""
+
+TRAVEL, HOLD = 1e-3, 0.4
+"""Longest motion [m] and longest time [s] between two places while the tool is near the block."""
+DRAG = 2e-3
+"""The same motion where nothing but the tool's friction remembers: what a drag does to the surface
+is then 8 % off what it is by places of half a millimetre (4 % by those of 1 mm), in half the time.
+"""
+REST = 1.5
+"""Longest time between two places while it is not, as a multiple of the time since it left; a
+shortest one is HOLD [1]."""
+
+
+def forgetful(setup: Setup) -> Setup:
+    """The setup without what makes a frame hang on those before it."""
+    material = replace(setup.material, relaxation=(), retained_fraction=0.0)
+    return replace(setup, material=material, tool=replace(setup.tool, friction_coefficient=0.0))
+
+
+def travel(setup: Setup) -> float:
+    """Longest motion between two places [m]."""
+    return TRAVEL if setup.material.remembers else DRAG
+
+
+class Past:
+    """Leads a block from group to group in order of time.
+
+    Args:
+        data: the sequence.
+        block: its replay, whose setup remembers.
+        moved: from stated to true places of the tool.
+    """
+
+    def __init__(self, data: Observations, block: Replay, moved: Transform) -> None:
+        self._block, self._last, self._left = block, -np.inf, -np.inf
+        self._travel = travel(block.setup)
+        self._frame: Equilibrium | None = None
+        self._times, way = data.way(block.setup)
+        self._way = moved.apply(way)
+        self._near = clear_of(block.setup.box.size, self._way) < block.setup.tool.radius + CLEARANCE
+
+    def reach(self, centre: FloatArray, time: float | None) -> Equilibrium:
+        """What is found with the tool's stated centre here (3,) [m] at a group's time [s]; None for
+        a block long at rest.
+        """
+        if time is None:
+            return self._block.step(FAR, None, float(self._times[0]) - 1.0)
+        for number in self._places(time):
+            self._last = float(self._times[number])
+            self._step(self._way[number], self._last)
+        self._last = max(time, self._last)
+        return self._step(centre, self._last)
+
+    def _step(self, centre: FloatArray, time: float) -> Equilibrium:
+        frame = self._block.sought(centre, (self._frame,), time)
+        if frame.outcome is Outcome.CONVERGED:
+            self._frame = frame
+        return frame
+
+    def _places(self, until: float) -> list[int]:
+        """Numbers of the places to be led through before this time [s]."""
+        found: list[int] = []
+        last = int(np.searchsorted(self._times, self._last)) if np.isfinite(self._last) else 0
+        for number in range(last, int(np.searchsorted(self._times, until))):
+            far = float(np.linalg.norm(self._way[number] - self._way[last]))
+            long = self._times[number] - self._times[last]
+            if self._near[number]:
+                wanted = far > self._travel or long > HOLD or not self._near[last]
+                self._left = float(self._times[number])
+            else:
+                away = self._times[last] - self._left
+                wanted = np.isfinite(self._left) and (
+                    self._near[last] or long > max(HOLD, REST * away)
+                )
+            if wanted:
+                found.append(number)
+                last = number
+        return found

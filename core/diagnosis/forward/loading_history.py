@@ -1,0 +1,122 @@
+"""What a sequence's block went through between the groups that are compared, told from those groups
+alone.
+
+A push is an interval in which the tool reaches into the stated block. Within it anything that a
+group shows (a strain, a pressure) is taken to change evenly in time from one group to the next,
+from nothing where the push begins to nothing where it ends, and in proportion to how deep the tool
+is: a hold that was not compared is as long, and a turn as deep, as the robot says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from palpate.dataset.tool_motion import box_gap
+from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.frames import Transform
+from palpate.replay.replay import Equilibrium
+from palpate.setup.setup import Setup
+
+__all__ = ["Timeline", "timeline_of"]
+
+_MOST_SCALED = 3.0
+"""How many times what a group shows another instant may have [1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """One sequence.
+
+    Attributes:
+        times: (t,) [s], evenly.
+        depths: (t,) of the tool in the stated block [m], zero outside.
+        places: (t, 3) of its centre [m].
+        instants: (g,) of the groups [s], NaN for the rest cloud.
+        touched: (k,) numbers of those in which the tool is in contact.
+        shares: (t, k) of what the touched groups show, at every time.
+    """
+
+    times: FloatArray
+    depths: FloatArray
+    places: FloatArray
+    instants: FloatArray
+    touched: tuple[int, ...]
+    shares: FloatArray
+
+    def faded(self, rates: FloatArray) -> FloatArray:
+        """Shares (g, k) that a memory still has of the touched groups at each group, whose
+        forgetting has these rates (t,) [1/s].
+
+        The memory c follows what is there, c' = rate (share - c), from nothing.
+        """
+        held, found = np.zeros(len(self.touched)), np.zeros((len(self.instants), len(self.touched)))
+        steps = np.diff(self.times, append=2 * self.times[-1] - self.times[-2])
+        upcoming = np.searchsorted(
+            self.times, self.instants
+        )  # past the end where an instant is not a number
+        for number, (step, rate) in enumerate(zip(steps, rates, strict=True)):
+            found[upcoming == number] = held
+            held = held + (self.shares[number] - held) * -np.expm1(-rate * step)
+        found[(upcoming == len(self.times)) & np.isfinite(self.instants)] = held
+        return found
+
+    def peaks(self) -> list[tuple[float, FloatArray]]:
+        """Times [s] of the groups in contact and of each push's deepest instant, in order, with
+        their shares (k,).
+        """
+        found = [
+            (float(self.instants[group]), np.eye(len(self.touched))[number])
+            for number, group in enumerate(self.touched)
+        ]
+        for begin, end in _pushes(self.depths):
+            deepest = begin + int(np.argmax(self.depths[begin:end]))
+            if self.shares[deepest].any():
+                found.append((float(self.times[deepest]), self.shares[deepest]))
+        return sorted(found, key=lambda one: one[0])
+
+
+def timeline_of(
+    data: Observations, setup: Setup, moved: Transform, frames: tuple[Equilibrium, ...]
+) -> Timeline:
+    """Of a sequence and its plain replay; `moved` leads from stated to true places of the tool."""
+    times, way = data.way(setup)
+    places = moved.apply(way) + np.array(setup.tool.offset)
+    instants = [data.instant(group, setup) for group in data.groups]
+    seen = np.array([np.nan if instant is None else instant for instant in instants])
+    touched = tuple(
+        number
+        for number, frame in enumerate(frames)
+        if frame.in_contact and np.isfinite(seen[number])
+    )
+    depths = np.maximum(-box_gap(places, setup.box.size, setup.tool.radius), 0.0)
+    own = np.array([frames[number].probe.centre for number in touched]).reshape(-1, 3)
+    reached = np.maximum(-box_gap(own, setup.box.size, setup.tool.radius), 1e-6)
+    shares = np.zeros((len(times), len(touched)))
+    for begin, end in _pushes(depths):
+        ends = times[begin], times[end - 1]
+        inside = [k for k, group in enumerate(touched) if ends[0] <= seen[group] <= ends[1]]
+        if not inside:
+            continue
+        knots = [ends[0], *(float(seen[touched[k]]) for k in inside), ends[1]]
+        depth = [0.0, *(float(reached[k]) for k in inside), 0.0]
+        for number, ((first, last), (before, after)) in enumerate(
+            zip(pairwise(knots), pairwise(depth), strict=True)
+        ):
+            rows = np.flatnonzero((times[begin:end] >= first) & (times[begin:end] <= last)) + begin
+            late = (times[rows] - first) / max(last - first, 1e-9)
+            scale = depths[rows] / np.maximum((1 - late) * before + late * after, 1e-6)
+            if number:
+                shares[rows, inside[number - 1]] = np.minimum(scale * (1 - late), _MOST_SCALED)
+            if number < len(inside):
+                shares[rows, inside[number]] = np.minimum(scale * late, _MOST_SCALED)
+    return Timeline(times, depths, places, seen, touched, shares)
+
+
+def _pushes(depths: FloatArray) -> list[tuple[int, int]]:
+    """Where each interval of contact begins, and the first number after it."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], (depths > 0).astype(int), [0]])))
+    return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]

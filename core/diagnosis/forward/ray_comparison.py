@@ -1,0 +1,271 @@
+"""What a group's points say of one model: where they meet its surface or its tool, and their
+averages by patch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from palpate.diagnosis.observation.frame_groups import Group
+from palpate.diagnosis.observation.stray_points import among_neighbours
+from palpate.foundation.arrays import FloatArray, IntArray
+from palpate.measurement.camera_model import sight_of
+from palpate.measurement.patch_averages import PatchMeans, plain_means, within_spread
+from palpate.measurement.surface_gaps import Gaps, Surface, gaps, gaps_beside
+from palpate.mesh.interpolation import patch_rows
+from palpate.replay.replay import Equilibrium
+from palpate.setup.setup import Setup
+
+__all__ = ["Compared", "Sample", "choose", "compare", "observe"]
+
+TOOL_REACH, CLEARLY = 1.5e-3, 5e-4
+"""A point this near to a model's ball [m], and nearer to it by this much than to the model's
+surface, is of the tool: clouds are cleaned of the tool where it was stated to be, and if it is
+somewhere else, some of its points remain."""
+
+JUMP, MUCH_NEARER = 3e-3, 1e-3
+"""A ray whose foot moves by more than this between models [m] has passed over a rim; so much nearer
+[m] must the point lie to the surface beside it, or models would gain by choosing."""
+_MOST_STRETCH = 2.0
+"""A model's surface may turn away from the camera so far that a gap along the ray counts this many
+times the gap itself."""
+FARTHEST_CHANGE = 8e-3
+"""A point's gap that changes by more than this [m] between models has met another side of the
+block: its old gap stands."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Which of a group's points are averaged where: settled by the baseline and kept for every
+    other model.
+
+    Were each model to choose anew, points would change patches with the model, and the noise they
+    carry would look like a difference between models. Nor may a model turn its sides towards the
+    camera or away from it, and the noise along the rays with them: gaps count along the ray, times
+    the cosine that the baseline's surface has. A ray that misses the model is compared with the
+    plane at the material point that the baseline showed it: were the baseline's gap to stand, the
+    truth would pay for it.
+
+    Attributes:
+        index: (m,) of the group's points.
+        patch: (m,).
+        gap: (m,) of the baseline [m], which stands where nothing is near.
+        foot: (m, 3) rest positions on the stated block of the material points that they met [m].
+        side: (m,) on which these lie.
+        facing: (m,) cosine between the baseline's normal and the way back to the camera.
+    """
+
+    index: IntArray
+    patch: IntArray
+    gap: FloatArray
+    facing: FloatArray
+    foot: FloatArray
+    side: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """A group's sample under one model.
+
+    Gaps are lengths as the camera reads them: a model that says it reads them too long would
+    otherwise shrink the noise with the cloud, and gain by it whatever is true.
+
+    Attributes:
+        places: (m, 3) where the points' rays meet the model, phantom frame [m]; of points on the
+            tool they themselves.
+        seen: those that lie on the surface.
+        means: of the gaps, by patch.
+        tool: (t,) those that lie on the tool instead.
+        away: (t, 3) unit vectors from its centre.
+        off: (t,) their gaps [m].
+        patch: (t,) where they count.
+        scale: how much longer than it is the camera reads a length along its ray [1], which normals
+            have in them, and not `away`.
+    """
+
+    places: FloatArray
+    seen: Gaps
+    means: PatchMeans
+    tool: IntArray
+    away: FloatArray
+    off: FloatArray
+    patch: IntArray
+    scale: float = 1.0
+
+    def average(self, values: FloatArray, patch: IntArray) -> FloatArray:
+        """Sums over the points of each patch (p, k) of (n, k) values, over all the patch's
+        points."""
+        total = np.zeros((len(self.means.mean), values.shape[1]))
+        np.add.at(total, patch, values)
+        return np.asarray(total / np.maximum(self.means.count, 1)[:, None])
+
+    def elsewhere(self, sample: Sample) -> FloatArray:
+        """Share (p,) of each patch's points that meet another side of this model than of the one
+        that chose them [1].
+        """
+        other = self.seen.side != sample.side[self.seen.index]
+        found = np.bincount(self.seen.patch[other], minlength=len(self.means.count))
+        return np.asarray(found / np.maximum(self.means.count, 1))
+
+    def along_sight(self, moved: FloatArray, scale: float = 1.0) -> FloatArray:
+        """Change of the averages (p,) [m] when the camera sees the places at (m, 3) [m] instead,
+        and reads lengths `scale` [1].
+
+        A gap is a length along its ray: it changes by how the ray passes the surface, not by how
+        the noisy point does that it leads to. Taken at the points, the noise of 35 000 of them,
+        turned a little, made a slope of tens of nats out of nothing.
+        """
+        shift = moved - self.places
+        surface = np.einsum("mi,mi->m", shift[self.seen.index], self.seen.normal)
+        ball = (
+            self.scale * np.einsum("ti,ti->t", shift[self.tool], self.away)
+            + (scale / self.scale - 1.0) * self.off
+        )
+        values, patch = (
+            np.concatenate([surface, ball]),
+            np.concatenate([self.seen.patch, self.patch]),
+        )
+        return np.asarray(self.average(values[:, None], patch)[:, 0])
+
+
+def observe(frame: Equilibrium, compared: Compared) -> sp.csr_matrix:
+    """Patch averages of the displacement along the normal as a linear function of the nodes'
+    displacement (p, 3n).
+    """
+    seen, patches = compared.seen, len(compared.means.mean)
+    nodes, weights = frame.mesh.locate(seen.foot)
+    share = 1.0 / np.maximum(compared.means.count, 1)[seen.patch]
+    by_patch = np.argsort(seen.patch, kind="stable")
+    ends = np.searchsorted(seen.patch[by_patch], np.arange(patches + 1))
+    count = len(frame.mesh.nodes)
+    entries, columns, rows = patch_rows(
+        nodes[by_patch], weights[by_patch], (seen.normal * share[:, None])[by_patch], ends, count
+    )
+    return sp.csr_matrix((entries, columns, rows), shape=(patches, 3 * count))
+
+
+def choose(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) -> Sample:
+    """The points to average, by the model at hand: those on clear parts of the surface, without
+    stray ones.
+    """
+    sight = sight_of(setup, reference=group.reference)
+    seen = gaps(
+        sight.place(group.points), sight.pose.translation, frame, surface, lowest=group.lowest
+    )
+    kept = within_spread(seen.gap, seen.patch, surface.patches)
+    kept[kept] = among_neighbours(seen.gap[kept], seen.patch[kept], surface)
+    index, patch = seen.index[kept].astype(np.int32), seen.patch[kept].astype(np.int32)
+    return Sample(
+        index,
+        patch,
+        (sight.scale * seen.gap[kept]).astype(np.float32),
+        seen.facing[kept].astype(np.float32),
+        surface.on_stated(seen.foot[kept]).astype(np.float32),
+        seen.side[kept].astype(np.int8),
+    )
+
+
+def _along_rays(seen: Gaps, sample: Sample, scale: float) -> Gaps:
+    """Gaps, and the normals that say how they change, as long as the baseline's surface would have
+    made them of these rays, and as a camera reads them whose lengths are `scale` times what they
+    are [1].
+    """
+    factor = scale * np.minimum(
+        sample.facing[seen.index] / np.maximum(seen.facing, 1e-6), _MOST_STRETCH
+    )
+    return replace(seen, gap=seen.gap * factor, normal=seen.normal * factor[:, None])
+
+
+def _places(points: FloatArray, camera: FloatArray, seen: Gaps, sample: Sample) -> FloatArray:
+    """Where the rays of points (m, 3) [m] meet the model; the points themselves where they meet
+    nothing.
+    """
+    places, rays = points.copy(), points[seen.index] - camera
+    ahead = seen.gap / np.maximum(seen.facing, sample.facing[seen.index] / _MOST_STRETCH)
+    places[seen.index] += rays * (ahead / np.linalg.norm(rays, axis=1))[:, None]
+    return places
+
+
+def _taken(part: Gaps, rows: IntArray) -> Gaps:
+    return Gaps(*(getattr(part, item.name)[rows] for item in fields(Gaps)))
+
+
+def _met_or_beside(
+    points: FloatArray, camera: FloatArray, frame: Equilibrium, surface: Surface, sample: Sample
+) -> Gaps:
+    """Gaps of the sample's points to the model: where their rays meet it, or beside it where they
+    miss.
+
+    A ray that meets the model far from where it met the baseline has passed over the rim of a dent
+    or an edge; such a point counts from the other place where that is much nearer, so that its gap
+    does not jump by millimetres as the rim passes its ray.
+    """
+    met = gaps(points, camera, frame, surface, everything=True)
+    usual = surface.own(sample.foot.astype(float))
+    away = np.linalg.norm(met.foot - usual[met.index], axis=1) > JUMP
+    missed = np.ones(len(points), dtype=bool)
+    missed[met.index] = False
+    elsewhere = np.concatenate([np.flatnonzero(missed), met.index[away]])
+    if not len(elsewhere):
+        return met
+    foot, side = usual[elsewhere], sample.side[elsewhere].astype(np.int64)
+    beside = replace(
+        gaps_beside(points[elsewhere], camera, frame, surface, foot, side), index=elsewhere
+    )
+    by_ray = np.full(len(points), np.inf)
+    by_ray[met.index] = np.abs(met.gap)
+    nearer = np.abs(beside.gap) < by_ray[elsewhere] - MUCH_NEARER
+    given_up = np.zeros(len(points), dtype=bool)
+    given_up[elsewhere[nearer]] = True
+    kept = ~given_up[met.index]
+    parts = (_taken(met, np.flatnonzero(kept)), _taken(beside, np.flatnonzero(nearer)))
+    return Gaps(
+        *(np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(Gaps))
+    )
+
+
+def compare(
+    group: Group, setup: Setup, frame: Equilibrium, surface: Surface, sample: Sample
+) -> Compared:
+    """The sample's points, where they meet the surface, and their averages; points of the model's
+    tool lie off the tool.
+    """
+    sight = sight_of(setup, reference=group.reference)
+    points, camera = sight.place(group.points[sample.index]), sight.pose.translation
+    met = _met_or_beside(points, camera, frame, surface, sample)
+    seen = _along_rays(met, sample, sight.scale)
+    values = sample.gap.astype(float)
+    near = np.abs(seen.gap - values[seen.index]) < FARTHEST_CHANGE
+    values[seen.index[near]] = seen.gap[near]
+    arm = points - frame.probe.centre
+    distance = np.linalg.norm(arm, axis=1)
+    off_tool = sight.scale * (distance - frame.probe.radius)
+    on_tool = (np.abs(off_tool) < TOOL_REACH) & (np.abs(off_tool) < np.abs(values) - CLEARLY)
+    values[on_tool] = off_tool[on_tool]
+    kept, tool = ~on_tool[seen.index], np.flatnonzero(on_tool)
+    index = seen.index[kept]
+    seen = Gaps(
+        index,
+        seen.gap[kept],
+        seen.foot[kept],
+        seen.normal[kept],
+        seen.facing[kept],
+        sample.patch[index],
+        seen.side[kept],
+    )
+    means = plain_means(values, sample.patch, surface.patches)
+    places = _places(points, camera, met, sample)
+    places[tool] = points[tool]
+    return Compared(
+        places,
+        seen,
+        means,
+        tool,
+        arm[tool] / distance[tool, None],
+        off_tool[tool],
+        sample.patch[tool],
+        sight.scale,
+    )

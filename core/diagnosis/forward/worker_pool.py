@@ -1,0 +1,222 @@
+"""Replays of all sequences under one setup, spread over processes that keep the measurements."""
+
+from __future__ import annotations
+
+import importlib
+import multiprocessing
+import os
+import pickle
+import tempfile
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import TracebackType
+from typing import Generic, ParamSpec, Self, TypeVar
+
+import numpy as np
+
+from palpate.diagnosis.forward.force_prediction import predict_forces
+from palpate.diagnosis.forward.history_columns import Trace, traces_of
+from palpate.diagnosis.forward.jacobian import Wanted
+from palpate.diagnosis.forward.prediction import Prediction, predict
+from palpate.diagnosis.forward.ray_comparison import Sample
+from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.effects import Effect
+from palpate.foundation.processes import bound_to_parent, giving_memory_back, keeping_memory
+from palpate.mesh.graded_mesh import SCREEN_GRID
+from palpate.mesh.protocol import Meshing
+from palpate.replay.replay import Equilibrium, Replay
+from palpate.setup.setup import Box, Setup, Tool
+
+__all__ = ["TOLERANCE", "Pending", "Workers"]
+
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+TOLERANCE = 3e-4
+"""Residual of a replay over the tool's push [1]."""
+P = ParamSpec("P")
+T = TypeVar("T")
+_READ: dict[Path, Observations] = {}
+"""What this process has read of the measurements that are held, by file."""
+
+
+def _begin() -> None:
+    bound_to_parent()
+    keeping_memory()
+
+
+def _ready() -> None:
+    """Load what every task needs: libraries, and the compiled kernels of a replay."""
+    importlib.import_module("open3d")
+    block = Replay(
+        Setup(geometry=Box(size=(0.03, 0.03, 0.02)), tool=Tool(radius=5e-3)), SCREEN_GRID, TOLERANCE
+    )
+    block.step(np.array([0.0, 0.0, 0.024]))
+
+
+def _measured(file: Path) -> Observations:
+    """What a sequence's file says; measurements that were held before are forgotten."""
+    if file not in _READ:
+        for other in [other for other in _READ if other.parent != file.parent]:
+            del _READ[other]
+        _READ[file] = pickle.loads(file.read_bytes())
+    return _READ[file]
+
+
+@dataclass(frozen=True)
+class _Tidily(Generic[P, T]):
+    """A task of a module's top level that leaves its process holding no memory which is not in
+    use."""
+
+    task: Callable[P, T]
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> T:
+        try:
+            return self.task(*args, **kwargs)
+        finally:
+            giving_memory_back()
+
+
+def _task(
+    file: Path,
+    setup: Setup,
+    grid: Meshing,
+    wanted: Wanted | None,
+    starts: Sequence[Equilibrium] | None,
+    samples: Sequence[Sample] | None,
+    tolerance: float,
+) -> Prediction:
+    data = _measured(file)
+    if data.unseen:
+        return predict_forces(data, setup, grid, wanted, starts, tolerance)
+    found = predict(data, setup, grid, wanted, starts, tolerance, samples)
+    return found if samples is None else replace(found, samples=())
+
+
+@dataclass(frozen=True, eq=False)
+class Pending:
+    """A prediction under way. Points that were chosen before are not sent back: they are most of
+    what there is to send.
+    """
+
+    future: Future[Prediction]
+    samples: tuple[Sample, ...] | None
+
+    def result(self) -> Prediction:
+        """Wait for it."""
+        found = self.future.result()
+        return found if self.samples is None else replace(found, samples=self.samples)
+
+
+def _trace(
+    file: Path,
+    setup: Setup,
+    grid: Meshing,
+    frames: Sequence[Equilibrium],
+    samples: Sequence[Sample],
+    effects: Sequence[Effect],
+) -> list[Trace]:
+    return traces_of(_measured(file), setup, grid, frames, samples, effects)
+
+
+class Workers:
+    """A pool of processes that predict sequences; use as a context manager.
+
+    Args:
+        data: measurements of each sequence.
+        count: number of processes.
+    """
+
+    def __init__(self, data: Sequence[Observations], count: int) -> None:
+        # One thread each: the processes are the parallelism, and small factorisations only lose by
+        # sharing cores.
+        for name in _THREADS:
+            os.environ.setdefault(name, "1")
+        self._count, self._held = count, 0
+        self._folder = tempfile.TemporaryDirectory(prefix="palpate-", ignore_cleanup_errors=True)
+        self._pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _begin)
+        self.hold(data)
+
+    def start(self) -> None:
+        """Start the processes now, which takes seconds, and not with the first tasks."""
+        for _ in range(self._count):
+            self._pool.submit(_ready)
+
+    def hold(self, data: Sequence[Observations]) -> None:
+        """Let other measurements be predicted from now on; what is under way is of the old ones.
+
+        They are handed over in files, which a process reads when it first needs them.
+        """
+        self._held += 1
+        self._home.mkdir()
+        for item in data:
+            self._file(item.name).write_bytes(pickle.dumps(item, pickle.HIGHEST_PROTOCOL))
+
+    @property
+    def _home(self) -> Path:
+        return Path(self._folder.name) / str(self._held)
+
+    def _file(self, name: str) -> Path:
+        return self._home / f"{name}.pickle"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        processes = list(getattr(self._pool, "_processes", {}).values())
+        self._pool.shutdown(wait=kind is None, cancel_futures=True)
+        if kind is not None:
+            for process in processes:
+                process.terminate()
+        self._folder.cleanup()
+
+    def submit(
+        self,
+        names: Sequence[str],
+        setup: Setup,
+        grid: Meshing,
+        wanted: Wanted | None = None,
+        starts: Sequence[Prediction] | None = None,
+        tolerance: float = TOLERANCE,
+        same_points: bool = True,
+    ) -> list[Pending]:
+        """Begin predicting these sequences under a setup.
+
+        Args:
+            starts: predictions to begin from, in the same order.
+            same_points: average the same points in the same patches as they.
+        """
+        pending = []
+        for number, name in enumerate(names):
+            begin = None if starts is None else starts[number].equilibria
+            points = None if starts is None or not same_points else starts[number].samples or None
+            future = self.run(
+                _task, self._file(name), setup, grid, wanted, begin, points, tolerance
+            )
+            pending.append(Pending(future, points))
+        return pending
+
+    def trace(
+        self,
+        names: Sequence[str],
+        setup: Setup,
+        grid: Meshing,
+        plain: Sequence[Prediction],
+        effects: Sequence[Effect],
+    ) -> list[Future[list[Trace]]]:
+        """Begin the traces of these effects in these sequences, whose replays without them are
+        `plain`.
+        """
+        return [
+            self.run(_trace, self._file(name), setup, grid, item.equilibria, item.samples, effects)
+            for name, item in zip(names, plain, strict=True)
+        ]
+
+    def run(self, task: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Begin a task of a module's top level."""
+        return self._pool.submit(_Tidily(task), *args, **kwargs)

@@ -1,0 +1,131 @@
+"""The gain of a palpation without clouds: how much nearer the extended model's forces come on
+pushes that nothing was fitted on.
+
+Where the modulus is no cause each model has the one that its fitted sequences' forces give: a
+stated modulus that is off is no gain of a lump, and would hide what the lump is worth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.diagnosis.forward.prediction import Prediction
+from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import DiagnosisError
+
+__all__ = ["FeltLadder", "felt_ladder"]
+
+_DRAWS = 2000
+_LEAST = 1e-12
+"""Mean square [N^2] below which nothing is reducible."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FeltLadder:
+    """RMS length of measured minus simulated force [N] while the tool presses, and the share of the
+    reducible error removed.
+
+    Attributes:
+        baseline, extended: of the stated and the extended model.
+        noise_floor: what the sensor's noise and bias alone leave.
+        removed: (value, low, high) of (baseline - extended) / (baseline - noise floor); 95 %
+            interval from resampled pushes.
+        probes: how many pushes were resampled.
+    """
+
+    baseline: float
+    extended: float
+    noise_floor: float
+    removed: tuple[float, float, float]
+    probes: int
+
+    def to_json(self, split: str) -> dict[str, Any]:
+        """As the report has it, in millinewtons."""
+        value, low, high = (round(part, 4) for part in self.removed)
+        steps = {
+            "baseline": self.baseline,
+            "extended": self.extended,
+            "noise_floor": self.noise_floor,
+        }
+        return {
+            "split": split,
+            "unit": "mN",
+            **{name: round(step * 1e3, 3) for name, step in steps.items()},
+            "reducible_removed": {"value": value, "low": low, "high": high},
+            "probes": self.probes,
+            "force": {"unit": "N"} | {name: round(step, 5) for name, step in steps.items()},
+        }
+
+
+def felt_ladder(
+    data: Sequence[Observations],
+    baseline: Sequence[Prediction],
+    extended: Sequence[Prediction],
+    seed: int,
+    stiffer: tuple[float, float] = (1.0, 1.0),
+) -> FeltLadder:
+    """Compare two models on the pushes of test sequences, which are resampled whole.
+
+    Args:
+        stiffer: modulus of each over the one that was replayed [1].
+    """
+    rows: list[tuple[str, float, float, float]] = []
+    for item, before, after in zip(data, baseline, extended, strict=True):
+        if before.felt is None or after.felt is None:
+            continue
+        for number, group in enumerate(item.groups):
+            if (
+                number in before.failed
+                or number in after.failed
+                or not np.isfinite(before.felt.gap[number]).all()
+            ):
+                continue
+            felt = [
+                side.stiffer(factor)
+                for side, factor in zip((before.felt, after.felt), stiffer, strict=True)
+            ]
+            one, other = (float((side.gap[number] ** 2).sum()) for side in felt)
+            rows.append(
+                (
+                    f"{item.name}/{group.probe}",
+                    one,
+                    other,
+                    3 * float(before.felt.noise[number]) ** 2,
+                )
+            )
+    if not rows:
+        raise DiagnosisError(
+            "the test sequences have no push whose force is known; name others in [splits] test"
+        )
+    names, table = np.array([row[0] for row in rows]), np.array([[*row[1:], 1.0] for row in rows])
+    pushes = np.array([table[names == name].sum(axis=0) for name in np.unique(names)])
+    chosen = np.random.default_rng(seed).integers(0, len(pushes), size=(_DRAWS, len(pushes)))
+    drawn, whole = _rms(pushes[chosen].sum(axis=1)), _rms(pushes.sum(axis=0)[None])
+    low, high = np.quantile(_share(drawn), [0.025, 0.975])
+    return FeltLadder(
+        baseline=float(whole[0, 0]),
+        extended=float(whole[0, 1]),
+        noise_floor=float(whole[0, 2]),
+        removed=(float(_share(whole)[0]), float(low), float(high)),
+        probes=len(pushes),
+    )
+
+
+def _rms(sums: FloatArray) -> FloatArray:
+    """(d, 3) [N] from sums of squares and, last, of groups (d, 4)."""
+    return np.asarray(np.sqrt(sums[:, :3] / sums[:, 3:]))
+
+
+def _share(rms: FloatArray) -> FloatArray:
+    """Removed share (d,), at most all; nothing is reducible where the baseline lies at the
+    floor."""
+    reducible = rms[:, 0] - rms[:, 2]
+    some = reducible > np.sqrt(_LEAST)
+    return np.where(
+        some, np.minimum((rms[:, 0] - rms[:, 1]) / np.where(some, reducible, 1.0), 1.0), 0.0
+    )

@@ -1,0 +1,215 @@
+"""Errors of models on the same patches of the same pushes, as sums from which any average, and any
+resampling, can be taken.
+
+The camera has a fixed pattern of some tenths of a millimetre, which is no error of the simulation.
+In each model it is what the untouched frames show, and it is taken off there. But a model that is
+wrong about the untouched block, too (sag, a camera that was moved), has its error in that very
+pattern. What all patterns hold along the difference of two models' is given back to each: a sag of
+which two thirds were named leaves one third in the extended model. Nothing here is fitted in favour
+of one of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.diagnosis.forward.prediction import Prediction
+from palpate.diagnosis.inference.noise_model import patch_variance
+from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.foundation.arrays import FloatArray, IntArray
+from palpate.foundation.errors import DiagnosisError
+from palpate.measurement.camera_model import sight_of
+from palpate.measurement.metrics import paper_distance
+from palpate.measurement.surface_gaps import Surface
+from palpate.setup.setup import Setup
+
+__all__ = ["DRAWS", "ProbeSums", "fixed_pattern", "paper_sums", "probe_sums", "removed_share"]
+
+DRAWS = 2000
+_PAPER_POINTS = 4000
+_LEAST_POINTS = 5
+_SAME_PATTERN = 1e-5
+"""Patterns that differ by less than this [m] are one: the models agree about the untouched
+block."""
+
+
+@dataclass(frozen=True, eq=False)
+class ProbeSums:
+    """Of k pushes under m models, over all patches of their groups, each weighed by its points.
+
+    Attributes:
+        names: of the pushes, "sequence/number".
+        squares: (k, m) squared errors without the fixed patterns [m^2].
+        along: (k, m) each fixed pattern times the difference of two of them, along which they are
+            errors.
+        size: (k,) it squared.
+        floor: (k,) what the scatter of single points leaves [m^2].
+        points: (k,).
+    """
+
+    names: tuple[str, ...]
+    squares: FloatArray
+    along: FloatArray
+    size: FloatArray
+    floor: FloatArray
+    points: FloatArray
+
+    def of(self, rows: Sequence[int]) -> ProbeSums:
+        """These pushes alone."""
+        own = list(rows)
+        arrays = (
+            values[own] for values in (self.squares, self.along, self.size, self.floor, self.points)
+        )
+        return ProbeSums(tuple(self.names[row] for row in own), *arrays)
+
+    def rms(self, chosen: IntArray | None = None, still: bool = True) -> FloatArray:
+        """RMS of every model, the noise floor last (d, m + 1) [m]; of pushes drawn with repetition
+        (d, n), or of all (1, m + 1).
+
+        Without what is `still`, what a model is wrong about in the untouched block, too, does not
+        count: sag, for one.
+        """
+        rows = np.arange(len(self.names))[None] if chosen is None else chosen
+        size, points = self.size[rows].sum(axis=1), np.maximum(self.points[rows].sum(axis=1), 1)
+        differ = size > _SAME_PATTERN**2 * points
+        share = self.along[rows].sum(axis=1) / np.where(differ, size, 1.0)[:, None]
+        lasting = np.where(differ & still, size, 0.0)[:, None] * share**2
+        mean = (
+            np.column_stack(
+                [self.squares[rows].sum(axis=1) + lasting, self.floor[rows].sum(axis=1)]
+            )
+            / points[:, None]
+        )
+        return np.asarray(np.sqrt(mean))
+
+    def draws(self, seed: int, draws: int = DRAWS) -> IntArray:
+        """Pushes drawn with repetition (draws, k)."""
+        return np.random.default_rng(seed).integers(
+            0, len(self.names), size=(draws, len(self.names))
+        )
+
+
+def removed_share(baseline: FloatArray, model: FloatArray, floor: FloatArray) -> FloatArray:
+    """Share of the reducible error that is gone, at most all; nothing is reducible where the
+    baseline already lies at the floor.
+    """
+    reducible = baseline - floor
+    share = (baseline - model) / np.where(reducible > 1e-6, reducible, 1.0)
+    return np.where(reducible > 1e-6, np.minimum(share, 1.0), 0.0)
+
+
+def fixed_pattern(
+    item: Observations, model: Prediction, before: bool = False
+) -> tuple[FloatArray, FloatArray]:
+    """The camera's fixed pattern (p,) [m] in the frames clear of the block, and how many points it
+    rests on (p,).
+
+    Of a block that may keep a dent, or stay where it slid to, only those `before` the first touch
+    count, if there are any.
+    """
+    free = np.array([group.free for group in item.groups])[:, None]
+    early = np.array([group.free and not group.probe for group in item.groups])[:, None]
+    free = early if before and early.any() else free
+    count = np.where(free & np.isfinite(model.gap), model.count, 0.0)
+    total = count.sum(axis=0)
+    return (np.nan_to_num(model.gap) * count).sum(axis=0) / np.maximum(total, 1), total
+
+
+def probe_sums(
+    data: Sequence[Observations],
+    models: Sequence[Sequence[Prediction]],
+    lasting: bool = False,
+    ends: tuple[int, int] = (0, -1),
+) -> ProbeSums:
+    """Sums over the touched groups of sequences under several models.
+
+    Args:
+        models: for each model its predictions, one for each sequence.
+        lasting: whether also what a push has left counts, a dent or a block that slid.
+        ends: the two models along whose difference fixed patterns are errors; the second one's
+            scatter and points make the noise floor and the weights.
+
+    Raises DiagnosisError where a sequence has no untouched frame, or none of them a touched one.
+    """
+    seen = [row for row in zip(data, *models, strict=True) if not row[0].unseen]
+    variance = patch_variance([row[1:][end] for row in seen for end in ends])
+    found: list[tuple[str, FloatArray]] = []
+    for item, *own in seen:
+        found += _rows(item, own, variance, lasting, ends)
+    if not found:
+        raise DiagnosisError(
+            "the test sequences have no frame in which the tool touches the phantom; name others in [splits] test"
+        )
+    names, table, count = (
+        np.array([row[0] for row in found]),
+        np.stack([row[1] for row in found]),
+        len(models),
+    )
+    probes = np.unique(names)
+    sums = np.array([table[names == name].sum(axis=0) for name in probes])
+    size, floor, points = sums[:, 2 * count :].T
+    return ProbeSums(
+        tuple(map(str, probes)), sums[:, :count], sums[:, count : 2 * count], size, floor, points
+    )
+
+
+def _rows(
+    item: Observations,
+    own: Sequence[Prediction],
+    variance: FloatArray,
+    lasting: bool,
+    ends: tuple[int, int],
+) -> list[tuple[str, FloatArray]]:
+    """Of one sequence: the push that each group belongs to, and its sums."""
+    patterns = [fixed_pattern(item, model, lasting) for model in own]
+    difference, known = patterns[ends[0]][0] - patterns[ends[1]][0], patterns[ends[1]][1]
+    if not known.sum():
+        raise DiagnosisError(
+            f"{item.name} has no untouched frame, so its noise floor is unknown; name others in [splits] test"
+        )
+    found = []
+    for number, group in enumerate(item.groups):
+        left = lasting and group.probe > 0
+        if (group.free and not left) or any(number in model.failed for model in own):
+            continue
+        seen = np.all([np.isfinite(model.gap[number]) for model in own], axis=0) & (
+            known >= _LEAST_POINTS
+        )
+        count = own[ends[1]].count[number][seen]
+        errors = [
+            model.gap[number] - pattern for model, (pattern, _) in zip(own, patterns, strict=True)
+        ]
+        floor = (variance[seen] * (1 + count / known[seen])).sum()
+        products = [
+            *(error**2 for error in errors),
+            *(pattern * difference for pattern, _ in patterns),
+            difference**2,
+        ]
+        sums = [(values[seen] * count).sum() for values in products]
+        found.append((f"{item.name}/{group.probe}", np.array([*sums, floor, count.sum()])))
+    return found
+
+
+def paper_sums(
+    data: Sequence[Observations], predictions: Sequence[Prediction], setup: Setup
+) -> dict[str, tuple[float, int]]:
+    """Sum of the paper's metric over touched groups [m], and their number, by push
+    ("sequence/number").
+    """
+    surface, sight = Surface.of(setup), sight_of(setup)
+    found: dict[str, tuple[float, int]] = {}
+    for item, prediction in zip(data, predictions, strict=True):
+        for number, group in enumerate(item.groups):
+            if not item.unseen and not group.free and number not in prediction.failed:
+                name = f"{item.name}/{group.probe}"
+                distance = paper_distance(
+                    sight.place(group.points[:_PAPER_POINTS]),
+                    prediction.equilibria[number],
+                    surface,
+                )
+                total, count = found.get(name, (0.0, 0))
+                found[name] = (total + distance, count + 1)
+    return found

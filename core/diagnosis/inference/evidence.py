@@ -1,0 +1,216 @@
+"""Gaussian evidence from quadratic forms: once a sequence is linearised, a few small matrices hold
+all it can say.
+
+Residuals and columns of one block of data (a sequence, or the rest cloud) are whitened, and each
+patch's own constant is projected out (the camera's fixed pattern). What remains is the Gram matrix
+of [residual, columns]; fits, predictive densities of left-out blocks and draws under the null
+hypothesis all come from sums of such matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.foundation.arrays import FloatArray
+
+__all__ = [
+    "FLAT",
+    "Block",
+    "Fit",
+    "draw_rights",
+    "explained",
+    "fit",
+    "gram",
+    "less_constants",
+    "log_evidence",
+    "predictive_gain",
+    "predictive_score",
+    "within_reach",
+]
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """One block of data: `gram` (1 + k, 1 + k) of the whitened residual and its k columns; `values`
+    counts independent values.
+    """
+
+    name: str
+    gram: FloatArray
+    values: float
+
+
+def gram(
+    residual: FloatArray, columns: FloatArray, weights: FloatArray, centred: bool = True
+) -> tuple[FloatArray, float]:
+    """Gram matrix of residual and columns; where `centred`, with each patch's weighted mean over
+    the groups taken out.
+
+    Args:
+        residual: (g, p) [m].
+        columns: (g, p, k).
+        weights: (g, p) inverse variances [1/m^2], zero where unseen.
+
+    Returns:
+        (1 + k, 1 + k) matrix, and the number of values less the constants taken out.
+    """
+    stacked = np.concatenate([np.where(weights > 0, residual, 0.0)[..., None], columns], axis=2)
+    taken = float((weights.sum(axis=0) > 0).sum()) if centred else 0.0
+    if centred:
+        stacked = less_constants(stacked, weights)
+    white = stacked * np.sqrt(weights)[..., None]
+    flat = white.reshape(-1, white.shape[2])
+    return np.asarray(flat.T @ flat), float((weights > 0).sum() - taken)
+
+
+def less_constants(columns: FloatArray, weights: FloatArray) -> FloatArray:
+    """Columns (g, p, k) less each patch's mean over the groups, by weights (g, p)."""
+    total = np.maximum(weights.sum(axis=0), 1e-300)
+    return np.asarray(columns - np.einsum("gp,gpk->pk", weights, columns) / total[:, None])
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Most probable change (k,) of the columns' factors, their covariance (k, k), and the misfit
+    that is left.
+    """
+
+    change: FloatArray
+    covariance: FloatArray
+    misfit: float
+
+
+def _parts(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[float, FloatArray, FloatArray]:
+    total = np.sum([block.gram for block in blocks], axis=0)
+    index = np.asarray(columns, dtype=int) + 1
+    return float(total[0, 0]), total[index, 0], total[np.ix_(index, index)]
+
+
+def fit(
+    blocks: Sequence[Block],
+    columns: Sequence[int],
+    precision: FloatArray,
+    offset: FloatArray | None = None,
+) -> Fit:
+    """Least squares with Gaussian priors.
+
+    Args:
+        columns: which to use.
+        precision: (k, k) of their priors.
+        offset: (k,) prior mean of the change; zero without it.
+    """
+    square, right, matrix = _parts(blocks, columns)
+    mean = np.zeros(len(right)) if offset is None else offset
+    covariance = np.linalg.inv(matrix + precision)
+    change = covariance @ (precision @ mean - right)
+    misfit = square + 2 * right @ change + change @ matrix @ change
+    return Fit(np.asarray(change, dtype=float), np.asarray(covariance, dtype=float), float(misfit))
+
+
+_DAMPINGS = np.geomspace(1e-3, 1e12, 61)
+
+
+def within_reach(
+    blocks: Sequence[Block],
+    columns: Sequence[int],
+    precision: FloatArray,
+    own: Sequence[int],
+    scales: FloatArray,
+    reach: float,
+) -> FloatArray:
+    """Least squares (k,) in which some columns change by no more than `reach` of their scales
+    (Levenberg 1944, Marquardt 1963).
+
+    What the data hardly tell is held back first, what they tell surely goes nearly all the way; a
+    whole step made shorter would keep its direction, which the doubtful ones rule.
+
+    Args:
+        columns, precision: as for `fit`.
+        own: places among the columns of those with a limit.
+        scales: (len(own),) their scales.
+    """
+    change = fit(blocks, columns, precision).change
+    if not len(own) or np.abs(change[own] / scales).max() <= reach:
+        return change
+    index, damped = np.asarray(own), precision.copy()
+    for damping in _DAMPINGS:
+        damped[index, index] = precision[index, index] + damping * scales**-2.0
+        change = fit(blocks, columns, damped).change
+        if np.abs(change[index] / scales).max() <= reach:
+            break
+    return change
+
+
+def log_evidence(blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray) -> float:
+    """Log density of the blocks' residuals with the columns' factors integrated out, up to a
+    constant of the data [nats].
+    """
+    square, right, matrix = _parts(blocks, columns)
+    full = matrix + precision
+    explained = right @ np.linalg.solve(full, right)
+    occam = np.linalg.slogdet(full)[1] - np.linalg.slogdet(precision)[1]
+    return float(-0.5 * (square - explained) - 0.5 * occam)
+
+
+def explained(blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray) -> float:
+    """How much of the misfit columns with these priors explain, halved: what a log density gains by
+    them [nats].
+    """
+    _, right, matrix = _parts(blocks, columns)
+    return 0.5 * float(right @ np.linalg.solve(matrix + precision, right))
+
+
+def draw_rights(
+    blocks: Sequence[Block],
+    columns: Sequence[int],
+    precision: FloatArray,
+    draws: int,
+    random: np.random.Generator,
+) -> FloatArray:
+    """Right sides (d, b, k) as the noise model gives them: white noise and discrepancy in each
+    block, and the shared factors of `columns` drawn from their prior of this precision.
+    """
+    shift = random.multivariate_normal(np.zeros(len(columns)), np.linalg.inv(precision), size=draws)
+    rights = np.empty((draws, len(blocks), blocks[0].gram.shape[0] - 1))
+    for number, block in enumerate(blocks):
+        inner = block.gram[1:, 1:]
+        values, vectors = np.linalg.eigh(inner)
+        root = vectors * np.sqrt(np.maximum(values, 0))
+        rights[:, number] = (
+            random.standard_normal((draws, len(values))) @ root.T
+            + shift @ inner[:, list(columns)].T
+        )
+    return rights
+
+
+FLAT = 1e-6
+"""Factor on a prior's precision that makes it say nothing."""
+
+
+def predictive_score(
+    blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray, stated: int
+) -> FloatArray:
+    """Log predictive density (b + 1,) of each block given all the others, and of the stated
+    accuracies given the blocks [nats].
+
+    The first `stated` columns are nuisances. What was stated of them (touches, calliper, data
+    sheet) is a measurement like any other, and is left out in its turn: a model that explains the
+    data only by breaking it must not come off well.
+    """
+    whole = log_evidence(blocks, columns, precision)
+    scores = [
+        whole - log_evidence([*blocks[:i], *blocks[i + 1 :]], columns, precision)
+        for i in range(len(blocks))
+    ]
+    free = precision.copy()
+    free[:stated, :stated] *= FLAT
+    return np.array([*scores, whole - log_evidence(blocks, columns, free)])
+
+
+def predictive_gain(score: FloatArray, baseline: FloatArray) -> tuple[float, float]:
+    """Total gain [nats] and its standard error from the blocks' paired differences."""
+    difference = score - baseline
+    return float(difference.sum()), float(difference.std(ddof=1) * np.sqrt(len(difference)))

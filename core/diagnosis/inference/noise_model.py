@@ -1,0 +1,253 @@
+"""What residuals look like when nothing is wrong: the sensor's noise, the mesh's error, and the
+engine's own accuracy.
+
+A cause may only be named for what none of these explains. The engine's accuracy is stated as two
+random fields, drawn anew for each sequence: displacements are right to a few percent, and so is the
+stiffness of any part of the block (a coarse contact zone acts like a stiffer one, another law at
+large strain like a softer one). Without them, an unsuspicious block is given lumps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from palpate.diagnosis.forward.prediction import Prediction
+from palpate.diagnosis.inference.evidence import Block, gram
+from palpate.diagnosis.observation.force_record import (
+    depth_discrepancy,
+    force_discrepancy,
+    force_scatter,
+)
+from palpate.foundation.arrays import FloatArray
+from palpate.measurement.surface_gaps import Surface
+
+__all__ = [
+    "DISPLACEMENT_ERROR",
+    "STIFFNESS_ERROR",
+    "Noise",
+    "noises",
+    "patch_variance",
+    "rows_of",
+    "smooth_basis",
+]
+
+DISPLACEMENT_ERROR = 0.02
+"""Standard deviation of the engine's relative error of displacement, smooth over FIELD_LENGTH along
+the surface [1]."""
+STIFFNESS_ERROR = 0.08
+"""Standard deviation of the logarithm of local stiffness that stands for discretisation and law
+[1]."""
+FIELD_LENGTH = 8e-3
+_WHITE_FLOOR = 2e-5
+_ELSEWHERE = 0.2
+"""A patch is no more what it was where so many of its points meet another side of the model [1]."""
+
+
+def patch_variance(predictions: Sequence[Prediction]) -> FloatArray:
+    """Variance (p,) [m^2] of single points about their patch's mean, pooled over all groups;
+    scattered patches get the median.
+    """
+    freedom = np.sum([np.maximum(item.count - 1, 0).sum(axis=0) for item in predictions], axis=0)
+    squares = np.sum(
+        [np.nansum(item.spread**2 * np.maximum(item.count - 1, 0), axis=0) for item in predictions],
+        axis=0,
+    )
+    enough = freedom > 50
+    variance = np.where(enough, squares / np.maximum(freedom, 1), np.nan)
+    typical = (
+        float(np.nanmedian(variance))
+        if enough.any()
+        else float(squares.sum() / max(freedom.sum(), 1))
+    )
+    return np.where(enough, variance, typical)
+
+
+def smooth_basis(centres: FloatArray, length: float) -> FloatArray:
+    """Gaussian bumps (p, b) at patch centres (p, 3) about every `length` [m] along the surface;
+    their squares add up to one.
+    """
+    chosen = [0]
+    nearest = np.linalg.norm(centres - centres[0], axis=1)
+    while nearest.max() > length:
+        chosen.append(int(nearest.argmax()))
+        nearest = np.minimum(nearest, np.linalg.norm(centres - centres[chosen[-1]], axis=1))
+    bumps = np.exp(
+        -0.5 * (np.linalg.norm(centres[:, None] - centres[chosen], axis=2) / (0.8 * length)) ** 2
+    )
+    return np.asarray(bumps / np.linalg.norm(bumps, axis=1, keepdims=True))
+
+
+def rows_of(item: Prediction) -> tuple[FloatArray, FloatArray]:
+    """Gaps (g, r) of the surface's patches [m] and, where there is one, of the force's three
+    components [N]; columns (g, r, k).
+    """
+    if item.felt is None:
+        return item.gap, item.columns
+    return np.concatenate([item.gap, item.felt.gap], axis=1), np.concatenate(
+        [item.columns, item.felt.columns], axis=1
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """The noise of one sequence under the baseline; the same weights serve every model, so that
+    scores compare.
+
+    Rows are the surface's patches in metres and, of a sequence with forces, three more in newtons,
+    one for each component.
+
+    Attributes:
+        weights: (g, r) inverse variances [1/m^2].
+        residual: (g, r) of the baseline [m], zero where unseen.
+        mesh: (g, r) fine minus default mesh [m].
+        discrepancy: (g, r, d) columns of the engine's own error, unit variance.
+        centred: whether each row has a constant of its own, as the camera's pattern is; forces
+            alone have none, since their bias was taken off.
+        spots: how many of the last discrepancies are of local stiffness.
+    """
+
+    weights: FloatArray
+    residual: FloatArray
+    mesh: FloatArray
+    discrepancy: FloatArray
+    centred: bool = True
+    spots: int = 0
+
+    @classmethod
+    def of(
+        cls,
+        baseline: Prediction,
+        fine: Prediction,
+        surface: Surface,
+        variance: FloatArray,
+        lumps: slice,
+    ) -> Noise:
+        """From the baseline on two meshes; `lumps` are the baseline's columns for a softer or
+        stiffer spot.
+        """
+        (gap, columns), finer = rows_of(baseline), rows_of(fine)[0]
+        seen = np.isfinite(gap) & np.isfinite(finer)
+        seen[list(set(baseline.failed) | set(fine.failed))] = False
+        mesh = np.where(seen, finer - gap, 0.0)
+        scatter = variance / np.maximum(baseline.count, 1) + _WHITE_FLOOR**2
+        if baseline.felt is not None:
+            scatter = np.concatenate([scatter, force_scatter(baseline.felt)], axis=1)
+        scatter = scatter + (0.5 * mesh) ** 2
+        centres = surface.patch_centres
+        size = np.array(
+            [
+                np.linalg.norm(frame.move(centres) - centres, axis=1)
+                if frame.in_contact
+                else np.zeros(len(centres))
+                for frame in baseline.equilibria
+            ]
+        )
+        displacement = DISPLACEMENT_ERROR * size[..., None] * smooth_basis(centres, FIELD_LENGTH)
+        if baseline.felt is not None:
+            displacement = _aside(
+                displacement, force_discrepancy(baseline.felt, baseline.equilibria)
+            )
+        stiffness = STIFFNESS_ERROR * columns[..., lumps].astype(float)
+        weights = np.where(seen, 1 / scatter, 0.0)
+        discrepancy = np.concatenate([displacement, stiffness], axis=2)
+        return cls(weights, np.where(seen, gap, 0.0), mesh, discrepancy, spots=stiffness.shape[2])
+
+    @classmethod
+    def felt(cls, baseline: Prediction, fine: Prediction, lumps: slice) -> Noise:
+        """The same of a sequence without clouds: the force's rows alone, with how deep each push
+        went as one more thing that is known only so well.
+        """
+        (gap, columns), finer = rows_of(baseline), rows_of(fine)[0]
+        assert baseline.felt is not None
+        seen = np.isfinite(gap) & np.isfinite(finer)
+        seen[list(set(baseline.failed) | set(fine.failed))] = False
+        mesh = np.where(seen, finer - gap, 0.0)
+        scatter = force_scatter(baseline.felt) + (0.5 * mesh) ** 2
+        parts = [
+            force_discrepancy(baseline.felt, baseline.equilibria),
+            depth_discrepancy(baseline.felt, baseline.equilibria),
+            STIFFNESS_ERROR * columns[..., lumps].astype(float),
+        ]
+        weights = np.where(seen, 1 / scatter, 0.0)
+        return cls(
+            weights, np.where(seen, gap, 0.0), mesh, np.concatenate(parts, axis=2), centred=False
+        )
+
+    def remeshed(self, model: Prediction, fine: Prediction) -> Noise:
+        """With the mesh's error as it is in another model, which is settled by now.
+
+        A patch of which it shows another side loses its weight: of a block that slid from under its
+        edge the points that were the top's are a side's, with that side's share of the camera's
+        pattern. All else stays, so that no patch gains or loses.
+        """
+        gap, finer = rows_of(model)[0], rows_of(fine)[0]
+        seen = np.isfinite(gap) & np.isfinite(finer) & (self.weights > 0)
+        seen[list(set(model.failed) | set(fine.failed))] = False
+        weights = self.weights.copy()
+        if model.elsewhere is not None:
+            weights[:, : model.elsewhere.shape[1]][model.elsewhere > _ELSEWHERE] = 0.0
+        return replace(self, weights=weights, mesh=np.where(seen, finer - gap, self.mesh))
+
+    def block(self, prediction: Prediction) -> Block:
+        """Quadratic form of a model's residual and columns (mesh error last), with the discrepancy
+        integrated out.
+        """
+        matrix, values = self.whole(prediction)
+        kept = matrix.shape[0] - self.discrepancy.shape[2]
+        cross, inner = matrix[:kept, kept:], matrix[kept:, kept:]
+        reduced = matrix[:kept, :kept] - cross @ np.linalg.solve(
+            inner + np.eye(len(inner)), cross.T
+        )
+        return Block(prediction.name, reduced, values)
+
+    def whole(self, prediction: Prediction) -> tuple[FloatArray, float]:
+        """Gram matrix of residual, columns, mesh error and the columns of the discrepancy, and the
+        number of values.
+
+        Where a model lost sight of a patch or found no equilibrium, the baseline's residual stands:
+        nothing is gained there.
+        """
+        gap, columns = rows_of(prediction)
+        usable = np.isfinite(gap) & (self.weights > 0)
+        usable[list(prediction.failed)] = False
+        residual = np.where(usable, gap, self.residual) + self.mesh
+        columns = np.where(usable[..., None], columns, 0.0)
+        stacked = np.concatenate([columns, self.mesh[..., None], self.discrepancy], axis=2)
+        return gram(residual, stacked, self.weights, self.centred)
+
+
+def _aside(surface: FloatArray, force: FloatArray) -> FloatArray:
+    """(g, p + 3, d + e) of columns (g, p, d) of the surface and others (g, 3, e) of the force,
+    which say nothing of each other.
+    """
+    nothing = [
+        np.zeros((*rows.shape[:2], other.shape[2]))
+        for rows, other in ((surface, force), (force, surface))
+    ]
+    return np.concatenate(
+        [
+            np.concatenate([surface, nothing[0]], axis=2),
+            np.concatenate([nothing[1], force], axis=2),
+        ],
+        axis=1,
+    )
+
+
+def noises(
+    baseline: Sequence[Prediction],
+    fine: Sequence[Prediction],
+    surface: Surface | None,
+    lumps: slice,
+) -> list[Noise]:
+    """The noise of every sequence; only those without clouds need no surface."""
+    seen = [item for item in baseline if not item.unseen]
+    variance = patch_variance(seen) if seen else np.empty(0)
+    return [
+        Noise.felt(b, f, lumps)
+        if b.unseen or surface is None
+        else Noise.of(b, f, surface, variance, lumps)
+        for b, f in zip(baseline, fine, strict=True)
+    ]

@@ -1,0 +1,156 @@
+"""Is anything wrong? The part of a model's error that is smooth over the surface and grows with the
+push, against pure noise.
+
+The whitened residual of each sequence is projected on smooth surface modes times the depth of the
+push (step 3 of the method); the same projection of draws from the noise model, with the nuisances
+fitted anew in each, says how much of it chance gives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import gamma
+
+from palpate.diagnosis.forward.prediction import Prediction
+from palpate.diagnosis.inference.evidence import Block, draw_rights
+from palpate.diagnosis.inference.hypothesis import Model
+from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.noise_model import smooth_basis
+from palpate.foundation.arrays import FloatArray
+
+__all__ = ["NOTHING", "Structure", "explained_by_modes", "structure_of"]
+
+MODE_LENGTH = 12e-3
+"""Distance between surface modes [m]: what a cause inside a block or at its base shows is no finer
+than this."""
+FELT_LENGTH = 12e-3
+"""The same between modes of the force, over the places that are pushed: a share of each push's own
+force."""
+DRAWS = 400
+QUANTILE = 0.999
+"""Of what chance gives; by a gamma distribution with the draws' mean and variance, as a sum of
+squares nearly has. At one in a hundred every tenth suite of ten controls would hold a false alarm,
+and the noise model is not exact."""
+_FAINT = 1e-3
+"""Prior precision of a mode's factor over the largest in the block: keeps modes that nobody saw
+from being divided by nothing."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Squared whitened residual along the modes.
+
+    Attributes:
+        value: of the data.
+        expected: mean of it when nothing is wrong.
+        bound: what it exceeds once in a thousand times then.
+    """
+
+    value: float
+    expected: float
+    bound: float
+
+    @property
+    def ratio(self) -> float:
+        """Over what chance gives; about one when nothing is wrong."""
+        return self.value / self.expected
+
+    @property
+    def significant(self) -> bool:
+        """Whether chance alone would rarely give it."""
+        return self.value > self.bound
+
+
+NOTHING = Structure(0.0, 1.0, 1.0)
+
+
+def _depth(item: Prediction) -> FloatArray:
+    """(g,) largest displacement of each group over the largest of the sequence [1]."""
+    size = np.array(
+        [
+            np.linalg.norm(frame.displacement, axis=1).max() if frame.in_contact else 0.0
+            for frame in item.equilibria
+        ]
+    )
+    return np.asarray(size / max(size.max(), 1e-9))
+
+
+def _with_modes(model: Model, bench: Bench) -> list[Block]:
+    """The model's blocks whose last columns are the modes."""
+    seen = (
+        smooth_basis(bench.surface.patch_centres, MODE_LENGTH) if bench.seen else np.zeros((0, 0))
+    )
+    felt = smooth_basis(bench.pushed[0], FELT_LENGTH) if len(bench.pushed[0]) else np.zeros((0, 0))
+    blocks, at = [], 0
+    for noise, item in zip(bench.noises, model.predictions, strict=True):
+        modes = max(seen.shape[1], felt.shape[1])
+        if item.felt is not None and item.unseen:
+            push = np.asarray(item.felt.push)
+            names = np.unique(push)
+            own = felt[at + np.searchsorted(names, push)]
+            at += len(names)
+            force = _wide(item.felt.force[:, :, None] * own[:, None, :], modes)
+            blocks.append(noise.block(item.beside(np.zeros((len(own), 0, modes)), force)))
+        else:
+            blocks.append(
+                noise.block(item.beside(_wide(_depth(item)[:, None, None] * seen, modes)))
+            )
+    return blocks
+
+
+def _wide(columns: FloatArray, count: int) -> FloatArray:
+    """With so many columns (..., count), the further ones zero: all blocks have the same."""
+    missing = count - columns.shape[-1]
+    return (
+        np.concatenate([columns, np.zeros((*columns.shape[:-1], missing))], axis=-1)
+        if missing
+        else columns
+    )
+
+
+def explained_by_modes(
+    blocks: Sequence[Block],
+    rights: FloatArray,
+    fitted: Sequence[int],
+    precision: FloatArray,
+    modes: Sequence[int],
+) -> FloatArray:
+    """What modes explain (d,) of right sides (d, b, k), after the `fitted` columns were fitted to
+    all blocks together.
+
+    Args:
+        precision: (f, f) prior of the fitted columns.
+        modes: columns of which each block has its own factors.
+    """
+    index, own = np.asarray(fitted), np.asarray(modes)
+    grams = np.array([block.gram[1:, 1:] for block in blocks])
+    total = grams[:, index[:, None], index].sum(axis=0) + precision
+    factors = -np.linalg.solve(total, rights[:, :, index].sum(axis=1).T).T
+    found = np.zeros(len(rights))
+    for number, matrix in enumerate(grams):
+        left = rights[:, number, own] + factors @ matrix[np.ix_(index, own)]
+        inner = matrix[np.ix_(own, own)]
+        inner = inner + _FAINT * np.diag(inner).max() * np.eye(len(own))
+        found += np.einsum("di,ij,dj->d", left, np.linalg.inv(inner), left)
+    return found
+
+
+def structure_of(bench: Bench, model: Model, seed: int) -> Structure:
+    """Structured error that a model leaves."""
+    blocks = _with_modes(model, bench)
+    size = blocks[0].gram.shape[0] - 1
+    first = model.predictions[0].columns.shape[2]
+    fitted = [*model.nuisance[:-1], size - 1, *model.columns]  # the mesh's error is the last column
+    precision = bench.held(model)
+    modes = range(first, size - 1)
+    data = np.array([[block.gram[1:, 0] for block in blocks]])
+    rights = draw_rights(blocks, fitted, precision, DRAWS, np.random.default_rng(seed))
+    value = float(explained_by_modes(blocks, data, fitted, precision, modes)[0])
+    chance = explained_by_modes(blocks, rights, fitted, precision, modes)
+    mean, variance = float(chance.mean()), float(chance.var(ddof=1))
+    return Structure(
+        value, mean, float(gamma.ppf(QUANTILE, mean**2 / variance, scale=variance / mean))
+    )

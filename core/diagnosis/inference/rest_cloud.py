@@ -1,0 +1,156 @@
+"""The static channel: the rest cloud against the stated shape, with the table as its floor.
+
+Here alone the sag of gravity shows. The camera's pose is free, since it was fitted to this very
+cloud, and the camera's smooth bias is a random field. Its size and reach come from the cloud
+itself, with every side of the block free to bulge, so that a block that sags does not pass for a
+bad camera.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from palpate.diagnosis.inference.camera_error_model import CameraErrors, camera_errors
+from palpate.diagnosis.inference.evidence import Block
+from palpate.foundation.arrays import FloatArray
+from palpate.measurement.camera_model import sight_of
+from palpate.measurement.patch_averages import patch_means
+from palpate.measurement.segmentation import Cleaner
+from palpate.measurement.surface_gaps import Surface, gaps
+from palpate.mesh.protocol import Meshing
+from palpate.registration.registration import motion_jacobian
+from palpate.replay.replay import rest
+from palpate.setup.setup import Setup
+
+__all__ = ["StaticChannel"]
+
+_TABLE_CELL = 0.012
+_POSE_FREEDOM = 0.05
+_LEAST_POINTS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class StaticChannel:
+    """The rest cloud, reduced; every model is compared at the same places.
+
+    Attributes:
+        centres, normals: (p, 3) of the patches of the surface that were seen [m], phantom frame.
+        table: (t, 3) of the table's cells [m].
+        residual: (p + t,) of the stated model, at the patches and at the table's cells [m].
+        factor: Cholesky factor of its covariance (p + t, p + t) [m^2], the camera's pose and bias
+            included.
+        errors: of the camera.
+    """
+
+    centres: FloatArray
+    normals: FloatArray
+    table: FloatArray
+    residual: FloatArray
+    factor: FloatArray
+    errors: CameraErrors
+
+    @classmethod
+    def of(cls, cloud: FloatArray, cleaner: Cleaner, setup: Setup, grid: Meshing) -> StaticChannel:
+        """From the raw rest cloud (n, 3) [m], camera frame, under the stated setup."""
+        clean = cleaner.clean(cloud)
+        table, height, scatter = _table_cells(clean.table_points)
+        surface, sight = Surface.of(setup), sight_of(setup, reference=True)
+        points = sight.place(cloud[clean.indices])
+        seen = gaps(
+            points, sight.pose.translation, rest(setup, grid), surface, lowest=cleaner.lowest
+        )
+        means = patch_means(seen.gap, seen.patch, surface.patches, least=_LEAST_POINTS)
+        used = np.flatnonzero(np.isfinite(means.mean) & (means.count >= _LEAST_POINTS))
+        centres, normals = surface.patch_centres[used], surface.patch_normals[used]
+        white = np.concatenate(
+            [
+                float(np.nanmedian(means.spread[used])) ** 2 / np.maximum(means.count[used], 1),
+                scatter,
+            ]
+        )
+        residual = np.concatenate([means.mean[used], height])
+        places = np.concatenate([centres, table])
+        directions = np.concatenate([normals, np.tile([0.0, 0.0, 1.0], (len(height), 1))])
+        pivot = np.array([0.0, 0.0, setup.box.size[2]])
+        moved = np.einsum("ni,nij->nj", directions, motion_jacobian(places, pivot))
+        free = np.column_stack([moved, _bulges(places[: len(used)], normals, len(residual))])
+        depth = sight.pose.inverse().apply(places)[:, 2]
+        errors = camera_errors(places, depth, white, residual, free)
+        covariance = (
+            errors.covariance
+            + _POSE_FREEDOM**2 * moved @ np.diag([1, 1, 1, 100, 100, 100]) @ moved.T
+        )
+        return cls(centres, normals, table, residual, cho_factor(covariance)[0], errors)
+
+    def block(
+        self,
+        stated: Setup,
+        setup: Setup,
+        grid: Meshing,
+        columns: int,
+        varied: dict[int, tuple[Setup, float]],
+    ) -> Block:
+        """Quadratic form with the pose and the bias integrated out.
+
+        Args:
+            stated: setup under which the channel was made.
+            setup: of the model.
+            columns: total number of columns.
+            varied: column to (setup a little changed, step) for the effects that the block or the
+                camera shows at rest (`Effect.at_rest`).
+        """
+        before, here = self._gap(stated, stated, grid), self._gap(stated, setup, grid)
+        stacked = np.zeros((len(self.residual), 1 + columns))
+        stacked[:, 0] = self.residual + here - before
+        for column, (other, step) in varied.items():
+            stacked[:, 1 + column] = (self._gap(stated, other, grid) - here) / step
+        return Block(
+            "rest", stacked.T @ cho_solve((self.factor, False), stacked), float(len(self.residual))
+        )
+
+    def _gap(self, stated: Setup, setup: Setup, grid: Meshing) -> FloatArray:
+        """Measured minus simulated (p + t,) [m] under a setup, had the stated one left nothing but
+        its sag.
+
+        What was measured lies, under the stated setup, about where its block and the table are.
+        """
+        rays = sight_of(stated, reference=True).read(np.concatenate([self.centres, self.table]))
+        gap = sight_of(setup, reference=True).place(rays)
+        gap[: len(self.centres)] -= rest(setup, grid).move(Surface.of(setup).own(self.centres))
+        return np.concatenate(
+            [
+                np.einsum("ni,ni->n", gap[: len(self.centres)], self.normals),
+                gap[len(self.centres) :, 2],
+            ]
+        )
+
+
+def _table_cells(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Places (t, 3) on the table [m], mean height (t,) there [m], and its variance (t,) [m^2], from
+    points (m, 3).
+    """
+    _, index = np.unique(
+        np.floor(table[:, :2] / _TABLE_CELL).astype(int), axis=0, return_inverse=True
+    )
+    index = index.ravel()
+    count = np.bincount(index)
+    means = np.stack([np.bincount(index, table[:, axis]) / count for axis in range(3)], axis=1)
+    spread = float(np.median(np.abs(table[:, 2] - means[index, 2]))) * 1.48 if len(table) else 0.0
+    good = count >= 4
+    return means[good] * np.array([1.0, 1.0, 0.0]), means[good, 2], spread**2 / count[good]
+
+
+def _bulges(centres: FloatArray, normals: FloatArray, rows: int) -> FloatArray:
+    """Columns (rows, c) with which each side lies off as a whole and bulges; a smooth bias must not
+    be needed for that.
+    """
+    found = []
+    for side in np.unique(normals, axis=0):
+        here = (normals == side).all(axis=1).astype(float)
+        along = [axis for axis in range(3) if side[axis] == 0]
+        shapes = [here, *(here * centres[:, axis] ** power for axis in along for power in (1, 2))]
+        found += [np.concatenate([shape, np.zeros(rows - len(centres))]) for shape in shapes]
+    return np.column_stack(found) if found else np.zeros((rows, 0))

@@ -1,0 +1,84 @@
+"""What was measured while nothing was pushed: the rest cloud, and the touches that the robot's
+registration rests on.
+
+A registration lays the touches on their landmarks as well as a rigid motion can. What they still
+miss by is no business of its pose: it says whether the touched polygon has the size and the order
+that were stated. Touches that miss are all that tells another place of a touch from a robot that is
+registered wrongly, or from a tool that is off.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.diagnosis.inference.evidence import Block
+from palpate.diagnosis.inference.rest_cloud import StaticChannel
+from palpate.foundation.arrays import FloatArray
+from palpate.measurement.touch_correction import touch_misses, touched_places
+from palpate.mesh.protocol import Meshing
+from palpate.registration.registration import motion_jacobian
+from palpate.setup.setup import Setup
+
+__all__ = ["TOUCH", "Still", "touch_block"]
+
+TOUCH = 5e-4
+"""Standard deviation of one coordinate of a touch [m]: the eye, the hand, and a ball that does not
+stay on a corner."""
+_LEAST_TOUCHES = 3
+
+Varied = dict[int, tuple[Setup, float]]
+"""Column to (setup a little changed, step)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Still:
+    """All evidence without a push, as one block of data."""
+
+    cloud: StaticChannel
+
+    def block(
+        self, stated: Setup, setup: Setup, grid: Meshing, columns: int, varied: Varied
+    ) -> Block:
+        """Quadratic form of a model; as `StaticChannel.block`, whose arguments these are, with the
+        touches beside the cloud.
+        """
+        cloud, touches = (
+            self.cloud.block(stated, setup, grid, columns, varied),
+            touch_block(setup, grid, columns, varied),
+        )
+        return Block(cloud.name, cloud.gram + touches.gram, cloud.values + touches.values)
+
+
+def touch_block(setup: Setup, grid: Meshing, columns: int, varied: Varied) -> Block:
+    """Quadratic form of what the touches miss their places by, with the robot's pose integrated out
+    under a flat prior.
+
+    Args:
+        setup: of the model.
+        grid: for the sag of the landmarks.
+        columns: total number of columns.
+        varied: as for `StaticChannel`.
+
+    Of three touches or more; fewer registered nothing, and say nothing.
+    """
+    count = len(setup.landmarks)
+    if count < _LEAST_TOUCHES:
+        return Block("touches", np.zeros((1 + columns, 1 + columns)), 0.0)
+    here = touch_misses(setup, grid)
+    stacked = np.zeros((3 * count, 1 + columns))
+    stacked[:, 0] = here.ravel()
+    for column, (other, step) in varied.items():
+        stacked[:, 1 + column] = (touch_misses(other, grid) - here).ravel() / step
+    stacked = _beside_pose(touched_places(setup), stacked) / TOUCH
+    return Block("touches", stacked.T @ stacked, 3.0 * count - 6.0)
+
+
+def _beside_pose(places: FloatArray, rows: FloatArray) -> FloatArray:
+    """Rows (3n, k) without what any small rigid motion of the places (n, 3) [m] does."""
+    middle = places.mean(axis=0)
+    reach = float(np.sqrt(((places - middle) ** 2).sum(axis=1).mean()))
+    motions = motion_jacobian(places, middle).reshape(-1, 6) * np.repeat([1.0, 1.0 / reach], 3)
+    basis, _ = np.linalg.qr(motions)
+    return np.asarray(rows - basis @ (basis.T @ rows))

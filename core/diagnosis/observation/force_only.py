@@ -1,0 +1,181 @@
+"""Sequences without clouds: what the force says at chosen instants of each short push.
+
+A push that presses and holds says two things: how hard the body resists at full depth, averaged
+over the hold, and at half of it on the way in, which tells a body that stiffens from a tool that
+came a little deeper than it was told. Nothing else is kept; thousands of samples between them say
+the same again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Sequence as Ordered
+from concurrent.futures import Future
+
+import numpy as np
+
+from palpate.dataset import Dataset, Sequence
+from palpate.dataset.tool_smoothing import SMOOTHING, smooth_centres
+from palpate.diagnosis.observation.force_record import ForceRecord
+from palpate.diagnosis.observation.frame_groups import Group, Observations, observe_all
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import DiagnosisError
+from palpate.foundation.processes import at_once
+from palpate.foundation.progress import Report, silent
+from palpate.registration.registration import Registration
+from palpate.setup.box import CLEARANCE
+from palpate.setup.setup import Setup
+
+__all__ = ["SHARES", "deepest_rows", "observe_each", "observe_forces", "pushed_places"]
+
+SHARES = (0.55,)
+"""Depths on the way in that are looked at, over the push's own [1]."""
+_LEAST_DEPTH = 0.5e-3
+"""Shallower contacts [m] are no pushes: their depth is hardly known."""
+_HELD = 1.5e-4
+"""Within so much of its full depth [m] the tool is held."""
+_MOST_HELD = 8
+_STEP = 0.02
+_NOTHING = np.empty((0, 3))
+
+
+def observe_forces(sequence: Sequence, setup: Setup, most: int) -> Observations:
+    """Instants of a sequence's pushes, at most so many groups of them, with its forces.
+
+    Raises DiagnosisError where the sensor is never clear of the body, so that its bias is unknown,
+    or where nothing is pushed.
+    """
+    home = f"sequences/{sequence.name}"
+    if sequence.forces is None:
+        raise DiagnosisError(
+            f"{home}: has neither clouds nor forces; leave it out of [splits]", file=home
+        )
+    clock, stream = sequence.kinematics, sequence.forces
+    clear = _gap(setup, smooth_centres(clock, stream.time)) > CLEARANCE
+    record = ForceRecord.of(stream, clear)
+    if record is None:
+        raise DiagnosisError(
+            f"{home}/forces.csv: the tool is hardly ever clear of the phantom, so that the sensor's bias is unknown; record "
+            "a second or more before it touches",
+            file=f"{home}/forces.csv",
+        )
+    begin, end = max(clock.time[0], stream.time[0]), min(clock.time[-1], stream.time[-1])
+    times = np.arange(begin, end, _STEP)
+    depth = -_gap(setup, smooth_centres(clock, times)) if len(times) else np.empty(0)
+    pushes = _pushes(depth)
+    if not pushes:
+        deepest = 1e3 * float(depth.max(initial=-np.inf))
+        raise DiagnosisError(
+            f"{home}: nothing is pressed by {1e3 * _LEAST_DEPTH:.1f} mm or more (at most {deepest:.2f} mm into the phantom as "
+            "stated); check touches.csv and the surface, or leave it out of [splits]",
+            file=home,
+        )
+    instants, groups = _instants(times, depth, _kept(pushes, most))
+    return Observations(sequence.name, instants, clock, groups, record, unseen=True)
+
+
+def _gap(setup: Setup, centres: FloatArray) -> FloatArray:
+    """Between the tool and the phantom as stated (m,) [m], of centres (m, 3) [m] in the robot
+    frame.
+    """
+    return setup.geometry.facing(setup.phantom_from_robot.apply(centres))[0] - setup.tool.radius
+
+
+def _pushes(depth: FloatArray) -> list[slice]:
+    """Runs of the path that are in touch and go deep enough."""
+    touching = np.concatenate([[False], depth > 0, [False]])
+    edges = np.flatnonzero(np.diff(touching.astype(int)))
+    runs = [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [run for run in runs if depth[run].max() >= _LEAST_DEPTH]
+
+
+def _kept(pushes: list[slice], most: int) -> list[slice]:
+    """As many pushes as `most` groups hold, evenly spread."""
+    count = max(1, most // (1 + len(SHARES)))
+    chosen = np.unique(np.linspace(0, len(pushes) - 1, min(count, len(pushes))).round().astype(int))
+    return [pushes[number] for number in chosen]
+
+
+def _instants(
+    times: FloatArray, depth: FloatArray, pushes: list[slice]
+) -> tuple[FloatArray, tuple[Group, ...]]:
+    """Times (f,) [s] and the groups of them: each push on its way in, and held."""
+    found, groups, count = [], [], 0
+    for probe, run in enumerate(pushes, start=1):
+        own, when = depth[run], times[run]
+        full = int(own.argmax())
+        for share in SHARES:
+            # The last time that it was shallower: a tool may hover and come back.
+            before = np.flatnonzero(own[: full + 1] < share * own[full])
+            if len(before) and before[-1] + 1 < full:
+                found.append(when[before[-1] + 1])
+                groups.append(Group((count,), _NOTHING, False, probe=probe))
+                count += 1
+        held = _held(when, own, full)
+        found += held.tolist()
+        groups.append(Group(tuple(range(count, count + len(held))), _NOTHING, False, probe=probe))
+        count += len(held)
+    return np.array(found), tuple(groups)
+
+
+def _held(when: FloatArray, depth: FloatArray, full: int) -> FloatArray:
+    """Instants [s] about the deepest while the tool is held there, so far apart that their averages
+    share no sample.
+    """
+    low = high = full
+    while low > 0 and depth[low - 1] > depth[full] - _HELD:
+        low -= 1
+    while high < len(depth) - 1 and depth[high + 1] > depth[full] - _HELD:
+        high += 1
+    room = when[high] - when[low] - 2 * SMOOTHING
+    count = int(np.clip(room // (2 * SMOOTHING) + 1, 1, _MOST_HELD)) if room > 0 else 1
+    return (
+        np.linspace(when[low] + SMOOTHING, when[high] - SMOOTHING, count)
+        if count > 1
+        else when[full : full + 1]
+    )
+
+
+def pushed_places(data: Ordered[Observations], setup: Setup) -> tuple[FloatArray, FloatArray]:
+    """Places (k, 3) [m] of the stated surface that are pushed, one for each push without clouds,
+    and the outward normals (k, 3).
+    """
+    places, normals = [], []
+    for item in data:
+        if not item.unseen:
+            continue
+        centres = item.centres(setup)
+        for probe in sorted({group.probe for group in item.groups}):
+            rows = [row for row, group in enumerate(item.groups) if group.probe == probe]
+            first = centres[rows[0]][None]
+            distance, normal = setup.geometry.facing(first)
+            places.append(first[0] - distance[0] * normal[0])
+            normals.append(normal[0])
+    return np.array(places).reshape(-1, 3), np.array(normals).reshape(-1, 3)
+
+
+def deepest_rows(item: Observations) -> list[int]:
+    """For each push the row of the group in which it is held, in their order."""
+    last = {group.probe: row for row, group in enumerate(item.groups)}
+    return list(last.values())
+
+
+def observe_each(
+    dataset: Dataset,
+    names: Ordered[str],
+    setup: Setup,
+    registration: Registration,
+    most: tuple[int, int],
+    report: Report = silent,
+    begin: Callable[..., Future[Observations]] = at_once,
+) -> list[Observations]:
+    """Observations of these sequences, with clouds or without, at most so many groups of each;
+    `begin` as of `observe_all`.
+    """
+    seen = [name for name in names if len(dataset.sequence(name))]
+    known = observe_all(dataset, seen, setup, registration, most[0], report, begin) if seen else []
+    found = {item.name: item for item in known}
+    return [
+        found[name] if name in found else observe_forces(dataset.sequence(name), setup, most[1])
+        for name in names
+    ]

@@ -1,0 +1,188 @@
+"""The two pictures that convince: the measured error pattern, and the pattern that the named cause
+predicts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.diagnosis.forward.prediction import Prediction
+from palpate.diagnosis.gain.probe_errors import fixed_pattern
+from palpate.diagnosis.inference.hypothesis import Model
+from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import DiagnosisError
+from palpate.measurement.surface_gaps import SIDES, Surface
+
+__all__ = ["Patterns", "draw_patterns", "patterns"]
+
+_SMOOTHING = 3.5e-3
+_LEAST_POINTS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Patterns:
+    """Error by patch (p,) [m], NaN where unseen: measured minus stated model, and extended minus
+    stated model.
+    """
+
+    centres: FloatArray
+    normals: FloatArray
+    measured: FloatArray
+    predicted: FloatArray
+
+    def save(self, path: Path) -> None:
+        """Write as npz."""
+        np.savez_compressed(
+            path,
+            centres=self.centres,
+            normals=self.normals,
+            measured=self.measured,
+            predicted=self.predicted,
+        )
+
+
+def patterns(bench: Bench, data: Sequence[Observations], baseline: Model, found: Model) -> Patterns:
+    """The error of the one push in which the cause matters most, and what the cause predicts of it,
+    smoothed alike.
+
+    A cause that shows in the push is compared without what the untouched frames show, the camera's
+    pattern; one that shows in the untouched block already (sag, a camera that was moved) with it.
+    Where no cause is named it is the push with the largest error.
+    """
+    pairs = [
+        row
+        for row in zip(data, baseline.predictions, found.predictions, strict=True)
+        if not row[0].unseen
+    ]
+    lasting = found.setup.marked_by_pushes
+    compared = [
+        _compare(item, before, after, whole=False, lasting=lasting) for item, before, after in pairs
+    ]
+    if sum(still for _, still, _ in compared) > sum(
+        (rows.change**2 * rows.points).sum() for _, _, rows in compared
+    ):
+        compared = [
+            _compare(item, before, after, whole=True, lasting=lasting)
+            for item, before, after in pairs
+        ]
+    unnamed = not any(rows.change.any() for _, _, rows in compared)
+    best: tuple[float, _Rows] | None = None
+    for touched, _, rows in compared:
+        for probe in np.unique(touched[touched > 0]):
+            points = rows.points * (touched == probe)[:, None]
+            size = float(((rows.error if unnamed else rows.change) ** 2 * points).sum())
+            if best is None or size > best[0]:
+                best = (size, _Rows(points, rows.error, rows.change))
+    if best is None:
+        raise DiagnosisError("the tool touches the phantom in no sequence that was fitted on")
+    points, error, change = best[1].points, best[1].error, best[1].change
+    near, weight = _kernel(bench.surface), points.sum(axis=0)
+    total = near @ weight
+    shown = np.where((total >= _LEAST_POINTS) & (weight > 0), total, np.nan)
+    measured, predicted = (
+        near @ (points * values).sum(axis=0) / shown for values in (error, change)
+    )
+    return Patterns(bench.surface.patch_centres, bench.surface.patch_normals, measured, predicted)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Points, error of the stated model and what the cause changes, by group and patch (g, p); zero
+    where unseen.
+    """
+
+    points: FloatArray
+    error: FloatArray
+    change: FloatArray
+
+
+def _compare(
+    item: Observations, before: Prediction, after: Prediction, *, whole: bool, lasting: bool
+) -> tuple[FloatArray, float, _Rows]:
+    """Probe of each touched group (g,), how much the cause changes untouched frames, and the errors
+    in the touched ones.
+
+    What a push leaves behind (`lasting`: a dent, a block that slid) is of that push.
+    """
+    (own, known), other = (
+        fixed_pattern(item, before, lasting),
+        fixed_pattern(item, after, lasting)[0],
+    )
+    seen = np.isfinite(before.gap) & np.isfinite(after.gap) & (known >= _LEAST_POINTS)
+    counts = [not group.free or (lasting and group.probe > 0) for group in item.groups]
+    touched = np.array(
+        [1 + group.probe if one else 0 for group, one in zip(item.groups, counts, strict=True)]
+    )
+    points = np.where(seen & (touched > 0)[:, None], before.count, 0.0)
+    still = np.where(known >= _LEAST_POINTS, own - other, 0.0)
+    error, change = np.where(seen, before.gap, 0.0), np.where(seen, before.gap - after.gap, 0.0)
+    if not whole:
+        error, change = error - np.where(seen, own, 0.0), change - np.where(seen, still, 0.0)
+    return touched, float((still**2 * points).sum()), _Rows(points, error, change)
+
+
+def _kernel(surface: Surface) -> FloatArray:
+    """Gaussian weights (p, p) between patches of one side."""
+    centres, normals = surface.patch_centres, surface.patch_normals
+    distance = np.linalg.norm(centres[:, None] - centres, axis=2)
+    return np.asarray(np.exp(-0.5 * (distance / _SMOOTHING) ** 2) * (normals @ normals.T > 0.5))
+
+
+def draw_patterns(found: Patterns, surface: Surface, path: Path) -> None:
+    """Both patterns, or the error alone where no cause is named, on the unfolded block, one colour
+    scale in mm, as PNG.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    shown = [("measured error", found.measured), ("predicted by the cause", found.predicted)]
+    shown = shown if np.nan_to_num(found.predicted).any() else shown[:1]
+    figure = Figure(figsize=(1.4 + 4.3 * len(shown), 4.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    sizes = np.abs(np.concatenate([found.measured, found.predicted]))
+    seen = sizes[np.isfinite(sizes)]
+    limit = max(1e3 * float(np.quantile(seen, 0.98)), 0.05) if len(seen) else 1.0
+    for number, (title, values) in enumerate(shown):
+        axes = figure.add_subplot(1, len(shown), number + 1)
+        drawn = _unfold(axes, found, values * 1e3, surface, limit)
+        axes.set_title(title)
+        axes.set_aspect("equal")
+        axes.axis("off")
+    figure.colorbar(
+        drawn,
+        ax=figure.axes,
+        shrink=0.7,
+        label="surface higher (+) or lower (-) than the simulation [mm]",
+    )
+    figure.savefig(path, dpi=130)
+
+
+def _unfold(axes: Any, found: Patterns, values: FloatArray, surface: Surface, limit: float) -> Any:
+    """Scatter the patches of the top and, folded out around it, of the four sides."""
+    x, y, z = surface.geometry.size
+    centres, normals = found.centres, found.normals
+    place = centres[:, :2].copy()
+    for side in SIDES[1:]:
+        axis, sign = "xy".index(side[1]), 1.0 if side[0] == "+" else -1.0
+        here = normals[:, axis] == sign
+        place[here, axis] = sign * ((x, y)[axis] / 2 + 1e-3 + z - centres[here, 2])
+    seen = np.isfinite(values)
+    size = (surface.patch * 1e3 * 1.55) ** 2
+    axes.scatter(*(1e3 * place[~seen]).T, s=size, c="0.93", marker="s", linewidths=0)
+    return axes.scatter(
+        *(1e3 * place[seen]).T,
+        s=size,
+        c=values[seen],
+        cmap="RdBu_r",
+        vmin=-limit,
+        vmax=limit,
+        marker="s",
+        linewidths=0,
+    )

@@ -1,0 +1,139 @@
+"""What a report says of a palpation without clouds: each push, the modulus, and of a lump its
+footprint, depth and cover.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.diagnosis.inference.hypothesis import Model
+from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.observation.force_only import deepest_rows
+from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.diagnosis.report.inclusion_footprint import Footprint, depth_of, footprint_of
+from palpate.diagnosis.search.findings import Findings
+from palpate.effects.base import with_effects
+from palpate.effects.elastic_material import StiffInclusion
+from palpate.foundation.arrays import FloatArray
+
+__all__ = ["Pushes", "palpated", "pushes_of"]
+
+
+@dataclass(frozen=True, eq=False)
+class Pushes:
+    """The pushes that were fitted on, each at its full depth.
+
+    Attributes:
+        place, normal: (k, 3) on the stated surface [m], and outwards.
+        depth: (k,) [m].
+        measured, stated, extended: (k,) the force along the normal [N], measured and under both
+            models; NaN where a replay failed.
+    """
+
+    place: FloatArray
+    normal: FloatArray
+    depth: FloatArray
+    measured: FloatArray
+    stated: FloatArray
+    extended: FloatArray
+
+    def to_json(self) -> list[dict[str, Any]]:
+        """Rows of the report, SI units."""
+        return [
+            {
+                "place": np.round(place, 5).tolist(),
+                "depth": round(float(depth), 5),
+                **{
+                    name: _number(value)
+                    for name, value in zip(("measured", "stated", "extended"), forces, strict=True)
+                },
+            }
+            for place, depth, *forces in zip(
+                self.place, self.depth, self.measured, self.stated, self.extended, strict=True
+            )
+        ]
+
+
+def pushes_of(bench: Bench, data: Sequence[Observations], baseline: Model, found: Model) -> Pushes:
+    """Of all sequences without clouds, in their order."""
+    rows: list[tuple[float, ...]] = []
+    place, normal = bench.pushed
+    for item, before, after in zip(data, baseline.predictions, found.predictions, strict=True):
+        if not item.unseen or before.felt is None or after.felt is None:
+            continue
+        centres = item.centres(bench.setup)
+        for row in deepest_rows(item):
+            out = normal[len(rows)]
+            depth = bench.setup.tool.radius - float(
+                bench.setup.geometry.facing(centres[row][None])[0][0]
+            )
+            stated, extended = (
+                side.felt.force[row] @ out for side in (before, after) if side.felt is not None
+            )
+            lost = [number for number, side in enumerate((before, after)) if row in side.failed]
+            forces = [float(value) for value in (stated, extended)]
+            for number in lost:
+                forces[number] = float("nan")
+            rows.append(
+                (depth, float((before.felt.gap[row] + before.felt.force[row]) @ out), *forces)
+            )
+    depths, measured, stated_all, extended_all = np.array(rows).reshape(-1, 4).T
+    return Pushes(place, normal, depths, measured, stated_all, extended_all)
+
+
+def palpated(
+    report: dict[str, Any], bench: Bench, data: Sequence[Observations], findings: Findings
+) -> tuple[dict[str, Any], Pushes, Footprint | None]:
+    """The report with `palpation`, and with `footprint`, `depth` and `cover` of a lump among its
+    causes; and what is drawn.
+    """
+    model = findings.best.model if findings.best else findings.baseline
+    pushes = pushes_of(bench, data, findings.baseline, model)
+    causes, shown = list(report["causes"]), None
+    for index, effect in enumerate(model.effects):
+        if not isinstance(effect, StiffInclusion):
+            continue
+        bench.tell("where the lump is felt")
+        shown = footprint_of(
+            bench, effect, _without(bench, model, index), float(np.median(pushes.depth))
+        )
+        depth, cover = depth_of(bench, model, index)
+        added = {
+            "depth": depth,
+            "cover": cover,
+            "footprint": None if shown is None else shown.to_json(),
+        }
+        causes = [cause | added if cause["effect"] == effect.name else cause for cause in causes]
+    palpation = {
+        "pushes": len(pushes.depth),
+        "depth": {"value": round(float(np.median(pushes.depth)), 5), "unit": "m"},
+        "force": {"value": round(float(np.median(pushes.measured)), 5), "unit": "N"},
+        "young_modulus": _modulus(report),
+        "weighed": [kind.name for kind in bench.weighed],
+        "felt": pushes.to_json(),
+    }
+    return {**report, "causes": causes, "palpation": palpation}, pushes, shown
+
+
+def _without(bench: Bench, model: Model, index: int) -> Any:
+    others = [effect for number, effect in enumerate(model.effects) if number != index]
+    return with_effects(bench.setup, others)
+
+
+def _modulus(report: dict[str, Any]) -> dict[str, Any] | None:
+    """Young's modulus with its interval, as a cause or as identified; None where the forces do not
+    tell it.
+    """
+    for row in (*report["causes"], *report["identified"]):
+        if row["effect"] == "young_modulus":
+            entry: dict[str, Any] = row["parameters"]["E"]
+            return entry
+    return None
+
+
+def _number(value: float) -> float | None:
+    return round(value, 5) if np.isfinite(value) else None

@@ -1,0 +1,206 @@
+"""The picture of a palpation: the pushes from above with the lump's footprint, and a cut through it
+with its depth.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from palpate.diagnosis.report.force_report import Pushes
+from palpate.diagnosis.report.inclusion_footprint import Footprint
+from palpate.foundation.arrays import FloatArray
+from palpate.setup.setup import Box, Shape
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["draw_palpation", "section"]
+
+INK, FAINT, FOUND = "#2b2f36", "#c9cdd3", "#0f766e"
+_LEAST = 5.0
+"""Smallest change that fills the colour scale [%]."""
+
+
+def draw_palpation(
+    path: Path,
+    body: Box | Shape,
+    pushes: Pushes,
+    shown: Footprint | None,
+    cause: dict[str, Any] | None,
+) -> None:
+    """As PNG; `cause` is the lump's row of the report, with its place, depth and cover."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    wide = cause is not None
+    figure = Figure(figsize=(12.0 if wide else 6.2, 5.2), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(1, 2 if wide else 1, squeeze=False)[0]
+    drawn = _from_above(axes[0], body, pushes, shown, cause)
+    bar = figure.colorbar(drawn, ax=axes[0], location="bottom", shrink=0.7, aspect=32, pad=0.02)
+    bar.set_label("measured force over the stated simulation's [%]", fontsize=9)
+    bar.ax.tick_params(labelsize=8)
+    if cause is not None:
+        _cut(axes[1], body, cause)
+        figure.legend(loc="outside lower right", ncols=2, frameon=False, fontsize=9)
+    figure.savefig(path, dpi=130)
+
+
+def _from_above(
+    axes: Axes,
+    body: Box | Shape,
+    pushes: Pushes,
+    shown: Footprint | None,
+    cause: dict[str, Any] | None,
+) -> Any:
+    _relief(axes, body)
+    change = 100 * (pushes.measured / pushes.stated - 1)
+    known = np.isfinite(change)
+    limit = max(float(np.abs(change[known]).max(initial=0.0)), _LEAST)
+    place = 1e3 * pushes.place
+    if (~known).any():
+        axes.scatter(place[~known, 0], place[~known, 1], s=50, marker="x", c=FAINT, zorder=3)
+    drawn = axes.scatter(
+        place[known, 0],
+        place[known, 1],
+        s=130,
+        c=change[known],
+        cmap="RdBu_r",
+        vmin=-limit,
+        vmax=limit,
+        edgecolors=INK,
+        linewidths=0.8,
+        zorder=3,
+    )
+    if shown is not None:
+        closed = 1e3 * _smooth(shown.contour)
+        axes.plot(
+            *closed[:, :2].T,
+            color=FOUND,
+            lw=2.2,
+            zorder=4,
+            label="felt here, half of the strongest",
+        )
+    if cause is not None:
+        x, y, radius = (1e3 * cause["parameters"][name]["value"] for name in ("x", "y", "radius"))
+        turn = np.linspace(0, 2 * np.pi, 100)
+        axes.plot(
+            x + radius * np.cos(turn),
+            y + radius * np.sin(turn),
+            color=FOUND,
+            lw=1.3,
+            ls="--",
+            zorder=4,
+            label="the lump below",
+        )
+    axes.set_title("pushes, seen from above", fontsize=11, loc="left")
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    _plain(axes)
+    return drawn
+
+
+def _relief(axes: Axes, body: Box | Shape) -> None:
+    """What lies under the pushes: the rim of a block, or an organ's height."""
+    if isinstance(body, Box):
+        x, y = 500 * body.size[0], 500 * body.size[1]
+        axes.fill([-x, x, x, -x], [-y, -y, y, y], color="#f1f2f4", ec=FAINT, lw=1.2, zorder=0)
+        return
+    from matplotlib.colors import LinearSegmentedColormap
+    from matplotlib.tri import Triangulation
+
+    up = body.facing(body.corners.mean(axis=1))[1][:, 2] > 0.05
+    shade = LinearSegmentedColormap.from_list("height", ["#dfe2e6", "#fbfbfc"])
+    x, y, z = 1e3 * body.vertices.T
+    axes.tripcolor(
+        Triangulation(x, y, body.triangles[up & ~body.held]),
+        z,
+        shading="gouraud",
+        cmap=shade,
+        zorder=0,
+    )
+
+
+def _cut(axes: Axes, body: Box | Shape, cause: dict[str, Any]) -> None:
+    """Through the lump's centre, the way the surface next to it leans most: the body, the lump, and
+    how deep it lies.
+    """
+    from matplotlib.collections import LineCollection
+
+    centre = np.array([cause["parameters"][name]["value"] for name in ("x", "y", "z")])
+    distance, normals = body.facing(centre[None])
+    normal = normals[0]
+    across = 0 if abs(normal[0]) >= abs(normal[1]) else 1
+    shown = [across, 2]
+    outline = 1e3 * section(body, 1 - across, float(centre[1 - across]))
+    axes.add_collection(LineCollection(list(outline), colors=INK, linewidths=1.8))
+    middle, radius = 1e3 * centre[shown], 1e3 * cause["parameters"]["radius"]["value"]
+    turn = np.linspace(0, 2 * np.pi, 120)
+    axes.fill(
+        middle[0] + radius * np.cos(turn),
+        middle[1] + radius * np.sin(turn),
+        color=FOUND,
+        alpha=0.28,
+        ec=FOUND,
+        lw=1.5,
+    )
+    depth, cover = cause["depth"], cause["cover"]
+    way = [centre, centre - distance[0] * normal]
+    span = [centre + (depth["value"] - depth[end]) * normal for end in ("low", "high")]
+    for ends, width in ((way, 1.2), (span, 5.0)):
+        line = 1e3 * np.array(ends)[:, shown]
+        axes.plot(line[:, 0], line[:, 1], color=FOUND, lw=width, alpha=0.8, solid_capstyle="butt")
+    axes.plot(*middle, "o", color=FOUND, ms=4)
+    axes.set_title(
+        f"centre {_between(depth)} deep\n{_between(cover)} of tissue above it",
+        fontsize=11,
+        loc="left",
+    )
+    axes.set(xlabel=f"{'xy'[across]} [mm]", ylabel="z [mm]", aspect="equal")
+    axes.autoscale_view()
+    axes.margins(0.06)
+    _plain(axes)
+
+
+def section(body: Box | Shape, axis: int, at: float) -> FloatArray:
+    """Where the plane x or y (`axis` 0 or 1) = `at` [m] cuts the surface: segments (k, 2, 2) in the
+    other of the two, and z [m].
+    """
+    kept = [1 - axis, 2]
+    if isinstance(body, Box):
+        side, height = body.size[1 - axis] / 2, body.size[2]
+        corners = np.array([[-side, 0.0], [side, 0.0], [side, height], [-side, height]])
+        return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    found = []
+    for corners in body.corners:
+        away, ends = corners[:, axis] - at, []
+        for a, b in ((0, 1), (1, 2), (2, 0)):
+            if (away[a] < 0) != (away[b] < 0):
+                share = away[a] / (away[a] - away[b])
+                ends.append(corners[a] + share * (corners[b] - corners[a]))
+        if len(ends) == 2:
+            found.append([end[kept] for end in ends])
+    return np.array(found).reshape(-1, 2, 2)
+
+
+def _smooth(contour: FloatArray) -> FloatArray:
+    """A closed, smooth curve (n, 3) through the contour's points."""
+    closed = np.concatenate([contour, contour[:1]])
+    return np.asarray(
+        CubicSpline(np.arange(len(closed)), closed, bc_type="periodic")(
+            np.linspace(0, len(contour), 160)
+        )
+    )
+
+
+def _between(entry: dict[str, Any]) -> str:
+    value, low, high = (1e3 * entry[name] for name in ("value", "low", "high"))
+    return f"{value:.1f} mm ({low:.1f} to {high:.1f})"
+
+
+def _plain(axes: Axes) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(labelsize=9, colors=INK)

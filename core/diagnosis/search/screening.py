@@ -1,0 +1,154 @@
+"""Which causes deserve a refit, and how large a gain chance alone can give.
+
+All effects of the catalogue are columns of one linear problem: those with a derivative by their
+sensitivities, the others by the difference that a finite size makes. The gain of each is the
+predictive score of left-out blocks against the model without it; the same gains on data drawn from
+the noise model alone give the bound that a cause must exceed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+
+import numpy as np
+
+from palpate.diagnosis.inference.evidence import FLAT, Block, draw_rights
+from palpate.effects import Effect
+from palpate.foundation.arrays import FloatArray
+
+__all__ = ["Candidate", "linear_gains", "null_gains", "pair_gains", "right_sides"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Candidate:
+    """An effect as columns: `columns` with prior deviations `spread`; `widened` are nuisances with
+    a wider prior instead.
+
+    `of` names the parameter whose search coordinate each column changes by one; without it a column
+    is all that `start` does.
+    """
+
+    start: Effect
+    of: tuple[str, ...] = ()
+    columns: tuple[int, ...] = ()
+    spread: tuple[float, ...] = ()
+    widened: dict[int, float] = field(default_factory=dict)
+
+    def precision(self, nuisance: Sequence[int], known: FloatArray) -> tuple[list[int], FloatArray]:
+        """Columns to use and their prior precision, given those of the nuisances."""
+        covariance = np.linalg.inv(known)
+        for column, spread in self.widened.items():
+            covariance[nuisance.index(column), nuisance.index(column)] += spread**2
+        size = len(nuisance) + len(self.columns)
+        precision = np.zeros((size, size))
+        precision[: len(nuisance), : len(nuisance)] = np.linalg.inv(covariance)
+        own = np.arange(len(nuisance), size)
+        precision[own, own] = np.array(self.spread) ** -2.0
+        return [*nuisance, *self.columns], precision
+
+    def beside(self, other: Candidate) -> Candidate:
+        """The same effect with the columns of another one fitted at once; its own come first."""
+        columns, spread = (*self.columns, *other.columns), (*self.spread, *other.spread)
+        return replace(
+            self, columns=columns, spread=spread, widened={**self.widened, **other.widened}
+        )
+
+
+def right_sides(blocks: Sequence[Block]) -> FloatArray:
+    """The data's own right sides (1, b, k)."""
+    return np.array([[block.gram[1:, 0] for block in blocks]])
+
+
+def _values(
+    blocks: Sequence[Block],
+    rights: FloatArray,
+    columns: Sequence[int],
+    precision: FloatArray,
+    known: FloatArray,
+) -> FloatArray:
+    """Sum over blocks, and the stated accuracies, of the log predictive density (d,) less what no
+    column changes.
+    """
+    index = np.asarray(columns)
+    grams = np.array([block.gram[1:, 1:][np.ix_(index, index)] for block in blocks])
+    rights = rights[:, :, index]
+
+    def evidence(matrix: FloatArray, right: FloatArray, prior: FloatArray) -> FloatArray:
+        full = matrix + prior
+        explained = np.einsum("di,ij,dj->d", right, np.linalg.inv(full), right)
+        return np.asarray(
+            0.5 * explained - 0.5 * (np.linalg.slogdet(full)[1] - np.linalg.slogdet(prior)[1])
+        )
+
+    matrix, right = grams.sum(axis=0), rights.sum(axis=1)
+    total = (len(blocks) + 1) * evidence(matrix, right, precision)
+    for number in range(len(blocks)):
+        total -= evidence(matrix - grams[number], right - rights[:, number], precision)
+    # The same flat prior for every candidate, whatever it widens, so that the scores compare.
+    free = precision.copy()
+    free[: len(known), : len(known)] = FLAT * known
+    return np.asarray(total - evidence(matrix, right, free))
+
+
+def linear_gains(
+    blocks: Sequence[Block],
+    rights: FloatArray,
+    nuisance: Sequence[int],
+    known: FloatArray,
+    candidates: Sequence[Candidate],
+) -> FloatArray:
+    """Gain (d, c) [nats] of each candidate for each set of right sides (d, b, k)."""
+    baseline = _values(blocks, rights, nuisance, known, known)
+    return np.stack(
+        [
+            _values(blocks, rights, *c.precision(list(nuisance), known), known) - baseline
+            for c in candidates
+        ],
+        axis=1,
+    )
+
+
+def null_gains(
+    blocks: Sequence[Block],
+    nuisance: Sequence[int],
+    known: FloatArray,
+    candidates: Sequence[Candidate],
+    draws: int,
+    seed: int,
+) -> FloatArray:
+    """Best-of-catalogue gains (d,) [nats] on draws from the noise model: white noise, discrepancy
+    and nuisances, no cause.
+    """
+    rights = draw_rights(blocks, nuisance, known, draws, np.random.default_rng(seed))
+    return np.asarray(linear_gains(blocks, rights, nuisance, known, candidates).max(axis=1))
+
+
+def pair_gains(
+    blocks: Sequence[Block],
+    rights: FloatArray,
+    nuisance: Sequence[int],
+    known: FloatArray,
+    candidates: Sequence[Candidate],
+    more: float = -np.inf,
+) -> list[tuple[float, Candidate, Candidate]]:
+    """Gain [nats] of every two effects together on one set of right sides (1, b, k), best first,
+    each by its best candidates.
+
+    Only those that gain so much `more` than the best candidate alone.
+    """
+    least = linear_gains(blocks, rights, nuisance, known, candidates).max() + more
+    pairs = [
+        (one, other)
+        for one, other in combinations(candidates, 2)
+        if one.start.name != other.start.name
+    ]
+    gains = linear_gains(
+        blocks, rights, nuisance, known, [one.beside(other) for one, other in pairs]
+    )[0].tolist()
+    found: dict[frozenset[str], tuple[float, Candidate, Candidate]] = {}
+    for gain, (one, other) in sorted(zip(gains, pairs, strict=True), key=lambda row: -row[0]):
+        if gain > least:
+            found.setdefault(frozenset((one.start.name, other.start.name)), (gain, one, other))
+    return list(found.values())

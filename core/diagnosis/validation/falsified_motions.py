@@ -1,0 +1,118 @@
+"""The same clouds with motions that were not made: what a cause explains of them, it does not owe
+to the pushes.
+
+Three ways to falsify a recording: its clock is turned on so far that the pushes come when nothing
+was pushed, its tool is mirrored to the other end of the block, and its tool goes the way of another
+sequence. Points, patches and their order stay as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from palpate.dataset import Kinematics
+from palpate.dataset.tool_motion import box_gap
+from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.foundation.arrays import FloatArray
+from palpate.setup.setup import Setup
+
+__all__ = ["FALSIFIED", "mirrored", "shifted", "swapped"]
+
+MIRROR = np.array([-1.0, -1.0, 1.0])
+"""Both ends and both sides of the block change places: a push near one of its middle planes would
+meet its own mirror image."""
+_TURNS = np.arange(0.2, 0.81, 0.05)
+_STILL_PUSHES = 0.5
+"""Shares of the recording by which a clock is turned on; of the deepest push that the clouds must
+then still see [1]."""
+
+
+def _with_path(item: Observations, position: FloatArray) -> Observations:
+    """With another way (n, 3) [m] of the tool in the robot frame at the stream's own times.
+
+    A group's frames no longer share one place, so the one in its middle stands for it.
+    """
+    stream = item.kinematics
+    groups = tuple(replace(g, frames=g.frames[len(g.frames) // 2 :][:1]) for g in item.groups)
+    return replace(
+        item, kinematics=Kinematics(stream.time, position, stream.quaternion), groups=groups
+    )
+
+
+def _turned(item: Observations, share: float) -> Observations:
+    time = item.kinematics.time
+    length = time[-1] - time[0]
+    return _with_path(
+        item, item.kinematics.position_at(time[0] + (time - time[0] + share * length) % length)
+    )
+
+
+def _depths(item: Observations, setup: Setup) -> FloatArray:
+    """How far the tool reaches into the stated block (g,) [m] at each group; zero where it does
+    not.
+    """
+    return np.maximum(-box_gap(item.centres(setup), setup.box.size, setup.tool.radius), 0.0)
+
+
+def shifted(data: Sequence[Observations], setup: Setup) -> list[Observations]:
+    """Each clock turned on, round the end of the recording, to where its pushes agree least with
+    those that were made.
+    """
+    found = []
+    for item in data:
+        true, best = _depths(item, setup), (np.inf, item)
+        for share in _TURNS:
+            other = _turned(item, float(share))
+            depths = _depths(other, setup)
+            shallow = depths.max() < _STILL_PUSHES * true.max()
+            agreement = (
+                float(depths @ true)
+                / max(float(np.linalg.norm(depths) * np.linalg.norm(true)), 1e-12)
+                + 10.0 * shallow
+            )
+            if agreement < best[0]:
+                best = (agreement, other)
+        found.append(best[1])
+    return found
+
+
+def mirrored(data: Sequence[Observations], setup: Setup) -> list[Observations]:
+    """Each tool led through the mirror image of its way, x and y turned about in the phantom
+    frame."""
+    pose = setup.phantom_from_robot
+    return [
+        _with_path(item, pose.inverse().apply(pose.apply(item.kinematics.position) * MIRROR))
+        for item in data
+    ]
+
+
+def swapped(data: Sequence[Observations], setup: Setup) -> list[Observations]:
+    """Each tool led the way of another sequence, stretched to its own duration: the exchange that
+    brings them farthest away.
+    """
+    deepest = np.array([item.centres(setup)[_depths(item, setup).argmax()] for item in data])
+
+    def apart(turn: int) -> float:
+        return float(np.linalg.norm(deepest - np.roll(deepest, -turn, axis=0), axis=1).min())
+
+    turn = max(range(1, len(data)), key=apart, default=0)
+    return [
+        _along(item, other) for item, other in zip(data, [*data[turn:], *data[:turn]], strict=True)
+    ]
+
+
+def _along(item: Observations, other: Observations) -> Observations:
+    here, there = item.kinematics.time, other.kinematics.time
+    share = (here - here[0]) / max(here[-1] - here[0], 1e-9)
+    return _with_path(item, other.kinematics.position_at(there[0] + share * (there[-1] - there[0])))
+
+
+Falsify = Callable[[Sequence[Observations], Setup], list[Observations]]
+FALSIFIED: Mapping[str, Falsify] = {
+    "clock shifted": shifted,
+    "geometry mirrored": mirrored,
+    "paths swapped": swapped,
+}

@@ -1,0 +1,71 @@
+"""When a cause that the fitted sequences ask for is not named after all (step 10 of the method)."""
+
+from __future__ import annotations
+
+from palpate.diagnosis.gain.force_gain import FeltLadder
+from palpate.diagnosis.gain.gain_ladder import Ladder
+from palpate.diagnosis.inference.residual_structure import Structure
+from palpate.diagnosis.search.findings import Findings
+
+__all__ = ["leaves_most", "objection"]
+
+_WORSE = 0.1
+"""Share of the reducible error that a cause surely adds on test sequences before it is withdrawn
+[1]: less may be the mesh's."""
+_LEFT = 0.5
+"""Share of the structure over chance that a cause may leave at most [1], where it leaves as much of
+the reducible error on test sequences. A softer lump had stood for a second body against the block's
+side: it removed 29 % (23 to 47 %) there, and a quarter of the structure. Where a cause was rightly
+named, nothing significant was left, or less than a seventh of what there was."""
+
+
+def objection(findings: Findings, gain: Ladder | FeltLadder | None) -> str:
+    """Why the causes found are not named; empty where nothing speaks against them."""
+    if findings.best is None:
+        return ""
+    names = " and ".join(findings.best.model.names)
+    return _harm(names, gain) or _no_explanation(names, findings, gain)
+
+
+def _harm(names: str, gain: Ladder | FeltLadder | None) -> str:
+    """They do not carry over: the test sequences get worse."""
+    if gain is None or gain.removed[2] > -_WORSE:
+        return ""
+    value, low, high = gain.removed
+    return (
+        f"{names} would explain the sequences that were fitted on, but makes the test sequences worse: it adds "
+        f"{-100 * value:.0f} % ({-100 * high:.0f} to {-100 * low:.0f} %) of the reducible error there, and is not named"
+    )
+
+
+def _no_explanation(names: str, findings: Findings, gain: Ladder | FeltLadder | None) -> str:
+    """They remove something, but what is wrong stays: the larger part of the smooth error that
+    grows with the push, and of what could be removed on test sequences.
+    """
+    before, left = findings.structure, findings.left
+    if not leaves_most(before, left, None if gain is None else gain.removed[0]):
+        return ""
+    tested = (
+        ""
+        if gain is None
+        else f", and of the reducible error on test sequences {_share(gain)} is removed"
+    )
+    return (
+        f"{names} would explain part of the sequences that were fitted on, but the error that is smooth over the surface and "
+        f"grows with the push stays: {left.ratio:.1f} times what chance gives, {before.ratio:.1f} times without it{tested}. "
+        "It is not named"
+    )
+
+
+def leaves_most(before: Structure, left: Structure, removed: float | None) -> bool:
+    """Whether a cause leaves what is wrong: significant structure, the larger part of that without
+    it, and of the reducible error on test sequences no more than the smaller part is `removed` [1];
+    None without such sequences.
+    """
+    stays = left.significant and left.ratio - 1.0 >= _LEFT * max(before.ratio - 1.0, 0.0)
+    return stays and (removed is None or removed <= 1.0 - _LEFT)
+
+
+def _share(gain: Ladder | FeltLadder) -> str:
+    value, low, high = gain.removed
+    return f"{100 * value:.0f} % ({100 * low:.0f} to {100 * high:.0f} %)"

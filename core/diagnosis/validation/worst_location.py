@@ -1,0 +1,64 @@
+"""Where on the phantom most of an error sits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.diagnosis.forward.prediction import Prediction
+from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.foundation.arrays import FloatArray
+
+__all__ = ["Worst", "gathered", "worst_patch", "worst_push"]
+
+_AROUND = 8e-3
+
+
+@dataclass(frozen=True)
+class Worst:
+    """A place [m] and the share [1] of an error that is around it."""
+
+    place: tuple[float, float, float]
+    share: float
+
+    def __str__(self) -> str:
+        x, y, z = (1e3 * part for part in self.place)
+        return f"{100 * self.share:.0f} % of it within {1e3 * _AROUND:.0f} mm of ({x:.0f}, {y:.0f}, {z:.0f}) mm"
+
+
+def gathered(centres: FloatArray, total: FloatArray) -> Worst:
+    """Of places (p, 3) [m] that with the most of a total (p,) around it."""
+    around = (np.linalg.norm(centres[:, None] - centres, axis=2) < _AROUND) @ total
+    worst = int(around.argmax())
+    x, y, z = (float(part) for part in centres[worst])
+    return Worst((x, y, z), float(around[worst] / max(total.sum(), 1e-300)))
+
+
+def worst_push(predictions: Sequence[Prediction], bench: Bench) -> Worst:
+    """Of the pushes that with the largest squared error of the force around it."""
+    total: list[float] = []
+    for item in predictions:
+        assert item.felt is not None and item.felt.push is not None
+        squares = np.nan_to_num(item.felt.gap**2).sum(axis=1)
+        total += [
+            float(squares[item.felt.push == name].sum()) for name in np.unique(item.felt.push)
+        ]
+    return gathered(bench.pushed[0], np.array(total))
+
+
+def worst_patch(predictions: Sequence[Prediction], bench: Bench) -> Worst:
+    """Of the patches that with the largest squared residual around it while something is touched,
+    less what is there at rest.
+    """
+    total = np.zeros(bench.surface.patches)
+    for item in predictions:
+        if item.unseen:
+            continue
+        touched = np.array([frame.in_contact for frame in item.equilibria])
+        still = np.isfinite(item.gap) & ~touched[:, None]
+        zero = np.where(still, item.gap, 0.0).sum(axis=0) / np.maximum(still.sum(axis=0), 1)
+        away = np.where(still.any(axis=0), np.nan_to_num(item.gap - zero), 0.0)
+        total += (away**2 * item.count * touched[:, None]).sum(axis=0)
+    return gathered(bench.surface.patch_centres, total)

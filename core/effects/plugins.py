@@ -1,0 +1,110 @@
+"""Effects that others wrote: found by the entry point `palpate.effects`, checked, and weighed like
+those of the catalogue.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+import warnings
+from collections.abc import Iterable
+from dataclasses import is_dataclass
+from importlib.metadata import EntryPoint, entry_points
+
+from palpate.effects.base import Effect, Parameter, Slot
+from palpate.foundation.errors import EffectError
+
+__all__ = ["GROUP", "checked", "outside_effects"]
+
+GROUP = "palpate.effects"
+
+
+def outside_effects(
+    known: Iterable[str], points: Iterable[EntryPoint] | None = None
+) -> tuple[type[Effect], ...]:
+    """The effects of installed packages, in the order of their entry points' names.
+
+    What cannot be loaded or breaks the contract is left out with a warning that says which and why:
+    one broken package must not take the catalogue away.
+
+    Args:
+        known: names that are taken.
+        points: entry points; those installed, without it.
+    """
+    taken, found = set(known), list[type[Effect]]()
+    for point in sorted(
+        entry_points(group=GROUP) if points is None else points, key=lambda one: one.name
+    ):
+        try:
+            effect = checked(point.load(), taken)
+        except Exception as error:  # whatever a stranger's module does on import
+            reason = (
+                error.message
+                if isinstance(error, EffectError)
+                else f"{type(error).__name__}: {error}"
+            )
+            warnings.warn(
+                f"the effect {point.name} = {point.value} is left out: {reason}", stacklevel=2
+            )
+            continue
+        taken.add(effect.name)
+        found.append(effect)
+    return tuple(found)
+
+
+def checked(effect: object, taken: Iterable[str]) -> type[Effect]:
+    """The same class if it keeps what every effect must keep; EffectError otherwise."""
+    if not (isinstance(effect, type) and issubclass(effect, Effect)):
+        raise EffectError(f"{effect!r} is no subclass of palpate.effects.Effect")
+    if inspect.isabstract(effect):
+        raise EffectError(
+            f"{effect.__name__} lacks {', '.join(sorted(effect.__abstractmethods__))}"
+        )
+    for name, kind in (("name", str), ("enters", Slot), ("summary", str)):
+        if not isinstance(getattr(effect, name, None), kind) or not getattr(effect, name):
+            raise EffectError(f"{effect.__name__} has no {name} ({kind.__name__})")
+    if effect.name in taken:
+        raise EffectError(f"the name {effect.name!r} is taken already")
+    if effect.enters is Slot.GEOMETRY:
+        raise EffectError(
+            f"{effect.name} changes the geometry, which a diagnosis cannot compare yet"
+        )
+    if not (is_dataclass(effect) and effect.__dataclass_params__.frozen):  # type: ignore[attr-defined]  # typeshed has no such field
+        raise EffectError(f"{effect.__name__} is no frozen dataclass")
+    if not effect.numbers():
+        raise EffectError(f"{effect.name} has no parameter that is a number")
+    for item in effect.numbers():
+        _check_number(effect.name, item)
+    return effect
+
+
+def _check_number(name: str, item: Parameter) -> None:
+    if not item.unit:
+        raise EffectError(
+            f"{name}: {item.name} has no unit; a pure number has the unit 1", parameter=item.name
+        )
+    if not (math.isfinite(item.low) and math.isfinite(item.high) and item.low < item.high):
+        raise EffectError(
+            f"{name}: {item.name} is bounded by {item.low:g} and {item.high:g}", parameter=item.name
+        )
+    if item.log and item.low <= 0:
+        raise EffectError(
+            f"{name}: {item.name} is searched by its logarithm and may be {item.low:g}",
+            parameter=item.name,
+        )
+    if item.periodic and (item.log or item.contrast):
+        raise EffectError(
+            f"{name}: {item.name} comes round and is searched by a logarithm or contrast",
+            parameter=item.name,
+        )
+    if item.contrast and (item.log or item.low < 0):
+        what = "by its logarithm, too" if item.log else f"and may be {item.low:g}"
+        raise EffectError(
+            f"{name}: {item.name} is searched as a ratio's contrast {what}", parameter=item.name
+        )
+    span = item.coordinate(item.high) - item.coordinate(item.low)
+    if not 0 < item.scale < span:
+        raise EffectError(
+            f"{name}: the scale of {item.name} is {item.scale:g}, not between 0 and {span:g}",
+            parameter=item.name,
+        )

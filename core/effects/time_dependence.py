@@ -1,0 +1,63 @@
+"""Causes in what the material remembers of its past (see `palpate.replay.material_history`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+from palpate.effects.base import Effect, Slot, parameter
+from palpate.setup.setup import Relaxation, Setup
+
+__all__ = ["PermanentSet", "Viscoelasticity"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Viscoelasticity(Effect):
+    """Delayed recovery and rate dependence: one more term of a Prony series."""
+
+    name, enters = "viscoelasticity", Slot.MATERIAL
+    summary = "the material relaxes and recovers with delay"
+    # A virtual push of 5 mm on two engines: the dents left differ by 5 %, and fade alike within 4
+    # %.
+    relaxed_fraction: float = parameter("1", low=0.0, high=0.95, scale=0.1, accuracy=0.02)
+    time_constant: float = parameter("s", low=1e-2, high=1e3, scale=0.5, log=True, accuracy=0.04)
+
+    @classmethod
+    def neutral(cls, setup: Setup) -> Self:
+        return cls(relaxed_fraction=0.0, time_constant=1.0)
+
+    @classmethod
+    def starts(cls, setup: Setup) -> Sequence[Self]:
+        return [cls(relaxed_fraction=0.5, time_constant=seconds) for seconds in (0.3, 3.0)]
+
+    def apply(self, setup: Setup) -> Setup:
+        if not self.relaxed_fraction:
+            return setup
+        term = Relaxation(fraction=self.relaxed_fraction, time_constant=self.time_constant)
+        return replace(
+            setup, material=replace(setup.material, relaxation=(*setup.material.relaxation, term))
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PermanentSet(Effect):
+    """Deformation that stays after release."""
+
+    name, enters = "permanent_set", Slot.MATERIAL
+    summary = "part of the deformation stays after release"
+    # The same push: the dents left differ by 2 to 3 %.
+    retained_fraction: float = parameter("1", low=0.0, high=0.8, scale=0.05, accuracy=0.006)
+
+    @classmethod
+    def neutral(cls, setup: Setup) -> Self:
+        return cls(retained_fraction=setup.material.retained_fraction)
+
+    @classmethod
+    def starts(cls, setup: Setup) -> Sequence[Self]:
+        return [cls(retained_fraction=0.15)]
+
+    def apply(self, setup: Setup) -> Setup:
+        return replace(
+            setup, material=replace(setup.material, retained_fraction=self.retained_fraction)
+        )

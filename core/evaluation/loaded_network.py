@@ -1,0 +1,86 @@
+"""A trained network as an evaluation and a recording use it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from palpate.dataset import Sequence as Recording
+from palpate.evaluation.corrected_prediction import Correct
+from palpate.evaluation.train_network import REQUEST
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import RunError
+from palpate.measurement.touch_correction import touch_correction
+from palpate.mesh.protocol import Meshing
+from palpate.setup.setup import Setup
+
+if TYPE_CHECKING:
+    from palpate.correction import Trained
+    from palpate.correction.corrected_replay import Feedback
+
+__all__ = ["Network"]
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """One trained network of a block.
+
+    Attributes:
+        trained: as it was kept.
+        about: what a reader wants to know of it, plain values.
+        feedback: whether the simulation answers for the points that the network does not see
+            ("follow") or not ("none"), see `palpate.correction.corrected_replay`.
+    """
+
+    trained: Trained
+    about: dict[str, Any]
+    feedback: Feedback = "none"
+
+    @classmethod
+    def load(cls, folder: Path, feedback: Feedback = "none") -> Self:
+        """From the folder of a training that is finished; RunError where there is none."""
+        from palpate.correction import Trained
+
+        try:
+            asked = json.loads((folder / REQUEST).read_text())
+        except (OSError, ValueError) as error:
+            raise RunError(
+                f"{folder} holds no training ({error}); train first", path=str(folder)
+            ) from None
+        trained = Trained.load(folder)
+        spec, known = trained.about["training"], trained.about
+        about = {
+            "kind": spec["network"]["kind"],
+            "features": spec["network"]["features"],
+            "trust": spec["network"]["trust"],
+            "hold": spec["hold"],
+            "every": asked["every"],
+            "seed": spec["seed"],
+            "epoch": known["epoch"],
+            "validation_error": known["error"],
+            "validation_error_without": known["raw_error"],
+            "feedback": feedback,
+        }
+        return cls(trained, about, feedback)
+
+    def corrector(self, setup: Setup) -> Correct:
+        """What corrects a frame of this setup."""
+        from palpate.correction import Corrector
+
+        return Corrector(self.trained, setup, feedback=self.feedback).correct
+
+    def columns(
+        self, sequence: Recording, times: FloatArray, setup: Setup, grid: Meshing
+    ) -> FloatArray:
+        """What it is told of the tool (n, 13) at cloud stamps (n,) [s] under a setup."""
+        from palpate.correction.samples.record_samples import tool_columns
+
+        robot = touch_correction(setup, grid) @ setup.phantom_from_robot
+        return tool_columns(
+            sequence,
+            times - setup.sensor.time_offset,
+            robot,
+            self.trained.about["force"] == "measured",
+        )

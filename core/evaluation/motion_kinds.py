@@ -1,0 +1,48 @@
+"""Kinds of motion: of each push of a sequence, and of those that were trained on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from palpate.dataset import Dataset
+from palpate.dataset.tool_motion import ContactKind, motion_of
+from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.setup.setup import Setup
+
+__all__ = ["kinds_in", "kinds_of_pushes"]
+
+
+def kinds_in(dataset: Dataset, names: Iterable[str], setup: Setup) -> set[ContactKind]:
+    """Kinds of motion (top, side, drag) that these sequences have."""
+    motions = (
+        motion_of(dataset, dataset.sequence(name), setup.phantom_from_robot) for name in names
+    )
+    return {contact.kind for motion in motions for contact in motion.contacts}
+
+
+def kinds_of_pushes(
+    dataset: Dataset, data: Sequence[Observations], setup: Setup
+) -> dict[str, ContactKind]:
+    """The kind of each push, by "sequence/number": that of the contact nearest in time, for a push
+    may begin before it touches.
+    """
+    found: dict[str, ContactKind] = {}
+    for item in data:
+        contacts = motion_of(
+            dataset, dataset.sequence(item.name), setup.phantom_from_robot
+        ).contacts
+        if not contacts:
+            continue
+        middles = np.array([(contact.start + contact.end) / 2 for contact in contacts])
+        for probe in sorted({group.probe for group in item.groups if not group.free}):
+            frames = [
+                frame
+                for group in item.groups
+                if group.probe == probe and not group.free
+                for frame in group.frames
+            ]
+            nearest = int(np.abs(middles - item.times[frames].mean()).argmin())
+            found[f"{item.name}/{probe}"] = contacts[nearest].kind
+    return found

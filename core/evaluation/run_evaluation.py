@@ -1,0 +1,231 @@
+"""A ladder from a dataset: its test sequences under the stated model, under others, and with
+networks on top of each.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from palpate.dataset import Dataset
+from palpate.diagnosis.forward.prediction import Prediction
+from palpate.diagnosis.forward.worker_pool import Workers
+from palpate.diagnosis.observation.force_only import observe_each
+from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.effects.base import with_effects
+from palpate.evaluation.corrected_prediction import corrected_prediction, tools_of
+from palpate.evaluation.error_ladder import Rung, ladder
+from palpate.evaluation.loaded_network import Network
+from palpate.evaluation.motion_kinds import kinds_in, kinds_of_pushes
+from palpate.evaluation.summary_sentence import meaning
+from palpate.foundation.errors import DiagnosisError, RunError
+from palpate.foundation.progress import Report, part, silent
+from palpate.measurement.phantom_drift import as_it_stood
+from palpate.mesh.graded_mesh import PAGE_GRID
+from palpate.mesh.protocol import Meshing
+from palpate.recording.saved_model import effects_from, kept_setup
+from palpate.registration.registration import register, setup_from
+from palpate.setup.setup import Setup
+
+__all__ = ["FILE", "MODELS", "Asked", "Bench", "Step", "evaluate"]
+
+FILE = "evaluation.json"
+MODELS = {
+    "baseline": "stated model",
+    "extended": "extended model",
+    "true": "true effects, known to nobody",
+}
+KINDS = {"unet2d": "2D network", "unet3d": "3D network", "graph": "graph network"}
+TEST_GROUPS, TEST_FELT = 24, 32
+"""Groups of a sequence at most."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What stands on the ladder beside the stated model.
+
+    Attributes:
+        model: model.json of a diagnosis, the extended model.
+        truth: effects as `Effect.to_json` has them.
+        networks: folders of trainings by the model they were trained on, "baseline", "extended" or
+            "true", and further ones on the same model as "baseline:name".
+        feedback: see `Network`.
+    """
+
+    model: Mapping[str, Any] | None = None
+    truth: Sequence[Mapping[str, Any]] | None = None
+    networks: Mapping[str, Path] = field(default_factory=dict)
+    feedback: Literal["none", "follow"] = "none"
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """The test sequences of a dataset, ready to be compared with models.
+
+    Attributes:
+        stated: the setup that is believed.
+        data: one for each test sequence.
+        kinds: of motion, of each push.
+        trained: kinds that networks and causes are fitted on.
+        grid: the mesh of all models, on which networks were trained, too.
+    """
+
+    dataset: Dataset
+    stated: Setup
+    data: Sequence[Observations]
+    kinds: Mapping[str, str]
+    trained: Collection[str]
+    grid: Meshing
+
+    @classmethod
+    def of(cls, dataset: Dataset, asked: Asked | None = None, report: Report = silent) -> Bench:
+        """Reads the clouds, and groups them by the clock of the best model that is asked for.
+
+        Raises DiagnosisError where no test sequence has clouds.
+        """
+        tested = [name for name in dataset.config.test if len(dataset.sequence(name))]
+        if not tested:
+            raise DiagnosisError(
+                "no sequence of [splits] test has clouds, so there is nothing to evaluate on; name one",
+                key="splits",
+            )
+        report(0.0, "relating robot, camera and phantom")
+        dataset, registration = as_it_stood(dataset, register(dataset))
+        stated, mended = setup_from(dataset, registration), registration.mended
+        *_, believed = _setups(stated, asked or Asked()).values()
+        seen_from = replace(setup_from(dataset, mended), sensor=believed.sensor)
+        data = observe_each(
+            dataset, tested, seen_from, mended, (TEST_GROUPS, TEST_FELT), part(report, 0.1, 1.0)
+        )
+        trained = kinds_in(dataset, (*dataset.config.train, *dataset.config.validation), stated)
+        kinds = kinds_of_pushes(dataset, data, stated)
+        return cls(dataset, stated, data, kinds, trained, PAGE_GRID.for_tool(stated.tool.radius))
+
+    def climb(
+        self, steps: Sequence[Step], *, workers: int = 2, seed: int = 0, report: Report = silent
+    ) -> dict[str, Any]:
+        """The ladder of these steps; the first model is the baseline, and networks stand after the
+        model they correct.
+        """
+        names, rungs = [item.name for item in self.data], list[Rung]()
+        with Workers(self.data, workers) as pool:
+            first: list[Prediction] | None = None
+            for number, step in enumerate(steps):
+                report(number / len(steps), f"replaying the test sequences: {step.label}")
+                own = [
+                    one.result() for one in pool.submit(names, step.setup, self.grid, None, first)
+                ]
+                first = first or own
+                rungs.append(
+                    Rung(name=step.name, label=step.label, setup=step.setup, predictions=own)
+                )
+                rungs += [
+                    self._corrected(rungs[-1], name, network)
+                    for name, network in step.networks.items()
+                ]
+        ends = (0, max(number for number, rung in enumerate(rungs) if rung.network is None))
+        return ladder(self.data, rungs, self.kinds, self.trained, ends=ends, seed=seed)
+
+    def _corrected(self, rung: Rung, name: str, network: Network) -> Rung:
+        correct, predictions = network.corrector(rung.setup), []
+        for item, model in zip(self.data, rung.predictions, strict=True):
+            columns = network.columns(
+                self.dataset.sequence(item.name), np.asarray(item.times), rung.setup, self.grid
+            )
+            predictions.append(
+                corrected_prediction(model, item, rung.setup, correct, tools_of(item, columns))
+            )
+        label = f"{rung.label} + {KINDS[network.about['kind']]}"
+        return Rung(
+            name=name, label=label, setup=rung.setup, predictions=predictions, network=network.about
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A model of the ladder, and networks on top of it by the names of their rungs."""
+
+    name: str
+    label: str
+    setup: Setup
+    networks: Mapping[str, Network] = field(default_factory=dict)
+
+
+def evaluate(
+    dataset: Dataset,
+    asked: Asked,
+    out: Path,
+    *,
+    workers: int = 2,
+    seed: int = 0,
+    report: Report = silent,
+) -> dict[str, Any]:
+    """The ladder on the test sequences; written to `out` (evaluation.json), which is whole or not
+    there.
+
+    Raises RunError where `out` exists or a network is missing, DiagnosisError where no test
+    sequence has clouds.
+    """
+    out = Path(out)
+    if out.exists():
+        raise RunError(f"{out} exists already; name another folder or move it away", file=str(out))
+    networks = {
+        name: Network.load(folder, asked.feedback) for name, folder in asked.networks.items()
+    }
+    bench = Bench.of(dataset, asked, part(report, 0.0, 0.2))
+    steps = [
+        Step(name, MODELS[name], setup, _own(name, networks))
+        for name, setup in _setups(bench.stated, asked).items()
+    ]
+    climbed = bench.climb(steps, workers=workers, seed=seed, report=part(report, 0.2, 0.95))
+    found = {
+        "format": 1,
+        "dataset": dataset.name,
+        "folder": dataset.path.resolve().name,
+        "split": "test",
+        **climbed,
+    }
+    found["sentence"] = meaning(found)
+    _write(out, found)
+    report(1.0, "done")
+    return found
+
+
+def _own(model: str, networks: Mapping[str, Network]) -> dict[str, Network]:
+    """Those of one model by the names of their rungs; the first is called "network", others by what
+    they are.
+    """
+    found: dict[str, Network] = {}
+    for key, network in networks.items():
+        if key.partition(":")[0] == model:
+            rung = f"{model}_network" if not found else f"{model}_{network.about['kind']}"
+            found[rung if rung not in found else f"{model}_{key.partition(':')[2]}"] = network
+    return found
+
+
+def _setups(stated: Setup, asked: Asked) -> dict[str, Setup]:
+    found = {"baseline": stated}
+    if asked.model is not None:
+        found["extended"] = kept_setup(stated, asked.model)
+    if asked.truth is not None:
+        found["true"] = with_effects(stated, effects_from(asked.truth))
+    return found
+
+
+def _write(out: Path, found: dict[str, Any]) -> None:
+    out.parent.mkdir(parents=True, exist_ok=True)
+    aside = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
+    try:
+        (aside / FILE).write_text(json.dumps(found, indent=1) + "\n")
+        aside.chmod(0o755)
+        os.rename(aside, out)
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)

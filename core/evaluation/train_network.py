@@ -1,0 +1,240 @@
+"""A training from a dataset: samples of one model are made once, kept for all trainings on it, and learned from.
+
+folder/             one training
+  request.json      what is trained, on what
+  checkpoint.pt     where it is; a training that was stopped goes on from there
+  history.json      [loss, validation error [mm], rate] of each epoch so far
+  network.pt        the best network, and training.json what came of it, once it is finished
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from palpate.dataset import Dataset
+from palpate.effects.base import with_effects
+from palpate.foundation.errors import CorrectionError, RunError
+from palpate.foundation.progress import Report, part, silent
+from palpate.recording.saved_model import effects_from, kept_setup
+from palpate.registration.registration import Registration, register, setup_from
+from palpate.setup.setup import Setup
+
+if TYPE_CHECKING:
+    from palpate.correction import Samples
+
+__all__ = ["REQUEST", "SUMMARY", "Wanted", "train_network", "whole_samples"]
+
+REQUEST, SUMMARY = "request.json", "training.json"
+_SAMPLING = 0.4
+"""Share of the time that replaying takes, for the progress."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """What is trained.
+
+    Attributes:
+        spec: see `palpate.correction.training_spec.TrainingSpec`, plain values; what is left out
+            has its default.
+        nodes: of the grid that is sampled, along x, y, z.
+        every: each how many clouds one is learned from.
+        points: kept of a cloud.
+    """
+
+    spec: Mapping[str, Any] = field(default_factory=dict)
+    nodes: tuple[int, int, int] = (13, 5, 5)
+    every: int = 1
+    points: int = 1024
+
+    def __post_init__(self) -> None:
+        for key, value, low, high in (
+            ("every", self.every, 1, 10_000),
+            ("points", self.points, 20, 100_000),
+        ):
+            if not low <= value <= high:
+                raise CorrectionError(
+                    f"{key} = {value}; expected {low} to {high}",
+                    key=key,
+                    value=value,
+                    low=low,
+                    high=high,
+                )
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "spec": dict(self.spec),
+            "nodes": list(self.nodes),
+            "every": self.every,
+            "points": self.points,
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Self:
+        """The inverse."""
+        nx, ny, nz = data.get("nodes", (13, 5, 5))
+        return cls(
+            spec=data.get("spec", {}),
+            nodes=(nx, ny, nz),
+            every=data.get("every", 1),
+            points=data.get("points", 1024),
+        )
+
+
+def train_network(
+    dataset: Dataset,
+    wanted: Wanted,
+    folder: Path,
+    *,
+    store: Path,
+    model: Mapping[str, Any] | None = None,
+    run: str | None = None,
+    truth: Sequence[Mapping[str, Any]] | None = None,
+    setup: Setup | None = None,
+    workers: int = 2,
+    report: Report = silent,
+) -> dict[str, Any]:
+    """Train on the stated model of a dataset, or on another one; returns what training.json says.
+
+    Args:
+        store: folder of samples for all trainings.
+        model: model.json of a diagnosis, of the `run` of this name.
+        truth: effects of a virtual dataset's truth file instead, as plain values.
+        setup: instead of all these.
+
+    What was begun in `folder` goes on, and what is finished there is returned. RunError where
+    another training is in it, CorrectionError for values or data that cannot be trained with.
+    """
+    from palpate.correction import Split, TrainingSpec, train
+
+    spec = TrainingSpec.from_json(wanted.spec)
+    effects = truth if model is None else model["effects"]
+    on = "extended" if model is not None else "baseline" if truth is None else "true"
+    said = {
+        "dataset": str(dataset.path.resolve()),
+        "run": run,
+        "model": on,
+        "effects": None if effects is None else list(effects),
+    }
+    _claim(folder, {**wanted.to_json(), **said})
+    if (folder / SUMMARY).is_file():
+        return dict(json.loads((folder / SUMMARY).read_text()))
+    registration = register(dataset)
+    if setup is None:
+        setup = _setup(setup_from(dataset, registration), model, truth)
+    samples = _samples(
+        dataset, wanted, store, registration, setup, workers, part(report, 0.0, _SAMPLING)
+    )
+    trained = train(samples, Split.of(samples), spec, folder, part(report, _SAMPLING, 1.0))
+    about = trained.about
+    summary = {
+        "format": 1,
+        "dataset": dataset.name,
+        "folder": dataset.path.resolve().name,
+        "kind": spec.network.kind,
+        "samples": len(samples),
+        "sequences": about["split"],
+        "epochs": len(about["history"]),
+        "best_epoch": about["epoch"],
+        "validation_error_mm": about["error"],
+        "validation_error_without_mm": about["raw_error"],
+        "history": about["history"],
+    }
+    _write(folder / SUMMARY, summary)
+    return summary
+
+
+def _setup(
+    stated: Setup, model: Mapping[str, Any] | None, truth: Sequence[Mapping[str, Any]] | None
+) -> Setup:
+    if model is not None:
+        return kept_setup(stated, model)
+    return stated if truth is None else with_effects(stated, effects_from(truth))
+
+
+def _samples(
+    dataset: Dataset,
+    wanted: Wanted,
+    store: Path,
+    registration: Registration,
+    setup: Setup,
+    workers: int,
+    report: Report,
+) -> Samples:
+    """Made once for each model, motion and density of a dataset."""
+    from palpate.correction import make_samples, recorder_for
+
+    recorder = recorder_for(
+        dataset, setup=setup, nodes=wanted.nodes, points=wanted.points, registration=registration
+    )
+    names = [
+        name
+        for name in (*dataset.config.train, *dataset.config.validation)
+        if len(dataset.sequence(name))
+    ]
+    said = [
+        str(dataset.path.resolve()),
+        setup.as_dict(),
+        repr(recorder.grid),
+        wanted.nodes,
+        wanted.every,
+        wanted.points,
+        names,
+    ]
+    folder = (
+        store
+        / hashlib.sha256(json.dumps(said, sort_keys=True, default=repr).encode()).hexdigest()[:16]
+    )
+    known = whole_samples(folder)
+    if known is not None:
+        return known
+    try:
+        return make_samples(
+            folder, recorder, sequences=names, every=wanted.every, workers=workers, report=report
+        )
+    except RunError:
+        known = whole_samples(folder)  # another training may have made the same in the meantime
+        if known is None:
+            raise
+        return known
+
+
+def whole_samples(folder: Path) -> Samples | None:
+    """Samples that are all there; what is left of others, of which files were dropped for want of
+    room, is taken away.
+    """
+    from palpate.correction import open_samples
+    from palpate.correction.samples.sample_arrays import ARRAYS
+
+    if not folder.is_dir():
+        return None
+    try:
+        samples = open_samples(folder)
+        for sequence in samples.sequences:
+            for name in ARRAYS:
+                samples.array(sequence, name)
+    except RunError:
+        shutil.rmtree(folder, ignore_errors=True)
+        return None
+    return samples
+
+
+def _claim(folder: Path, said: dict[str, Any]) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / REQUEST
+    if file.is_file() and json.loads(file.read_text()) != said:
+        raise RunError(f"{folder} has another training; name another folder", file=REQUEST)
+    _write(file, said)
+
+
+def _write(file: Path, value: Any) -> None:
+    aside = file.with_name(f".{file.name}.part")
+    aside.write_text(json.dumps(value, indent=1) + "\n")
+    os.replace(aside, file)

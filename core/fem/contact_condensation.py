@@ -1,0 +1,222 @@
+"""The body linearised once, its contact solved exactly: many steps from one factor.
+
+Pushing a ball into a soft block changes the elastic tangent slowly, but which points touch changes
+with every step. So the body's answer M^-1 to forces on the surface near the tool is computed once
+(a static condensation on those nodes), and each step solves
+
+    r(u) + M e - K e + f(u + e) - f(u) = 0
+
+for the change e, with r the residual, f the true contact force and K the contact's share of M: a
+small dense system by Newton's method. What is left is the change of the elastic tangent, by which
+the residual shrinks from step to step.
+"""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+from numpy.linalg import LinAlgError
+from scipy.linalg import cho_factor, cho_solve
+
+from palpate.fem.contact import assemble_contact, contact_energy
+from palpate.fem.linalg.direct_solver import NotPositiveDefinite
+from palpate.fem.model import CONTACT_STIFFNESS, BlockModel, Probe
+from palpate.foundation.arrays import FloatArray, IntArray
+
+__all__ = ["Compliance"]
+
+_MARGIN, _EDGES = 5e-4, 0.3
+"""Surface nodes this far from the ball [m], or this share of their side's length, may come to touch
+it in the steps to come. Where one further off does, the residual says so, and the next
+linearisation has it."""
+_INNER_STEPS = 25
+_INNER_TOLERANCE = 1e-8
+
+
+class Compliance:
+    """The answer of a body to forces near the tool, linearised at one state; `at` makes one."""
+
+    def __init__(
+        self,
+        model: BlockModel,
+        faces: IntArray,
+        nodes: IntArray,
+        positions: FloatArray,
+        probe: Probe,
+    ) -> None:
+        self._faces, self._nodes = faces, nodes
+        self._unknown = model.topology.unknown[nodes].ravel()
+        where = np.full(len(model.mesh.nodes), -1)
+        where[nodes] = np.arange(len(nodes))
+        self._local = np.ascontiguousarray(where[model.topology.surface[faces]])
+        self._slots = _dense_slots(self._local, len(nodes))
+        self._share = self._contact(model, positions[nodes], probe, bending=False)[1]
+        self._held = np.linalg.inv(model.topology.factor.answers(self._unknown))
+        self._stiffness = self._held - self._share
+        self._topology, self._generation = model.topology, model.topology.factor.generation
+
+    def fits(self, model: BlockModel) -> bool:
+        """Whether the factor this rests on is still there, and of a grid with the same elements."""
+        return (
+            model.topology is self._topology
+            and model.topology.factor.generation == self._generation
+        )
+
+    @classmethod
+    def at(cls, model: BlockModel, positions: FloatArray, probe: Probe) -> Self | None:
+        """Linearise at these positions (n, 3) [m]; None when nothing is near the tool or the
+        tangent has no factor.
+        """
+        top = model.topology
+        distance = np.linalg.norm(positions[top.surface] - probe.centre, axis=2)
+        edges = np.linalg.norm(positions[top.surface] - positions[top.surface[:, :1]], axis=2).max(
+            axis=1
+        )
+        near = np.flatnonzero(
+            distance.min(axis=1) < probe.radius + np.maximum(_MARGIN, _EDGES * edges)
+        )
+        nodes = np.unique(top.surface[near])
+        nodes = nodes[top.free[nodes].all(axis=1)]
+        near = near[np.isin(top.surface[near], nodes).all(axis=1)]
+        if not len(near):
+            return None
+        state = model.assemble(positions, probe, bending=False)
+        try:
+            model.factorise(state.data)
+        except NotPositiveDefinite:
+            return None
+        return cls(model, near, nodes, positions, probe)
+
+    def _contact(
+        self, model: BlockModel, positions: FloatArray, probe: Probe, *, bending: bool = True
+    ) -> tuple[FloatArray, FloatArray]:
+        """Contact force (m,) and its tangent (m, m) on the nodes near the tool, at these positions
+        of theirs.
+        """
+        force, data = np.zeros_like(positions), np.zeros(positions.size**2)
+        assemble_contact(
+            self._local,
+            model.areas[self._faces],
+            model.face.shapes,
+            model.face.gradients,
+            positions,
+            probe.centre,
+            probe.radius,
+            False,
+            not model.dense,
+            CONTACT_STIFFNESS,
+            bending,
+            self._slots,
+            force,
+            data,
+            np.zeros(3),
+        )
+        if model.grip is not None:
+            grip = model.grip.of(self._faces)
+            grip.assemble(
+                self._local,
+                model.face,
+                positions,
+                probe.centre,
+                self._slots,
+                force,
+                data,
+                np.zeros(3),
+            )
+        return force.ravel(), data.reshape(positions.size, positions.size)
+
+    def step(
+        self, model: BlockModel, positions: FloatArray, residual: FloatArray, probe: Probe
+    ) -> FloatArray | None:
+        """Positions after one step; None when the contact finds no balance."""
+        free = model.topology.factor.approximate(residual)
+        here = positions[self._nodes]
+        touched, _ = self._contact(model, here, probe)
+        change = self._balance(model, here, probe, self._held @ free[self._unknown] - touched)
+        if change is None:
+            return None
+        force, _ = self._contact(model, here + change.reshape(-1, 3), probe)
+        moved = positions.copy()
+        further = np.zeros_like(residual)
+        further[self._unknown] = force - touched - self._share @ change
+        moved[model.topology.free] -= free + model.topology.factor.approximate(further)
+        return moved
+
+    def _balance(
+        self, model: BlockModel, here: FloatArray, probe: Probe, load: FloatArray
+    ) -> FloatArray | None:
+        """The change (m,) that minimises the condensed body's energy and the contact's, by Newton's
+        method with a line search.
+        """
+        change = np.zeros(len(load))
+        energy = self._energy(model, here, probe, load, change)
+        for _ in range(_INNER_STEPS):
+            slope, move = self._move(model, here, probe, load, change)
+            length = 1.0
+            while length > 1e-3:
+                value = self._energy(model, here, probe, load, change + length * move)
+                if value <= energy + 1e-4 * length * float(slope @ move) + model.rounding:
+                    break
+                length /= 2
+            change, energy = change + length * move, value
+            if float(np.abs(move).max()) < _INNER_TOLERANCE:
+                return change
+        return None
+
+    def _move(
+        self,
+        model: BlockModel,
+        here: FloatArray,
+        probe: Probe,
+        load: FloatArray,
+        change: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Gradient of the condensed energy (m,) and Newton's step; without the contact's bending
+        where that is not positive.
+        """
+        force, tangent = self._contact(model, here + change.reshape(-1, 3), probe)
+        slope = self._stiffness @ change + load + force
+        try:
+            factor = cho_factor(self._stiffness + tangent, check_finite=False)
+            return slope, np.asarray(-cho_solve(factor, slope, check_finite=False))
+        except LinAlgError:
+            _, tangent = self._contact(model, here + change.reshape(-1, 3), probe, bending=False)
+            return slope, np.asarray(-np.linalg.solve(self._stiffness + tangent, slope))
+
+    def _energy(
+        self,
+        model: BlockModel,
+        here: FloatArray,
+        probe: Probe,
+        load: FloatArray,
+        change: FloatArray,
+    ) -> float:
+        """Energy over E [m^3] of the condensed body and the contact."""
+        touched = contact_energy(
+            self._local,
+            model.areas[self._faces],
+            model.face.shapes,
+            model.face.gradients,
+            here + change.reshape(-1, 3),
+            probe.centre,
+            probe.radius,
+            False,
+            not model.dense,
+            CONTACT_STIFFNESS,
+        )
+        if model.grip is not None:
+            touched += model.grip.of(self._faces).energy(
+                self._local, model.face, here + change.reshape(-1, 3), probe.centre
+            )
+        return float(0.5 * change @ self._stiffness @ change + load @ change + touched)
+
+
+def _dense_slots(local: IntArray, count: int) -> IntArray:
+    """Where the entries of each face's matrix belong in a dense one of all nodes, (f, 3 b, 3 b); -1
+    for nodes that are none.
+    """
+    numbers = (3 * local[:, :, None] + np.arange(3)).reshape(len(local), -1)
+    return np.ascontiguousarray(numbers[:, :, None] * 3 * count + numbers[:, None, :]).astype(
+        np.int32
+    )

@@ -1,0 +1,278 @@
+"""MKL's Pardiso: the fastest direct solver for systems of this size (shared out by pypardiso)."""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import math
+import os
+import sys
+import weakref
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from palpate.fem.linalg.direct_solver import NotPositiveDefinite
+from palpate.foundation.arrays import FloatArray, IntArray
+
+__all__ = ["Pardiso"]
+
+log = logging.getLogger(__name__)
+
+_POSITIVE_DEFINITE = 2
+_ANALYSE, _FACTORISE, _SOLVE, _FORWARD, _RELEASE = 11, 22, 33, 331, -1
+_ZERO_PIVOT = -4
+_DOMAIN = 4
+"""MKL's number for Pardiso where threads are set by domain."""
+_CHOSEN, _ORDERING, _ALGORITHM, _PRECISION, _PARTIAL = 0, 1, 23, 27, 30
+_NESTED_DISSECTION, _TWO_LEVEL, _SINGLE, _SPARSE_RIGHT_SIDES = 2, 1, 1, 1
+_NONE = np.empty(0, dtype=np.int64)
+_SAME = {np.dtype(np.float32): 1e-3, np.dtype(np.float64): 1e-9}
+"""Cheap answers are right to this share of the largest."""
+_SETTLED, _MOST_ROUNDS = 1e-5, 10
+"""A solution is refined until it changes by no more than this share of it: each round leaves as
+much of the error again."""
+_ANY, _INTEGERS = ctypes.c_void_p, ctypes.POINTER(ctypes.c_int32)
+
+
+@lru_cache(maxsize=1)
+def _pardiso() -> Any:
+    """MKL's entry point. pypardiso looks through the whole environment for the library, for a
+    second or three in each process.
+    """
+    beside = sorted((Path(sys.prefix) / "lib").glob("libmkl_rt.so*"))
+    if beside:  # said before the import, which looks for the library already
+        os.environ.setdefault("PYPARDISO_MKL_RT", str(beside[0]))
+    from pypardiso import PyPardisoSolver
+
+    solver = PyPardisoSolver()
+    # A factor made by one number of threads and used by another ends the process, as where
+    # MKL_NUM_THREADS asks for several and a solve is bounded to one (`palpate.foundation.threads`).
+    solver.libmkl.MKL_Domain_Set_Num_Threads(1, _DOMAIN)
+    return solver._mkl_pardiso
+
+
+def _room(shape: tuple[int, ...], kind: np.dtype[Any]) -> Any:
+    """An array in column order that begins at a cache line: MKL's last digits depend on where an
+    array lies.
+    """
+    size, line = math.prod(shape), 64 // kind.itemsize
+    memory = np.empty(size + line, dtype=kind)
+    begin = -memory.ctypes.data // kind.itemsize % line
+    return memory[begin : begin + size].reshape(shape, order="F")
+
+
+class _Handle:
+    """One matrix in MKL's memory, with everything its calls need that does not change between them.
+
+    Args:
+        pattern: as of `Pardiso`.
+        asked: (m,) unknowns between which entries of the inverse will be wanted.
+        single: precision.
+    """
+
+    def __init__(self, pattern: sp.csr_matrix, asked: IntArray, single: bool) -> None:
+        self.kind: np.dtype[Any] = np.dtype(np.float32 if single else np.float64)
+        self.entries = np.asarray(pattern.data, dtype=self.kind)
+        self.size = pattern.shape[0]
+        self.rows = pattern.indptr.astype(np.int32) + 1
+        self.columns = pattern.indices.astype(np.int32) + 1
+        self.memory = np.zeros(64, dtype=np.int64)
+        self.options = np.zeros(64, dtype=np.int32)
+        # MKL's own defaults refine every solution, which a Cholesky factor does not need: a solve
+        # takes three times as long.
+        self.options[_CHOSEN], self.options[_ORDERING] = 1, _NESTED_DISSECTION
+        self.options[_PRECISION] = _SINGLE if single else 0
+        self.order = np.zeros(self.size, dtype=np.int32)
+        self.asked = np.zeros(self.size, dtype=bool)
+        self.asked[asked] = True
+        if len(asked):
+            # Of MKL's two ways to factorise, the usual one answers sparse right sides wrongly, and
+            # takes ten times as long.
+            self.options[_ALGORITHM] = _TWO_LEVEL
+        self.call = _pardiso()
+        self.run(_ANALYSE, np.zeros(self.size), asked)
+
+    def run(self, phase: int, right: FloatArray, sparse: IntArray = _NONE) -> FloatArray:
+        """Carry out a phase; returns the solution (n,) or (n, m) in column order and this precision
+        where the phase has one.
+
+        Of right sides that are empty but in the unknowns `sparse` the solution is right only there.
+        These are among those asked for, all of which are to be named when the matrix is analysed
+        and when it is factorised.
+        """
+        self.options[_PARTIAL] = _SPARSE_RIGHT_SIDES if len(sparse) else 0
+        self.order[:] = 0
+        self.order[sparse] = 1
+        solution, given, error = (
+            _room(right.shape, self.kind),
+            _room(right.shape, self.kind),
+            ctypes.c_int32(0),
+        )
+        given[...] = right
+        number = [
+            ctypes.byref(ctypes.c_int32(value))
+            for value in (1, _POSITIVE_DEFINITE, phase, self.size)
+        ]
+        columns = ctypes.byref(ctypes.c_int32(1 if right.ndim == 1 else right.shape[1]))
+        self.call(
+            self.memory.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)),
+            number[0],
+            number[0],
+            number[1],
+            number[2],
+            number[3],
+            self.entries.ctypes.data_as(_ANY),
+            self.rows.ctypes.data_as(_INTEGERS),
+            self.columns.ctypes.data_as(_INTEGERS),
+            self.order.ctypes.data_as(_INTEGERS),
+            columns,
+            self.options.ctypes.data_as(_INTEGERS),
+            ctypes.byref(ctypes.c_int32(0)),
+            given.ctypes.data_as(_ANY),
+            solution.ctypes.data_as(_ANY),
+            ctypes.byref(error),
+        )
+        if error.value == _ZERO_PIVOT:
+            raise NotPositiveDefinite("the matrix has no Cholesky factor")
+        if error.value:
+            raise RuntimeError(f"MKL Pardiso failed in phase {phase} with error {error.value}")
+        return np.asarray(solution)
+
+
+def _release(handle: _Handle) -> None:
+    handle.run(_RELEASE, np.zeros(handle.size))
+
+
+class Pardiso:
+    """As `Factor`.
+
+    A factor of single precision takes half the time and memory; what it leaves of a right side,
+    reckoned in double precision, is solved for again until the solution is a double's (iterative
+    refinement: Higham and Mary 2022, Acta Numerica 31, section 7).
+
+    Args:
+        pattern: upper triangle (with diagonal) in CSR form, indices sorted; its `data` is the array
+            that is factorised.
+        single: precision of the factor.
+    """
+
+    _handle: _Handle
+
+    def __init__(self, pattern: sp.csr_matrix, single: bool = False) -> None:
+        self._matrix, self._single = pattern, single
+        self._idle = np.zeros(pattern.shape[0])
+        self.generation = 0
+        self._trusted, self._current = True, False
+        _pardiso()  # where it is missing, that is said here and now
+        self._asked: IntArray | None = None
+
+    def _analyse(self, asked: IntArray) -> None:
+        """Analyse the pattern, with cheap answers between these unknowns (m,): in which order they
+        are eliminated hangs on it.
+        """
+        self._handle, self._asked, self._checked = (
+            _Handle(self._matrix, asked, self._single),
+            asked,
+            False,
+        )
+        self._forget = weakref.finalize(self, _release, self._handle)
+        # At interpreter exit the memory goes anyway, and the library may be gone first.
+        self._forget.atexit = False
+
+    def factorise(self, data: FloatArray, asked: IntArray | None = None) -> None:
+        """Factorise the matrix with these entries of its upper triangle; raises
+        NotPositiveDefinite.
+
+        `answers` between unknowns that are all among those `asked` (m,) take a fifth of the time;
+        asking for others than the last time takes an analysis. The factor there is stays where it
+        is of these very entries.
+        """
+        wanted = asked if asked is not None and self._trusted else _NONE
+        same = self._asked is not None and np.array_equal(wanted, self._asked)
+        if same and self._current and np.array_equal(data, self._matrix.data):
+            return
+        self.generation += 1
+        self._current = False
+        if not same:
+            if self._asked is not None:
+                self._forget()
+            self._analyse(wanted)
+        self._matrix.data[:] = data
+        self._handle.entries[:] = data
+        self._handle.run(_FACTORISE, self._idle, wanted)
+        self._current = True
+
+    def approximate(self, right: FloatArray) -> FloatArray:
+        """Solve for one (n,) or several (n, m) right sides, as well as the last factor has it by
+        itself.
+        """
+        return np.ascontiguousarray(self._handle.run(_SOLVE, right), dtype=float)
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Solve for one (n,) or several (n, m) right sides with the last factor."""
+        found = self.approximate(right)
+        for _ in range(_MOST_ROUNDS if self._single else 0):
+            change = self.approximate(right - self._times(found))
+            found += change
+            if (np.abs(change).max(axis=0) <= _SETTLED * np.abs(found).max(axis=0)).all():
+                return found
+        return self._in_double(right) if self._single else found
+
+    def _times(self, vectors: FloatArray) -> FloatArray:
+        """The matrix times one (n,) or several (n, m) vectors."""
+        upper = self._matrix
+        diagonal = upper.data[upper.indptr[:-1]]
+        return np.asarray(upper @ vectors + upper.T @ vectors - (diagonal * vectors.T).T)
+
+    def _in_double(self, right: FloatArray) -> FloatArray:
+        """As `solve`, of a matrix that single precision is not enough for, nor for those to
+        come."""
+        log.warning(
+            "a stiffness matrix is too ill-conditioned for single precision: solving in double takes about twice as long"
+        )
+        self._forget()
+        self._single, self._current, asked = False, False, self._asked
+        self._asked = None
+        self.factorise(self._matrix.data, asked)
+        return self.solve(right)
+
+    def answers(self, unknowns: IntArray) -> FloatArray:
+        """The inverse's entries (m, m) between these unknowns (m,): with A = L L^T they are those
+        of Y^T Y, Y = L^-1 of unit loads.
+
+        Half a solution is half the work, and most rows of Y are empty; but where these unknowns
+        were asked for, MKL passes over all that is empty itself.
+        """
+        if not len(unknowns):
+            return np.empty((0, 0))
+        unit = np.zeros((self._handle.size, len(unknowns)), dtype=self._handle.kind, order="F")
+        unit[unknowns, np.arange(len(unknowns))] = 1.0
+        if self._handle.asked[unknowns].all():
+            found = self._handle.run(_SOLVE, unit, unknowns)[unknowns]
+            if self._believed(found, unknowns):
+                return np.asarray(found, dtype=float)
+        half = self._handle.run(_FORWARD, unit)
+        filled = half[half.any(axis=1)]
+        return np.asarray(filled.T @ filled, dtype=float)
+
+    def _believed(self, found: FloatArray, unknowns: IntArray) -> bool:
+        """Whether cheap answers (m, m) are those of a whole solution: looked at once after each
+        analysis, for one of them.
+        """
+        if not self._checked:
+            load = self._idle.copy()
+            load[unknowns[0]] = 1.0
+            whole = self.approximate(load)[unknowns]
+            self._checked = True
+            self._trusted = bool(
+                np.abs(found[:, 0] - whole).max() <= _SAME[self._handle.kind] * np.abs(whole).max()
+            )
+            if not self._trusted:
+                log.warning(
+                    "MKL's answers to sparse loads are wrong on this machine: they are done without, which takes longer"
+                )
+        return self._trusted

@@ -1,0 +1,72 @@
+"""SuperLU, which comes with scipy: for machines that have no MKL."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import SuperLU, splu
+
+from palpate.fem.linalg.direct_solver import NotPositiveDefinite
+from palpate.foundation.arrays import FloatArray, IntArray
+
+__all__ = ["SuperLUFactor"]
+
+
+class SuperLUFactor:
+    """As `Factor`; the pattern is analysed anew for every matrix, since scipy keeps no analysis.
+
+    Args:
+        pattern: upper triangle (with diagonal) in CSR form, indices sorted.
+    """
+
+    def __init__(self, pattern: sp.csr_matrix) -> None:
+        upper = sp.csr_matrix(
+            (np.arange(1, pattern.nnz + 1), pattern.indices, pattern.indptr), shape=pattern.shape
+        )
+        whole = sp.csc_matrix(upper + sp.triu(upper, 1).T)
+        self._source, self._indices, self._starts, self._shape = (
+            whole.data - 1,
+            whole.indices,
+            whole.indptr,
+            pattern.shape,
+        )
+        self._lu: SuperLU | None = None
+        self.generation = 0
+
+    def factorise(self, data: FloatArray, asked: IntArray | None = None) -> None:
+        """Factorise the matrix with these entries of its upper triangle; raises
+        NotPositiveDefinite. All `asked` cost alike.
+        """
+        self.generation += 1
+        matrix = sp.csc_matrix(
+            (np.asarray(data, dtype=float)[self._source], self._indices, self._starts),
+            shape=self._shape,
+        )
+        try:
+            self._lu = splu(
+                matrix,
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError as error:  # an exactly singular matrix
+            raise NotPositiveDefinite("the matrix has no Cholesky factor") from error
+        # With pivots taken from the diagonal, as many are negative as eigenvalues (Sylvester's law
+        # of inertia).
+        on_diagonal = np.array_equal(self._lu.perm_r, self._lu.perm_c)
+        if not on_diagonal or not (self._lu.U.diagonal() > 0).all():
+            raise NotPositiveDefinite("the matrix has no Cholesky factor")
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Solve for one (n,) or several (n, m) right sides with the last factor."""
+        if self._lu is None:
+            raise RuntimeError("nothing has been factorised yet")
+        return np.ascontiguousarray(self._lu.solve(np.asarray(right, dtype=float)))
+
+    def approximate(self, right: FloatArray) -> FloatArray:
+        """As `solve`."""
+        return self.solve(right)
+
+    def answers(self, unknowns: IntArray) -> FloatArray:
+        """The inverse's entries (m, m) between these unknowns (m,)."""
+        return self.solve(np.eye(self._shape[0])[:, unknowns])[unknowns]

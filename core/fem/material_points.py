@@ -1,0 +1,177 @@
+"""Where a material remembers: points that stay at the same rest coordinates while grids may come
+and go.
+
+On a grid that never moves they are its quadrature points, and nothing is interpolated. A graded
+grid moves with the tool; handing what is remembered from each to the next would smear it a little
+every time, so there it stays on a fine even grid of cells: the strain is its mean over a cell, and
+is read back by interpolation between the cells' middles, once.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+
+from palpate.fem.model import rule_of
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import MeshError
+from palpate.mesh.box_mesh import BoxMesh, GridSpec
+from palpate.mesh.graded_mesh import Grading
+from palpate.mesh.grid_axes import even_axis
+from palpate.mesh.protocol import Mesh, Meshing
+from palpate.setup.setup import Setup
+
+__all__ = [
+    "CellPoints",
+    "MaterialPoints",
+    "QuadraturePoints",
+    "material_points",
+    "quadrature_tangents",
+]
+
+_CELLS_PER_EDGE, _MOST_CELLS = 1.5, 64
+"""Cells along the finest edge of the grid, and at most along an axis. After a poke by 5 mm and
+release the dent that memory left was 0.024 mm RMS off a converged one on a quadratic grid of 1.5
+mm, whether it remembered in such cells or, not moving, at its quadrature points; in cells of twice
+the grid's edge 0.044 mm."""
+
+
+class MaterialPoints(Protocol):
+    """Points of a material and how they are reached from a grid."""
+
+    def tangents(self, mesh: Mesh, positions: FloatArray) -> FloatArray:
+        """Derivatives (m, 3, 3) of the nodes' positions (n, 3) along x, y, z, one row each, at the
+        points [1].
+        """
+
+    def read(self, mesh: Mesh, field: FloatArray) -> FloatArray:
+        """A field (m, c) of the points at the quadrature points (e, q, c) of a grid."""
+
+
+def quadrature_tangents(mesh: Mesh, positions: FloatArray) -> FloatArray:
+    """Derivatives (e, q, 3, 3) of the positions (n, 3) along x, y, z, one row each, at the
+    quadrature points [1].
+    """
+    gradients = rule_of(mesh).gradients
+    return np.asarray(np.swapaxes(gradients, 2, 3) @ positions[mesh.connectivity.elements][:, None])
+
+
+class QuadraturePoints:
+    """The quadrature points of a grid that does not move."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._mesh = mesh
+
+    def _same(self, mesh: Mesh) -> None:
+        if mesh is not self._mesh and not np.array_equal(mesh.nodes, self._mesh.nodes):
+            raise MeshError(
+                "what is remembered at a grid's quadrature points is lost when the grid moves"
+            )
+
+    def tangents(self, mesh: Mesh, positions: FloatArray) -> FloatArray:
+        """As `MaterialPoints` has it."""
+        self._same(mesh)
+        return quadrature_tangents(mesh, positions).reshape(-1, 3, 3)
+
+    def read(self, mesh: Mesh, field: FloatArray) -> FloatArray:
+        """As `MaterialPoints` has it."""
+        self._same(mesh)
+        return field.reshape(*rule_of(mesh).weights.shape, -1)
+
+
+class CellPoints:
+    """The cells of a fine even grid, whatever grids the block is solved on; edge lengths of the
+    block [m], cells along x, y, z.
+    """
+
+    def __init__(self, size: tuple[float, float, float], cells: tuple[int, int, int]) -> None:
+        (x, y, z), (nx, ny, nz) = size, cells
+        spans = ((-x / 2, x / 2, nx), (-y / 2, y / 2, ny), (0.0, z, nz))
+        self._corners = tuple(even_axis(low, high, count + 1) for low, high, count in spans)
+
+    def tangents(self, mesh: Mesh, positions: FloatArray) -> FloatArray:
+        """As `MaterialPoints` has it: means over the cells of the field between their corners."""
+        assert isinstance(mesh, BoxMesh)
+        nx, ny, nz = mesh.shape
+        (mx, dx), (my, dy), (mz, dz) = (_means(self, mesh, axis) for axis in range(3))
+        field = positions.reshape(nz, ny, nx, 3)
+        low, rising = _along(mz, field, 0), _along(dz, field, 0)
+        rows = [
+            _along(dx, _along(my, low, 1), 2),
+            _along(mx, _along(dy, low, 1), 2),
+            _along(mx, _along(my, rising, 1), 2),
+        ]
+        return np.stack([row.reshape(-1, 3) for row in rows], axis=1)
+
+    def read(self, mesh: Mesh, field: FloatArray) -> FloatArray:
+        """As `MaterialPoints` has it."""
+        assert isinstance(mesh, BoxMesh)
+        found = field.reshape(*self._counts[::-1], -1)
+        for axis in range(3):
+            found = _along(_reading(self, mesh, axis), found, 2 - axis)
+        (ex, ey, ez), points = _elements(mesh), _points_along(mesh)
+        found = found.reshape(ez, points, ey, points, ex, points, -1).transpose(0, 2, 4, 1, 3, 5, 6)
+        return np.ascontiguousarray(found).reshape(ez * ey * ex, points**3, -1)
+
+    @property
+    def _counts(self) -> list[int]:
+        """Cells along x, y, z."""
+        return [len(corners) - 1 for corners in self._corners]
+
+
+def _along(matrix: FloatArray, field: FloatArray, axis: int) -> FloatArray:
+    """The matrix (p, n) on one axis of n of a field."""
+    return np.asarray(np.moveaxis(np.tensordot(matrix, field, axes=(1, axis)), 0, axis))
+
+
+def _elements(mesh: BoxMesh) -> tuple[int, int, int]:
+    nx, ny, nz = ((count - 1) // mesh.order for count in mesh.shape)
+    return nx, ny, nz
+
+
+def _points_along(mesh: BoxMesh) -> int:
+    """Of the quadrature of an element, along one edge."""
+    return round(float(np.cbrt(rule_of(mesh).weights.shape[1])))
+
+
+@lru_cache(maxsize=96)
+def _means(cells: CellPoints, mesh: BoxMesh, axis: int) -> tuple[FloatArray, FloatArray]:
+    """Mean value and mean slope (c, n), (c, n) [1/m] over the cells along an axis, from the values
+    at the grid's nodes.
+    """
+    corners = cells._corners[axis]
+    at_corners = mesh.shapes_along(axis, corners)
+    return (at_corners[1:] + at_corners[:-1]) / 2, np.diff(at_corners, axis=0) / (
+        corners[1] - corners[0]
+    )
+
+
+@lru_cache(maxsize=96)
+def _reading(cells: CellPoints, mesh: BoxMesh, axis: int) -> FloatArray:
+    """The value (p, c) at the grid's quadrature points along an axis, on straight lines through the
+    values in the cells.
+    """
+    corners, points = cells._corners[axis], _points_along(mesh)
+    middles = (corners[1:] + corners[:-1]) / 2
+    apart = rule_of(mesh).places.reshape(*_elements(mesh)[::-1], *([points] * 3), 3)
+    places = np.moveaxis(apart[..., axis], (2 - axis, 5 - axis), (0, 1))[:, :, 0, 0, 0, 0].ravel()
+    found = np.zeros((len(places), len(middles)))
+    index = np.clip(np.searchsorted(middles, places) - 1, 0, len(middles) - 2)
+    share = (places - middles[index]) / (middles[1] - middles[0])
+    rows = np.arange(len(places))
+    found[rows, index], found[rows, index + 1] = 1 - share, share
+    return found
+
+
+def material_points(setup: Setup, grid: Meshing, mesh: Mesh) -> MaterialPoints:
+    """The points for a body that is meshed like this, of which this mesh is one."""
+    spacing = grid.spacing if isinstance(grid, Grading | GridSpec) else None
+    if spacing is None:
+        return QuadraturePoints(mesh)
+    size = setup.box.size
+    nx, ny, nz = (
+        int(np.clip(np.ceil(_CELLS_PER_EDGE * edge / spacing), 2, _MOST_CELLS)) for edge in size
+    )
+    return CellPoints(size, (nx, ny, nz))

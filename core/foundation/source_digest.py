@@ -1,0 +1,36 @@
+"""A digest of the sources, by which stored results say what code they come from."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cache
+from pathlib import Path
+
+__all__ = ["USERS", "source_digest"]
+
+USERS = (
+    "app",
+    "blind",
+    "correction",
+    "evaluation",
+    "recording/interactive.py",
+    "recording/resolve_frame.py",
+    "static",
+    "sweep",
+)
+"""Folders and files that neither a diagnosis nor the making of data imports."""
+
+
+@cache
+def source_digest() -> str:
+    """Digest (12 hex digits) of all sources that a diagnosis or a virtual dataset depends on.
+
+    The folders in `USERS` are left out: they may change without making old results invalid.
+    """
+    root = Path(__file__).parent.parent
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        name = path.relative_to(root).as_posix()
+        if not any(name == user or name.startswith(f"{user}/") for user in USERS):
+            digest.update(f"{name}\n".encode() + path.read_bytes())
+    return digest.hexdigest()[:12]

@@ -1,0 +1,142 @@
+"""A body filled with quadratic tetrahedra whose edges are straight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from palpate.foundation.arrays import FloatArray, IntArray
+from palpate.mesh.elements import EDGES, TET10, shapes_of
+from palpate.mesh.interpolation import weighted_nodes
+from palpate.mesh.protocol import Connectivity
+from palpate.setup.closest_point import containing, nearest
+from palpate.setup.fixed_region import BoolArray
+
+__all__ = ["SolidMesh", "sides_of"]
+
+_SIDES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
+"""Corners of a tetrahedron's sides, counter-clockwise from outside."""
+_QUARTERS = ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))
+"""The triangles between the six nodes of a side."""
+_ON_THE_EDGE = 1e-9
+"""How far outside a tetrahedron a point of its surface may lie by rounding, in barycentric
+coordinates."""
+
+
+def sides_of(tetrahedra: IntArray) -> IntArray:
+    """Corners (f, 3) of the sides of tetrahedra (e, 4) that belong to one of them only,
+    counter-clockwise from outside.
+    """
+    sides = tetrahedra[:, np.array(_SIDES)].reshape(-1, 3)
+    _, first, uses = np.unique(
+        np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    return np.asarray(sides[np.sort(first[uses == 1])])
+
+
+@dataclass(frozen=True, eq=False)
+class SolidMesh:
+    """Corners and tetrahedra of a body, to which the nodes in the middle of the edges are added.
+
+    Attributes:
+        corners: (c, 3) rest positions [m], phantom frame.
+        tetrahedra: (e, 4) corners, of positive volume.
+        held: (f,) which of `sides_of(tetrahedra)` are held.
+    """
+
+    corners: FloatArray
+    tetrahedra: IntArray
+    held: BoolArray
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Only what cannot be made again travels between processes."""
+        return {"corners": self.corners, "tetrahedra": self.tetrahedra, "held": self.held}
+
+    @cached_property
+    def _edges(self) -> tuple[IntArray, IntArray]:
+        """Ends (k, 2) of all edges, and the number of each tetrahedron's (e, 6)."""
+        ends = np.sort(self.tetrahedra[:, np.array(EDGES)].reshape(-1, 2), axis=1)
+        unique, inverse = np.unique(ends, axis=0, return_inverse=True)
+        return unique, inverse.reshape(-1, len(EDGES))
+
+    @cached_property
+    def nodes(self) -> FloatArray:
+        """(n, 3) rest positions [m]: the corners, then the middles of the edges."""
+        return np.concatenate([self.corners, self.corners[self._edges[0]].mean(axis=1)])
+
+    @cached_property
+    def connectivity(self) -> Connectivity:
+        """Which nodes form what."""
+        ends, numbers = self._edges
+        count = len(self.corners)
+        sides = sides_of(self.tetrahedra)
+        keys = ends[:, 0] * count + ends[:, 1]
+        between = np.sort(sides[:, np.array(EDGES[:3])], axis=2)
+        middles = np.searchsorted(keys, between[..., 0] * count + between[..., 1]) + count
+        whole = np.ascontiguousarray(np.concatenate([sides, middles], axis=1))
+        return Connectivity(
+            element=TET10,
+            count=len(self.nodes),
+            elements=np.ascontiguousarray(
+                np.concatenate([self.tetrahedra, numbers + count], axis=1)
+            ),
+            surface=np.ascontiguousarray(whole[~self.held]),
+            base=np.ascontiguousarray(whole[self.held]),
+            hull=np.ascontiguousarray(whole[:, np.array(_QUARTERS)].reshape(-1, 3)),
+            base_nodes=np.unique(whole[self.held]),
+        )
+
+    @property
+    def focus(self) -> FloatArray:
+        """Nowhere else in another frame."""
+        return np.zeros(3)
+
+    @property
+    def near_focus(self) -> IntArray:
+        """None: it follows no tool."""
+        return np.empty(0, dtype=np.int64)
+
+    @cached_property
+    def _frames(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Bounds (e, 3) twice [m], first corners (e, 3) [m] and the inverses (e, 3, 3) [1/m] that
+        give barycentric coordinates.
+        """
+        corners = self.corners[self.tetrahedra]
+        inverses = np.linalg.inv((corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1))
+        slack = 1e-6 * np.ptp(corners, axis=1)
+        low, high = corners.min(axis=1) - slack, corners.max(axis=1) + slack
+        return low, high, np.ascontiguousarray(corners[:, 0]), np.ascontiguousarray(inverses)
+
+    def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Elements' nodes and shape functions (m, 10) at rest positions (m, 3) [m]; outside is
+        moved to the surface.
+        """
+        places = np.array(points, dtype=float)
+        element = containing(places, *self._frames, _ON_THE_EDGE)
+        outside = np.flatnonzero(element < 0)
+        if len(outside):
+            sides = sides_of(self.tetrahedra)
+            side, places[outside] = nearest(places[outside], self.corners[sides])
+            element[outside] = self._owners[side]
+        _, _, origins, inverses = self._frames
+        shares = np.einsum("mij,mj->mi", inverses[element], places - origins[element])
+        shares = np.clip(
+            np.concatenate([1 - shares.sum(axis=1, keepdims=True), shares], axis=1), 0.0, None
+        )
+        shares /= shares.sum(axis=1, keepdims=True)
+        return self.connectivity.elements[element], shapes_of(shares)
+
+    @cached_property
+    def _owners(self) -> IntArray:
+        """The tetrahedron that each side on the surface belongs to (f,)."""
+        sides = np.sort(self.tetrahedra[:, np.array(_SIDES)].reshape(-1, 3), axis=1)
+        _, first, uses = np.unique(sides, axis=0, return_index=True, return_counts=True)
+        return np.asarray(np.sort(first[uses == 1]) // len(_SIDES))
+
+    def interpolate(self, field: FloatArray, points: FloatArray) -> FloatArray:
+        """A nodal field (n, c) at rest positions (m, 3) [m]."""
+        nodes, weights = self.locate(points)
+        return weighted_nodes(nodes, weights, field)

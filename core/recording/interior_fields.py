@@ -1,0 +1,144 @@
+"""A block's interior in each frame of a recording: every node's displacement and energy density,
+small enough to be kept.
+
+Meshes follow the tool, so that each frame has node coordinates of its own; three axes say them.
+What is asked for between the nodes is interpolated linearly: pictures want no more, and quadratic
+shape functions would make negative energies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+
+from palpate.fem.energy_density import nodal_density
+from palpate.fem.model import BlockModel
+from palpate.foundation.arrays import FloatArray, IntArray
+from palpate.mesh.box_mesh import BoxMesh
+from palpate.replay.equilibrium import Equilibrium
+from palpate.setup.setup import Setup
+
+__all__ = ["Inside"]
+
+_PARTS = ("inside_counts", "inside_axes", "inside_moved", "inside_energy", "inside_modulus")
+
+
+@dataclass(frozen=True, eq=False)
+class Inside:
+    """Nodes of the block in each of f frames, phantom frame.
+
+    Attributes:
+        counts: (f, 3) nodes along x, y, z.
+        axes: their coordinates at rest in the stated block, frame after frame [m].
+        moved: (n, 3) displacement of all nodes [m], frame after frame, x fastest.
+        energy: (n,) elastic energy density over E [1]; NaN where a frame has no equilibrium with
+            all elements upright.
+        modulus: E as believed [Pa].
+    """
+
+    counts: IntArray
+    axes: FloatArray
+    moved: FloatArray
+    energy: FloatArray
+    modulus: float
+
+    @classmethod
+    def of(cls, setup: Setup, frames: Sequence[Equilibrium]) -> Self:
+        """Of a replay's frames on block meshes."""
+        counts: list[tuple[int, int, int]] = []
+        axes: list[FloatArray] = []
+        moved: list[FloatArray] = []
+        energy: list[FloatArray] = []
+        longer = np.array(setup.box.size) / np.array((setup.registered or setup.box).size)
+        for frame in frames:
+            mesh = frame.mesh
+            if not isinstance(mesh, BoxMesh):
+                raise TypeError("only a block's frames have axes")
+            counts.append(mesh.shape)
+            axes.extend(axis / part for axis, part in zip(mesh.axes, longer, strict=True))
+            places = frame.move(
+                mesh.nodes
+            )  # a correction that stands on the equilibrium counts, too
+            moved.append(places - mesh.nodes / longer)
+            with np.errstate(invalid="ignore", divide="ignore"):
+                energy.append(nodal_density(BlockModel(setup, mesh), places))
+        with np.errstate(over="ignore"):
+            return cls(
+                np.array(counts, dtype=np.int32),
+                _small(axes, np.float32),
+                _small(moved, np.float16),
+                _small(energy, np.float16),
+                setup.material.young_modulus,
+            )
+
+    def arrays(self, model: str) -> dict[str, Any]:
+        """Arrays for a file, named after the model."""
+        values = (self.counts, self.axes, self.moved, self.energy, np.array(self.modulus))
+        return {f"{part}_{model}": value for part, value in zip(_PARTS, values, strict=True)}
+
+    @classmethod
+    def read(cls, arrays: Mapping[str, Any], model: str) -> Self | None:
+        """From such a file; None where it has none of this model."""
+        if any(f"{part}_{model}" not in arrays for part in _PARTS):
+            return None
+        counts, axes, moved, energy, modulus = (arrays[f"{part}_{model}"] for part in _PARTS)
+        return cls(counts, axes, moved, energy, float(modulus))
+
+    def displacement(self, frame: int, places: FloatArray) -> FloatArray:
+        """How far the material has moved (m, 3) [m] that lies at `places` (m, 3) [m] in the stated
+        block at rest.
+        """
+        return self._between(self.moved, frame, places)
+
+    def energy_density(self, frame: int, places: FloatArray) -> FloatArray:
+        """Elastic energy per rest volume (m,) [J/m^3] there, with the modulus as believed."""
+        return self._between(self.energy, frame, places) * self.modulus
+
+    @cached_property
+    def _begins(self) -> tuple[IntArray, IntArray]:
+        """Where each frame's axes and nodes begin."""
+        nodes = np.prod(self.counts.astype(np.int64), axis=1)
+        return np.cumsum(self.counts.sum(axis=1)) - self.counts.sum(axis=1), np.cumsum(
+            nodes
+        ) - nodes
+
+    def _between(self, values: FloatArray, frame: int, places: FloatArray) -> FloatArray:
+        """Trilinear interpolation of nodal values of one frame."""
+        nx, ny, nz = (int(count) for count in self.counts[frame])
+        at, first = self._begins[0][frame], self._begins[1][frame]
+        own = np.split(np.asarray(self.axes[at : at + nx + ny + nz], dtype=float), [nx, nx + ny])
+        grid = np.asarray(values[first : first + nx * ny * nz], dtype=float).reshape(
+            nz, ny, nx, *values.shape[1:]
+        )
+        return trilinear(own, grid, np.asarray(places, dtype=float))
+
+
+def _small(parts: list[FloatArray], kind: type[Any]) -> Any:
+    return np.concatenate(parts).astype(kind)
+
+
+def trilinear(axes: Sequence[FloatArray], grid: FloatArray, places: FloatArray) -> FloatArray:
+    """Values (m, ...) at places (m, 3) of a grid (nz, ny, nx, ...) on these axes; outside is moved
+    to the border.
+    """
+    lower, parts = [], []
+    for axis, at in zip(axes, places.T, strict=True):
+        index = np.clip(np.searchsorted(axis, at, side="right") - 1, 0, len(axis) - 2)
+        lower.append(index)
+        parts.append(np.clip((at - axis[index]) / (axis[index + 1] - axis[index]), 0.0, 1.0))
+    total = np.zeros((len(places), *grid.shape[3:]))
+    for dx in (0, 1):
+        for dy in (0, 1):
+            for dz in (0, 1):
+                corner = [
+                    part if step else 1 - part
+                    for part, step in zip(parts, (dx, dy, dz), strict=True)
+                ]
+                weight = corner[0] * corner[1] * corner[2]
+                value = grid[lower[2] + dz, lower[1] + dy, lower[0] + dx]
+                total += weight[:, None] * value if value.ndim > 1 else weight * value
+    return total

@@ -1,0 +1,189 @@
+"""One frame of a recorded sequence, solved again with causes of one's own choice: what if the base
+were soft, the lump smaller?
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.dataset import open_dataset
+from palpate.dataset.accepted_registration import Accepted
+from palpate.dataset.tool_smoothing import smooth_centres
+from palpate.effects import DIAGNOSED, Effect
+from palpate.effects.base import with_effects
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import RunError
+from palpate.measurement.camera_model import sight_of
+from palpate.measurement.phantom_drift import as_it_stood
+from palpate.measurement.segmentation import cleaner_for, find_shaft_axis, tool_poses
+from palpate.measurement.touch_correction import touch_correction
+from palpate.mesh.graded_mesh import PAGE_GRID
+from palpate.recording.interactive import Live
+from palpate.recording.interior_fields import Inside
+from palpate.recording.record_sequence import Recorded, observed
+from palpate.recording.saved_model import tuned_as
+from palpate.registration.registration import register, setup_from
+from palpate.replay.equilibrium import Equilibrium
+from palpate.replay.replay import replay
+from palpate.setup.setup import Setup, Shape
+
+__all__ = ["Moment", "WhatIf", "opened"]
+
+_TOLERANCE = 1e-3
+"""Residual over the push at which a frame counts as converged; that of the recording."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """One frame under one's own causes, phantom frame, SI.
+
+    Attributes:
+        surface: (v, 3) moved material vertices, in the order of the recording.
+        error: (v,) mean gap of the measured points around each, NaN where unseen.
+        distance: RMS of `error`.
+        tool: (3,) centre.
+        radius: of the tool.
+        outcome: how the solve ended.
+        converged: whether that is an equilibrium.
+        camera: (4, 4) phantom_from_camera.
+        inside: its nodes, as a recording of one frame.
+    """
+
+    surface: FloatArray
+    error: FloatArray
+    distance: float
+    tool: FloatArray
+    radius: float
+    outcome: str
+    converged: bool
+    camera: FloatArray
+    inside: Inside
+
+
+class WhatIf:
+    """A recorded sequence whose frames can be solved again.
+
+    Args:
+        folder: of the dataset.
+        sequence: name.
+        clouds: (f,) which clouds the recording has.
+        extended: the model's setup as in model.json, of which the registration as fitted is taken.
+    """
+
+    def __init__(
+        self, folder: Path, sequence: str, clouds: Sequence[int], extended: dict[str, Any]
+    ) -> None:
+        registered = extended.get("registration")
+        dataset = open_dataset(folder).registered(
+            Accepted.from_json(registered) if registered else None
+        )
+        if isinstance(dataset.geometry, Shape) or not len(dataset.sequence(sequence)):
+            raise RunError(
+                f"{sequence} has no clouds of a block, so that there is nothing to compare with",
+                sequence=sequence,
+            )
+        dataset, registration = as_it_stood(dataset, register(dataset))
+        self.stated = setup_from(dataset, registration)
+        self.tuned = tuned_as(self.stated, extended)
+        self._sequence = dataset.sequence(sequence)
+        self._clouds = np.asarray(clouds, dtype=int)
+        self._times = np.asarray(self._sequence.cloud_times)[self._clouds]
+        self._cleaner, self._shaft = (
+            cleaner_for(dataset, registration),
+            find_shaft_axis(dataset, registration.mended),
+        )
+        self._grid = PAGE_GRID.for_tool(self.stated.tool.radius)
+        self._cleaned: dict[int, FloatArray] = {}
+        self._last: tuple[int, Equilibrium] | None = None
+
+    def __len__(self) -> int:
+        return len(self._clouds)
+
+    def beginnings(self) -> list[dict[str, Any]]:
+        """A finite size of each effect of the catalogue, from which to go on by hand."""
+        found = []
+        for effect in DIAGNOSED:
+            starts = effect.starts(self.stated)
+            if starts:
+                found.append(starts[len(starts) // 2].to_json())
+        return found
+
+    def setup(self, effects: Sequence[Effect], tuned: bool = True) -> Setup:
+        """The stated setup with these causes; `tuned` as in `solve`."""
+        return with_effects(self.tuned if tuned else self.stated, effects)
+
+    def live(self, effects: Sequence[Effect], tuned: bool = True) -> Live:
+        """The same block under a tool that a hand leads."""
+        return Live(self.setup(effects, tuned), self._grid)
+
+    def solve(self, frame: int, effects: Sequence[Effect], tuned: bool = True) -> Moment:
+        """The frame with these causes added to the stated setup.
+
+        Args:
+            frame: index into the recording.
+            tuned: whether robot pose, tool radius and Poisson's ratio are as the diagnosis fitted
+                them within their accuracies, or as stated.
+
+        Where a frame hangs on those before it (memory, friction at the tool), all up to it are
+        solved. Raises RunError for a frame that is not there, EffectError for parameters out of
+        bounds.
+        """
+        if not 0 <= frame < len(self):
+            raise RunError(
+                f"there is no frame {frame}; the recording has 0 to {len(self) - 1}", frame=frame
+            )
+        setup = self.setup(effects, tuned)
+        solved = self._solved(setup, frame)
+        side: Recorded = observed(setup, [solved], [self._cloud(frame)])
+        return Moment(
+            side.surface[0],
+            side.error[0],
+            float(side.distance[0]),
+            side.tool[0],
+            setup.tool.radius,
+            solved.outcome.value,
+            not side.outcome[0],
+            np.asarray(sight_of(setup).pose.matrix),
+            side.inside,
+        )
+
+    def _solved(self, setup: Setup, frame: int) -> Equilibrium:
+        robot = touch_correction(setup, self._grid) @ setup.phantom_from_robot
+        picked = slice(0, frame + 1) if setup.remembers else slice(frame, frame + 1)
+        times = self._times[picked] - setup.sensor.time_offset
+        centres = robot.apply(smooth_centres(self._sequence.kinematics, times))
+        warm = (
+            None
+            if setup.remembers or self._last is None or self._last[0] != frame
+            else [self._last[1]]
+        )
+        found = replay(setup, centres, self._grid, times=times, starts=warm, tolerance=_TOLERANCE)[
+            -1
+        ]
+        self._last = (frame, found)
+        return found
+
+    def _cloud(self, frame: int) -> FloatArray:
+        if frame not in self._cleaned:
+            pose = tool_poses(
+                self._sequence.kinematics,
+                self._times[[frame]],
+                self.stated.phantom_from_robot,
+                self._shaft,
+            )[0]
+            cloud = self._sequence.cloud(int(self._clouds[frame]))
+            self._cleaned[frame] = cloud[self._cleaner.clean(cloud, pose).indices]
+        return self._cleaned[frame]
+
+
+@lru_cache(maxsize=4)
+def opened(folder: str, sequence: str, clouds: tuple[int, ...], extended: str) -> WhatIf:
+    """The same, kept for the next question; `extended` is the text of model.json."""
+    return WhatIf(Path(folder), sequence, clouds, json.loads(extended))

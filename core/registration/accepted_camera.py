@@ -1,0 +1,41 @@
+"""Camera to phantom as a person accepted it, in the place of a fit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from palpate.dataset.accepted_registration import Accepted
+from palpate.foundation.arrays import FloatArray
+from palpate.registration.camera_fit import CameraFit, refine_camera
+
+__all__ = ["camera_as_accepted"]
+
+APART = 3.0e-3
+"""An accepted pose further than this [m] from where the cloud itself would draw it is told of: its
+directions may be open."""
+
+
+def camera_as_accepted(
+    cloud: FloatArray, size: tuple[float, float, float], depth_sigma: float, accepted: Accepted
+) -> CameraFit:
+    """The accepted pose and its covariance, with the statistics of the rest cloud (n, 3) [m],
+    camera frame, about it.
+    """
+    fit = refine_camera(cloud, size, accepted.phantom_from_camera, depth_sigma)
+    motion = fit.phantom_from_camera @ accepted.phantom_from_camera.inverse()
+    apart = float(np.linalg.norm(motion.apply(fit.pivot) - fit.pivot))
+    warnings = list(fit.warnings)
+    if apart > APART:
+        warnings.append(
+            f"The accepted registration {accepted.name} lies {apart * 1e3:.1f} mm from where the rest cloud would draw it "
+            f"(under {APART * 1e3:.0f} mm is expected): look at it again."
+        )
+    return replace(
+        fit,
+        phantom_from_camera=accepted.phantom_from_camera,
+        covariance=accepted.covariance,
+        weak_directions=accepted.weak_directions,
+        warnings=tuple(warnings),
+    )

@@ -1,0 +1,390 @@
+"""Camera to phantom from the rest cloud: coarse ICP by Open3D, then robust point-to-plane
+Gauss-Newton on faces and table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import RegistrationError
+from palpate.foundation.frames import Transform
+from palpate.registration.faces import (
+    FACES,
+    TABLE_REACH,
+    Assignment,
+    assign,
+    box_distance,
+    camera_planes,
+)
+from palpate.registration.guess import automatic_guess, half_turn
+from palpate.registration.pose import motion_jacobian, small_motion
+from palpate.registration.uncertainty import PRIOR, estimate, make_patches, weak_directions
+
+__all__ = ["CameraFit", "fit_camera", "refine_camera"]
+
+HUBER, TUKEY = 1.345, 4.685
+EXPLAINED_LEAST = 0.7
+LEAST_POINTS = 50
+
+
+@dataclass(frozen=True, eq=False)
+class CameraFit:
+    """Camera to phantom.
+
+    Attributes:
+        phantom_from_camera: the fit.
+        covariance: (6, 6) [m, rad] of a small motion about `pivot` (see palpate.registration.pose),
+            smooth sensor bias included.
+        pivot: (3,) [m] centre of the block's top, phantom frame.
+        lever: half the block's diagonal [m], by which rotations are weighed against translations.
+        rms: of point-to-plane distances that count [m].
+        noise, bias: the sensor's white noise along the line of sight, and the size of its smooth
+            error [m].
+        face_counts: points on each face used.
+        face_offsets: mean distance of each face's points from its plane [m], positive outside.
+        table_height: of the table's points over z = 0 [m]; NaN where no table is seen.
+        weak_directions: in words.
+        explained: share of the points near the block that lie on its stated surface [1].
+        automatic: the first guess was found, not given. turned: the fit half a turn about z away,
+            which a plain block cannot tell from this one.
+        warnings: for people.
+    """
+
+    phantom_from_camera: Transform
+    covariance: FloatArray
+    pivot: FloatArray
+    lever: float
+    rms: float
+    noise: float
+    bias: float
+    face_counts: dict[str, int]
+    face_offsets: dict[str, float]
+    table_height: float
+    weak_directions: tuple[str, ...]
+    explained: float
+    automatic: bool
+    warnings: tuple[str, ...]
+
+    @property
+    def turned(self) -> Transform:
+        """phantom_from_camera with the block half a turn about z."""
+        return half_turn() @ self.phantom_from_camera
+
+
+def fit_camera(
+    cloud: FloatArray,
+    size: tuple[float, float, float],
+    depth_sigma: float = 0.002,
+    guess: Transform | None = None,
+) -> CameraFit:
+    """Lay a raw rest cloud (n, 3) [m], camera frame, against a block of `size` [m] on its table.
+
+    Starts from `guess` (phantom_from_camera) and from a search of its own, and keeps what explains
+    more of the cloud. Directions that the cloud leaves open stay at the first guess, get a wide
+    covariance, and are named.
+    """
+    if len(cloud) < LEAST_POINTS:
+        raise RegistrationError(
+            f"the rest cloud has {len(cloud)} points, at least {LEAST_POINTS} are needed",
+            points=len(cloud),
+        )
+    gate = max(2.0 * depth_sigma, 3.0e-3)
+    poses = []
+    failure = None
+    if guess is not None:
+        poses.append(_refine(cloud, size, _coarse(cloud, size, guess), guess, gate))
+    try:
+        found = automatic_guess(cloud, size, depth_sigma)
+        starts = sorted((found, half_turn() @ found), key=lambda pose: _preference(pose, guess))
+        poses.append(_refine(cloud, size, starts[0], guess or starts[0], gate))
+    except RegistrationError as error:
+        failure = error
+    if not poses:
+        raise failure or RegistrationError(
+            "no first guess of camera to phantom: give [camera] to_phantom"
+        )
+    shares = [_explained(cloud, size, pose, depth_sigma) for pose in poses]
+    # The given guess decides between equals: it knows the heading and the directions that are open.
+    best = 1 if len(poses) == 2 and shares[1] > shares[0] + 0.05 else 0
+    return _conclude(
+        cloud, size, poses[best], shares[best], gate, guess, automatic=guess is None or best == 1
+    )
+
+
+def refine_camera(
+    cloud: FloatArray,
+    size: tuple[float, float, float],
+    start: Transform,
+    depth_sigma: float = 0.002,
+) -> CameraFit:
+    """The same from `start` (phantom_from_camera) alone: a person's start is refined, never
+    replaced by a search.
+    """
+    if len(cloud) < LEAST_POINTS:
+        raise RegistrationError(
+            f"the rest cloud has {len(cloud)} points, at least {LEAST_POINTS} are needed",
+            points=len(cloud),
+        )
+    gate = max(2.0 * depth_sigma, 3.0e-3)
+    pose = _refine(cloud, size, _coarse(cloud, size, start), start, gate)
+    return _conclude(
+        cloud, size, pose, _explained(cloud, size, pose, depth_sigma), gate, pose, automatic=False
+    )
+
+
+def _preference(pose: Transform, guess: Transform | None) -> float:
+    """Small for the heading nearest to the guess; without one, for the camera on the -y side, as a
+    person would stand.
+    """
+    if guess is None:
+        return float(pose.translation[1])
+    return float(-np.trace(pose.rotation @ guess.rotation.T))
+
+
+def _coarse(cloud: FloatArray, size: tuple[float, float, float], guess: Transform) -> Transform:
+    """ICP of Open3D (point to plane) against points sampled on the visible faces and the table
+    around them.
+    """
+    import open3d as o3d
+
+    points, normals = _sampled(size, guess.translation)
+    target = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    target.normals = o3d.utility.Vector3dVector(normals)
+    source = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud)).voxel_down_sample(2.0e-3)
+    registration = o3d.pipelines.registration
+    pose = guess.matrix
+    for reach in (0.015, 0.008, 0.004):
+        to_plane = registration.TransformationEstimationPointToPlane(
+            registration.TukeyLoss(k=reach)
+        )
+        criteria = registration.ICPConvergenceCriteria(max_iteration=40)
+        pose = np.asarray(
+            registration.registration_icp(
+                source, target, reach, pose, to_plane, criteria
+            ).transformation
+        )
+    found = Transform.from_matrix(pose)
+    moved = np.linalg.norm(
+        (found @ guess.inverse()).apply(np.array([0.0, 0.0, size[2]]))
+        - np.array([0.0, 0.0, size[2]])
+    )
+    return found if moved < 0.05 else guess
+
+
+def _sampled(
+    size: tuple[float, float, float], camera: FloatArray, step: float = 1.5e-3
+) -> tuple[FloatArray, FloatArray]:
+    """Points (m, 3) [m] and normals (m, 3) on the faces that a camera at (3,) sees, and on the
+    table beside them.
+    """
+    planes = camera_planes(size, camera)
+    reach = np.array(size) / 2 + np.array([TABLE_REACH, TABLE_REACH, 0.0])
+    axes = [np.arange(-r, r, step) for r in reach]
+    x, y = (grid.ravel() for grid in np.meshgrid(axes[0], axes[1]))
+    half_x, half_y, height = size[0] / 2, size[1] / 2, size[2]
+    over = (np.abs(x) < half_x) & (np.abs(y) < half_y)
+    points = [np.column_stack([x, y, np.where(over, height, 0.0)])]
+    normals = [np.tile([0.0, 0.0, 1.0], (len(x), 1))]
+    for k, (axis, sign) in enumerate(((0, -1), (0, 1), (1, -1), (1, 1)), start=1):
+        if planes.visible[k]:
+            along, z = (
+                grid.ravel()
+                for grid in np.meshgrid(
+                    np.arange(-size[1 - axis] / 2, size[1 - axis] / 2, step),
+                    np.arange(0, height, step),
+                )
+            )
+            side, normal = np.zeros((len(along), 3)), np.zeros((len(along), 3))
+            side[:, axis], side[:, 1 - axis], side[:, 2], normal[:, axis] = (
+                sign * size[axis] / 2,
+                along,
+                z,
+                sign,
+            )
+            points.append(side)
+            normals.append(normal)
+    return np.concatenate(points), np.concatenate(normals)
+
+
+def _pivot(size: tuple[float, float, float]) -> FloatArray:
+    return np.array([0.0, 0.0, size[2]])
+
+
+def _noise(found: Assignment) -> float:
+    """Robust standard deviation of the depth noise [m], along the line of sight."""
+    return max(1.0e-5, 1.4826 * float(np.median(np.abs(found.distance / found.slant))))
+
+
+def _refine(
+    cloud: FloatArray,
+    size: tuple[float, float, float],
+    pose: Transform,
+    guess: Transform,
+    gate: float,
+) -> Transform:
+    """Gauss-Newton on signed distances to the planes, weighted by slant, Huber first and Tukey at
+    the end.
+
+    The wide prior about `guess` acts in every direction and is felt only in those that no plane
+    determines.
+    """
+    pivot = _pivot(size)
+    for step in range(30):
+        found = assign(
+            pose.apply(cloud),
+            camera_planes(size, pose.translation),
+            pose.translation,
+            gate * (3.0 if step < 5 else 1.0),
+        )
+        if len(found.rows) < LEAST_POINTS:
+            raise RegistrationError(
+                f"{len(found.rows)} of {len(cloud)} points of the rest cloud lie on the phantom's faces or the table, "
+                f"at least {LEAST_POINTS} are needed: check [phantom] size and [camera] to_phantom"
+            )
+        weights = _weights(found, _noise(found), tukey=step >= 8)
+        jacobian = np.einsum("ki,kij->kj", found.normals, motion_jacobian(found.points, pivot))
+        weighted = jacobian * (weights / (_noise(found) * found.slant) ** 2)[:, None]
+        drift = pose @ guess.inverse()
+        pull = np.concatenate([drift.apply(pivot) - pivot, drift.rotation_vector]) / PRIOR**2
+        step_vector = -np.linalg.solve(
+            weighted.T @ jacobian + np.diag(1 / PRIOR**2), weighted.T @ found.distance + pull
+        )
+        pose = small_motion(step_vector, pivot) @ pose
+        if (
+            step > 10
+            and np.abs(step_vector[:3]).max() < 1e-7
+            and np.abs(step_vector[3:]).max() < 1e-6
+        ):
+            break
+    return pose
+
+
+def _weights(found: Assignment, sigma: float, *, tukey: bool) -> FloatArray:
+    """Robust weights (k,) of distances scaled by their noise."""
+    scaled = np.abs(found.distance) / (sigma * found.slant)
+    if tukey:
+        return np.asarray(np.maximum(0.0, 1 - (scaled / TUKEY) ** 2) ** 2)
+    return np.asarray(np.minimum(1.0, HUBER / np.maximum(scaled, 1e-12)))
+
+
+def _explained(
+    cloud: FloatArray, size: tuple[float, float, float], pose: Transform, depth_sigma: float
+) -> float:
+    """Share of the points over the table and near the block that lie on its surface [1]."""
+    points = pose.apply(cloud)
+    distance = box_distance(points, np.array(size))
+    near = (points[:, 2] > 3.0e-3) & (distance < 0.02)
+    return (
+        float((np.abs(distance[near]) < max(1.5 * depth_sigma, 2.0e-3)).mean())
+        if near.any()
+        else 0.0
+    )
+
+
+def _conclude(
+    cloud: FloatArray,
+    size: tuple[float, float, float],
+    pose: Transform,
+    share: float,
+    gate: float,
+    guess: Transform | None,
+    *,
+    automatic: bool,
+) -> CameraFit:
+    """Last step with the correlated noise model, covariance, and everything worth saying."""
+    pivot = _pivot(size)
+    # Twice, since a block that sags has pulled the pose along, and with it which point counts.
+    for _ in range(2):
+        found, weights = _weighted(cloud, size, pose, gate)
+        patches = make_patches(found, weights, pose.translation, pivot)
+        last = estimate(patches)
+        pose = small_motion(last.motion, pivot) @ pose
+    found, weights = _weighted(cloud, size, pose, gate)
+    kept = found.only(weights > 0)
+    counts = {
+        name: int((kept.face == k).sum()) for k, name in enumerate(FACES) if (kept.face == k).any()
+    }
+    offsets = {
+        name: float(np.average(found.distance[found.face == k], weights=weights[found.face == k]))
+        for k, name in enumerate(FACES)
+        if name in counts
+    }
+    lever = float(np.linalg.norm(size)) / 2
+    return CameraFit(
+        phantom_from_camera=pose,
+        covariance=last.covariance,
+        pivot=pivot,
+        lever=lever,
+        rms=float(np.sqrt(np.average(found.distance**2, weights=weights))),
+        noise=patches.noise,
+        bias=last.bias,
+        face_counts=counts,
+        face_offsets=offsets,
+        table_height=offsets.get("table", float("nan")),
+        weak_directions=weak_directions(last.covariance, counts, lever),
+        explained=share,
+        automatic=automatic,
+        warnings=tuple(_doubts(share, pose, guess, pivot, offsets, last.bias)),
+    )
+
+
+def _weighted(
+    cloud: FloatArray, size: tuple[float, float, float], pose: Transform, gate: float
+) -> tuple[Assignment, FloatArray]:
+    """Points on planes with robust weights (k,) about each plane's own median: a face that lies off
+    as a whole is no outlier.
+    """
+    found = assign(pose.apply(cloud), camera_planes(size, pose.translation), pose.translation, gate)
+    medians = np.array(
+        [
+            np.median(found.distance[found.face == k]) if (found.face == k).any() else 0.0
+            for k in range(len(FACES))
+        ]
+    )
+    centred = replace(found, distance=found.distance - medians[found.face])
+    return found, _weights(centred, _noise(centred), tukey=True)
+
+
+def _doubts(
+    share: float,
+    pose: Transform,
+    guess: Transform | None,
+    pivot: FloatArray,
+    offsets: dict[str, float],
+    bias: float,
+) -> list[str]:
+    doubts = []
+    if share < EXPLAINED_LEAST:
+        doubts.append(
+            f"Only {share:.0%} of the rest cloud's points near the block lie on its stated surface "
+            f"(expected over {EXPLAINED_LEAST:.0%}): check [phantom] size and [camera] to_phantom."
+        )
+    if guess is None:
+        doubts.append(
+            "A plain block looks the same after half a turn: its heading cannot be told from the rest cloud; "
+            "give [camera] to_phantom to settle it."
+        )
+    else:
+        drift = guess @ pose.inverse()
+        shift, turn = (
+            float(np.linalg.norm(drift.apply(pivot) - pivot)),
+            float(np.linalg.norm(drift.rotation_vector)),
+        )
+        if shift > 0.015 or turn > np.radians(8.0):
+            doubts.append(
+                f"The fit lies {shift * 1e3:.1f} mm and {np.degrees(turn):.1f} degrees from [camera] to_phantom: check that guess."
+            )
+    if (
+        "top" in offsets
+        and "table" in offsets
+        and abs(offsets["top"] - offsets["table"]) > max(6.0e-4, 2 * bias)
+    ):
+        doubts.append(
+            f"The top lies {abs(offsets['top'] - offsets['table']) * 1e3:.1f} mm "
+            f"{'higher' if offsets['top'] > offsets['table'] else 'lower'} over the table than [phantom] size says: "
+            "it sags under its weight, has another size, or something lies under it."
+        )
+    return doubts

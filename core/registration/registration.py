@@ -1,0 +1,244 @@
+"""Registration: robot to phantom from touches, camera to phantom from the rest cloud, each with
+what is doubtful about it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from palpate.dataset import Dataset
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import RegistrationError
+from palpate.foundation.frames import Transform
+from palpate.foundation.progress import Report, silent
+from palpate.registration.accepted_camera import camera_as_accepted
+from palpate.registration.camera_fit import CameraFit, fit_camera
+from palpate.registration.heading import tool_misfit, turned_fit
+from palpate.registration.landmark_pairing import TouchProposal, propose
+from palpate.registration.landmark_repair import Repair, repairs, resized, settled
+from palpate.registration.pose import motion_jacobian, small_motion
+from palpate.registration.robot_fit import RobotFit, fit_robot
+from palpate.registration.uncertainty import PRIOR
+from palpate.setup.setup import Material, Sensor, Setup, Shape, Tool, Touching
+
+__all__ = [
+    "CameraFit",
+    "Registration",
+    "Repair",
+    "RobotFit",
+    "TouchProposal",
+    "fit_camera",
+    "fit_robot",
+    "motion_jacobian",
+    "propose",
+    "register",
+    "setup_from",
+    "small_motion",
+]
+
+DOUBTFUL_TOUCHES = 2.0e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Registration:
+    """How the frames of a dataset relate, and how surely.
+
+    A covariance (6, 6) is that of (translation [m], rotation vector [rad]) along the phantom's
+    axes, of the small motion about the pivot (3,) [m] that leads from the stated pose to the true
+    one: `small_motion(vector, pivot) @ phantom_from_...`.
+
+    Attributes:
+        phantom_from_robot, robot_covariance, robot_pivot: from the touches; the pivot is their
+            landmarks' centroid.
+        touch_residuals: (n, 3) [m], phantom frame, moved touch minus landmark.
+        touch_rms: root mean square length of the residuals [m].
+        phantom_from_camera, camera_covariance, camera_pivot: from the rest cloud; the pivot is the
+            centre of the block's top.
+        weak_directions: of the camera's pose, in words.
+        warnings: what a person should look at.
+        proposal: another pairing or size of the touches that would fit better; never applied.
+        camera: the camera fit with its statistics; None without a rest cloud, or clouds that it
+            could serve.
+        repair: the pairing and the size of the touched polygon from which the measurement is looked
+            at; None where they stand.
+    """
+
+    phantom_from_robot: Transform
+    robot_covariance: FloatArray
+    robot_pivot: FloatArray
+    touch_residuals: FloatArray
+    touch_rms: float
+    phantom_from_camera: Transform
+    camera_covariance: FloatArray
+    camera_pivot: FloatArray
+    weak_directions: tuple[str, ...]
+    warnings: tuple[str, ...]
+    proposal: TouchProposal | None
+    camera: CameraFit | None
+    repair: Repair | None = None
+
+    @property
+    def mended(self) -> Registration:
+        """With the robot where the repaired touches put it: for whoever has to find the tool in the
+        clouds.
+        """
+        if self.repair is None:
+            return self
+        fit = self.repair.fit
+        return replace(
+            self,
+            phantom_from_robot=fit.phantom_from_robot,
+            robot_covariance=fit.covariance,
+            robot_pivot=fit.pivot,
+            repair=None,
+        )
+
+
+def register(dataset: Dataset, report: Report = silent) -> Registration:
+    """Relate robot, camera and phantom; raises RegistrationError where that is impossible, warns
+    where it is doubtful.
+
+    Where the dataset has an accepted registration, camera to phantom is as that says.
+    """
+    report(0.0, "robot to phantom from touches")
+    robot, proposal = _register_robot(dataset)
+    warnings = _touch_warnings(robot, proposal)
+    report(0.2, "camera to phantom from the rest cloud")
+    camera, found = None, _repairs(dataset, proposal)
+    repair = found[0] if found else None
+    if dataset.has_rest and dataset.observed:
+        config = dataset.config
+        if isinstance(dataset.geometry, Shape):
+            raise RegistrationError(
+                f"{config.surface}: clouds are registered to a block only, not to other shapes yet; leave the clouds of this "
+                "dataset out, so that its forces are compared"
+            )
+        if dataset.accepted is not None:
+            camera = camera_as_accepted(
+                dataset.rest_cloud(), config.size, config.depth_sigma, dataset.accepted
+            )
+        else:
+            camera = fit_camera(
+                dataset.rest_cloud(), config.size, config.depth_sigma, config.to_phantom
+            )
+        report(0.7, "which way round the block lies")
+        # A heading that was found by itself follows the tool; one that was given tells it which way
+        # round it came.
+        repair = repair if camera.automatic else settled(dataset, found, camera.phantom_from_camera)
+        camera = _settle_heading(
+            dataset, (repair.fit if repair else robot).phantom_from_robot, camera
+        )
+        warnings += camera.warnings
+    report(1.0, "registered")
+    return Registration(
+        phantom_from_robot=robot.phantom_from_robot,
+        robot_covariance=robot.covariance,
+        robot_pivot=robot.pivot,
+        touch_residuals=robot.residuals,
+        touch_rms=robot.rms,
+        phantom_from_camera=camera.phantom_from_camera if camera else Transform(),
+        camera_covariance=camera.covariance if camera else np.diag(PRIOR**2),
+        camera_pivot=camera.pivot if camera else np.array([0.0, 0.0, dataset.config.size[2]]),
+        weak_directions=camera.weak_directions if camera else (),
+        warnings=warnings,
+        proposal=proposal,
+        camera=camera,
+        repair=repair,
+    )
+
+
+def setup_from(dataset: Dataset, registration: Registration) -> Setup:
+    """What the experimenter believes, with the registrations found and the touches that they rest
+    on.
+    """
+    config = dataset.config
+    misses = tuple((float(x), float(y), float(z)) for x, y, z in registration.touch_residuals)
+    return Setup(
+        geometry=dataset.geometry,
+        tool=Tool(radius=config.tool_radius),
+        material=Material(young_modulus=config.young_modulus, poisson_ratio=config.poisson_ratio),
+        sensor=Sensor(depth_sigma=config.depth_sigma),
+        mass=config.mass,
+        landmarks=tuple(config.landmarks[name] for name in dataset.touches.names),
+        touching=Touching(misses=misses, lift=config.touch_offset),
+        phantom_from_robot=registration.phantom_from_robot,
+        phantom_from_camera=registration.phantom_from_camera,
+    )
+
+
+def _register_robot(dataset: Dataset) -> tuple[RobotFit, TouchProposal | None]:
+    config, touches = dataset.config, dataset.touches
+    lift = np.array([0.0, 0.0, config.touch_offset])
+    expected = {name: np.asarray(place) + lift for name, place in config.landmarks.items()}
+    robot = fit_robot(touches.positions, np.array([expected[name] for name in touches.names]))
+    # Starts beside a rounded body lie within the box around it, and would seem to be blocked.
+    size = config.size if not isinstance(dataset.geometry, Shape) else None
+    return robot, propose(touches.names, touches.positions, expected, size, _tool_starts(dataset))
+
+
+def _repairs(dataset: Dataset, proposal: TouchProposal | None) -> tuple[Repair, ...]:
+    config, touches = dataset.config, dataset.touches
+    lift = np.array([0.0, 0.0, config.touch_offset])
+    expected = np.array([np.asarray(config.landmarks[name]) + lift for name in touches.names])
+    size = config.size if not isinstance(dataset.geometry, Shape) else None
+    found = repairs(touches.positions, expected, size, _tool_starts(dataset))
+    if found or proposal is None or proposal.scale == 1.0:
+        return found
+    return (resized(touches.positions, expected),)
+
+
+def _tool_starts(dataset: Dataset) -> FloatArray:
+    """Where each sequence begins (k, 3) [m], robot frame."""
+    return np.array([dataset.sequence(name).kinematics.position[0] for name in dataset.sequences])
+
+
+def _touch_warnings(robot: RobotFit, proposal: TouchProposal | None) -> tuple[str, ...]:
+    warnings: tuple[str, ...] = (proposal.sentence,) if proposal else ()
+    if robot.rms > DOUBTFUL_TOUCHES:
+        worst = np.linalg.norm(robot.residuals, axis=1)
+        warnings += (
+            f"The touches miss their landmarks by {robot.rms * 1e3:.1f} mm RMS (at most {worst.max() * 1e3:.1f} mm, "
+            f"row {worst.argmax() + 1}; under {DOUBTFUL_TOUCHES * 1e3:.0f} mm is expected): "
+            "what is found from this registration is doubtful.",
+        )
+    return warnings
+
+
+def _doubt_tool(dataset: Dataset, camera: CameraFit, misfit: float) -> CameraFit:
+    """Warn where camera and kinematics put the tool in different places."""
+    expected = dataset.config.tool_radius + 0.01
+    if not misfit > expected:
+        return camera
+    doubt = (
+        f"The camera sees the tool {misfit * 1e3:.0f} mm from where the kinematics put its centre, "
+        f"at most {expected * 1e3:.0f} mm is expected: check touches.csv, [camera] to_phantom and that both clocks agree."
+    )
+    return replace(camera, warnings=(*camera.warnings, doubt))
+
+
+def _settle_heading(
+    dataset: Dataset, phantom_from_robot: Transform, camera: CameraFit
+) -> CameraFit:
+    """Let the tool in the clouds decide between the two headings of a plain block; a given first
+    guess is only doubted.
+    """
+    as_is, turned = tool_misfit(
+        dataset, phantom_from_robot, [camera.phantom_from_camera, camera.turned]
+    )
+    decided = abs(as_is - turned) > 3.0e-3
+    if not camera.automatic:
+        if decided and turned < as_is:
+            doubt = (
+                f"The camera sees the tool {as_is * 1e3:.0f} mm from where the kinematics put it, and {turned * 1e3:.0f} mm "
+                "with the block half a turn about z: the landmarks in touches.csv or [camera] to_phantom are half a turn off."
+            )
+            return replace(camera, warnings=(*camera.warnings, doubt))
+        return _doubt_tool(dataset, camera, as_is)
+    if not decided:
+        return camera
+    settled = tuple(text for text in camera.warnings if "half a turn" not in text)
+    if as_is < turned:
+        return replace(camera, warnings=settled)
+    return replace(turned_fit(camera), warnings=settled)

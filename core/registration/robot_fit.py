@@ -1,0 +1,107 @@
+"""Robot to phantom from touched landmarks: the closed-form rigid fit of Kabsch (1976), proper by
+Umeyama's sign (1991).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import RegistrationError
+from palpate.foundation.frames import Transform
+from palpate.registration.pose import motion_jacobian
+
+__all__ = ["FLOOR", "RobotFit", "fit_robot", "rigid_fits", "similarity"]
+
+FLOOR = 1.0e-4
+"""No touch is trusted better than this [m]."""
+USUAL, USUAL_WORTH = 3.0e-4, 2.0
+"""Four touches leave six degrees of freedom, and agree by luck now and then: the variance is
+estimated together with the usual error of a careful touch [m], which counts as this many residuals
+(posterior mean under an inverse gamma prior)."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotFit:
+    """Robot to phantom.
+
+    Attributes:
+        phantom_from_robot: the fit.
+        residuals: (n, 3) [m], phantom frame, touch moved by the fit minus its landmark.
+        rms: root mean square length of the residuals [m].
+        sigma: error of one coordinate of one touch [m], from 3n - 6 degrees of freedom and the
+            usual error of a touch.
+        pivot: (3,) [m] centroid of the landmarks, phantom frame.
+        covariance: (6, 6) [m, rad] of a small motion about `pivot` (see palpate.registration.pose).
+    """
+
+    phantom_from_robot: Transform
+    residuals: FloatArray
+    rms: float
+    sigma: float
+    pivot: FloatArray
+    covariance: FloatArray
+
+
+def rigid_fits(
+    source: FloatArray, targets: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The best proper rotation (k, 3, 3), translation (k, 3) and RMS (k,) [m] from source (n, 3) to
+    each of targets (k, n, 3).
+    """
+    a = source - source.mean(axis=0)
+    b = targets - targets.mean(axis=1, keepdims=True)
+    u, _, vt = np.linalg.svd(np.einsum("kni,nj->kij", b, a))
+    sign = np.ones((len(targets), 3))
+    sign[:, 2] = np.sign(np.linalg.det(u) * np.linalg.det(vt))
+    rotation = np.einsum("kij,kj,kjl->kil", u, sign, vt)
+    left = b - np.einsum("kij,nj->kni", rotation, a)
+    translation = targets.mean(axis=1) - rotation @ source.mean(axis=0)
+    return rotation, translation, np.sqrt((left**2).sum(axis=2).mean(axis=1))
+
+
+def similarity(touches: FloatArray, landmarks: FloatArray) -> tuple[float, float, float]:
+    """Size of the touched polygon over that of its landmarks [1], its standard error [1], and the
+    RMS left [m].
+
+    Both are (n, 3) [m], in any two frames; Umeyama's fit touches = s R landmarks + t.
+    """
+    rotation, _, _ = rigid_fits(landmarks, touches[None])
+    a = (landmarks - landmarks.mean(axis=0)) @ rotation[0].T
+    b = touches - touches.mean(axis=0)
+    spread = float((a**2).sum())
+    scale = float((a * b).sum()) / spread
+    squares = float(((b - scale * a) ** 2).sum())
+    sigma = max(FLOOR, np.sqrt(squares / max(3 * len(a) - 7, 1)))
+    return scale, float(sigma / np.sqrt(spread)), float(np.sqrt(squares / len(a)))
+
+
+def fit_robot(touches: FloatArray, landmarks: FloatArray) -> RobotFit:
+    """Fit touches (n, 3) [m], robot frame, to the tool centres expected at their landmarks (n, 3)
+    [m], phantom frame.
+
+    At least three touches that do not lie on one line are needed, otherwise RegistrationError.
+    Never a reflection.
+    """
+    if len(touches) < 3:
+        raise RegistrationError(
+            f"{len(touches)} touches found, at least 3 are needed: touch more landmarks",
+            touches=len(touches),
+        )
+    for points, name in ((landmarks, "landmarks"), (touches, "touches")):
+        widths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        if widths[1] < 1e-3 or widths[1] < 0.02 * widths[0]:
+            raise RegistrationError(
+                f"the {name} lie on one line (within {widths[1] * 1e3:.2f} mm), so the rotation about it is open: touch one aside"
+            )
+    rotation, translation, rms = rigid_fits(touches, landmarks[None])
+    fit = Transform(rotation[0], translation[0])
+    residuals = fit.apply(touches) - landmarks
+    freedom = 3 * len(touches) - 6 + USUAL_WORTH - 2.0
+    sigma = max(FLOOR, float(np.sqrt(((residuals**2).sum() + USUAL_WORTH * USUAL**2) / freedom)))
+    pivot = landmarks.mean(axis=0)
+    jacobian = motion_jacobian(landmarks, pivot).reshape(-1, 6)
+    covariance = np.asarray(sigma**2 * np.linalg.inv(jacobian.T @ jacobian), dtype=float)
+    return RobotFit(fit, residuals, float(rms[0]), sigma, pivot, covariance)

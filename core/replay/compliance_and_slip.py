@@ -1,0 +1,114 @@
+"""What gives way when it is pushed: a tool on a spring, and a base that slides on the table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from palpate.fem.newton import Outcome
+from palpate.foundation.arrays import FloatArray
+from palpate.replay.equilibrium import Equilibrium
+from palpate.setup.setup import Setup
+
+__all__ = ["GRAVITY", "give_way", "nearest_node", "reach_of", "slide", "slide_by", "weight_of"]
+
+GRAVITY = 9.81
+"""Acceleration of free fall [m/s^2]."""
+
+_PLACED, _MOST_PLACES = 1e-2, 30
+"""How well a tool that gives way is placed [m], over the tolerance, and how often that is tried."""
+_LONGEST_SLIDE = 1e-3
+_SHALLOWEST = 2e-4
+_HELD = 2e-4
+"""A base stays where friction holds all but this share of the push [1]."""
+_STIFFENING = 1.5
+"""Stiffness of a push over its force by its depth [1]: of a ball on a flat, whose force grows with
+the depth to the power 1.5 (Hertz); of deeper ones it is less. A slide by this falls short of where
+friction holds; one that went beyond would stay there."""
+
+
+def give_way(
+    centre: FloatArray,
+    start: Equilibrium,
+    setup: Setup,
+    tolerance: float,
+    placed: Callable[[FloatArray, Equilibrium], Equilibrium],
+) -> Equilibrium:
+    """Equilibrium with the tool on a spring whose other end is at `centre` (3,) [m], by Broyden's
+    method on its true centre.
+
+    Args:
+        start: to begin from.
+        tolerance: of the replay.
+        placed: the equilibrium with the tool held at a place, begun from another.
+    """
+    giving, modulus = setup.tool.compliance_times_stiffness, setup.material.young_modulus
+    softness, place = giving / modulus, centre + giving / modulus * start.force
+    inverse = np.eye(3) / (
+        1 + giving * 2 * setup.tool.radius
+    )  # a punch of the ball's size resists the most
+    frame = placed(place, start)
+    for _ in range(_MOST_PLACES):
+        miss = centre + softness * frame.force - place
+        if frame.outcome is not Outcome.CONVERGED or np.linalg.norm(miss) < _PLACED * tolerance:
+            return frame
+        step = inverse @ miss
+        place = place + step
+        frame = placed(place, start if setup.tool.friction_coefficient else frame)
+        change = miss - (centre + softness * frame.force - place)
+        turned = inverse @ change
+        inverse += np.outer(step - turned, step @ inverse) / (step @ turned)
+    return replace(frame, outcome=Outcome.TOOL_SWINGS)
+
+
+def slide(frame: Equilibrium, friction: float, weight: float) -> FloatArray | None:
+    """How far the base moves on (2,) [m] where Coulomb's friction does not hold it; None where it
+    does.
+
+    Args:
+        friction: coefficient [1].
+        weight: of the block [N]; with the tool's push it loads the base.
+    """
+    if _excess(frame.force, friction, weight) <= _HELD * friction * weight:
+        return None
+    return slide_by(frame.force, reach_of(frame), friction, weight)
+
+
+def slide_by(force: FloatArray, reach: float, friction: float, weight: float) -> FloatArray:
+    """The same of a base that does slide, by the force on the tool (3,) [N] and the sideways
+    indentation [m] it stands for.
+    """
+    push, pull = -force[:2], float(np.linalg.norm(force[:2]))
+    stiffness = _STIFFENING * pull / max(reach, _SHALLOWEST)
+    return np.asarray(
+        push / pull * min(_excess(force, friction, weight) / stiffness, _LONGEST_SLIDE)
+    )
+
+
+def _excess(force: FloatArray, friction: float, weight: float) -> float:
+    """Sideways push beyond what friction holds [N]."""
+    return float(np.linalg.norm(force[:2])) - friction * max(weight + float(force[2]), 0.0)
+
+
+def weight_of(setup: Setup) -> float:
+    """Of the block [N]."""
+    return setup.mass * GRAVITY
+
+
+def nearest_node(frame: Equilibrium) -> int:
+    """The node next to the tool's centre."""
+    surface = frame.mesh.nodes + frame.displacement
+    return int(
+        np.argmin(
+            np.linalg.norm(surface - (frame.probe.centre - np.append(frame.slip, 0.0)), axis=1)
+        )
+    )
+
+
+def reach_of(frame: Equilibrium) -> float:
+    """Sideways indentation [m] that the push stands for: the tool's displacement of the material it
+    touches.
+    """
+    return float(np.linalg.norm(frame.displacement[nearest_node(frame), :2]))

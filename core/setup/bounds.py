@@ -1,0 +1,16 @@
+"""Bounds that a belief about the experiment must keep."""
+
+from __future__ import annotations
+
+import math
+
+from palpate.foundation.errors import SetupError
+
+__all__ = ["within"]
+
+
+def within(key: str, value: float, low: float, high: float, unit: str) -> None:
+    """Raise SetupError with key, value and bounds where the value is outside, or not finite."""
+    if not (math.isfinite(value) and low <= value <= high):
+        message = f"{key} = {value:g} {unit} is outside {low:g} to {high:g} {unit}"
+        raise SetupError(message, key=key, value=value, low=low, high=high)

@@ -1,0 +1,92 @@
+"""A block, the phantom that needs no file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.foundation.arrays import FloatArray
+from palpate.setup.bounds import within
+
+__all__ = ["CLEARANCE", "Box", "clear_of"]
+
+_SAMPLING = (35, 21, 19)
+"""Points along the edges where the surface is sampled."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box:
+    """A block on its base, edge lengths (x, y, z) [m]."""
+
+    size: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        for axis, length in zip("xyz", self.size, strict=True):
+            within(f"size {axis}", length, 1e-3, 2.0, "m")
+
+    @property
+    def low(self) -> FloatArray:
+        """Lowest corner (3,) [m], phantom frame."""
+        return np.array([-self.size[0] / 2, -self.size[1] / 2, 0.0])
+
+    @property
+    def high(self) -> FloatArray:
+        """Highest corner (3,) [m]."""
+        return np.array([self.size[0] / 2, self.size[1] / 2, self.size[2]])
+
+    @property
+    def height(self) -> float:
+        """[m]."""
+        return self.size[2]
+
+    def nearest(self, points: FloatArray) -> FloatArray:
+        """Places of the block (m, 3) [m] nearest to points (m, 3) [m]: the points themselves within
+        it.
+        """
+        return np.clip(points, self.low, self.high)
+
+    def facing(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Distance (m,) [m] of points (m, 3) [m] to top and sides, negative within, and the normals
+        (m, 3) of the side that faces them; the base is no face.
+        """
+        beyond = np.concatenate(
+            [np.abs(points[:, :2]) - self.high[:2], points[:, 2:] - self.size[2]], axis=1
+        )
+        distance = np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0)
+        side = beyond.argmax(axis=1)
+        normals = (
+            np.eye(3)[side]
+            * np.where(side == 2, 1.0, np.sign(points[np.arange(len(points)), side]))[:, None]
+        )
+        return np.asarray(distance), np.asarray(normals)
+
+    def surface_points(self) -> FloatArray:
+        """Rest positions (m, 3) [m] spread evenly over the free surface."""
+        axes = [
+            np.linspace(low, high, count)
+            for low, high, count in zip(self.low, self.high, _SAMPLING, strict=True)
+        ]
+        z, y, x = (axis.ravel() for axis in np.meshgrid(*axes[::-1], indexing="ij"))
+        points = np.stack([x, y, z], axis=1)
+        on_side = (np.abs(points[:, :2]) == self.high[:2]).any(axis=1)
+        return points[on_side | (points[:, 2] == self.high[2])]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {"size": list(self.size)}
+
+
+CLEARANCE = 1.5e-3
+"""A tool farther than this from the stated block [m] does not touch it, whatever is slightly
+wrong."""
+
+
+def clear_of(size: tuple[float, float, float], centres: FloatArray) -> FloatArray:
+    """Distance (m,) [m] of points (m, 3) to the stated block; zero inside."""
+    low, high = (
+        np.array([-size[0] / 2, -size[1] / 2, 0.0]),
+        np.array([size[0] / 2, size[1] / 2, size[2]]),
+    )
+    return np.asarray(np.linalg.norm(centres - np.clip(centres, low, high), axis=1))

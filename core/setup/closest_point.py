@@ -1,0 +1,134 @@
+"""Where points lie among triangles and tetrahedra: kernels that try them all, which for some
+thousands is fast enough.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+__all__ = ["containing", "nearest", "turns_around"]
+
+
+@njit(cache=True)
+def _shares(p: Any, a: Any, b: Any, c: Any) -> tuple[float, float, float]:  # noqa: PLR0911 (one for each corner, edge and the inside)
+    """Barycentric coordinates of the triangle's point nearest to p (Ericson, Real-Time Collision
+    Detection, 2005, 5.1.5).
+    """
+    ab, ac, ap, bp, cp = b - a, c - a, p - a, p - b, p - c
+    d1, d2, d3 = np.dot(ab, ap), np.dot(ac, ap), np.dot(ab, bp)
+    d4, d5, d6 = np.dot(ac, bp), np.dot(ab, cp), np.dot(ac, cp)
+    if d1 <= 0 and d2 <= 0:
+        return 1.0, 0.0, 0.0
+    if d3 >= 0 and d4 <= d3:
+        return 0.0, 1.0, 0.0
+    if d6 >= 0 and d5 <= d6:
+        return 0.0, 0.0, 1.0
+    vc, vb, va = d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4
+    if vc <= 0 and d1 >= 0 and d3 <= 0:
+        share = d1 / (d1 - d3)
+        return 1.0 - share, share, 0.0
+    if vb <= 0 and d2 >= 0 and d6 <= 0:
+        share = d2 / (d2 - d6)
+        return 1.0 - share, 0.0, share
+    if va <= 0 and d4 >= d3 and d5 >= d6:
+        share = (d4 - d3) / (d4 - d3 + d5 - d6)
+        return 0.0, 1.0 - share, share
+    whole = va + vb + vc
+    return va / whole, vb / whole, vc / whole
+
+
+@njit(cache=True)
+def nearest(points: Any, corners: Any) -> tuple[Any, Any]:
+    """The nearest of triangles (t, 3, 3) [m] to each point (m, 3) [m], (m,), and the place on it
+    (m, 3) [m].
+    """
+    numbers, places = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
+    middles = np.empty((len(corners), 3))
+    reaches = np.empty(len(corners))
+    for t in range(len(corners)):
+        middles[t] = (corners[t, 0] + corners[t, 1] + corners[t, 2]) / 3
+        reaches[t] = max([np.linalg.norm(corners[t, i] - middles[t]) for i in range(3)])
+    for m in range(len(points)):
+        best = np.inf
+        for t in range(len(corners)):
+            far = 0.0
+            for i in range(3):
+                far += (points[m, i] - middles[t, i]) ** 2
+            if far > (best + reaches[t]) ** 2:
+                continue
+            u, v, w = _shares(points[m], corners[t, 0], corners[t, 1], corners[t, 2])
+            place = u * corners[t, 0] + v * corners[t, 1] + w * corners[t, 2]
+            distance = float(np.linalg.norm(points[m] - place))
+            if distance < best:
+                best, numbers[m] = distance, t
+                places[m] = place
+    return numbers, places
+
+
+@njit(cache=True)
+def containing(
+    points: Any, lows: Any, highs: Any, origins: Any, inverses: Any, tolerance: float
+) -> Any:
+    """The tetrahedron that holds each point (m, 3) [m], (m,); -1 where none does.
+
+    `lows`, `highs` (e, 3) bound the tetrahedra [m]; `inverses` (e, 3, 3) [1/m] turn a place seen
+    from `origins` (e, 3) [m] into barycentric coordinates 1 to 3, each of which may be so far below
+    zero.
+    """
+    numbers = np.full(len(points), -1)
+    for m in range(len(points)):
+        for e in range(len(lows)):
+            x, y, z = points[m]
+            if (
+                x < lows[e, 0]
+                or y < lows[e, 1]
+                or z < lows[e, 2]
+                or x > highs[e, 0]
+                or y > highs[e, 1]
+                or z > highs[e, 2]
+            ):
+                continue
+            dx, dy, dz = x - origins[e, 0], y - origins[e, 1], z - origins[e, 2]
+            total, inside = 0.0, True
+            for i in range(3):
+                share = inverses[e, i, 0] * dx + inverses[e, i, 1] * dy + inverses[e, i, 2] * dz
+                total += share
+                inside = inside and share >= -tolerance
+            if inside and total <= 1 + tolerance:
+                numbers[m] = e
+                break
+    return numbers
+
+
+@njit(cache=True)
+def turns_around(faces: Any, positions: Any, point: Any) -> float:
+    """How often flat polygons (f, 3) or (f, 4) wind around a point (3,): over a closed surface 1
+    inside and 0 outside.
+
+    Sum of the triangles' solid angles (van Oosterom and Strackee 1983) over that of the sphere.
+    """
+    total, arms, lengths = 0.0, np.empty((3, 3)), np.empty(3)
+    for f in range(faces.shape[0]):
+        for second in range(1, faces.shape[1] - 1):
+            for corner, a in enumerate((0, second, second + 1)):
+                for i in range(3):
+                    arms[corner, i] = positions[faces[f, a], i] - point[i]
+                lengths[corner] = np.sqrt(
+                    arms[corner, 0] ** 2 + arms[corner, 1] ** 2 + arms[corner, 2] ** 2
+                )
+            a, b, c = arms[0], arms[1], arms[2]
+            across = (
+                a[0] * (b[1] * c[2] - b[2] * c[1])
+                + a[1] * (b[2] * c[0] - b[0] * c[2])
+                + a[2] * (b[0] * c[1] - b[1] * c[0])
+            )
+            along = lengths[0] * lengths[1] * lengths[2]
+            for i in range(3):
+                along += (
+                    a[i] * b[i] * lengths[2] + b[i] * c[i] * lengths[0] + c[i] * a[i] * lengths[1]
+                )
+            total += 2 * np.arctan2(across, along)
+    return total / (4 * np.pi)

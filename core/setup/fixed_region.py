@@ -1,0 +1,117 @@
+"""Which part of a surface is held: a plane, named triangles, or painted vertices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from palpate.foundation.arrays import FloatArray, IntArray
+from palpate.foundation.errors import MeshError
+
+__all__ = ["BoolArray", "Faces", "FixedRegion", "Painted", "Plane"]
+
+BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+
+
+class FixedRegion(Protocol):
+    """A way to say what is held."""
+
+    def mask(self, name: str, vertices: FloatArray, triangles: IntArray) -> BoolArray:
+        """Which triangles (t, 3) of the vertices (v, 3) [m] are held (t,); MeshError, with the
+        file's name, if none can be.
+        """
+
+
+@dataclass(frozen=True)
+class Plane:
+    """All triangles that lie within `tolerance` [m] of the plane z = `height` [m], or below it:
+    what stands on a table.
+    """
+
+    height: float = 0.0
+    tolerance: float = 1e-4
+
+    def mask(self, name: str, vertices: FloatArray, triangles: IntArray) -> BoolArray:
+        """Which triangles are held (t,)."""
+        tops = vertices[triangles, 2].max(axis=1)
+        held = tops <= self.height + self.tolerance
+        if not held.any():
+            raise MeshError(
+                f"{name}: no triangle lies below z = {self.height:g} m within {self.tolerance:g} m, the lowest reaches up to "
+                f"{tops.min():.4g} m; expected a base there: move the surface, or raise height or tolerance",
+                file=name,
+                height=self.height,
+                tolerance=self.tolerance,
+                lowest=float(tops.min()),
+            )
+        return np.asarray(held)
+
+
+@dataclass(frozen=True)
+class Faces:
+    """Triangles by number, as they stand in the file."""
+
+    triangles: tuple[int, ...]
+
+    @classmethod
+    def of(cls, triangles: Sequence[int] | IntArray) -> Faces:
+        """From any sequence of numbers."""
+        return cls(tuple(int(number) for number in triangles))
+
+    def mask(self, name: str, vertices: FloatArray, triangles: IntArray) -> BoolArray:
+        """Which triangles are held (t,)."""
+        return _marked(name, "triangle", self.triangles, len(triangles))
+
+
+@dataclass(frozen=True)
+class Painted:
+    """All triangles whose three vertices are painted; vertices by number, as they stand in the
+    file.
+    """
+
+    vertices: tuple[int, ...]
+
+    @classmethod
+    def of(cls, paint: Sequence[int] | IntArray | BoolArray) -> Painted:
+        """From numbers, or from one truth value per vertex (v,)."""
+        numbers = np.asarray(paint)
+        return cls(
+            tuple(
+                int(number)
+                for number in (np.flatnonzero(numbers) if numbers.dtype == bool else numbers)
+            )
+        )
+
+    def mask(self, name: str, vertices: FloatArray, triangles: IntArray) -> BoolArray:
+        """Which triangles are held (t,)."""
+        held = np.asarray(
+            _marked(name, "vertex", self.vertices, len(vertices))[triangles].all(axis=1)
+        )
+        if not held.any():
+            raise MeshError(
+                f"{name}: the {len(self.vertices)} painted vertices are nowhere all three corners of a triangle; expected an "
+                "area: paint whole triangles",
+                file=name,
+                painted=len(self.vertices),
+            )
+        return held
+
+
+def _marked(name: str, what: str, numbers: tuple[int, ...], count: int) -> BoolArray:
+    if not numbers or min(numbers) < 0 or max(numbers) >= count:
+        found = (
+            f"{what} {max(numbers, key=lambda number: (number < 0, number))}"
+            if numbers
+            else f"no {what} at all"
+        )
+        raise MeshError(
+            f"{name}: the fixed region names {found}; expected numbers from 0 to {count - 1}",
+            file=name,
+            count=count,
+        )
+    marked = np.zeros(count, dtype=bool)
+    marked[list(numbers)] = True
+    return marked

@@ -1,0 +1,256 @@
+"""Closed surfaces from files, and the checks that one has to pass before it is filled: each failure
+is one sentence.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from palpate.foundation.arrays import FloatArray, IntArray
+from palpate.foundation.errors import MeshError
+
+__all__ = ["FORMATS", "check_surface", "read_surface"]
+
+FORMATS = (".stl", ".ply", ".obj")
+_SMALLEST, _LARGEST = 1e-3, 2.0
+"""Extent [m] that a phantom may have along any axis, and must not exceed: as for a block."""
+
+
+def read_surface(path: Path, scale: float = 1.0) -> tuple[FloatArray, IntArray]:
+    """Vertices (v, 3) [m] and triangles (t, 3) of a file, unchecked; `scale` is its unit of length
+    in metres.
+
+    Vertices that stand several times in the same place are one, numbered by the first, so that
+    STL's triangles hang together.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise MeshError(
+            f"{path.name}: a surface is read from {', '.join(FORMATS)}, not from {path.suffix or 'this'}",
+            file=str(path),
+        )
+    if not path.is_file():
+        raise MeshError(
+            f"{path.name}: there is no such file in {path.parent}; expected a surface there",
+            file=str(path),
+        )
+    import trimesh
+
+    try:
+        found = trimesh.load_mesh(path, process=False, maintain_order=True)
+        vertices, triangles = (
+            np.array(found.vertices, dtype=float),
+            np.array(found.faces, dtype=np.int64),
+        )
+    except Exception as error:  # whatever a reader of three formats meets in a broken file
+        raise MeshError(
+            f"{path.name}: cannot be read as a surface ({error}); export it anew", file=str(path)
+        ) from error
+    return merged(scale * vertices.reshape(-1, 3), triangles.reshape(-1, 3))
+
+
+def merged(vertices: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
+    """Equal vertices made one, in the order of their first appearance."""
+    _, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return vertices[first[order]], rank[inverse.ravel()][triangles]
+
+
+def check_surface(name: str, vertices: FloatArray, triangles: IntArray) -> None:
+    """Raise MeshError where vertices (v, 3) [m] and triangles (t, 3) are not one closed surface
+    that turns outwards.
+
+    Args:
+        name: of the file, for the sentence.
+    """
+    _check_numbers(name, vertices, triangles)
+    _check_size(name, vertices)
+    directed = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    ends, edge, uses = np.unique(
+        np.sort(directed, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    _check_closed(name, vertices, ends, uses)
+    _check_winding(name, vertices, triangles, directed, edge.ravel())
+    _check_crossings(name, vertices, triangles)
+
+
+def _at(place: FloatArray) -> str:
+    """A place [m] as a sentence shows it."""
+    return "(" + ", ".join(f"{value:.4f}" for value in place) + ") m"
+
+
+def _check_numbers(name: str, vertices: FloatArray, triangles: IntArray) -> None:
+    if not len(triangles):
+        raise MeshError(
+            f"{name}: holds no triangle ({len(vertices)} vertices); expected a closed surface",
+            file=name,
+            triangles=0,
+        )
+    broken = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    if len(broken):
+        raise MeshError(
+            f"{name}: {len(broken)} of {len(vertices)} vertices are not finite, the first is number {broken[0]}: "
+            f"{vertices[broken[0]].tolist()}; expected metres: export it anew",
+            file=name,
+            count=len(broken),
+            vertex=int(broken[0]),
+        )
+    if triangles.min() < 0 or triangles.max() >= len(vertices):
+        raise MeshError(
+            f"{name}: a triangle names vertex {triangles.max()} of {len(vertices)}; export it anew",
+            file=name,
+        )
+    ordered = np.sort(triangles, axis=1)
+    flat = np.flatnonzero((np.diff(ordered, axis=1) == 0).any(axis=1))
+    if len(flat):
+        raise MeshError(
+            f"{name}: {len(flat)} of {len(triangles)} triangles have a corner twice, the first is number {flat[0]}; "
+            "expected triangles with an area: remove them",
+            file=name,
+            count=len(flat),
+            triangle=int(flat[0]),
+        )
+
+
+def _check_size(name: str, vertices: FloatArray) -> None:
+    size = np.ptp(vertices, axis=0)
+    if size.max() <= _LARGEST and size.min() >= _SMALLEST:
+        return
+    found = " x ".join(f"{length:.4g}" for length in size)
+    hints = {1e-3: "it is in millimetres", 1e3: "it was scaled from millimetres twice"}
+    fitting = [
+        scale
+        for scale in hints
+        if (scale * size).max() <= _LARGEST and (scale * size).min() >= _SMALLEST
+    ]
+    hint = "correct it"
+    if fitting:
+        metres = " x ".join(f"{fitting[0] * length:.4g}" for length in size)
+        hint = (
+            f"if {hints[fitting[0]]}, say so with scale = {fitting[0]:g}, which makes it {metres} m"
+        )
+    raise MeshError(
+        f"{name}: measures {found} m along x, y, z; expected {_SMALLEST:g} to {_LARGEST:g} m: {hint}",
+        file=name,
+        size=size.tolist(),
+        scale=fitting[0] if fitting else None,
+    )
+
+
+def _check_closed(name: str, vertices: FloatArray, ends: IntArray, uses: IntArray) -> None:
+    """Every edge belongs to two triangles. `ends` (k, 2) vertices and `uses` (k,) of the edges."""
+    lone = ends[uses == 1]
+    if len(lone):
+        graph = sp.coo_matrix(
+            (np.ones(len(lone)), (lone[:, 0], lone[:, 1])), shape=(len(vertices), len(vertices))
+        )
+        hole = connected_components(graph, directed=False)[1][lone[:, 0]]
+        names, sizes = np.unique(hole, return_counts=True)
+        largest = np.unique(lone[hole == names[np.argmax(sizes)]])
+        raise MeshError(
+            f"{name}: is open: {len(lone)} of {len(ends)} edges belong to one triangle only, around {len(names)} hole(s), the "
+            f"largest of {sizes.max()} edges at {_at(vertices[largest].mean(axis=0))}; expected a closed surface: close it",
+            file=name,
+            open_edges=len(lone),
+            holes=len(names),
+            place=vertices[largest].mean(axis=0).tolist(),
+        )
+    shared = ends[uses > 2]
+    if len(shared):
+        place = vertices[shared[0]].mean(axis=0)
+        raise MeshError(
+            f"{name}: {len(shared)} edges belong to more than two triangles, the first at {_at(place)}; expected a surface without "
+            "inner walls or doubled triangles: remove them",
+            file=name,
+            edges=len(shared),
+            place=place.tolist(),
+        )
+
+
+def _check_winding(
+    name: str, vertices: FloatArray, triangles: IntArray, directed: IntArray, edge: IntArray
+) -> None:
+    """One body, all of whose triangles turn outwards. `directed` (3 t, 2) sides of the triangles,
+    `edge` (3 t,) their edges.
+    """
+    count = len(triangles)
+    pairs = np.argsort(edge, kind="stable").reshape(-1, 2)
+    first, second = (pairs % count).T
+    bodies, body = connected_components(
+        sp.coo_matrix((np.ones(len(first)), (first, second)), shape=(count, count)), directed=False
+    )
+    if bodies > 1:
+        sizes = sorted(
+            (_volume(vertices, triangles[body == number]) * 1e6 for number in range(bodies)),
+            key=abs,
+            reverse=True,
+        )
+        shown = ", ".join(f"{size:.3g}" for size in sizes[:3])
+        raise MeshError(
+            f"{name}: holds {bodies} separate surfaces (the largest enclose {shown} cm3); expected one body without cavities: "
+            "keep one of them, or join them",
+            file=name,
+            bodies=bodies,
+        )
+    # Each triangle stands in the graph as it is and turned over; sides that run the same way join
+    # one's face to the other's back.
+    turned = (directed[pairs[:, 0], 0] == directed[pairs[:, 1], 0]).astype(int)
+    rows = np.concatenate([first, first + count])
+    columns = np.concatenate([second + count * turned, second + count * (1 - turned)])
+    _, side = connected_components(
+        sp.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(2 * count,) * 2), directed=False
+    )
+    flipped = np.flatnonzero(side[:count] != side[0])
+    if len(flipped) > count / 2:
+        flipped = np.flatnonzero(side[:count] == side[0])
+    if len(flipped):
+        place = vertices[triangles[flipped[0]]].mean(axis=0)
+        raise MeshError(
+            f"{name}: {len(flipped)} of {count} triangles are flipped against the rest, the first is number {flipped[0]} at "
+            f"{_at(place)}; expected all to turn outwards: make the normals consistent",
+            file=name,
+            flipped=len(flipped),
+            triangle=int(flipped[0]),
+            place=place.tolist(),
+        )
+    volume = _volume(vertices, triangles)
+    if volume <= 0:
+        raise MeshError(
+            f"{name}: all {count} triangles turn inwards (volume {1e6 * volume:.3g} cm3); expected outwards: flip the normals",
+            file=name,
+            flipped=count,
+            volume=volume,
+        )
+
+
+def _volume(vertices: FloatArray, triangles: IntArray) -> float:
+    """Enclosed volume [m^3], negative inside out."""
+    a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
+    return float(np.einsum("ti,ti->", a, np.cross(b, c)) / 6)
+
+
+def _check_crossings(name: str, vertices: FloatArray, triangles: IntArray) -> None:
+    import open3d as o3d
+
+    # Its tests compare with absolute numbers made for bodies of about one.
+    spread = (vertices - vertices.mean(axis=0)) / np.ptp(vertices, axis=0).max()
+    mesh = o3d.geometry.TriangleMesh(
+        o3d.utility.Vector3dVector(spread), o3d.utility.Vector3iVector(triangles.astype(np.int32))
+    )
+    pairs = np.asarray(mesh.get_self_intersecting_triangles())
+    if len(pairs):
+        one, other = (int(number) for number in pairs[0])
+        place = vertices[triangles[one]].mean(axis=0)
+        raise MeshError(
+            f"{name}: {len(pairs)} pairs of triangles cross, the first are numbers {one} and {other} at {_at(place)}; expected a "
+            "surface that does not cut itself: repair it there",
+            file=name,
+            crossings=len(pairs),
+            triangles=[one, other],
+            place=place.tolist(),
+        )

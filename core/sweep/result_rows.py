@@ -1,0 +1,51 @@
+"""The rows of a sweep on disk, as its points end."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from palpate.foundation.errors import RunError
+
+__all__ = ["Rows"]
+
+
+class Rows:
+    """The rows of one sweep, one JSON object a line, each on the disk before the next begins."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+
+    def read(self) -> list[dict[str, Any]]:
+        """All whole rows; a last one that is torn, as a kill while writing leaves it, does not
+        count.
+        """
+        if not self._file.is_file():
+            return []
+        lines = self._file.read_text().split("\n")
+        rows: list[dict[str, Any]] = []
+        for number, line in enumerate(lines[:-1], 1):
+            try:
+                rows.append(json.loads(line))
+            except ValueError as error:
+                raise RunError(
+                    f"{self._file.name}, row {number} cannot be read ({error}); remove the row",
+                    row=number,
+                ) from error
+        return rows
+
+    def start(self, rows: Sequence[dict[str, Any]]) -> None:
+        """Write what is whole anew, so that nothing follows a torn row."""
+        aside = self._file.with_name(f".{self._file.name}.part")
+        aside.write_text("".join(json.dumps(row) + "\n" for row in rows))
+        os.replace(aside, self._file)
+
+    def add(self, row: dict[str, Any]) -> None:
+        """One more."""
+        with self._file.open("a") as stream:
+            stream.write(json.dumps(row) + "\n")
+            stream.flush()
+            os.fsync(stream.fileno())

@@ -1,0 +1,36 @@
+"""A dataset and its truth: both whole or neither."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from palpate.foundation.errors import RunError
+from palpate.synthetic.scenario.truth import Truth, truth_path
+
+__all__ = ["whole_or_nothing"]
+
+
+def whole_or_nothing(folder: Path, fill: Callable[[Path], Truth]) -> Truth:
+    """Make the dataset `folder` by filling a folder aside, and its truth beside it: both or
+    neither.
+
+    Raises RunError where `folder` exists.
+    """
+    if folder.exists():
+        raise RunError(
+            f"{folder} exists already; choose another name or remove it", path=str(folder)
+        )
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        truth = fill(aside)
+        aside.chmod(0o755)
+        truth.save(truth_path(folder))
+        aside.rename(folder)
+    except BaseException:
+        shutil.rmtree(aside, ignore_errors=True)
+        raise
+    return truth

@@ -1,0 +1,156 @@
+"""What the virtual block is made of and stands on, from what a scenario hides."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from palpate.foundation.arrays import FloatArray
+from palpate.synthetic.scenario.scenario import Scenario
+from palpate.synthetic.solver.holzapfel_fibres import fibre_modulus
+from palpate.synthetic.solver.inelastic_history import relaxed_share
+from palpate.synthetic.solver.obstacles import Neighbour, Shaft, shaft_radius
+from palpate.synthetic.solver.solid_model import Solid
+from palpate.synthetic.solver.tet_block import Block
+
+__all__ = ["creep_of", "levels_of", "seams_of", "solid_of", "true_offset", "true_radius"]
+
+BoolArray = np.ndarray[Any, np.dtype[np.bool_]]
+
+
+def true_radius(scenario: Scenario) -> float:
+    """Of the tool [m]."""
+    hidden = scenario.hidden("tool_radius")
+    return hidden.value("radius") if hidden else scenario.tool_radius
+
+
+def true_offset(scenario: Scenario) -> FloatArray:
+    """True minus stated centre of the tool (3,) before anything is touched, phantom frame [m]."""
+    hidden = scenario.hidden("tool_offset")
+    return np.array([hidden.value(name) for name in ("dx", "dy", "dz")]) if hidden else np.zeros(3)
+
+
+def creep_of(scenario: Scenario) -> FloatArray:
+    """How fast the block moves on its table (3,) [m/s]."""
+    creep = scenario.disturbance("phantom_creep")
+    if creep is None:
+        return np.zeros(3)
+    direction = creep.value("direction")
+    return creep.value("speed") * np.array([np.cos(direction), np.sin(direction), 0.0])
+
+
+def levels_of(scenario: Scenario) -> tuple[float, ...]:
+    """Heights between two materials [m]: under a skin, where there is one."""
+    skin = scenario.hidden("surface_layer")
+    return (scenario.true_size[2] - skin.value("thickness"),) if skin else ()
+
+
+def seams_of(scenario: Scenario) -> tuple[tuple[int, float], ...]:
+    """Axis and place [m] of the line where a base that is loose begins to be held: between two
+    nodes it would lie anywhere.
+    """
+    strip = scenario.hidden("base_detachment")
+    if strip is None:
+        return ()
+    axis, sign = _side(str(strip.parameters["edge"]))
+    return ((axis, sign * (scenario.true_size[axis] / 2 - strip.value("extent"))),)
+
+
+def _side(name: str) -> tuple[int, float]:
+    """Axis and sign of a side called like "-x"."""
+    return "xy".index(name[1]), -1.0 if name[0] == "-" else 1.0
+
+
+def solid_of(scenario: Scenario, block: Block, axis: FloatArray | None = None) -> Solid:
+    """The solid that fills `block`, and what touches it; `axis` (3,) points from the tool's shaft
+    towards the tip.
+    """
+    nu, weight = scenario.hidden("poisson_ratio"), scenario.hidden("gravity")
+    limit, fibres, springs = (
+        scenario.hidden(name) for name in ("strain_stiffening", "anisotropy", "base_compliance")
+    )
+    poisson_ratio = nu.value("nu") if nu else scenario.poisson_ratio
+    angle = fibres.value("direction") if fibres else 0.0
+    held = _held(scenario, block.nodes)
+    return Solid(
+        young_modulus=_modulus(scenario, block),
+        poisson_ratio=poisson_ratio,
+        weight=weight.value("specific_weight_over_stiffness") * scenario.true_modulus
+        if weight
+        else 0.0,
+        held=np.zeros_like(held) if springs else held,
+        tool_radius=true_radius(scenario),
+        lifts=scenario.hidden("base_detachment") is not None,
+        stretch_limit=limit.value("J_m") if limit else None,
+        fibres=np.array([np.cos(angle), np.sin(angle), 0.0]) if fibres else None,
+        fibre_modulus=fibre_modulus(fibres.value("stiffness_ratio"), poisson_ratio)
+        if fibres
+        else 0.0,
+        springs=_springs(scenario, block, springs.value("stiffness_over_E")) if springs else None,
+        relaxed=relaxed_share(scenario),
+        shaft=_shaft(scenario, axis),
+        neighbour=_neighbour(scenario),
+    )
+
+
+def _shaft(scenario: Scenario, axis: FloatArray | None) -> Shaft | None:
+    """Up to well above the block; where nothing is said of it, it touches nothing."""
+    if axis is None or scenario.disturbance("shaft_contact") is None:
+        return None
+    return Shaft(-axis, shaft_radius(true_radius(scenario)), 2 * scenario.true_size[2])
+
+
+def _neighbour(scenario: Scenario) -> Neighbour | None:
+    body = scenario.disturbance("second_body")
+    if body is None:
+        return None
+    axis, sign = _side(str(body.parameters["side"]))
+    return Neighbour(
+        axis, sign, body.value("overlap"), body.value("stiffness_over_E") * scenario.true_modulus
+    )
+
+
+def _modulus(scenario: Scenario, block: Block) -> FloatArray:
+    """Young's modulus (e, 4) at the volume points [Pa]."""
+    modulus = np.full(block.weights.shape, scenario.true_modulus)
+    lump, skin, slope = (
+        scenario.hidden(name) for name in ("stiff_inclusion", "surface_layer", "stiffness_gradient")
+    )
+    height = scenario.true_size[2]
+    if lump is not None:
+        inside = np.linalg.norm(
+            block.places - [lump.value(axis) for axis in "xyz"], axis=2
+        ) < lump.value("radius")
+        modulus[inside] *= lump.value("stiffness_ratio")
+    if skin is not None:
+        modulus[block.places[..., 2] > height - skin.value("thickness")] *= skin.value(
+            "stiffness_ratio"
+        )
+    if slope is not None:
+        modulus *= np.exp(slope.value("log_ratio") * (block.places[..., 2] / height - 0.5))
+    return modulus
+
+
+def _held(scenario: Scenario, nodes: FloatArray) -> BoolArray:
+    """Which of the nodes (n, 3) a rigid support holds (n,)."""
+    return (nodes[:, 2] < 1e-9) & _bonded(scenario, nodes)
+
+
+def _bonded(scenario: Scenario, places: FloatArray) -> BoolArray:
+    """Whether the base is fixed to what it stands on at places (..., 3) of it."""
+    strip = scenario.hidden("base_detachment")
+    if strip is None:
+        return np.ones(places.shape[:-1], dtype=bool)
+    axis, sign = _side(str(strip.parameters["edge"]))
+    return np.asarray(
+        scenario.true_size[axis] / 2 - sign * places[..., axis] >= strip.value("extent") - 1e-9
+    )
+
+
+def _springs(scenario: Scenario, block: Block, stiffness_over_modulus: float) -> FloatArray:
+    """Stiffness per area at the points of the sole (f, q) [N/m^3]; none where the base is loose."""
+    places = np.einsum(
+        "fqa,fai->fqi", block.sole.values, block.nodes[block.elements[block.sole.owner]]
+    )
+    return np.where(_bonded(scenario, places), stiffness_over_modulus * scenario.true_modulus, 0.0)

@@ -1,0 +1,171 @@
+"""The files of a dataset in format 1, written as a bench would export them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.frames import Transform
+from palpate.synthetic.scenario.scenario import Scenario
+
+__all__ = [
+    "write_clouds",
+    "write_config",
+    "write_felt_config",
+    "write_forces",
+    "write_kinematics",
+    "write_ply",
+    "write_touches",
+]
+
+
+def write_ply(path: Path, points: FloatArray) -> None:
+    """A binary cloud (n, 3) [m], little endian, single precision."""
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
+    header += "property float x\nproperty float y\nproperty float z\nend_header\n"
+    path.write_bytes(header.encode() + np.ascontiguousarray(points, dtype="<f4").tobytes())
+
+
+def write_kinematics(
+    path: Path, times: FloatArray, positions: FloatArray, quaternion: FloatArray
+) -> None:
+    """Tool poses: times (n,) [s], positions (n, 3) [m] in the robot frame, one orientation (4,)
+    xyzw.
+    """
+    turn = ",".join(f"{part:.7f}" for part in quaternion)
+    rows = [
+        f"{t:.5f},{x:.7f},{y:.7f},{z:.7f},{turn}"
+        for t, (x, y, z) in zip(times.tolist(), positions.tolist(), strict=True)
+    ]
+    path.write_text("\n".join(["t,x,y,z,qx,qy,qz,qw", *rows]) + "\n")
+
+
+def write_forces(path: Path, times: FloatArray, forces: FloatArray) -> None:
+    """Force on the tool: times (n,) [s], forces (n, 3) [N] in the robot frame."""
+    rows = [
+        f"{t:.5f},{x:.6f},{y:.6f},{z:.6f}"
+        for t, (x, y, z) in zip(times.tolist(), forces.tolist(), strict=True)
+    ]
+    path.write_text("\n".join(["t,fx,fy,fz", *rows]) + "\n")
+
+
+def write_clouds(path: Path, times: FloatArray, files: list[str]) -> None:
+    """The list of clouds with their stamps (n,) [s]."""
+    path.write_text(
+        "\n".join(
+            [
+                "t,file",
+                *(f"{time:.5f},{file}" for time, file in zip(times.tolist(), files, strict=True)),
+            ]
+        )
+        + "\n"
+    )
+
+
+def write_touches(path: Path, names: list[str], positions: FloatArray) -> None:
+    """Where the tool's centre (n, 3) [m] was as it touched the landmarks, robot frame."""
+    rows = [
+        f"{name},{x:.7f},{y:.7f},{z:.7f}"
+        for name, (x, y, z) in zip(names, positions.tolist(), strict=True)
+    ]
+    path.write_text("\n".join(["landmark,x,y,z", *rows]) + "\n")
+
+
+def write_config(
+    path: Path, name: str, scenario: Scenario, landmarks: dict[str, FloatArray], guess: Transform
+) -> None:
+    """dataset.toml: what the experimenter believes, and a first guess of the camera's pose."""
+    matrix = ", ".join(
+        "[" + ", ".join(f"{value:.9f}" for value in row) + "]" for row in guess.matrix
+    )
+    lines = [
+        *_believed(name, scenario, "", landmarks),
+        "[camera]",
+        'name = "virtual depth camera"',
+        "depth_sigma = 0.002",
+        f"to_phantom = [{matrix}]",
+        "",
+        *_listed(
+            {split: list(names) for split, names in scenario.splits.items()}
+            or _splits(scenario.sequences)
+        ),
+    ]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def write_felt_config(
+    path: Path,
+    name: str,
+    scenario: Scenario,
+    surface: str,
+    landmarks: dict[str, FloatArray],
+    splits: dict[str, list[str]],
+) -> None:
+    """dataset.toml of a palpation without a camera, of a box or of what a `surface` encloses."""
+    path.write_text(
+        "\n".join([*_believed(name, scenario, surface, landmarks), *_listed(splits)]) + "\n"
+    )
+
+
+def _believed(
+    name: str, scenario: Scenario, surface: str, landmarks: dict[str, FloatArray]
+) -> list[str]:
+    geometry = (
+        ['geometry = "mesh"', f'surface = "{surface}"']
+        if surface
+        else ['geometry = "box"', f"size = {_list(scenario.size)}"]
+    )
+    return [
+        "format = 1",
+        f'name = "{name}"',
+        "",
+        "[phantom]",
+        *geometry,
+        f"mass = {scenario.mass}",
+        'fixed = "base"',
+        f"young_modulus = {scenario.young_modulus}",
+        f"poisson_ratio = {scenario.poisson_ratio}",
+        "",
+        "[tool]",
+        'shape = "sphere"',
+        f"radius = {scenario.tool_radius}",
+        "",
+        "[landmarks]",
+        *(f"{key} = {_list(place)}" for key, place in landmarks.items()),
+        f"touch_offset = {scenario.touch_offset}",
+        "",
+    ]
+
+
+def _listed(splits: dict[str, list[str]]) -> list[str]:
+    return [
+        "[splits]",
+        *(
+            f"{split} = [{', '.join(chr(34) + one + chr(34) for one in names)}]"
+            for split, names in splits.items()
+        ),
+    ]
+
+
+def _list(values: FloatArray | tuple[float, ...]) -> str:
+    return "[" + ", ".join(f"{value:.6g}" for value in values) + "]"
+
+
+def _splits(sequences: tuple[str, ...]) -> dict[str, list[str]]:
+    """Of each kind the first trains; the second top poke validates; the rest tests."""
+    splits: dict[str, list[str]] = {"train": [], "validation": [], "test": []}
+    met: dict[str, int] = {}
+    for name in sequences:
+        kind = name.rpartition("-")[0]
+        number = met.setdefault(kind, 0)
+        met[kind] += 1
+        splits[
+            "train"
+            if number == 0
+            else "validation"
+            if number == 1 and kind == "poke-top"
+            else "test"
+        ].append(name)
+    return splits

@@ -1,0 +1,304 @@
+"""Palpation by force alone: many short probes over a block's top or over an organ, as laboratories
+with a force sensor record it.
+
+Each probe comes in along the surface's normal, presses to a depth, holds and lets go. There is no
+camera: what is written is where the tool was, and what it felt, with the faults of real sensors
+(`palpate.synthetic.bench.force_sensor`). The operator finds the surface by feel, so that each depth
+is a little off; kinematics say where the tool was, not where it should have been.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.frames import Transform
+from palpate.foundation.processes import bound_to
+from palpate.foundation.progress import Report, silent
+from palpate.synthetic.atomic_write import whole_or_nothing
+from palpate.synthetic.bench.force_sensor import FORCE_NOISE, ForceSensor
+from palpate.synthetic.bench.motion_plan import Motion, Probe
+from palpate.synthetic.bench.organ_shape import (
+    AXES,
+    organ_block,
+    organ_normals,
+    organ_places,
+    organ_surface,
+    write_surface,
+)
+from palpate.synthetic.bench.virtual_experiment import perform
+from palpate.synthetic.dataset_writer import (
+    write_felt_config,
+    write_forces,
+    write_kinematics,
+    write_touches,
+)
+from palpate.synthetic.scenario.scenario import HiddenEffect, Scenario
+from palpate.synthetic.scenario.truth import Truth
+from palpate.synthetic.solver.tet_block import Block, Grading
+
+__all__ = ["Body", "Palpation", "draw_palpation", "make_palpation"]
+
+Body = Literal["box", "organ"]
+HOVER, ABOVE = 5e-3, 12e-3
+"""How far the tool stops before the surface, and how far above everything it travels [m]."""
+KINEMATICS_NOISE, TOUCH_NOISE, DEPTH_MISS = 0.05e-3, 0.15e-3, 0.3e-3
+SPLITS = ("train", "validation", "test")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Palpation:
+    """One palpation.
+
+    Attributes:
+        body: what is palpated.
+        scenario: beliefs and what is hidden.
+        probes: of each sequence.
+        depth: of a push [m].
+        splits: number of sequences for train, validation and test.
+    """
+
+    body: Body
+    scenario: Scenario
+    probes: int = 6
+    depth: tuple[float, float] = (3.2e-3, 4.8e-3)
+    splits: tuple[int, int, int] = (2, 1, 2)
+
+    @property
+    def sequences(self) -> dict[str, list[str]]:
+        """Names of the sequences of each split."""
+        ends = np.cumsum([0, *self.splits])
+        names = [f"palpation-{number:02d}" for number in range(1, ends[-1] + 1)]
+        return {split: names[a:b] for split, a, b in zip(SPLITS, ends[:-1], ends[1:], strict=True)}
+
+
+def draw_palpation(body: Body, effects: int, seed: int) -> Palpation:
+    """A palpation with one stiff lump, or none where `effects` is 0."""
+    rng = np.random.default_rng([seed, 31])
+    # A force sensor off the vibration of a driven arm is a few times quieter than one on it.
+    scenario = Scenario(force_noise=FORCE_NOISE / 2, robot_rate=250.0, young_modulus=5e3)
+    if not effects:
+        return Palpation(body=body, scenario=scenario)
+    radius, ratio = float(rng.uniform(6.5e-3, 8.5e-3)), float(rng.uniform(4.0, 8.0))
+    if body == "box":
+        x, y = rng.uniform(-1, 1, 2) * (0.02, 0.008)
+        place = np.array([x, y, scenario.size[2] - radius - rng.uniform(2e-3, 4e-3)])
+    else:
+        way = np.append(rng.uniform(-0.5, 0.5, 2), 1.0)
+        top = organ_places(way[None])[0]
+        place = top - organ_normals(top[None])[0] * (radius + rng.uniform(2e-3, 3.5e-3))
+    values = {name: round(float(value), 5) for name, value in zip("xyz", place, strict=True)}
+    lump = HiddenEffect(
+        "stiff_inclusion",
+        {**values, "radius": round(radius, 5), "stiffness_ratio": round(ratio, 2)},
+    )
+    return Palpation(body=body, scenario=replace(scenario, effects=(lump,)))
+
+
+def make_palpation(
+    folder: Path, palpation: Palpation, seed: int, workers: int = 1, report: Report = silent
+) -> Truth:
+    """Make the dataset `folder` and its truth beside it: both whole or neither. Raises RunError
+    where `folder` exists.
+    """
+    truth = whole_or_nothing(
+        folder, lambda aside: _fill(aside, folder.name, palpation, seed, workers, report)
+    )
+    report(1.0, f"made {folder.name}")
+    return truth
+
+
+def _fill(
+    folder: Path, name: str, palpation: Palpation, seed: int, workers: int, report: Report
+) -> Truth:
+    rng, scenario = np.random.default_rng([seed, 32]), palpation.scenario
+    robot_from_phantom = Transform(
+        Rotation.random(rng=rng).as_matrix(), rng.uniform(-0.25, 0.25, 3)
+    )
+    landmarks = _landmarks(palpation)
+    touched = (
+        np.array(list(landmarks.values()))
+        + (0.0, 0.0, scenario.touch_offset)
+        + rng.normal(size=(len(landmarks), 3)) * TOUCH_NOISE
+    )
+    write_touches(folder / "touches.csv", list(landmarks), robot_from_phantom.apply(touched))
+    surface = "" if palpation.body == "box" else "phantom.stl"
+    if surface:
+        write_surface(folder / surface, *organ_surface())
+    write_felt_config(
+        folder / "dataset.toml", name, scenario, surface, landmarks, palpation.sequences
+    )
+    motions = _motions(palpation, seed)
+    jobs = [
+        (palpation, motion, robot_from_phantom, folder / "sequences" / motion.name, seed)
+        for motion in motions
+    ]
+    shortened: dict[str, list[float]] = {}
+    with ProcessPoolExecutor(workers, get_context("forkserver"), bound_to, (os.getpid(),)) as pool:
+        for done, record in enumerate(pool.map(_record, *zip(*jobs, strict=True))):
+            shortened |= record
+            report((done + 1) / len(jobs), f"recorded {done + 1} of {len(jobs)} sequences")
+    return Truth(scenario.effects, 0.0, Transform(), robot_from_phantom, shortened=shortened)
+
+
+def _landmarks(palpation: Palpation) -> dict[str, FloatArray]:
+    """Corners of a block's top; marks on an organ."""
+    if palpation.body == "organ":
+        ways = [
+            (0.0, 0.0, 1.0),
+            (1.0, 0.1, 0.4),
+            (-1.0, 0.2, 0.5),
+            (0.1, 1.0, 0.5),
+            (-0.1, -1.0, 0.4),
+        ]
+        return {
+            f"mark_{number}": place for number, place in enumerate(organ_places(np.array(ways)))
+        }
+    x, y, z = palpation.scenario.size
+    signs = ((1, 1), (1, -1), (-1, -1), (-1, 1))
+    return {
+        f"corner_{number}": np.array([a * x / 2, b * y / 2, z])
+        for number, (a, b) in enumerate(signs)
+    }
+
+
+def _motions(palpation: Palpation, seed: int) -> list[Motion]:
+    """Each sequence has its own places, spread over all that can be reached."""
+    names = [name for names in palpation.sequences.values() for name in names]
+    found = []
+    for name in names:
+        rng = np.random.default_rng([seed, 33, *name.encode()])
+        places = _spread(_reachable(palpation, rng), palpation.probes)
+        found.append(_motion(palpation, name, places[rng.permutation(len(places))], rng))
+    return found
+
+
+def _reachable(palpation: Palpation, rng: np.random.Generator) -> FloatArray:
+    """Many places (n, 3) [m] drawn from where a probe may press."""
+    drawn = rng.uniform(-1, 1, size=(400, 2))
+    if palpation.body == "box":
+        x, y, z = palpation.scenario.size
+        margin = 1.6 * palpation.scenario.tool_radius
+        return np.column_stack([drawn * (x / 2 - margin, y / 2 - margin), np.full(400, z)])
+    places = organ_places(
+        np.column_stack([drawn * 1.3, np.full(400, 0.9)]) * (AXES[0], AXES[1], AXES[2])
+    )
+    return places[places[:, 2] > 0.4 * AXES[2]]
+
+
+def _spread(places: FloatArray, count: int) -> FloatArray:
+    """Of the places (n, 3) so many that lie far apart: each next one farthest from those before
+    (Gonzalez 1985).
+    """
+    chosen = [0]
+    away = np.linalg.norm(places - places[0], axis=1)
+    while len(chosen) < min(count, len(places)):
+        chosen.append(int(away.argmax()))
+        away = np.minimum(away, np.linalg.norm(places - places[chosen[-1]], axis=1))
+    return places[chosen]
+
+
+def _motion(
+    palpation: Palpation, name: str, places: FloatArray, rng: np.random.Generator
+) -> Motion:
+    radius, normals = palpation.scenario.tool_radius, _normals(palpation, places)
+    top = (
+        max(
+            palpation.scenario.size[2] if palpation.body == "box" else AXES[2],
+            float(places[:, 2].max()),
+        )
+        + radius
+        + ABOVE
+    )
+    time, probes = 2.0, []
+    for place, normal in zip(places, normals, strict=True):
+        depth = rng.uniform(*palpation.depth) + DEPTH_MISS * rng.normal()
+        hover, deep = place + (radius + HOVER) * normal, place + (radius - depth) * normal
+        way = np.array(
+            [hover, deep] if palpation.body == "box" else [[hover[0], hover[1], top], hover, deep]
+        )
+        probes.append(_timed(way, time, rng))
+        time = float(probes[-1].times[-1]) + rng.uniform(0.5, 0.8)
+    return Motion(name, np.array([0.0, 0.0, -1.0]), tuple(probes), time + 1.5)
+
+
+def _timed(way: FloatArray, begin: float, rng: np.random.Generator) -> Probe:
+    """Quickly to where the tool stops before the surface, slowly in, a hold, and back."""
+    arcs = Probe(way, np.zeros(1), np.zeros(1)).corners
+    far, hover, deep = float(arcs[-2]), float(arcs[-2]), float(arcs[-1])
+    steps = [(0.0, 0.0)]
+    if far > 0:
+        steps += [(far / 40e-3 + 0.2, hover), (0.3, hover)]
+    steps += [((deep - hover) / rng.uniform(5e-3, 8e-3), deep), (rng.uniform(0.7, 0.9), deep)]
+    steps += [((deep - hover) / 10e-3, hover)]
+    if far > 0:
+        steps += [(far / 40e-3 + 0.2, 0.0)]
+    durations, stops = np.array(steps).T
+    return Probe(way, begin + np.cumsum(durations), stops)
+
+
+def _normals(palpation: Palpation, places: FloatArray) -> FloatArray:
+    return (
+        organ_normals(places)
+        if palpation.body == "organ"
+        else np.tile([0.0, 0.0, 1.0], (len(places), 1))
+    )
+
+
+def _organ(scenario: Scenario, probe: Probe, fine: float) -> Block:
+    """The organ's body for one probe, small also within a lump."""
+    lump = scenario.hidden("stiff_inclusion")
+    within = None
+    if lump is not None:
+        radius = lump.value("radius")
+        centre = np.array([[lump.value(axis) for axis in "xyz"]])
+        within = Grading(
+            centre, np.array([1.1 * radius]), np.array([0.55 * radius]), coarse=1.0, growth=3.0
+        )
+    return organ_block(probe.waypoints[-1:], 0.8 * scenario.tool_radius, fine, within)
+
+
+def _record(
+    palpation: Palpation, motion: Motion, robot_from_phantom: Transform, folder: Path, seed: int
+) -> dict[str, list[float]]:
+    """Solve one sequence, write its files, and say how far each probe stopped short [m], where one
+    did.
+    """
+    scenario = palpation.scenario
+    track = perform(scenario, motion, body=_organ if palpation.body == "organ" else None)
+    rng = np.random.default_rng([seed, 34, *motion.name.encode()])
+    folder.mkdir(parents=True)
+    start = rng.uniform(5.0, 45.0)
+    count = int(motion.duration * scenario.robot_rate)
+    times = np.cumsum(np.clip(1 + 0.15 * rng.normal(size=count), 0.3, 1.7)) / scenario.robot_rate
+    times = np.unique(np.round(start + times[times < motion.duration], 5))
+    centres = (
+        track.motion.centre(times - start) + rng.normal(size=(len(times), 3)) * KINEMATICS_NOISE
+    )
+    turn = Rotation.align_vectors(motion.axis[None], [[0.0, 0.0, 1.0]])[0]
+    quaternion = (Rotation.from_matrix(robot_from_phantom.rotation) * turn).as_quat()
+    write_kinematics(
+        folder / "kinematics.csv", times, robot_from_phantom.apply(centres), quaternion
+    )
+    sensor = ForceSensor.draw(scenario.force_noise or FORCE_NOISE, np.random.default_rng([seed, 4]))
+    stamps = sensor.instants(motion.duration, rng)
+    on_tool = -track.push(stamps) @ robot_from_phantom.rotation.T
+    write_forces(folder / "forces.csv", start + stamps, sensor.read(stamps, on_tool, rng))
+    short = _short(motion.probes, track.motion.probes)
+    return {motion.name: short} if any(short) else {}
+
+
+def _short(planned: Sequence[Probe], made: Sequence[Probe]) -> list[float]:
+    return [
+        float(np.linalg.norm(one.waypoints[-1] - other.waypoints[-1]))
+        for one, other in zip(planned, made, strict=True)
+    ]

@@ -1,0 +1,107 @@
+"""What goes wrong outside the catalogue: nothing there expresses it, so that a diagnosis should
+name nothing alone for it.
+
+A camera that warms up turns and shifts while a sequence lasts, registered half way; depth ripples
+with the distance, as interference between cameras leaves it; the phantom creeps sideways on its
+table; another soft body lies against a side that the camera does not see; and the shaft of a tool
+held upright touches the rim of the top while its ball is pushed into a side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.frames import Transform
+from palpate.synthetic.scenario.parameter_names import check_named
+
+__all__ = ["DISTURBANCES", "Disturbance", "draw_disturbance", "drifted", "rippled"]
+
+DISTURBANCES: Mapping[str, Mapping[str, str]] = {
+    "camera_drift": {"translation": "m", "rotation": "rad"},
+    "depth_ripple": {"amplitude": "1", "period": "m"},
+    "phantom_creep": {"speed": "m/s", "direction": "rad"},
+    "second_body": {"overlap": "m", "stiffness_over_E": "1/m", "side": ""},
+    "shaft_contact": {"lean": "rad"},
+}
+"""Those the virtual bench can make, with the unit of each parameter.
+
+`camera_drift`: how far the camera is off at a sequence's end, by which it was off the other way at
+its beginning. `depth_ripple`: depth z is read as z (1 + amplitude sin(2 pi z / period)).
+`phantom_creep`: which way in the plane, from x, and how fast the block moves through a sequence; it
+is laid back after each. `second_body`: how far it would stand in the block without giving way, its
+pressure per way that it is pushed back over the block's modulus, and the side it lies against,
+which the camera does not see; it is black, so that nothing is seen of it either. `shaft_contact`:
+how far the shaft leans over the block from the vertical in pushes from the side.
+"""
+_Range = tuple[float, float] | tuple[str, str, str, str]
+_CLEAR: Mapping[str, Mapping[str, _Range]] = {
+    "camera_drift": {"translation": (1.0e-3, 2.0e-3), "rotation": (0.008, 0.016)},
+    "depth_ripple": {"amplitude": (1.5e-3, 3.0e-3), "period": (14e-3, 24e-3)},
+    "phantom_creep": {"speed": (4e-5, 9e-5), "direction": (0.0, 6.28)},
+    "second_body": {
+        "overlap": (1.5e-3, 3.0e-3),
+        "stiffness_over_E": (60.0, 150.0),
+        "side": ("-x", "+x", "-y", "+y"),
+    },
+    "shaft_contact": {"lean": (0.0, 0.12)},
+}
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """One by its name, with its parameters in SI units."""
+
+    name: str
+    parameters: Mapping[str, float | str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_named(self.name, self.parameters, DISTURBANCES, "disturb by")
+
+    def value(self, name: str) -> float:
+        """A numeric parameter."""
+        return float(self.parameters[name])
+
+
+def draw_disturbance(name: str, seed: int) -> Disturbance:
+    """One of a clear size; EffectError for an unknown name."""
+    rng = np.random.default_rng([seed, 104729])
+    return Disturbance(name, {key: _drawn(span, rng) for key, span in _CLEAR.get(name, {}).items()})
+
+
+def _drawn(span: _Range, rng: np.random.Generator) -> float | str:
+    """A number between two, with so many decimals as tell them apart, or one of some words."""
+    if len(span) > 2:
+        return str(rng.choice(np.array(span)))
+    low, high = (float(end) for end in span)
+    return round(float(rng.uniform(low, high)), 7 if high < 1e-3 else 5)
+
+
+def drifted(
+    disturbances: Sequence[Disturbance], share: float, rng: np.random.Generator
+) -> Transform:
+    """The camera's motion, phantom frame, when a share [1] of a sequence is over; the same
+    directions from the same generator.
+    """
+    step, turn = rng.normal(size=(2, 3))
+    for one in disturbances:
+        if one.name == "camera_drift":
+            size = 2.0 * share - 1.0
+            step *= size * one.value("translation") / np.linalg.norm(step)
+            return Transform.from_vector(
+                step, turn * size * one.value("rotation") / np.linalg.norm(turn)
+            )
+    return Transform()
+
+
+def rippled(disturbances: Sequence[Disturbance], depth: FloatArray) -> FloatArray:
+    """What a camera reads (n,) [m] for these true depths (n,) [m]."""
+    for one in disturbances:
+        if one.name == "depth_ripple":
+            depth = depth * (
+                1.0 + one.value("amplitude") * np.sin(2 * np.pi * depth / one.value("period"))
+            )
+    return depth

@@ -1,0 +1,97 @@
+"""What is hidden in a virtual dataset, as the file that stands beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from palpate.foundation.frames import Transform
+from palpate.synthetic.scenario.disturbance import DISTURBANCES, Disturbance
+from palpate.synthetic.scenario.scenario import HIDDEN, HiddenEffect
+
+__all__ = ["Truth", "truth_path"]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The hidden effects and the true registrations.
+
+    Attributes:
+        effects: empty where the verdict is none.
+        visibility: root mean square change of the visible surface by the hidden effects while it is
+            touched [m].
+        phantom_from_camera: as `rest.ply` was taken.
+        robot_from_phantom: of the robot's true frame.
+        camera_shift: phantom frame; `camera_shift @ phantom_from_camera` holds in the sequences.
+        disturbances: what no effect of the catalogue expresses; the verdict is then unexplained.
+        begun: by sequence, how far along x and y a block that was not put back lay from its place
+            as it began [m].
+        shortened: by sequence, how far each of its pushes stopped short of its plan because the
+            block gave way [m].
+    """
+
+    effects: tuple[HiddenEffect, ...]
+    visibility: float
+    phantom_from_camera: Transform
+    robot_from_phantom: Transform
+    camera_shift: Transform = field(default_factory=Transform)
+    shortened: Mapping[str, list[float]] = field(default_factory=dict)
+    disturbances: tuple[Disturbance, ...] = ()
+    begun: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def verdict(self) -> str:
+        """What a perfect diagnosis says: found, unexplained or none."""
+        return "unexplained" if self.disturbances else "found" if self.effects else "none"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values: each parameter with its unit, the visibility in mm."""
+        return {
+            "verdict": self.verdict,
+            "effects": [
+                _described(hidden.effect, hidden.parameters, HIDDEN) for hidden in self.effects
+            ],
+            **self._disturbed(),
+            "visibility_mm": round(self.visibility * 1e3, 4),
+            "stopped_short_mm": {
+                name: [round(part * 1e3, 3) for part in parts]
+                for name, parts in self.shortened.items()
+            },
+            "began_off_mm": {
+                name: [round(part * 1e3, 4) for part in parts] for name, parts in self.begun.items()
+            },
+            "registration": {
+                "phantom_from_camera": self.phantom_from_camera.matrix.tolist(),
+                "robot_from_phantom_R": self.robot_from_phantom.rotation.tolist(),
+                "robot_from_phantom_t": self.robot_from_phantom.translation.tolist(),
+                "camera_shift": self.camera_shift.matrix.tolist(),
+            },
+        }
+
+    def _disturbed(self) -> dict[str, Any]:
+        """Said only where there is something: most truths have no such entry."""
+        found = [_described(one.name, one.parameters, DISTURBANCES) for one in self.disturbances]
+        return {"disturbances": found} if found else {}
+
+    def save(self, path: Path) -> None:
+        """Write JSON."""
+        path.write_text(json.dumps(self.as_dict(), indent=1) + "\n")
+
+
+def truth_path(folder: Path) -> Path:
+    """Where the truth of the dataset in `folder` stands: beside it, never in it."""
+    return folder.with_name(folder.name + ".truth.json")
+
+
+def _described(
+    name: str, values: Mapping[str, float | str], units: Mapping[str, Mapping[str, str]]
+) -> dict[str, Any]:
+    return {
+        "effect": name,
+        "parameters": {
+            key: {"value": value, "unit": units[name][key]} for key, value in values.items()
+        },
+    }

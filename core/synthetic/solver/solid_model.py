@@ -1,0 +1,47 @@
+"""What a virtual block really is, and what besides the ball touches it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from palpate.foundation.arrays import FloatArray
+from palpate.synthetic.solver.obstacles import Neighbour, Shaft
+
+__all__ = ["Solid"]
+
+
+@dataclass(frozen=True)
+class Solid:
+    """What the block really is.
+
+    Attributes:
+        young_modulus: (e, 4) at the volume points [Pa].
+        poisson_ratio: [1].
+        weight: per volume [N/m^3].
+        held: (n,) bool, nodes that do not move.
+        tool_radius: [m].
+        lifts: whether some of the base may lift off the table.
+        stretch_limit: J_m of Gent's law [1]; None for a material without.
+        fibres: (3,) unit vector along them; None for a material without.
+        fibre_modulus: theirs over Young's modulus [1].
+        springs: (f, q) per area, in all directions, at the points of the sole [N/m^3]; None for a
+            base without.
+        relaxed: share of the shear modulus that has relaxed after a long rest [1].
+        shaft: what of the tool may touch the block beside the ball; None where nothing does.
+        neighbour: what lies against a face; None of none.
+    """
+
+    young_modulus: FloatArray
+    poisson_ratio: float
+    weight: float
+    held: Any
+    tool_radius: float
+    lifts: bool
+    stretch_limit: float | None = None
+    fibres: FloatArray | None = None
+    fibre_modulus: float = 0.0
+    springs: FloatArray | None = None
+    relaxed: float = 0.0
+    shaft: Shaft | None = None
+    neighbour: Neighbour | None = None

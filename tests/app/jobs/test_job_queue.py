@@ -1,0 +1,151 @@
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+from job_working import TARGETS, alive, ended, reached, scratch_is_clean
+
+from palpate.app.http_errors import Conflict, Missing
+from palpate.app.jobs.job_queue import Jobs
+from palpate.app.jobs.job_records import JobState
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return tmp_path / "runs"
+
+
+@pytest.fixture
+def jobs(folder: Path) -> Iterator[Jobs]:
+    with closing(Jobs(folder, TARGETS)) as jobs:
+        yield jobs
+
+
+def test_job_runs_in_another_process_and_leaves_its_result(
+    jobs: Jobs, tmp_path: Path, folder: Path
+) -> None:
+    done = ended(
+        jobs, jobs.submit("count", {"steps": 3, "result": str(tmp_path / "result")}, label="block")
+    )
+    assert (done.state, done.fraction, done.result) == (JobState.DONE, 1.0, {"steps": 3})
+    assert done.id.startswith("block-")
+    assert len(list((tmp_path / "result").iterdir())) == 3
+    assert done.started is not None
+    assert done.finished is not None
+    assert done.created <= done.started <= done.finished
+
+
+def test_progress_is_seen_while_the_job_runs(jobs: Jobs, tmp_path: Path) -> None:
+    job = jobs.submit("count", {"steps": 50, "pause": 0.05, "result": str(tmp_path / "result")})
+    now = reached(jobs, job, lambda now: now.fraction > 0.05)
+    assert now.state is JobState.RUNNING
+    assert now.text.startswith("step ")
+
+
+def test_cancelled_job_ends_its_whole_family_and_leaves_nothing(
+    jobs: Jobs, tmp_path: Path, folder: Path
+) -> None:
+    job = jobs.submit("sleep_with_child", {"result": str(tmp_path / "pids")})
+    reached(jobs, job, lambda now: now.fraction == 0.5)
+    family = [int(pid) for pid in (tmp_path / "pids").read_text().split()]
+    assert all(alive(pid) for pid in family)
+    assert jobs.cancel(job.id).state is JobState.CANCELLED
+    end = time.monotonic() + 10
+    while (
+        any(alive(pid) for pid in family) or not scratch_is_clean(folder)
+    ) and time.monotonic() < end:
+        time.sleep(0.02)
+    assert not any(alive(pid) for pid in family)
+    assert scratch_is_clean(folder)
+    with pytest.raises(Conflict, match="is cancelled already"):
+        jobs.cancel(job.id)
+
+
+def test_waiting_job_can_be_cancelled_before_it_starts(jobs: Jobs, tmp_path: Path) -> None:
+    first = jobs.submit("count", {"steps": 10, "pause": 0.05, "result": str(tmp_path / "first")})
+    second = jobs.submit("count", {"steps": 1, "result": str(tmp_path / "second")})
+    assert jobs.get(second.id).state is JobState.QUEUED
+    jobs.cancel(second.id)
+    assert ended(jobs, first).state is JobState.DONE
+    third = jobs.submit("count", {"steps": 1, "result": str(tmp_path / "third")})
+    assert ended(jobs, third).state is JobState.DONE
+    assert not (tmp_path / "second").exists()
+
+
+def test_failed_job_keeps_its_error_with_its_place(jobs: Jobs, folder: Path) -> None:
+    failed = ended(jobs, jobs.submit("refuse", {}))
+    assert failed.state is JobState.FAILED
+    assert failed.error == {
+        "kind": "DatasetError",
+        "message": "touches.csv, row 3: nan",
+        "where": {"file": "touches.csv", "row": 3},
+    }
+
+
+@pytest.mark.parametrize(
+    ("kind", "error"),
+    [
+        ("stumble", "InternalError: ZeroDivisionError: a bug"),
+        ("die", "WorkerDied: the worker process ended with code 7"),
+    ],
+)
+def test_bug_and_sudden_death_are_told(jobs: Jobs, kind: str, error: str) -> None:
+    failed = ended(jobs, jobs.submit(kind, {}))
+    assert failed.state is JobState.FAILED
+    assert failed.error is not None
+    assert f"{failed.error['kind']}: {failed.error['message']}" == error
+
+
+def test_work_that_gives_up_is_cancelled(jobs: Jobs) -> None:
+    assert ended(jobs, jobs.submit("give_up", {})).state is JobState.CANCELLED
+
+
+def test_closing_interrupts_what_runs(folder: Path, tmp_path: Path) -> None:
+    with closing(Jobs(folder, TARGETS)) as jobs:
+        job = jobs.submit("sleep_with_child", {"result": str(tmp_path / "pids")})
+        reached(jobs, job, lambda now: now.fraction == 0.5)
+    family = [int(pid) for pid in (tmp_path / "pids").read_text().split()]
+    end = time.monotonic() + 10
+    while any(alive(pid) for pid in family) and time.monotonic() < end:
+        time.sleep(0.02)
+    assert not any(alive(pid) for pid in family)
+    assert os.getpid() not in family
+
+
+def test_unknown_job_is_missing(jobs: Jobs) -> None:
+    with pytest.raises(Missing, match="there is no job x"):
+        jobs.get("x")
+
+
+def test_every_change_is_noticed(jobs: Jobs, tmp_path: Path) -> None:
+    seen: list[Any] = [jobs.version]
+    job = jobs.submit("count", {"steps": 2, "result": str(tmp_path / "result")})
+    seen.append(jobs.version)
+    ended(jobs, job)
+    seen.append(jobs.version)
+    assert seen[0] < seen[1] < seen[2]
+
+
+def test_what_a_killed_job_made_beside_the_others_is_gone_and_it_is_done_once_more(
+    tmp_path: Path,
+) -> None:
+    beside = tmp_path / "datasets" / ".importing"
+    (beside / "of-an-earlier-server").mkdir(parents=True)
+    with closing(
+        Jobs(tmp_path / "runs", TARGETS, beside=[beside], tidy=lambda: "made room")
+    ) as jobs:
+        assert not beside.exists()
+        job = ended(
+            jobs, jobs.submit("litter", {"beside": str(beside), "again": str(tmp_path / "again")})
+        )
+        assert job.state is JobState.INTERRUPTED
+        assert not list(beside.iterdir()) and scratch_is_clean(tmp_path / "runs")
+        jobs.retry(job.id)
+        assert ended(jobs, job).state is JobState.DONE
+        assert not list(beside.iterdir())
+        assert [note.text for note in jobs.notes(job.id)].count("made room") == 2

@@ -1,0 +1,41 @@
+"""The error of each frame in a report that is one file: whole, whatever the order of the
+sequences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from palpate.app.reporting.report_plots import drawn_errors, error_plots
+from palpate.app.storage.run_store import Replay
+
+
+def _replay(name: str, worst: float) -> Replay:
+    """Four frames, the third with the largest error [m], the last without a comparison."""
+    raw = np.array([1e-4, 1e-4, worst, np.nan])
+    return Replay(
+        name,
+        {
+            "time": np.arange(4.0),
+            "distance_raw": raw,
+            "distance_extended": 0.5 * raw,
+            "noise_floor": 1e-4,
+        },
+    )
+
+
+@pytest.mark.parametrize("worst", [(2e-4, 9e-4, 3e-4), (9e-4, 2e-4, 3e-4)])
+def test_no_curve_leaves_its_panel_and_all_have_one_scale(worst: tuple[float, ...]) -> None:
+    drawn = drawn_errors(
+        [_replay(f"poke-top-0{number}", size) for number, size in enumerate(worst, 1)], {}
+    )
+    limits = [axes.get_ylim() for axes in drawn.axes if axes.get_visible()]
+    assert len(limits) == len(worst) and len(set(limits)) == 1
+    assert limits[0][0] == 0.0 and 0.9 < limits[0][1] < 1.1
+
+
+def test_panels_carry_name_and_split_and_nothing_is_drawn_of_nothing() -> None:
+    assert "poke-top-01 (test)" in error_plots(
+        [_replay("poke-top-01", 2e-4)], {"poke-top-01": "test"}
+    )
+    assert error_plots([], {}) == ""

@@ -1,0 +1,223 @@
+from __future__ import annotations
+
+import pytest
+import torch
+from shapes import filled_box
+from torch import nn
+
+from palpate.correction import Body, NetworkSpec, build
+from palpate.correction.networks.unet import Padded, UNet, by_halves, pooled
+from palpate.correction.networks.unet_inference import Compact
+from palpate.foundation.errors import CorrectionError
+
+SIZE = (0.0687, 0.0393, 0.0358)
+SMALL = (4, 6, 8)
+GRIDS = [(13, 5, 5), (25, 9, 9), (4, 3, 2)]
+KINDS = ["unet2d", "unet3d", "graph"]
+
+
+def _body(kind, nodes):
+    return Body.top(SIZE, nodes) if kind == "unet2d" else Body.block(SIZE, nodes)
+
+
+def _awake(spec, body):
+    """A network whose last layer says something."""
+    network = build(spec, body)
+    torch.manual_seed(1)
+    for parameter in network.inside.last.parameters():
+        nn.init.normal_(parameter, std=3.0)
+    return network
+
+
+def _inputs(body, frames=2, seed=0):
+    generator = torch.Generator().manual_seed(seed)
+    rest = torch.as_tensor(body.rest, dtype=torch.float32)
+    tool = torch.cat([torch.tensor([0.01, 0.0, 0.04]), torch.randn(10, generator=generator)])
+    return rest + 1e-3 * torch.randn((frames, *rest.shape), generator=generator), tool.expand(
+        frames, -1
+    )
+
+
+@pytest.mark.parametrize("nodes", GRIDS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_output_has_the_shape_of_the_input_and_keeps_the_bound(kind, nodes):
+    body = _body(kind, nodes)
+    vertices, tool = _inputs(body)
+    moved = (
+        _awake(NetworkSpec(kind=kind, features=SMALL, trust=0.5), body)(vertices, tool) - vertices
+    )
+    assert moved.shape == vertices.shape
+    share = moved.abs().amax(dim=(0, 1)) / torch.as_tensor(body.voxel)
+    assert (share <= 0.5 + 1e-5).all()
+    assert share.max() > 0.3
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_untrained_network_leaves_the_simulation_as_it_is(kind):
+    body = _body(kind, (13, 5, 5))
+    vertices, tool = _inputs(body)
+    assert torch.equal(
+        build(NetworkSpec(kind=kind, features=SMALL), body)(vertices, tool), vertices
+    )
+
+
+def test_unet_of_the_paper_has_its_layers():
+    inside = build(NetworkSpec(kind="unet2d"), Body.top(SIZE, (13, 5, 5))).inside
+    assert isinstance(inside, UNet)
+    widths = [
+        [part.weight.shape[0] for part in block.modules() if isinstance(part, Padded)]
+        for block in inside.down
+    ]
+    assert widths == [[64, 64], [128, 128], [256, 256]]
+    bottom = [part.weight.shape[:2] for part in inside.bottom if isinstance(part, Padded)]
+    assert [tuple(shape) for shape in bottom] == [
+        (256, 256 + 7),
+        (256, 256),
+        (256, 256),
+        (256, 256),
+    ]
+    assert all(
+        part.weight.shape[2:] == (3, 3) for part in inside.modules() if isinstance(part, Padded)
+    )
+
+
+@pytest.mark.parametrize("shape", [(2, 1), (13, 5), (1, 1), (4, 2, 2), (2, 1, 1), (3, 1, 4)])
+def test_taps_left_out_change_nothing(shape):
+    torch.manual_seed(0)
+    part = Padded(len(shape), 3, 5)
+    values = torch.randn(2, 3, *shape)
+    plain = (nn.functional.conv2d if len(shape) == 2 else nn.functional.conv3d)(
+        values, part.weight, part.bias, padding=1
+    )
+    assert torch.allclose(part(values), plain, atol=1e-6)
+
+
+@pytest.mark.parametrize("shape", [(13, 5), (13, 5, 5), (2, 1, 3)])
+def test_pool_for_cuda_is_that_of_torch_and_so_is_its_gradient(shape):
+    torch.manual_seed(0)
+    one, other = (
+        torch.rand(2, 3, *shape, generator=torch.Generator().manual_seed(1)).requires_grad_()
+        for _ in range(2)
+    )
+    weights = torch.rand_like(pooled(one))
+    (pooled(one) * weights).sum().backward()
+    (by_halves(other) * weights).sum().backward()
+    assert torch.equal(pooled(one), by_halves(other))
+    assert one.grad is not None and other.grad is not None
+    assert torch.equal(one.grad, other.grad)
+
+
+def test_every_voxel_feels_the_tool_and_every_other_voxel():
+    torch.manual_seed(0)
+    network = UNet((13, 5), 3, 7, SMALL)
+    values, known = torch.randn(1, 3, 13, 5), torch.randn(1, 7)
+    here = network(values, known)
+    assert ((network(values, known + 1) - here).abs().amax(dim=1) > 1e-5).float().mean() > 0.95
+    shifted = values.clone()
+    shifted[0, :, 0, 0] += 1.0
+    assert ((network(shifted, known) - here).abs().amax(dim=1) > 1e-4).float().mean() > 0.9
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_only_the_inputs_that_are_asked_for_are_seen(kind):
+    body = _body(kind, (4, 3, 2))
+    vertices, tool = _inputs(body)
+    other = tool.clone()
+    other[:, 7:] += 5.0
+    blind = _awake(NetworkSpec(kind=kind, features=SMALL), body)
+    sensing = _awake(
+        NetworkSpec(kind=kind, features=SMALL, inputs=("pose", "velocity", "force")), body
+    )
+    assert torch.equal(blind(vertices, tool), blind(vertices, other))
+    assert not torch.allclose(sensing(vertices, tool), sensing(vertices, other), atol=1e-7)
+
+
+def test_graph_network_works_on_tetrahedra():
+    body = Body.of_mesh(filled_box(SIZE, 0.014))
+    vertices, tool = _inputs(body)
+    corrected = _awake(NetworkSpec(kind="graph", features=SMALL), body)(vertices, tool)
+    assert corrected.shape == vertices.shape
+    assert not torch.equal(corrected, vertices)
+
+
+def test_graph_network_does_not_know_how_nodes_are_numbered():
+    body = Body.block(SIZE, (4, 3, 2))
+    order = torch.randperm(len(body.rest), generator=torch.Generator().manual_seed(3))
+    place = torch.argsort(order)
+    turned = Body(
+        body.rest[order],
+        place.numpy()[body.edges],
+        body.voxel,
+        place.numpy()[body.corners],
+        body.shares,
+        None,
+        body.index,
+    )
+    vertices, tool = _inputs(body)
+    spec = NetworkSpec(kind="graph", features=SMALL)
+    here, there = _awake(spec, body), _awake(spec, turned)
+    assert torch.allclose(
+        here(vertices, tool)[:, order], there(vertices[:, order], tool), atol=1e-7
+    )
+
+
+@pytest.mark.parametrize("nodes", GRIDS)
+@pytest.mark.parametrize("kind", ["unet2d", "unet3d"])
+def test_compact_network_says_the_same(kind, nodes):
+    body = _body(kind, nodes)
+    network = _awake(NetworkSpec(kind=kind, features=SMALL, inputs=("pose", "force")), body).eval()
+    vertices, tool = _inputs(body, 1)
+    with torch.no_grad():
+        wanted, single = (
+            network(vertices, tool)[0],
+            Compact(network, half=False)(vertices[0], tool[0]),
+        )
+        rough = Compact(network, half=True)(vertices[0], tool[0])
+        exact = network.double()(vertices.double(), tool.double())[0]
+    assert (
+        Compact(network, half=False)(vertices[0].double(), tool[0].double()) - exact
+    ).abs().max() < 1e-12
+    assert (single - exact).abs().max() < 3 * (
+        wanted - exact
+    ).abs().max()  # rounded in another order, but no worse
+    assert (rough - wanted).square().mean() < 0.05**2 * (wanted - vertices[0]).square().mean()
+
+
+def test_same_seed_gives_the_same_weights_whatever_was_drawn_before():
+    body = Body.top(SIZE, (4, 3, 2))
+    first = build(NetworkSpec(features=SMALL), body, seed=4)
+    torch.rand(7)
+    second, other = (
+        build(NetworkSpec(features=SMALL), body, seed=4),
+        build(NetworkSpec(features=SMALL), body, seed=5),
+    )
+    pairs = zip(first.parameters(), second.parameters(), other.parameters(), strict=True)
+    same, differs = zip(
+        *((torch.equal(a, b), not torch.equal(a, c)) for a, b, c in pairs), strict=True
+    )
+    assert all(same)
+    assert any(differs)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"kind": "mlp"}, "unet2d"),
+        ({"trust": 0.0}, "trust"),
+        ({"inputs": ("smell",)}, "velocity"),
+        ({"features": ()}, "features"),
+    ],
+)
+def test_impossible_network_is_refused(wrong, said):
+    with pytest.raises(CorrectionError, match=said):
+        NetworkSpec(**wrong)
+
+
+def test_network_for_another_body_is_refused():
+    with pytest.raises(CorrectionError, match="2 axes"):
+        build(NetworkSpec(kind="unet2d"), Body.block(SIZE, (4, 3, 2)))
+
+
+def test_spec_survives_json():
+    spec = NetworkSpec(kind="graph", features=(3, 5), trust=0.25, inputs=("pose", "force"))
+    assert NetworkSpec.from_json(spec.to_json()) == spec

@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pushed_block import GRID, SETUP, SIZE, poke
+from shapes import filled_box
+
+from palpate.correction import Body
+from palpate.foundation.errors import CorrectionError
+from palpate.measurement.metrics import supersampled
+from palpate.measurement.surface_gaps import Surface
+from palpate.mesh.box_mesh import GridSpec, box_mesh
+from palpate.replay.replay import replay
+
+NODES = (13, 5, 5)
+
+
+def test_surface_is_that_of_the_papers_metric():
+    frame = replay(SETUP, np.array([poke(2e-3), poke(4e-3)]), GRID)[-1]
+    body = Body.block(SIZE, NODES)
+    assert np.allclose(
+        body.surface(frame.move(body.rest)), supersampled(frame, Surface(SETUP.box)), atol=1e-12
+    )
+
+
+def test_top_is_the_upper_layer_of_the_block():
+    body = Body.block(SIZE, NODES)
+    top = body.upper
+    assert top.grid == NODES[:2]
+    assert top.flat
+    assert np.allclose(top.rest, body.rest[top.index])
+    assert np.allclose(top.rest[:, 2], SIZE[2])
+    assert top.surface(top.rest).shape == (37 * 13, 3)
+    assert np.allclose(top.voxel, body.voxel)
+
+
+def test_neighbours_of_a_hexahedral_mesh_are_those_along_its_axes():
+    grid = Body.block(SIZE, NODES)
+    mesh = Body.of_mesh(box_mesh(SIZE, GridSpec(nodes=NODES)))
+    assert {tuple(pair) for pair in mesh.edges.T} == {tuple(pair) for pair in grid.edges.T}
+
+
+@pytest.mark.parametrize("nodes", [(13, 5, 5), (25, 9, 9), (4, 3, 2)])
+def test_shares_add_up_to_one(nodes):
+    body = Body.block(SIZE, nodes)
+    assert np.allclose(body.shares.sum(axis=1), 1.0)
+    assert np.allclose(body.surface(body.rest).max(axis=0), body.rest.max(axis=0))
+
+
+def test_body_survives_a_file():
+    body = Body.block(SIZE, (4, 3, 2))
+    again = Body.from_arrays(body.to_arrays())
+    assert again.grid == body.grid
+    assert np.array_equal(again.corners, body.corners)
+
+
+def test_body_without_a_grid_has_no_top_layer():
+    with pytest.raises(CorrectionError, match="top layer"):
+        _ = Body.of_mesh(box_mesh(SIZE, GridSpec(nodes=(4, 3, 2)))).upper
+
+
+def test_surface_of_tetrahedra_leaves_out_what_is_held():
+    mesh = filled_box(SIZE, 0.012)
+    body = Body.of_mesh(mesh)
+    places, hull = body.surface(body.rest), mesh.connectivity.hull
+    assert body.grid is None
+    assert np.isin(
+        hull[~np.isin(hull, mesh.connectivity.base_nodes).all(axis=1)], body.corners
+    ).all()
+    on_base = np.isclose(places[:, 2], 0.0)
+    rim = np.isclose(np.abs(places[:, :2]), np.array(SIZE[:2]) / 2).any(axis=1)
+    assert (rim | ~on_base).all()
+    assert len(np.unique(places.round(9), axis=0)) == len(places)

@@ -1,0 +1,75 @@
+"""Fits that come to rest beside a kink, on a function of one number whose best value is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from palpate.diagnosis.inference.evidence import Block, log_evidence
+from palpate.diagnosis.inference.gauss_newton import fitted
+from palpate.diagnosis.inference.hypothesis import Model
+from palpate.effects import Effect
+from palpate.effects.support import BaseCompliance, BaseSlip
+from palpate.foundation.arrays import FloatArray
+from palpate.setup.setup import Box, Setup, Tool
+
+BEST, KINK, REST = np.log(0.15), np.log(0.143), np.log(0.139)
+PRIOR = np.array([[1e-6]])
+SETUP = Setup(geometry=Box(size=(0.07, 0.04, 0.036)), tool=Tool(radius=5e-3))
+
+
+@dataclass
+class Slope:
+    """Residuals (2,) that are linear in one coordinate and vanish at `best`; below a `kink` others
+    do not quite vanish at `REST`.
+
+    Keeps where it was asked.
+    """
+
+    best: float = BEST
+    kink: float = KINK
+    asked: list[float] = field(default_factory=list)
+
+    def evaluate(self, effects: Sequence[Effect], starts: Any) -> Model:
+        (at,) = effects[0].coordinates
+        self.asked.append(at)
+        rows = np.array([[0.0, 300.0 * (at - self.best)], [0.0, 300.0]])
+        if at < self.kink:
+            rows = np.array([[10.0, 200.0 * (at - REST)], [0.0, 200.0]])
+        return Model(tuple(effects), SETUP, (), (Block("one", rows @ rows.T, 1.0),), (0,), {}, ())
+
+    def objective(self, model: Model, nuisances: FloatArray) -> float:
+        return log_evidence(model.blocks, (), np.zeros((0, 0)))
+
+    def tempered(self, model: Model) -> list[Block]:
+        return list(model.blocks)
+
+    def held(self, model: Model, nuisances: FloatArray) -> FloatArray:
+        return PRIOR
+
+
+def _fit(bench: Slope, effect: Effect, hopeless: float = -np.inf) -> Model:
+    return fitted(bench, bench.evaluate([effect], None), np.zeros((0, 0)), hopeless)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("start", [0.12, 0.139, 0.145, 0.22])
+def test_the_best_friction_is_found_from_either_side_of_a_kink(start: float) -> None:
+    found = _fit(Slope(), BaseSlip(friction_coefficient=start))
+    assert found.effects[0].coordinates[0] == pytest.approx(BEST, abs=2e-3)
+
+
+def test_without_a_kink_nothing_is_asked_beside_the_optimum() -> None:
+    smooth = Slope(best=np.log(30.0), kink=-np.inf)
+    found = _fit(smooth, BaseCompliance(stiffness_over_E=50.0))
+    assert found.effects[0].coordinates[0] == pytest.approx(np.log(30.0), abs=2e-3)
+    assert len(smooth.asked) <= 3
+
+
+def test_a_fit_that_is_given_up_is_not_asked_again() -> None:
+    bench = Slope()
+    _fit(bench, BaseSlip(friction_coefficient=0.139), hopeless=1e6)
+    assert len(bench.asked) == 1

@@ -1,0 +1,55 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from palpate.diagnosis.observation.stray_points import among_neighbours
+from palpate.measurement.surface_gaps import Surface
+from palpate.setup.setup import Box
+
+SURFACE = Surface(Box(size=(0.06, 0.04, 0.03)))
+HIDDEN = 20
+
+
+def _cloud(stray: float, points: int, slope: float = 0.0):
+    """Gaps [m] with twenty points on every patch of the top but one, which has a few that lie
+    `stray` off.
+    """
+    top = np.flatnonzero(SURFACE.patch_normals[:, 2] > 0.9)
+    hidden = top[HIDDEN]
+    patch = np.concatenate([np.repeat(np.setdiff1d(top, [hidden]), 20), np.full(points, hidden)])
+    gap = slope * SURFACE.patch_centres[patch, 0] + np.random.default_rng(3).normal(
+        0.0, 3e-4, len(patch)
+    )
+    gap[patch == hidden] += stray
+    return gap, patch, hidden
+
+
+@pytest.mark.parametrize("stray", [4e-3, -2e-3])
+def test_lone_points_far_from_all_around_are_set_aside(stray):
+    gap, patch, hidden = _cloud(stray, 2)
+    kept = among_neighbours(gap, patch, SURFACE)
+    assert not kept[patch == hidden].any()
+    assert kept[patch != hidden].all()
+
+
+def test_a_patch_with_its_usual_points_speaks_for_itself():
+    gap, patch, _ = _cloud(4e-3, 20)
+    assert among_neighbours(gap, patch, SURFACE).all()
+
+
+def test_a_patch_that_floats_where_no_dent_could_bring_it_is_set_aside_however_well_it_is_seen():
+    gap, patch, hidden = _cloud(1.1e-2, 20)
+    kept = among_neighbours(gap, patch, SURFACE)
+    assert not kept[patch == hidden].any()
+    assert kept[patch != hidden].all()
+
+
+def test_what_lies_where_its_neighbours_lie_is_kept_however_wrong_the_model():
+    gap, patch, _ = _cloud(0.0, 2, slope=0.1)
+    assert np.abs(gap).max() > 2e-3
+    assert among_neighbours(gap, patch, SURFACE).all()
+
+
+def test_no_point_at_all():
+    assert len(among_neighbours(np.zeros(0), np.zeros(0, dtype=int), SURFACE)) == 0

@@ -1,0 +1,295 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from noisy_model import LUMP, RADIUS, noisy_model, stated_bench
+from small_dataset import write_valid_dataset
+
+from palpate.dataset import Dataset, open_dataset
+from palpate.diagnosis.gain.gain_ladder import Ladder
+from palpate.diagnosis.inference.camera_error_model import Ripple
+from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.residual_structure import Structure
+from palpate.diagnosis.report.report import UNEXPLAINED_MISFIT, report_of, verdict_of
+from palpate.diagnosis.search.findings import RIVAL, Findings, Trial
+from palpate.diagnosis.validation.held_out_test import HeldOut
+from palpate.diagnosis.validation.rejection import objection
+from palpate.diagnosis.validation.stiffness_error_test import Asked
+from palpate.diagnosis.validation.worst_location import Worst
+from palpate.effects import DIAGNOSED, Effect
+from palpate.effects.elastic_material import PoissonRatio
+
+NU = PoissonRatio(nu=0.40)
+RIM = Worst((0.03, 0.0, 0.039), 0.4)
+LADDER = Ladder(
+    baseline=1.92e-3,
+    extended=0.61e-3,
+    noise_floor=0.55e-3,
+    removed=(0.956, 0.93, 0.98),
+    paper=(2.4e-3, 1.3e-3),
+    probes=9,
+)
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    """Two sequences, one of them without forces."""
+    return open_dataset(write_valid_dataset(tmp_path_factory.mktemp("data") / "small-block"))
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Bench]:
+    with stated_bench() as found:
+        yield found
+
+
+Tried = tuple[tuple[Effect, ...], float, float]
+
+
+def _findings(bench: Bench, *trials: Tried, accepted: bool = True, misfit: float = 2.0) -> Findings:
+    """Trials as (effects, gain, misfit left), best first; the first is accepted or not."""
+    made = [
+        Trial(noisy_model(bench, *effects), gain, left, asked=12.0 * len(effects))
+        for effects, gain, left in trials
+    ]
+    screened = {kind.name: 0.5 * number for number, kind in enumerate(DIAGNOSED)}
+    return Findings(
+        noisy_model(bench), made[0] if accepted and made else None, made, 12.0, misfit, screened
+    )
+
+
+def test_one_cause_far_ahead_is_found(bench):
+    assert (
+        verdict_of(_findings(bench, ((LUMP,), 90.0, 1.05), ((RADIUS,), 90.0 - 1.1 * RIVAL, 1.4)))
+        == "found"
+    )
+
+
+def test_two_causes_about_as_good_are_ambiguous(bench):
+    assert (
+        verdict_of(_findings(bench, ((LUMP,), 90.0, 1.05), ((RADIUS,), 90.0 - 0.9 * RIVAL, 1.1)))
+        == "ambiguous"
+    )
+
+
+def test_same_cause_from_another_start_is_no_rival(bench):
+    assert verdict_of(_findings(bench, ((LUMP,), 90.0, 1.05), ((LUMP,), 89.0, 1.1))) == "found"
+
+
+def test_part_of_a_pair_is_no_rival(bench):
+    assert (
+        verdict_of(_findings(bench, ((LUMP, RADIUS), 90.0, 1.05), ((LUMP,), 89.0, 1.1))) == "found"
+    )
+
+
+@pytest.mark.parametrize(
+    ("left", "wanted"), [(1.02, "none"), (UNEXPLAINED_MISFIT + 0.2, "unexplained")]
+)
+def test_without_a_cause_it_depends_on_what_is_left(bench, left, wanted):
+    assert verdict_of(_findings(bench, ((LUMP,), 3.0, 1.0), accepted=False, misfit=left)) == wanted
+    assert verdict_of(_findings(bench, accepted=False, misfit=left)) == wanted
+
+
+def test_structured_error_without_a_cause_is_unexplained(bench):
+    findings = _findings(bench, accepted=False, misfit=1.02)
+    findings.structure = findings.left = Structure(50.0, 20.0, 30.0)
+    assert verdict_of(findings) == "unexplained"
+    findings.structure = findings.left = Structure(29.0, 20.0, 30.0)
+    assert verdict_of(findings) == "none"
+
+
+def test_depth_that_waves_is_told_and_is_no_noise(bench, dataset):
+    findings = _findings(bench, misfit=1.0)
+    assert verdict_of(findings) == "none"
+    findings.ripple = Ripple(size=2e-4, reach=4e-3, gain=80.0, share=0.3)
+    report = report_of(dataset, bench, findings, LADDER, "test")
+    assert (report["verdict"], report["causes"], report["unexplained"]["fraction"]) == (
+        "unexplained",
+        [],
+        0.3,
+    )
+    assert "rest.ply" in report["unexplained"]["where"]
+    assert any(
+        "waves with the distance from the camera, by about 0.2 mm" in text
+        for text in report["warnings"]
+    )
+
+
+def test_error_that_only_the_test_sequences_show_is_no_all_clear(bench, dataset):
+    findings = _findings(bench, misfit=1.0)
+    findings.beyond = HeldOut(noisy_model(bench), Structure(20.0, 20.0, 30.0))
+    clear = report_of(dataset, bench, findings, LADDER, "test")
+    assert (clear["verdict"], clear["unexplained"]["fraction"]) == ("none", 0.0)
+    assert (
+        clear["evidence"]["held_out_structure"],
+        clear["evidence"]["held_out_structure_bound"],
+    ) == (1.0, 1.5)
+    findings.beyond = HeldOut(noisy_model(bench), Structure(50.0, 20.0, 30.0))
+    report = report_of(dataset, bench, findings, LADDER, "test")
+    assert (report["verdict"], report["causes"], report["unexplained"]["fraction"]) == (
+        "unexplained",
+        [],
+        0.6,
+    )
+    assert report["unexplained"]["when"] == "most in poke-02, on which nothing was fitted"
+
+
+def test_sequence_that_asks_for_more_than_a_replay_errs_is_no_all_clear(bench, dataset):
+    findings = _findings(bench, misfit=1.0)
+    name = findings.baseline.predictions[-1].name
+    findings.asked = Asked(name, 1.2, 0.5, 6.0, RIM)
+    clear = report_of(dataset, bench, findings, LADDER, "test")
+    assert (
+        clear["verdict"] == "none"
+        and clear["evidence"]["local_stiffness_error"][0]["sequence"] == name
+    )
+    findings.asked = Asked(name, 4.0, 13.2, 6.0, RIM)
+    report = report_of(dataset, bench, findings, LADDER, "test")
+    assert (report["verdict"], report["causes"], report["unexplained"]["fraction"]) == (
+        "unexplained",
+        [],
+        0.9375,
+    )
+    assert report["unexplained"]["when"] == f"most in {name}"
+    assert report["unexplained"]["where"] == "40 % of it within 8 mm of (30, 0, 39) mm"
+    assert report["warnings"][-1].startswith(
+        f"{name} would need local stiffness that is off by 16 %"
+    )
+
+
+def test_test_sequence_that_asks_for_more_is_no_all_clear_either(bench, dataset):
+    findings = _findings(bench, misfit=1.0)
+    other = noisy_model(bench)
+    findings.asked = Asked("poke-01", 1.0, 0.0, 6.0, RIM)
+    findings.beyond = HeldOut(
+        other, Structure(20.0, 20.0, 30.0), Asked(other.predictions[-1].name, 4.0, 13.2, 6.0, RIM)
+    )
+    report = report_of(dataset, bench, findings, LADDER, "test")
+    assert report["verdict"] == "unexplained"
+    assert (
+        report["unexplained"]["when"]
+        == f"most in {other.predictions[-1].name}, on which nothing was fitted"
+    )
+
+
+def test_named_cause_stands_beside_waves_of_depth(bench, dataset):
+    findings = _findings(bench, ((RADIUS,), 60.0, 1.0))
+    findings.ripple = Ripple(size=2e-4, reach=4e-3, gain=80.0, share=0.3)
+    report = report_of(dataset, bench, findings, LADDER, "test")
+    assert report["verdict"] == "found"
+    assert any("waves with the distance" in text for text in report["warnings"])
+
+
+def test_report_keeps_the_contract(bench, dataset):
+    findings = _findings(bench, ((LUMP,), 90.0, 1.05), ((RADIUS,), 40.0, 1.5))
+    report = report_of(dataset, bench, findings, LADDER, "test")
+    assert json.loads(json.dumps(report)) == report
+    assert (report["format"], report["dataset"], report["verdict"]) == (1, "small-block", "found")
+    (cause,) = report["causes"]
+    assert cause["effect"] == "stiff_inclusion" and cause["probability"] > 0.99
+    assert set(cause["parameters"]) == {"x", "y", "z", "radius", "stiffness_ratio"}
+    assert all(
+        {"value", "unit", "low", "high"} == set(entry) for entry in cause["parameters"].values()
+    )
+    assert {row["effect"] for row in report["ranking"]} == {kind.name for kind in DIAGNOSED} - {
+        "stiff_inclusion"
+    }
+    assert all({"effect", "probability", "error_removed"} <= set(row) for row in report["ranking"])
+    assert report["ranking"][0]["effect"] == "tool_radius" and report["ranking"][0][
+        "error_removed"
+    ] == pytest.approx(0.5)
+    assert {"fraction", "where", "when"} <= set(report["unexplained"])
+    assert report["warnings"] == ["the touches disagree"]
+    assert report["gain"] == {
+        "split": "test",
+        "unit": "mm",
+        "baseline": 1.92,
+        "extended": 0.61,
+        "noise_floor": 0.55,
+        "reducible_removed": {"value": 0.956, "low": 0.93, "high": 0.98},
+        "paper_metric": {"baseline": 2.4, "extended": 1.3},
+        "probes": 9,
+    }
+
+
+def test_stiffness_is_not_identifiable_without_forces(bench, dataset):
+    report = report_of(dataset, bench, _findings(bench, accepted=False, misfit=1.0), None, "test")
+    (entry,) = report["not_identifiable"]
+    assert report["identified"] == []
+    assert entry["effect"] == "young_modulus"
+    assert "force" in entry["measure_instead"] and entry["why"]
+
+
+def test_report_without_a_cause_names_none(bench, dataset):
+    report = report_of(
+        dataset,
+        bench,
+        _findings(bench, ((LUMP,), 2.0, 1.0), accepted=False, misfit=1.0),
+        None,
+        "test",
+    )
+    assert report["verdict"] == "none" and report["causes"] == [] and report["gain"] is None
+    assert len(report["ranking"]) == len(DIAGNOSED)
+
+
+def test_cause_that_makes_the_test_sequences_worse_is_withdrawn(bench, dataset):
+    findings = _findings(bench, ((RADIUS,), 106.0, 1.02), ((LUMP,), 8.0, 1.03), misfit=1.03)
+    worse = replace(LADDER, removed=(-0.75, -1.4, -0.31))
+    why = objection(findings, worse)
+    findings.withdraw(why)
+    report = report_of(dataset, bench, findings, LADDER, "test")
+    assert report["verdict"] == "none" and report["causes"] == []
+    assert report["warnings"] == ["the touches disagree", why]
+    assert why.startswith("tool_radius would explain") and "adds 75 % (31 to 140 %)" in why
+    chances = {row["effect"]: row["probability"] for row in report["ranking"]}
+    assert chances["tool_radius"] == 0.0 < chances["stiff_inclusion"]
+
+
+def test_ambiguous_report_names_every_rival(bench, dataset):
+    findings = _findings(bench, ((LUMP,), 90.0, 1.05), ((RADIUS,), 88.0, 1.1), ((NU,), 20.0, 1.9))
+    report = report_of(dataset, bench, findings, None, "test")
+    assert [cause["effect"] for cause in report["causes"]] == ["stiff_inclusion", "tool_radius"]
+    first, second = (cause["probability"] for cause in report["causes"])
+    assert 0.5 < first < 0.75 and second == pytest.approx(1 - first, abs=1e-3)
+
+
+@pytest.mark.parametrize("accepted", [True, False])
+def test_probabilities_of_exclusive_causes_add_up_to_at_most_one(bench, dataset, accepted):
+    trials = (
+        ((LUMP,), 20.0, 1.1),
+        ((RADIUS,), 16.0, 1.2),
+        ((NU,), 13.0, 1.2),
+        ((LUMP,), 18.0, 1.2),
+    )
+    report = report_of(dataset, bench, _findings(bench, *trials, accepted=accepted), None, "test")
+    chances = [row["probability"] for row in (*report["causes"], *report["ranking"])]
+    assert all(0 <= chance <= 1 for chance in chances)
+    assert sum(chances) <= 1 + 1e-3
+    assert sum(chances) < 0.99  # that there is no cause has a probability, too
+
+
+def test_a_further_cause_that_was_refused_is_less_probable_than_not(bench, dataset):
+    """It gains 10 nats where the search asks 12 of it: the odds against it are what is lacking."""
+    findings = _findings(bench, ((LUMP,), 90.0, 1.05), ((LUMP, RADIUS), 100.0, 1.02))
+    chances = {
+        row["effect"]: row["probability"]
+        for row in report_of(dataset, bench, findings, None, "test")["ranking"]
+    }
+    assert 0.2 < chances["tool_radius"] < 0.5
+    findings.trials[1] = replace(
+        findings.trials[1], gain=1000.0, asked=np.inf
+    )  # of one sequence alone
+    report = report_of(dataset, bench, findings, None, "test")
+    assert {row["effect"]: row["probability"] for row in report["ranking"]}["tool_radius"] == 0.0
+    assert report["causes"][0]["probability"] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_what_is_left_is_told_by_place_and_sequence(bench, dataset):
+    findings = _findings(bench, accepted=False, misfit=3.0)
+    left = report_of(dataset, bench, findings, None, "test")["unexplained"]
+    assert left["when"] == "most in poke-02"
+    assert 0 <= left["fraction"] <= 1 and "mm" in left["where"]

@@ -1,0 +1,113 @@
+"""Hypotheses in which something is remembered, on the bench that fits them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from dragged_block import dragged
+from pushed_block import GRID, SETUP, registration
+
+from palpate.diagnosis.forward.prediction import Prediction
+from palpate.diagnosis.forward.worker_pool import Workers
+from palpate.diagnosis.gain.gain_ladder import ladder
+from palpate.diagnosis.inference.credible_intervals import intervals
+from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.noise_model import Noise
+from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.diagnosis.validation.falsified_motions import FALSIFIED
+from palpate.diagnosis.validation.negative_controls import controls
+from palpate.effects import Effect
+from palpate.effects.time_dependence import PermanentSet, Viscoelasticity
+from palpate.effects.tool import ToolFriction, ToolRadius
+from palpate.foundation.arrays import FloatArray
+
+TRUE: dict[str, Effect] = {
+    "viscoelasticity": Viscoelasticity(relaxed_fraction=0.6, time_constant=1.2),
+    "permanent_set": PermanentSet(retained_fraction=0.25),
+    "tool_friction": ToolFriction(friction_coefficient=0.35),
+}
+BEGIN: dict[str, Effect] = {
+    "viscoelasticity": Viscoelasticity(relaxed_fraction=0.5, time_constant=0.3),
+    "permanent_set": PermanentSet(retained_fraction=0.15),
+    "tool_friction": ToolFriction(friction_coefficient=0.5),
+}
+
+
+@pytest.fixture(scope="module", params=TRUE)
+def name(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def data(name: str) -> list[Observations]:
+    """Two drags, there and back, of a block in which one thing is remembered."""
+    truth = TRUE[name].apply(SETUP)
+    return [
+        dragged(truth, 1e-4, f"drag-{number:02d}", turn) for number, turn in enumerate((1.0, -1.0))
+    ]
+
+
+@pytest.fixture(scope="module")
+def bench(data: list[Observations]) -> Iterator[Bench]:
+    with Workers(data, 1) as workers:
+        made = Bench(SETUP, registration(), workers, [item.name for item in data], None, GRID, GRID)
+        shape = made.evaluate(()).predictions[0].gap.shape
+        made.noises = [_noise(item, shape) for item in made.evaluate(()).predictions]
+        yield made
+
+
+def _noise(item: Prediction, shape: tuple[int, ...]) -> Noise:
+    weights = np.where(np.isfinite(item.gap), item.count / 1e-8, 0.0)
+    return Noise(weights, np.nan_to_num(item.gap), np.zeros(shape), np.zeros((*shape, 0)))
+
+
+def _change(there: list[Prediction], here: list[Prediction]) -> FloatArray:
+    return np.concatenate(
+        [one.less(other)[0].ravel() for one, other in zip(there, here, strict=True)]
+    )
+
+
+def test_columns_are_nearly_what_another_size_changes(bench, name):
+    baseline, effect = bench.evaluate(()), BEGIN[name]
+    model = bench.evaluate((effect,), baseline.predictions)
+    for number, (item, column) in enumerate(zip(effect.numbers(), model.columns, strict=True)):
+        coordinates = effect.coordinates
+        coordinates[number] += item.scale
+        there = [
+            f.result() for f in bench.predict([effect.at(coordinates)], None, baseline.predictions)
+        ]
+        true = _change(there, list(model.predictions)) / item.scale
+        stated = np.concatenate([one.columns[..., column].ravel() for one in model.predictions])
+        assert true @ stated / np.linalg.norm(true) / np.linalg.norm(stated) > 0.85
+
+
+def test_columns_of_what_is_not_remembered_stay_in_their_places(bench, name):
+    radius, baseline = ToolRadius(radius=4.6e-3), bench.evaluate(())
+    both, alone = (
+        bench.evaluate((BEGIN[name], radius), baseline.predictions),
+        bench.evaluate((radius,), baseline.predictions),
+    )
+    own, place = (model.predictions[0].columns[..., model.columns[-1]] for model in (both, alone))
+    assert len(both.columns) == 1 + len(BEGIN[name].numbers())
+    assert np.array_equal(own, place) and np.abs(own).max() > 0.1
+
+
+def test_fit_finds_what_is_remembered_and_its_gain_and_controls_know_it(bench, data, name):
+    baseline = bench.evaluate(())
+    model = bench.refit([BEGIN[name]], baseline.predictions)
+    for item, value, true in zip(
+        model.effects[0].numbers(),
+        model.effects[0].coordinates,
+        TRUE[name].coordinates,
+        strict=True,
+    ):
+        assert value == pytest.approx(true, abs=0.6 * item.scale)
+    (entry,) = intervals(bench, model)
+    assert all(one["low"] < one["value"] < one["high"] for one in entry.values())
+    gain = ladder(data, baseline.predictions, model.predictions, SETUP, model.setup, 0)
+    assert gain.removed[0] > 0.8
+    found = controls(bench, data, model, baseline)
+    assert [control.control for control in found] == list(FALSIFIED)
+    assert all(control.true > 30 and control.passed is not False for control in found)

@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pushed_block import SETUP
+
+from palpate.diagnosis.inference.hypothesis import Model
+from palpate.diagnosis.inference.residual_structure import Structure
+from palpate.diagnosis.search.findings import LEAST_GAIN, Findings, Trial
+from palpate.diagnosis.search.forward_selection import PROMISING, _asks_for_more, _needed
+from palpate.effects.support import BaseCompliance
+
+STATED = Model((), SETUP, (), (), (), {}, ())
+SOFT = Model((BaseCompliance(stiffness_over_E=41.0),), SETUP, (), (), (), {}, ())
+QUIET, LOUD = Structure(75.0, 100.0, 140.0), Structure(300.0, 100.0, 140.0)
+
+
+def test_first_cause_must_gain_what_chance_alone_does_not():
+    assert _needed(Findings(STATED, bound=31.0), Trial(STATED, 0.0, 1.2)) == 31.0
+
+
+def _second(first: float, left: Structure = QUIET) -> float:
+    return _needed(Findings(STATED, left=left), Trial(SOFT, first, 1.06))
+
+
+def test_second_cause_may_show_a_fifth_of_what_the_first_does():
+    """A soft base of 2508 nats and touches of other places, 484 more, on the virtual bench."""
+    assert _second(2508.0) < 484.0
+
+
+@pytest.mark.parametrize(
+    ("only", "best"),
+    [(3389.0, 5.1), (14780.0, 6.1), (3252.0, 34.7), (3675.0, 8.8), (694.0, 20.4), (194.0, 37.0)],
+)
+def test_nothing_is_named_beside_an_only_cause(only: float, best: float):
+    """What the best of the catalogue gained on top of it, on the virtual bench and on data of
+    another solver.
+    """
+    assert _second(only) > best
+
+
+def test_where_structure_is_left_a_fainter_second_cause_is_let_in():
+    assert _second(2508.0, LOUD) == 2 * LEAST_GAIN < _second(2508.0)
+
+
+def test_what_tangents_know_little_of_is_refitted_beside_a_cause_only_where_another_might_be_named():
+    needed = _second(994.0)
+    quiet, promising = (
+        np.array([3.0, 0.9 * PROMISING * needed]),
+        np.array([3.0, 1.1 * PROMISING * needed]),
+    )
+    assert _asks_for_more(Findings(STATED), Trial(STATED, 0.0, 1.2), quiet)
+    soft = Trial(SOFT, 994.0, 1.06)
+    assert not _asks_for_more(Findings(STATED, left=QUIET), soft, quiet)
+    assert _asks_for_more(Findings(STATED, left=QUIET), soft, promising)
+    assert _asks_for_more(Findings(STATED, left=LOUD), soft, quiet)
+    assert not _asks_for_more(Findings(STATED, left=QUIET), soft, np.empty(0))

@@ -1,0 +1,123 @@
+"""How much of the engine's own error a sequence asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pushed_block import CORNERS, SETUP, TOP, observed, poke, registration
+
+from palpate.diagnosis.forward.worker_pool import Workers
+from palpate.diagnosis.inference.evidence import Block, gram
+from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.noise_model import STIFFNESS_ERROR
+from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.diagnosis.search.candidates import lump_places
+from palpate.diagnosis.validation.stiffness_error_test import (
+    USUAL,
+    Asked,
+    Wanted,
+    asked_of,
+    bound_for,
+    most_asked,
+)
+from palpate.diagnosis.validation.worst_location import Worst
+from palpate.effects.base import with_effects
+from palpate.effects.elastic_material import StiffInclusion
+from palpate.mesh.box_mesh import GridSpec
+from palpate.setup.setup import Setup
+
+GRID, FINE = GridSpec(nodes=(9, 7, 6), spacing=2e-3), GridSpec(nodes=(11, 9, 7), spacing=1.7e-3)
+STATED = replace(SETUP, landmarks=CORNERS)
+LUMP = StiffInclusion(x=0.002, y=0.0, z=0.026, radius=7e-3, stiffness_ratio=6.0)
+
+
+def _pushed(name: str, truth: Setup, seed: int) -> Observations:
+    centres = np.array([poke(-6e-3), poke(2e-3), poke(4e-3), poke(6e-3)])
+    return replace(observed(truth, centres, count=20000, noise=2e-4, seed=seed), name=name)
+
+
+DATA = {
+    one.name: one
+    for one in (
+        _pushed("clear", STATED, 0),
+        _pushed("alike", STATED, 10),
+        _pushed("lumpy", with_effects(STATED, [LUMP]), 20),
+    )
+}
+
+
+@pytest.fixture(scope="module")
+def workers() -> Iterator[Workers]:
+    with Workers(list(DATA.values()), 1) as found:
+        yield found
+
+
+def _looked_at(workers: Workers, *names: str) -> Asked:
+    bench = Bench(STATED, registration(), workers, names, None, GRID, FINE)
+    found = most_asked(bench, bench.baseline((), lump_places(bench)))
+    assert found is not None
+    return found
+
+
+def test_what_is_as_stated_asks_for_nothing_unusual(workers: Workers) -> None:
+    found = _looked_at(workers, "clear", "alike")
+    assert not found.significant and found.warning == "" and found.gain < 0.3 * found.bound
+
+
+def test_what_acts_in_one_sequence_alone_is_told_with_its_name(workers: Workers) -> None:
+    found = _looked_at(workers, "clear", "alike", "lumpy")
+    assert found.significant and found.sequence == "lumpy" and found.factor > 2
+    x, y, z = found.place.place
+    # Straight above the lump the tool is in the way.
+    assert np.hypot(x - LUMP.x, y - LUMP.y) < 15e-3 and z == TOP and 0.1 < found.place.share < 0.3
+    assert (
+        "lumpy would need local stiffness that is off by" in found.warning
+        and "4 % at most" in found.warning
+    )
+
+
+GROUPS, PATCHES, NUISANCES, MOVED, SPOTS = 8, 60, 2, 6, 20
+FITTED, OWN = [0, 1], MOVED + SPOTS
+
+
+def _asked(deviation: float, seed: int) -> Wanted:
+    """Of white noise, nuisances, and errors of local stiffness of this deviation over the allowed
+    one.
+    """
+    random = np.random.default_rng(seed)
+    columns = random.standard_normal((GROUPS, PATCHES, NUISANCES + OWN)) * 0.3
+    factors = random.standard_normal(NUISANCES + OWN) * np.array(
+        [*[1.0] * NUISANCES, *[0.5] * MOVED, *[deviation] * SPOTS]
+    )
+    residual = columns @ factors + random.standard_normal((GROUPS, PATCHES))
+    block = Block("poke", *gram(residual, columns, np.ones((GROUPS, PATCHES))))
+    return asked_of(block, FITTED, np.eye(NUISANCES), OWN, SPOTS)
+
+
+@pytest.mark.parametrize("deviation", [0.05, USUAL])
+def test_what_is_usual_is_rarely_too_much(deviation: float) -> None:
+    gains = np.array([_asked(deviation, seed).gain for seed in range(200)])
+    assert (gains > bound_for(1)).sum() <= 2 and np.median(gains) < 0.5
+
+
+def test_more_than_usual_is_measured() -> None:
+    found = [_asked(4 * USUAL, seed) for seed in range(20)]
+    assert all(one.gain > bound_for(4) for one in found)
+    assert np.median([one.factor for one in found]) == pytest.approx(4.0, rel=0.5)
+
+
+def test_more_sequences_ask_for_more_by_chance() -> None:
+    assert 4.5 < bound_for(1) < bound_for(4) < bound_for(20) < 8.0
+
+
+def test_factor_is_said_in_percent_of_stiffness() -> None:
+    found = Asked("poke-side-01", 4.0, 13.2, 6.1, Worst((0.0, 0.0, 0.0), 1.0))
+    assert (
+        f"off by {100 * 4 * USUAL * STIFFNESS_ERROR:.0f} %" in found.warning
+        and found.share == 1 - 1 / 16
+    )
+    assert found.to_json()["deviation"] == pytest.approx(4 * USUAL * STIFFNESS_ERROR)
+    assert replace(found, gain=5.0).warning == ""

@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from palpate.fem.contact_condensation import Compliance
+from palpate.fem.model import BlockModel, Probe
+from palpate.fem.modified_newton import Follower
+from palpate.fem.newton import misfit, solve
+from palpate.foundation.arrays import FloatArray
+from palpate.mesh.box_mesh import GridSpec
+from palpate.mesh.elements import HEXAHEDRA
+from palpate.mesh.graded_mesh import REPLAY_GRID
+from palpate.replay.replay import Replay
+from palpate.setup.setup import Box, Setup, Tool
+
+SIZE = (0.0687, 0.0393, 0.0358)
+SETUP = Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3))
+PLACE = np.array([4e-3, 2e-3, SIZE[2] + 5e-3 - 3e-3])
+ORDERS = pytest.mark.parametrize("order", HEXAHEDRA)
+
+
+def _pressed(order: int) -> tuple[BlockModel, FloatArray, Probe]:
+    """A block at rest under a tool 3 mm deep: model, positions (n, 3) [m] and tool."""
+    block = Replay(SETUP, GridSpec(nodes=(9, 9, 5), spacing=2e-3, order=order), 1e-10)
+    frame = block.step(PLACE)
+    assert frame.outcome.name == "CONVERGED"
+    return block.model(frame.mesh), frame.mesh.nodes + frame.displacement, frame.probe
+
+
+@ORDERS
+@pytest.mark.parametrize(
+    "motion", [(0, 0, -2e-4), (3e-4, 0, 0), (0, -2e-4, 4e-4)], ids=["deeper", "along", "back"]
+)
+def test_following_finds_what_newton_finds(order, motion):
+    model, positions, probe = _pressed(order)
+    moved = Probe(probe.centre + motion, probe.radius)
+    found, wanted = (
+        Follower().solve(model, moved, positions, 1e-9),
+        solve(model, moved, positions, probe, 1e-9),
+    )
+    assert found is not None
+    assert found.converged and wanted.converged
+    travelled = np.abs(wanted.positions - positions).max()
+    assert np.abs(found.positions - wanted.positions).max() < 1e-6 * travelled
+    assert np.allclose(found.push, wanted.push, rtol=1e-6)
+
+
+@ORDERS
+def test_one_step_takes_the_contact_to_its_balance(order):
+    model, positions, probe = _pressed(order)
+    compliance = Compliance.at(model, positions, probe)
+    assert compliance is not None
+    moved = Probe(probe.centre - (0, 0, 5e-5), probe.radius)
+    before = model.assemble(positions, moved, tangent=False)
+    stepped = compliance.step(model, positions, before.residual, moved)
+    assert stepped is not None
+    after = model.assemble(stepped, moved, tangent=False)
+    assert misfit(model, after) < 2e-3 * misfit(model, before)
+
+
+def test_body_in_balance_stays_where_it_is():
+    model, positions, probe = _pressed(1)
+    compliance = Compliance.at(model, positions, probe)
+    assert compliance is not None
+    residual = model.assemble(positions, probe, tangent=False).residual
+    stepped = compliance.step(model, positions, residual, probe)
+    assert stepped is not None
+    assert np.abs(stepped - positions).max() < 1e-9
+
+
+def test_linearisation_is_given_up_with_its_factor():
+    model, positions, probe = _pressed(1)
+    compliance = Compliance.at(model, positions, probe)
+    assert compliance is not None and compliance.fits(model)
+    model.topology.factor.factorise(model.assemble(positions, probe).data)
+    assert not compliance.fits(model)
+
+
+@pytest.mark.parametrize(
+    "place", [PLACE, np.array([SIZE[0] / 2 + 5e-3 - 2e-3, 4e-3, 0.02])], ids=["top", "side"]
+)
+def test_what_a_tool_presses_on_is_what_the_graded_mesh_says_is_near(place):
+    block = Replay(SETUP, REPLAY_GRID, 1e-6)
+    frame = block.step(place)
+    compliance = Compliance.at(
+        block.model(frame.mesh), frame.mesh.nodes + frame.displacement, frame.probe
+    )
+    assert frame.in_contact and compliance is not None
+    assert np.isin(compliance._nodes, frame.mesh.near_focus).all()
+    assert len(frame.mesh.near_focus) < 0.1 * len(frame.mesh.nodes)
+    assert not len(GridSpec(nodes=(9, 9, 5), order=2).mesh(SETUP, place).near_focus)
+
+
+def test_tool_that_is_far_away_leaves_nothing_to_linearise():
+    model, positions, _ = _pressed(1)
+    far = Probe(np.array([0.0, 0.0, 0.2]), 5e-3)
+    assert Compliance.at(model, positions, far) is None
+    assert Follower().solve(model, far, positions, 1e-9) is None
+
+
+def test_many_small_steps_take_few_factors():
+    model, positions, probe = _pressed(1)
+    follower, before = Follower(), model.topology.factor.generation
+    for number in range(1, 21):
+        moved = Probe(probe.centre - (0, 0, 3e-5 * number), probe.radius)
+        solution = follower.solve(model, moved, positions, 1e-6)
+        assert solution is not None and solution.converged
+        positions = solution.positions
+    assert model.topology.factor.generation - before <= 4

@@ -1,0 +1,152 @@
+"""Frames solved again: the same as the recording where the causes are the same, and nearer to the
+data with the true one.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from recorded_run import RADIUS, SEQUENCE, write_recorded_run
+
+from palpate.foundation.errors import EffectError, RunError
+from palpate.recording.interior_fields import Inside
+from palpate.recording.resolve_frame import WhatIf
+from palpate.recording.saved_model import effects_from
+
+LARGER = {"effect": "tool_radius", "parameters": {"radius": RADIUS}}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("whatif")
+    return write_recorded_run(place / "datasets", place / "runs")
+
+
+@pytest.fixture(scope="module")
+def replay(run: Path) -> dict[str, Any]:
+    with np.load(run / "replays" / f"{SEQUENCE}.npz") as stored:
+        return {name: stored[name] for name in stored.files}
+
+
+def opened(run: Path, replay: dict[str, Any]) -> WhatIf:
+    folder = Path(json.loads((run / "origin.json").read_text())["dataset"])
+    return WhatIf(
+        folder,
+        SEQUENCE,
+        replay["cloud_index"].tolist(),
+        json.loads((run / "model.json").read_text()),
+    )
+
+
+@pytest.fixture(scope="module")
+def what(run: Path, replay: dict[str, Any]) -> WhatIf:
+    return opened(run, replay)
+
+
+@pytest.fixture(scope="module")
+def deepest(replay: dict[str, Any]) -> int:
+    return int(np.argmin(replay["tool_raw"][:, 2]))
+
+
+def test_no_cause_is_the_stated_model_and_the_models_causes_are_the_extended_one(
+    what: WhatIf, replay: dict[str, Any], deepest: int
+) -> None:
+    for name, rows in (("raw", []), ("extended", [LARGER])):
+        moment = what.solve(deepest, effects_from(rows))
+        push = np.abs(replay[name][deepest] - replay["rest"]).max()
+        assert np.abs(moment.surface - replay[name][deepest]).max() < 2e-3 * push
+        assert moment.distance == pytest.approx(replay[f"distance_{name}"][deepest], rel=5e-3)
+        assert moment.tool == pytest.approx(replay[f"tool_{name}"][deepest], abs=1e-9)
+        assert moment.radius == pytest.approx(float(replay[f"tool_radius_{name}"]))
+        assert moment.converged and moment.outcome == "converged"
+
+
+def test_true_cause_lies_nearest_to_what_was_measured(what: WhatIf, deepest: int) -> None:
+    off = {
+        radius: what.solve(deepest, effects_from([_radius(radius)])).distance
+        for radius in (5e-3, RADIUS, 9e-3)
+    }
+    assert min(off, key=lambda radius: off[radius]) == RADIUS
+
+
+def test_answer_does_not_hang_on_what_was_asked_before(
+    run: Path, replay: dict[str, Any], what: WhatIf, deepest: int
+) -> None:
+    for radius in (4e-3, 8e-3):
+        what.solve(deepest, effects_from([_radius(radius)]))
+    warm, cold = (one.solve(deepest, effects_from([LARGER])) for one in (what, opened(run, replay)))
+    push = np.abs(cold.surface - replay["rest"]).max()
+    assert np.abs(warm.surface - cold.surface).max() < 2e-3 * push
+
+
+def test_what_remembers_is_led_along_all_frames_before(what: WhatIf, deepest: int) -> None:
+    relaxing = {"effect": "permanent_set", "parameters": {"retained_fraction": 0.4}}
+    after = len(what) - 1
+    dent = what.solve(after, effects_from([relaxing])).surface - what.solve(after, []).surface
+    assert np.abs(dent).max() > 1e-4
+
+
+def test_every_effect_has_a_beginning_that_can_be_asked_for(what: WhatIf) -> None:
+    rows = what.beginnings()
+    assert {"stiff_inclusion", "gravity", "time_offset"} <= {row["effect"] for row in rows}
+    assert [effect.name for effect in effects_from(rows)] == [row["effect"] for row in rows]
+
+
+def test_frame_that_is_not_there_is_refused(what: WhatIf) -> None:
+    with pytest.raises(RunError, match="no frame 999"):
+        what.solve(999, [])
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ({"effect": "magic", "parameters": {}}, "no effect is called 'magic'"),
+        ({"effect": "tool_radius", "parameters": {}}, "given are none"),
+        ({"effect": "tool_radius", "parameters": {"radius": "large"}}, "is no number"),
+        ({"effect": "tool_radius", "parameters": {"radius": 9.0}}, "outside"),
+    ],
+)
+def test_what_is_no_effect_is_refused(row: dict[str, Any], message: str) -> None:
+    with pytest.raises(EffectError, match=message):
+        effects_from([row])
+
+
+def _radius(value: float) -> dict[str, Any]:
+    return {"effect": "tool_radius", "parameters": {"radius": value}}
+
+
+@pytest.mark.parametrize("model", ["raw", "extended"])
+def test_recorded_inside_meets_the_recorded_surface(
+    replay: dict[str, Any], model: str, deepest: int
+) -> None:
+    inside = Inside.read(replay, model)
+    assert inside is not None
+    push = replay[model][deepest] - replay["rest"]
+    off = np.linalg.norm(inside.displacement(deepest, replay["rest"]) - push, axis=1)
+    most = np.linalg.norm(push, axis=1).max()
+    assert most > 2e-3 and off.mean() < 0.01 * most and off.max() < 0.1 * most
+    assert np.abs(inside.displacement(deepest, replay["rest"] * [1.0, 1.0, 0.0])).max() < 1e-9
+
+
+def test_recorded_energy_is_highest_below_the_tool_and_none_is_negative(
+    replay: dict[str, Any], deepest: int
+) -> None:
+    inside = Inside.read(replay, "raw")
+    assert inside is not None
+    energy = inside.energy_density(deepest, replay["rest"])
+    assert energy.min() >= 0.0 and energy.max() > 10 * np.median(energy)
+    assert (
+        np.linalg.norm(replay["rest"][energy.argmax()][:2] - replay["tool_raw"][deepest][:2]) < 0.01
+    )
+
+
+def test_force_and_iterations_are_recorded_with_each_model(
+    replay: dict[str, Any], deepest: int
+) -> None:
+    for model in ("raw", "extended"):
+        assert replay[f"force_{model}"][deepest] > 0.1 and replay[f"force_{model}"][0] == 0.0
+        assert replay[f"iterations_{model}"][deepest] > 0 and not replay[f"outcome_{model}"].any()
