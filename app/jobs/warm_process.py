@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import threading
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures import TimeoutError as TooLong
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
 from typing import Any, TypeVar
 
 from palpate.foundation.errors import RunError
-from palpate.foundation.processes import bound_to_process
+from palpate.foundation.processes import ProcessPool
 
 __all__ = ["Solver"]
 
@@ -28,16 +25,14 @@ class Solver:
 
     def __init__(self, patience: float = _PATIENCE) -> None:
         self._patience = patience
-        self._pool: ProcessPoolExecutor | None = None
+        self._pool: ProcessPool | None = None
         self._lock = threading.Lock()
 
     def ask(self, task: Callable[..., T], *args: Any) -> T:
         """The task's answer; RunError where it takes too long or its process ends."""
         with self._lock:
             if self._pool is None:
-                self._pool = ProcessPoolExecutor(
-                    1, get_context("spawn"), bound_to_process, (os.getpid(),)
-                )
+                self._pool = ProcessPool(1)
             try:
                 return self._pool.submit(task, *args).result(self._patience)
             except TooLong:
@@ -59,8 +54,5 @@ class Solver:
     def _end(self) -> None:
         if self._pool is None:
             return
-        processes = list((self._pool._processes or {}).values())
-        self._pool.shutdown(wait=False, cancel_futures=True)
-        for process in processes:
-            process.terminate()
+        self._pool.terminate()
         self._pool = None

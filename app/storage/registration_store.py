@@ -7,8 +7,6 @@ from __future__ import annotations
 import json
 import os
 import time
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -19,6 +17,7 @@ from palpate.app.http_errors import Conflict, Missing
 from palpate.app.storage.run_store import NAME
 from palpate.dataset.accepted_registration import Accepted, rest_digest
 from palpate.foundation.errors import RegistrationError, RunError
+from palpate.foundation.processes import ProcessPool
 
 __all__ = ["Registrations", "accepted_for", "register"]
 
@@ -116,7 +115,7 @@ def register(dataset: Path, cloud: list[list[float]], mesh: list[list[float]]) -
     """Fit pairs and run ICP from there in a process of its own, since the server itself loads no
     Open3D.
     """
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+    with ProcessPool(1) as pool:
         return pool.submit(_register, dataset, cloud, mesh).result()
 
 

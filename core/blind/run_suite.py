@@ -4,26 +4,24 @@ when it is stopped.
 
 from __future__ import annotations
 
-import os
 import shutil
 import tempfile
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from palpate.blind.case_results import RESULTS_FILE, Result, add_result, read_results
 from palpate.blind.cases import Case, scenario_of
 from palpate.foundation.errors import RunError
-from palpate.foundation.processes import bound_to
+from palpate.foundation.processes import ProcessPool
 from palpate.foundation.progress import Report, silent
 from palpate.foundation.source_digest import source_digest
 
-__all__ = ["source_digest", "known_results", "run_case", "run_suite"]
+__all__ = ["known_results", "run_case", "run_suite", "source_digest"]
 
 Run = Callable[[Case, Path], Result]
 _PATIENCE = 5.0
@@ -173,15 +171,14 @@ def _outcomes(cases: Sequence[Case], place: Path, workers: int, run: Run) -> Ite
     """Results as they come. Each case has a process of its own, so that one that dies takes no
     other along.
     """
-    context, waiting = get_context("forkserver"), deque(cases)
-    context.set_forkserver_preload(["palpate.blind"])
-    running: dict[Future[Result], tuple[Case, ProcessPoolExecutor]] = {}
+    waiting = deque(cases)
+    running: dict[Future[Result], tuple[Case, ProcessPool]] = {}
     try:
         while waiting or running:
             while waiting and len(running) < workers:
                 case, pool = (
                     waiting.popleft(),
-                    ProcessPoolExecutor(1, context, bound_to, (os.getpid(),)),
+                    ProcessPool(1, start="forkserver", preload=["palpate.blind"]),
                 )
                 running[pool.submit(run, case, place)] = (case, pool)
             for future in wait(running, return_when=FIRST_COMPLETED).done:
@@ -191,7 +188,7 @@ def _outcomes(cases: Sequence[Case], place: Path, workers: int, run: Run) -> Ite
                 yield result
     finally:
         for _, pool in running.values():
-            _end(pool)
+            pool.terminate(_PATIENCE)
 
 
 def _result(future: Future[Result], case: Case) -> Result:
@@ -202,15 +199,3 @@ def _result(future: Future[Result], case: Case) -> Result:
     except Exception as problem:
         error = f"{type(problem).__name__}: {problem}"
     return Result(case, code=source_digest(), error=error)
-
-
-def _end(pool: ProcessPoolExecutor) -> None:
-    """Stop what still runs, and wait until it has."""
-    processes = list((pool._processes or {}).values())
-    pool.shutdown(wait=False, cancel_futures=True)
-    for process in processes:
-        process.terminate()
-    for process in processes:
-        process.join(_PATIENCE)
-        if process.is_alive():
-            process.kill()

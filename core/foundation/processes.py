@@ -1,4 +1,4 @@
-"""How a process of a pool behaves towards the one that started it."""
+"""Process pools whose processes end with their owner, and how a process handles freed memory."""
 
 from __future__ import annotations
 
@@ -6,23 +6,15 @@ import ctypes
 import os
 import signal
 import threading
-import time
-from collections.abc import Callable
-from concurrent.futures import Future
-from typing import ParamSpec, TypeVar
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from multiprocessing import get_context, parent_process
+from multiprocessing.connection import wait
+from typing import Any, Literal, ParamSpec, TypeVar
 
-__all__ = [
-    "at_once",
-    "bound_to",
-    "bound_to_parent",
-    "bound_to_process",
-    "giving_memory_back",
-    "keeping_memory",
-]
+__all__ = ["ProcessPool", "at_once", "giving_memory_back", "keeping_memory"]
 
-_DIE_WITH_PARENT = 1
-_EVERY = 2.0
-"""How often [s] a process looks whether the one it works for is there."""
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _KEPT, _LARGE = -1, -3, 1 << 27, 1 << 25
 """Numbers of glibc's mallopt, and bytes: freed memory that is kept, and the size from which an
 array has pages of its own."""
@@ -33,43 +25,77 @@ T = TypeVar("T")
 
 
 def at_once(task: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-    """Carry out a task here and now, where a pool could do it in another process."""
+    """Run a task in this process and return its finished future, as an executor's `submit` would."""
     done: Future[T] = Future()
     done.set_result(task(*args, **kwargs))
     return done
 
 
-def bound_to_parent() -> None:
-    """Leave Ctrl-C to the process that started this one, and end with it (Linux)."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if hasattr(ctypes, "CDLL") and os.name == "posix" and os.uname().sysname == "Linux":
-        ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGTERM)
+class ProcessPool(ProcessPoolExecutor):
+    """The one kind of process pool in Palpate: an executor whose processes never outlive their owner.
 
+    Each process uses one thread (the processes are the parallelism), leaves Ctrl-C to its owner,
+    keeps freed memory for the next solve, and ends as soon as the process that made the pool has
+    ended, even by SIGKILL.
 
-def bound_to(pid: int) -> None:
-    """The same where a fork server stands between: end soon after the process of that number has,
-    even if it was killed.
+    Args:
+        workers: number of processes.
+        start: "spawn", or "forkserver" for processes that are made from a server which has
+            imported `preload` once.
+        preload: modules that the fork server imports.
+        begin: called once in each process before its first task, with `args`.
+        args: arguments of `begin`.
     """
-    bound_to_parent()
-    bound_to_process(pid)
 
+    def __init__(
+        self,
+        workers: int,
+        *,
+        start: Literal["spawn", "forkserver"] = "spawn",
+        preload: Sequence[str] = (),
+        begin: Callable[..., None] | None = None,
+        args: tuple[Any, ...] = (),
+    ) -> None:
+        for name in _THREADS:
+            os.environ.setdefault(name, "1")
+        context = get_context(start)
+        if preload:
+            context.set_forkserver_preload(list(preload))
+        super().__init__(workers, context, _begin, (begin, args))
 
-def bound_to_process(pid: int) -> None:
-    """The same for what a thread starts that may end before its process: Linux takes the end of
-    that thread for the parent's.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_after, args=(pid,), daemon=True).start()
+    def terminate(self, patience: float | None = None) -> None:
+        """Stop what runs and drop what waits.
 
-
-def _end_after(pid: int) -> None:
-    while True:
-        try:
-            os.kill(pid, 0)
-        except ProcessLookupError:
-            os.kill(os.getpid(), signal.SIGTERM)
+        Args:
+            patience: wait at most this long [s] for each process to end, then kill it; None does
+                not wait.
+        """
+        processes = list((self._processes or {}).values())
+        self.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.terminate()
+        if patience is None:
             return
-        time.sleep(_EVERY)
+        for process in processes:
+            process.join(patience)
+            if process.is_alive():
+                process.kill()
+
+
+def _begin(begin: Callable[..., None] | None, args: tuple[Any, ...]) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_owner, daemon=True).start()
+    keeping_memory()
+    if begin is not None:
+        begin(*args)
+
+
+def _end_with_owner() -> None:
+    """End this process when its owner has ended: the pipe between them then closes."""
+    owner = parent_process()
+    if owner is not None:
+        wait([owner.sentinel])
+        os.kill(os.getpid(), signal.SIGTERM)
 
 
 def keeping_memory() -> None:

@@ -6,8 +6,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from concurrent.futures import as_completed
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from palpate.dataset import Dataset
 from palpate.effects import Effect
 from palpate.effects.base import with_effects
 from palpate.foundation.errors import DatasetError
-from palpate.foundation.processes import bound_to_parent
+from palpate.foundation.processes import ProcessPool
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.phantom_drift import as_it_stood
 from palpate.measurement.segmentation import cleaner_for, find_shaft_axis
@@ -68,9 +67,7 @@ def replay_into(
     grid = PAGE_GRID.for_tool(stated.tool.radius)
     (out / "replays").mkdir(parents=True)
     (out / "pictures").mkdir()
-    with ProcessPoolExecutor(
-        min(workers, len(names)), get_context("spawn"), bound_to_parent
-    ) as pool:
+    with ProcessPool(min(workers, len(names))) as pool:
         tasks = [
             pool.submit(
                 record,

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
-from palpate.foundation.processes import bound_to
+from palpate.foundation.processes import ProcessPool
 from palpate.foundation.progress import Report, silent
 from palpate.synthetic.atomic_write import whole_or_nothing
 from palpate.synthetic.bench.depth_camera import DepthCamera, Scene, place_camera
@@ -218,9 +216,7 @@ def _all(jobs: list[_Job], workers: int) -> Iterator[_Record]:
     if workers <= 1:
         yield from (_record(job) for job in jobs)
         return
-    with ProcessPoolExecutor(
-        min(workers, len(jobs)), get_context("forkserver"), bound_to, (os.getpid(),)
-    ) as pool:
+    with ProcessPool(min(workers, len(jobs)), start="forkserver") as pool:
         futures = [pool.submit(_record, job) for job in jobs]
         try:
             for future in as_completed(futures):

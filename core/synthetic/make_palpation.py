@@ -9,11 +9,8 @@ is a little off; kinematics say where the tool was, not where it should have bee
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Literal
 
@@ -22,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
-from palpate.foundation.processes import bound_to
+from palpate.foundation.processes import ProcessPool
 from palpate.foundation.progress import Report, silent
 from palpate.synthetic.atomic_write import whole_or_nothing
 from palpate.synthetic.bench.force_sensor import FORCE_NOISE, ForceSensor
@@ -143,7 +140,7 @@ def _fill(
         for motion in motions
     ]
     shortened: dict[str, list[float]] = {}
-    with ProcessPoolExecutor(workers, get_context("forkserver"), bound_to, (os.getpid(),)) as pool:
+    with ProcessPool(workers, start="forkserver") as pool:
         for done, record in enumerate(pool.map(_record, *zip(*jobs, strict=True))):
             shortened |= record
             report((done + 1) / len(jobs), f"recorded {done + 1} of {len(jobs)} sequences")

@@ -5,13 +5,11 @@ beside what the camera saw.
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +26,7 @@ from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import CorrectionError, RunError
 from palpate.foundation.frames import Transform
-from palpate.foundation.processes import bound_to
+from palpate.foundation.processes import ProcessPool
 from palpate.foundation.progress import Report, part, silent
 from palpate.measurement.camera_model import Sight, sight_of
 from palpate.measurement.phantom_drift import as_it_stood
@@ -193,9 +191,7 @@ def _all(
             told = part(report, number / len(names), (number + 1) / len(names))
             yield name, _sample(recorder, folder, name, every, told)
         return
-    with ProcessPoolExecutor(
-        min(workers, len(names)), get_context("forkserver"), bound_to, (os.getpid(),)
-    ) as pool:
+    with ProcessPool(min(workers, len(names)), start="forkserver") as pool:
         futures = [pool.submit(_sample, recorder.only(name), folder, name, every) for name in names]
         try:
             for done, future in enumerate(as_completed(futures)):

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import importlib
-import multiprocessing
-import os
 import pickle
 import tempfile
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -23,7 +21,7 @@ from palpate.diagnosis.forward.prediction import Prediction, predict
 from palpate.diagnosis.forward.ray_comparison import Sample
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.effects import Effect
-from palpate.foundation.processes import bound_to_parent, giving_memory_back, keeping_memory
+from palpate.foundation.processes import ProcessPool, giving_memory_back
 from palpate.mesh.graded_mesh import SCREEN_GRID
 from palpate.mesh.protocol import Meshing
 from palpate.replay.replay import Equilibrium, Replay
@@ -31,18 +29,12 @@ from palpate.setup.setup import Box, Setup, Tool
 
 __all__ = ["TOLERANCE", "Pending", "Workers"]
 
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 TOLERANCE = 3e-4
 """Residual of a replay over the tool's push [1]."""
 P = ParamSpec("P")
 T = TypeVar("T")
 _READ: dict[Path, Observations] = {}
 """What this process has read of the measurements that are held, by file."""
-
-
-def _begin() -> None:
-    bound_to_parent()
-    keeping_memory()
 
 
 def _ready() -> None:
@@ -128,13 +120,9 @@ class Workers:
     """
 
     def __init__(self, data: Sequence[Observations], count: int) -> None:
-        # One thread each: the processes are the parallelism, and small factorisations only lose by
-        # sharing cores.
-        for name in _THREADS:
-            os.environ.setdefault(name, "1")
         self._count, self._held = count, 0
         self._folder = tempfile.TemporaryDirectory(prefix="palpate-", ignore_cleanup_errors=True)
-        self._pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _begin)
+        self._pool = ProcessPool(count)
         self.hold(data)
 
     def start(self) -> None:
@@ -168,11 +156,10 @@ class Workers:
         value: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        processes = list(getattr(self._pool, "_processes", {}).values())
-        self._pool.shutdown(wait=kind is None, cancel_futures=True)
-        if kind is not None:
-            for process in processes:
-                process.terminate()
+        if kind is None:
+            self._pool.shutdown(cancel_futures=True)
+        else:
+            self._pool.terminate()
         self._folder.cleanup()
 
     def submit(

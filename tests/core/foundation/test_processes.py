@@ -1,4 +1,4 @@
-"""Processes that compute for another end with it, however it ended."""
+"""A pool's processes end with the process that made the pool, however that ended."""
 
 from __future__ import annotations
 
@@ -13,41 +13,51 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from palpate.foundation.processes import giving_memory_back
+from palpate.foundation.processes import ProcessPool, giving_memory_back
 
-MAKER = """
-import sys
-from pathlib import Path
-from palpate.synthetic import Scenario, make_dataset
+OWNER = """
+import sys, time
+from palpate.foundation.processes import ProcessPool
 if __name__ == "__main__":
-    scenario = Scenario(sequences=("poke-top-01", "poke-top-02"), rate=30.0)
-    make_dataset(Path(sys.argv[1]), scenario, seed=1, workers=2, report=lambda done, text: None)
+    pool = ProcessPool(2, start=sys.argv[1])
+    for _ in range(2):
+        pool.submit(time.sleep, 600)
+    time.sleep(600)
 """
+MEMBERS = {"spawn": 4, "forkserver": 5}
+"""Owner, resource tracker, fork server and two workers."""
 PATIENCE = 60.0
 """For processes to start and to end, on a machine that is busy [s]."""
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_making_that_is_killed_leaves_no_process_behind(tmp_path: Path) -> None:
-    script = tmp_path / "maker.py"
-    script.write_text(MAKER)
-    root = Path(__file__).parents[2]
-    maker = subprocess.Popen(
-        [sys.executable, str(script), str(tmp_path / "made")],
-        cwd=root,
-        env=os.environ | {"PYTHONPATH": str(root)},
-        start_new_session=True,
-    )
+@pytest.mark.parametrize("start", ["spawn", "forkserver"])
+def test_pool_whose_owner_is_killed_leaves_no_process_behind(start: str, tmp_path: Path) -> None:
+    script = tmp_path / "owner.py"
+    script.write_text(OWNER)
+    owner = subprocess.Popen([sys.executable, str(script), start], start_new_session=True)
     try:
-        assert _within(
-            PATIENCE, lambda: len(_session(maker.pid)) >= 5
-        )  # with tracker, fork server and two that compute
-        maker.kill()
-        maker.wait()
-        assert _within(PATIENCE, lambda: not _session(maker.pid))
+        assert _within(PATIENCE, lambda: len(_session(owner.pid)) >= MEMBERS[start])
+        owner.kill()
+        owner.wait()
+        assert _within(PATIENCE, lambda: not _session(owner.pid))
     finally:
-        for process in _session(maker.pid):
+        for process in _session(owner.pid):
             os.kill(process, signal.SIGKILL)
+
+
+def test_terminated_pool_waits_until_its_processes_have_ended() -> None:
+    pool = ProcessPool(1)
+    future = pool.submit(time.sleep, 600)
+    assert _within(PATIENCE, future.running)
+    (process,) = pool._processes.values()
+    pool.terminate(PATIENCE)
+    assert not process.is_alive()
+
+
+def test_pool_begins_each_process_as_asked(tmp_path: Path) -> None:
+    with ProcessPool(1, begin=os.chdir, args=(tmp_path,)) as pool:
+        assert pool.submit(os.getcwd).result(PATIENCE) == str(tmp_path)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc, and tells glibc")

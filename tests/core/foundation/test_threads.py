@@ -52,7 +52,7 @@ print(all(live.at(np.array(poke(depth))).converged for depth in (-1e-3, 1e-3, 2e
 
 
 def test_factors_hold_where_mkl_is_told_to_use_several_threads() -> None:
-    here = Path(__file__).parents[2]
+    here = Path(__file__).parents[3]
     known = {
         **os.environ,
         "MKL_NUM_THREADS": "2",
