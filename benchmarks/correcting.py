@@ -24,17 +24,17 @@ from palpate.correction import (
     Samples,
     Split,
     SurfaceLoss,
-    Trained,
+    TrainedNetwork,
     TrainingSpec,
-    errors_of,
-    learn_along,
+    learn_online,
     make_samples,
     recorder_for,
     replay_corrected,
+    sample_errors,
     train,
 )
 from palpate.correction.corrected_replay import FEEDBACKS, CorrectedFrame
-from palpate.correction.samples.record_samples import robot_of, tool_columns
+from palpate.correction.samples.record_samples import tool_columns
 from palpate.dataset import open_dataset
 from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.measurement.metrics import paper_distance
@@ -65,7 +65,7 @@ def _samples(folder: Path, weight: float, sequences: tuple[str, ...]) -> tuple[R
     return recorder, make_samples(folder / "samples", recorder)
 
 
-def _trained(folder: Path, samples: Samples, kind: str, hold: float) -> Trained:
+def _trained(folder: Path, samples: Samples, kind: str, hold: float) -> TrainedNetwork:
     network = NetworkSpec(kind=kind, features=FEATURES)  # type: ignore[arg-type]
     spec = TrainingSpec(
         network=network, hold=hold, rate=1e-3, batch=16, epochs=15, patience=15, device="cpu"
@@ -75,7 +75,7 @@ def _trained(folder: Path, samples: Samples, kind: str, hold: float) -> Trained:
 
 
 @torch.no_grad()
-def _kinds(samples: Samples, networks: dict[tuple[str, float], Trained]) -> Table:
+def _kinds(samples: Samples, networks: dict[tuple[str, float], TrainedNetwork]) -> Table:
     """Of the top alone and of all that was measured, and how far what is hidden was moved."""
     table = Table(
         "network",
@@ -110,7 +110,7 @@ def _kinds(samples: Samples, networks: dict[tuple[str, float], Trained]) -> Tabl
 
 
 def _feedbacks(
-    recorder: Recorder, samples: Samples, networks: dict[tuple[str, float], Trained]
+    recorder: Recorder, samples: Samples, networks: dict[tuple[str, float], TrainedNetwork]
 ) -> Table:
     table = Table(
         "network",
@@ -153,7 +153,7 @@ def _feedbacks(
 
 
 def _replayed(recorder: Recorder, corrector: Corrector) -> tuple[np.ndarray, list[CorrectedFrame]]:
-    sequence, robot = recorder.dataset.sequence(TESTED), robot_of(recorder)
+    sequence, robot = recorder.dataset.sequence(TESTED), recorder.phantom_from_robot
     times = np.asarray(sequence.cloud_times)
     centres, tools = (
         robot.apply(smooth_centres(sequence.kinematics, times)),
@@ -171,7 +171,9 @@ def _errors(recorder: Recorder, samples: Samples, frames: list[CorrectedFrame]) 
     return found
 
 
-def _online(samples: Samples, other: Samples, networks: dict[tuple[str, float], Trained]) -> Table:
+def _online(
+    samples: Samples, other: Samples, networks: dict[tuple[str, float], TrainedNetwork]
+) -> Table:
     """Frames of the material that was trained on, then of one four times as stiff."""
     first, second = len(samples.rows([TESTED])), (TESTED,)
     table = Table(
@@ -183,7 +185,7 @@ def _online(samples: Samples, other: Samples, networks: dict[tuple[str, float], 
         title="a material that changes half way",
     )
     for (kind, _), trained in networks.items():
-        stream = learn_along(trained, [(samples, second), (other, second)], OnlineSpec())
+        stream = learn_online(trained, [(samples, second), (other, second)], OnlineSpec())
         half = first + (len(stream.raw) - first) // 2
         for name, part in (
             ("as trained for", slice(first)),
@@ -209,7 +211,9 @@ def run() -> list[Table]:
         for (kind, _), trained in networks.items():
             loss = SurfaceLoss(trained.body, samples.seen[trained.body.index])
             raw, found = (
-                float(errors_of(net, loss, trained.body, samples, samples.rows([TESTED])).mean())
+                float(
+                    sample_errors(net, loss, trained.body, samples, samples.rows([TESTED])).mean()
+                )
                 for net in (None, trained.network)
             )
             if not found < raw:

@@ -21,8 +21,8 @@ from torch import Tensor, nn
 from benchmarks.stopwatch import timed
 from palpate.correction import Batch, Body, CorrectionNetwork, NetworkSpec, SurfaceLoss, build
 from palpate.correction.networks.chamfer import Loss
-from palpate.correction.networks.unet import Padded
-from palpate.correction.networks.unet_inference import Compact, has_half
+from palpate.correction.networks.unet import PaddedConvolution
+from palpate.correction.networks.unet_inference import UNetInference, supports_bfloat16
 
 __all__ = ["plain_loss", "plain_network", "run", "samples_of"]
 
@@ -71,7 +71,7 @@ class _Plain(nn.Module):
         def block(parts: nn.Module) -> nn.Sequential:
             layers: list[nn.Module] = []
             for part in parts.children():
-                if isinstance(part, Padded):
+                if isinstance(part, PaddedConvolution):
                     made = convolution(part.weight.shape[1], part.weight.shape[0], 3, padding=1)
                     made.weight, made.bias = part.weight, part.bias
                     layers += [made, nn.ReLU()]
@@ -192,7 +192,7 @@ def _frame(
     vertices, tool = batch.positions[:1], batch.tool[:1]
     with torch.inference_mode():
         wanted = plain(vertices, tool)[0]
-        found = Compact(network, half=False)(vertices[0], tool[0])
+        found = UNetInference(network, half=False)(vertices[0], tool[0])
         apart = float((found - wanted).abs().max())
         if not apart < 1e-7:
             raise RuntimeError(
@@ -200,10 +200,10 @@ def _frame(
             )
         kinds: list[Callable[[], object]] = [lambda: plain(vertices, tool)]
         for half in (False, True):
-            compact = Compact(network, half=half)
+            compact = UNetInference(network, half=half)
             kinds.append(lambda compact=compact: compact(vertices[0], tool[0]))  # type: ignore[misc]
         times = [min(timed(work)[1] for _ in range(FRAMES)) * 1e3 for work in kinds]
-        fastest = Compact(network)
+        fastest = UNetInference(network)
         with _threads(CORES):
             wall = (
                 statistics.median(
@@ -213,7 +213,7 @@ def _frame(
             )
     return (
         f"{wall:.2f}",
-        f"{times[2]:.2f}" if has_half() else "-",
+        f"{times[2]:.2f}" if supports_bfloat16() else "-",
         f"{times[1]:.2f}",
         f"{times[0]:.2f}",
     )

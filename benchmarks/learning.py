@@ -30,11 +30,11 @@ from palpate.correction import (
     Split,
     SurfaceLoss,
     TrainingSpec,
-    errors_of,
     open_samples,
+    sample_errors,
     train,
 )
-from palpate.correction.samples.sample_arrays import Arrays
+from palpate.correction.samples.sample_arrays import SampleWriter
 from palpate.correction.samples.sample_store import FORMAT
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
@@ -102,7 +102,7 @@ def _sequence(folder: Path, body: Body, named: tuple[str, int]) -> int:
     name, frames = named
     (folder / name).mkdir(parents=True)
     arrays, row, rng = (
-        Arrays(folder / name, frames, len(body.rest), POINTS),
+        SampleWriter(folder / name, frames, len(body.rest), POINTS),
         0,
         np.random.default_rng([5, *name.encode()]),
     )
@@ -112,7 +112,7 @@ def _sequence(folder: Path, body: Body, named: tuple[str, int]) -> int:
     ]
     before: list[Equilibrium | None] = [None, None]
     for number, centre in enumerate(_way(name, frames)):
-        now = [block.sought(centre, (last,)) for block, last in zip(blocks, before, strict=True)]
+        now = [block.solve_from_any(centre, (last,)) for block, last in zip(blocks, before, strict=True)]
         before = [frame if frame.outcome is Outcome.CONVERGED else None for frame in now]
         if None in before:
             continue
@@ -208,7 +208,7 @@ def main() -> None:
     for name in split.test:
         rows = samples.rows([name])
         raw, found = (
-            errors_of(net, loss, trained.body, samples, rows, asked.device).mean()
+            sample_errors(net, loss, trained.body, samples, rows, asked.device).mean()
             for net in (None, trained.network)
         )
         console.print(f"{name}: {raw:.3f} mm without, {found:.3f} mm with the network")

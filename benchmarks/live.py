@@ -12,7 +12,7 @@ from palpate.effects import effect_named
 from palpate.fem.newton import MAX_PENETRATION
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.graded_mesh import PAGE_GRID
-from palpate.recording.interactive import Felt, Live
+from palpate.recording.interactive import InteractiveFrame, InteractiveReplay
 
 __all__ = ["run"]
 
@@ -35,7 +35,7 @@ def hand(depth: float) -> FloatArray:
     return np.column_stack([x, y, z])
 
 
-def answers(live: Live, places: FloatArray) -> tuple[list[Felt], FloatArray, FloatArray]:
+def answers(live: InteractiveReplay, places: FloatArray) -> tuple[list[InteractiveFrame], FloatArray, FloatArray]:
     """What was felt at each place, and how long it took (n,) [s]: of the processor, and on the
     wall.
     """
@@ -52,7 +52,7 @@ def answers(live: Live, places: FloatArray) -> tuple[list[Felt], FloatArray, Flo
     return felt, np.array(busy), np.array(wall)
 
 
-def check(felt: list[Felt], places: FloatArray, radius: float) -> None:
+def check(felt: list[InteractiveFrame], places: FloatArray, radius: float) -> None:
     """RuntimeError unless all are equilibria at the places asked for, with no point of the surface
     in the tool.
     """
@@ -86,7 +86,7 @@ def run() -> list[Table]:
     for name, setup in (("stated", SETUP), ("with a stiff lump", lump.apply(SETUP))):
         for depth in (4e-3, 8e-3):
             places = hand(depth)
-            felt, busy, wall = answers(Live(setup, PAGE_GRID.for_tool(setup.tool.radius)), places)
+            felt, busy, wall = answers(InteractiveReplay(setup, PAGE_GRID.for_tool(setup.tool.radius)), places)
             check(felt, places, setup.tool.radius)
             rate, pure = len(wall) / wall.sum(), len(busy) / busy.sum()
             spans = [f"{1e3 * value:.0f}" for value in (np.median(wall), np.quantile(wall, 0.95))]

@@ -26,10 +26,10 @@ from palpate.app.client import Client
 from palpate.dataset import open_dataset
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.graded_mesh import REPLAY_GRID
-from palpate.sweep import Axis, Request, Space
-from palpate.sweep.samplers import batches
-from palpate.sweep.sweep_data import watch
-from palpate.sweep.sweep_error import error_of, measure
+from palpate.sweep import Axis, ParameterSpace, SweepSpec
+from palpate.sweep.samplers import point_batches
+from palpate.sweep.sweep_data import read_sweep_data
+from palpate.sweep.sweep_error import error_from_sums, replay_errors
 from palpate.synthetic import HiddenEffect, Scenario, make_dataset
 
 __all__ = ["run"]
@@ -94,13 +94,13 @@ def run(points: int = POINTS) -> list[Table]:
 
 def _loop(home: Path, points: int) -> tuple[float, FloatArray]:
     began = time.monotonic()
-    space = Space((Axis("tool_radius.radius", LOW, HIGH),))
-    stated, data = watch(open_dataset(home / "datasets" / "phantom"), (), FRAMES)
+    space = ParameterSpace((Axis("tool_radius.radius", LOW, HIGH),))
+    stated, data = read_sweep_data(open_dataset(home / "datasets" / "phantom"), (), FRAMES)
     grid = REPLAY_GRID.for_tool(stated.tool.radius)
     errors = []
-    for values in next(batches(Request(space=space, steps=points, frames=FRAMES))):
-        sums = np.array(measure(space.setup(stated, values), data[0], grid).sums)
-        errors.append(float(error_of(sums.sum(axis=0), "distance")))
+    for values in next(point_batches(SweepSpec(space=space, steps=points, frames=FRAMES))):
+        sums = np.array(replay_errors(space.setup(stated, values), data[0], grid).sums)
+        errors.append(float(error_from_sums(sums.sum(axis=0), "distance")))
     return time.monotonic() - began, np.array(errors)
 
 

@@ -24,7 +24,7 @@ from rich.console import Console
 from rich.table import Table
 
 from palpate.effects import CATALOGUE, Effect, Slot
-from palpate.fem.model import Probe
+from palpate.fem.model import ToolSphere
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.box_mesh import GridSpec
@@ -138,7 +138,7 @@ def faults(situation: Situation, frames: list[Equilibrium]) -> list[str]:
             found.append(f"frame {number}: not a number")
         elif frame.outcome is Outcome.CONVERGED:
             model, positions = block.model(frame.mesh), frame.mesh.nodes + frame.displacement
-            probe = Probe(frame.probe.centre - np.append(frame.slip, 0.0), frame.probe.radius)
+            probe = ToolSphere(frame.probe.centre - np.append(frame.slip, 0.0), frame.probe.radius)
             if not np.isfinite(model.energy(positions, probe)):
                 found.append(f"frame {number}: converged with an inverted element")
             points = np.einsum(

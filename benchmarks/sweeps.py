@@ -16,11 +16,11 @@ from rich.console import Console
 
 from palpate.dataset import open_dataset
 from palpate.mesh.graded_mesh import SCREEN_GRID
-from palpate.sweep import Axis, Request, Space
-from palpate.sweep.executors import Processes, outcomes
-from palpate.sweep.samplers import batches
-from palpate.sweep.sweep_data import watch
-from palpate.sweep.sweep_error import measure
+from palpate.sweep import Axis, ParameterSpace, SweepSpec
+from palpate.sweep.executors import ProcessExecutor, run_tasks
+from palpate.sweep.samplers import point_batches
+from palpate.sweep.sweep_data import read_sweep_data
+from palpate.sweep.sweep_error import replay_errors
 from palpate.synthetic import HiddenEffect, Scenario, make_dataset
 
 POINTS, WORKERS = 200, 2
@@ -30,24 +30,26 @@ def run(points: int) -> tuple[float, float, float]:
     """Seconds of the loop and of the processes, those that start them counted, and the largest
     difference of any sum.
     """
-    space = Space((Axis("tool_radius.radius", 4e-3, 8e-3), Axis("poisson_ratio.nu", 0.3, 0.49)))
+    space = ParameterSpace(
+        (Axis("tool_radius.radius", 4e-3, 8e-3), Axis("poisson_ratio.nu", 0.3, 0.49))
+    )
     with tempfile.TemporaryDirectory() as folder:
         hidden = HiddenEffect("tool_radius", {"radius": 6e-3})
         make_dataset(
             Path(folder) / "phantom", Scenario(effects=(hidden,), sequences=("poke-top-01",)), 3
         )
-        stated, data = watch(open_dataset(Path(folder) / "phantom"), (), 4)
+        stated, data = read_sweep_data(open_dataset(Path(folder) / "phantom"), (), 4)
     grid = SCREEN_GRID.for_tool(stated.tool.radius)
-    asked = next(batches(Request(space=space, method="random", points=points)))
+    asked = next(point_batches(SweepSpec(space=space, method="random", points=points)))
     tasks = [(space.setup(stated, values), 0) for values in asked]
     began = time.monotonic()
-    plain = [measure(setup, data[0], grid) for setup, _ in tasks]
+    plain = [replay_errors(setup, data[0], grid) for setup, _ in tasks]
     middle = time.monotonic()
-    crew = Processes(WORKERS, data, grid)
+    executor = ProcessExecutor(WORKERS, data, grid)
     try:
-        spread = dict(told for told in outcomes(crew, tasks) if told is not None)
+        spread = dict(told for told in run_tasks(executor, tasks) if told is not None)
     finally:
-        crew.close()
+        executor.close()
     end = time.monotonic()
     pairs = [
         (np.array(one.sums), np.array(spread[number].sums)) for number, one in enumerate(plain)

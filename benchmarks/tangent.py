@@ -18,7 +18,7 @@ from palpate.fem.linalg.direct_solver import Factor
 from palpate.fem.linalg.sparsity import SOLVERS, factor_of
 from palpate.fem.model import BlockModel
 from palpate.foundation.arrays import FloatArray
-from palpate.gradients.forward import local_probe
+from palpate.gradients.forward import local_tool
 from palpate.mesh.graded_mesh import REPLAY_GRID
 from palpate.replay.replay import replay
 
@@ -39,12 +39,12 @@ def _pressed() -> tuple[BlockModel, FloatArray, sp.csr_matrix, FloatArray]:
     top = SETUP.geometry.height + SETUP.tool.radius
     frame = replay(SETUP, np.array([[0.0, 0.0, top - depth] for depth in DEPTHS]), REPLAY_GRID)[-1]
     model, positions = BlockModel(SETUP, frame.mesh), frame.mesh.nodes + frame.displacement
-    state, pattern = model.assemble(positions, local_probe(frame)), model.topology.pattern
+    state, pattern = model.assemble(positions, local_tool(frame)), model.topology.pattern
     upper = sp.csr_matrix((state.data, pattern.indices, pattern.indptr), shape=pattern.shape)
     along = np.random.default_rng(0).standard_normal(pattern.shape[0])
     ways = [_moved(model, positions, sign * STEP * along) for sign in (1, -1)]
     ahead, behind = (
-        model.assemble(way, local_probe(frame), tangent=False).residual for way in ways
+        model.assemble(way, local_tool(frame), tangent=False).residual for way in ways
     )
     expected, diagonal = (ahead - behind) / (2 * STEP), sp.diags_array(upper.diagonal())
     wrong = float(

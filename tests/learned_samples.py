@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate.correction import Body, Samples, open_samples
-from palpate.correction.samples.sample_arrays import Arrays
+from palpate.correction.samples.sample_arrays import SampleWriter
 from palpate.correction.samples.sample_store import FORMAT
 
 __all__ = ["NODES", "SIZE", "write_samples"]
@@ -28,7 +28,7 @@ def write_samples(
     folder.mkdir(parents=True)
     for name in names:
         (folder / name).mkdir()
-        arrays = Arrays(folder / name, rows, len(body.rest), 60)
+        arrays = SampleWriter(folder / name, rows, len(body.rest), 60)
         for row in range(rows):
             place = np.append(rng.uniform(-0.015, 0.015, 2), 0.033)
             around = np.exp(-((body.rest[:, :2] - place[:2]) ** 2).sum(axis=1) / 0.01**2) * (

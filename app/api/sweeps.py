@@ -13,7 +13,7 @@ from palpate.app.schemas import JobOut
 from palpate.app.server.pagination import PageOf, part_of
 from palpate.app.services import Desk, DeskOf, KeyOf
 from palpate.app.storage.sweep_store import Sweeps
-from palpate.sweep.sweep_request import MOST_POINTS, Measure, Method, Request
+from palpate.sweep.sweep_spec import MOST_POINTS, Measure, Method, SweepSpec
 
 __all__ = ["router"]
 
@@ -38,7 +38,7 @@ class SweptParameter(BaseModel):
 
 
 class SweepRequest(BaseModel):
-    """What is swept, over which clouds, and how; see `palpate.sweep.sweep_request.Request`."""
+    """What is swept, over which clouds, and how; see `palpate.sweep.sweep_spec.SweepSpec`."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", json_schema_extra={"examples": [EXAMPLE]}
@@ -61,7 +61,7 @@ class SweepRequest(BaseModel):
 @router.post("", status_code=202)
 def start(request: SweepRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
     """Check what is asked, then queue it; the answer's id names job and sweep."""
-    asked = Request.from_json(request.model_dump(exclude={"dataset", "registration"}))
+    asked = SweepSpec.from_json(request.model_dump(exclude={"dataset", "registration"}))
     dataset = desk.library.open(request.dataset)
     for name in asked.sequences:
         dataset.sequence(name)

@@ -50,7 +50,7 @@ class TrainingRequest(BaseModel):
     seed: int = Field(default=0, ge=0, lt=2**31)
 
     def asked(self) -> dict[str, Any]:
-        """As `palpate.evaluation.train_network.Wanted` has it."""
+        """As `palpate.evaluation.train_network.TrainingPlan` has it."""
         if any(not 1 <= width <= 4096 for width in self.features):
             raise CorrectionError(f"features = {self.features}; expected 1 to 4096", key="features")
         network = {

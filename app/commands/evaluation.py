@@ -172,9 +172,9 @@ def _paper(
     from palpate.app.storage.training_store import Trainings
     from palpate.dataset import open_dataset
     from palpate.evaluation.paper_tables import PaperRequest, run_paper
-    from palpate.evaluation.train_network import Wanted
+    from palpate.evaluation.train_network import TrainingPlan
 
-    training = Wanted(
+    training = TrainingPlan(
         spec={"network": {"features": features}, "epochs": epochs, "seed": seed}, every=every
     )
     folder = runs / "paper" / dataset.resolve().name

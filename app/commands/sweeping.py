@@ -61,7 +61,7 @@ def sweep(
     from palpate.app.storage.sweep_store import Sweeps
     from palpate.dataset import open_dataset
     from palpate.sweep.run_sweep import run_sweep
-    from palpate.sweep.sweep_request import Request
+    from palpate.sweep.sweep_spec import SweepSpec
 
     asked = {
         "parameters": [_axis(text) for text in parameter],
@@ -75,7 +75,7 @@ def sweep(
         "measure": measure,
         "seed": seed,
     }
-    request = Request.from_json(asked)
+    request = SweepSpec.from_json(asked)
     accepted = accepted_for(dataset, registration, runs)
     opened, sweeps = open_dataset(dataset).registered(accepted), Sweeps(runs)
     said = [str(dataset.resolve()), request.to_json(), *([accepted.to_json()] if accepted else [])]

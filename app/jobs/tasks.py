@@ -104,7 +104,7 @@ def sweep(request: dict[str, Any], report: Report) -> dict[str, Any]:
     from palpate.dataset import open_dataset
     from palpate.dataset.accepted_registration import Accepted
     from palpate.sweep.run_sweep import run_sweep
-    from palpate.sweep.sweep_request import Request
+    from palpate.sweep.sweep_spec import SweepSpec
 
     registered = request.get("registration")
     dataset = open_dataset(Path(request["dataset"])).registered(
@@ -113,7 +113,7 @@ def sweep(request: dict[str, Any], report: Report) -> dict[str, Any]:
     sweeps, name = Sweeps(Path(request["runs"])), Path(request["scratch"]).name
     found = run_sweep(
         dataset,
-        Request.from_json(request["sweep"]),
+        SweepSpec.from_json(request["sweep"]),
         sweeps.folder / name,
         store=sweeps.store,
         workers=int(request["workers"]),
@@ -130,14 +130,14 @@ def train(request: dict[str, Any], report: Report) -> dict[str, Any]:
     A job that is done once more goes on where it was.
     """
     from palpate.dataset import open_dataset
-    from palpate.evaluation.train_network import Wanted, train_network
+    from palpate.evaluation.train_network import TrainingPlan, train_network
 
     runs, name = Path(request["runs"]), str(request.get("folder") or Path(request["scratch"]).name)
     trainings, dataset = Trainings(runs), open_dataset(Path(request["dataset"]))
     run = Runs(runs).get(request["run"]) if request.get("run") else None
     summary = train_network(
         dataset,
-        Wanted.from_json(request["training"]),
+        TrainingPlan.from_json(request["training"]),
         trainings.folder / name,
         store=trainings.store,
         model=None if run is None else run.model,
@@ -157,21 +157,21 @@ def train(request: dict[str, Any], report: Report) -> dict[str, Any]:
 
 def _show(run: Run, dataset: Any, training: Path, runs: Path, report: Report) -> None:
     """The corrected model beside the others of a run."""
-    from palpate.evaluation.loaded_network import Network
+    from palpate.evaluation.loaded_network import LoadedNetwork
     from palpate.evaluation.record_corrections import record_corrections
 
     frames = {name: run.replay(name)["cloud_index"] for name in run.sequences}
     if frames:
         model = json.loads((run.path / "model.json").read_text())
         record_corrections(
-            dataset, model, Network.load(training), frames, runs / CORRECTIONS / run.name, report
+            dataset, model, LoadedNetwork.load(training), frames, runs / CORRECTIONS / run.name, report
         )
 
 
 def evaluate(request: Mapping[str, Any], report: Report) -> dict[str, Any]:
     """The job: the ladder of `request["dataset"]`; the folder has the name of the job."""
     from palpate.dataset import open_dataset
-    from palpate.evaluation.run_evaluation import Asked
+    from palpate.evaluation.run_evaluation import EvaluationSpec
     from palpate.evaluation.run_evaluation import evaluate as climb
 
     runs = Path(request["runs"])
@@ -187,7 +187,7 @@ def evaluate(request: Mapping[str, Any], report: Report) -> dict[str, Any]:
         list(request.get("trainings", ())),
         request.get("truth") is not None,
     )
-    asked = Asked(
+    asked = EvaluationSpec(
         model=None if run is None else run.model,
         truth=request.get("truth"),
         networks=networks,

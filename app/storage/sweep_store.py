@@ -11,7 +11,7 @@ from typing import Any
 from palpate.app.http_errors import Missing
 from palpate.app.storage.run_store import NAME
 from palpate.foundation.errors import RunError
-from palpate.sweep.result_rows import Rows
+from palpate.sweep.result_rows import ResultRows
 
 __all__ = ["Sweeps"]
 
@@ -62,7 +62,7 @@ class Sweeps:
 
     def points(self, name: str) -> list[dict[str, Any]]:
         """The points that have ended, in that order; those that failed with their reason."""
-        return Rows(self.folder / name / "points.jsonl").read()
+        return ResultRows(self.folder / name / "points.jsonl").read()
 
     def _json(self, name: str, file: str) -> dict[str, Any]:
         try:

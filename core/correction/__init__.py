@@ -8,13 +8,13 @@ trained = train(samples, Split.of(samples), TrainingSpec(network=NetworkSpec(kin
 from palpate.correction.corrected_replay import CorrectedFrame, Corrector, replay_corrected
 from palpate.correction.networks.architectures import CorrectionNetwork, NetworkSpec, build
 from palpate.correction.networks.chamfer import SurfaceLoss
-from palpate.correction.online import Learner, OnlineSpec, learn_along
+from palpate.correction.online import Learner, OnlineSpec, learn_online
 from palpate.correction.samples.corrected_points import Body
 from palpate.correction.samples.record_samples import Recorder, make_samples, recorder_for
 from palpate.correction.samples.sample_splits import Split
 from palpate.correction.samples.sample_store import Batch, Samples, open_samples
-from palpate.correction.train import body_for, errors_of, train
-from palpate.correction.trained_network import Trained
+from palpate.correction.train import body_for, sample_errors, train
+from palpate.correction.trained_network import TrainedNetwork
 from palpate.correction.training_spec import TrainingSpec
 
 __all__ = [
@@ -30,12 +30,12 @@ __all__ = [
     "Samples",
     "Split",
     "SurfaceLoss",
-    "Trained",
+    "TrainedNetwork",
     "TrainingSpec",
     "body_for",
     "build",
-    "errors_of",
-    "learn_along",
+    "sample_errors",
+    "learn_online",
     "make_samples",
     "open_samples",
     "recorder_for",

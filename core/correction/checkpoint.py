@@ -14,7 +14,7 @@ import torch
 
 from palpate.foundation.errors import RunError
 
-__all__ = ["load", "note", "random_state", "restore_random_state", "save"]
+__all__ = ["load", "save_json", "random_state", "restore_random_state", "save"]
 
 
 def save(path: Path, content: dict[str, Any]) -> None:
@@ -30,7 +30,7 @@ def save(path: Path, content: dict[str, Any]) -> None:
         aside.unlink(missing_ok=True)
 
 
-def note(path: Path, value: Any) -> None:
+def save_json(path: Path, value: Any) -> None:
     """Write plain values for readers without torch, whole at any moment."""
     aside = path.with_name(f".{path.name}-{uuid4().hex}")
     aside.write_text(json.dumps(value))

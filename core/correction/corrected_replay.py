@@ -20,11 +20,11 @@ from typing import Literal, get_args
 import numpy as np
 import torch
 
-from palpate.correction.elastic_extension import Following
+from palpate.correction.elastic_extension import ElasticExtension
 from palpate.correction.networks.architectures import CorrectionNetwork
-from palpate.correction.networks.chamfer import held_weights
-from palpate.correction.networks.unet_inference import Compact
-from palpate.correction.trained_network import Trained
+from palpate.correction.networks.chamfer import hold_weights
+from palpate.correction.networks.unet_inference import UNetInference
+from palpate.correction.trained_network import TrainedNetwork
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import CorrectionError
@@ -52,7 +52,7 @@ class Corrector:
 
     def __init__(
         self,
-        trained: Trained,
+        trained: TrainedNetwork,
         setup: Setup,
         *,
         feedback: Feedback = "none",
@@ -68,9 +68,9 @@ class Corrector:
         self.measured_force = trained.about.get("force") == "measured"
         self._network = _single(trained.network, half)
         self._lattice = self._mesh(setup)
-        self._following: Following | None = None
+        self._following: ElasticExtension | None = None
         if feedback != "none" and self._lattice is not None:
-            self._following = Following(setup, self._lattice, self._driven(trained))
+            self._following = ElasticExtension(setup, self._lattice, self._driven(trained))
 
     def _mesh(self, setup: Setup) -> BoxMesh | None:
         """The grid of all the samples' points; None for a body that is no grid."""
@@ -82,12 +82,12 @@ class Corrector:
             grid = (*grid, layers)
         return box_mesh(setup.box.size, GridSpec(nodes=(grid[0], grid[1], grid[2])))
 
-    def _driven(self, trained: Trained) -> IntArray:
+    def _driven(self, trained: TrainedNetwork) -> IntArray:
         """What the network is believed of: the top, or all points that the camera sees."""
         if self.body.flat:
             return self.body.index
         seen = np.asarray(trained.about["seen"], dtype=float)
-        return np.flatnonzero(held_weights(seen) < 0.5)
+        return np.flatnonzero(hold_weights(seen) < 0.5)
 
     def correction(self, frame: Equilibrium, tool: FloatArray) -> FloatArray:
         """How far the body's points are moved (v, 3) [m]; tool (13,) as in the samples, a simulated
@@ -127,7 +127,7 @@ def _single(
 ) -> Callable[[torch.Tensor, torch.Tensor], torch.Tensor]:
     """The network for one frame (v, 3) and tool (13,)."""
     if network.spec.kind != "graph":
-        return Compact(network, half)
+        return UNetInference(network, half)
     plain = network.cpu().eval()
 
     def single(vertices: torch.Tensor, tool: torch.Tensor) -> torch.Tensor:
@@ -170,12 +170,12 @@ def replay_corrected(
     block, previous, start = Replay(setup, grid, tolerance), None, None
     for number, centre in enumerate(centres):
         time = None if times is None else float(times[number])
-        raw = block.sought(centre, (start, previous), time)
+        raw = block.solve_from_any(centre, (start, previous), time)
         if raw.outcome is not Outcome.CONVERGED:
-            previous = start = previous if setup.remembers else None
+            previous = start = previous if setup.has_history else None
             yield CorrectedFrame(raw, raw)
             continue
         corrected = corrector.correct(raw, tools[number])
         previous = raw
-        start = corrected if corrector.feedback == "start" and not setup.remembers else raw
+        start = corrected if corrector.feedback == "start" and not setup.has_history else raw
         yield CorrectedFrame(raw, corrected)

@@ -23,10 +23,10 @@ from palpate.foundation.threads import on_one_thread
 from palpate.mesh.box_mesh import BoxMesh
 from palpate.setup.setup import Setup
 
-__all__ = ["Following"]
+__all__ = ["ElasticExtension"]
 
 
-class Following:
+class ElasticExtension:
     """Displacements of all nodes of a grid from those of some.
 
     Args:

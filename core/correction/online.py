@@ -19,12 +19,12 @@ from torch import Tensor
 from palpate.correction.networks.chamfer import Distance, SurfaceLoss
 from palpate.correction.networks.devices import device_of
 from palpate.correction.samples.sample_store import Batch, Samples
-from palpate.correction.trained_network import Trained
+from palpate.correction.trained_network import TrainedNetwork
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import CorrectionError
 from palpate.foundation.progress import Report, silent
 
-__all__ = ["Learner", "OnlineSpec", "Stream", "learn_along"]
+__all__ = ["Learner", "OnlineSpec", "OnlineErrors", "learn_online"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +77,7 @@ class Learner:
         spec: how it learns.
     """
 
-    def __init__(self, trained: Trained, spec: OnlineSpec) -> None:
+    def __init__(self, trained: TrainedNetwork, spec: OnlineSpec) -> None:
         self.spec, self.body, self._device = spec, trained.body, device_of(spec.device)
         self.network = deepcopy(trained.network).to(self._device)
         seen = np.asarray(trained.about["seen"], dtype=float)[self.body.index]
@@ -128,7 +128,7 @@ class Learner:
 
 
 @dataclass(frozen=True, eq=False)
-class Stream:
+class OnlineErrors:
     """Errors [mm] of frames in the order in which they came (f,): learning, of the network as it
     was, and without one.
     """
@@ -138,12 +138,12 @@ class Stream:
     raw: FloatArray
 
 
-def learn_along(
-    trained: Trained,
+def learn_online(
+    trained: TrainedNetwork,
     streams: Sequence[tuple[Samples, Sequence[str]]],
     spec: OnlineSpec,
     report: Report = silent,
-) -> Stream:
+) -> OnlineErrors:
     """Predict each frame, then learn from it.
 
     Args:
@@ -168,4 +168,4 @@ def learn_along(
             learner.learn(frame)
             done += 1
     online, still, without = np.array(rows, dtype=float).reshape(-1, 3).T
-    return Stream(online, still, without)
+    return OnlineErrors(online, still, without)

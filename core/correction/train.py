@@ -23,7 +23,7 @@ from palpate.correction.networks.devices import device_of, reproducible
 from palpate.correction.samples.corrected_points import Body
 from palpate.correction.samples.sample_splits import Split
 from palpate.correction.samples.sample_store import Samples
-from palpate.correction.trained_network import FILE, Trained
+from palpate.correction.trained_network import FILE, TrainedNetwork
 from palpate.correction.training_spec import TrainingSpec
 from palpate.foundation.arrays import IntArray
 from palpate.foundation.errors import CorrectionError, RunError
@@ -32,7 +32,7 @@ from palpate.foundation.progress import Report, silent
 if TYPE_CHECKING:
     from torch.utils.tensorboard import SummaryWriter
 
-__all__ = ["body_for", "errors_of", "train"]
+__all__ = ["body_for", "sample_errors", "train"]
 
 CHECKPOINT, HISTORY = "checkpoint.pt", "history.json"
 _CHUNK = 256
@@ -46,7 +46,7 @@ def body_for(samples: Samples, kind: str) -> Body:
 
 def train(
     samples: Samples, split: Split, spec: TrainingSpec, folder: Path, report: Report = silent
-) -> Trained:
+) -> TrainedNetwork:
     """Train a network, or go on with a training that was begun in `folder`; what is finished is
     returned as it is.
 
@@ -61,7 +61,7 @@ def train(
     with reproducible(device, spec.seed, spec.threads):
         run = _Run(samples, split, spec, folder, device)
         if run.done and (folder / FILE).exists():
-            return Trained.load(folder, device)
+            return TrainedNetwork.load(folder, device)
         try:
             while not run.done:
                 run.epoch(report)
@@ -77,7 +77,7 @@ def train(
 
 
 @torch.no_grad()
-def errors_of(
+def sample_errors(
     network: CorrectionNetwork | None,
     loss: SurfaceLoss,
     body: Body,
@@ -180,7 +180,7 @@ class _Run:
             self._writer.close()
             self._writer = None
 
-    def result(self) -> Trained:
+    def result(self) -> TrainedNetwork:
         """The best network."""
         self.network.load_state_dict(self.best)
         known = {
@@ -195,7 +195,7 @@ class _Run:
             "epoch": self.place.best_epoch + 1,
             "history": self.place.history,
         }
-        return Trained(self.network.eval(), self.body, about)
+        return TrainedNetwork(self.network.eval(), self.body, about)
 
     # -- steps ------------------------------------------------------------------------------------------------------------------
 
@@ -227,7 +227,7 @@ class _Run:
     def _validate(self) -> None:
         place, self.network = self.place, self.network.eval()
         error = float(
-            errors_of(
+            sample_errors(
                 self.network, self.loss, self.body, self.samples, self.held_out, self.device
             ).mean()
         )
@@ -269,8 +269,8 @@ class _Run:
     # -- what is kept -----------------------------------------------------------------------------------------------------------
 
     def _begin(self) -> None:
-        self.network.measure_by(*_usual(self.samples, self.rows, self.body))
-        raw = errors_of(None, self.loss, self.body, self.samples, self.held_out, self.device)
+        self.network.set_input_scales(*_usual(self.samples, self.rows, self.body))
+        raw = sample_errors(None, self.loss, self.body, self.samples, self.held_out, self.device)
         if not len(raw):
             names = ", ".join(self.split.validation)
             raise CorrectionError(
@@ -309,7 +309,7 @@ class _Run:
                 "random": checkpoint.random_state(),
             },
         )
-        checkpoint.note(self.folder / HISTORY, self.place.history)
+        checkpoint.save_json(self.folder / HISTORY, self.place.history)
 
     def _resume(self) -> None:
         kept = checkpoint.load(self.folder / CHECKPOINT, self.device)

@@ -13,14 +13,14 @@ from palpate.correction.networks.architectures import CorrectionNetwork, Network
 from palpate.correction.samples.corrected_points import Body
 from palpate.foundation.errors import RunError
 
-__all__ = ["FILE", "Trained"]
+__all__ = ["FILE", "TrainedNetwork"]
 
 FILE = "network.pt"
 _FORMAT = 1
 
 
 @dataclass(frozen=True, eq=False)
-class Trained:
+class TrainedNetwork:
     """A network in evaluation mode.
 
     Attributes:

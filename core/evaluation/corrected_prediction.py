@@ -17,15 +17,15 @@ from palpate.measurement.surface_gaps import Surface
 from palpate.replay.equilibrium import Equilibrium
 from palpate.setup.setup import Setup
 
-__all__ = ["Correct", "corrected_prediction", "tools_of"]
+__all__ = ["FrameCorrection", "corrected_prediction", "tool_inputs"]
 
-Correct = Callable[[Equilibrium, FloatArray], Equilibrium]
+FrameCorrection = Callable[[Equilibrium, FloatArray], Equilibrium]
 """A frame, and the tool (13,) there as in `palpate.correction.samples.sample_store`, to the frame
 with its shape corrected."""
 
 
 def corrected_prediction(
-    model: Prediction, data: Observations, setup: Setup, correct: Correct, tools: FloatArray
+    model: Prediction, data: Observations, setup: Setup, correct: FrameCorrection, tools: FloatArray
 ) -> Prediction:
     """A model's prediction of one sequence with its frames corrected; the same points are averaged
     in the same patches.
@@ -33,7 +33,7 @@ def corrected_prediction(
     Args:
         model: with its samples.
         setup: under which it was made.
-        tools: (g, 13) of each group, see `tools_of`.
+        tools: (g, 13) of each group, see `tool_inputs`.
     """
     surface = Surface.of(setup)
     frames = [correct(frame, tool) for frame, tool in zip(model.equilibria, tools, strict=True)]
@@ -49,7 +49,7 @@ def corrected_prediction(
     )
 
 
-def tools_of(data: Observations, columns: FloatArray) -> FloatArray:
+def tool_inputs(data: Observations, columns: FloatArray) -> FloatArray:
     """What a network is told of the tool in each group (g, 13): the mean over its frames, of
     `columns` (f, 13) of all frames.
 

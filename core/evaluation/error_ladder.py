@@ -17,7 +17,7 @@ from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import DiagnosisError
 from palpate.setup.setup import Setup
 
-__all__ = ["Rung", "ladder"]
+__all__ = ["Rung", "build_ladder"]
 
 _DIGITS = 4
 _ORDER = ("all", "seen", "unseen", "kind", "sequence")
@@ -57,7 +57,7 @@ class _Paper:
         return np.asarray(self.sums[rows].sum(axis=1) / frames[:, None])
 
 
-def ladder(
+def build_ladder(
     data: Sequence[Observations],
     rungs: Sequence[Rung],
     kinds: Mapping[str, str],

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from palpate.dataset import Sequence as Recording
-from palpate.evaluation.corrected_prediction import Correct
+from palpate.evaluation.corrected_prediction import FrameCorrection
 from palpate.evaluation.train_network import REQUEST
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RunError
@@ -17,14 +17,14 @@ from palpate.mesh.protocol import Meshing
 from palpate.setup.setup import Setup
 
 if TYPE_CHECKING:
-    from palpate.correction import Trained
+    from palpate.correction import TrainedNetwork
     from palpate.correction.corrected_replay import Feedback
 
-__all__ = ["Network"]
+__all__ = ["LoadedNetwork"]
 
 
 @dataclass(frozen=True, eq=False)
-class Network:
+class LoadedNetwork:
     """One trained network of a block.
 
     Attributes:
@@ -34,14 +34,14 @@ class Network:
             ("follow") or not ("none"), see `palpate.correction.corrected_replay`.
     """
 
-    trained: Trained
+    trained: TrainedNetwork
     about: dict[str, Any]
     feedback: Feedback = "none"
 
     @classmethod
     def load(cls, folder: Path, feedback: Feedback = "none") -> Self:
         """From the folder of a training that is finished; RunError where there is none."""
-        from palpate.correction import Trained
+        from palpate.correction import TrainedNetwork
 
         try:
             asked = json.loads((folder / REQUEST).read_text())
@@ -49,7 +49,7 @@ class Network:
             raise RunError(
                 f"{folder} holds no training ({error}); train first", path=str(folder)
             ) from None
-        trained = Trained.load(folder)
+        trained = TrainedNetwork.load(folder)
         spec, known = trained.about["training"], trained.about
         about = {
             "kind": spec["network"]["kind"],
@@ -65,7 +65,7 @@ class Network:
         }
         return cls(trained, about, feedback)
 
-    def corrector(self, setup: Setup) -> Correct:
+    def corrector(self, setup: Setup) -> FrameCorrection:
         """What corrects a frame of this setup."""
         from palpate.correction import Corrector
 

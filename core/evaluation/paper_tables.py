@@ -17,15 +17,15 @@ from pathlib import Path
 from typing import Any
 
 from palpate.dataset import Dataset
-from palpate.evaluation.loaded_network import Network
-from palpate.evaluation.run_evaluation import Bench, Step
-from palpate.evaluation.train_network import Wanted, train_network
+from palpate.evaluation.loaded_network import LoadedNetwork
+from palpate.evaluation.run_evaluation import EvaluationData, LadderStep
+from palpate.evaluation.train_network import TrainingPlan, train_network
 from palpate.foundation.progress import Report, part, silent
 from palpate.setup.setup import Setup
-from palpate.sweep import Axis, Request, Space
+from palpate.sweep import Axis, ParameterSpace, SweepSpec
 from palpate.sweep.run_sweep import run_sweep
 
-__all__ = ["MODULI", "PaperRequest", "run_paper", "what_it_shows"]
+__all__ = ["MODULI", "PaperRequest", "run_paper", "interpret_search"]
 
 MODULI = (5e3, 1e4, 1e1)
 """Young's moduli at which the paper corrects the simulation [Pa]."""
@@ -46,7 +46,7 @@ class PaperRequest:
     """
 
     frames: int = 8
-    training: Wanted = field(default_factory=Wanted)
+    training: TrainingPlan = field(default_factory=TrainingPlan)
     moduli: tuple[float, ...] = MODULI
 
 
@@ -94,7 +94,7 @@ def run_paper(
         workers,
         part(report, 0.08, 0.18),
     )
-    bench = Bench.of(dataset, report=part(report, 0.18, 0.2))
+    bench = EvaluationData.read(dataset, report=part(report, 0.18, 0.2))
     rows = []
     for number, modulus in enumerate(request.moduli):
         low, width = 0.2 + 0.8 * number / len(request.moduli), 0.8 / len(request.moduli)
@@ -116,7 +116,7 @@ def run_paper(
         "unit": "mm",
         "coarse": _table(coarse),
         "fine": _table(fine),
-        "what_the_search_shows": what_it_shows(coarse, fine),
+        "what_the_search_shows": interpret_search(coarse, fine),
         "correction": rows,
     }
     aside = folder / ".paper.json.part"
@@ -140,8 +140,8 @@ def _search(
     its points.
     """
     names = tuple(name for name in dataset.config.validation if len(dataset.sequence(name)))
-    space = Space((Axis(_NAME, *span),))
-    request = Request(space=space, steps=steps, sequences=names, frames=frames, measure="paper")
+    space = ParameterSpace((Axis(_NAME, *span),))
+    request = SweepSpec(space=space, steps=steps, sequences=names, frames=frames, measure="paper")
     found = run_sweep(dataset, request, folder, store=store, workers=workers, report=report)
     rows = [json.loads(line) for line in (folder / "points.jsonl").read_text().splitlines()]
     last = {row["number"]: row for row in rows}
@@ -160,7 +160,7 @@ def _table(search: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def what_it_shows(coarse: Mapping[str, Any], fine: Mapping[str, Any]) -> str:
+def interpret_search(coarse: Mapping[str, Any], fine: Mapping[str, Any]) -> str:
     """What the two searches mean."""
     changes = [one["change"] * 1e3 for search in (coarse, fine) for one in search["directions"]]
     most = max(changes, default=0.0)
@@ -175,11 +175,11 @@ def what_it_shows(coarse: Mapping[str, Any], fine: Mapping[str, Any]) -> str:
 
 
 def _corrected(
-    bench: Bench,
+    bench: EvaluationData,
     modulus: float,
     folder: Path,
     samples: Path,
-    training: Wanted,
+    training: TrainingPlan,
     workers: int,
     seed: int,
     report: Report,
@@ -204,9 +204,9 @@ def _corrected(
             workers=workers,
             report=told,
         )
-        networks[kind] = Network.load(place)
-    climbed = bench.climb(
-        [Step("simulation", "simulation", setup, networks)],
+        networks[kind] = LoadedNetwork.load(place)
+    climbed = bench.compute_ladder(
+        [LadderStep("simulation", "simulation", setup, networks)],
         workers=workers,
         seed=seed,
         report=part(report, 0.9, 1.0),

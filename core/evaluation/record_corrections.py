@@ -15,7 +15,7 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.dataset.tool_smoothing import smooth_centres
-from palpate.evaluation.loaded_network import Network
+from palpate.evaluation.loaded_network import LoadedNetwork
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.camera_model import sight_of
@@ -23,8 +23,8 @@ from palpate.measurement.phantom_drift import as_it_stood, camera_of
 from palpate.measurement.segmentation import cleaner_for, find_shaft_axis, tool_poses
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import PAGE_GRID
-from palpate.recording.record_sequence import observed
-from palpate.recording.saved_model import kept_setup
+from palpate.recording.record_sequence import compare_with_clouds
+from palpate.recording.saved_model import setup_of_model
 from palpate.registration.registration import register, setup_from
 from palpate.replay.replay import replay
 
@@ -37,7 +37,7 @@ _TOLERANCE = 1e-3
 def record_corrections(
     dataset: Dataset,
     model: Mapping[str, Any],
-    network: Network,
+    network: LoadedNetwork,
     frames: Mapping[str, FloatArray],
     out: Path,
     report: Report = silent,
@@ -54,7 +54,7 @@ def record_corrections(
     """
     dataset, registration = as_it_stood(dataset, register(dataset))
     stated = setup_from(dataset, registration)
-    setup, grid = kept_setup(stated, model), PAGE_GRID.for_tool(stated.tool.radius)
+    setup, grid = setup_of_model(stated, model), PAGE_GRID.for_tool(stated.tool.radius)
     cleaner, shaft = (
         cleaner_for(dataset, registration),
         find_shaft_axis(dataset, registration.mended),
@@ -85,7 +85,7 @@ def record_corrections(
                 cloud[cleaner.clean(cloud, pose).indices]
                 for cloud, pose in zip(raw, poses, strict=True)
             ]
-            side = observed(
+            side = compare_with_clouds(
                 setup,
                 [correct(frame, one) for frame, one in zip(solved, tool, strict=True)],
                 clouds,

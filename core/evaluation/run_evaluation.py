@@ -21,21 +21,21 @@ from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.observation.force_only import observe_each
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.effects.base import with_effects
-from palpate.evaluation.corrected_prediction import corrected_prediction, tools_of
-from palpate.evaluation.error_ladder import Rung, ladder
-from palpate.evaluation.loaded_network import Network
+from palpate.evaluation.corrected_prediction import corrected_prediction, tool_inputs
+from palpate.evaluation.error_ladder import Rung, build_ladder
+from palpate.evaluation.loaded_network import LoadedNetwork
 from palpate.evaluation.motion_kinds import kinds_in, kinds_of_pushes
-from palpate.evaluation.summary_sentence import meaning
+from palpate.evaluation.summary_sentence import summary_sentence
 from palpate.foundation.errors import DiagnosisError, RunError
 from palpate.foundation.progress import Report, part, silent
 from palpate.measurement.phantom_drift import as_it_stood
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.mesh.protocol import Meshing
-from palpate.recording.saved_model import effects_from, kept_setup
+from palpate.recording.saved_model import effects_from, setup_of_model
 from palpate.registration.registration import register, setup_from
 from palpate.setup.setup import Setup
 
-__all__ = ["FILE", "MODELS", "Asked", "Bench", "Step", "evaluate"]
+__all__ = ["FILE", "MODELS", "EvaluationSpec", "EvaluationData", "LadderStep", "evaluate"]
 
 FILE = "evaluation.json"
 MODELS = {
@@ -49,7 +49,7 @@ TEST_GROUPS, TEST_FELT = 24, 32
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
+class EvaluationSpec:
     """What stands on the ladder beside the stated model.
 
     Attributes:
@@ -67,7 +67,7 @@ class Asked:
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
+class EvaluationData:
     """The test sequences of a dataset, ready to be compared with models.
 
     Attributes:
@@ -86,7 +86,9 @@ class Bench:
     grid: Meshing
 
     @classmethod
-    def of(cls, dataset: Dataset, asked: Asked | None = None, report: Report = silent) -> Bench:
+    def of(
+        cls, dataset: Dataset, asked: EvaluationSpec | None = None, report: Report = silent
+    ) -> EvaluationData:
         """Reads the clouds, and groups them by the clock of the best model that is asked for.
 
         Raises DiagnosisError where no test sequence has clouds.
@@ -100,7 +102,7 @@ class Bench:
         report(0.0, "relating robot, camera and phantom")
         dataset, registration = as_it_stood(dataset, register(dataset))
         stated, mended = setup_from(dataset, registration), registration.mended
-        *_, believed = _setups(stated, asked or Asked()).values()
+        *_, believed = _setups(stated, asked or EvaluationSpec()).values()
         seen_from = replace(setup_from(dataset, mended), sensor=believed.sensor)
         data = observe_each(
             dataset, tested, seen_from, mended, (TEST_GROUPS, TEST_FELT), part(report, 0.1, 1.0)
@@ -109,8 +111,13 @@ class Bench:
         kinds = kinds_of_pushes(dataset, data, stated)
         return cls(dataset, stated, data, kinds, trained, PAGE_GRID.for_tool(stated.tool.radius))
 
-    def climb(
-        self, steps: Sequence[Step], *, workers: int = 2, seed: int = 0, report: Report = silent
+    def compute_ladder(
+        self,
+        steps: Sequence[LadderStep],
+        *,
+        workers: int = 2,
+        seed: int = 0,
+        report: Report = silent,
     ) -> dict[str, Any]:
         """The ladder of these steps; the first model is the baseline, and networks stand after the
         model they correct.
@@ -132,16 +139,16 @@ class Bench:
                     for name, network in step.networks.items()
                 ]
         ends = (0, max(number for number, rung in enumerate(rungs) if rung.network is None))
-        return ladder(self.data, rungs, self.kinds, self.trained, ends=ends, seed=seed)
+        return build_ladder(self.data, rungs, self.kinds, self.trained, ends=ends, seed=seed)
 
-    def _corrected(self, rung: Rung, name: str, network: Network) -> Rung:
+    def _corrected(self, rung: Rung, name: str, network: LoadedNetwork) -> Rung:
         correct, predictions = network.corrector(rung.setup), []
         for item, model in zip(self.data, rung.predictions, strict=True):
             columns = network.columns(
                 self.dataset.sequence(item.name), np.asarray(item.times), rung.setup, self.grid
             )
             predictions.append(
-                corrected_prediction(model, item, rung.setup, correct, tools_of(item, columns))
+                corrected_prediction(model, item, rung.setup, correct, tool_inputs(item, columns))
             )
         label = f"{rung.label} + {KINDS[network.about['kind']]}"
         return Rung(
@@ -150,18 +157,18 @@ class Bench:
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class LadderStep:
     """A model of the ladder, and networks on top of it by the names of their rungs."""
 
     name: str
     label: str
     setup: Setup
-    networks: Mapping[str, Network] = field(default_factory=dict)
+    networks: Mapping[str, LoadedNetwork] = field(default_factory=dict)
 
 
 def evaluate(
     dataset: Dataset,
-    asked: Asked,
+    asked: EvaluationSpec,
     out: Path,
     *,
     workers: int = 2,
@@ -178,14 +185,16 @@ def evaluate(
     if out.exists():
         raise RunError(f"{out} exists already; name another folder or move it away", file=str(out))
     networks = {
-        name: Network.load(folder, asked.feedback) for name, folder in asked.networks.items()
+        name: LoadedNetwork.load(folder, asked.feedback) for name, folder in asked.networks.items()
     }
-    bench = Bench.of(dataset, asked, part(report, 0.0, 0.2))
+    bench = EvaluationData.read(dataset, asked, part(report, 0.0, 0.2))
     steps = [
-        Step(name, MODELS[name], setup, _own(name, networks))
+        LadderStep(name, MODELS[name], setup, _own(name, networks))
         for name, setup in _setups(bench.stated, asked).items()
     ]
-    climbed = bench.climb(steps, workers=workers, seed=seed, report=part(report, 0.2, 0.95))
+    climbed = bench.compute_ladder(
+        steps, workers=workers, seed=seed, report=part(report, 0.2, 0.95)
+    )
     found = {
         "format": 1,
         "dataset": dataset.name,
@@ -193,17 +202,17 @@ def evaluate(
         "split": "test",
         **climbed,
     }
-    found["sentence"] = meaning(found)
+    found["sentence"] = summary_sentence(found)
     _write(out, found)
     report(1.0, "done")
     return found
 
 
-def _own(model: str, networks: Mapping[str, Network]) -> dict[str, Network]:
+def _own(model: str, networks: Mapping[str, LoadedNetwork]) -> dict[str, LoadedNetwork]:
     """Those of one model by the names of their rungs; the first is called "network", others by what
     they are.
     """
-    found: dict[str, Network] = {}
+    found: dict[str, LoadedNetwork] = {}
     for key, network in networks.items():
         if key.partition(":")[0] == model:
             rung = f"{model}_network" if not found else f"{model}_{network.about['kind']}"
@@ -211,10 +220,10 @@ def _own(model: str, networks: Mapping[str, Network]) -> dict[str, Network]:
     return found
 
 
-def _setups(stated: Setup, asked: Asked) -> dict[str, Setup]:
+def _setups(stated: Setup, asked: EvaluationSpec) -> dict[str, Setup]:
     found = {"baseline": stated}
     if asked.model is not None:
-        found["extended"] = kept_setup(stated, asked.model)
+        found["extended"] = setup_of_model(stated, asked.model)
     if asked.truth is not None:
         found["true"] = with_effects(stated, effects_from(asked.truth))
     return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-__all__ = ["meaning"]
+__all__ = ["summary_sentence"]
 
 _WHO = {
     "baseline_network": "the network alone",
@@ -18,7 +18,7 @@ _WHO = {
 _STILL = "What is as wrong in untouched frames may be the camera's, and counts only once a second model says it is not."
 
 
-def meaning(ladder: Mapping[str, Any]) -> str:
+def summary_sentence(ladder: Mapping[str, Any]) -> str:
     """Shares of the error that can be removed, on kinds of motion that were trained on and on those
     that were not.
 

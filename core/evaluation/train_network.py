@@ -22,14 +22,14 @@ from palpate.dataset import Dataset
 from palpate.effects.base import with_effects
 from palpate.foundation.errors import CorrectionError, RunError
 from palpate.foundation.progress import Report, part, silent
-from palpate.recording.saved_model import effects_from, kept_setup
+from palpate.recording.saved_model import effects_from, setup_of_model
 from palpate.registration.registration import Registration, register, setup_from
 from palpate.setup.setup import Setup
 
 if TYPE_CHECKING:
     from palpate.correction import Samples
 
-__all__ = ["REQUEST", "SUMMARY", "Wanted", "train_network", "whole_samples"]
+__all__ = ["REQUEST", "SUMMARY", "TrainingPlan", "train_network", "complete_samples"]
 
 REQUEST, SUMMARY = "request.json", "training.json"
 _SAMPLING = 0.4
@@ -37,7 +37,7 @@ _SAMPLING = 0.4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wanted:
+class TrainingPlan:
     """What is trained.
 
     Attributes:
@@ -90,7 +90,7 @@ class Wanted:
 
 def train_network(
     dataset: Dataset,
-    wanted: Wanted,
+    wanted: TrainingPlan,
     folder: Path,
     *,
     store: Path,
@@ -155,13 +155,13 @@ def _setup(
     stated: Setup, model: Mapping[str, Any] | None, truth: Sequence[Mapping[str, Any]] | None
 ) -> Setup:
     if model is not None:
-        return kept_setup(stated, model)
+        return setup_of_model(stated, model)
     return stated if truth is None else with_effects(stated, effects_from(truth))
 
 
 def _samples(
     dataset: Dataset,
-    wanted: Wanted,
+    wanted: TrainingPlan,
     store: Path,
     registration: Registration,
     setup: Setup,
@@ -192,7 +192,7 @@ def _samples(
         store
         / hashlib.sha256(json.dumps(said, sort_keys=True, default=repr).encode()).hexdigest()[:16]
     )
-    known = whole_samples(folder)
+    known = complete_samples(folder)
     if known is not None:
         return known
     try:
@@ -200,13 +200,13 @@ def _samples(
             folder, recorder, sequences=names, every=wanted.every, workers=workers, report=report
         )
     except RunError:
-        known = whole_samples(folder)  # another training may have made the same in the meantime
+        known = complete_samples(folder)  # another training may have made the same in the meantime
         if known is None:
             raise
         return known
 
 
-def whole_samples(folder: Path) -> Samples | None:
+def complete_samples(folder: Path) -> Samples | None:
     """Samples that are all there; what is left of others, of which files were dropped for want of
     room, is taken away.
     """

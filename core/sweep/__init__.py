@@ -3,7 +3,7 @@
 What is asked stands here; what does it, `palpate.sweep.run_sweep.run_sweep`, is heavy to import.
 """
 
-from palpate.sweep.parameter_space import Axis, Space
-from palpate.sweep.sweep_request import Request
+from palpate.sweep.parameter_space import Axis, ParameterSpace
+from palpate.sweep.sweep_spec import SweepSpec
 
-__all__ = ["Axis", "Request", "Space"]
+__all__ = ["Axis", "SweepSpec", "ParameterSpace"]

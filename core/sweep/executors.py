@@ -129,9 +129,15 @@ class DaskExecutor:
         self._client.close()
 
 
-def make_executor(workers: int, scheduler: str | None, data: tuple[SweepSequence, ...], grid: Meshing) -> ReplayExecutor:
+def make_executor(
+    workers: int, scheduler: str | None, data: tuple[SweepSequence, ...], grid: Meshing
+) -> ReplayExecutor:
     """ProcessExecutor here, or the cluster whose scheduler is at this address."""
-    return ProcessExecutor(workers, data, grid) if scheduler is None else DaskExecutor(scheduler, data, grid)
+    return (
+        ProcessExecutor(workers, data, grid)
+        if scheduler is None
+        else DaskExecutor(scheduler, data, grid)
+    )
 
 
 def run_tasks(

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from palpate.foundation.arrays import FloatArray
-from palpate.sweep.sweep_error import error_of
+from palpate.sweep.sweep_error import error_from_sums
 
-__all__ = ["Direction", "direction"]
+__all__ = ["Direction", "assess_direction"]
 
 _DRAWS, _LEVEL = 2000, 0.05
 _LEAST = 1e-6
@@ -46,7 +46,7 @@ class Direction:
         return {**vars(self), "values": list(self.values), "errors": list(self.errors)}
 
 
-def direction(
+def assess_direction(
     name: str, values: Sequence[float], sums: FloatArray, measure: str, seed: int
 ) -> Direction:
     """From the sums (k, probes, 4) of `palpate.sweep.sweep_error` at k values of a parameter.
@@ -55,11 +55,11 @@ def direction(
     value are chosen from these same data, therefore the interval's level is shared out over all
     that could have been chosen (Bonferroni).
     """
-    whole = error_of(sums.sum(axis=1), measure)
+    whole = error_from_sums(sums.sum(axis=1), measure)
     best, worst = int(whole.argmin()), int(whole.argmax())
     change, probes = float(whole[worst] - whole[best]), sums.shape[1]
     drawn = np.random.default_rng(seed).integers(0, probes, size=(_DRAWS, probes))
-    differences = error_of(sums[worst][drawn].sum(axis=1), measure) - error_of(
+    differences = error_from_sums(sums[worst][drawn].sum(axis=1), measure) - error_from_sums(
         sums[best][drawn].sum(axis=1), measure
     )
     level = _LEVEL / max(1, len(values) - 1)

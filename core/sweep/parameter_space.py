@@ -15,7 +15,7 @@ from palpate.effects import Effect, Parameter, effect_named
 from palpate.foundation.errors import EffectError
 from palpate.setup.setup import Setup
 
-__all__ = ["Axis", "Space", "Values"]
+__all__ = ["Axis", "ParameterSpace", "Values"]
 
 Values = Mapping[str, float | str]
 
@@ -82,7 +82,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Space:
+class ParameterSpace:
     """The axes of a sweep, and parameters of effects that are held at other values than the setup's
     own.
     """

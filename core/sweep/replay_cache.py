@@ -12,15 +12,15 @@ from uuid import uuid4
 from palpate.foundation.source_digest import source_digest
 from palpate.mesh.protocol import Meshing
 from palpate.setup.setup import Setup
-from palpate.sweep.sweep_error import TOLERANCE, Outcomes
+from palpate.sweep.sweep_error import TOLERANCE, ReplayResult
 
-__all__ = ["Store", "key_of"]
+__all__ = ["ReplayCache", "replay_key"]
 
 _DIGITS = 9
 
 
-def key_of(setup: Setup, digest: str, grid: Meshing) -> str:
-    """Of one setup on one sequence (`Watched.digest`): the same for whatever gives the same replay
+def replay_key(setup: Setup, digest: str, grid: Meshing) -> str:
+    """Of one setup on one sequence (`SweepSequence.digest`): the same for whatever gives the same replay
     under the same code.
     """
     said = {"setup": _rounded(setup.as_dict()), "watched": digest, "grid": repr(grid)}
@@ -39,24 +39,24 @@ def _rounded(value: Any) -> Any:
     return [_rounded(one) for one in value] if isinstance(value, (list, tuple)) else value
 
 
-class Store:
+class ReplayCache:
     """One small file for each replay, below `folder`; several sweeps may share it at the same
     time."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
-    def get(self, key: str) -> Outcomes | None:
+    def get(self, key: str) -> ReplayResult | None:
         """What is known; a file that cannot be read is as good as none."""
         path = self._path(key)
         try:
-            found = Outcomes.from_json(json.loads(path.read_text()))
+            found = ReplayResult.from_json(json.loads(path.read_text()))
             os.utime(path)  # what is used last is dropped last
             return found
         except (OSError, ValueError, KeyError, TypeError):
             return None
 
-    def put(self, key: str, found: Outcomes) -> None:
+    def put(self, key: str, found: ReplayResult) -> None:
         """Keep it: whole or not at all."""
         path = self._path(key)
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -10,10 +10,10 @@ from typing import Any
 
 from palpate.foundation.errors import RunError
 
-__all__ = ["Rows"]
+__all__ = ["ResultRows"]
 
 
-class Rows:
+class ResultRows:
     """The rows of one sweep, one JSON object a line, each on the disk before the next begins."""
 
     def __init__(self, file: Path) -> None:

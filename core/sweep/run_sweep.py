@@ -19,15 +19,15 @@ from palpate.foundation.progress import Report, part, silent
 from palpate.mesh.graded_mesh import REPLAY_GRID
 from palpate.mesh.protocol import Meshing
 from palpate.setup.setup import Setup
-from palpate.sweep.executors import Crew, crew_of, outcomes
-from palpate.sweep.flat_directions import direction
+from palpate.sweep.executors import ReplayExecutor, make_executor, run_tasks
+from palpate.sweep.flat_directions import assess_direction
 from palpate.sweep.parameter_space import Axis, Values
-from palpate.sweep.replay_cache import Store, key_of
-from palpate.sweep.result_rows import Rows
-from palpate.sweep.samplers import batches
-from palpate.sweep.sweep_data import Watched, watch
-from palpate.sweep.sweep_error import Outcomes, error_of
-from palpate.sweep.sweep_request import Request
+from palpate.sweep.replay_cache import ReplayCache, replay_key
+from palpate.sweep.result_rows import ResultRows
+from palpate.sweep.samplers import point_batches
+from palpate.sweep.sweep_data import SweepSequence, read_sweep_data
+from palpate.sweep.sweep_error import ReplayResult, error_from_sums
+from palpate.sweep.sweep_spec import SweepSpec
 
 __all__ = ["run_sweep"]
 
@@ -38,7 +38,7 @@ through it."""
 
 def run_sweep(
     dataset: Dataset,
-    request: Request,
+    request: SweepSpec,
     folder: Path,
     *,
     store: Path,
@@ -60,23 +60,25 @@ def run_sweep(
     """
     registered = {"registration": dataset.accepted.name} if dataset.accepted else {}
     _claim(folder, {**request.to_json(), "dataset": str(dataset.path.name), **registered})
-    stated, data = watch(dataset, request.sequences, request.frames, part(report, 0.0, 0.05))
+    stated, data = read_sweep_data(
+        dataset, request.sequences, request.frames, part(report, 0.0, 0.05)
+    )
     grid = grid or REPLAY_GRID.for_tool(stated.tool.radius)
-    crew = crew_of(workers, scheduler, data, grid)
+    executor = make_executor(workers, scheduler, data, grid)
     try:
         run = _Run(
             request,
             stated,
             data,
             grid,
-            crew,
-            Store(store),
-            Rows(folder / "points.jsonl"),
+            executor,
+            ReplayCache(store),
+            ResultRows(folder / "points.jsonl"),
             part(report, 0.05, 1.0),
         )
         summary = run.whole()
     finally:
-        crew.close()
+        executor.close()
     _write(folder / "summary.json", summary)
     report(1.0, "done")
     return summary
@@ -103,17 +105,17 @@ class _Run:
 
     def __init__(
         self,
-        request: Request,
+        request: SweepSpec,
         stated: Setup,
-        data: Sequence[Watched],
+        data: Sequence[SweepSequence],
         grid: Meshing,
-        crew: Crew,
-        store: Store,
-        rows: Rows,
+        executor: ReplayExecutor,
+        store: ReplayCache,
+        rows: ResultRows,
         report: Report,
     ) -> None:
         self.request, self.stated, self.data, self.grid = request, stated, data, grid
-        self.crew, self.store, self.rows, self.report = crew, store, rows, report
+        self.executor, self.store, self.rows, self.report = executor, store, rows, report
         self.digests = [item.digest for item in data]
         self.points: list[dict[str, Any]] = []
         self.sums: dict[int, FloatArray] = {}
@@ -126,7 +128,7 @@ class _Run:
 
     def whole(self) -> dict[str, Any]:
         """All points, then the lines through the best one, then the summary."""
-        asked = batches(self.request)
+        asked = point_batches(self.request)
         # Along with the first batch, so that no process waits for the stated setup alone.
         errors = self._batch([None, *next(asked)], "search")[1:]
         while True:
@@ -182,7 +184,9 @@ class _Run:
             return None
         sums = np.array([self.sums[row["number"]] for row in line])
         values = [float(row["values"][axis.name]) for row in line]
-        return direction(axis.name, values, sums, self.request.measure, self.request.seed).to_json()
+        return assess_direction(
+            axis.name, values, sums, self.request.measure, self.request.seed
+        ).to_json()
 
     def _batch(self, points: Sequence[Values | None], kind: str) -> list[float | None]:
         """Errors [m] of these points, in their order; None is the stated setup, and a kind of its
@@ -193,11 +197,11 @@ class _Run:
         keys = [
             []
             if isinstance(one, str)
-            else [key_of(one, digest, self.grid) for digest in self.digests]
+            else [replay_key(one, digest, self.grid) for digest in self.digests]
             for one in setups
         ]
         self.points += [{} for _ in points]
-        known: dict[str, Outcomes] = {}
+        known: dict[str, ReplayResult] = {}
         tasks: dict[str, tuple[Setup, int]] = {}
         for setup, own in zip(setups, keys, strict=True):
             if isinstance(setup, str):
@@ -211,7 +215,7 @@ class _Run:
         open_rows = dict(enumerate(keys))
         self._settle(open_rows, known, begin, points, setups, kind)
         names = list(tasks)
-        for told in outcomes(self.crew, list(tasks.values())):
+        for told in run_tasks(self.executor, list(tasks.values())):
             if told is not None:
                 known[names[told[0]]] = told[1]
                 self.computed += 1
@@ -225,7 +229,7 @@ class _Run:
     def _settle(
         self,
         waiting: dict[int, list[str]],
-        known: dict[str, Outcomes],
+        known: dict[str, ReplayResult],
         begin: int,
         points: Sequence[Values | None],
         setups: Sequence[Setup | str],
@@ -254,8 +258,8 @@ class _Run:
             if not failure:
                 sums = np.array([probe for key in keys for probe in known[key].sums])
                 self.sums[begin + place] = sums
-                row["error"] = float(error_of(sums.sum(axis=0), self.request.measure))
-                row["paper"] = float(error_of(sums.sum(axis=0), "paper"))
+                row["error"] = float(error_from_sums(sums.sum(axis=0), self.request.measure))
+                row["paper"] = float(error_from_sums(sums.sum(axis=0), "paper"))
             self.points[begin + place] = row
             if self.old.get(begin + place) != row:
                 self.rows.add(row)

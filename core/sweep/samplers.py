@@ -13,24 +13,24 @@ from collections.abc import Generator, Sequence
 import numpy as np
 
 from palpate.sweep.parameter_space import Axis
-from palpate.sweep.sweep_request import Request
+from palpate.sweep.sweep_spec import SweepSpec
 
-__all__ = ["Batches", "batches"]
+__all__ = ["PointBatches", "point_batches"]
 
 Point = dict[str, float]
-Batches = Generator[list[Point], Sequence[float | None], None]
+PointBatches = Generator[list[Point], Sequence[float | None], None]
 """Yields points by name; is sent the error [m] of each, None where a point failed."""
 _BATCH = 8
 
 
-def batches(request: Request) -> Batches:
+def point_batches(request: SweepSpec) -> PointBatches:
     """The points of a request."""
     if request.method == "grid":
         return _grid(request)
     return _random(request) if request.method == "random" else _told(request)
 
 
-def _grid(request: Request) -> Batches:
+def _grid(request: SweepSpec) -> PointBatches:
     """Each level spans one step of the last to both sides of the best point so far."""
     axes = request.space.axes
     spans = [axis.ends for axis in axes]
@@ -57,7 +57,7 @@ def _point(axes: Sequence[Axis], place: Sequence[float]) -> Point:
     return {axis.name: axis.value(value) for axis, value in zip(axes, place, strict=True)}
 
 
-def _random(request: Request) -> Batches:
+def _random(request: SweepSpec) -> PointBatches:
     axes, rng = request.space.axes, np.random.default_rng(request.seed)
     low, high = np.array([axis.ends for axis in axes]).T
     yield [
@@ -66,7 +66,7 @@ def _random(request: Request) -> Batches:
     ]
 
 
-def _told(request: Request) -> Batches:
+def _told(request: SweepSpec) -> PointBatches:
     """TPE (Bergstra et al. 2011) or CMA-ES (Hansen 2016) as Optuna has them."""
     import optuna
 

@@ -16,16 +16,16 @@ from palpate.foundation.progress import Report, silent
 from palpate.measurement.phantom_drift import as_it_stood
 from palpate.measurement.segmentation import cleaner_for, find_shaft_axis, tool_poses
 from palpate.registration.registration import register, setup_from
-from palpate.setup.box import CLEARANCE, clear_of
+from palpate.setup.box import CLEARANCE, distance_to_block
 from palpate.setup.setup import Setup
 
-__all__ = ["Watched", "watch"]
+__all__ = ["SweepSequence", "read_sweep_data"]
 
 _MOST_POINTS = 6000
 
 
 @dataclass(frozen=True, eq=False)
-class Watched:
+class SweepSequence:
     """Chosen frames of one sequence, in the order of time.
 
     Attributes:
@@ -55,9 +55,9 @@ class Watched:
         return digest.hexdigest()
 
 
-def watch(
+def read_sweep_data(
     dataset: Dataset, names: Sequence[str], frames: int, report: Report = silent
-) -> tuple[Setup, tuple[Watched, ...]]:
+) -> tuple[Setup, tuple[SweepSequence, ...]]:
     """The stated setup with its registrations, and the touched frames of these sequences, at most
     `frames` of each.
 
@@ -88,7 +88,7 @@ def watch(
         sequence = dataset.sequence(name)
         times = np.asarray(sequence.cloud_times)
         centres = setup.phantom_from_robot.apply(smooth_centres(sequence.kinematics, times))
-        touched = clear_of(setup.box.size, centres) <= setup.tool.radius + CLEARANCE
+        touched = distance_to_block(setup.box.size, centres) <= setup.tool.radius + CLEARANCE
         probes = np.cumsum(np.diff(touched.astype(int), prepend=0) > 0)
         near = np.flatnonzero(touched)
         if not len(near):
@@ -105,7 +105,7 @@ def watch(
             raw = sequence.cloud(int(frame))
             clouds.append(_thinned(raw[cleaner.clean(raw, pose).indices]))
         found.append(
-            Watched(
+            SweepSequence(
                 name,
                 sequence.kinematics,
                 times[chosen],

@@ -21,9 +21,9 @@ from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.protocol import Meshing
 from palpate.replay.replay import replay
 from palpate.setup.setup import Setup
-from palpate.sweep.sweep_data import Watched
+from palpate.sweep.sweep_data import SweepSequence
 
-__all__ = ["TOLERANCE", "Outcomes", "error_of", "measure"]
+__all__ = ["TOLERANCE", "ReplayResult", "error_from_sums", "replay_errors"]
 
 TOLERANCE = 1e-3
 """Residual at which a frame of a sweep counts as converged, over the push [1]; as in the page's
@@ -31,7 +31,7 @@ replays."""
 
 
 @dataclass(frozen=True)
-class Outcomes:
+class ReplayResult:
     """What one setup gave on one sequence, by push of the tool.
 
     Attributes:
@@ -50,13 +50,13 @@ class Outcomes:
         return {"sums": [list(row) for row in self.sums], "failure": self.failure}
 
     @classmethod
-    def from_json(cls, data: dict[str, Any]) -> Outcomes:
+    def from_json(cls, data: dict[str, Any]) -> ReplayResult:
         """The inverse."""
         rows = tuple((float(a), float(b), float(c), float(d)) for a, b, c, d in data["sums"])
         return cls(rows, str(data["failure"]))
 
 
-def error_of(sums: FloatArray, measure: str) -> FloatArray:
+def error_from_sums(sums: FloatArray, measure: str) -> FloatArray:
     """Error [m] from sums (..., 4): RMS of patch averages weighted by points, or the paper's metric
     as a mean over frames.
     """
@@ -65,23 +65,23 @@ def error_of(sums: FloatArray, measure: str) -> FloatArray:
     return np.asarray(np.sqrt(sums[..., 0] / np.maximum(sums[..., 1], 1)))
 
 
-def measure(setup: Setup, seen: Watched, grid: Meshing) -> Outcomes:
+def replay_errors(setup: Setup, seen: SweepSequence, grid: Meshing) -> ReplayResult:
     """Replay the frames of one sequence under this setup and compare; what cannot be replayed is a
     failure that says why.
 
-    Of frames that hang on those before them (`Setup.remembers`) only the chosen ones are replayed,
+    Of frames that hang on those before them (`Setup.has_history`) only the chosen ones are replayed,
     in the order of time.
     """
     try:
-        return Outcomes(_sums(setup, seen, grid))
+        return ReplayResult(_sums(setup, seen, grid))
     except PalpateError as error:
-        return Outcomes(failure=f"{seen.name}: {error.message}")
+        return ReplayResult(failure=f"{seen.name}: {error.message}")
     except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
-        return Outcomes(failure=f"{seen.name}: {type(error).__name__}: {error}")
+        return ReplayResult(failure=f"{seen.name}: {type(error).__name__}: {error}")
 
 
 def _sums(
-    setup: Setup, seen: Watched, grid: Meshing
+    setup: Setup, seen: SweepSequence, grid: Meshing
 ) -> tuple[tuple[float, float, float, float], ...]:
     times = seen.times - setup.sensor.time_offset
     robot = touch_correction(setup, grid) @ setup.phantom_from_robot

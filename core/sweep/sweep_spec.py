@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from palpate.foundation.errors import SetupError
-from palpate.sweep.parameter_space import Axis, Space
+from palpate.sweep.parameter_space import Axis, ParameterSpace
 
-__all__ = ["METHODS", "MOST_POINTS", "Measure", "Method", "Request"]
+__all__ = ["METHODS", "MOST_POINTS", "Measure", "Method", "SweepSpec"]
 
 Method = Literal["grid", "random", "tpe", "cmaes"]
 Measure = Literal["distance", "paper"]
@@ -18,7 +18,7 @@ MOST_POINTS = 20000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
+class SweepSpec:
     """One sweep.
 
     Attributes:
@@ -34,7 +34,7 @@ class Request:
         seed: of all draws.
     """
 
-    space: Space
+    space: ParameterSpace
     method: Method = "grid"
     steps: int = 7
     levels: int = 1
@@ -98,7 +98,7 @@ class Request:
         }
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> Request:
+    def from_json(cls, data: Mapping[str, Any]) -> SweepSpec:
         """The inverse; what is left out has its default."""
         axes = tuple(
             Axis(one["parameter"], float(one["low"]), float(one["high"]))
@@ -110,7 +110,7 @@ class Request:
             if key in data
         }
         return cls(
-            space=Space(axes, dict(data.get("fixed", {}))),
+            space=ParameterSpace(axes, dict(data.get("fixed", {}))),
             sequences=tuple(data.get("sequences", ())),
             **plain,
         )

@@ -151,7 +151,7 @@ class CorrectionNetwork(nn.Module):
     """Vertices and tool in, corrected vertices out, for one body.
 
     The tool's place is seen as a share of the body's extent, and displacements, velocity and force
-    by what is usual in the samples (`measure_by`), which is kept with the weights. The place is
+    by what is usual in the samples (`set_input_scales`), which is kept with the weights. The place is
     not: pushes in one spot have next to no spread, and any other spot would lie a hundred
     deviations away.
     """
@@ -201,7 +201,7 @@ class CorrectionNetwork(nn.Module):
     def _keep(self, name: str, values: Any) -> None:
         self.register_buffer(name, torch.as_tensor(np.asarray(values, dtype=np.float32)))
 
-    def measure_by(self, velocity: float, force: float, displacement: float) -> None:
+    def set_input_scales(self, velocity: float, force: float, displacement: float) -> None:
         """What is usual, RMS along an axis: the tool's velocity [m/s], its force [N], displacements
         of the points [m].
         """

@@ -25,7 +25,7 @@ from palpate.correction.samples.sample_store import Batch
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import CorrectionError
 
-__all__ = ["Distance", "Loss", "SurfaceLoss", "held_weights", "nearest"]
+__all__ = ["Distance", "Loss", "SurfaceLoss", "hold_weights", "nearest"]
 
 Distance = Literal["chamfer", "symmetric", "hausdorff"]
 _LEAST = 1e-8
@@ -50,7 +50,7 @@ class Loss:
     hidden: Tensor
 
 
-def held_weights(seen: FloatArray) -> FloatArray:
+def hold_weights(seen: FloatArray) -> FloatArray:
     """How much each material point (v,) is to stay where the simulation has it [0..1], by the
     measured points near it (v,).
     """
@@ -92,7 +92,7 @@ class SurfaceLoss:
         if not 0 <= hold <= 1e6:
             raise CorrectionError(f"hold = {hold:g}; expected 0 to 1e6", key="hold", value=hold)
         self.distance, self.hold, self._flat = distance, hold, body.flat
-        weights = held_weights(seen)
+        weights = hold_weights(seen)
         self._held = torch.as_tensor(weights, dtype=torch.float32, device=device)
         self._visible = torch.as_tensor(
             (weights[body.corners] * body.shares).sum(axis=1) < 0.5, device=device

@@ -6,7 +6,7 @@ with skip connections. Pools keep what an odd size leaves over (`ceil_mode`), an
 is cut to the size of its skip connection: the output has the input's size whatever it is.
 
 At the bottom of a grid as small as 13x5x5 most of a convolution's kernel lies in the padding: along
-an axis of one voxel two thirds of it. `Padded` leaves the taps out that never meet a voxel, which
+an axis of one voxel two thirds of it. `PaddedConvolution` leaves the taps out that never meet a voxel, which
 changes no result and saves most of the work there. Channels-last memory was tried: on a processor
 training is 5 % slower with it (`python -m benchmarks correction`).
 """
@@ -21,14 +21,14 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-__all__ = ["Padded", "UNet", "by_halves", "pooled"]
+__all__ = ["PaddedConvolution", "UNet", "max_pool_by_halves", "max_pool"]
 
 KERNEL, BOTTOM = 3, 4
 _TOOL = 0.1
 """Size of the first weights on what is known of the tool, over that of all others [1]."""
 
 
-class Padded(nn.Module):
+class PaddedConvolution(nn.Module):
     """A convolution with kernel 3 and padding 1 over two or three axes."""
 
     def __init__(self, axes: int, inputs: int, outputs: int) -> None:
@@ -47,15 +47,15 @@ class Padded(nn.Module):
         return convolve(values, weight, self.bias, padding=padding)
 
 
-def pooled(values: Tensor) -> Tensor:
+def max_pool(values: Tensor) -> Tensor:
     """The largest of each two along every axis (b, c, ...), and what an odd length leaves over."""
     if values.device.type == "cpu":
         pool = functional.max_pool2d if values.dim() == 4 else functional.max_pool3d
         return torch.as_tensor(pool(values, 2, ceil_mode=True))
-    return by_halves(values)
+    return max_pool_by_halves(values)
 
 
-def by_halves(values: Tensor) -> Tensor:
+def max_pool_by_halves(values: Tensor) -> Tensor:
     """The same by steps whose gradients CUDA adds up in one order, as it does not those of its own
     pools; 3 times slower on CPU.
     """
@@ -74,7 +74,10 @@ def by_halves(values: Tensor) -> Tensor:
 
 def _two(axes: int, inputs: int, outputs: int) -> nn.Sequential:
     return nn.Sequential(
-        Padded(axes, inputs, outputs), nn.ReLU(), Padded(axes, outputs, outputs), nn.ReLU()
+        PaddedConvolution(axes, inputs, outputs),
+        nn.ReLU(),
+        PaddedConvolution(axes, outputs, outputs),
+        nn.ReLU(),
     )
 
 
@@ -104,7 +107,10 @@ class UNet(nn.Module):
         deep = features[-1]
         bottom: list[nn.Module] = []
         for number in range(BOTTOM):
-            bottom += [Padded(axes, deep + known if number == 0 else deep, deep), nn.ReLU()]
+            bottom += [
+                PaddedConvolution(axes, deep + known if number == 0 else deep, deep),
+                nn.ReLU(),
+            ]
         self.bottom = nn.Sequential(*bottom)
         widths, transposed = (
             [deep, *reversed(features)],
@@ -130,10 +136,10 @@ class UNet(nn.Module):
         for part, shape in zip(parts, [*lengths[:-1], lengths[-1], *lengths[-2::-1]], strict=True):
             met = math.prod((3 * length - 2) / length for length in shape)
             for layer in part.modules():
-                if isinstance(layer, Padded):
+                if isinstance(layer, PaddedConvolution):
                     layer.weight.normal_(0.0, math.sqrt(2.0 / (met * layer.weight.shape[1])))
                     layer.bias.zero_()
-        # Trained on few places, a network that heeds the tool from the start says anything of all
+        # TrainedNetwork on few places, a network that heeds the tool from the start says anything of all
         # others.
         first = self.bottom[0].get_parameter("weight")
         first[:, first.shape[1] - self._known :] *= _TOOL
@@ -149,7 +155,7 @@ class UNet(nn.Module):
         for block in self.down:
             values = block(values)
             skips.append(values)
-            values = pooled(values)
+            values = max_pool(values)
         spread = known.reshape(*known.shape, *[1] * self._axes).expand(-1, -1, *values.shape[2:])
         values = self.bottom(torch.cat([values, spread.to(values.dtype)], dim=1))
         for double, block in zip(self.doubled, self.up, strict=True):

@@ -19,16 +19,16 @@ from torch import Tensor
 from torch.nn import functional
 
 from palpate.correction.networks.architectures import CorrectionNetwork
-from palpate.correction.networks.unet import Padded, UNet
+from palpate.correction.networks.unet import PaddedConvolution, UNet
 from palpate.foundation.arrays import IntArray
 
-__all__ = ["Compact", "has_half"]
+__all__ = ["UNetInference", "supports_bfloat16"]
 
 Step = Callable[[Tensor], Tensor]
 Shape = tuple[int, ...]
 
 
-def has_half() -> bool:
+def supports_bfloat16() -> bool:
     """Whether this processor multiplies bfloat16 itself; elsewhere it is slower than single
     precision.
     """
@@ -36,7 +36,7 @@ def has_half() -> bool:
     return bool(supported is not None and supported())
 
 
-class Compact:
+class UNetInference:
     """Vertices (v, 3) [m] and tool (13,) to corrected vertices, as `CorrectionNetwork` of a U-Net
     does with a batch of one.
 
@@ -50,7 +50,9 @@ class Compact:
         if not isinstance(inside, UNet) or grid is None:
             raise TypeError(f"only a U-Net can be made compact, this is a {type(inside).__name__}")
         self._type = (
-            torch.bfloat16 if (has_half() if half is None else half) else network.bound.dtype
+            torch.bfloat16
+            if (supports_bfloat16() if half is None else half)
+            else network.bound.dtype
         )
         self._network, self._columns = network.cpu(), network.spec.columns
         shapes = [grid[::-1]]
@@ -93,7 +95,7 @@ class Compact:
         steps = [
             self._convolution(part, shape)
             for part in modules.children()
-            if isinstance(part, Padded)
+            if isinstance(part, PaddedConvolution)
         ]
 
         def block(values: Tensor) -> Tensor:
@@ -103,7 +105,7 @@ class Compact:
 
         return block
 
-    def _convolution(self, part: Padded, shape: Shape) -> Step:
+    def _convolution(self, part: PaddedConvolution, shape: Shape) -> Step:
         rows, taps = _met(shape)
         axes = len(shape)
         # Kernels are stored along x, y, z; rows run with x fastest.

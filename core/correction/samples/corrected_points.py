@@ -117,7 +117,7 @@ class Body:
         )
 
     def to_arrays(self) -> dict[str, Any]:
-        """Arrays and plain values for a file."""
+        """SampleWriter and plain values for a file."""
         plain = {item.name: getattr(self, item.name) for item in fields(self)}
         return {**plain, "grid": None if self.grid is None else list(self.grid)}
 

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from palpate.correction.samples.corrected_points import Body
-from palpate.correction.samples.sample_arrays import Arrays
+from palpate.correction.samples.sample_arrays import SampleWriter
 from palpate.correction.samples.sample_store import FORMAT, Samples, open_samples
 from palpate.dataset import Dataset
 from palpate.dataset import Sequence as Recording
@@ -36,10 +36,10 @@ from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.mesh.protocol import Meshing
 from palpate.registration.registration import Registration, register, setup_from
 from palpate.replay.replay import Equilibrium, Replay
-from palpate.setup.box import CLEARANCE, clear_of
+from palpate.setup.box import CLEARANCE, distance_to_block
 from palpate.setup.setup import Setup
 
-__all__ = ["Recorder", "canonical", "make_samples", "recorder_for", "tool_columns"]
+__all__ = ["Recorder", "canonical_quaternions", "make_samples", "recorder_for", "tool_columns"]
 
 TOLERANCE = 1e-3
 """Residual at which a frame counts as converged, over the push [1]; as in the page's replays."""
@@ -69,6 +69,11 @@ class Recorder:
     points: int
     measured: bool
     seed: int = 0
+
+    @property
+    def phantom_from_robot(self) -> Transform:
+        """The robot registration under the setup, corrected for the sag at the touches."""
+        return touch_correction(self.setup, self.grid) @ self.setup.phantom_from_robot
 
     def only(self, name: str) -> Recorder:
         """The same with one sequence alone, to be sent to a process."""
@@ -210,26 +215,26 @@ def _sample(
     sequence = recorder.dataset.sequence(name)
     chosen = np.arange(0, len(sequence), every)
     stamps = np.asarray(sequence.cloud_times)[chosen]
-    times, robot = stamps - recorder.setup.sensor.time_offset, robot_of(recorder)
+    times, robot = stamps - recorder.setup.sensor.time_offset, recorder.phantom_from_robot
     centres = robot.apply(smooth_centres(sequence.kinematics, times))
     poses = tool_poses(
         sequence.kinematics, stamps, recorder.setup.phantom_from_robot, recorder.shaft
     )
     tool, sight = tool_columns(sequence, times, robot, recorder.measured), sight_of(recorder.setup)
-    touched = clear_of(recorder.setup.box.size, centres) <= recorder.setup.tool.radius + CLEARANCE
+    touched = distance_to_block(recorder.setup.box.size, centres) <= recorder.setup.tool.radius + CLEARANCE
     probes = np.where(touched, np.cumsum(np.diff(touched.astype(int), prepend=0) > 0), 0)
     (folder / name).mkdir()
-    files = Arrays(folder / name, len(chosen), len(recorder.body.rest), recorder.points)
+    files = SampleWriter(folder / name, len(chosen), len(recorder.body.rest), recorder.points)
     seen, row = np.zeros(len(recorder.body.rest)), 0
     block, previous = Replay(recorder.setup, recorder.grid, TOLERANCE), None
     for number, frame in enumerate(chosen):
         report(number / len(chosen), f"{name}: frame {number + 1} of {len(chosen)}")
-        found = block.sought(centres[number], (previous,), float(times[number]))
+        found = block.solve_from_any(centres[number], (previous,), float(times[number]))
         previous = (
             found
             if found.outcome is Outcome.CONVERGED
             else previous
-            if recorder.setup.remembers
+            if recorder.setup.has_history
             else None
         )
         cloud = sequence.cloud(int(frame))
@@ -259,11 +264,6 @@ def _sample(
 _LEAST_POINTS = 20
 
 
-def robot_of(recorder: Recorder) -> Transform:
-    """phantom_from_robot under the recorder's setup."""
-    return touch_correction(recorder.setup, recorder.grid) @ recorder.setup.phantom_from_robot
-
-
 def _measured(
     recorder: Recorder,
     sight: Sight,
@@ -285,7 +285,7 @@ def _measured(
     return points[np.argsort(~upper, kind="stable")], int(upper.sum()), near
 
 
-def canonical(quaternions: FloatArray) -> FloatArray:
+def canonical_quaternions(quaternions: FloatArray) -> FloatArray:
     """The same rotations (n, 4) with their largest component positive: q and -q are one rotation,
     and a network sees numbers.
     """
@@ -312,7 +312,9 @@ def tool_columns(
         )
     centres = phantom_from_robot.apply(smooth_centres(path, times))
     velocity = phantom_from_robot.rotate(ahead - behind) / (2 * SMOOTHING)
-    return np.concatenate([centres, canonical(turned.as_quat()), velocity, force], axis=1)
+    return np.concatenate(
+        [centres, canonical_quaternions(turned.as_quat()), velocity, force], axis=1
+    )
 
 
 def _write_about(

@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["ARRAYS", "Arrays"]
+__all__ = ["ARRAYS", "SampleWriter"]
 
 ARRAYS: dict[str, Any] = {
     "positions": np.float32,
@@ -25,7 +25,7 @@ ARRAYS: dict[str, Any] = {
 _CHUNK = 256
 
 
-class Arrays:
+class SampleWriter:
     """Of one sequence in a folder that is there: `rows` at most, cut to their number at the end."""
 
     def __init__(self, folder: Path, rows: int, vertices: int, points: int) -> None:

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import torch
 
-from palpate.correction import Body, Corrector, NetworkSpec, Trained, build, replay_corrected
+from palpate.correction import Body, Corrector, NetworkSpec, TrainedNetwork, build, replay_corrected
 from palpate.correction.corrected_replay import FEEDBACKS
-from palpate.correction.elastic_extension import Following, _tangent
-from palpate.correction.samples.record_samples import robot_of, tool_columns
+from palpate.correction.elastic_extension import ElasticExtension, _tangent
+from palpate.correction.samples.record_samples import tool_columns
 from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.fem.model import BlockModel
 from palpate.foundation.errors import CorrectionError
@@ -32,7 +32,9 @@ def _trained(kind, body=None, **about):
     for parameter in network.inside.last.parameters():
         torch.nn.init.normal_(parameter, std=0.2)
     seen = np.where(np.isclose(Body.block(SIZE, NODES).rest[:, 2], SIZE[2]), 5.0, 0.0)
-    return Trained(network.eval(), body, {"force": "simulated", "seen": seen.tolist(), **about})
+    return TrainedNetwork(
+        network.eval(), body, {"force": "simulated", "seen": seen.tolist(), **about}
+    )
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +77,7 @@ def test_body_that_follows_is_in_equilibrium_and_held_at_its_base():
     top = np.flatnonzero(np.isclose(mesh.nodes[:, 2], SIZE[2]))
     given = np.zeros_like(mesh.nodes)
     given[top] = np.random.default_rng(0).normal(0, 1e-3, (len(top), 3))
-    found = Following(SETUP, mesh, top)(given)
+    found = ElasticExtension(SETUP, mesh, top)(given)
     model = BlockModel(SETUP, mesh)
     force = np.zeros_like(found)
     force[model.topology.free] = _tangent(model) @ found[model.topology.free]
@@ -90,7 +92,7 @@ def test_small_motion_of_the_top_is_followed_as_the_solver_would():
     top = np.flatnonzero(np.isclose(mesh.nodes[:, 2], SIZE[2]))
     given = np.zeros_like(mesh.nodes)
     given[top] = [2e-6, 0.0, -1e-6]
-    found = Following(SETUP, mesh, top)(given)
+    found = ElasticExtension(SETUP, mesh, top)(given)
     model = BlockModel(SETUP, mesh)
     residual = model.assemble(mesh.nodes + found, None, tangent=False).residual
     there = np.zeros_like(found)
@@ -117,7 +119,7 @@ def test_replay_on_the_bench_is_corrected_as_the_samples_were(bench):
     body = bench.samples.body
     trained = _trained("unet3d", body, seen=bench.samples.seen.tolist())
     sequence = bench.dataset.sequence("poke-top-01")
-    times, robot = np.asarray(sequence.cloud_times)[:12], robot_of(recorder)
+    times, robot = np.asarray(sequence.cloud_times)[:12], recorder.phantom_from_robot
     centres, tools = (
         robot.apply(smooth_centres(sequence.kinematics, times)),
         tool_columns(sequence, times, robot, False),

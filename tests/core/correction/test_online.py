@@ -13,7 +13,7 @@ from palpate.correction import (
     OnlineSpec,
     Split,
     TrainingSpec,
-    learn_along,
+    learn_online,
     train,
 )
 from palpate.foundation.errors import Cancelled, CorrectionError
@@ -24,7 +24,7 @@ def test_learning_on_the_way_follows_a_material_that_changes_half_way(bench, sti
     spec = TrainingSpec(network=network, rate=2e-3, batch=8, epochs=8, device="cpu")
     trained = train(bench.samples, Split.of(bench.samples), spec, tmp_path)
     before, after = bench.samples.rows(["poke-top-03"]), stiffer.samples.rows(["poke-top-01"])
-    stream = learn_along(
+    stream = learn_online(
         trained,
         [(bench.samples, ["poke-top-03"]), (stiffer.samples, ["poke-top-01"])],
         OnlineSpec(),
@@ -61,7 +61,7 @@ def test_each_frame_is_predicted_before_it_is_learned_from(known):
     with torch.no_grad():
         wanted = trained.network(frame.positions, frame.tool)
     assert torch.equal(learner.predict(frame), wanted)
-    stream = learn_along(trained, [(samples, ["three"])], OnlineSpec())
+    stream = learn_online(trained, [(samples, ["three"])], OnlineSpec())
     assert stream.online[0] == stream.frozen[0]
     assert stream.online[0] == pytest.approx(learner.error(wanted, frame))
 
@@ -69,7 +69,7 @@ def test_each_frame_is_predicted_before_it_is_learned_from(known):
 def test_network_it_was_made_from_stays_as_it_is(known):
     samples, trained = known
     before = [value.clone() for value in trained.network.state_dict().values()]
-    learn_along(trained, [(samples, ["two"])], OnlineSpec())
+    learn_online(trained, [(samples, ["two"])], OnlineSpec())
     assert all(
         torch.equal(a, b)
         for a, b in zip(before, trained.network.state_dict().values(), strict=True)
@@ -78,14 +78,14 @@ def test_network_it_was_made_from_stays_as_it_is(known):
 
 def test_without_steps_nothing_is_learned(known):
     samples, trained = known
-    stream = learn_along(trained, [(samples, ["two"])], OnlineSpec(steps=0))
+    stream = learn_online(trained, [(samples, ["two"])], OnlineSpec(steps=0))
     assert np.array_equal(stream.online, stream.frozen)
 
 
 def test_same_seed_learns_the_same(known):
     samples, trained = known
     runs = [
-        learn_along(trained, [(samples, ["two"])], OnlineSpec(seed=seed, memory=4)).online
+        learn_online(trained, [(samples, ["two"])], OnlineSpec(seed=seed, memory=4)).online
         for seed in (0, 0, 1)
     ]
     assert np.array_equal(runs[0], runs[1])
@@ -100,7 +100,7 @@ def test_stream_can_be_cancelled(known):
             raise Cancelled
 
     with pytest.raises(Cancelled):
-        learn_along(trained, [(samples, ["two"])], OnlineSpec(), stop)
+        learn_online(trained, [(samples, ["two"])], OnlineSpec(), stop)
 
 
 @pytest.mark.parametrize(

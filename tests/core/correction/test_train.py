@@ -18,9 +18,9 @@ from palpate.correction import (
     Samples,
     Split,
     SurfaceLoss,
-    Trained,
+    TrainedNetwork,
     TrainingSpec,
-    errors_of,
+    sample_errors,
     train,
 )
 from palpate.correction.train import CHECKPOINT, _Run
@@ -43,11 +43,11 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> Samples:
     return write_samples(tmp_path_factory.mktemp("training") / "samples")
 
 
-def _weights(trained: Trained) -> list[torch.Tensor]:
+def _weights(trained: TrainedNetwork) -> list[torch.Tensor]:
     return list(trained.network.state_dict().values())
 
 
-def _same(one: Trained, other: Trained) -> bool:
+def _same(one: TrainedNetwork, other: TrainedNetwork) -> bool:
     return all(torch.equal(a, b) for a, b in zip(_weights(one), _weights(other), strict=True))
 
 
@@ -78,7 +78,7 @@ def test_network_beats_no_network_on_a_held_out_sequence_of_the_bench(kind, benc
     loss = SurfaceLoss(trained.body, bench.samples.seen[trained.body.index])
     rows = bench.samples.rows(split.test)
     raw, corrected = (
-        errors_of(network, loss, trained.body, bench.samples, rows).mean()
+        sample_errors(network, loss, trained.body, bench.samples, rows).mean()
         for network in (None, trained.network)
     )
     assert corrected < 0.92 * raw
@@ -171,7 +171,7 @@ def test_training_stops_when_validation_gets_no_better_and_keeps_the_best(sample
     assert trained.about["error"] == min([*errors, trained.about["raw_error"]])
     loss = SurfaceLoss(trained.body, samples.seen)
     kept = (
-        errors_of(
+        sample_errors(
             trained.network,
             loss,
             trained.body,
@@ -284,7 +284,7 @@ def test_request_survives_json():
 
 def test_trained_network_survives_its_file(samples, tmp_path):
     trained = train(samples, Split.of(samples), TINY, tmp_path)
-    again = Trained.load(tmp_path)
+    again = TrainedNetwork.load(tmp_path)
     batch = samples.batch(samples.rows(["three"])[:2])
     with torch.no_grad():
         assert torch.equal(
@@ -295,4 +295,4 @@ def test_trained_network_survives_its_file(samples, tmp_path):
 
 def test_missing_network_says_train_first(tmp_path):
     with pytest.raises(RunError, match="train first"):
-        Trained.load(tmp_path)
+        TrainedNetwork.load(tmp_path)

@@ -12,7 +12,7 @@ from pushed_block import GRID, SETUP, SIZE, dwelling, poke, seen_points
 
 from palpate.diagnosis.forward.prediction import predict
 from palpate.diagnosis.observation.frame_groups import Group, Observations
-from palpate.evaluation.corrected_prediction import corrected_prediction, tools_of
+from palpate.evaluation.corrected_prediction import corrected_prediction, tool_inputs
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.metrics import paper_distance
 from palpate.measurement.surface_gaps import Surface
@@ -56,5 +56,5 @@ def test_group_is_told_the_mean_tool_of_its_frames_and_the_rest_cloud_that_of_th
         Group((1, 2), none, False, probe=1),
     )
     columns = np.arange(39.0).reshape(3, 13)
-    told = tools_of(Observations("told", times, stream, groups), columns)
+    told = tool_inputs(Observations("told", times, stream, groups), columns)
     np.testing.assert_array_equal(told, [columns[0], columns[0], columns[1:].mean(axis=0)])

@@ -13,8 +13,8 @@ from pushed_block import SETUP, dwelling, poke, prediction, seen_points
 
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.observation.frame_groups import Group, Observations
-from palpate.evaluation.error_ladder import Rung, ladder
-from palpate.evaluation.summary_sentence import meaning
+from palpate.evaluation.error_ladder import Rung, build_ladder
+from palpate.evaluation.summary_sentence import summary_sentence
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.box_mesh import GridSpec
 from palpate.replay.replay import rest
@@ -57,7 +57,7 @@ def _sized(*sizes: float) -> FloatArray:
 
 
 def _climbed(*rungs: Rung, **more: Any) -> dict[str, Any]:
-    return ladder([_observations()], rungs, KINDS, {"top"}, **more)
+    return build_ladder([_observations()], rungs, KINDS, {"top"}, **more)
 
 
 def _part(found: dict[str, Any], part: str) -> dict[str, Any]:
@@ -129,18 +129,18 @@ def test_sag_that_a_model_names_counts_and_also_when_a_network_learned_it():
 
 
 def test_sentence_says_both_shares_on_both_kinds():
-    assert meaning(_climbed(*THREE)) == (
+    assert summary_sentence(_climbed(*THREE)) == (
         "The network alone removes 50 % and 0 % of the error that can be removed on kinds of motion that training has, and on "
         "others; naming the cause alone 75 % and 75 %."
     )
 
 
 def test_sentence_of_a_lone_model_asks_for_another():
-    assert "nothing stands beside it yet" in meaning(_climbed(THREE[0]))
+    assert "nothing stands beside it yet" in summary_sentence(_climbed(THREE[0]))
 
 
 def test_sentence_of_a_network_alone_says_what_cannot_be_told_without_a_second_model():
-    text = meaning(_climbed(*THREE[:2], ends=(0, 0)))
+    text = summary_sentence(_climbed(*THREE[:2], ends=(0, 0)))
     assert (
         "50 % and 0 % of the error that moves with the tool" in text
         and "may be the camera's" in text
@@ -166,7 +166,9 @@ def test_block_that_stays_where_it_slid_is_no_pattern_of_the_cameras():
         _rung("baseline_network", corrected, network=True),
         _rung("true", _sized(0, 0, 0, 0)),
     ]
-    found = _part(ladder([replace(item, groups=groups)], rungs, KINDS, {"top"}), "all")["errors"]
+    found = _part(build_ladder([replace(item, groups=groups)], rungs, KINDS, {"top"}), "all")[
+        "errors"
+    ]
     assert found["baseline"]["error"] == pytest.approx(3.0)
     # It is right while the tool is there to tell it, and pays for what it leaves, not for what it
     # mends.

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from palpate.dataset import open_dataset
-from palpate.evaluation.paper_tables import PaperRequest, run_paper, what_it_shows
-from palpate.evaluation.train_network import Wanted
+from palpate.evaluation.paper_tables import PaperRequest, interpret_search, run_paper
+from palpate.evaluation.train_network import TrainingPlan
 from palpate.synthetic import HiddenEffect, Scenario, make_dataset
 
 
@@ -19,7 +19,7 @@ def _search(change: float, flat: bool) -> dict[str, object]:
 
 
 def test_flat_search_is_explained_by_the_modulus_that_cancels():
-    text = what_it_shows(_search(2e-9, True), _search(4e-9, True))
+    text = interpret_search(_search(2e-9, True), _search(4e-9, True))
     assert (
         "Both searches are flat" in text
         and "less than 0.001 mm" in text
@@ -28,7 +28,9 @@ def test_flat_search_is_explained_by_the_modulus_that_cancels():
 
 
 def test_search_that_changes_something_is_not_called_flat():
-    assert "changes by up to 0.31 mm" in what_it_shows(_search(3.1e-4, False), _search(1e-5, True))
+    assert "changes by up to 0.31 mm" in interpret_search(
+        _search(3.1e-4, False), _search(1e-5, True)
+    )
 
 
 @pytest.mark.slow
@@ -44,7 +46,7 @@ def test_tables_on_a_small_phantom(tmp_path: Path):
         robot_rate=200.0,
     )
     make_dataset(tmp_path / "block", scenario, 3)
-    training = Wanted(
+    training = TrainingPlan(
         spec={"network": {"features": [8, 16]}, "epochs": 4, "batch": 8, "rate": 3e-3}
     )
     request = PaperRequest(frames=3, training=training, moduli=(5e3, 1e1))

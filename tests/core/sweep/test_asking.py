@@ -10,10 +10,10 @@ import pytest
 
 from palpate.foundation.errors import EffectError, SetupError
 from palpate.setup.setup import Box, Setup, Tool
-from palpate.sweep import Axis, Request, Space
-from palpate.sweep.flat_directions import direction
-from palpate.sweep.result_rows import Rows
-from palpate.sweep.samplers import batches
+from palpate.sweep import Axis, ParameterSpace, SweepSpec
+from palpate.sweep.flat_directions import assess_direction
+from palpate.sweep.result_rows import ResultRows
+from palpate.sweep.samplers import point_batches
 
 NU = Axis("poisson_ratio.nu", 0.3, 0.49)
 SETUP = Setup(geometry=Box(size=(0.07, 0.04, 0.036)), tool=Tool(radius=5e-3))
@@ -46,22 +46,22 @@ def test_an_axis_that_cannot_be_is_refused(name: str, low: float, high: float, s
 )
 def test_a_request_that_cannot_be_is_refused(change: dict[str, Any], said: str) -> None:
     with pytest.raises(SetupError, match=said):
-        Request(space=Space((NU,)), **change)
+        SweepSpec(space=ParameterSpace((NU,)), **change)
 
 
 def test_a_request_survives_json() -> None:
-    asked = Request(
-        space=Space((NU,), {"gravity.specific_weight_over_stiffness": 1.0}),
+    asked = SweepSpec(
+        space=ParameterSpace((NU,), {"gravity.specific_weight_over_stiffness": 1.0}),
         method="tpe",
         points=7,
         sequences=("a",),
         seed=3,
     )
-    assert Request.from_json(asked.to_json()) == asked
+    assert SweepSpec.from_json(asked.to_json()) == asked
 
 
 def test_a_value_and_what_is_fixed_are_in_the_setup() -> None:
-    setup = Space((NU,), {"gravity.specific_weight_over_stiffness": 1.5}).setup(
+    setup = ParameterSpace((NU,), {"gravity.specific_weight_over_stiffness": 1.5}).setup(
         SETUP, {NU.name: 0.41}
     )
     assert (setup.material.poisson_ratio, setup.load.specific_weight_over_stiffness) == (0.41, 1.5)
@@ -76,7 +76,7 @@ def errors(points: list[dict[str, float]], best: float) -> list[float | None]:
 
 
 def test_each_level_of_a_grid_spans_a_step_to_both_sides_of_the_best() -> None:
-    asked = batches(Request(space=Space((NU,)), steps=5, levels=2))
+    asked = point_batches(SweepSpec(space=ParameterSpace((NU,)), steps=5, levels=2))
     first = next(asked)
     second = asked.send(errors(first, 0.4))
     step = (0.49 - 0.3) / 4
@@ -89,10 +89,10 @@ def test_each_level_of_a_grid_spans_a_step_to_both_sides_of_the_best() -> None:
 
 @pytest.mark.parametrize("method", ["tpe", "cmaes"])
 def test_optuna_walks_the_same_way_twice_and_nears_the_optimum(method: Any) -> None:
-    space = Space((NU, Axis("young_modulus.E", 1e3, 1e5)))
+    space = ParameterSpace((NU, Axis("young_modulus.E", 1e3, 1e5)))
     walks = []
     for _ in range(2):
-        asked = batches(Request(space=space, method=method, points=48, seed=4))
+        asked = point_batches(SweepSpec(space=space, method=method, points=48, seed=4))
         walked, points = [], next(asked)
         while True:
             walked += points
@@ -124,18 +124,21 @@ def test_noise_between_probes_is_flat_and_a_change_in_all_of_them_is_not() -> No
     rng = np.random.default_rng(0)
     base = 1e-7 * (1 + 0.5 * rng.random(12))
     noisy = np.stack([base * (1 + 0.2 * rng.standard_normal(12)) for _ in range(5)])
-    assert direction("a", range(5), sums(noisy), "distance", 0).flat
+    assert assess_direction("a", range(5), sums(noisy), "distance", 0).flat
     assert (
-        direction(
+        assess_direction(
             "a", range(5), sums(noisy * np.array([1, 1.2, 1.5, 2, 3])[:, None]), "distance", 0
         ).flat
         is False
     )
-    assert direction("a", range(2), sums(np.array([[1e-7], [2e-7]])), "distance", 0).flat is None
+    assert (
+        assess_direction("a", range(2), sums(np.array([[1e-7], [2e-7]])), "distance", 0).flat
+        is None
+    )
 
 
 def test_rows_outlive_a_torn_end(tmp_path: Path) -> None:
-    kept = Rows(tmp_path / "rows")
+    kept = ResultRows(tmp_path / "rows")
     kept.start([])
     kept.add({"number": 0})
     with (tmp_path / "rows").open("a") as stream:

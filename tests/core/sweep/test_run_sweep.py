@@ -17,17 +17,17 @@ import pytest
 
 from palpate.dataset import open_dataset
 from palpate.mesh.graded_mesh import SCREEN_GRID
-from palpate.sweep import Axis, Request, Space
-from palpate.sweep.executors import Processes, outcomes
+from palpate.sweep import Axis, ParameterSpace, SweepSpec
+from palpate.sweep.executors import ProcessExecutor, run_tasks
 from palpate.sweep.run_sweep import run_sweep
-from palpate.sweep.sweep_data import watch
-from palpate.sweep.sweep_error import error_of, measure
+from palpate.sweep.sweep_data import read_sweep_data
+from palpate.sweep.sweep_error import error_from_sums, replay_errors
 
 RADIUS = Axis("tool_radius.radius", 4e-3, 8e-3)
 GRID = SCREEN_GRID.for_tool(5e-3)
 
 
-def sweep(phantom: Path, folder: Path, request: Request, **others: Any) -> dict[str, Any]:
+def sweep(phantom: Path, folder: Path, request: SweepSpec, **others: Any) -> dict[str, Any]:
     return run_sweep(
         open_dataset(phantom), request, folder, grid=GRID, **{"store": folder / "store", **others}
     )
@@ -55,7 +55,9 @@ def same(some: list[dict[str, Any]], others: list[dict[str, Any]]) -> bool:
 def test_a_grid_from_coarse_to_fine_finds_the_hidden_radius_and_says_that_it_matters(
     phantom: Path, tmp_path: Path
 ) -> None:
-    found = sweep(phantom, tmp_path, Request(space=Space((RADIUS,)), steps=5, levels=3, frames=6))
+    found = sweep(
+        phantom, tmp_path, SweepSpec(space=ParameterSpace((RADIUS,)), steps=5, levels=3, frames=6)
+    )
     assert found["best"]["values"]["tool_radius.radius"] == pytest.approx(6e-3, abs=0.6e-3)
     assert found["best"]["error"] < found["stated"]
     (direction,) = found["directions"]
@@ -69,19 +71,19 @@ def test_a_grid_from_coarse_to_fine_finds_the_hidden_radius_and_says_that_it_mat
 def test_other_methods_call_the_modulus_flat_and_not_the_radius(
     phantom: Path, tmp_path: Path, method: Any
 ) -> None:
-    space = Space((RADIUS, Axis("young_modulus.E", 2e3, 2e5)))
-    found = sweep(phantom, tmp_path, Request(space=space, method=method, points=16, frames=4))
+    space = ParameterSpace((RADIUS, Axis("young_modulus.E", 2e3, 2e5)))
+    found = sweep(phantom, tmp_path, SweepSpec(space=space, method=method, points=16, frames=4))
     flat = {one["name"]: one["flat"] for one in found["directions"]}
     assert flat == {"tool_radius.radius": False, "young_modulus.E": True}
     assert found["best"]["values"]["tool_radius.radius"] == pytest.approx(6e-3, abs=1.2e-3)
 
 
 def test_what_cannot_be_is_kept_with_its_reason(phantom: Path, tmp_path: Path) -> None:
-    buried = Space(
+    buried = ParameterSpace(
         (Axis("stiff_inclusion.z", 0.005, 0.4),),
         {"stiff_inclusion.stiffness_ratio": 5.0, "stiff_inclusion.radius": 0.5},
     )
-    found = sweep(phantom, tmp_path, Request(space=buried, steps=2, frames=1))
+    found = sweep(phantom, tmp_path, SweepSpec(space=buried, steps=2, frames=1))
     assert found["failed"] == 2 and found["best"] is None
     searched = [row for row in rows(tmp_path) if row["kind"] == "search"]
     assert len(searched) == 2 and all(
@@ -90,25 +92,25 @@ def test_what_cannot_be_is_kept_with_its_reason(phantom: Path, tmp_path: Path) -
 
 
 def test_a_process_that_is_killed_costs_nothing(phantom: Path) -> None:
-    stated, data = watch(open_dataset(phantom), (), 2)
+    stated, data = read_sweep_data(open_dataset(phantom), (), 2)
     tasks = [(RADIUS_SPACE.setup(stated, {RADIUS.name: value}), 0) for value in RADIUS.line(4)]
-    crew, found, killed = Processes(2, data, GRID), {}, False
+    executor, found, killed = ProcessExecutor(2, data, GRID), {}, False
     try:
-        for told in outcomes(crew, tasks):
+        for told in run_tasks(executor, tasks):
             if told is not None:
                 found[told[0]] = told[1]
             if len(found) == 1 and not killed:
                 killed = True
-                for pool in crew._busy.values():
+                for pool in executor._busy.values():
                     for process in (pool._processes or {}).values():
                         process.kill()
     finally:
-        crew.close()
+        executor.close()
     assert sorted(found) == list(range(4))
     for number, (setup, _) in enumerate(
         tasks
     ):  # another process has another memory, and sums in it another last digit
-        alone = measure(setup, data[0], GRID)
+        alone = replay_errors(setup, data[0], GRID)
         assert (
             (found[number].failure, found[number].lost)
             == (alone.failure, alone.lost)
@@ -117,24 +119,24 @@ def test_a_process_that_is_killed_costs_nothing(phantom: Path) -> None:
         np.testing.assert_allclose(found[number].sums, alone.sums, rtol=1e-9)
 
 
-RADIUS_SPACE = Space((RADIUS,))
+RADIUS_SPACE = ParameterSpace((RADIUS,))
 KILLED = """
 from pathlib import Path
 from palpate.dataset import open_dataset
 from palpate.mesh.graded_mesh import SCREEN_GRID
-from palpate.sweep import Request
+from palpate.sweep import SweepSpec
 from palpate.sweep.run_sweep import run_sweep
 import json, sys
 if __name__ == "__main__":
     data, folder, said = sys.argv[1:]
     folder = Path(folder)
-    request = Request.from_json(json.loads(said))
+    request = SweepSpec.from_json(json.loads(said))
     run_sweep(open_dataset(Path(data)), request, folder, grid=SCREEN_GRID.for_tool(5e-3), store=folder / "store")
 """
 
 
 def test_a_sweep_that_is_killed_goes_on_where_it_was(phantom: Path, tmp_path: Path) -> None:
-    request = Request(space=RADIUS_SPACE, method="tpe", points=10, frames=3, seed=2)
+    request = SweepSpec(space=RADIUS_SPACE, method="tpe", points=10, frames=3, seed=2)
     folder, script = tmp_path / "killed", tmp_path / "killed.py"
     script.write_text(KILLED)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
@@ -163,7 +165,7 @@ def test_a_sweep_that_is_killed_goes_on_where_it_was(phantom: Path, tmp_path: Pa
 
 def test_a_dask_cluster_gives_the_same(phantom: Path, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
-    request = Request(space=RADIUS_SPACE, steps=4, frames=2)
+    request = SweepSpec(space=RADIUS_SPACE, steps=4, frames=2)
     with distributed.LocalCluster(
         n_workers=2,
         threads_per_worker=1,
@@ -182,9 +184,9 @@ def test_a_dask_cluster_gives_the_same(phantom: Path, tmp_path: Path) -> None:
 
 
 def test_the_error_is_that_of_the_sums(phantom: Path) -> None:
-    stated, data = watch(open_dataset(phantom), (), 3)
-    sums = np.array(measure(stated, data[0], GRID).sums)
-    assert error_of(sums.sum(axis=0), "distance") == pytest.approx(
+    stated, data = read_sweep_data(open_dataset(phantom), (), 3)
+    sums = np.array(replay_errors(stated, data[0], GRID).sums)
+    assert error_from_sums(sums.sum(axis=0), "distance") == pytest.approx(
         np.sqrt(sums[:, 0].sum() / sums[:, 1].sum())
     )
-    assert error_of(sums.sum(axis=0), "paper") == pytest.approx(sums[:, 2].sum() / 3)
+    assert error_from_sums(sums.sum(axis=0), "paper") == pytest.approx(sums[:, 2].sum() / 3)

@@ -6,8 +6,8 @@ from shapes import filled_box
 from torch import nn
 
 from palpate.correction import Body, NetworkSpec, build
-from palpate.correction.networks.unet import Padded, UNet, by_halves, pooled
-from palpate.correction.networks.unet_inference import Compact
+from palpate.correction.networks.unet import PaddedConvolution, UNet, max_pool, max_pool_by_halves
+from palpate.correction.networks.unet_inference import UNetInference
 from palpate.foundation.errors import CorrectionError
 
 SIZE = (0.0687, 0.0393, 0.0358)
@@ -65,11 +65,13 @@ def test_unet_of_the_paper_has_its_layers():
     inside = build(NetworkSpec(kind="unet2d"), Body.top(SIZE, (13, 5, 5))).inside
     assert isinstance(inside, UNet)
     widths = [
-        [part.weight.shape[0] for part in block.modules() if isinstance(part, Padded)]
+        [part.weight.shape[0] for part in block.modules() if isinstance(part, PaddedConvolution)]
         for block in inside.down
     ]
     assert widths == [[64, 64], [128, 128], [256, 256]]
-    bottom = [part.weight.shape[:2] for part in inside.bottom if isinstance(part, Padded)]
+    bottom = [
+        part.weight.shape[:2] for part in inside.bottom if isinstance(part, PaddedConvolution)
+    ]
     assert [tuple(shape) for shape in bottom] == [
         (256, 256 + 7),
         (256, 256),
@@ -77,14 +79,16 @@ def test_unet_of_the_paper_has_its_layers():
         (256, 256),
     ]
     assert all(
-        part.weight.shape[2:] == (3, 3) for part in inside.modules() if isinstance(part, Padded)
+        part.weight.shape[2:] == (3, 3)
+        for part in inside.modules()
+        if isinstance(part, PaddedConvolution)
     )
 
 
 @pytest.mark.parametrize("shape", [(2, 1), (13, 5), (1, 1), (4, 2, 2), (2, 1, 1), (3, 1, 4)])
 def test_taps_left_out_change_nothing(shape):
     torch.manual_seed(0)
-    part = Padded(len(shape), 3, 5)
+    part = PaddedConvolution(len(shape), 3, 5)
     values = torch.randn(2, 3, *shape)
     plain = (nn.functional.conv2d if len(shape) == 2 else nn.functional.conv3d)(
         values, part.weight, part.bias, padding=1
@@ -99,10 +103,10 @@ def test_pool_for_cuda_is_that_of_torch_and_so_is_its_gradient(shape):
         torch.rand(2, 3, *shape, generator=torch.Generator().manual_seed(1)).requires_grad_()
         for _ in range(2)
     )
-    weights = torch.rand_like(pooled(one))
-    (pooled(one) * weights).sum().backward()
-    (by_halves(other) * weights).sum().backward()
-    assert torch.equal(pooled(one), by_halves(other))
+    weights = torch.rand_like(max_pool(one))
+    (max_pool(one) * weights).sum().backward()
+    (max_pool_by_halves(other) * weights).sum().backward()
+    assert torch.equal(max_pool(one), max_pool_by_halves(other))
     assert one.grad is not None and other.grad is not None
     assert torch.equal(one.grad, other.grad)
 
@@ -170,12 +174,12 @@ def test_compact_network_says_the_same(kind, nodes):
     with torch.no_grad():
         wanted, single = (
             network(vertices, tool)[0],
-            Compact(network, half=False)(vertices[0], tool[0]),
+            UNetInference(network, half=False)(vertices[0], tool[0]),
         )
-        rough = Compact(network, half=True)(vertices[0], tool[0])
+        rough = UNetInference(network, half=True)(vertices[0], tool[0])
         exact = network.double()(vertices.double(), tool.double())[0]
     assert (
-        Compact(network, half=False)(vertices[0].double(), tool[0].double()) - exact
+        UNetInference(network, half=False)(vertices[0].double(), tool[0].double()) - exact
     ).abs().max() < 1e-12
     assert (single - exact).abs().max() < 3 * (
         wanted - exact

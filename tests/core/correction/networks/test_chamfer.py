@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import directed_hausdorff
 
 from palpate.correction import Batch, Body, SurfaceLoss
-from palpate.correction.networks.chamfer import _by_all, held_weights, nearest
+from palpate.correction.networks.chamfer import _by_all, hold_weights, nearest
 from palpate.foundation.errors import CorrectionError
 from palpate.measurement.metrics import paper_distance
 from palpate.measurement.surface_gaps import Surface
@@ -127,8 +127,8 @@ def test_hidden_points_are_held_and_seen_ones_are_free():
 
 
 def test_nothing_is_believed_where_nothing_was_seen():
-    assert held_weights(np.zeros(4)).tolist() == [1.0] * 4
-    assert held_weights(np.array([0.0, 100.0])).round(3).tolist() == [1.0, 0.0]
+    assert hold_weights(np.zeros(4)).tolist() == [1.0] * 4
+    assert hold_weights(np.array([0.0, 100.0])).round(3).tolist() == [1.0, 0.0]
 
 
 def test_frame_without_points_counts_nothing_and_breaks_nothing():

@@ -6,7 +6,7 @@ from learned_samples import write_samples
 from scipy.spatial.transform import Rotation
 
 from palpate.correction import Body, make_samples, open_samples, recorder_for
-from palpate.correction.samples.record_samples import canonical, robot_of, tool_columns
+from palpate.correction.samples.record_samples import canonical_quaternions, tool_columns
 from palpate.dataset import Kinematics, Sequence
 from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.foundation.errors import Cancelled, CorrectionError, RunError
@@ -20,7 +20,7 @@ def test_samples_hold_what_the_replay_and_the_camera_say(bench):
     samples, recorder = bench.samples, bench.recorder
     sequence = bench.dataset.sequence("poke-top-02")
     rows, times = samples.rows(["poke-top-02"]), np.asarray(sequence.cloud_times)
-    centres = robot_of(recorder).apply(smooth_centres(sequence.kinematics, times))
+    centres = recorder.phantom_from_robot.apply(smooth_centres(sequence.kinematics, times))
     frames = replay(recorder.setup, centres, recorder.grid, times=times, tolerance=1e-3)
     assert samples.column("frame", rows).tolist() == list(range(len(sequence)))
     for number in (0, 20, 30):
@@ -149,9 +149,10 @@ def test_samples_are_not_written_over(bench, tmp_path):
 
 def test_rotation_and_its_opposite_quaternion_are_one():
     turned = Rotation.random(20, rng=np.random.default_rng(0)).as_quat()
-    assert np.allclose(canonical(turned), canonical(-turned))
+    assert np.allclose(canonical_quaternions(turned), canonical_quaternions(-turned))
     assert np.allclose(
-        Rotation.from_quat(canonical(turned)).as_matrix(), Rotation.from_quat(turned).as_matrix()
+        Rotation.from_quat(canonical_quaternions(turned)).as_matrix(),
+        Rotation.from_quat(turned).as_matrix(),
     )
 
 

@@ -7,23 +7,23 @@ from pathlib import Path
 import pytest
 from learned_samples import write_samples
 
-from palpate.evaluation.train_network import Wanted, whole_samples
+from palpate.evaluation.train_network import TrainingPlan, complete_samples
 from palpate.foundation.errors import CorrectionError
 
 
 def test_whole_samples_are_taken_and_what_is_left_of_others_is_removed(tmp_path: Path):
     folder = tmp_path / "samples"
-    assert whole_samples(folder) is None
+    assert complete_samples(folder) is None
     write_samples(folder, rows=4)
-    found = whole_samples(folder)
+    found = complete_samples(folder)
     assert found is not None and len(found) == 12
     (folder / "two" / "points.npy").unlink()  # as when caches are dropped for want of room
-    assert whole_samples(folder) is None and not folder.exists()
+    assert complete_samples(folder) is None and not folder.exists()
 
 
 def test_request_goes_to_json_and_back():
-    wanted = Wanted(spec={"epochs": 3}, nodes=(9, 5, 5), every=2, points=500)
-    assert Wanted.from_json(wanted.to_json()) == wanted
+    wanted = TrainingPlan(spec={"epochs": 3}, nodes=(9, 5, 5), every=2, points=500)
+    assert TrainingPlan.from_json(wanted.to_json()) == wanted
 
 
 @pytest.mark.parametrize(
@@ -31,4 +31,4 @@ def test_request_goes_to_json_and_back():
 )
 def test_values_out_of_bounds_are_named(asked: dict[str, int], said: str):
     with pytest.raises(CorrectionError, match=said):
-        Wanted(**asked)  # type: ignore[arg-type]
+        TrainingPlan(**asked)  # type: ignore[arg-type]

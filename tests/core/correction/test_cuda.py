@@ -14,10 +14,10 @@ from palpate.correction import (
     Samples,
     Split,
     SurfaceLoss,
-    Trained,
+    TrainedNetwork,
     TrainingSpec,
     build,
-    errors_of,
+    sample_errors,
     train,
 )
 from palpate.correction.networks.chamfer import nearest
@@ -43,7 +43,7 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> Samples:
     return write_samples(tmp_path_factory.mktemp("card") / "samples")
 
 
-def _same(one: Trained, other: Trained) -> bool:
+def _same(one: TrainedNetwork, other: TrainedNetwork) -> bool:
     weights = zip(
         one.network.state_dict().values(), other.network.state_dict().values(), strict=True
     )
@@ -132,7 +132,9 @@ def test_what_was_trained_on_a_card_corrects_alike_on_a_processor(samples, tmp_p
     trained = train(samples, Split.of(samples), SPEC, tmp_path)
     rows, errors = samples.rows(["three"]), []
     for place in ("cpu", "cuda"):
-        loaded = Trained.load(tmp_path, place)
+        loaded = TrainedNetwork.load(tmp_path, place)
         loss = SurfaceLoss(trained.body, samples.seen[trained.body.index], device=place)
-        errors.append(errors_of(loaded.network, loss, trained.body, samples, rows, place).numpy())
+        errors.append(
+            sample_errors(loaded.network, loss, trained.body, samples, rows, place).numpy()
+        )
     assert np.allclose(errors[0], errors[1], rtol=1e-3)
