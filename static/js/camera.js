@@ -1,14 +1,20 @@
-// Where the scene is looked at from, kept from visit to visit: the viewer itself begins anew each time.
+// Keeps the 3D camera in local storage, because the viewer starts with its own each time.
 import { put } from "./api.js";
 import { fromViewer } from "./drag.js";
 import { state } from "./store.js";
 
-const KEY = "palpate.camera";
-const SETTLE_MS = 500; // ms without motion after which a place is kept
+/** @import { ViewerWindow, ViserClient } from "./types.js" */
 
-/** Keep the place each time a person has turned, moved or zoomed. */
+const KEY = "palpate.camera";
+const SETTLE_MS = 500; // ms without motion after which the camera is stored
+
+/**
+ * Store the camera each time a person has turned, moved or zoomed it.
+ * @param {ViewerWindow} viewer
+ */
 export function watchCamera(viewer) {
-  let waiting = null;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  let waiting;
   const later = () => {
     clearTimeout(waiting);
     waiting = setTimeout(() => save(viewer), SETTLE_MS);
@@ -17,10 +23,17 @@ export function watchCamera(viewer) {
     viewer.addEventListener(kind, later, { capture: true, passive: true });
 }
 
+/**
+ * Store position and target of the camera in the phantom frame.
+ * @param {ViewerWindow} viewer
+ */
 function save(viewer) {
-  const { camera, cameraControl: control } = viewer.__viserMutable ?? {};
+  const { camera, cameraControl: control } = /** @type {Partial<ViserClient>} */ (
+    viewer.__viserMutable ?? {}
+  );
   if (!camera || !control || !state().run) return;
   const target = control._target ?? control.getTarget();
+  /** @param {{ x: number, y: number, z: number }} vector */
   const place = (vector) =>
     fromViewer(viewer, [vector.x, vector.y, vector.z]).map((value) => +value.toFixed(6));
   localStorage.setItem(
@@ -29,15 +42,18 @@ function save(viewer) {
   );
 }
 
-/** A standard view was asked for: it begins anew. */
+/** Delete the stored camera, because a standard view was chosen. */
 export function forgetCamera() {
   localStorage.removeItem(KEY);
 }
 
-/** Tell the server before the viewer opens. */
+/**
+ * Send the stored camera to the server; to be done before the viewer loads.
+ * @param {string} page
+ */
 export async function restoreCamera(page) {
   try {
-    const kept = JSON.parse(localStorage.getItem(KEY));
+    const kept = JSON.parse(localStorage.getItem(KEY) ?? "null");
     if (kept) await put(`/sessions/${page}/camera`, kept);
   } catch {
     forgetCamera();

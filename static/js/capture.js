@@ -1,7 +1,8 @@
-// Pictures of the scene to keep: a still as PNG, a sequence or its looped part as GIF, with legend and caption.
+// Pictures of the scene for download: a still as PNG, a sequence or its looped part as GIF,
+// with legend and caption.
 import { GIFEncoder, applyPalette, quantize } from "../vendor/gifenc/gifenc.esm.js";
-import { toast } from "./api.js";
-import { element, fill } from "./dom.js";
+import { ApiError, toast, toError } from "./api.js";
+import { byId, element, fill } from "./dom.js";
 import { formatMm } from "./format.js";
 import { legendContent } from "./legend.js";
 import { playedRange } from "./playback-loop.js";
@@ -10,10 +11,15 @@ import { set, state } from "./store.js";
 import { initToolButton } from "./view-tools.js";
 
 const MOST_FRAMES = 150;
-const CLIP_WIDTH = 800;
-let page = null;
-let running = null;
+const CLIP_WIDTH = 800; // pixels
+let page = ""; // identifier of this page's session
+/** @type {AbortController | null} */
+let running = null; // cancels the clip that is being made
 
+/**
+ * Set the buttons up.
+ * @param {string} id identifier of this page's session
+ */
 export function start(id) {
   page = id;
   initToolButton("still", "camera", "Save the picture as PNG", () => saveStill().catch(toast));
@@ -22,16 +28,21 @@ export function start(id) {
   );
 }
 
+/** Download the scene as PNG. */
 async function saveStill() {
   const canvas = await captureCanvas(devicePixelRatio || 1);
-  canvas.toBlob((blob) => save(blob, "png"));
+  canvas.toBlob((blob) => blob && save(blob, "png"));
 }
 
-/** Frame after frame as the scene shows it; may be stopped, and leaves the page where it was. */
+/**
+ * Download the played frames as GIF. Each frame is shown in the scene and captured; the page then
+ * shows the frame from before.
+ */
 async function saveClip() {
   const { series, frame: before, speed } = state();
   if (!series || running) return;
   running = new AbortController();
+  const { signal } = running;
   set({ playing: false });
   const [from, to] = playedRange(series.time.length);
   const stride = Math.ceil((to - from + 1) / MOST_FRAMES);
@@ -44,14 +55,14 @@ async function saveClip() {
     for (const [place, frame] of frames.entries()) {
       showProgress(place, frames.length);
       set({ frame });
-      await until(() => state().held?.view?.frame === frame, running.signal);
-      const canvas = await captureCanvas(
-        Math.min(1, CLIP_WIDTH / viewerBox().width),
-        running.signal,
+      await until(() => state().rendered?.view?.frame === frame, signal);
+      const canvas = await captureCanvas(Math.min(1, CLIP_WIDTH / viewerBox().width), signal);
+      const { data, width, height } = context(canvas).getImageData(
+        0,
+        0,
+        canvas.width,
+        canvas.height,
       );
-      const { data, width, height } = canvas
-        .getContext("2d")
-        .getImageData(0, 0, canvas.width, canvas.height);
       const palette = quantize(data, 256);
       const lasts = (series.time[Math.min(to, frame + stride)] - series.time[frame]) / speed;
       gif.writeFrame(applyPalette(data, palette), width, height, {
@@ -61,8 +72,8 @@ async function saveClip() {
     }
     gif.finish();
     save(new Blob([gif.bytes()], { type: "image/gif" }), "gif");
-  } catch (problem) {
-    if (problem.name !== "AbortError") throw problem;
+  } catch (error) {
+    if (toError(error).name !== "AbortError") throw error;
   } finally {
     running = null;
     fill("clip-bar").hidden = true;
@@ -70,8 +81,12 @@ async function saveClip() {
   }
 }
 
+/**
+ * @param {number} done
+ * @param {number} all
+ */
 function showProgress(done, all) {
-  const bar = document.getElementById("clip-bar");
+  const bar = byId("clip-bar");
   bar.hidden = false;
   fill(
     bar,
@@ -89,35 +104,52 @@ function showProgress(done, all) {
   );
 }
 
-async function until(true_, signal) {
-  while (!true_()) {
+/**
+ * Wait until a condition holds.
+ * @param {() => boolean} holds
+ * @param {AbortSignal} signal
+ */
+async function until(holds, signal) {
+  while (!holds()) {
     signal.throwIfAborted();
     await new Promise((resolve) => setTimeout(resolve, 20));
   }
 }
 
-const viewerBox = () => document.getElementById("viewer").getBoundingClientRect();
+/**
+ * @param {HTMLCanvasElement} canvas
+ * @returns {CanvasRenderingContext2D}
+ */
+const context = (canvas) =>
+  /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", { willReadFrequently: true }));
 
-/** The scene with its legend and a line that says what it is, on the page's background. */
+const viewerBox = () => byId("viewer").getBoundingClientRect();
+
+/**
+ * Return a canvas with the scene, its legend and a caption on the page's background.
+ * @param {number} ratio pixels of the canvas per pixel of the page
+ * @param {AbortSignal} [signal]
+ * @returns {Promise<HTMLCanvasElement>}
+ */
 async function captureCanvas(ratio, signal) {
   const { width, height } = viewerBox();
-  const size = [width, height].map((edge) =>
+  const [wide, tall] = [width, height].map((edge) =>
     Math.max(16, Math.min(4096, Math.round(edge * ratio))),
   );
-  const answer = await fetch(`/api/sessions/${page}/still.png?width=${size[0]}&height=${size[1]}`, {
-    signal,
-  });
-  if (!answer.ok) throw await answer.json();
+  const path = `/api/sessions/${page}/still.png?width=${wide}&height=${tall}`;
+  const answer = await fetch(path, { signal });
+  if (!answer.ok) throw new ApiError(await answer.json());
   const picture = await createImageBitmap(await answer.blob());
-  const canvas = Object.assign(document.createElement("canvas"), {
-    width: size[0],
-    height: size[1],
-  });
-  const pen = canvas.getContext("2d", { willReadFrequently: true });
+  const canvas = element("canvas", { width: wide, height: tall });
+  const pen = context(canvas);
   const style = getComputedStyle(document.documentElement);
+  /**
+   * @param {string} name
+   * @returns {string}
+   */
   const ink = (name) => style.getPropertyValue(`--${name}`).trim();
   pen.fillStyle = ink("scene");
-  pen.fillRect(0, 0, ...size);
+  pen.fillRect(0, 0, wide, tall);
   pen.drawImage(picture, 0, 0);
   pen.scale(ratio, ratio);
   pen.font = '12px "Inter", Arial, sans-serif';
@@ -128,6 +160,10 @@ async function captureCanvas(ratio, signal) {
   return canvas;
 }
 
+/**
+ * @param {CanvasRenderingContext2D} pen
+ * @param {(name: string) => string} ink
+ */
 function drawLegend(pen, ink) {
   const what = legendContent();
   if (!what) return;
@@ -150,15 +186,22 @@ function drawLegend(pen, ink) {
   }
 }
 
+/** @returns {string} */
 function caption() {
   const { series, frame, sequence, heading } = state();
   if (!series) return "";
   const errors = series.models
-    .map((name) => `${name} ${formatMm(series[`distance_${name}`][frame], false)}`)
+    .map((name) => `${name} ${formatMm(series[`distance_${name}`]?.[frame], false)}`)
     .join(", ");
-  return `${heading?.dataset ?? ""} · ${sequence} · ${series.time[frame].toFixed(2)} s · RMS error ${errors} mm`;
+  const time = `${series.time[frame].toFixed(2)} s`;
+  return `${heading?.dataset ?? ""} · ${sequence} · ${time} · RMS error ${errors} mm`;
 }
 
+/**
+ * Download a picture.
+ * @param {Blob} blob
+ * @param {"png" | "gif"} kind
+ */
 function save(blob, kind) {
   const { sequence, frame } = state();
   const link = element("a", {

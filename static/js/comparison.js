@@ -1,9 +1,16 @@
-// Models side by side over sequences: what each is off by, where it was fitted and where it was not.
-import { get } from "./api.js";
+// Table of the models' errors by sequence; another run of the same dataset can be put beside
+// this one.
+import { get, toError } from "./api.js";
 import { element, fill } from "./dom.js";
 import { formatPercent, formatDateTime, readableName } from "./format.js";
 
-/** A table that fills itself; another run of the same dataset can be put beside this one. */
+/** @import { Comparison, RunEntry, RunHeading } from "./types.js" */
+
+/**
+ * Create the table, which loads its values, and the choice of another run.
+ * @param {RunHeading} heading
+ * @returns {HTMLElement[]}
+ */
 export function comparisonSection(heading) {
   const table = element("div", {}, element("p", { class: "muted" }, "Adding up…"));
   const choice = element("select", {
@@ -18,13 +25,13 @@ export function comparisonSection(heading) {
         comparisonTable(await get(`/runs/${encodeURIComponent(heading.id)}/comparison${beside}`)),
       );
     } catch (problem) {
-      fill(table, element("div", { class: "note-card bad" }, problem.message));
+      fill(table, element("div", { class: "note-card bad" }, toError(problem).message));
     }
   };
   choice.addEventListener("change", load);
   load();
   get("/runs")
-    .then((runs) => {
+    .then((/** @type {RunEntry[]} */ runs) => {
       const others = runs.filter(
         ({ id, dataset }) => id !== heading.id && dataset === heading.dataset,
       );
@@ -36,22 +43,23 @@ export function comparisonSection(heading) {
           element(
             "option",
             { value: run.id },
-            `beside ${run.causes.map(readableName).join(", ") || run.verdict}, ${formatDateTime(run.created)}`,
+            `beside ${namesOf(run)}, ${formatDateTime(run.created)}`,
           ),
         ),
       );
       choice.hidden = false;
     })
-    .catch(() => {}); // the list in the rail says what is wrong with it
+    .catch(() => {}); // the sidebar reports a list that cannot be loaded
   return [table, choice];
 }
 
+/**
+ * @param {Comparison} comparison
+ * @returns {HTMLElement[]}
+ */
 function comparisonTable({ runs, sequences }) {
   const several = runs.length > 1;
-  const names = runs.map(
-    ({ causes, verdict }, place) =>
-      `${place ? "the other" : "this"}: ${causes.map(readableName).join(", ") || verdict}`,
-  );
+  const names = runs.map((run, index) => `${index ? "the other" : "this"}: ${namesOf(run)}`);
   return [
     element(
       "table",
@@ -79,8 +87,8 @@ function comparisonTable({ runs, sequences }) {
           return element(
             "tr",
             {},
-            element("th", {}, sequence, element("small", {}, one.split ?? "")),
-            element("td", { class: "number" }, threeDecimals(one.raw)),
+            element("th", {}, sequence, element("small", {}, one?.split ?? "")),
+            element("td", { class: "number" }, threeDecimals(one?.raw)),
             rows.map((row) =>
               element(
                 "td",
@@ -88,8 +96,8 @@ function comparisonTable({ runs, sequences }) {
                 threeDecimals(row?.extended),
               ),
             ),
-            element("td", { class: "number muted" }, threeDecimals(one.noise_floor)),
-            several ? null : element("td", { class: "number" }, formatPercent(one.removed)),
+            element("td", { class: "number muted" }, threeDecimals(one?.noise_floor)),
+            several ? null : element("td", { class: "number" }, formatPercent(one?.removed)),
           );
         }),
       ),
@@ -97,9 +105,22 @@ function comparisonTable({ runs, sequences }) {
     element(
       "p",
       { class: "gain-note" },
-      "Distance of the measured points from the model, over all frames; the gain above is of the pushes alone, without the camera's fixed pattern.",
+      "Distance of the measured points from the model, over all frames; the gain above is of the " +
+        "pushes alone, without the camera's fixed pattern.",
     ),
   ];
 }
 
+/**
+ * Format a length in metres as millimetres without the unit.
+ * @param {number | null | undefined} value
+ * @returns {string}
+ */
 const threeDecimals = (value) => (typeof value === "number" ? (1000 * value).toFixed(3) : "–");
+
+/**
+ * Return the causes that a run found, or its verdict.
+ * @param {RunEntry} run
+ * @returns {string}
+ */
+const namesOf = ({ causes, verdict }) => causes.map(readableName).join(", ") || verdict;

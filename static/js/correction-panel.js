@@ -1,5 +1,6 @@
-// The panel of the correction network: train it on a model, watch it learn, and see what it is worth beside naming the cause.
-import { get, post, errorTitle } from "./api.js";
+// The panel of the correction network: trains it on a model, shows the training, and compares
+// models with and without networks on the test sequences (the ladder).
+import { errorCard, get, post } from "./api.js";
 import { validationCurve, ladderChart } from "./correction-plots.js";
 import { element, fill } from "./dom.js";
 import { capitalise } from "./format.js";
@@ -7,25 +8,39 @@ import { onJobsDone, addResultOpener } from "./jobs.js";
 import { addPanel, openedPanel, openPanel } from "./panels.js";
 import { subscribe, state } from "./store.js";
 
+/** @import { Evaluation, Job, RunEntry, Training } from "./types.js" */
+
+/** @type {[string, string][]} */
 const KINDS = [
   ["unet2d", "2D U-Net, top layer"],
   ["unet3d", "3D U-Net, volume"],
   ["graph", "Graph network, mesh"],
 ];
-const PAUSE = 900;
-let box = null;
-let settings = {
-  dataset: null,
-  run: "",
-  kind: "unet2d",
-  trust: 0.5,
-  hold: 1,
-  epochs: 40,
-  every: 1,
-};
-let followed = null; // {kind: "trainings" | "evaluations", id}
-let generation = 0;
+const PAUSE = 900; // between requests while a job runs [ms]
+/** @typedef {"trainings" | "evaluations"} JobKind */
+/**
+ * What the form is set to; `run` is empty for the stated model.
+ * @typedef {object} Settings
+ * @property {string} dataset
+ * @property {string} run
+ * @property {string} kind
+ * @property {number} trust largest correction [voxels]
+ * @property {number} hold weight that holds the hidden part [1/mm]
+ * @property {number} epochs
+ * @property {number} every one of so many clouds is used
+ */
+/** @type {HTMLElement} */
+let box;
+/** @type {Settings} */
+let settings = { dataset: "", run: "", kind: "unet2d", trust: 0.5, hold: 1, epochs: 40, every: 1 };
+/** @type {{ kind: JobKind, id: string } | null} */
+let followed = null; // the job that is shown; null while the form is
+let generation = 0; // increases whenever the panel starts to show something else
 
+/**
+ * Add the panel.
+ * @param {() => void} refresh called when a training has added a model to a run
+ */
 export function start(refresh) {
   box = addPanel("correction", "Correction", followPanel, () => {
     generation += 1;
@@ -40,20 +55,22 @@ export function start(refresh) {
   });
 }
 
+/**
+ * @param {JobKind} kind
+ * @param {string} id
+ */
 function show(kind, id) {
   followed = { kind, id };
   openPanel("correction");
 }
 
-const errorCard = (problem) =>
-  element(
-    "div",
-    { class: "note-card bad", role: "alert" },
-    element("strong", {}, errorTitle(problem)),
-    problem.message,
-  );
-const isOpen = (job) => job && ["queued", "running"].includes(job.state);
+/**
+ * @param {Job | null} job
+ * @returns {job is Job}
+ */
+const isOpen = (job) => job !== null && ["queued", "running"].includes(job.state);
 
+/** Draw the panel, and again while the job that is shown runs. */
 async function followPanel() {
   const mine = ++generation;
   while (mine === generation && openedPanel() === "correction") {
@@ -68,6 +85,10 @@ async function followPanel() {
   }
 }
 
+/**
+ * Create the button that shows the form again.
+ * @returns {HTMLElement}
+ */
 const backButton = () =>
   element(
     "button",
@@ -82,8 +103,13 @@ const backButton = () =>
     "All of them",
   );
 
-/** The form, what there is, and the newest ladder. */
+/**
+ * Draw the form, the trainings and evaluations, and the newest ladder.
+ * @param {number} mine generation that this call draws for
+ * @returns {Promise<boolean>}
+ */
 async function drawAll(mine) {
+  /** @type {[{ datasets: string[], folder: string }, RunEntry[], Training[], Evaluation[]]} */
   const [{ datasets, folder }, runs, trainings, evaluations] = await Promise.all([
     get("/datasets"),
     get("/runs"),
@@ -101,7 +127,8 @@ async function drawAll(mine) {
         element(
           "p",
           {},
-          `A network learns from clouds. Put a dataset folder into ${folder} and open this panel again.`,
+          "A network learns from clouds. " +
+            `Put a dataset folder into ${folder} and open this panel again.`,
         ),
       ),
     );
@@ -111,7 +138,7 @@ async function drawAll(mine) {
   if (!datasets.includes(settings.dataset))
     settings = {
       ...settings,
-      dataset: datasets.includes(current?.folder) ? current.folder : datasets[0],
+      dataset: datasets.find((name) => name === current?.folder) ?? datasets[0],
       run: "",
     };
   const models = runs.filter(
@@ -124,9 +151,9 @@ async function drawAll(mine) {
     element(
       "h1",
       { class: "verdict" },
-      newest?.summary.sentence ?? "What can a network learn of the error that the model leaves?",
+      newest?.summary?.sentence ?? "What can a network learn of the error that the model leaves?",
     ),
-    newest ? ladderChart(newest.summary) : null,
+    newest?.summary ? ladderChart(newest.summary) : null,
     form(datasets, models),
     list("Trainings", "trainings", trainings),
     list("Ladders", "evaluations", evaluations),
@@ -134,7 +161,17 @@ async function drawAll(mine) {
   return false;
 }
 
+/**
+ * @param {string[]} datasets
+ * @param {RunEntry[]} models
+ * @returns {HTMLElement}
+ */
 function form(datasets, models) {
+  /**
+   * @param {"dataset" | "run" | "kind"} name
+   * @param {[string, string][]} entries
+   * @returns {HTMLSelectElement}
+   */
   const select = (name, entries) => {
     const node = element(
       "select",
@@ -152,6 +189,14 @@ function form(datasets, models) {
     });
     return node;
   };
+  /**
+   * @param {"trust" | "hold" | "epochs" | "every"} name
+   * @param {string} label
+   * @param {number} low
+   * @param {number} high
+   * @param {number} [step]
+   * @returns {HTMLElement}
+   */
   const number = (name, label, low, high, step = 1) => {
     const field = element("input", {
       name,
@@ -167,6 +212,7 @@ function form(datasets, models) {
     });
     return element("label", {}, label, field);
   };
+  /** @type {HTMLElement} */
   const whole = element(
     "form",
     {
@@ -183,7 +229,7 @@ function form(datasets, models) {
       "Dataset",
       select(
         "dataset",
-        datasets.map((name) => [name, name]),
+        datasets.map((name) => /** @type {[string, string]} */ ([name, name])),
       ),
     ),
     element(
@@ -192,7 +238,9 @@ function form(datasets, models) {
       "On top of",
       select("run", [
         ["", "the stated model"],
-        ...models.map(({ id }) => [id, `the extended model of ${id}`]),
+        ...models.map(
+          ({ id }) => /** @type {[string, string]} */ ([id, `the extended model of ${id}`]),
+        ),
       ]),
     ),
     element("label", {}, "Network", select("kind", KINDS)),
@@ -233,6 +281,12 @@ function form(datasets, models) {
   return whole;
 }
 
+/**
+ * Start a job and show it; errors are shown in the form.
+ * @param {JobKind} kind
+ * @param {object} body
+ * @param {HTMLElement} near element with the buttons to disable
+ */
 async function requestJob(kind, body, near) {
   for (const button of near.querySelectorAll("button")) button.disabled = true;
   try {
@@ -245,6 +299,12 @@ async function requestJob(kind, body, near) {
   }
 }
 
+/**
+ * @param {string} heading
+ * @param {JobKind} kind
+ * @param {(Training | Evaluation)[]} entries
+ * @returns {HTMLElement | null}
+ */
 function list(heading, kind, entries) {
   if (!entries.length) return null;
   return element(
@@ -269,7 +329,7 @@ function list(heading, kind, entries) {
           element(
             "span",
             { class: "muted" },
-            summary?.validation_error_mm
+            summary && "validation_error_mm" in summary
               ? `${summary.validation_error_mm.toFixed(3)} mm`
               : (job?.state ?? "on disk"),
           ),
@@ -279,16 +339,28 @@ function list(heading, kind, entries) {
   );
 }
 
-/** One training or evaluation; whether it goes on. */
+/**
+ * Draw a training or evaluation; return whether it still runs.
+ * @param {number} mine generation that this call draws for
+ * @returns {Promise<boolean>}
+ */
 async function drawOne(mine) {
+  if (!followed) return false;
   const { kind, id } = followed;
-  const whole = await get(`/${kind}/${encodeURIComponent(id)}`);
+  /** @type {Training | Evaluation} */
+  const entry = await get(`/${kind}/${encodeURIComponent(id)}`);
   if (mine !== generation) return false;
-  const { job } = whole;
-  const say =
+  const { job } = entry;
+  const training = "history" in entry ? entry : null;
+  const evaluation = "history" in entry ? null : entry;
+  /**
+   * @param {string} path
+   * @returns {(event: { currentTarget: HTMLButtonElement }) => Promise<void>}
+   */
+  const request =
     (path) =>
-    async ({ currentTarget }) => {
-      currentTarget.disabled = true;
+    async ({ currentTarget: button }) => {
+      button.disabled = true;
       await post(path).catch((problem) => box.append(errorCard(problem)));
       followPanel();
     };
@@ -305,9 +377,9 @@ async function drawOne(mine) {
     element(
       "h1",
       { class: "verdict" },
-      kind === "trainings"
-        ? trainingSentence(whole)
-        : (whole.summary?.sentence ?? "Measuring the test sequences …"),
+      training
+        ? trainingSentence(training)
+        : (evaluation?.summary?.sentence ?? "Measuring the test sequences …"),
     ),
     isOpen(job)
       ? element(
@@ -322,21 +394,22 @@ async function drawOne(mine) {
         )
       : null,
     job?.error ? errorCard(job.error) : null,
-    whole.history?.length
+    training?.history.length
       ? element(
           "section",
           {},
           element("h2", {}, "Validation by epoch"),
-          validationCurve(whole.history, whole.summary?.validation_error_without_mm),
+          validationCurve(training.history, training.summary?.validation_error_without_mm),
         )
       : null,
-    kind === "evaluations" && whole.summary
+    evaluation?.summary
       ? [
-          ladderChart(whole.summary),
+          ladderChart(evaluation.summary),
           element(
             "p",
             { class: "gain-note" },
-            "Of the moving part, which leaves out what is as wrong in the untouched block, the file on disk has the same shares, and the paper's mean distance.",
+            "Of the moving part, which leaves out what is as wrong in the untouched block, " +
+              "the file on disk has the same shares, and the paper's mean distance.",
           ),
         ]
       : null,
@@ -346,18 +419,18 @@ async function drawOne(mine) {
       isOpen(job)
         ? element(
             "button",
-            { class: "button", type: "button", onclick: say(`/${kind}/${id}/cancel`) },
+            { class: "button", type: "button", onclick: request(`/${kind}/${id}/cancel`) },
             "Stop",
           )
         : null,
       job?.can_retry
         ? element(
             "button",
-            { class: "button", type: "button", onclick: say(`/jobs/${id}/retry`) },
+            { class: "button", type: "button", onclick: request(`/jobs/${id}/retry`) },
             kind === "trainings" ? "Go on" : "Retry",
           )
         : null,
-      kind === "trainings" && whole.summary
+      training?.summary
         ? element(
             "button",
             {
@@ -366,7 +439,7 @@ async function drawOne(mine) {
               onclick: () =>
                 requestJob(
                   "evaluations",
-                  { dataset: whole.summary.folder, run: whole.request?.run ?? null },
+                  { dataset: training.summary?.folder, run: training.request?.run ?? null },
                   box,
                 ),
             },
@@ -379,12 +452,18 @@ async function drawOne(mine) {
   return isOpen(job);
 }
 
+/**
+ * @param {Training} training
+ * @returns {string}
+ */
 function trainingSentence({ job, history, summary }) {
   if (summary) {
     const [before, after] = [summary.validation_error_without_mm, summary.validation_error_mm];
-    return `In validation the mean distance is ${after.toFixed(2)} mm with the network, ${before.toFixed(2)} mm without.`;
+    const [reached, without] = [after, before].map((error) => `${error.toFixed(2)} mm`);
+    return `In validation the mean distance is ${reached} with the network, ${without} without.`;
   }
   if (!history.length)
     return isOpen(job) ? "Replaying what the network learns from …" : "Nothing was learned yet.";
-  return `After ${history.length} epochs the mean distance in validation is ${Math.min(...history.map(([, error]) => error)).toFixed(2)} mm.`;
+  const least = Math.min(...history.map(([, error]) => error)).toFixed(2);
+  return `After ${history.length} epochs the mean distance in validation is ${least} mm.`;
 }

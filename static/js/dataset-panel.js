@@ -1,12 +1,20 @@
-// The right panel on a dataset: what it holds, whether it is in order, and the way to its diagnosis.
-import { get, post, toast } from "./api.js";
-import { element, fill } from "./dom.js";
+// The right panel for a dataset: what it holds, whether its files are in order, and buttons for
+// jobs on it.
+import { get, post, toast, toError } from "./api.js";
+import { byId, element, fill } from "./dom.js";
 import { capitalise, formatMm } from "./format.js";
 import { openPanel } from "./panels.js";
 import { cameraSelect, openRegistration } from "./register.js";
 
+/** @import { DatasetSummary, ServerError } from "./types.js" */
+
+/**
+ * Check a dataset and show it.
+ * @param {string} name
+ * @param {(dataset: string, registration: string | null) => Promise<void>} diagnose
+ */
 export async function showDataset(name, diagnose) {
-  const panel = document.getElementById("panel");
+  const panel = byId("panel");
   openPanel("report");
   fill(
     panel,
@@ -14,6 +22,7 @@ export async function showDataset(name, diagnose) {
     element("h1", { class: "verdict" }, name),
     element("p", { class: "gain-note" }, "Reading every file …"),
   );
+  /** @type {DatasetSummary} */
   let summary;
   try {
     summary = await get(`/datasets/${encodeURIComponent(name)}/check`);
@@ -22,7 +31,7 @@ export async function showDataset(name, diagnose) {
       panel,
       element("div", { class: "eyebrow" }, "Dataset"),
       element("h1", { class: "verdict" }, name),
-      errorCard(problem),
+      errorCard(toError(problem)),
     );
     return;
   }
@@ -116,8 +125,14 @@ export async function showDataset(name, diagnose) {
   );
 }
 
-/** A button that asks for a job. */
-function jobButton(label, title, ask) {
+/**
+ * Create a button that starts a job.
+ * @param {string} label
+ * @param {string} title
+ * @param {() => Promise<unknown>} request
+ * @returns {HTMLElement}
+ */
+function jobButton(label, title, request) {
   const button = element(
     "button",
     {
@@ -127,7 +142,7 @@ function jobButton(label, title, ask) {
       onclick: async () => {
         button.disabled = true;
         try {
-          await ask();
+          await request();
           button.textContent = "Started";
         } catch (problem) {
           toast(problem);
@@ -140,9 +155,19 @@ function jobButton(label, title, ask) {
   return button;
 }
 
+/**
+ * @param {string} label
+ * @param {string | number} value
+ * @returns {HTMLElement}
+ */
 const fact = (label, value) =>
   element("tr", {}, element("th", {}, label), element("td", { class: "number" }, String(value)));
 
+/**
+ * @param {string} title
+ * @param {string[]} sentences
+ * @returns {HTMLElement | null}
+ */
 const noteSection = (title, sentences) =>
   sentences.length
     ? element(
@@ -153,6 +178,10 @@ const noteSection = (title, sentences) =>
       )
     : null;
 
+/**
+ * @param {ServerError} problem
+ * @returns {HTMLElement}
+ */
 const errorCard = ({ message, where }) =>
   element(
     "div",
@@ -163,7 +192,7 @@ const errorCard = ({ message, where }) =>
       ? element(
           "div",
           { class: "where" },
-          Object.entries(where)
+          Object.entries(where ?? {})
             .map(([key, value]) => `${key}: ${value}`)
             .join("  "),
         )

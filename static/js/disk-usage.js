@@ -1,19 +1,33 @@
-// What results and caches take on the server's disk, and a way to drop the caches.
+// Use of the server's disk by results and caches, and a button that deletes the caches.
 import { get, post, toast } from "./api.js";
 import { element, fill } from "./dom.js";
 
+/** @import { DiskUsage } from "./types.js" */
+
+/**
+ * @param {number} bytes
+ * @returns {string}
+ */
 const size = (bytes) =>
   bytes >= 2 ** 30
     ? `${(bytes / 2 ** 30).toFixed(1)} GB`
     : `${(bytes / 2 ** 20).toFixed(bytes < 2 ** 20 ? 2 : 0)} MB`;
 
-/** A line that says it; asked anew whenever it is made. */
+/**
+ * Create the line with the disk usage; it asks the server each time it is created.
+ * @returns {HTMLElement}
+ */
 export function diskUsageLine() {
   const box = element("p", { class: "disk muted", id: "disk" });
-  const show = ({ used, caches, limit }) =>
+  /**
+   * @param {DiskUsage} usage
+   * @returns {void}
+   */
+  const show = ({ used, caches, limit }) => {
+    const part = caches ? `${size(caches)} of it caches. ` : "no caches.";
     fill(
       box,
-      `${size(used)} of ${size(limit)} on the disk, ${caches ? `${size(caches)} of it caches. ` : "no caches."}`,
+      `${size(used)} of ${size(limit)} on the disk, ${part}`,
       caches
         ? element(
             "button",
@@ -27,6 +41,7 @@ export function diskUsageLine() {
           )
         : null,
     );
+  };
   get("/disk")
     .then(show)
     .catch(() => {});

@@ -1,8 +1,26 @@
-// Patch pictures on the unfolded box: the top in the middle, the sides folded out; sides that were never seen are left out.
-import { element, fill } from "./dom.js";
+// Maps of the error on the unfolded box: the top in the middle, the sides folded out. Sides
+// that were never seen are left out.
+import { byId, element, fill } from "./dom.js";
 import { bandIndex, scaleBar } from "./colour-scale.js";
 
+/** @import { FrameValues, Palette, Patterns } from "./types.js" */
+
+/** @typedef {"top" | "+x" | "-x" | "+y" | "-y"} FaceName */
+/** @typedef {{ index: number, at: [number, number] }} Patch */
+/**
+ * A face of the box on the plane [m]: its patches, its rectangle [left, low, right, high], and the
+ * median distance between patches.
+ * @typedef {{ name: FaceName, patches: Patch[], rect: number[], spacing: number }} Face
+ */
+/** @typedef {{ faces: Face[], bounds: number[] }} UnfoldedBox */
+
+/** @type {FaceName[]} */
 const FACES = ["top", "+x", "-x", "+y", "-y"];
+
+/**
+ * Place on the plane of a point on a face of a box of a size.
+ * @type {Record<FaceName, (point: number[], size: number[]) => [number, number]>}
+ */
 const UNFOLDED = {
   top: ([x, y]) => [x, y],
   "+x": ([, y, z], [sx, , sz]) => [sx / 2 + sz - z, y],
@@ -10,6 +28,11 @@ const UNFOLDED = {
   "+y": ([x, , z], [, sy, sz]) => [x, sy / 2 + sz - z],
   "-y": ([x, , z], [, sy, sz]) => [x, -sy / 2 - (sz - z)],
 };
+
+/**
+ * Rectangle of a face on the plane.
+ * @type {Record<FaceName, (size: number[]) => number[]>}
+ */
 const FACE_RECTS = {
   top: ([sx, sy]) => [-sx / 2, -sy / 2, sx / 2, sy / 2],
   "+x": ([sx, sy, sz]) => [sx / 2, -sy / 2, sx / 2 + sz, sy / 2],
@@ -18,6 +41,14 @@ const FACE_RECTS = {
   "-y": ([sx, sy, sz]) => [-sx / 2, -sy / 2 - sz, sx / 2, -sy / 2],
 };
 
+/**
+ * Create the maps of measured and predicted error; a click enlarges them.
+ * @param {Patterns} patterns
+ * @param {number[]} size edges of the box [m]
+ * @param {Palette} palette
+ * @param {boolean} [explained] whether there is a prediction
+ * @returns {HTMLElement}
+ */
 export function patternSection(patterns, size, palette, explained = true) {
   const box = unfoldPatches(patterns, size);
   if (!box.faces.length)
@@ -33,9 +64,14 @@ export function patternSection(patterns, size, palette, explained = true) {
       map("Measured error", "measured"),
       explained ? map("Predicted by the cause", "predicted") : null,
     );
+  /**
+   * @param {string} caption
+   * @param {"measured" | "predicted"} key
+   * @returns {HTMLElement}
+   */
   const map = (caption, key) => {
     const canvas = element("canvas", { "data-pattern": key });
-    // Once it has a width: the panel may be behind another one while the report comes.
+    // Drawn once it has a width, since the panel may be hidden while the report loads.
     const seen = new ResizeObserver(() => {
       if (!canvas.clientWidth) return;
       seen.disconnect();
@@ -57,11 +93,12 @@ export function patternSection(patterns, size, palette, explained = true) {
       element(
         "p",
         { class: "note" },
-        "Measured surface minus raw simulation in mm, on the unfolded box: the top in the middle, the sides folded out; grey was not seen.",
+        "Measured surface minus raw simulation in mm, on the unfolded box: the top in the " +
+          "middle, the sides folded out; grey was not seen.",
       ),
     );
   function enlarge() {
-    const dialog = document.getElementById("enlarged");
+    const dialog = byId("enlarged", HTMLDialogElement);
     if (dialog.open) {
       dialog.close();
       return;
@@ -72,9 +109,15 @@ export function patternSection(patterns, size, palette, explained = true) {
   return element("div", {}, maps(), legend());
 }
 
-/** Places of the patches on the plane, by face, and the rectangle that holds all faces with anything seen. */
+/**
+ * Return the faces on which anything was seen, and the rectangle around them.
+ * @param {Patterns} patterns
+ * @param {number[]} size
+ * @returns {UnfoldedBox}
+ */
 function unfoldPatches({ centres, normals, measured }, size) {
-  const byFace = Object.fromEntries(FACES.map((face) => [face, []]));
+  /** @type {Record<FaceName, Patch[]>} */
+  const byFace = { top: [], "+x": [], "-x": [], "+y": [], "-y": [] };
   centres.forEach((centre, index) => {
     const face = faceOf(normals[index]);
     if (face) byFace[face].push({ index, at: UNFOLDED[face](centre, size) });
@@ -94,12 +137,23 @@ function unfoldPatches({ centres, normals, measured }, size) {
   return { faces, bounds };
 }
 
+/**
+ * Return the face to which a normal belongs; null for the bottom.
+ * @param {number[]} normal
+ * @returns {FaceName | null}
+ */
 function faceOf(normal) {
   const axis = normal.map(Math.abs).indexOf(Math.max(...normal.map(Math.abs)));
   if (axis === 2) return normal[2] > 0 ? "top" : null;
-  return (normal[axis] > 0 ? "+" : "-") + "xy"[axis];
+  if (axis === 0) return normal[0] > 0 ? "+x" : "-x";
+  return normal[1] > 0 ? "+y" : "-y";
 }
 
+/**
+ * Return the median distance of a patch to its nearest neighbour [m].
+ * @param {Patch[]} patches
+ * @returns {number}
+ */
 function medianSpacing(patches) {
   const nearest = patches.map((a) =>
     Math.min(
@@ -112,6 +166,13 @@ function medianSpacing(patches) {
   return nearest[Math.floor(nearest.length / 2)] || 0.003;
 }
 
+/**
+ * @param {HTMLCanvasElement} canvas
+ * @param {UnfoldedBox} box
+ * @param {FrameValues} values
+ * @param {number} limit
+ * @param {Palette} palette
+ */
 function drawMap(canvas, { faces, bounds }, values, limit, palette) {
   const [left, low, right, high] = bounds;
   const ratio = devicePixelRatio || 1;
@@ -120,7 +181,7 @@ function drawMap(canvas, { faces, bounds }, values, limit, palette) {
   const height = Math.round((high - low) * scale);
   canvas.width = width;
   canvas.height = height;
-  const pen = canvas.getContext("2d");
+  const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
   const image = pen.createImageData(width, height);
   for (const face of faces) {
     const field = interpolator(face, values);
@@ -153,8 +214,15 @@ function drawMap(canvas, { faces, bounds }, values, limit, palette) {
     pen.strokeRect((x0 - left) * scale, (high - y1) * scale, (x1 - x0) * scale, (y1 - y0) * scale);
 }
 
-/** A local mean of the patches around a place, null where the nearest patch was not seen or is too far. */
+/**
+ * Return a function of a place on a face: a local mean of the patches around it; null where the
+ * nearest patch was not seen or is too far away.
+ * @param {Face} face
+ * @param {FrameValues} values
+ * @returns {(x: number, y: number) => number | null}
+ */
 function interpolator({ patches, spacing: step }, values) {
+  /** @type {Map<string, { at: [number, number], value: number | null }[]>} */
   const cells = new Map();
   for (const { index, at } of patches) {
     const key = `${Math.floor(at[0] / step)},${Math.floor(at[1] / step)}`;

@@ -1,4 +1,10 @@
-// Numbers as people read them.
+// Numbers, names and times as text.
+/** @import { Estimate } from "./types.js" */
+
+/**
+ * Factor from an SI unit to the unit that is shown, and that unit.
+ * @type {Record<string, [number, string]>}
+ */
 export const UNITS = {
   m: [1e3, "mm"],
   Pa: [1e-3, "kPa"],
@@ -8,10 +14,20 @@ export const UNITS = {
   1: [1, ""],
 };
 
+/**
+ * Return a name of the API as words: "tool_radius" becomes "tool radius".
+ * @param {string} name
+ * @returns {string}
+ */
 export const readableName = (name) => NAMES[name] ?? name.replaceAll("_", " ");
 
+/**
+ * @param {string} text
+ * @returns {string}
+ */
 export const capitalise = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
+/** @type {Record<string, string>} */
 const NAMES = {
   poisson_ratio: "Poisson’s ratio",
   young_modulus: "Young’s modulus",
@@ -19,14 +35,24 @@ const NAMES = {
   specific_weight_over_stiffness: "ρg/E",
 };
 
-/** Millimetres from metres: two decimals below 10 mm. */
+/**
+ * Format a length in metres as millimetres: two decimals below 10 mm, else one.
+ * @param {number | null | undefined} metres
+ * @param {boolean} [unit]
+ * @returns {string}
+ */
 export function formatMm(metres, unit = true) {
   if (metres === null || metres === undefined || !Number.isFinite(metres)) return "–";
   const value = metres * 1e3;
   return value.toFixed(Math.abs(value) < 9.995 ? 2 : 1) + (unit ? " mm" : "");
 }
 
-/** A parameter and its interval, with as many decimals as the interval's width deserves; a value that it dwarfs adds none. */
+/**
+ * Format a parameter and its interval, with as many decimals as the interval's width deserves; a
+ * value far below that width adds none.
+ * @param {Estimate} estimate
+ * @returns {{ value: string, unit: string, interval: string }}
+ */
 export function formatParameter({ value, unit, low, high }) {
   if (typeof value !== "number") return { value: String(value), unit: "", interval: "" };
   const [factor, shown] = UNITS[unit] ?? [1, unit];
@@ -41,6 +67,10 @@ export function formatParameter({ value, unit, low, high }) {
       1 - Math.floor(Math.log10(size || Infinity)),
     ),
   );
+  /**
+   * @param {number} number
+   * @returns {string}
+   */
   const text = (number) =>
     (number * factor)
       .toFixed(places)
@@ -49,12 +79,22 @@ export function formatParameter({ value, unit, low, high }) {
   return { value: text(value), unit: shown, interval: open ? "" : `${text(low)} to ${text(high)}` };
 }
 
+/**
+ * Format a fraction of 1 as a percentage.
+ * @param {number | null | undefined} fraction
+ * @param {number} [digits]
+ * @returns {string}
+ */
 export function formatPercent(fraction, digits = 0) {
   if (typeof fraction !== "number") return "–";
   if (fraction > 0 && fraction < 0.005 && !digits) return "<1 %";
   return `${(100 * fraction).toFixed(digits).replace("-", "−")} %`;
 }
 
+/**
+ * @param {number} seconds
+ * @returns {string}
+ */
 export function formatDuration(seconds) {
   const whole = Math.max(0, Math.round(seconds));
   return whole < 60
@@ -62,6 +102,10 @@ export function formatDuration(seconds) {
     : `${Math.floor(whole / 60)} min ${String(whole % 60).padStart(2, "0")} s`;
 }
 
+/**
+ * @param {number} epoch seconds since 1970
+ * @returns {string}
+ */
 export function formatDateTime(epoch) {
   return new Date(epoch * 1e3).toLocaleString(undefined, {
     day: "numeric",

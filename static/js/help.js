@@ -1,8 +1,13 @@
-// Help: the tutorial from nothing to a sweep and an accepted registration, and all keys. Opened by the button or by "?".
-import { element, fill, icon } from "./dom.js";
+// The help dialog: a tutorial from the import to a sweep and an accepted registration, and all
+// keys.
+import { byId, element, fill, icon } from "./dom.js";
 import { bindShortcuts } from "./shortcuts.js";
 import { REGISTER_SHORTCUTS as REGISTER } from "./register-shortcuts.js";
 
+/**
+ * Keys and what they do.
+ * @type {string[][]}
+ */
 const PAGE = [
   ["?", "this help"],
   ["Space", "play or pause"],
@@ -17,25 +22,37 @@ const PAGE = [
   ["Tab, Enter", "reach and press every control"],
 ];
 
+/**
+ * @param {string} text
+ * @returns {HTMLElement}
+ */
 const code = (text) => element("code", {}, text);
 
+/**
+ * Titles and paragraphs of the tutorial.
+ * @type {[string, HTMLElement[]][]}
+ */
 const STEPS = [
   [
-    "Bring a dataset",
+    "Import a dataset",
     [
       element(
         "p",
         {},
         "No data at hand? ",
         code("make demo"),
-        " made a phantom with a hidden fault, and opened this page on it: it stands under Datasets. Of your own, press ",
+        " made a phantom with a hidden fault, and opened this page on it: it stands under " +
+          "Datasets. Of your own, press ",
         element("b", {}, "Import …"),
-        " there and choose an archive of your folder, or name a folder on the server’s disk. The import shows among the jobs; what is wrong with the data is listed by file and row.",
+        " there and choose an archive of your folder, or name a folder on the server’s disk. " +
+          "The import shows among the jobs; what is wrong with the data is listed by file and " +
+          "row.",
       ),
       element(
         "p",
         {},
-        "Then choose the dataset on the left: what it holds, what is doubtful, and what it cannot tell.",
+        "Then choose the dataset on the left: what it holds, what is doubtful, and what it " +
+          "cannot tell.",
       ),
     ],
   ],
@@ -47,19 +64,24 @@ const STEPS = [
         {},
         "Open ",
         element("b", {}, "Register"),
-        ". The rest cloud stands beside the phantom, from whatever start. Click a corner on the cloud, then the same corner on the phantom (near a landmark the click is the landmark). Drag with the mouse turns the view, the wheel zooms.",
+        ". The rest cloud stands beside the phantom, from whatever start. Click a corner on " +
+          "the cloud, then the same corner on the phantom (near a landmark the click is the " +
+          "landmark). Drag with the mouse turns the view, the wheel zooms.",
       ),
       element(
         "p",
         {},
-        "After three pairs the list shows what each pair misses by; a millimetre or two is usual. What does not fit is said at the pair: mirrored, in one line, clicked twice. Choose an end to move it: click anew, drag it, or press arrow keys.",
+        "After three pairs the list shows what each pair misses by; a millimetre or two is " +
+          "usual. What does not fit is said at the pair: mirrored, in one line, clicked twice. " +
+          "Choose an end to move it: click anew, drag it, or press arrow keys.",
       ),
       element(
         "p",
         {},
         "Press ",
         element("b", {}, "Refine by ICP"),
-        " (Enter): the residual before and after, and the directions that the cloud determines weakly, as arrows. ",
+        " (Enter): the residual before and after, and the directions that the cloud " +
+          "determines weakly, as arrows. ",
         element("b", {}, "Accept"),
         " keeps it under a name; ",
         element("b", {}, "Back to the pairs"),
@@ -75,14 +97,17 @@ const STEPS = [
         {},
         "Open ",
         element("b", {}, "Sweep"),
-        ", choose the dataset, a parameter and its range; for a first look take 5 steps and 4 clouds of each sequence. Under Camera choose the registration you accepted. ",
+        ", choose the dataset, a parameter and its range; for a first look take 5 steps and " +
+          "4 clouds of each sequence. Under Camera choose the registration you accepted. ",
         element("b", {}, "Start the sweep"),
         ": points appear as they end.",
       ),
       element(
         "p",
         {},
-        "At the end the least error and its place stand on top. A parameter along which the error does not change beyond chance is called flat: these clouds cannot tell it. Stop at any time; Resume goes on.",
+        "At the end the least error and its place stand on top. A parameter along which the " +
+          "error does not change beyond chance is called flat: these clouds cannot tell it. " +
+          "Stop at any time; Resume goes on.",
       ),
     ],
   ],
@@ -94,7 +119,8 @@ const STEPS = [
         {},
         "Choose the dataset and press ",
         element("b", {}, "Diagnose"),
-        ": minutes later the verdict, its evidence, the gain on sequences nothing was fitted on, and what to measure next. ",
+        ": minutes later the verdict, its evidence, the gain on sequences nothing was fitted " +
+          "on, and what to measure next. ",
         element("b", {}, "What if"),
         " lets you switch causes on and off on the frame that is shown.",
       ),
@@ -121,10 +147,12 @@ const STEPS = [
   ],
 ];
 
+/** Create the dialog; the help button and "?" open it. */
 export function startHelp() {
   const dialog = document.body.appendChild(
     element("dialog", { id: "help", class: "ask help", "aria-label": "Help" }),
   );
+  /** @param {string[][]} keys */
   const list = (keys) =>
     element(
       "dl",
@@ -167,7 +195,7 @@ export function startHelp() {
     if (!dialog.open) dialog.showModal();
     dialog.scrollTop = 0;
   };
-  const button = document.getElementById("help-button");
+  const button = byId("help-button");
   fill(button, "?").addEventListener("click", open);
   bindShortcuts({ "?": open });
 }

@@ -1,20 +1,25 @@
-// A dataset is brought: an archive dropped or chosen, or a folder on the server's disk; then its import is a job like others.
-import { ApiError, post, errorTitle } from "./api.js";
+// The dialog that imports a dataset: an archive, chosen or dropped on the page, or a folder on
+// the server. The import is a job.
+import { ApiError, errorCard, post } from "./api.js";
 import { element, fill } from "./dom.js";
 
 const NAME = "[A-Za-z0-9][A-Za-z0-9._\\-]*";
+/** @type {HTMLDialogElement | null} */
 let box = null;
 
-/** Ask for a dataset; whoever drops an archive on the page has chosen it already. */
+/**
+ * Open the dialog.
+ * @param {File | null} [file] an archive that was dropped on the page
+ */
 export function openImportDialog(file = null) {
   box ??= document.body.appendChild(
     element("dialog", { class: "ask", "aria-label": "Import a dataset" }),
   );
-  draw(file);
+  draw(box, file);
   if (!box.open) box.showModal();
 }
 
-/** Archives dropped anywhere on the page are imported. */
+/** Import an archive that is dropped anywhere on the page. */
 export function importDroppedFiles() {
   window.addEventListener("dragover", (event) => {
     if (event.dataTransfer?.types.includes("Files")) event.preventDefault();
@@ -28,7 +33,11 @@ export function importDroppedFiles() {
   });
 }
 
-function draw(file) {
+/**
+ * @param {HTMLDialogElement} dialog
+ * @param {File | null} file
+ */
+function draw(dialog, file) {
   const problem = element("div", { role: "alert" });
   const bar = element("i");
   const progress = element("div", { class: "progress", hidden: true }, bar);
@@ -48,7 +57,8 @@ function draw(file) {
     "aria-label": "Archive of the dataset",
   });
   chosen.addEventListener("change", () => {
-    if (chosen.files[0] && !name.value) name.value = datasetName(chosen.files[0].name);
+    const picked = chosen.files?.[0];
+    if (picked && !name.value) name.value = datasetName(picked.name);
   });
   const folder = element("input", {
     name: "folder",
@@ -70,7 +80,7 @@ function draw(file) {
       class: "ask-form",
       onsubmit: async (event) => {
         event.preventDefault();
-        const archive = file ?? chosen.files[0] ?? null;
+        const archive = file ?? chosen.files?.[0] ?? null;
         fill(problem);
         if (!archive && !folder.value) {
           fill(
@@ -90,7 +100,7 @@ function draw(file) {
               bar.style.width = `${100 * share}%`;
             });
           else await post("/imports/folder", { folder: folder.value, name: name.value });
-          box.close();
+          dialog.close();
         } catch (refused) {
           fill(problem, errorCard(refused));
           start.disabled = false;
@@ -109,21 +119,31 @@ function draw(file) {
       "div",
       { class: "actions" },
       start,
-      element("button", { class: "button", type: "button", onclick: () => box.close() }, "Cancel"),
+      element(
+        "button",
+        { class: "button", type: "button", onclick: () => dialog.close() },
+        "Cancel",
+      ),
     ),
   );
   fill(
-    box,
+    dialog,
     element("h1", { class: "verdict" }, "Import a dataset"),
     element(
       "p",
       { class: "gain-note" },
-      "Every file is checked first: the dataset is taken as a whole, or refused with all that is wrong with it.",
+      "Every file is checked first: the dataset is taken as a whole, " +
+        "or refused with all that is wrong with it.",
     ),
     form,
   );
 }
 
+/**
+ * Return a valid dataset name from the name of a file or folder.
+ * @param {string} file
+ * @returns {string}
+ */
 const datasetName = (file) =>
   file
     .replace(/(\.tar)?\.(zip|tar|gz|tgz|bz2|xz)$/i, "")
@@ -131,27 +151,25 @@ const datasetName = (file) =>
     .replace(/^[^A-Za-z0-9]+/, "")
     .slice(0, 64);
 
-const errorCard = (problem) =>
-  element(
-    "div",
-    { class: "note-card bad" },
-    element("strong", {}, errorTitle(problem)),
-    problem.message,
-  );
-
-/** Send a file with its progress, which fetch cannot tell. */
-function upload(file, name, told) {
+/**
+ * Send a file with XMLHttpRequest, because fetch does not report progress.
+ * @param {File} file
+ * @param {string} name
+ * @param {(share: number) => void} onProgress
+ * @returns {Promise<unknown>}
+ */
+function upload(file, name, onProgress) {
   return new Promise((done, refused) => {
     const request = new XMLHttpRequest();
     request.open("POST", `/api/imports?name=${encodeURIComponent(name)}`);
     request.setRequestHeader("content-type", "application/octet-stream");
-    request.upload.onprogress = ({ loaded, total }) => told(total ? loaded / total : 0);
+    request.upload.onprogress = ({ loaded, total }) => onProgress(total ? loaded / total : 0);
     request.onload = () => {
       let body = { kind: "Error", message: `The server answered ${request.status}.`, where: {} };
       try {
         body = JSON.parse(request.responseText);
       } catch {
-        /* said above */
+        // The message above is shown.
       }
       if (request.status < 300) done(body);
       else refused(new ApiError(body));

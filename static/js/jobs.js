@@ -1,28 +1,51 @@
-// Jobs as they go: the newest few on the left, all of them with log and retry in a panel of their own.
+// Jobs: the newest few in the sidebar, all of them with log and retry in a panel.
 import { get, post, toast } from "./api.js";
 import { diskUsageLine } from "./disk-usage.js";
-import { element, fill, icon } from "./dom.js";
+import { byId, element, fill, icon } from "./dom.js";
 import { capitalise, formatDuration, formatDateTime } from "./format.js";
 import { addPanel, openedPanel, openPanel } from "./panels.js";
 
-const JUST_ENDED = 15 * 60;
-const RETRY = { sweep: "Resume", training: "Resume" };
-const LEVELS = { warning: "⚠ ", error: "✕ " };
-const listeners = [];
-const openers = {};
-const rows = new Map();
-let jobs = [];
-let panel = null;
+/** @import { Job, LogEntry } from "./types.js" */
 
-/** Call `listener(jobs that have just ended well)` whenever some have. */
+/**
+ * Opens a result of a job; gets the value, the job's id and the whole result.
+ * @typedef {(value: string, id: string, result: Record<string, string>) => unknown} OpenResult
+ */
+/** @typedef {{ mark: string, node: HTMLElement, update: (job: Job) => void }} JobRow */
+
+const JUST_ENDED = 15 * 60; // for so long a failed job stays in the sidebar [s]
+/** @type {Record<string, string>} */
+const RETRY = { sweep: "Resume", training: "Resume" };
+/** @type {Record<string, string>} */
+const LEVELS = { warning: "⚠ ", error: "✕ " };
+/** @type {((jobs: Job[]) => void)[]} */
+const listeners = [];
+/** @type {Record<string, { label: string, open: OpenResult }>} */
+const openers = {};
+/** @type {Map<string, JobRow>} */
+const rows = new Map();
+/** @type {Job[]} */
+let jobs = [];
+/** @type {HTMLElement} */
+let panel;
+
+/**
+ * Call a function with the jobs that have just ended well.
+ * @param {(jobs: Job[]) => void} listener
+ */
 export const onJobsDone = (listener) => listeners.push(listener);
 
-/** How to open what a job made: by the key of its result, a label and a function of its value. */
+/**
+ * Offer a button for jobs whose result has a key.
+ * @param {string} key
+ * @param {string} label
+ * @param {OpenResult} open
+ */
 export function addResultOpener(key, label, open) {
   openers[key] = { label, open };
 }
 
-/** Follow the server's list. */
+/** Add the panel and follow the server's list of jobs. */
 export function startJobs() {
   panel = addPanel("jobs", "Jobs", drawPanel);
   const events = new EventSource("/api/jobs/events");
@@ -33,20 +56,29 @@ export function startJobs() {
     const done = jobs.filter(
       ({ id, state }) => state === "done" && before.has(id) && before.get(id) !== "done",
     );
-    if (done.length && panel.firstChild)
-      document.getElementById("disk")?.replaceWith(diskUsageLine());
+    if (done.length && panel.firstChild) byId("disk").replaceWith(diskUsageLine());
     if (done.length) for (const listener of listeners) listener(done);
   };
   setInterval(draw, 1000);
 }
 
+/**
+ * @param {Job} job
+ * @returns {boolean}
+ */
 const isOpen = ({ state }) => state === "running" || state === "queued";
+
+/**
+ * Return whether a job has failed or was cancelled lately.
+ * @param {Job} job
+ * @returns {boolean}
+ */
 const isRecent = ({ state, finished }) =>
-  state !== "done" && Date.now() / 1e3 - finished < JUST_ENDED;
+  state !== "done" && Date.now() / 1e3 - (finished ?? 0) < JUST_ENDED;
 
 function draw() {
   const shown = jobs.filter((job) => isOpen(job) || isRecent(job)).slice(0, 6);
-  placeRows(document.getElementById("jobs"), shown, "rail", "Nothing is running.");
+  placeRows(byId("jobs"), shown, "rail", "Nothing is running.");
   if (openedPanel() === "jobs") drawPanel();
 }
 
@@ -60,36 +92,48 @@ function drawPanel() {
       diskUsageLine(),
     );
   placeRows(
-    panel.querySelector(".jobs-list"),
+    /** @type {HTMLElement} */ (panel.querySelector(".jobs-list")),
     jobs,
     "panel",
     "Nothing has been asked for yet: diagnose a dataset, or start a sweep.",
   );
 }
 
-/** Put rows into a box in order; a row is built anew only when its job's state changes, so that buttons stay where they are. */
+/**
+ * Put rows into a box in order. A row is created again only when its job's state changes, so that
+ * its buttons stay where they are.
+ * @param {HTMLElement} box
+ * @param {Job[]} shown
+ * @param {"rail" | "panel"} where
+ * @param {string} empty text in place of rows
+ */
 function placeRows(box, shown, where, empty) {
-  const wanted = shown.map((job) => {
+  const ordered = shown.map((job) => {
     const key = `${where} ${job.id}`;
     const mark = `${job.state} ${job.attempt}`;
     let row = rows.get(key);
-    if (row?.mark !== mark) {
+    if (!row || row.mark !== mark) {
       row = { mark, ...buildRow(job, where === "panel") };
       rows.set(key, row);
     }
     row.update(job);
     return row.node;
   });
-  const nodes = wanted.length
-    ? wanted
+  const nodes = ordered.length
+    ? ordered
     : [box.querySelector(".empty") ?? element("p", { class: "empty" }, empty)];
   if (
     nodes.length !== box.children.length ||
-    nodes.some((node, place) => box.children[place] !== node)
+    nodes.some((node, index) => box.children[index] !== node)
   )
     box.replaceChildren(...nodes);
 }
 
+/**
+ * @param {Job} job
+ * @param {boolean} wide for the panel
+ * @returns {Omit<JobRow, "mark">}
+ */
 function buildRow(job, wide) {
   const { id, kind, dataset, state, error, finished, started, can_retry: retriable } = job;
   const active = isOpen(job);
@@ -97,27 +141,31 @@ function buildRow(job, wide) {
   const bar = element("i");
   const text = element("span");
   const left = element("span");
-  const say =
-    (path) =>
-    async ({ currentTarget }) => {
-      currentTarget.disabled = true;
-      await post(`/jobs/${id}/${path}`).catch((problem) => {
+  /**
+   * @param {"cancel" | "retry"} verb
+   * @returns {(event: { currentTarget: HTMLButtonElement }) => Promise<void>}
+   */
+  const request =
+    (verb) =>
+    async ({ currentTarget: button }) => {
+      button.disabled = true;
+      await post(`/jobs/${id}/${verb}`).catch((problem) => {
         toast(problem);
-        currentTarget.disabled = false;
+        button.disabled = false;
       });
     };
   const buttons = [
     active
       ? element(
           "button",
-          { class: "icon-button", type: "button", title: "Cancel", onclick: say("cancel") },
+          { class: "icon-button", type: "button", title: "Cancel", onclick: request("cancel") },
           icon("close"),
         )
       : null,
     retriable
       ? element(
           "button",
-          { class: "button small", type: "button", "data-retry": id, onclick: say("retry") },
+          { class: "button small", type: "button", "data-retry": id, onclick: request("retry") },
           RETRY[kind] ?? "Retry",
         )
       : null,
@@ -169,24 +217,31 @@ function buildRow(job, wide) {
           "Details",
         ),
   );
-  const update = ({ fraction, text: said, remaining, started: since }) => {
+  /** @param {Job} job */
+  const update = ({ fraction, text: message, remaining, started: since }) => {
     if (active) share.textContent = `${Math.round(100 * fraction)} %`;
     bar.style.width = `${100 * fraction}%`;
-    text.textContent = said;
+    text.textContent = message;
     left.textContent =
       state !== "running"
         ? ""
         : remaining !== null
           ? `about ${formatDuration(remaining)} left`
-          : formatDuration(Date.now() / 1e3 - since);
+          : formatDuration(Date.now() / 1e3 - (since ?? 0));
   };
   return { node, update };
 }
 
-/** A way to each thing that the job made. */
+/**
+ * Create a button or link for each thing that the job made.
+ * @param {Job} job
+ * @returns {HTMLElement[]}
+ */
 function resultLinks({ id, dataset, result }) {
-  return Object.entries(openers)
-    .filter(([key]) => result?.[key] !== undefined)
+  if (!result) return [];
+  const { files = [], ...values } = result;
+  const buttons = Object.entries(openers)
+    .filter(([key]) => key in values)
     .map(([key, { label, open }]) =>
       element(
         "button",
@@ -194,36 +249,38 @@ function resultLinks({ id, dataset, result }) {
           class: "button small",
           type: "button",
           "data-open": key,
-          onclick: () => open(result[key], id, result),
+          onclick: () => open(values[key], id, values),
         },
         label,
       ),
-    )
-    .concat(
-      (result?.files ?? []).map((file) =>
-        element(
-          "a",
-          {
-            class: "button small",
-            href: `/api/exports/${encodeURIComponent(result.export)}/${encodeURIComponent(file)}`,
-            download: file,
-          },
-          dataset ? file.replace(`${dataset}-`, "").replace(`${dataset}.`, "report.") : file,
-        ),
-      ),
     );
+  const folder = `/api/exports/${encodeURIComponent(result.export)}`;
+  const links = files.map((file) =>
+    element(
+      "a",
+      { class: "button small", href: `${folder}/${encodeURIComponent(file)}`, download: file },
+      dataset ? file.replace(`${dataset}-`, "").replace(`${dataset}.`, "report.") : file,
+    ),
+  );
+  return [...buttons, ...links];
 }
 
-/** The job's log, read when it is opened and followed while it is. */
+/**
+ * Create the job's log, which is loaded and followed while it is open.
+ * @param {string} id
+ * @returns {HTMLElement}
+ */
 function jobLog(id) {
   const lines = element("ol", { class: "log" });
   const box = element("details", { ontoggle: follow }, element("summary", {}, "Log"), lines);
   let next = 0;
   let busy = false;
+  /** Load the lines that are new, again and again until the job has ended. */
   async function follow() {
     while (box.open && box.isConnected && !busy) {
       busy = true;
       try {
+        /** @type {{ notes: LogEntry[], next: number }} */
         const more = await get(`/jobs/${id}/log?after=${next}`);
         next = more.next;
         lines.append(

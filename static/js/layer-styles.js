@@ -1,6 +1,10 @@
-// How each layer is drawn: what is chosen for all, and what a layer has of its own. The server has the same rules in app/view.py.
+// How each layer is drawn: what is chosen for all layers, and what a layer has of its own. The
+// server applies the same rules to the request.
 import { set, state } from "./store.js";
 
+/** @import { LayerStyle, Model, Quantity, ViewRequest } from "./types.js" */
+
+/** @type {Record<string, string>} */
 export const LAYERS = {
   measured: "Measured cloud",
   raw: "Raw model",
@@ -12,21 +16,39 @@ export const LAYERS = {
   base: "Fixed base",
   lump: "Lump found",
 };
+/** @type {Model[]} */
 export const MODELS = ["raw", "extended", "corrected"];
+
+/**
+ * Quantities that colours show; `factor` converts SI units to `unit`.
+ * @type {Record<Quantity, { label: string, unit: string, factor: number }>}
+ */
 export const QUANTITIES = {
   error: { label: "Error", unit: "mm", factor: 1e3 },
   displacement: { label: "Displacement", unit: "mm", factor: 1e3 },
   energy: { label: "Energy density", unit: "J/m³", factor: 1 },
 };
 
+/** @returns {Model[]} */
 const shownModels = () => [...MODELS].reverse().filter((model) => state().layers.includes(model));
 
-/** Of the models that are shown, the one whose surface lies in front. */
+/**
+ * Return the model whose surface is in front, of those that are shown.
+ * @returns {Model | null}
+ */
 const frontModel = () =>
   shownModels().find((model) => model === state().colour) ?? shownModels()[0] ?? null;
 
+/**
+ * @param {string} layer
+ * @returns {number}
+ */
 export const opacity = (layer) => state().looks[layer]?.opacity ?? 1;
 
+/**
+ * @param {Model} model
+ * @returns {boolean}
+ */
 export function isColoured(model) {
   return (
     state().looks[model]?.coloured ??
@@ -35,21 +57,33 @@ export function isColoured(model) {
   );
 }
 
+/**
+ * @param {Model} model
+ * @returns {boolean}
+ */
 export function isWireframe(model) {
   return state().looks[model]?.lines ?? (!state().side_by_side && model !== frontModel());
 }
 
+/**
+ * @param {string} layer
+ * @param {LayerStyle} change
+ */
 export function setLayerStyle(layer, change) {
   set({ looks: { ...state().looks, [layer]: { ...state().looks[layer], ...change } } });
 }
 
-/** Why a layer cannot be shown here; null where it can. */
+/**
+ * Return why a layer cannot be shown; null where it can.
+ * @param {string} layer
+ * @returns {string | null}
+ */
 export function unavailableReason(layer) {
   const { heading, series } = state();
   if (layer === "measured" && heading && !heading.has_clouds)
     return "The dataset is not where this run says, so its clouds cannot be shown";
   if (!series) return null;
-  if (MODELS.includes(layer) && !series.models.includes(layer))
+  if (isModel(layer) && !series.models.includes(layer))
     return layer === "corrected"
       ? "No correction network was trained for this run"
       : "This run does not hold the model";
@@ -59,27 +93,43 @@ export function unavailableReason(layer) {
   return null;
 }
 
-export const quantityUnavailableReason = (quantity) =>
-  state().series && state().series.limits[quantity] === null ? state().series.inside : null;
+/**
+ * Return why a quantity cannot be shown; null where it can.
+ * @param {Quantity} quantity
+ * @returns {string | null}
+ */
+export function quantityUnavailableReason(quantity) {
+  const { series } = state();
+  return series?.limits[quantity] === null ? series.inside : null;
+}
 
-/** Draw one model coloured and in front, the others as lines; "plain" colours none. */
+/**
+ * Draw one model coloured and in front, the others as lines; "plain" colours none.
+ * @param {string} colour
+ */
 export function colourBy(colour) {
   const layers =
     colour === "plain" || state().layers.includes(colour)
       ? state().layers
       : [...state().layers, colour];
   const looks = Object.fromEntries(
-    Object.entries(state().looks).map(([layer, { opacity: kept }]) => [
+    Object.entries(state().looks).map(([layer, style]) => [
       layer,
-      kept ? { opacity: kept } : {},
+      style.opacity ? { opacity: style.opacity } : {},
     ]),
   );
   set({ colour, layers: inDrawOrder(layers), looks });
 }
 
+/**
+ * Sort layers as they are listed, and leave out unknown ones.
+ * @param {string[]} layers
+ * @returns {string[]}
+ */
 export const inDrawOrder = (layers) =>
   Object.keys(LAYERS).filter((layer) => layers.includes(layer));
 
+/** @param {string} layer */
 export function toggleLayer(layer) {
   const { layers } = state();
   set({
@@ -89,7 +139,10 @@ export function toggleLayer(layer) {
   });
 }
 
-/** All that the server needs to draw. */
+/**
+ * Return all that the server needs to draw the scene.
+ * @returns {ViewRequest}
+ */
 export function viewRequest() {
   const {
     run,
@@ -105,20 +158,26 @@ export function viewRequest() {
     section,
     looks,
   } = state();
-  const held = quantityUnavailableReason(quantity) ? "error" : quantity;
-  const range = ranges[held] ?? "robust";
+  const available = quantityUnavailableReason(quantity) ? "error" : quantity;
+  const range = ranges[available] ?? "robust";
   return {
     run,
     sequence,
     frame,
     layers: inDrawOrder(layers),
     colour,
-    quantity: held,
+    quantity: available,
     scale: range === "fixed" ? "fixed" : "robust",
-    limit: range === "manual" ? (limits[held] ?? null) : null,
+    limit: range === "manual" ? (limits[available] ?? null) : null,
     crop,
     side_by_side: aside,
     section: section?.on ? { axis: section.axis, at: section.at, flip: section.flip } : null,
     looks: Object.fromEntries(Object.entries(looks).filter(([layer]) => layer in LAYERS)),
   };
 }
+
+/**
+ * @param {string} layer
+ * @returns {layer is Model}
+ */
+export const isModel = (layer) => layer in { raw: 0, extended: 0, corrected: 0 };

@@ -1,11 +1,12 @@
-// Which layers are shown and how: switches in the toolbar, everything else in a panel that opens below them.
-import { element, fill, icon, swatch } from "./dom.js";
+// Layers: switches in the toolbar, and a panel below it for how each layer is drawn.
+import { byId, element, fill, icon, swatch } from "./dom.js";
 import {
   unavailableReason,
   colourBy,
   isColoured,
   LAYERS,
   isWireframe,
+  isModel,
   MODELS,
   quantityUnavailableReason,
   opacity,
@@ -15,6 +16,8 @@ import {
 } from "./layer-styles.js";
 import { subscribe, set, state } from "./store.js";
 
+/** @import { Model, Quantity } from "./types.js" */
+
 const CHIPS = {
   measured: "Measured",
   raw: "Raw",
@@ -22,14 +25,17 @@ const CHIPS = {
   corrected: "Corrected",
   tool: "Tool",
 };
+const quantities = /** @type {[Quantity, { label: string }][]} */ (Object.entries(QUANTITIES));
 const SEGMENTS = { plain: "Plain", raw: "Raw", extended: "Extended", corrected: "Corrected" };
 
+/** Set the toolbar's switches and the panel up. */
 export function start() {
-  const button = fill("layers-button", icon("layers"), "Layers");
+  const button = byId("layers-button");
+  fill(button, icon("layers"), "Layers");
   button.addEventListener("click", () => setOpen(box().hidden));
   document.addEventListener("pointerdown", (event) => {
-    if (!box().hidden && !box().contains(event.target) && !button.contains(event.target))
-      setOpen(false);
+    const target = /** @type {Node} */ (event.target);
+    if (!box().hidden && !box().contains(target) && !button.contains(target)) setOpen(false);
   });
   window.addEventListener("blur", () => {
     if (document.activeElement?.id === "viewer") setOpen(false);
@@ -48,25 +54,34 @@ export function start() {
   drawToolbar();
 }
 
-const box = () => document.getElementById("layers-panel");
+const box = () => byId("layers-panel");
 
-function setOpen(wanted) {
-  box().hidden = !wanted;
-  document.getElementById("layers-button").setAttribute("aria-expanded", String(wanted));
-  if (wanted) {
+/**
+ * Open or close the panel.
+ * @param {boolean} open
+ */
+function setOpen(open) {
+  box().hidden = !open;
+  byId("layers-button").setAttribute("aria-expanded", String(open));
+  if (open) {
     drawRows();
-    box().querySelector("input, button")?.focus();
+    /** @type {HTMLElement | null} */ (box().querySelector("input, button"))?.focus();
   }
 }
 
-const isAvailable = (model) =>
-  !MODELS.includes(model) || !state().series || state().series.models.includes(model);
+/**
+ * Return whether the run holds a model; true while nobody knows.
+ * @param {string} name
+ * @returns {boolean}
+ */
+const isAvailable = (name) =>
+  !isModel(name) || !state().series || Boolean(state().series?.models.includes(name));
 
 function drawToolbar() {
   const { layers, colour, quantity, series } = state();
   document
     .querySelector(".toolbar")
-    .classList.toggle("full", Boolean(series?.models.includes("corrected")));
+    ?.classList.toggle("full", Boolean(series?.models.includes("corrected")));
   fill(
     "layers",
     Object.entries(CHIPS)
@@ -90,7 +105,7 @@ function drawToolbar() {
   );
   fill(
     "quantity",
-    Object.entries(QUANTITIES).map(([name, { label }]) =>
+    quantities.map(([name, { label }]) =>
       element(
         "option",
         {
@@ -103,7 +118,7 @@ function drawToolbar() {
       ),
     ),
   );
-  document.getElementById("quantity").title = quantityUnavailableReason("energy")
+  byId("quantity").title = quantityUnavailableReason("energy")
     ? `Energy density: ${quantityUnavailableReason("energy")}`
     : "What the colours show";
   fill(
@@ -129,18 +144,21 @@ function drawToolbar() {
   );
 }
 
+/** Set the choice of the quantity up that colours show. */
 export function startQuantity() {
-  document.getElementById("quantity").addEventListener("change", (event) => {
-    set({ quantity: event.target.value });
+  const select = byId("quantity", HTMLSelectElement);
+  select.addEventListener("change", () => {
+    set({ quantity: /** @type {Quantity} */ (select.value) });
     if (state().colour === "plain" && !MODELS.some(isColoured)) colourBy("raw");
-    event.target.blur();
+    select.blur();
   });
 }
 
+/** Draw the panel's rows, unless a slider is being dragged, and keep the focus. */
 function drawRows() {
   if (box().hidden) return;
-  const focused = document.activeElement?.dataset?.of;
-  const kind = document.activeElement?.dataset?.kind;
+  const active = document.activeElement;
+  const { of: focused, kind } = active instanceof HTMLElement ? active.dataset : {};
   if (kind === "opacity") return; // a slider that is dragged stays as it is
   fill(
     box(),
@@ -181,13 +199,18 @@ function drawRows() {
       ),
     ),
   );
-  if (focused) box().querySelector(`[data-of="${focused}"][data-kind="${kind}"]`)?.focus();
+  const again = focused ? box().querySelector(`[data-of="${focused}"][data-kind="${kind}"]`) : null;
+  if (again instanceof HTMLElement) again.focus();
 }
 
+/**
+ * @param {string} name
+ * @returns {HTMLElement}
+ */
 function row(name) {
   const why = unavailableReason(name);
   const shown = state().layers.includes(name) && why === null;
-  const model = MODELS.includes(name);
+  const model = isModel(name);
   return element(
     "div",
     { class: shown ? "layer-row" : "layer-row off", title: why, "data-row": name },
@@ -222,6 +245,11 @@ function row(name) {
   );
 }
 
+/**
+ * @param {Model} name
+ * @param {boolean} shown
+ * @returns {HTMLElement}
+ */
 function colourSelect(name, shown) {
   const value = isColoured(name) ? state().quantity : "plain";
   return element(
@@ -233,12 +261,12 @@ function colourSelect(name, shown) {
       "data-kind": "colour",
       onchange: (event) => {
         const plain = event.target.value === "plain";
-        if (!plain) set({ quantity: event.target.value });
+        if (!plain) set({ quantity: /** @type {Quantity} */ (event.target.value) });
         setLayerStyle(name, plain ? { coloured: false } : { coloured: true, lines: false });
       },
     },
     element("option", { value: "plain", selected: value === "plain" }, "Plain"),
-    Object.entries(QUANTITIES).map(([quantity, { label }]) =>
+    quantities.map(([quantity, { label }]) =>
       element(
         "option",
         {
@@ -253,15 +281,21 @@ function colourSelect(name, shown) {
   );
 }
 
+/**
+ * @param {string} name
+ * @param {boolean} shown
+ * @returns {HTMLElement}
+ */
 function opacitySlider(name, shown) {
+  const kind = name === "measured" ? "Density" : "Opacity";
   const bar = element("input", {
     type: "range",
     min: 5,
     max: 100,
     step: 5,
     value: Math.round(100 * opacity(name)),
-    disabled: !shown || (MODELS.includes(name) && isWireframe(name)),
-    "aria-label": `${name === "measured" ? "Density" : "Opacity"} of the ${LAYERS[name].toLowerCase()}`,
+    disabled: !shown || (isModel(name) && isWireframe(name)),
+    "aria-label": `${kind} of the ${LAYERS[name].toLowerCase()}`,
     title: name === "measured" ? "Share of the points that are drawn" : null,
     "data-of": name,
     "data-kind": "opacity",

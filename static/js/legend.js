@@ -1,30 +1,53 @@
-// The one legend: what the colours mean, with its unit and range.
-import { element, swatch } from "./dom.js";
-import { fill } from "./dom.js";
+// The scene's legend: what the colours mean, with unit and range.
+import { byId, element, fill, swatch } from "./dom.js";
 import { isColoured, MODELS, QUANTITIES } from "./layer-styles.js";
 import { verticalScaleBar } from "./colour-scale.js";
 import { subscribe, set, state } from "./store.js";
 
+/** @import { Quantity, Rgb } from "./types.js" */
+
+/**
+ * @typedef {object} Legend
+ * @property {string} title
+ * @property {[string, string] | null} ends words above and below a signed scale
+ * @property {Rgb[]} bands
+ * @property {number} low in `unit`
+ * @property {number} high in `unit`
+ * @property {number} factor from SI units to `unit`
+ * @property {string} unit
+ * @property {Quantity} quantity
+ * @property {boolean} signed
+ */
+
+/**
+ * Ranges of the colour scale with label and title.
+ * @type {Record<string, [string, string]>}
+ */
 const RANGES = {
   robust: ["Robust", "Holds nearly all that occurs in the raw model of this sequence"],
   fixed: ["Fixed", "The same for all sequences of this diagnosis"],
   manual: ["Manual", "As you set it"],
 };
 
+/** Draw the legend whenever what it shows has changed. */
 export function start() {
   subscribe(
-    ["colour", "quantity", "ranges", "limits", "held", "palette", "trial", "looks", "live"],
+    ["colour", "quantity", "ranges", "limits", "rendered", "palette", "trial", "looks", "live"],
     draw,
   );
 }
 
-/** What the legend says, for whoever draws it: null where nothing is coloured. */
+/**
+ * Return what the legend shows; null where nothing is coloured.
+ * @returns {Legend | null}
+ */
 export function legendContent() {
-  const { held, palette, trial, colour } = state();
-  const { quantity, limit } = held?.drawn ?? {};
-  if (!palette || !quantity || !limit) return null;
+  const { rendered, palette, trial, colour } = state();
+  const { quantity, limit } = rendered?.drawn ?? {};
+  if (!palette || !rendered?.view || !quantity || !limit) return null;
+  const shown = rendered.view.layers;
   const { unit, factor, label } = QUANTITIES[quantity];
-  const names = MODELS.filter((model) => held.view.layers.includes(model) && isColoured(model));
+  const names = MODELS.filter((model) => shown.includes(model) && isColoured(model));
   const one = state().live
     ? "live"
     : trial && colour === "extended"
@@ -46,22 +69,21 @@ export function legendContent() {
   };
 }
 
+/** Draw the legend, unless its number field has the focus. */
 function draw() {
-  const box = document.getElementById("legend");
+  const box = byId("legend");
   const what = legendContent();
   box.hidden = what === null;
-  if (
-    box.hidden ||
-    (box.contains(document.activeElement) && document.activeElement.type === "number")
-  )
-    return;
+  const focused = document.activeElement;
+  const typing = focused instanceof HTMLInputElement && focused.type === "number";
+  if (!what || (typing && box.contains(focused))) return;
   const { ranges, limits } = state();
   const range = ranges[what.quantity] ?? "robust";
-  const setRange = (wanted) =>
+  /** @param {string} name */
+  const setRange = (name) =>
     set({
-      ranges: { ...ranges, [what.quantity]: wanted },
-      limits:
-        wanted === "manual" ? { ...limits, [what.quantity]: what.high / what.factor } : limits,
+      ranges: { ...ranges, [what.quantity]: name },
+      limits: name === "manual" ? { ...limits, [what.quantity]: what.high / what.factor } : limits,
     });
   fill(
     box,
@@ -92,6 +114,11 @@ function draw() {
   );
 }
 
+/**
+ * Create the field for the end of a manual scale.
+ * @param {Legend} legend
+ * @returns {HTMLElement}
+ */
 function limitField({ high, factor, unit, quantity, signed }) {
   const label = `End of the scale in ${unit}`;
   return element(

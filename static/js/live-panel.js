@@ -1,31 +1,52 @@
-// Live: the tool is led by hand, in the scene or on a pad, and the chosen model answers at once.
-import { get, remove } from "./api.js";
-import { element, fill } from "./dom.js";
+// The panel "Live": the tool is moved by hand, in the scene or on a pad, and the chosen model
+// answers at once.
+import { get, remove, toError } from "./api.js";
+import { byId, element, fill } from "./dom.js";
 import { projectPointer, hitsTool } from "./drag.js";
 import { capitalise, formatMm } from "./format.js";
 import { addPanel, openedPanel } from "./panels.js";
 import { onViewerLoad, pageId, refreshScene } from "./scene.js";
 import { subscribe, set, state } from "./store.js";
 
+/** @import { EffectValues, LiveAnswer, Point, ViewerWindow, WhatIfRow } from "./types.js" */
+
+/** @type {Record<string, string>} */
 const MODELS = { raw: "Raw model", extended: "Extended model", whatif: "As set under What if" };
-const PAD = 300;
-const PAUSE = 8; // ms
-let retried = false;
-let box = null;
+const PAD = 300; // width of the pad in pixels
+const PAUSE = 8; // least time between requests [ms]
+let retried = false; // a request has been repeated after a problem
+/** @type {HTMLElement} */
+let box;
+/** @type {WebSocket | null} */
 let socket = null;
 let model = "extended";
-let extendedEffects = null; // the extended model's effects
-let toolCentre = null; // of the tool's centre, as wished for [m]
-let radius = 0.005;
-let sendTimer = null;
-let answer = null;
-let answerTimes = [];
-let dragState = null; // while the tool is dragged in the scene: from where its centre was held
+/** @type {EffectValues[]} */
+let extendedEffects = [];
 
+/**
+ * Requested place of the tool's centre.
+ * @type {Point}
+ */
+let toolCentre = [];
+let radius = 0.005; // of the tool [m]
+/** @type {ReturnType<typeof setTimeout> | null} */
+let sendTimer = null;
+/** @type {LiveAnswer | null} */
+let answer = null;
+/** @type {number[]} */
+let answerTimes = []; // of the last second [ms]
+/**
+ * While the tool is dragged in the scene: the point where it was grabbed, from there to its centre,
+ * and whether it moves level.
+ * @type {{ held: Point, offset: Point, level: boolean } | null}
+ */
+let dragState = null;
+
+/** Add the panel. */
 export function start() {
   box = addPanel("live", "Live", open, leave);
   onViewerLoad(watchViewer);
-  // What is seen inside is sent only where it is shown.
+  // The server sends fields inside the block only while they are shown.
   subscribe(["section", "quantity", "layers"], () => {
     if (state().live && answer) send();
   });
@@ -38,8 +59,9 @@ export function start() {
   });
 }
 
+/** Set the model up and draw the panel. */
 async function open() {
-  const { run, sequence, heading, held } = state();
+  const { run, sequence, heading, rendered } = state();
   if (!run || !sequence) {
     fill(box, mutedText("Choose a diagnosis on the left; here you then push its models by hand."));
     return;
@@ -58,54 +80,68 @@ async function open() {
     const found = await get(`/runs/${encodeURIComponent(run)}/model`);
     extendedEffects = found.effects ?? [];
     radius = found.setup?.tool?.radius ?? radius;
-  } catch (problem) {
+  } catch (error) {
     fill(
       box,
       element(
         "div",
         { class: "note-card bad" },
         element("strong", {}, "This cannot be led"),
-        problem.message,
+        toError(error).message,
       ),
     );
     return;
   }
   if (openedPanel() !== "live") return;
   set({ live: true, playing: false });
-  toolCentre = held?.drawn?.tool ?? aboveMiddle();
+  toolCentre = rendered?.drawn?.tool ?? aboveMiddle();
   answerTimes = [];
   answer = null;
   draw();
   connect();
 }
 
+/** Close the connection and show the recording again. */
 async function leave() {
   if (!socket) return;
   socket.close();
   socket = null;
   dragState = null;
   set({ live: false });
-  await remove(`/sessions/${pageId()}/live`).catch(() => {}); // it goes with the connection, too, but somewhat later
+  // The server does so as well when it sees the connection closed, but later.
+  await remove(`/sessions/${pageId()}/live`).catch(() => {});
   refreshScene();
 }
 
+/**
+ * @param {string} text
+ * @returns {HTMLElement}
+ */
 const mutedText = (text) => element("p", { class: "muted" }, text);
 
+/**
+ * Return the lowest and the highest corner of the block.
+ * @returns {[Point, Point]}
+ */
 const blockCorners = () =>
   state().series?.box ?? [
     [-0.04, -0.02, 0],
     [0.04, 0.02, 0.04],
   ];
 
+/**
+ * Return a place of the tool above the block's middle.
+ * @returns {Point}
+ */
 const aboveMiddle = () => {
   const [low, high] = blockCorners();
   return [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, high[2] + 2 * radius];
 };
 
+/** Open the socket, and again if it closes while the panel is in front. */
 function connect() {
-  const mine = new WebSocket(
-    `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/sessions/${pageId()}/live`,
-  );
+  const scheme = location.protocol === "https:" ? "wss" : "ws";
+  const mine = new WebSocket(`${scheme}://${location.host}/api/sessions/${pageId()}/live`);
   socket = mine;
   mine.onopen = send;
   mine.onmessage = ({ data }) => {
@@ -121,6 +157,11 @@ function connect() {
   };
 }
 
+/**
+ * Draw an answer; repeat the request once after a problem, because an ended solver is then
+ * restarted.
+ * @param {LiveAnswer} found
+ */
 function received(found) {
   answer = found;
   if (found.problem) {
@@ -128,73 +169,91 @@ function received(found) {
     if (!retried) {
       retried = true;
       setTimeout(send, 1000);
-    } // a solver that ended is started anew when it is asked again
+    }
     return;
   }
   retried = false;
   const now = performance.now();
   answerTimes = [...answerTimes.filter((at) => now - at < 1000), now];
-  const { held } = state();
-  if (held?.drawn && found.drawn)
-    set({ held: { ...held, drawn: { ...held.drawn, ...found.drawn, tool: found.tool } } });
+  const { rendered } = state();
+  if (rendered?.drawn && found.drawn)
+    set({
+      rendered: { ...rendered, drawn: { ...rendered.drawn, ...found.drawn, tool: found.tool } },
+    });
   drawAnswer();
 }
 
-/** Ask for the newest place, at most once in `PAUSE`. No answer is awaited: the server solves the newest, and is not idle on the way. */
+/**
+ * Request the newest place, at most once in PAUSE, without waiting for answers: the server solves
+ * the newest request and stays busy.
+ */
 function send() {
   if (sendTimer || socket?.readyState !== WebSocket.OPEN) return;
   sendTimer = setTimeout(() => {
     sendTimer = null;
-    if (socket?.readyState !== WebSocket.OPEN) return; // it is asked when the connection opens
+    if (socket?.readyState !== WebSocket.OPEN) return; // sent again when the connection opens
     const { run, sequence } = state();
     socket.send(JSON.stringify({ run, sequence, at: toolCentre, ...modelRequest() }));
   }, PAUSE);
 }
 
+/**
+ * Return the part of a request that chooses the model.
+ * @returns {{ effects: EffectValues[], tuned: boolean, shown: string }}
+ */
 function modelRequest() {
   if (model === "raw") return { effects: [], tuned: false, shown: "raw" };
-  const tried = model === "whatif" ? storedWhatIf() : null;
-  const rows = tried ? tried.rows.filter((row) => row.on) : extendedEffects;
+  const stored = model === "whatif" ? storedWhatIf() : null;
+  const rows = stored ? stored.rows.filter((row) => row.on) : extendedEffects;
   return {
     effects: rows.map(({ effect, parameters }) => ({ effect, parameters })),
-    tuned: tried?.tuned ?? true,
+    tuned: stored?.tuned ?? true,
     shown: "extended",
   };
 }
 
+/**
+ * Return what the panel "What if" has stored for this run.
+ * @returns {{ rows: WhatIfRow[], tuned: boolean } | null}
+ */
 function storedWhatIf() {
   try {
-    const kept = JSON.parse(sessionStorage.getItem("palpate.whatif"));
-    return kept?.run === state().run ? kept : null;
+    const stored = JSON.parse(sessionStorage.getItem("palpate.whatif") ?? "null");
+    return stored?.run === state().run ? stored : null;
   } catch {
     return null;
   }
 }
 
+/** @param {Point} to */
 function moveTool(to) {
   toolCentre = to;
   drawPad();
   send();
 }
 
-/** The viewer's own window, each time it is opened anew. */
+/**
+ * Let the tool be dragged in the viewer.
+ * @param {ViewerWindow} viewer
+ */
 function watchViewer(viewer) {
-  const caught = (event) =>
-    state().live &&
-    answer?.tool &&
-    viewer.__viserMutable?.camera &&
-    hitsTool(viewer, event, answer.tool, radius);
+  /**
+   * Return the tool's centre if it is under the pointer.
+   * @param {PointerEvent} event
+   * @returns {Point | null}
+   */
+  const toolUnder = (event) => {
+    const tool = state().live && viewer.__viserMutable?.camera ? answer?.tool : null;
+    return tool && hitsTool(viewer, event, tool, radius) ? tool : null;
+  };
   viewer.addEventListener(
     "pointerdown",
     (event) => {
-      if (event.button !== 0 || !caught(event)) return;
+      const tool = event.button === 0 ? toolUnder(event) : null;
+      if (!tool) return;
       event.stopImmediatePropagation();
-      const held = projectPointer(viewer, event, answer.tool, event.shiftKey);
-      dragState = {
-        held,
-        off: answer.tool.map((value, i) => value - held[i]),
-        level: event.shiftKey,
-      };
+      const held = projectPointer(viewer, event, tool, event.shiftKey);
+      dragState = { held, offset: minus(tool, held), level: event.shiftKey };
       viewer.document.body.style.cursor = "grabbing";
     },
     true,
@@ -203,18 +262,17 @@ function watchViewer(viewer) {
     "pointermove",
     (event) => {
       if (!dragState) {
-        if (state().live) viewer.document.body.style.cursor = caught(event) ? "grab" : "";
+        if (state().live) viewer.document.body.style.cursor = toolUnder(event) ? "grab" : "";
         return;
       }
       event.stopImmediatePropagation();
-      if (event.shiftKey !== dragState.level)
-        dragState = {
-          ...dragState,
-          held: answer.tool.map((value, i) => value - dragState.off[i]),
-          level: event.shiftKey,
-        };
-      const at = projectPointer(viewer, event, dragState.held, dragState.level);
-      moveTool(at.map((value, i) => value + dragState.off[i]));
+      if (event.shiftKey !== dragState.level && answer) {
+        const held = minus(answer.tool, dragState.offset);
+        dragState = { ...dragState, held, level: event.shiftKey };
+      }
+      const { held, offset, level } = dragState;
+      const at = projectPointer(viewer, event, held, level);
+      moveTool(at.map((value, i) => value + offset[i]));
     },
     true,
   );
@@ -229,8 +287,16 @@ function watchViewer(viewer) {
     );
 }
 
+/**
+ * @param {Point} a
+ * @param {Point} b
+ * @returns {Point}
+ */
+const minus = (a, b) => a.map((value, i) => value - b[i]);
+
+/** Draw the panel. */
 function draw() {
-  const raised = () => {
+  const lift = () => {
     const [, high] = blockCorners();
     moveTool([toolCentre[0], toolCentre[1], high[2] + 2 * radius]);
   };
@@ -240,7 +306,8 @@ function draw() {
     element(
       "p",
       { class: "gain-note" },
-      "Drag the tool in the scene: down to push, with Shift to move it level. Or lead it on the pad. Nobody measured these pushes, so the cloud is hidden.",
+      "Drag the tool in the scene: down to push, with Shift to move it level. " +
+        "Or lead it on the pad. Nobody measured these pushes, so the cloud is hidden.",
     ),
     element(
       "label",
@@ -269,7 +336,7 @@ function draw() {
     element(
       "div",
       { class: "actions" },
-      element("button", { class: "button", type: "button", onclick: raised }, "Lift the tool"),
+      element("button", { class: "button", type: "button", onclick: lift }, "Lift the tool"),
       element(
         "button",
         { class: "button", type: "button", onclick: () => moveTool(aboveMiddle()) },
@@ -281,7 +348,16 @@ function draw() {
   drawAnswer();
 }
 
-/** The block from above; the tool is where the pointer is. */
+/**
+ * Convert a place of the tool to pixels of the pad.
+ * @type {(place: Point) => [number, number]}
+ */
+let toPad = () => [0, 0];
+
+/**
+ * Create the pad: the block from above, on which the pointer or arrow keys move the tool.
+ * @returns {SVGSVGElement}
+ */
 function toolPad() {
   const [low, high] = blockCorners();
   const room = 2 * radius;
@@ -296,9 +372,12 @@ function toolPad() {
     role: "application",
     "aria-label": "Tool from above; arrow keys move it by 1 mm",
     tabindex: 0,
-  }).forEach(([key, value]) => node.setAttribute(key, value));
-  node.innerHTML = `<rect x="${room * scale}" y="${room * scale}" width="${(high[0] - low[0]) * scale}" height="${(high[1] - low[1]) * scale}" rx="3"/><circle r="${radius * scale}"/>`;
-  node.place = ([x, y]) => [(x - low[0] + room) * scale, (high[1] + room - y) * scale];
+  }).forEach(([key, value]) => node.setAttribute(key, String(value)));
+  const [width, height] = [high[0] - low[0], high[1] - low[1]].map((edge) => edge * scale);
+  const [left, size] = [room * scale, `width="${width}" height="${height}"`];
+  node.innerHTML = `<rect x="${left}" y="${left}" ${size} rx="3"/><circle r="${radius * scale}"/>`;
+  toPad = ([x, y]) => [(x - low[0] + room) * scale, (high[1] + room - y) * scale];
+  /** @param {PointerEvent} event */
   const move = (event) =>
     moveTool([
       event.offsetX / scale + low[0] - room,
@@ -312,6 +391,7 @@ function toolPad() {
   node.addEventListener("pointermove", (event) => {
     if (event.buttons & 1) move(event);
   });
+  /** @type {Record<string, [number, number] | undefined>} */
   const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
   node.addEventListener("keydown", (event) => {
     const step = steps[event.key];
@@ -323,7 +403,10 @@ function toolPad() {
   return node;
 }
 
-/** How far the tool reaches below the top, mm. */
+/**
+ * Create the slider for the depth of the tool's tip below the block's top [mm].
+ * @returns {HTMLElement}
+ */
 function depthSlider() {
   const [low, high] = blockCorners();
   const most = 0.25 * Math.min(...high.map((value, i) => value - low[i])) * 1e3;
@@ -345,47 +428,58 @@ function depthSlider() {
   );
 }
 
+/** Show the requested place on pad and slider. */
 function drawPad() {
   const node = document.getElementById("live-pad");
-  if (!node || !toolCentre) return;
-  const [x, y] = node.place(toolCentre);
+  if (!node || !toolCentre.length) return;
+  const [x, y] = toPad(toolCentre);
   const circle = node.querySelector("circle");
-  circle.setAttribute("cx", x);
-  circle.setAttribute("cy", y);
+  circle?.setAttribute("cx", String(x));
+  circle?.setAttribute("cy", String(y));
   const below = (blockCorners()[1][2] + radius - toolCentre[2]) * 1e3;
-  const bar = document.getElementById("live-depth");
-  if (document.activeElement !== bar) bar.value = below;
-  document.getElementById("live-below").textContent = `${below.toFixed(1)} mm`;
+  const bar = byId("live-depth", HTMLInputElement);
+  if (document.activeElement !== bar) bar.value = String(below);
+  byId("live-below").textContent = `${below.toFixed(1)} mm`;
 }
 
-/** The same numbers over the scene, where one looks while dragging. */
+/** Show depth, force and rate over the scene. */
 function drawBar() {
-  const bar = document.getElementById("live-bar");
-  bar.hidden = !state().live || !answer || Boolean(answer.problem);
-  if (bar.hidden) return;
-  bar.classList.toggle("bad", !answer.converged);
+  const bar = byId("live-bar");
+  const shown = state().live && answer && !answer.problem ? answer : null;
+  bar.hidden = !shown;
+  if (!shown) return;
+  bar.classList.toggle("bad", !shown.converged);
   fill(
     bar,
-    answer.converged
+    shown.converged
       ? [
-          element("b", {}, formatMm(answer.depth)),
-          element("b", {}, forceText()),
-          element("span", { class: "muted" }, answerRate() ? `${answerRate().toFixed(0)}/s` : ""),
+          element("b", {}, formatMm(shown.depth)),
+          element("b", {}, forceText(shown)),
+          element("span", { class: "muted" }, answerRate() ? `${answerRate()}/s` : ""),
         ]
       : [element("b", {}, "No equilibrium")],
   );
 }
 
-const forceText = () => {
-  const force = Math.hypot(...answer.force);
+/**
+ * @param {LiveAnswer} live
+ * @returns {string}
+ */
+const forceText = ({ force: components }) => {
+  const force = Math.hypot(...components);
   return `${force.toFixed(force < 1 ? 3 : 2)} N`;
 };
 
-const answerRate = () =>
-  answerTimes.length > 1
-    ? (answerTimes.length - 1) / ((answerTimes.at(-1) - answerTimes[0]) / 1e3)
-    : null;
+/**
+ * Return the answers per second as text; empty while it is unknown.
+ * @returns {string}
+ */
+const answerRate = () => {
+  const seconds = (answerTimes[answerTimes.length - 1] - answerTimes[0]) / 1e3;
+  return answerTimes.length > 1 ? ((answerTimes.length - 1) / seconds).toFixed(0) : "";
+};
 
+/** Draw the answer in the panel and over the scene. */
 function drawAnswer() {
   drawBar();
   if (!document.getElementById("live-answer")) return;
@@ -405,6 +499,12 @@ function drawAnswer() {
     fill("live-answer", mutedText("Setting the model up …"));
     return;
   }
+  /**
+   * @param {string} label
+   * @param {string} value
+   * @param {string} id
+   * @returns {HTMLElement}
+   */
   const fact = (label, value, id) =>
     element("div", { class: "live-fact" }, element("span", {}, label), element("b", { id }, value));
   fill(
@@ -413,8 +513,8 @@ function drawAnswer() {
       "div",
       { class: "live-facts" },
       fact("Push depth", formatMm(answer.depth), "live-push"),
-      fact("Force", forceText(), "live-force"),
-      fact("Answers/s", answerRate() ? answerRate().toFixed(0) : "–", "live-rate"),
+      fact("Force", forceText(answer), "live-force"),
+      fact("Answers/s", answerRate() || "–", "live-rate"),
       fact("Solved in", `${(1e3 * answer.seconds).toFixed(0)} ms`, "live-solve"),
     ),
     answer.converged

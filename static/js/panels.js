@@ -1,11 +1,15 @@
-// The right side: one panel for each thing that is done, a tab for each, the report first.
-import { element, fill } from "./dom.js";
+// The panels on the right side and their tabs. The report is the first.
+import { byId, element, fill } from "./dom.js";
 
+/**
+ * @type {{ id: string, label: string, box: HTMLElement, opened: ((box: HTMLElement) => unknown) |
+ *   null, left: (() => unknown) | null }[]}
+ */
 const panels = [
   {
     id: "report",
     label: "Report",
-    box: document.getElementById("panel"),
+    box: byId("panel"),
     opened: null,
     left: null,
   },
@@ -13,9 +17,13 @@ const panels = [
 let current = "report";
 
 /**
- * A further panel with its tab.
- * @param opened called with the panel's element whenever it comes to the front; fills it.
- * @param left called when another comes to the front.
+ * Add a panel with its tab.
+ * @param {string} id
+ * @param {string} label
+ * @param {(box: HTMLElement) => unknown} opened called with the panel's element each time it
+ *   comes to the front; fills it
+ * @param {(() => unknown) | null} [left] called when another panel comes to the front
+ * @returns {HTMLElement}
  */
 export function addPanel(id, label, opened, left = null) {
   const box = element("div", {
@@ -26,24 +34,27 @@ export function addPanel(id, label, opened, left = null) {
     tabindex: "-1",
     hidden: true,
   });
-  document.getElementById("panel").parentElement.append(box);
+  byId("panel").after(box);
   panels.push({ id, label, box, opened, left });
   draw();
   return box;
 }
 
-/** Bring a panel to the front. */
+/**
+ * Bring a panel to the front.
+ * @param {string} id
+ */
 export function openPanel(id) {
   const wanted = panels.find((panel) => panel.id === id);
   if (!wanted) return;
-  if (id !== current) panels.find((panel) => panel.id === current).left?.();
+  if (id !== current) panels.find((panel) => panel.id === current)?.left?.();
   current = id;
   for (const panel of panels) panel.box.hidden = panel.id !== id;
   draw();
   wanted.opened?.(wanted.box);
 }
 
-/** Which panel is in front. */
+/** Return the id of the panel in front. */
 export const openedPanel = () => current;
 
 function draw() {

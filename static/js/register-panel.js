@@ -1,28 +1,48 @@
-// The panel of manual registration: pairs with their residuals, what is doubtful about them, and what ICP made of them.
-import { errorTitle } from "./api.js";
+// The panel of registration by hand: pairs with their residuals and doubts, and the result of
+// ICP.
+import { errorCard } from "./api.js";
 import { element, fill, icon } from "./dom.js";
 import { capitalise, formatMm } from "./format.js";
 import { completePairs } from "./register-pairs.js";
 import { REGISTER_SHORTCUTS } from "./register-shortcuts.js";
 
+/**
+ * @import {
+ *   Child, IcpResult, PairEditor, PointPair, RegisterActions, RegisterView, Side
+ * } from "./types.js"
+ */
+
 const DEGREES = 180 / Math.PI;
 
-/** The colour that the scene gives a pair. */
+/**
+ * Return the colour that the scene gives a pair.
+ * @param {number} number
+ * @returns {string}
+ */
 const colourOf = (number) => `hsl(${((0.58 + number * 0.381966) % 1) * 360} 75% 45%)`;
 
-export function drawPanel(box, work, view, actions) {
-  const typing = document.activeElement?.id === "register-name" ? document.activeElement : null;
-  const name = typing?.value ?? box.querySelector("#register-name")?.value;
+/**
+ * @param {HTMLElement} box
+ * @param {PairEditor | null} editor
+ * @param {RegisterView} view
+ * @param {RegisterActions} actions
+ */
+export function drawPanel(box, editor, view, actions) {
+  const field = nameField(box);
+  const name = field?.value;
+  const typing = field !== null && document.activeElement === field;
+  const folder = `/api/datasets/${encodeURIComponent(view.dataset ?? "")}`;
   fill(
     box,
     element("div", { class: "eyebrow" }, "Registration by hand"),
-    element("h1", { class: "verdict" }, heading(work, view)),
+    element("h1", { class: "verdict" }, heading(editor, view)),
     view.datasets.length
       ? null
       : element(
           "p",
           { class: "gain-note" },
-          `No dataset in ${view.folder ?? "the datasets folder"} yet: import one, or put a folder there.`,
+          `No dataset in ${view.folder ?? "the datasets folder"} yet: ` +
+            "import one, or put a folder there.",
         ),
     view.datasets.length
       ? element(
@@ -42,10 +62,10 @@ export function drawPanel(box, work, view, actions) {
         )
       : null,
     view.cannot ? errorCard(view.cannot) : null,
-    work && !view.cannot
-      ? work.values.found
-        ? resultPart(work, view, actions, name)
-        : pairsPart(work, view, actions)
+    editor && !view.cannot
+      ? editor.values.found
+        ? resultPart(editor.values.found, view, actions, name)
+        : pairsPart(editor, view, actions)
       : null,
     view.names.length
       ? element(
@@ -63,7 +83,7 @@ export function drawPanel(box, work, view, actions) {
                 element(
                   "a",
                   {
-                    href: `/api/datasets/${encodeURIComponent(view.dataset)}/registrations/${encodeURIComponent(one)}`,
+                    href: `${folder}/registrations/${encodeURIComponent(one)}`,
                     download: `${view.dataset}-${one}.json`,
                   },
                   "Save as a file",
@@ -87,20 +107,25 @@ export function drawPanel(box, work, view, actions) {
       ),
     ),
   );
-  if (typing) {
-    const field = box.querySelector("#register-name");
-    field?.focus();
-    field?.setSelectionRange(field.value.length, field.value.length);
-  }
+  const next = typing ? nameField(box) : null;
+  next?.focus();
+  next?.setSelectionRange(next.value.length, next.value.length);
 }
 
-function heading(work, view) {
-  if (!work) return "Lay the cloud onto the phantom";
+/**
+ * @param {PairEditor | null} editor
+ * @param {RegisterView} view
+ * @returns {string}
+ */
+function heading(editor, view) {
+  if (!editor) return "Lay the cloud onto the phantom";
   if (view.busy) return view.busy;
-  const { found, pairs } = work.values;
+  const { found, pairs } = editor.values;
   const count = completePairs(pairs).length;
-  if (found)
-    return `${formatMm(found.registration.residual_before)} before, ${formatMm(found.registration.residual_after)} after ICP`;
+  if (found) {
+    const { residual_before: before, residual_after: after } = found.registration;
+    return `${formatMm(before)} before, ${formatMm(after)} after ICP`;
+  }
   if (view.problem) return "These pairs do not fit yet";
   if (view.fit) return `${count} pairs fit to ${formatMm(view.fit.rms)} RMS`;
   return count
@@ -108,8 +133,14 @@ function heading(work, view) {
     : "Click a point of the cloud, then the same point of the phantom";
 }
 
-function pairsPart(work, view, actions) {
-  const { pairs } = work.values;
+/**
+ * @param {PairEditor} editor
+ * @param {RegisterView} view
+ * @param {RegisterActions} actions
+ * @returns {Child[]}
+ */
+function pairsPart(editor, view, actions) {
+  const { pairs } = editor.values;
   const shared = view.problem && !view.problem.at.length;
   return [
     view.missed ? element("p", { class: "note-card", role: "status" }, view.missed) : null,
@@ -119,7 +150,7 @@ function pairsPart(work, view, actions) {
           "div",
           { class: "note-card bad", role: "alert" },
           element("strong", {}, "No fit"),
-          capitalise(view.problem.message),
+          capitalise(view.problem?.message ?? ""),
         )
       : null,
     element(
@@ -133,7 +164,7 @@ function pairsPart(work, view, actions) {
             element(
               "tbody",
               {},
-              pairs.flatMap((pair, number) => pairRow(pair, number, work, view)),
+              pairs.flatMap((pair, number) => pairRow(pair, number, editor, view)),
             ),
           )
         : element(
@@ -186,9 +217,9 @@ function pairsPart(work, view, actions) {
         {
           class: "button",
           type: "button",
-          disabled: !work.canUndo(),
+          disabled: !editor.canUndo(),
           title: "Ctrl+Z",
-          onclick: work.undo,
+          onclick: editor.undo,
         },
         "Undo",
       ),
@@ -201,9 +232,22 @@ function pairsPart(work, view, actions) {
   ];
 }
 
-function pairRow(pair, number, work, view) {
+/**
+ * Create the row of a pair, and below it the row with its error.
+ * @param {PointPair} pair
+ * @param {number} number
+ * @param {PairEditor} editor
+ * @param {RegisterView} view
+ * @returns {Child[]}
+ */
+function pairRow(pair, number, editor, view) {
   const at = view.fit?.of.indexOf(number) ?? -1;
-  const chosen = work.values.chosen;
+  const chosen = editor.values.chosen;
+  /**
+   * @param {Side} side
+   * @param {string} label
+   * @returns {HTMLElement}
+   */
   const end = (side, label) =>
     element(
       "button",
@@ -214,20 +258,17 @@ function pairRow(pair, number, work, view) {
         "aria-pressed": String(chosen?.[0] === number && chosen[1] === side),
         disabled: !pair[side],
         title: pair[side] ? "Choose this end, to move it" : "Not clicked yet",
-        onclick: () => work.choose(number, side),
+        onclick: () => editor.choose(number, side),
       },
       pair[side] ? label : "–",
     );
-  const bad = view.problem?.at.includes(number);
-  const swap =
-    bad &&
-    view.problem.at.length === 2 &&
-    view.problem.at[0] === number &&
-    /exchanging/.test(view.problem.message);
+  const problem = view.problem?.at.includes(number) ? view.problem : null;
+  const [first, second] = problem?.at ?? [];
+  const swap = problem?.at.length === 2 && /exchanging/.test(problem.message);
   return [
     element(
       "tr",
-      { "data-pair": number, class: bad ? "bad" : "" },
+      { "data-pair": number, class: problem ? "bad" : "" },
       element(
         "th",
         {},
@@ -242,7 +283,7 @@ function pairRow(pair, number, work, view) {
       element(
         "td",
         { class: "number", "data-residual": number },
-        at >= 0 ? formatMm(view.fit.residuals[at], false) : pair.cloud && pair.mesh ? "…" : "",
+        at >= 0 ? formatMm(view.fit?.residuals[at], false) : pair.cloud && pair.mesh ? "…" : "",
       ),
       element(
         "td",
@@ -253,13 +294,13 @@ function pairRow(pair, number, work, view) {
             class: "icon-button",
             type: "button",
             title: `Leave pair ${number + 1} out`,
-            onclick: () => work.leaveOut(number),
+            onclick: () => editor.leaveOut(number),
           },
           icon("close"),
         ),
       ),
     ),
-    bad && view.problem.at[0] === number
+    problem && first === number
       ? element(
           "tr",
           { class: "said" },
@@ -269,7 +310,7 @@ function pairRow(pair, number, work, view) {
             element(
               "div",
               { class: "note-card bad", role: "alert" },
-              capitalise(view.problem.message),
+              capitalise(problem.message),
               swap
                 ? element(
                     "p",
@@ -279,7 +320,7 @@ function pairRow(pair, number, work, view) {
                       {
                         class: "button small",
                         type: "button",
-                        onclick: () => work.exchange(...view.problem.at),
+                        onclick: () => editor.exchange(first, second),
                       },
                       "Exchange them",
                     ),
@@ -289,12 +330,23 @@ function pairRow(pair, number, work, view) {
           ),
         )
       : null,
-  ].filter(Boolean);
+  ];
 }
 
-function resultPart(work, view, actions, name) {
-  const { registration: found } = work.values.found;
+/**
+ * @param {IcpResult} found
+ * @param {RegisterView} view
+ * @param {RegisterActions} actions
+ * @param {string} [name] as typed so far
+ * @returns {Child[]}
+ */
+function resultPart({ registration: found }, view, actions, name) {
   const firm = found.directions.at(0);
+  /**
+   * @param {string} label
+   * @param {...Child} value
+   * @returns {HTMLElement}
+   */
   const fact = (label, ...value) =>
     element("tr", {}, element("th", {}, label), element("td", { class: "number" }, ...value));
   return [
@@ -340,7 +392,10 @@ function resultPart(work, view, actions, name) {
         : element(
             "p",
             { class: "gain-note", "data-firm": "" },
-            `Every direction is firm; the weakest, mostly ${dominantPart(firm.parts)}, is known to ± ${formatMm(firm.sigma)}.`,
+            firm
+              ? `Every direction is firm; the weakest, mostly ${dominantPart(firm.parts)}, ` +
+                  `is known to ± ${formatMm(firm.sigma)}.`
+              : "",
           ),
     ),
     found.warnings.length
@@ -356,12 +411,18 @@ function resultPart(work, view, actions, name) {
   ];
 }
 
+/**
+ * @param {RegisterView} view
+ * @param {RegisterActions} actions
+ * @returns {Child[]}
+ */
 const acceptedPart = (view, actions) => [
   element(
     "div",
     { class: "note-card good", role: "status" },
     element("strong", {}, "Accepted"),
-    `Kept as ${view.accepted}. A diagnosis or a sweep of ${view.dataset} can use it: choose it as “Camera” there.`,
+    `Kept as ${view.accepted}. A diagnosis or a sweep of ${view.dataset} can use it: ` +
+      "choose it as “Camera” there.",
   ),
   element(
     "div",
@@ -379,6 +440,12 @@ const acceptedPart = (view, actions) => [
   ),
 ];
 
+/**
+ * @param {RegisterView} view
+ * @param {RegisterActions} actions
+ * @param {string} [name]
+ * @returns {HTMLElement}
+ */
 const acceptForm = (view, actions, name) =>
   element(
     "form",
@@ -386,7 +453,7 @@ const acceptForm = (view, actions, name) =>
       class: "register-accept",
       onsubmit: (event) => {
         event.preventDefault();
-        actions.accept(new FormData(event.target).get("name").trim());
+        actions.accept(String(new FormData(event.target).get("name")).trim());
       },
     },
     element(
@@ -420,19 +487,26 @@ const acceptForm = (view, actions, name) =>
     ),
   );
 
-/** A name that is not taken. */
+/**
+ * Return a name that is not taken.
+ * @param {string[]} names
+ * @returns {string}
+ */
 function freeName(names) {
   for (let number = 1; ; number += 1)
     if (!names.includes(`by-hand-${number}`)) return `by-hand-${number}`;
 }
 
+/**
+ * Return the name of the largest part of a direction.
+ * @param {Record<string, number>} parts
+ * @returns {string}
+ */
 const dominantPart = (parts) =>
   Object.entries(parts).sort((a, b) => Math.abs(b[1]) - Math.abs(a[1]))[0][0];
 
-const errorCard = (problem) =>
-  element(
-    "div",
-    { class: "note-card bad", role: "alert" },
-    element("strong", {}, errorTitle(problem)),
-    problem.message,
-  );
+/**
+ * @param {HTMLElement} box
+ * @returns {HTMLInputElement | null}
+ */
+const nameField = (box) => box.querySelector("#register-name");

@@ -1,5 +1,6 @@
-// Registration by hand: points clicked on cloud and phantom, a fit from three pairs on, ICP from there, accepted under a name or not.
-import { get, post, errorTitle, toast } from "./api.js";
+// Registration by hand: points are clicked on cloud and phantom; three pairs or more give a
+// fit, which ICP refines and which is accepted under a name or not.
+import { errorCard, get, post, toast, toError } from "./api.js";
 import { element, fill, icon } from "./dom.js";
 import { addPanel, openedPanel, openPanel } from "./panels.js";
 import { drawPanel } from "./register-panel.js";
@@ -7,20 +8,52 @@ import { lastDataset, completePairs, createPairEditor } from "./register-pairs.j
 import { pageId } from "./scene.js";
 import { handleRegisterShortcut } from "./register-shortcuts.js";
 
+/**
+ * @import {
+ *   CompletePair, IcpResult, PairEditor, PairValues, Point, PointPair, RegisterActions,
+ *   RegisterView, ServerError, Side
+ * } from "./types.js"
+ */
+
 const ENDS = ["phantom", "cloud"];
-let box = null;
-let frame = null;
-let bar = null;
+/** @type {HTMLElement} */
+let box;
+/** @type {HTMLIFrameElement} */
+let frame;
+/** @type {HTMLElement} */
+let bar;
+/** @type {PairEditor | null} */
 let editor = null;
+/** @type {WebSocket | null} */
 let socket = null;
-let view = null; // what the panel shows beside the pairs: datasets, fit, problem, busy, names, landmarks
-let fitRequests = 0;
+/** @type {RegisterView} */
+const view = {
+  dataset: null,
+  datasets: [],
+  folder: null,
+  fit: null,
+  problem: null,
+  busy: null,
+  names: [],
+  landmarks: {},
+  stated: true,
+  cannot: null,
+  refused: null,
+  missed: null,
+  accepted: null,
+};
+let fitRequests = 0; // number of the newest request for a fit
 let sending = false;
-let drawnState = null;
-let stale = false;
+let stale = false; // the scene has changed since the last request
+/** @type {string | null} */
+let drawnState = null; // what the panel shows, as JSON
+/** @type {(dataset: string) => unknown} */
+let openDatasetPanel = () => undefined;
 
-let openDatasetPanel = null;
-
+/**
+ * Add the panel, its scene and the bar above the scene.
+ * @param {(dataset: string) => unknown} openDataset
+ */
 export function startRegister(openDataset) {
   openDatasetPanel = openDataset;
   box = addPanel("register", "Register", open, leave);
@@ -35,8 +68,8 @@ export function startRegister(openDataset) {
     role: "toolbar",
     "aria-label": "What clicks are for",
   });
-  document.querySelector(".scene").append(frame);
-  document.querySelector(".centre").prepend(bar);
+  document.querySelector(".scene")?.append(frame);
+  document.querySelector(".centre")?.prepend(bar);
   frame.addEventListener("load", () => {
     applyTheme();
     frame.contentWindow?.addEventListener("keydown", onKeyDown, true);
@@ -44,14 +77,23 @@ export function startRegister(openDataset) {
   window.addEventListener("keydown", onKeyDown, true);
 }
 
-/** Bring the panel to the front on one dataset. */
+/**
+ * Bring the panel to the front for a dataset.
+ * @param {string} dataset
+ */
 export function openRegistration(dataset) {
   choose(dataset).catch(toast);
   openPanel("register");
 }
 
-/** A choice of how the camera is registered: automatically, or as somebody accepted it; hidden where there is no choice. */
+/**
+ * Create the choice between the automatic registration and those that were accepted; hidden where
+ * there are none.
+ * @param {string} dataset
+ * @returns {Promise<HTMLSelectElement>}
+ */
 export async function cameraSelect(dataset) {
+  /** @type {{ registrations: string[] }} */
   const { registrations } = await get(
     `/datasets/${encodeURIComponent(dataset)}/registrations`,
   ).catch(() => ({ registrations: [] }));
@@ -63,6 +105,7 @@ export async function cameraSelect(dataset) {
   );
 }
 
+/** Open scene and socket and show the last dataset. */
 async function open() {
   drawnState = null;
   document.body.classList.add("registering");
@@ -70,21 +113,11 @@ async function open() {
   frame.hidden = false;
   connect();
   try {
+    /** @type {{ datasets: string[], folder: string }} */
     const { datasets, folder } = await get("/datasets");
-    view = {
-      datasets,
-      folder,
-      fit: null,
-      problem: null,
-      busy: null,
-      names: [],
-      landmarks: {},
-      stated: true,
-      ...view,
-      datasets,
-    };
+    Object.assign(view, { datasets, folder });
     const dataset =
-      view.dataset ?? [lastDataset(), datasets[0]].find((name) => datasets.includes(name));
+      view.dataset ?? [lastDataset(), datasets[0]].find((name) => name && datasets.includes(name));
     if (dataset) await choose(dataset);
     else draw();
   } catch (problem) {
@@ -92,6 +125,7 @@ async function open() {
   }
 }
 
+/** Show the page's scene again. */
 function leave() {
   document.body.classList.remove("registering");
   frame.hidden = true;
@@ -99,23 +133,17 @@ function leave() {
   socket = null;
 }
 
+/**
+ * Show a dataset with the pairs that are stored for it.
+ * @param {string} dataset
+ */
 async function choose(dataset) {
-  if (!view)
-    view = {
-      datasets: [],
-      fit: null,
-      problem: null,
-      busy: null,
-      names: [],
-      landmarks: {},
-      stated: true,
-    };
   if (view.dataset !== dataset || !editor) {
     Object.assign(view, { dataset, fit: null, problem: null, names: [] });
-    editor = createPairEditor(dataset, (others) => {
+    editor = createPairEditor(dataset, (pairsChanged) => {
       draw();
       sendScene();
-      if (others) fit();
+      if (pairsChanged) fit();
     });
     editor.set({ chosen: null });
     fit();
@@ -125,20 +153,22 @@ async function choose(dataset) {
   await listNames();
 }
 
+/** Load the names of the accepted registrations. */
 async function listNames() {
-  const { registrations } = await get(`${registrationsPath()}`);
+  const { registrations } = await get(registrationsPath());
   view.names = registrations;
   draw();
 }
 
-const registrationsPath = () => `/datasets/${encodeURIComponent(view.dataset)}/registrations`;
+/** @returns {string} */
+const registrationsPath = () => `/datasets/${encodeURIComponent(view.dataset ?? "")}/registrations`;
 
-/** Each click in the scene comes as the point that it means. */
+/** Open the socket on which the server sends the point of each click in the scene. */
 function connect() {
   if (socket) return;
-  socket = new WebSocket(
-    `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/sessions/${pageId()}/registering/clicks`,
-  );
+  const scheme = location.protocol === "https:" ? "wss" : "ws";
+  const path = `/api/sessions/${pageId()}/registering/clicks`;
+  socket = new WebSocket(`${scheme}://${location.host}${path}`);
   const mine = socket;
   socket.onmessage = ({ data }) => clicked(JSON.parse(data));
   socket.onclose = () => {
@@ -153,6 +183,10 @@ function connect() {
   };
 }
 
+/**
+ * @param {{ picked?: { side: Side, point: Point, landmark: string | null, pair: number | null },
+ *   chosen?: { pair: number, side: Side } | null, problem?: string | null }} click
+ */
 function clicked({ picked, chosen, problem }) {
   if (!editor || view.busy) return;
   view.missed = problem ?? null;
@@ -168,11 +202,14 @@ function clicked({ picked, chosen, problem }) {
     );
     return;
   }
-  editor.place(picked.side, picked.point, picked.landmark, picked.pair);
+  if (picked) editor.place(picked.side, picked.point, picked.landmark, picked.pair);
 }
 
-/** Have the scene show what is here; while it is being drawn only the newest is kept. */
+/**
+ * Request the scene with the current pairs; while one is awaited only the newest request is kept.
+ */
 async function sendScene() {
+  if (!editor) return;
   if (sending) {
     stale = true;
     return;
@@ -184,7 +221,7 @@ async function sendScene() {
     found?.registration.phantom_from_camera ??
     (over ? (view.fit?.phantom_from_camera ?? null) : null);
   try {
-    const held = await post(`/sessions/${pageId()}/registering`, {
+    const shown = await post(`/sessions/${pageId()}/registering`, {
       dataset: view.dataset,
       pairs: pairs.map(({ cloud, mesh }) => ({ cloud, mesh })),
       mode,
@@ -194,10 +231,10 @@ async function sendScene() {
       over,
       weak: weakDirections(found),
     });
-    Object.assign(view, { landmarks: held.landmarks, stated: held.stated, cannot: null });
-    if (!held.stated && start === "stated") editor.values.start = "levelled";
+    Object.assign(view, { landmarks: shown.landmarks, stated: shown.stated, cannot: null });
+    if (!shown.stated && start === "stated") editor.values.start = "levelled";
   } catch (problem) {
-    view.cannot = problem;
+    view.cannot = toError(problem);
   }
   sending = false;
   draw();
@@ -207,24 +244,34 @@ async function sendScene() {
 const TRANSLATIONS = ["translation along x", "translation along y", "translation along z"];
 const ROTATIONS = ["rotation about x", "rotation about y", "rotation about z"];
 
-/** The directions that the cloud determines weakly, as arrows. */
+/**
+ * Return the directions that the cloud determines weakly, to be drawn as arrows.
+ * @param {IcpResult | null} found
+ * @returns {object[]}
+ */
 function weakDirections(found) {
-  return (found?.registration.directions ?? [])
-    .slice(0, found?.registration.weak_directions.length ?? 0)
-    .slice(0, 6)
-    .map(({ parts }, at) => ({
-      translation: TRANSLATIONS.map((name) => parts[name]),
-      rotation: ROTATIONS.map((name) => parts[name]),
-      text: uncertainty(found.registration.weak_directions[at]),
-    }));
+  if (!found) return [];
+  const { directions, weak_directions: texts } = found.registration;
+  return directions.slice(0, Math.min(6, texts.length)).map(({ parts }, index) => ({
+    translation: TRANSLATIONS.map((name) => parts[name]),
+    rotation: ROTATIONS.map((name) => parts[name]),
+    text: uncertainty(texts[index]),
+  }));
 }
 
-/** "± 1.2 mm" of the words for a weak direction, or that it is open. */
-const uncertainty = (text) =>
-  /\+- ([\d.]+ \w+)/.test(text) ? `± ${text.match(/\+- ([\d.]+ \w+)/)[1]}` : "open";
+/**
+ * Return the uncertainty in the text for a weak direction, such as "± 1.2 mm", or "open".
+ * @param {string} text
+ * @returns {string}
+ */
+const uncertainty = (text) => {
+  const match = text.match(/\+- ([\d.]+ \w+)/);
+  return match ? `± ${match[1]}` : "open";
+};
 
-/** The rigid fit of the whole pairs, or why there is none yet. */
+/** Request the rigid fit of the complete pairs, if there are three or more. */
 async function fit() {
+  if (!editor) return;
   const mine = ++fitRequests;
   const pairs = completePairs(editor.values.pairs);
   if (pairs.length < 3) {
@@ -241,8 +288,9 @@ async function fit() {
       fit: { ...found, of: pairs.map(({ number }) => number) },
       problem: null,
     });
-  } catch (problem) {
+  } catch (error) {
     if (mine !== fitRequests) return;
+    const problem = toError(error);
     Object.assign(view, {
       fit: null,
       problem: { ...problem, message: problem.message, at: pairNumbers(problem, pairs) },
@@ -252,7 +300,12 @@ async function fit() {
   sendScene();
 }
 
-/** Which pairs a refusal speaks of, as numbered in the list. */
+/**
+ * Return the numbers in the list of the pairs that an error is about.
+ * @param {ServerError} problem
+ * @param {CompletePair[]} pairs
+ * @returns {number[]}
+ */
 const pairNumbers = (problem, pairs) =>
   typeof problem.where?.pairs === "string"
     ? problem.where.pairs
@@ -261,8 +314,12 @@ const pairNumbers = (problem, pairs) =>
         .filter((at) => at !== undefined)
     : [];
 
+/**
+ * Refine the fit by ICP; with a name, accept the result under it.
+ * @param {string | null} [accept]
+ */
 async function refine(accept = null) {
-  if (!view.fit || view.busy) return;
+  if (!editor || !view.fit || view.busy) return;
   view.busy = accept ? "Keeping it …" : "Laying the cloud against phantom and table …";
   draw();
   const pairs = completePairs(editor.values.pairs).map(({ cloud, mesh }) => ({ cloud, mesh }));
@@ -279,11 +336,15 @@ async function refine(accept = null) {
     }
   } catch (problem) {
     view.busy = null;
-    view.refused = problem;
+    view.refused = toError(problem);
     draw();
   }
 }
 
+/**
+ * What the panel and the keys can do.
+ * @type {RegisterActions}
+ */
 const actions = {
   choose,
   refine,
@@ -294,34 +355,44 @@ const actions = {
   back: () => {
     view.refused = null;
     view.accepted = null;
-    editor.set({ found: null, over: false });
+    editor?.set({ found: null, over: false });
   },
-  openDataset: () => openDatasetPanel?.(view.dataset),
-  clear: () => editor.put([], { mode: "cloud", chosen: null, over: false }),
-  look: () => post(`/sessions/${pageId()}/registering/look`).catch(toast),
-  landmark: (name) => editor.place("mesh", view.landmarks[name], name),
+  openDataset: () => view.dataset && openDatasetPanel(view.dataset),
+  clear: () => editor?.put([], { mode: "cloud", chosen: null, over: false }),
+  look: () => {
+    post(`/sessions/${pageId()}/registering/look`).catch(toast);
+  },
+  landmark: (name) => editor?.place("mesh", view.landmarks[name], name),
   nudge: async (right, up) => {
-    const [number, side] = editor.values.chosen ?? [];
+    if (!editor?.values.chosen) return;
+    const [number, side] = editor.values.chosen;
     const point = editor.values.pairs[number]?.[side];
     if (!point) return;
     try {
-      const moved = (
-        await post(`/sessions/${pageId()}/registering/nudge`, { side, point, right, up })
-      ).point;
-      editor.place(side, moved, null, number);
+      const moved = await post(`/sessions/${pageId()}/registering/nudge`, {
+        side,
+        point,
+        right,
+        up,
+      });
+      editor.place(side, moved.point, null, number);
     } catch (problem) {
       toast(problem);
     }
   },
 };
 
+/** @param {KeyboardEvent} event */
 const onKeyDown = (event) => {
   if (openedPanel() === "register" && editor) handleRegisterShortcut(event, editor, actions);
 };
 
-/** The panel anew, where anything changed: a button that is replaced while it is pressed would do nothing. */
+/**
+ * Draw bar and panel if anything changed; a button that is replaced while it is pressed would not
+ * act.
+ */
 function draw() {
-  if (!view || openedPanel() !== "register") return;
+  if (openedPanel() !== "register") return;
   const now = JSON.stringify([
     view,
     view.problem?.message,
@@ -336,17 +407,25 @@ function draw() {
   drawPanel(box, editor, view, actions);
 }
 
+/** Draw the bar above the scene. */
 function drawBar() {
   if (!editor) {
     fill(bar);
     return;
   }
-  const { mode, over, start, found, pairs } = editor.values;
+  const { set, values } = editor;
+  const { mode, over, start, found, pairs, chosen } = values;
+  /**
+   * @param {string} now
+   * @param {[string, string, string][]} entries value, label and title
+   * @param {(value: string) => void} act
+   * @returns {HTMLElement}
+   */
   const segment = (now, entries, act) =>
     element(
       "div",
       { class: "segments", role: "radiogroup" },
-      entries.map(([value, label, hint, off]) =>
+      entries.map(([value, label, explanation]) =>
         element(
           "button",
           {
@@ -354,8 +433,7 @@ function drawBar() {
             role: "radio",
             "aria-checked": String(now === value),
             "data-value": value,
-            title: hint,
-            disabled: off,
+            title: explanation,
             onclick: () => act(value),
           },
           label,
@@ -371,13 +449,9 @@ function drawBar() {
         ["cloud", "Cloud", "Key C"],
         ["mesh", "Phantom", "Key M"],
       ],
-      (value) => editor.set({ mode: value, chosen: null }),
+      (value) => set({ mode: value === "cloud" ? "cloud" : "mesh", chosen: null }),
     ),
-    element(
-      "span",
-      { class: "label", id: "register-hint" },
-      clickHint(pairs, mode, editor.values.chosen),
-    ),
+    element("span", { class: "label", id: "register-hint" }, clickHint(pairs, mode, chosen)),
     element("div", { class: "spring" }),
     segment(
       String(over),
@@ -385,20 +459,20 @@ function drawBar() {
         ["false", "Beside", "Cloud beside the phantom (V)"],
         ["true", "Over", "Cloud laid on the phantom (V)"],
       ],
-      (value) => editor.set({ over: value === "true" }),
+      (value) => set({ over: value === "true" }),
     ),
     element(
       "select",
       {
         "aria-label": "How the cloud is shown before there is a fit",
         disabled: Boolean(found),
-        onchange: ({ target }) => editor.set({ start: target.value }),
+        onchange: ({ target }) => set({ start: target.value }),
       },
-      [
+      /** @type {[string, string, boolean?][]} */ ([
         ["stated", "First guess as stated", !view.stated],
         ["levelled", "Levelled by its table"],
         ["camera", "As the camera sees it"],
-      ].map(([value, label, off]) =>
+      ]).map(([value, label, off]) =>
         element("option", { value, selected: value === start, disabled: off }, label),
       ),
     ),
@@ -415,23 +489,26 @@ function drawBar() {
   );
 }
 
+/**
+ * Return what the next click places.
+ * @param {PointPair[]} pairs
+ * @param {Side} mode
+ * @param {PairValues["chosen"]} chosen
+ * @returns {string}
+ */
 function clickHint(pairs, mode, chosen) {
   const thing = ENDS[mode === "cloud" ? 1 : 0];
   if (chosen)
-    return `point ${chosen[0] + 1} on the ${thing}: click where it belongs, drag it, or move it by arrow keys`;
-  const open = pairs.findIndex((pair) => !pair[mode]);
-  return `point ${(open >= 0 ? open : pairs.length) + 1} on the ${thing}`;
+    return (
+      `point ${chosen[0] + 1} on the ${thing}: ` +
+      "click where it belongs, drag it, or move it by arrow keys"
+    );
+  const next = pairs.findIndex((pair) => !pair[mode]);
+  return `point ${(next >= 0 ? next : pairs.length) + 1} on the ${thing}`;
 }
 
+/** Give the scene the page's light or dark theme. */
 function applyTheme() {
   const inside = frame.contentDocument?.documentElement;
-  if (inside) inside.style.colorScheme = document.documentElement.dataset.theme;
+  if (inside) inside.style.colorScheme = document.documentElement.dataset.theme ?? "";
 }
-
-const errorCard = (problem) =>
-  element(
-    "div",
-    { class: "note-card bad", role: "alert" },
-    element("strong", {}, errorTitle(problem)),
-    problem.message,
-  );

@@ -1,7 +1,8 @@
-// The right panel on a diagnosis: the verdict first, then cause, gain, patterns, rivals, and what cannot be told.
-import { post, toast } from "./api.js";
+// The right panel for a run: the verdict, causes, gain, error maps, rivals, and what the data
+// cannot tell.
+import { post, toast, toError } from "./api.js";
 import { comparisonSection } from "./comparison.js";
-import { element, fill } from "./dom.js";
+import { byId, element, fill } from "./dom.js";
 import {
   capitalise,
   formatParameter,
@@ -12,8 +13,21 @@ import {
 import { openPanel } from "./panels.js";
 import { patternSection } from "./error-maps.js";
 
-const panel = () => document.getElementById("panel");
+/**
+ * @import {
+ *   AmbiguityRow, Cause, Child, ControlRow, Estimate, Gain, Palette, Palpation, Patterns,
+ *   ProbeProposal, RankingEntry, Report, RunHeading, Unexplained
+ * } from "./types.js"
+ */
 
+const panel = () => byId("panel");
+
+/**
+ * @param {RunHeading} heading
+ * @param {Report} report
+ * @param {Patterns | null} patterns
+ * @param {Palette | null} palette
+ */
 export function showReport(heading, report, patterns, palette) {
   const causes = report.causes ?? [];
   fill(
@@ -61,7 +75,7 @@ export function showReport(heading, report, patterns, palette) {
     heading.sequences?.length
       ? section("Every sequence", "RMS distance, mm", comparisonSection(heading))
       : null,
-    patterns
+    patterns && palette
       ? section(
           causes.length ? "The error and its explanation" : "The error that is left",
           "",
@@ -110,10 +124,15 @@ export function showReport(heading, report, patterns, palette) {
         )
       : null,
   );
-  document.getElementById("panel").scrollTop = 0;
+  panel().scrollTop = 0;
 }
 
-/** Model, reports and replays as files: a job, whose files stand among the jobs when it is done. */
+/**
+ * Create the button that starts the export of reports, model and replays; the files are listed
+ * with the job.
+ * @param {string} run
+ * @returns {HTMLElement}
+ */
 function exportButton(run) {
   const button = element(
     "button",
@@ -137,18 +156,23 @@ function exportButton(run) {
   return button;
 }
 
-export function showProblem(problem) {
+/** @param {unknown} error */
+export function showProblem(error) {
   fill(
     panel(),
     element(
       "div",
       { class: "note-card bad" },
       element("strong", {}, "This run cannot be shown"),
-      problem.message,
+      toError(error).message,
     ),
   );
 }
 
+/**
+ * Say what to do while there is no run.
+ * @param {boolean} hasDatasets
+ */
 export function showWelcome(hasDatasets) {
   fill(
     panel(),
@@ -157,7 +181,8 @@ export function showWelcome(hasDatasets) {
       { class: "empty-panel" },
       element("h1", {}, "No diagnosis yet"),
       hasDatasets
-        ? "Choose a dataset on the left, check it, and start its diagnosis. It takes a few minutes; the page shows how far it is."
+        ? "Choose a dataset on the left, check it, and start its diagnosis. " +
+            "It takes a few minutes; the page shows how far it is."
         : element(
             "ol",
             {},
@@ -178,13 +203,20 @@ export function showWelcome(hasDatasets) {
             element(
               "li",
               {},
-              "The button “?” above leads from nothing to a sweep and a registration in ten minutes.",
+              "The button “?” above leads from nothing to a sweep and a registration " +
+                "in ten minutes.",
             ),
           ),
     ),
   );
 }
 
+/**
+ * @param {string} title
+ * @param {string} aside
+ * @param {...Child} children
+ * @returns {HTMLElement}
+ */
 const section = (title, aside, ...children) =>
   element(
     "section",
@@ -193,6 +225,10 @@ const section = (title, aside, ...children) =>
     ...children,
   );
 
+/**
+ * @param {Cause} cause
+ * @returns {HTMLElement}
+ */
 function causeCard({ effect, probability, parameters }) {
   const rows = Object.entries(parameters ?? {}).map(([name, entry]) => {
     const shown = formatParameter(entry);
@@ -224,21 +260,24 @@ function causeCard({ effect, probability, parameters }) {
   );
 }
 
-/** Pushes and footprint as drawn by the diagnosis, and what a hand would want to know of a lump. */
+/**
+ * Create the picture of pushes and footprint, and the table of forces and depths.
+ * @param {string} run
+ * @param {Palpation} summary
+ * @param {Cause[]} causes
+ * @returns {HTMLElement[]}
+ */
 function palpationSummary(run, { depth, force, young_modulus: modulus }, causes) {
+  /** @type {[string, Estimate][]} */
   const rows = [
     ["pushed", depth],
     ["resisted with", force],
-    ...(modulus ? [["Young's modulus", modulus]] : []),
-    ...causes.flatMap((one) =>
-      one.cover
-        ? [
-            ["depth of its centre", one.depth],
-            ["tissue above it", one.cover],
-          ]
-        : [],
-    ),
   ];
+  if (modulus) rows.push(["Young's modulus", modulus]);
+  for (const one of causes) {
+    if (one.cover && one.depth)
+      rows.push(["depth of its centre", one.depth], ["tissue above it", one.cover]);
+  }
   return [
     element("img", {
       src: `/api/runs/${encodeURIComponent(run)}/pictures/palpation.png`,
@@ -270,15 +309,26 @@ function palpationSummary(run, { depth, force, young_modulus: modulus }, causes)
   ];
 }
 
-/** In place of an interval that is open on a side, or none at all. */
+/**
+ * Return what to write in place of an interval that is open on a side, or none at all; null for a
+ * closed one.
+ * @param {Estimate} estimate
+ * @returns {string | null}
+ */
 function openInterval({ identifiability, unit, low, high }) {
   if (identifiability === "at least")
-    return `at least ${formatParameter({ value: low, unit }).value}`;
+    return `at least ${formatParameter({ value: low ?? "?", unit }).value}`;
   if (identifiability === "at most")
-    return `at most ${formatParameter({ value: high, unit }).value}`;
+    return `at most ${formatParameter({ value: high ?? "?", unit }).value}`;
   return identifiability === "not identifiable" ? "not determined" : null;
 }
 
+/**
+ * Create the bars of the errors on sequences that nothing was fitted on.
+ * @param {Gain} gain
+ * @param {boolean} named whether a cause was named
+ * @returns {HTMLElement}
+ */
 function gainLadder(
   {
     baseline,
@@ -293,14 +343,22 @@ function gainLadder(
   named,
 ) {
   const added = named || typeof others.baseline_network === "number";
-  const steps = [
+  /** @type {[string, number | null | undefined, string][]} */
+  const all = [
     ["Raw model", baseline, "raw"],
     ["Raw + network", others.baseline_network, "corrected"],
     ["Extended", added ? extended : null, "extended"],
     ["Extended + network", others.extended_network, "corrected"],
     ["Noise floor", floor, "floor"],
-  ].filter(([, value]) => typeof value === "number");
+  ];
+  const steps = /** @type {[string, number, string][]} */ (
+    all.filter(([, value]) => typeof value === "number")
+  );
   const most = Math.max(...steps.map(([, value]) => value));
+  /**
+   * @param {number} value
+   * @returns {string}
+   */
   const number = (value) => (value < 10 ? value.toFixed(value < 1 ? 3 : 2) : value.toFixed(1));
   const range =
     removed && typeof removed.low === "number"
@@ -312,13 +370,13 @@ function gainLadder(
     element(
       "div",
       { class: "ladder" },
-      steps.flatMap(([label, value, thing]) => [
+      steps.flatMap(([label, value, colour]) => [
         element("span", {}, label),
         element(
           "div",
           { class: "bar" },
           element("i", {
-            style: { width: `${(100 * value) / most}%`, background: `var(--${thing})` },
+            style: { width: `${(100 * value) / most}%`, background: `var(--${colour})` },
           }),
         ),
         element("span", { class: "bar-value" }, `${number(value)}`),
@@ -335,16 +393,33 @@ function gainLadder(
               `${range} of the error above the noise floor is gone on the ${split} sequences. `,
             ]
           : null,
-      added && typeof others.tuned?.value === "number"
-        ? `The robot's pose, the tool's radius and Poisson's ratio were fitted within their accuracies along with it; that alone, with no cause, ${others.tuned.value > 0.005 ? `removes ${formatPercent(others.tuned.value)}` : "removes nothing"}. `
-        : null,
+      added ? tunedSentence(others.tuned?.value) : null,
       typeof paper?.baseline === "number" && typeof paper?.extended === "number"
-        ? `Mean distance as in the literature: ${number(paper.baseline)}${added ? ` → ${number(paper.extended)}` : ""} ${unit}.`
+        ? `Mean distance as in the literature: ${number(paper.baseline)}` +
+            `${added ? ` → ${number(paper.extended)}` : ""} ${unit}.`
         : null,
     ),
   );
 }
 
+/**
+ * @param {number | null | undefined} share of the error that the fit of the setup removes
+ * @returns {string | null}
+ */
+function tunedSentence(share) {
+  if (typeof share !== "number") return null;
+  const effect = share > 0.005 ? `removes ${formatPercent(share)}` : "removes nothing";
+  return (
+    "The robot's pose, the tool's radius and Poisson's ratio were fitted within their accuracies " +
+    `along with it; that alone, with no cause, ${effect}. `
+  );
+}
+
+/**
+ * @param {RankingEntry[]} entries
+ * @param {string[]} named effects that were named as causes
+ * @returns {HTMLElement}
+ */
 function rankingTable(entries, named) {
   return element(
     "div",
@@ -368,6 +443,11 @@ function rankingTable(entries, named) {
   );
 }
 
+/**
+ * Create the list of the smallest effects that the data would show.
+ * @param {AmbiguityRow[]} rows
+ * @returns {HTMLElement}
+ */
 function detectionLimits(rows) {
   return element(
     "div",
@@ -387,34 +467,58 @@ function detectionLimits(rows) {
   );
 }
 
-/** The smallest size of an effect that this data would show: worst of each unit, best place of a lump, share of a finite cause. */
+/**
+ * Return the smallest size of an effect that this data would show: the worst for each unit, the
+ * best place of a lump, the share of a finite cause.
+ * @param {AmbiguityRow} row
+ * @returns {string}
+ */
 function smallestDetectable({ limits, typical, at }) {
   const sizes = limits.map(({ change, factor, share }) => change ?? factor ?? share ?? null);
   if (sizes.includes(null)) return "not at any size";
+  const size = sizes[0] ?? 0;
   const where = Object.entries(at)
     .map(([name, entry]) => `${readableName(name)} ${shortValue(entry)}`)
     .join(", ");
+  // A factor without coordinates belongs to an effect of the whole phantom.
   if ("factor" in limits[0] && !("x" in at))
-    return `${twoDigits(sizes[0])} times${where ? ` at ${where}` : ""}`; // has no place
-  if ("factor" in limits[0])
-    return `${twoDigits(sizes[0])} times at best; half of the places ${typical.factor ? `${twoDigits(typical.factor)} times` : "not at any size"}`;
-  if ("share" in limits[0]) return `${formatPercent(sizes[0])} of ${where}`;
+    return `${twoDigits(size)} times${where ? ` at ${where}` : ""}`;
+  if ("factor" in limits[0]) {
+    const half = typical.factor ? `${twoDigits(typical.factor)} times` : "not at any size";
+    return `${twoDigits(size)} times at best; half of the places ${half}`;
+  }
+  if ("share" in limits[0]) return `${formatPercent(size)} of ${where}`;
+  /** @type {Record<string, number>} */
   const worst = {};
-  for (const { unit, change } of limits) worst[unit] = Math.max(change, worst[unit] ?? 0);
+  for (const { unit = "", change } of limits) worst[unit] = Math.max(change ?? 0, worst[unit] ?? 0);
   return Object.entries(worst)
     .map(([unit, value]) => shortValue({ value, unit }))
     .join(", ");
 }
 
+/**
+ * @param {number} value
+ * @returns {number}
+ */
 const twoDigits = (value) => Number(value.toPrecision(2));
 
+/**
+ * Format a value with two digits and its unit.
+ * @param {Estimate} entry
+ * @returns {string}
+ */
 function shortValue(entry) {
   const { value, unit } = formatParameter(entry);
   const number = Number(value);
-  return `${Number.isFinite(number) ? twoDigits(number) : value}${unit && unit !== "°" ? ` ${unit}` : unit}`;
+  const text = Number.isFinite(number) ? String(twoDigits(number)) : value;
+  return `${text}${unit && unit !== "°" ? ` ${unit}` : unit}`;
 }
 
-/** One line for each cause under each falsified motion: the share of its gain that is left. */
+/**
+ * Create a line for each cause under each falsified motion: the share of its gain that is left.
+ * @param {ControlRow[]} rows
+ * @returns {HTMLElement}
+ */
 function controlRows(rows) {
   const several = new Set(rows.map(({ effect }) => effect)).size > 1;
   return element(
@@ -435,7 +539,7 @@ function controlRows(rows) {
           passed === false
             ? "it may not come of the pushes"
             : passed === null
-              ? readableName(why)
+              ? readableName(why ?? "")
               : "",
         ]
           .filter(Boolean)
@@ -445,6 +549,10 @@ function controlRows(rows) {
   );
 }
 
+/**
+ * @param {ProbeProposal} proposal
+ * @returns {HTMLElement}
+ */
 function probeEntry({ text, separates, probability }) {
   const names = separates.map((name) => (name === "none" ? "nothing" : readableName(name)));
   const chance =
@@ -459,10 +567,15 @@ function probeEntry({ text, separates, probability }) {
   );
 }
 
+/**
+ * @param {Unexplained} unexplained
+ * @returns {HTMLElement}
+ */
 function unexplainedNote({ fraction, where, when: time, structure, structure_bound: bound }) {
   const times =
     typeof structure === "number"
-      ? `What is left is ${structure.toFixed(2)} times what chance gives, where more than ${bound.toFixed(2)} would be an error with a pattern.`
+      ? `What is left is ${structure.toFixed(2)} times what chance gives, ` +
+        `where more than ${bound?.toFixed(2)} would be an error with a pattern.`
       : "";
   if (fraction === 0 && times)
     return element(
@@ -480,18 +593,26 @@ function unexplainedNote({ fraction, where, when: time, structure, structure_bou
   );
 }
 
+/**
+ * @param {NonNullable<Report["identified"]>[number]} entry
+ * @returns {HTMLElement}
+ */
 const identifiedCard = ({ effect, why, parameters }) =>
   element(
     "div",
     { class: "note-card" },
     element("strong", {}, capitalise(readableName(effect))),
-    Object.entries(parameters).map(
-      ([name, entry]) =>
-        `${readableName(name)} = ${formatParameter(entry).value} ${formatParameter(entry).unit} (${formatParameter(entry).interval}). `,
-    ),
+    Object.entries(parameters).map(([name, entry]) => {
+      const { value, unit, interval } = formatParameter(entry);
+      return `${readableName(name)} = ${value} ${unit} (${interval}). `;
+    }),
     why ? `${capitalise(why)}.` : "",
   );
 
+/**
+ * @param {NonNullable<Report["not_identifiable"]>[number]} entry
+ * @returns {HTMLElement}
+ */
 const unidentifiableCard = ({ effect, why, measure_instead: instead }) =>
   element(
     "div",

@@ -1,4 +1,5 @@
-// The 3D: the viewer in its frame, and the socket that says what to show.
+// The 3D scene: the viewer in its frame, and the socket that requests what it shows.
+import { byId } from "./dom.js";
 import * as camera from "./camera.js";
 import * as capture from "./capture.js";
 import { handleShortcut } from "./shortcuts.js";
@@ -8,6 +9,12 @@ import { viewRequest } from "./layer-styles.js";
 import { subscribe, set, state } from "./store.js";
 import * as views from "./view-tools.js";
 
+/** @import { State, ViewerWindow } from "./types.js" */
+
+/**
+ * Keys of the state that a request depends on.
+ * @type {(keyof State)[]}
+ */
 const SENT = [
   "run",
   "sequence",
@@ -25,11 +32,13 @@ const SENT = [
 const page = sessionStorage.getItem("palpate.page") ?? crypto.randomUUID();
 sessionStorage.setItem("palpate.page", page);
 
+/** @type {WebSocket | null} */
 let socket = null;
-let busy = false;
-let stale = false;
-let wait = 500;
+let busy = false; // an answer is awaited
+let stale = false; // the view has changed since the last request
+let wait = 500; // before the next attempt to connect [ms]
 
+/** Start the scene and what belongs to it. */
 export function start() {
   layers.start();
   layers.startQuantity();
@@ -39,10 +48,11 @@ export function start() {
   subscribe([...SENT, "series"], () => send());
   window.addEventListener("keydown", handleShortcut);
   subscribe(["theme"], applyTheme);
-  subscribe(["heading"], showNote);
-  const frame = document.getElementById("viewer");
+  subscribe(["heading"], () => showNote());
+  const frame = byId("viewer", HTMLIFrameElement);
   frame.addEventListener("load", () => {
     applyTheme();
+    if (!frame.contentWindow) return;
     frame.contentWindow.addEventListener("keydown", handleShortcut, true);
     for (const watch of watchers) watch(frame.contentWindow);
   });
@@ -51,21 +61,31 @@ export function start() {
   connect();
 }
 
+/**
+ * Return the identifier of this page's session at the server.
+ * @returns {string}
+ */
 export const pageId = () => page;
 
+/** @type {((viewer: ViewerWindow) => void)[]} */
 const watchers = [];
 
-/** Call with the viewer's window each time it is opened. */
+/**
+ * Call a function with the viewer's window each time it has loaded.
+ * @param {(viewer: ViewerWindow) => void} watch
+ */
 export function onViewerLoad(watch) {
   watchers.push(watch);
 }
 
 function openFrame() {
-  document.getElementById("viewer").src = `/viser/${page}`;
+  byId("viewer", HTMLIFrameElement).src = `/viser/${page}`;
 }
 
+/** Open the socket, and again whenever it closes. */
 function connect() {
-  const address = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/sessions/${page}/socket`;
+  const scheme = location.protocol === "https:" ? "wss" : "ws";
+  const address = `${scheme}://${location.host}/api/sessions/${page}/socket`;
   let opened = false;
   socket = new WebSocket(address);
   socket.onopen = () => {
@@ -77,11 +97,11 @@ function connect() {
     send();
   };
   socket.onmessage = ({ data }) => {
-    const held = JSON.parse(data);
+    const rendered = JSON.parse(data);
     busy = false;
-    if (held.problem) showNote(held.problem.message);
+    if (rendered.problem) showNote(rendered.problem.message);
     else {
-      set({ held });
+      set({ rendered });
       showNote();
     }
     if (stale) send();
@@ -95,13 +115,13 @@ function connect() {
   };
 }
 
-/** Ask again for what is shown, where it has changed on the server. */
+/** Request the scene again because it has changed on the server. */
 export const refreshScene = () => send();
 
-/** Ask for what is wanted now; while an answer is awaited only the newest wish is kept. */
+/** Request the current view; while an answer is awaited only the newest request is kept. */
 function send() {
   if (!state().run || !state().sequence) return;
-  if (busy || socket?.readyState !== WebSocket.OPEN) {
+  if (busy || !socket || socket.readyState !== WebSocket.OPEN) {
     stale = true;
     return;
   }
@@ -110,14 +130,17 @@ function send() {
   socket.send(JSON.stringify(viewRequest()));
 }
 
-/** Words over the scene while there is nothing to see in it. */
+/**
+ * Show a text over the scene, or by default what is to be done while it is empty.
+ * @param {string | null} [text]
+ */
 function showNote(text = null) {
-  const box = document.getElementById("scene-note");
+  const box = byId("scene-note");
   const message =
     typeof text === "string"
       ? text
       : state().run
-        ? state().held
+        ? state().rendered
           ? ""
           : "Opening the scene …"
         : "Choose a diagnosis on the left, or start one from a dataset.";
@@ -125,7 +148,8 @@ function showNote(text = null) {
   if (message) box.textContent = message;
 }
 
+/** Give the viewer the page's light or dark theme. */
 function applyTheme() {
-  const inside = document.getElementById("viewer").contentDocument?.documentElement;
+  const inside = byId("viewer", HTMLIFrameElement).contentDocument?.documentElement;
   if (inside) inside.style.colorScheme = state().theme;
 }

@@ -1,18 +1,31 @@
-// The left rail: diagnoses, the sequences of the open one, datasets.
+// The left sidebar: jobs, runs, the sequences of the open run, datasets.
 import { get, post, toast } from "./api.js";
 import { openImportDialog, importDroppedFiles } from "./import-dialog.js";
 import { showDataset } from "./dataset-panel.js";
-import { element, fill } from "./dom.js";
+import { byId, element, fill } from "./dom.js";
 import { formatMm, formatDateTime, readableName } from "./format.js";
 import { onJobsDone, addResultOpener, startJobs } from "./jobs.js";
 import { openedPanel } from "./panels.js";
 import { openRegistration } from "./register.js";
 import { subscribe, set, state } from "./store.js";
 
-const TAGS = { train: "fit", validation: "val", test: "test" };
-let requestedDiagnosis = null;
-let openRun = null;
+/** @import { RunEntry } from "./types.js" */
 
+/**
+ * Labels of the splits.
+ * @type {Record<string, string>}
+ */
+const TAGS = { train: "fit", validation: "val", test: "test" };
+/** @type {string | null} */
+let requestedDiagnosis = null; // the last diagnosis that was started here
+/** @type {(id: string) => unknown} */
+let openRun = () => undefined;
+
+/**
+ * Fill the sidebar and follow the jobs; `open` opens a run. Returns the number of datasets.
+ * @param {(id: string) => unknown} open
+ * @returns {Promise<number>}
+ */
 export async function start(open) {
   openRun = open;
   subscribe(["run", "sequence", "heading"], drawSequences);
@@ -24,21 +37,23 @@ export async function start(open) {
       refreshRuns(),
       done.some(({ result }) => result?.dataset) ? refreshDatasets() : null,
     ]);
-    // Who has gone elsewhere meanwhile finds it among the jobs and the diagnoses.
-    if (openedPanel() === "report" && done.some(({ id }) => id === requestedDiagnosis))
-      openRun(requestedDiagnosis);
+    // Opened only while the report is in front, so that nobody is taken away from another panel.
+    const finished = done.find(({ id }) => id === requestedDiagnosis);
+    if (finished && openedPanel() === "report") openRun(finished.id);
   });
   addResultOpener("registration", "See the registration", (_, __, { dataset }) =>
     openRegistration(dataset),
   );
-  document.getElementById("import").addEventListener("click", () => openImportDialog());
+  byId("import").addEventListener("click", () => openImportDialog());
   importDroppedFiles();
   startJobs();
   const [datasets] = await Promise.all([refreshDatasets(), refreshRuns()]);
   return datasets.length;
 }
 
+/** @returns {Promise<string[]>} */
 async function refreshDatasets() {
+  /** @type {{ datasets: string[], folder: string }} */
   const { datasets, folder } = await get("/datasets");
   fill(
     "datasets",
@@ -59,18 +74,29 @@ async function refreshDatasets() {
   return datasets;
 }
 
-/** A dataset in the right panel. */
+/**
+ * Show a dataset in the right panel.
+ * @param {string} name
+ */
 export const openDataset = (name) => showDataset(name, diagnose);
 
+/** @type {RunEntry[]} */
 let runs = [];
 
+/**
+ */
 async function refreshRuns() {
   runs = await get("/runs");
   drawRuns();
   return runs;
 }
 
-export const runToOpen = (wanted) => (runs.find(({ id }) => id === wanted) ?? runs[0])?.id ?? null;
+/**
+ * Return the id of a run if there is such a run, else that of the newest one.
+ * @param {string | null} id
+ * @returns {string | null}
+ */
+export const runToOpen = (id) => (runs.find((run) => run.id === id) ?? runs[0])?.id ?? null;
 
 function drawRuns() {
   fill(
@@ -104,7 +130,9 @@ function drawRuns() {
               element(
                 "span",
                 { class: "sub" },
-                `${verdict === "replay" ? "replay · " : ""}${folder ?? dataset} · ${formatDateTime(created)}`,
+                [verdict === "replay" ? "replay" : "", folder ?? dataset, formatDateTime(created)]
+                  .filter(Boolean)
+                  .join(" · "),
               ),
             ),
           ),
@@ -115,7 +143,7 @@ function drawRuns() {
 
 function drawSequences() {
   const { heading, sequence } = state();
-  document.getElementById("sequences-section").hidden = !heading;
+  byId("sequences-section").hidden = !heading;
   if (!heading) return;
   fill(
     "sequences",
@@ -127,10 +155,12 @@ function drawSequences() {
           type: "button",
           "aria-current": String(entry.name === sequence),
           "data-sequence": entry.name,
-          title: `${entry.frames} frames, ${entry.seconds.toFixed(0)} s; error in the worst frame, raw → extended`,
+          title:
+            `${entry.frames} frames, ${entry.seconds.toFixed(0)} s; ` +
+            "error in the worst frame, raw → extended",
           onclick: () => set({ sequence: entry.name, frame: 0, playing: false }),
         },
-        element("span", { class: `tag ${entry.split ?? ""}` }, TAGS[entry.split] ?? "–"),
+        element("span", { class: `tag ${entry.split ?? ""}` }, TAGS[entry.split ?? ""] ?? "–"),
         element("span", { class: "name" }, entry.name),
         element(
           "span",
@@ -142,7 +172,12 @@ function drawSequences() {
   );
 }
 
-export async function diagnose(dataset, registration = null) {
+/**
+ * Start the diagnosis of a dataset, with a kept registration or the automatic one.
+ * @param {string} dataset
+ * @param {string | null} [registration]
+ */
+async function diagnose(dataset, registration = null) {
   try {
     requestedDiagnosis = (await post("/diagnoses", { dataset, registration })).id;
   } catch (problem) {

@@ -1,4 +1,8 @@
-// What the page shows, in one place; parts subscribe to the keys they draw. Some keys outlive the page.
+// State of the page: modules read it with `state`, change it with `set`, and subscribe to the
+// keys they draw. The keys in STORED_KEYS are kept in the browser's local storage.
+/** @import { State } from "./types.js" */
+
+/** @type {(keyof State)[]} */
 const STORED_KEYS = [
   "run",
   "sequence",
@@ -14,14 +18,16 @@ const STORED_KEYS = [
   "crop",
 ];
 
+/** @returns {Partial<State>} */
 const readStored = () => {
   try {
-    return JSON.parse(localStorage.getItem("palpate.view")) ?? {};
+    return JSON.parse(localStorage.getItem("palpate.view") ?? "{}") ?? {};
   } catch {
     return {};
   }
 };
 
+/** @type {State} */
 const values = {
   run: null,
   sequence: null,
@@ -42,18 +48,27 @@ const values = {
   heading: null,
   series: null,
   palette: null,
-  held: null,
+  rendered: null,
   trial: false,
   live: false,
-  theme: document.documentElement.dataset.theme,
+  theme: document.documentElement.dataset.theme ?? "light",
   ...readStored(),
 };
+/** @type {[(keyof State)[], (state: State) => void][]} */
 const listeners = [];
 
+/**
+ * Return the state; treat it as read-only.
+ * @returns {State}
+ */
 export const state = () => values;
 
+/**
+ * Change keys of the state and call the subscribers of those whose value differs.
+ * @param {Partial<State>} changes
+ */
 export function set(changes) {
-  const changed = Object.keys(changes).filter(
+  const changed = /** @type {(keyof State)[]} */ (Object.keys(changes)).filter(
     (key) => JSON.stringify(values[key]) !== JSON.stringify(changes[key]),
   );
   if (!changed.length) return;
@@ -68,6 +83,11 @@ export function set(changes) {
     if (changed.some((key) => keys.includes(key))) listener(values);
 }
 
+/**
+ * Call the listener with the state whenever one of the keys has changed.
+ * @param {(keyof State)[]} keys
+ * @param {(state: State) => void} listener
+ */
 export function subscribe(keys, listener) {
   listeners.push([keys, listener]);
 }

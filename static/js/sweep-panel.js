@@ -1,25 +1,41 @@
-// The panel of sweeps: what to move and over which clouds, the points as they come, and what they say.
-import { get, post, errorTitle } from "./api.js";
+// The panel of sweeps: the form, the points as they arrive, and what they say about each
+// parameter.
+import { errorCard, errorTitle, get, post } from "./api.js";
 import { element, fill, icon } from "./dom.js";
-import { capitalise, readableName } from "./format.js";
+import { capitalise, readableName, UNITS } from "./format.js";
 import { addResultOpener } from "./jobs.js";
 import { addPanel, openPanel } from "./panels.js";
 import { cameraSelect } from "./register.js";
-import { formatErrorChange as changed, formatError, sweepPlot } from "./sweep-plots.js";
+import { formatErrorChange, formatError, sweepPlot } from "./sweep-plots.js";
 
+/**
+ * @import {
+ *   DatasetSummary, Effect, Job, Parameter, PlotAxis, Sweep, SweepBounds, SweepDirection,
+ *   SweepPoint
+ * } from "./types.js"
+ */
+
+/** @type {[string, string][]} */
 const METHODS = [
   ["grid", "Grid, coarse to fine"],
   ["random", "Random"],
   ["tpe", "TPE"],
   ["cmaes", "CMA-ES"],
 ];
-const UNITS = { m: [1e3, "mm"], Pa: [1e-3, "kPa"], s: [1e3, "ms"] };
-const PAUSE = 700;
-let effects = null;
-let axes = [];
-let box = null;
-let followedId = null;
+const SHOWN_UNITS = ["m", "Pa", "s"]; // SI units that the form converts
+const PAUSE = 700; // between requests for new points [ms]
+/** @typedef {{ error: number, number: number, values: Record<string, number> }} BestPoint */
+/** @typedef {Parameter & { key: string, label: string }} SweepableParameter */
+/** @type {Effect[]} */
+let effects = [];
+/** @type {SweepBounds[]} */
+let axes = []; // of the form
+/** @type {HTMLElement} */
+let box;
+/** @type {string | null} */
+let followedId = null; // the sweep that is shown; null while the form is
 
+/** Add the panel. */
 export function startSweeps() {
   box = addPanel(
     "sweep",
@@ -36,10 +52,11 @@ export function startSweeps() {
   });
 }
 
+/** Show the form. */
 async function openForm() {
   try {
     const [catalogue, { datasets, folder }] = await Promise.all([
-      effects ?? get("/effects"),
+      effects.length ? effects : get("/effects"),
       get("/datasets"),
     ]);
     effects = catalogue;
@@ -50,6 +67,10 @@ async function openForm() {
   }
 }
 
+/**
+ * Return the numeric parameters with bounds, with the names that the API and the form use.
+ * @returns {SweepableParameter[]}
+ */
 const sweepableParameters = () =>
   effects.flatMap((effect) =>
     effect.parameters
@@ -63,21 +84,29 @@ const sweepableParameters = () =>
             : capitalise(readableName(effect.name)),
       })),
   );
-const parameterOf = (name) => sweepableParameters().find(({ key }) => key === name);
-const unitOf = (name) =>
-  UNITS[parameterOf(name)?.unit] ?? [
-    1,
-    parameterOf(name)?.unit === "1" ? "" : (parameterOf(name)?.unit ?? ""),
-  ];
-const errorCard = (problem) =>
-  element(
-    "div",
-    { class: "note-card bad", role: "alert" },
-    element("strong", {}, errorTitle(problem)),
-    problem.message,
-  );
 
-async function showForm(datasets, folder, problem = null) {
+/**
+ * @param {string} name
+ * @returns {SweepableParameter | undefined}
+ */
+const parameterOf = (name) => sweepableParameters().find(({ key }) => key === name);
+
+/**
+ * Return the factor from SI units to the unit of the form, and that unit.
+ * @param {string} name
+ * @returns {[number, string]}
+ */
+const unitOf = (name) => {
+  const { unit = "" } = parameterOf(name) ?? {};
+  return SHOWN_UNITS.includes(unit) ? UNITS[unit] : [1, unit === "1" ? "" : unit];
+};
+
+/**
+ * @param {string[]} datasets
+ * @param {string} folder
+ */
+async function showForm(datasets, folder) {
+  /** @type {{ id: string, job: Job | null }[]} */
   const old = await get("/sweeps");
   if (!datasets.length) {
     fill(
@@ -89,23 +118,36 @@ async function showForm(datasets, folder, problem = null) {
         element(
           "p",
           {},
-          `A sweep compares replays with clouds. Put a dataset folder into ${folder} and open this panel again.`,
+          "A sweep compares replays with clouds. " +
+            `Put a dataset folder into ${folder} and open this panel again.`,
         ),
       ),
     );
     return;
   }
+  /**
+   * @param {string} name
+   * @param {[string, string][]} entries
+   * @returns {HTMLSelectElement}
+   */
   const select = (name, entries) =>
     element(
       "select",
       { name },
       entries.map(([value, label]) => element("option", { value }, label)),
     );
+  /**
+   * @param {string} name
+   * @param {number} value
+   * @param {number} low
+   * @param {number} high
+   * @returns {HTMLInputElement}
+   */
   const number = (name, value, low, high) =>
     element("input", { name, type: "number", value, min: low, max: high, step: 1, required: true });
   const dataset = select(
     "dataset",
-    datasets.map((name) => [name, name]),
+    datasets.map((name) => /** @type {[string, string]} */ ([name, name])),
   );
   const sequences = element("select", {
     name: "sequences",
@@ -120,6 +162,7 @@ async function showForm(datasets, folder, problem = null) {
   };
   dataset.addEventListener("change", listCameras);
   const listSequences = async () => {
+    /** @type {Pick<DatasetSummary, "sequences">} */
     const summary = await get(`/datasets/${encodeURIComponent(dataset.value)}`).catch(() => ({
       sequences: [],
     }));
@@ -144,11 +187,12 @@ async function showForm(datasets, folder, problem = null) {
     others.hidden = method.value === "grid";
   });
   const rows = element("div", { class: "sweep-form" });
-  const drawRows = () =>
+  const drawRows = () => {
     fill(
       rows,
       axes.map((axis) => axisRow(axis, drawRows)),
     );
+  };
   drawRows();
   const start = element("button", { class: "button strong", type: "submit" }, "Start the sweep");
   const form = element(
@@ -159,20 +203,20 @@ async function showForm(datasets, folder, problem = null) {
         event.preventDefault();
         start.disabled = true;
         const values = new FormData(form);
-        const asked = {
+        const request = {
           dataset: dataset.value,
           registration: values.get("registration") || null,
           parameters: axes.map(({ name, low, high }) => ({ parameter: name, low, high })),
           method: method.value,
           measure: values.get("measure"),
-          frames: +values.get("frames"),
+          frames: Number(values.get("frames")),
           sequences: [...sequences.selectedOptions].map(({ value }) => value),
           ...(method.value === "grid"
-            ? { steps: +values.get("steps"), levels: +values.get("levels") }
-            : { points: +values.get("points") }),
+            ? { steps: Number(values.get("steps")), levels: Number(values.get("levels")) }
+            : { points: Number(values.get("points")) }),
         };
         try {
-          followSweep((await post("/sweeps", asked)).id);
+          followSweep((await post("/sweeps", request)).id);
         } catch (refused) {
           start.disabled = false;
           form.querySelector(".note-card")?.remove();
@@ -194,7 +238,7 @@ async function showForm(datasets, folder, problem = null) {
           const next = sweepableParameters().find(
             ({ key }) => !axes.some(({ name }) => name === key),
           );
-          axes.push({ name: next.key, low: next.low, high: next.high });
+          if (next) axes.push(wholeRange(next));
           drawRows();
         },
       },
@@ -218,7 +262,6 @@ async function showForm(datasets, folder, problem = null) {
       ),
     ),
     element("div", { class: "actions" }, start),
-    problem ? errorCard(problem) : null,
   );
   fill(
     box,
@@ -250,8 +293,19 @@ async function showForm(datasets, folder, problem = null) {
   await Promise.all([listSequences(), listCameras()]);
 }
 
+/**
+ * Create the form's row for a swept parameter.
+ * @param {SweepBounds} axis
+ * @param {() => void} redraw
+ * @returns {HTMLElement}
+ */
 function axisRow(axis, redraw) {
   const [factor, unit] = unitOf(axis.name);
+  /**
+   * @param {"low" | "high"} key
+   * @param {string} label
+   * @returns {HTMLElement}
+   */
   const bound = (key, label) => {
     const field = element("input", {
       type: "number",
@@ -274,7 +328,7 @@ function axisRow(axis, redraw) {
   );
   choice.addEventListener("change", () => {
     const item = parameterOf(choice.value);
-    Object.assign(axis, { name: item.key, low: item.low, high: item.high });
+    if (item) Object.assign(axis, wholeRange(item));
     redraw();
   });
   return element(
@@ -300,23 +354,28 @@ function axisRow(axis, redraw) {
   );
 }
 
-/** Follow a sweep until it has ended or the panel shows something else. */
+/**
+ * Draw a sweep until it has ended or the panel shows something else.
+ * @param {string} id
+ */
 async function followSweep(id) {
   followedId = id;
+  /** @type {SweepPoint[]} */
   let points = [];
   let next = 0;
   while (followedId === id) {
     try {
-      const [whole, more] = await Promise.all([
+      /** @type {[Sweep, { points: SweepPoint[], next: number }]} */
+      const [sweep, more] = await Promise.all([
         get(`/sweeps/${id}`),
         get(`/sweeps/${id}/points?after=${next}`),
       ]);
       if (followedId !== id) return;
       points = points.concat(more.points);
       next = more.next;
-      const seen = new Map(points.map((point) => [point.number, point]));
-      draw(id, whole, [...seen.values()]);
-      const ended = !whole.job || !["queued", "running"].includes(whole.job.state);
+      const byNumber = new Map(points.map((point) => [point.number, point]));
+      draw(sweep, [...byNumber.values()]);
+      const ended = !sweep.job || !["queued", "running"].includes(sweep.job.state);
       if (ended && !more.points.length) return;
     } catch (problem) {
       fill(box, errorCard(problem), backButton());
@@ -326,6 +385,10 @@ async function followSweep(id) {
   }
 }
 
+/**
+ * Create the button that shows the form again.
+ * @returns {HTMLElement}
+ */
 const backButton = () =>
   element(
     "button",
@@ -340,8 +403,12 @@ const backButton = () =>
     "Another sweep",
   );
 
-function draw(id, { job, request, summary }, points) {
-  const running = job && ["queued", "running"].includes(job.state);
+/**
+ * @param {Sweep} sweep
+ * @param {SweepPoint[]} points
+ */
+function draw({ id, job, request, summary }, points) {
+  const running = job && ["queued", "running"].includes(job.state) ? job : null;
   const stop = element(
     "button",
     {
@@ -356,9 +423,12 @@ function draw(id, { job, request, summary }, points) {
   );
   const swept = points.filter(({ kind }) => kind !== "stated");
   const stated = points.find(({ kind }) => kind === "stated")?.error ?? null;
-  const best = swept
-    .filter(({ error }) => error !== null)
-    .reduce((one, other) => (one && one.error <= other.error ? one : other), null);
+  const best = swept.reduce(
+    (/** @type {BestPoint | null} */ one, { error, number, values }) =>
+      error === null || (one && one.error <= error) ? one : { error, number, values },
+    null,
+  );
+  /** @type {PlotAxis[]} */
   const drawn = (request?.parameters ?? []).map(({ parameter: name, low, high }) => ({
     name,
     low,
@@ -380,7 +450,7 @@ function draw(id, { job, request, summary }, points) {
         ? element("span", { class: "verdict-tag none", "data-state": job.state }, job.state)
         : null,
     ),
-    element("h1", { class: "verdict" }, sentence(best, stated, drawn, running)),
+    element("h1", { class: "verdict" }, sentence(best, stated, drawn, running !== null)),
     running
       ? element(
           "div",
@@ -388,9 +458,9 @@ function draw(id, { job, request, summary }, points) {
           element(
             "div",
             { class: "sweep-progress" },
-            element("i", { style: { width: `${100 * job.fraction}%` } }),
+            element("i", { style: { width: `${100 * running.fraction}%` } }),
           ),
-          element("p", { class: "gain-note" }, job.text),
+          element("p", { class: "gain-note" }, running.text),
         )
       : null,
     job?.error
@@ -447,32 +517,59 @@ function draw(id, { job, request, summary }, points) {
   );
 }
 
+/**
+ * @param {string} name
+ * @param {number} value
+ * @returns {string}
+ */
 function formatValue(name, value) {
   const [factor, unit] = unitOf(name);
   return `${+(value * factor).toPrecision(3)}${unit ? ` ${unit}` : ""}`;
 }
 
+/**
+ * @param {BestPoint | null} best
+ * @param {number | null} stated error of the setup as stated [m]
+ * @param {PlotAxis[]} drawn
+ * @param {boolean} running
+ * @returns {string}
+ */
 function sentence(best, stated, drawn, running) {
   if (!best) return running ? "Reading the clouds …" : "No point has an error.";
   const where = drawn
     .map(({ name, label }) => `${label} ${formatValue(name, best.values[name])}`)
     .join(", ");
-  return `Least error ${formatError(best.error)} at ${where}${stated === null ? "" : `; ${formatError(stated)} as stated`}.`;
+  const reference = stated === null ? "" : `; ${formatError(stated)} as stated`;
+  return `Least error ${formatError(best.error)} at ${where}${reference}.`;
 }
 
-const directionCard = ({ name, flat, change, low, high }) =>
-  element(
+/**
+ * Create the card that says whether a parameter matters.
+ * @param {SweepDirection} direction
+ * @returns {HTMLElement}
+ */
+const directionCard = ({ name, flat, change, low, high }) => {
+  const verdict = flat ? "flat" : flat === null ? "unknown" : "matters";
+  const [lowest, highest] = [formatErrorChange(low), formatErrorChange(high)];
+  return element(
     "div",
     { class: "note-card", "data-direction": name, "data-flat": String(flat) },
-    element(
-      "strong",
-      {},
-      `${capitalise(readableName(name.split(".")[0]))}: ${flat ? "flat" : flat === null ? "unknown" : "matters"}`,
-    ),
+    element("strong", {}, `${capitalise(readableName(name.split(".")[0]))}: ${verdict}`),
     flat
-      ? "The error does not change along it beyond what drawing the pushes anew changes: these clouds cannot tell it. "
+      ? "The error does not change along it beyond what drawing the pushes anew changes: " +
+          "these clouds cannot tell it. "
       : flat === null
-        ? "Only one push was compared, so nobody knows what chance does; take more sequences or clouds. "
+        ? "Only one push was compared, so nobody knows what chance does; " +
+          "take more sequences or clouds. "
         : "",
-    `From best to worst the error changes by ${changed(change)} (95 % interval ${changed(low)} to ${changed(high)}).`,
+    `From best to worst the error changes by ${formatErrorChange(change)} ` +
+      `(95 % interval ${lowest} to ${highest}).`,
   );
+};
+
+/**
+ * Return a parameter with its bounds as the range of a sweep.
+ * @param {SweepableParameter} item
+ * @returns {SweepBounds}
+ */
+const wholeRange = ({ key, low, high }) => ({ name: key, low: low ?? 0, high: high ?? 0 });

@@ -1,4 +1,4 @@
-// Before anything is drawn: the remembered theme, else the system's.
+// Sets the stored theme, or else the system's, before anything is drawn.
 (() => {
   const stored = localStorage.getItem("palpate.theme");
   const dark = stored ? stored === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;

@@ -1,5 +1,6 @@
-// Time: play by the wall clock, step, scrub; one cursor for scene and plot.
-import { element, fill, icon, swatch } from "./dom.js";
+// The timeline: playback by the wall clock, steps and slider. The scene and the plot show the
+// same frame.
+import { byId, element, fill, icon, swatch } from "./dom.js";
 import { formatMm } from "./format.js";
 import { bindShortcuts } from "./shortcuts.js";
 import * as loop from "./playback-loop.js";
@@ -7,19 +8,28 @@ import { drawPlot, frameAt, frameSummary } from "./timeline-plot.js";
 import { subscribe, set, state } from "./store.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
-const MODEL_LABELS = { raw: "Raw", extended: "Extended", corrected: "Corrected" };
-let clock = 0;
-let last = 0;
 
+/**
+ */
+const RANKS = ["Worst", "Second worst", "Third worst"];
+const MODEL_LABELS = { raw: "Raw", extended: "Extended", corrected: "Corrected" };
+let clock = 0; // playback time [s]
+let last = 0; // time of the last animation frame [ms]
+/** @type {import("./timeline-plot.js").TimeScale | null} */
+let timeScale = null;
+
+/** Set buttons, slider, shortcuts and plot up. */
 export function start() {
+  const speeds = byId("speed", HTMLSelectElement);
   fill(
-    "speed",
+    speeds,
     SPEEDS.map((speed) =>
       element("option", { value: speed, selected: speed === state().speed }, `${speed}×`),
     ),
-  ).addEventListener("change", (event) => {
-    set({ speed: +event.target.value });
-    event.target.blur();
+  );
+  speeds.addEventListener("change", () => {
+    set({ speed: +speeds.value });
+    speeds.blur();
   });
   const buttons = {
     first: () => go(0),
@@ -30,11 +40,15 @@ export function start() {
   };
   for (const [name, action] of Object.entries(buttons))
     fill(name, icon(name)).addEventListener("click", action);
-  const scrub = document.getElementById("scrub");
+  const scrub = byId("scrub", HTMLInputElement);
   scrub.addEventListener("input", () => {
     set({ playing: false });
     go(+scrub.value);
   });
+  /**
+   * @param {KeyboardEvent} event
+   * @returns {number}
+   */
   const far = (event) => (event.shiftKey ? 10 : 1);
   bindShortcuts({
     " ": toggle,
@@ -59,21 +73,34 @@ export function start() {
   new ResizeObserver(() => {
     draw();
     drawWorst();
-  }).observe(document.getElementById("plot").parentElement);
+  }).observe(byId("plot").parentElement ?? byId("plot"));
   draw();
 }
 
+/**
+ * Return the number of frames.
+ * @returns {number}
+ */
 const count = () => state().series?.time.length ?? 0;
 
+/**
+ * Show a frame.
+ * @param {number} frame
+ */
 export function go(frame) {
   if (count()) set({ frame: Math.max(0, Math.min(count() - 1, frame)) });
 }
 
+/**
+ * Stop and go on by some frames.
+ * @param {number} by
+ */
 function step(by) {
   set({ playing: false });
   go(state().frame + by);
 }
 
+/** Play or pause; at the end of the played part from its start. */
 function toggle() {
   if (!count()) return;
   const [from, to] = loop.playedRange(count());
@@ -81,12 +108,14 @@ function toggle() {
   set({ playing: !state().playing });
 }
 
+/** Start playback at the shown frame. */
 function begin() {
-  clock = state().series.time[state().frame];
+  clock = state().series?.time[state().frame] ?? 0;
   last = performance.now();
   requestAnimationFrame(tick);
 }
 
+/** @param {number} now time of the animation frame [ms] */
 function tick(now) {
   const { playing, speed, series } = state();
   if (!playing || !series) return;
@@ -99,26 +128,39 @@ function tick(now) {
   else requestAnimationFrame(tick);
 }
 
+/**
+ * Let the pointer choose frames in the plot, or with Shift the loop, and show the values under
+ * it.
+ */
 function watchPlot() {
-  const canvas = document.getElementById("plot");
-  const tip = document.getElementById("plot-tip");
+  const canvas = byId("plot", HTMLCanvasElement);
+  const tip = byId("plot-tip");
   let dragging = false;
-  let marked = null;
-  const frameOf = (event) => frameAt(state().series.time, canvas.timeAt(event.offsetX));
+  /** @type {number | null} */
+  let marked = null; // frame at which a loop is being drawn
+  /**
+   * @param {PointerEvent} event
+   * @returns {number | null}
+   */
+  const frameOf = (event) => {
+    const { series } = state();
+    return series && timeScale ? frameAt(series.time, timeScale.timeAt(event.offsetX)) : null;
+  };
   canvas.addEventListener("pointerdown", (event) => {
-    if (!count()) return;
+    const frame = frameOf(event);
+    if (frame === null) return;
     dragging = true;
     canvas.setPointerCapture(event.pointerId);
     set({ playing: false });
-    if (event.shiftKey) marked = frameOf(event);
-    else go(frameOf(event));
+    if (event.shiftKey) marked = frame;
+    else go(frame);
   });
   canvas.addEventListener("pointermove", (event) => {
-    if (!count()) return;
+    const { series } = state();
     const frame = frameOf(event);
+    if (!series || frame === null) return;
     if (dragging && marked === null) go(frame);
     if (dragging && marked !== null) loop.setLoop(marked, frame, count());
-    const { series } = state();
     tip.hidden = false;
     tip.textContent = [`${series.time[frame].toFixed(2)} s`, ...frameSummary(series, frame)].join(
       "\n",
@@ -136,22 +178,22 @@ function watchPlot() {
   });
 }
 
-/** A button over each of the worst frames. */
+/** Draw a button over each of the worst frames. */
 function drawWorst() {
   const { series, frame } = state();
-  const canvas = document.getElementById("plot");
+  const scale = timeScale;
   fill(
     "worst",
-    series && canvas.timeToPixel
+    series && scale
       ? series.worst.map((at, place) =>
           element(
             "button",
             {
               type: "button",
-              style: { left: `${canvas.timeToPixel(series.time[at])}px` },
+              style: { left: `${scale.timeToPixel(series.time[at])}px` },
               "aria-pressed": String(frame === at),
               "data-frame": at,
-              title: `${["Worst", "Second worst", "Third worst"][place]} frame, ${at + 1}: raw ${formatMm(series.distance_raw[at])}`,
+              title: `${RANKS[place]} frame, ${at + 1}: raw ${formatMm(series.distance_raw[at])}`,
               onclick: (event) => {
                 set({ playing: false });
                 go(at);
@@ -165,21 +207,28 @@ function drawWorst() {
   );
 }
 
-const readoutEntry = (thing, label, value) =>
+/**
+ * @param {string} name of the colour
+ * @param {string} label
+ * @param {string} value
+ * @returns {HTMLElement}
+ */
+const readoutEntry = (name, label, value) =>
   element(
     "span",
     { title: label },
-    swatch(thing, true),
+    swatch(name, true),
     element("span", { class: "word" }, label),
     element("b", {}, value),
   );
 
+/** Draw slider, clock, readout and plot. */
 function draw() {
   const { series, frame, sequence } = state();
-  const scrub = document.getElementById("scrub");
+  const scrub = byId("scrub", HTMLInputElement);
   scrub.disabled = !series;
-  scrub.max = Math.max(0, count() - 1);
-  scrub.value = frame;
+  scrub.max = String(Math.max(0, count() - 1));
+  scrub.value = String(frame);
   const at = Math.min(frame, count() - 1);
   fill(
     "clock",
@@ -195,11 +244,15 @@ function draw() {
     series
       ? [
           ...series.models.map((name) =>
-            readoutEntry(name, MODEL_LABELS[name], formatMm(series[`distance_${name}`][at], false)),
+            readoutEntry(
+              name,
+              MODEL_LABELS[name],
+              formatMm(series[`distance_${name}`]?.[at], false),
+            ),
           ),
           readoutEntry("floor", "Floor", formatMm(series.noise_floor)),
         ]
       : [],
   ).classList.toggle("full", (series?.models.length ?? 0) > 2);
-  drawPlot(document.getElementById("plot"), series, at, loop.playedRange(count()));
+  timeScale = drawPlot(byId("plot", HTMLCanvasElement), series, at, loop.playedRange(count()));
 }

@@ -1,20 +1,29 @@
-// Looking at the scene: standard views, models side by side, and the section through the block.
+// Tools beside the scene: standard views, models side by side, the section through the block.
 import { post, toast } from "./api.js";
 import { forgetCamera } from "./camera.js";
-import { element, fill, icon } from "./dom.js";
+import { byId, element, fill, icon } from "./dom.js";
 import { bindShortcuts } from "./shortcuts.js";
 import { inDrawOrder } from "./layer-styles.js";
 import { subscribe, set, state } from "./store.js";
 
+/** @import { Axis, Section } from "./types.js" */
+
+/** Name of the view, its icon, and the button's title. */
 const VIEWS = [
   ["reset", "target", "Look at the phantom again (0)"],
   ["top", "top", "From the top (1)"],
   ["front", "front", "From the front (2)"],
   ["side", "side", "From the side (3)"],
 ];
+/** @type {Axis[]} */
 const AXES = ["x", "y", "z"];
+/** @type {(where: string) => void} */
 let look = () => {};
 
+/**
+ * Set the buttons up.
+ * @param {string} page identifier of this page's session
+ */
 export function start(page) {
   look = (where) => {
     forgetCamera();
@@ -44,8 +53,16 @@ export function start(page) {
   drawSection();
 }
 
+/**
+ * Give a button of index.html its icon, title and action.
+ * @param {string} id
+ * @param {string} shape
+ * @param {string} title
+ * @param {() => void} act
+ */
 export function initToolButton(id, shape, title, act) {
-  const node = fill(id, icon(shape));
+  const node = byId(id, HTMLButtonElement);
+  fill(node, icon(shape));
   Object.assign(node, { type: "button", title });
   node.classList.add("icon-button");
   node.addEventListener("click", act);
@@ -55,6 +72,7 @@ function toggleSideBySide() {
   set({ side_by_side: !state().side_by_side });
 }
 
+/** Show on the buttons what is switched on. */
 function updatePressed() {
   const pressed = {
     aside: state().side_by_side,
@@ -62,37 +80,46 @@ function updatePressed() {
     crop: !state().crop,
   };
   for (const [id, value] of Object.entries(pressed))
-    document.getElementById(id).setAttribute("aria-pressed", String(value));
+    byId(id).setAttribute("aria-pressed", String(value));
 }
 
+/** Open or close the section; opening it also shows the lumps found. */
 function toggleSection() {
   const { section, series } = state();
   if (!series) return;
-  const wanted = section
+  /** @type {Section} */
+  const next = section
     ? { ...section, on: !section.on }
     : { on: true, axis: "y", at: middleOf("y"), flip: false };
-  // Who opens the block wants to see what was found in it.
   set({
-    section: wanted,
-    layers: wanted.on && series.lumps ? inDrawOrder([...state().layers, "lump"]) : state().layers,
+    section: next,
+    layers: next.on && series.lumps ? inDrawOrder([...state().layers, "lump"]) : state().layers,
   });
 }
 
+/**
+ * Return the block's middle along an axis [m].
+ * @param {Axis} axis
+ * @returns {number}
+ */
 const middleOf = (axis) => {
-  const [low, high] = state().series.box;
+  const [low, high] = state().series?.box ?? [
+    [0, 0, 0],
+    [0, 0, 0],
+  ];
   const at = AXES.indexOf(axis);
   return (low[at] + high[at]) / 2;
 };
 
+/** Draw the bar of the section, unless its slider is being dragged. */
 function drawSection() {
   const { section, series } = state();
-  const box = document.getElementById("section-bar");
-  box.hidden = !section?.on || !series;
-  if (
-    box.hidden ||
-    (box.contains(document.activeElement) && document.activeElement.type === "range")
-  )
-    return;
+  const box = byId("section-bar");
+  const open = section?.on && series;
+  box.hidden = !open;
+  const focused = document.activeElement;
+  const dragged = focused instanceof HTMLInputElement && focused.type === "range";
+  if (!open || (dragged && box.contains(focused))) return;
   const at = AXES.indexOf(section.axis);
   const [low, high] = series.box.map((corner) => corner[at] * 1e3);
   const number = element("output", {}, `${(section.at * 1e3).toFixed(1)} mm`);
@@ -104,7 +131,7 @@ function drawSection() {
     value: section.at * 1e3,
     "aria-label": `Section at ${section.axis} in mm`,
     oninput: (event) => {
-      set({ section: { ...state().section, at: +event.target.value / 1e3 } });
+      set({ section: { ...(state().section ?? section), at: +event.target.value / 1e3 } });
       number.textContent = `${(+event.target.value).toFixed(1)} mm`;
     },
   });

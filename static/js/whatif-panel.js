@@ -1,5 +1,6 @@
-// What if: causes switched on and off and moved by sliders; the shown frame is solved again at once.
-import { get, post, remove, toast } from "./api.js";
+// The panel "What if": causes are switched on and off and moved by sliders; the shown frame is
+// solved again.
+import { get, post, remove, toast, toError } from "./api.js";
 import { sliderRange, toPosition, fromPosition } from "./slider-scale.js";
 import { element, fill } from "./dom.js";
 import { capitalise, formatMm, UNITS, readableName } from "./format.js";
@@ -7,18 +8,32 @@ import { addPanel, openedPanel, openPanel } from "./panels.js";
 import { pageId } from "./scene.js";
 import { subscribe, set, state } from "./store.js";
 
+/** @import { Effect, EffectValues, Parameter, WhatIfAnswer, WhatIfRow } from "./types.js" */
+
 const KEY = "palpate.whatif";
-let box = null;
+/** @type {HTMLElement} */
+let box;
+/** @type {Effect[] | null} */
 let catalogue = null;
-let sequenceModel = null; // {key, model, beginnings} of the run and sequence that are shown
-let rows = []; // {effect, on, parameters}
-let tuned = true;
-let undoStack = [];
-let previousView = null; // what the scene showed before this panel came to the front
+
+/**
+ * The diagnosed effects of the run, and initial values of all effects for the shown sequence.
+ * @type {{ key: string, model: EffectValues[], beginnings: EffectValues[] } | null}
+ */
+let sequenceModel = null;
+/** @type {WhatIfRow[]} */
+let rows = [];
+let tuned = true; // the registration is as the diagnosis fitted it
+/** @type {string[]} */
+let undoStack = []; // earlier rows as JSON
+/** @type {{ layers: string[], colour: string } | null} */
+let previousView = null; // what the scene showed before the panel came to the front
 let busy = false;
-let stale = false;
+let stale = false; // the rows have changed since the last request
+/** @type {WhatIfAnswer | null} */
 let answer = null;
 
+/** Add the panel. */
 export function start() {
   box = addPanel("whatif", "What if", open, leave);
   box.addEventListener("keydown", (event) => {
@@ -35,6 +50,7 @@ export function start() {
   });
 }
 
+/** Load what the sequence needs, draw the panel and solve the frame. */
 async function open() {
   const { run, sequence, layers, colour, heading } = state();
   if (!run || !sequence) {
@@ -50,7 +66,8 @@ async function open() {
     fill(
       box,
       mutedText(
-        "The dataset of this diagnosis is not where it was, so that there is nothing to compare with.",
+        "The dataset of this diagnosis is not where it was, so that there is nothing to " +
+          "compare with.",
       ),
     );
     return;
@@ -73,56 +90,83 @@ async function open() {
     catalogue ??= await get("/effects");
     const found = await get(sequencePath("whatif"));
     if (`${state().run}/${state().sequence}` !== key) return;
-    const same = storedRows(run);
+    const stored = storedRows(run);
     sequenceModel = { key, ...found };
-    rows = same?.rows ?? diagnosedRows();
-    tuned = same?.tuned ?? true;
+    rows = stored?.rows ?? diagnosedRows();
+    tuned = stored?.tuned ?? true;
     undoStack = [];
     draw();
     solve();
-  } catch (problem) {
+  } catch (error) {
     fill(
       box,
       element(
         "div",
         { class: "note-card bad" },
         element("strong", {}, "This cannot be tried"),
-        problem.message,
+        toError(error).message,
       ),
     );
   }
 }
 
+/** Show what the scene showed before. */
 function leave() {
   if (previousView) set(previousView);
   previousView = null;
-  if (answer) remove(`/sessions/${pageId()}/whatif`).catch(() => {}); // a page that was never shown has nothing to go back to
+  // Without an answer the server shows nothing that would have to be taken back.
+  if (answer) remove(`/sessions/${pageId()}/whatif`).catch(() => {});
   answer = null;
   set({ trial: false });
 }
 
+/**
+ * @param {string} text
+ * @returns {HTMLElement}
+ */
 const mutedText = (text) => element("p", { class: "muted" }, text);
 
-const sequencePath = (verb) =>
-  `/runs/${encodeURIComponent(state().run)}/sequences/${encodeURIComponent(state().sequence)}/${verb}`;
+/**
+ * Return the API's path of the shown sequence.
+ * @param {string} verb
+ * @returns {string}
+ */
+const sequencePath = (verb) => {
+  const [run, sequence] = [state().run ?? "", state().sequence ?? ""].map(encodeURIComponent);
+  return `/runs/${run}/sequences/${sequence}/${verb}`;
+};
 
+/**
+ * Return the causes as the diagnosis found them.
+ * @returns {WhatIfRow[]}
+ */
 const diagnosedRows = () =>
-  sequenceModel.model.map(({ effect, parameters }) => ({
+  (sequenceModel?.model ?? []).map(({ effect, parameters }) => ({
     effect,
     on: true,
     parameters: { ...parameters },
   }));
 
+/**
+ * Return what was set for a run before the page was reloaded.
+ * @param {string} run
+ * @returns {{ rows: WhatIfRow[], tuned: boolean } | null}
+ */
 function storedRows(run) {
   try {
-    const kept = JSON.parse(sessionStorage.getItem(KEY));
-    return kept?.run === run ? kept : null;
+    const stored = JSON.parse(sessionStorage.getItem(KEY) ?? "null");
+    return stored?.run === run ? stored : null;
   } catch {
     return null;
   }
 }
 
-/** Change something: `act` moves rows; what was before can be undone. A slider that is dragged is one change. */
+/**
+ * Apply a change, store it and solve the frame. A `whole` change can be undone; the steps of a
+ * dragged slider are not whole.
+ * @param {() => void} act
+ * @param {boolean} [whole]
+ */
 function applyChange(act, whole = true) {
   const before = JSON.stringify({ rows, tuned });
   if (whole) undoStack.push(before);
@@ -132,8 +176,11 @@ function applyChange(act, whole = true) {
   solve();
 }
 
+/** Take the last change back. */
 function undo() {
-  const before = JSON.parse(undoStack.pop());
+  const last = undoStack.pop();
+  if (!last) return;
+  const before = JSON.parse(last);
   rows = before.rows;
   tuned = before.tuned;
   sessionStorage.setItem(KEY, JSON.stringify({ run: state().run, rows, tuned }));
@@ -141,7 +188,7 @@ function undo() {
   solve();
 }
 
-/** Solve the shown frame; while one is being solved only the newest wish is kept. */
+/** Solve the shown frame; while one is being solved only the newest request is kept. */
 async function solve() {
   if (busy) {
     stale = true;
@@ -160,7 +207,7 @@ async function solve() {
       .map(({ effect, parameters }) => ({ effect, parameters }));
     answer = await post(sequencePath("whatif"), { frame, effects, tuned, page: pageId() });
   } catch (problem) {
-    answer = { problem };
+    answer = { problem: toError(problem) };
   }
   clearTimeout(waiting);
   busy = false;
@@ -172,12 +219,13 @@ async function solve() {
   if (stale) solve();
 }
 
+/** Draw the panel. */
 function draw() {
   const changed = JSON.stringify(rows) !== JSON.stringify(diagnosedRows()) || !tuned;
-  const absent = catalogue.filter(
+  const initial = sequenceModel?.beginnings ?? [];
+  const absent = (catalogue ?? []).filter(
     ({ name }) =>
-      sequenceModel.beginnings.some(({ effect }) => effect === name) &&
-      !rows.some(({ effect }) => effect === name),
+      initial.some(({ effect }) => effect === name) && !rows.some(({ effect }) => effect === name),
   );
   fill(
     box,
@@ -185,7 +233,8 @@ function draw() {
     element(
       "p",
       { class: "gain-note" },
-      "Switch causes on and off and move them: the frame that is shown is solved again, and takes the place of the extended model in the scene.",
+      "Switch causes on and off and move them: the frame that is shown is solved again, and " +
+        "takes the place of the extended model in the scene.",
     ),
     element("div", { id: "whatif-answer" }),
     rows.map(causeCard),
@@ -250,31 +299,43 @@ function draw() {
   drawAnswer();
 }
 
-/** The shown sequence, all of it, with these causes: a run of its own among the diagnoses when it is done. */
-async function replayAll({ currentTarget }) {
-  currentTarget.disabled = true;
+/**
+ * Start a job that replays the whole sequence with these causes; its run is then in the sidebar.
+ * @param {{ currentTarget: HTMLButtonElement }} event
+ */
+async function replayAll({ currentTarget: button }) {
+  button.disabled = true;
   const { heading, sequence } = state();
   const effects = rows
     .filter((row) => row.on)
     .map(({ effect, parameters }) => ({ effect, parameters }));
   try {
-    await post("/replays", { dataset: heading.folder, sequences: [sequence], effects });
+    await post("/replays", { dataset: heading?.folder, sequences: [sequence], effects });
     openPanel("jobs");
   } catch (problem) {
     toast(problem);
   }
-  currentTarget.disabled = false;
+  button.disabled = false;
 }
 
+/**
+ * @param {boolean} checked
+ * @param {() => void} act
+ * @returns {HTMLInputElement}
+ */
 const switchInput = (checked, act) =>
   element("input", { type: "checkbox", role: "switch", checked, onchange: act });
 
+/**
+ * @param {WhatIfRow} row
+ * @returns {HTMLElement}
+ */
 function causeCard(row) {
-  const effect = catalogue.find(({ name }) => name === row.effect);
-  const beginning =
-    sequenceModel.model.find((one) => one.effect === row.effect) ??
-    sequenceModel.beginnings.find((one) => one.effect === row.effect);
-  const own = sequenceModel.model.some((one) => one.effect === row.effect);
+  /** @param {EffectValues} one */
+  const same = (one) => one.effect === row.effect;
+  const effect = catalogue?.find(({ name }) => name === row.effect);
+  const diagnosed = sequenceModel?.model.find(same);
+  const initial = diagnosed ?? sequenceModel?.beginnings.find(same);
   return element(
     "fieldset",
     { class: row.on ? "whatif-card" : "whatif-card off", "data-effect": row.effect },
@@ -283,7 +344,7 @@ function causeCard(row) {
       {},
       element(
         "label",
-        { class: "whatif-switch", title: effect.summary },
+        { class: "whatif-switch", title: effect?.summary },
         switchInput(row.on, () =>
           applyChange(() => {
             row.on = !row.on;
@@ -291,7 +352,7 @@ function causeCard(row) {
         ),
         capitalise(readableName(row.effect)),
       ),
-      own
+      diagnosed
         ? null
         : element(
             "button",
@@ -307,14 +368,19 @@ function causeCard(row) {
             "take away",
           ),
     ),
-    effect.parameters.map((item) =>
+    effect?.parameters.map((item) =>
       item.choices.length
         ? choiceField(row, item)
-        : sliderField(row, item, beginning.parameters[item.name]),
+        : sliderField(row, item, Number(initial?.parameters[item.name])),
     ),
   );
 }
 
+/**
+ * @param {WhatIfRow} row
+ * @param {Parameter} item
+ * @returns {HTMLElement}
+ */
 function choiceField(row, item) {
   return element(
     "label",
@@ -336,17 +402,25 @@ function choiceField(row, item) {
   );
 }
 
-function sliderField(row, item, beginning) {
-  const span = sliderRange(item, beginning);
+/**
+ * Create slider and number field of a parameter.
+ * @param {WhatIfRow} row
+ * @param {Parameter} item
+ * @param {number} initial value around which the slider lies
+ * @returns {HTMLElement}
+ */
+function sliderField(row, item, initial) {
+  const span = sliderRange(item, initial);
   const [factor, unit] = UNITS[item.unit] ?? [1, item.unit];
-  const shown = () => Number((row.parameters[item.name] * factor).toPrecision(4));
+  const value = () => Number(row.parameters[item.name]);
+  const shown = () => String(Number((value() * factor).toPrecision(4)));
   const label = `${capitalise(readableName(row.effect))}: ${readableName(item.name)}`;
   const bar = element("input", {
     type: "range",
     min: 0,
     max: 1000,
     step: 1,
-    value: toPosition(item, span, row.parameters[item.name]),
+    value: toPosition(item, span, value()),
     disabled: !row.on,
     "aria-label": label,
   });
@@ -374,8 +448,9 @@ function sliderField(row, item, beginning) {
     refocus(label);
   });
   number.addEventListener("change", () => {
-    const value = +number.value / factor;
-    if (number.value === "" || value < (item.low ?? -Infinity) || value > (item.high ?? Infinity)) {
+    const typed = +number.value / factor;
+    const outside = typed < (item.low ?? -Infinity) || typed > (item.high ?? Infinity);
+    if (number.value === "" || outside) {
       number.setCustomValidity(
         `${readableName(item.name)} lies between ${boundsText(item, factor, unit)}`,
       );
@@ -383,7 +458,7 @@ function sliderField(row, item, beginning) {
       return;
     }
     applyChange(() => {
-      row.parameters[item.name] = value;
+      row.parameters[item.name] = typed;
     });
   });
   return element(
@@ -396,22 +471,39 @@ function sliderField(row, item, beginning) {
   );
 }
 
-const boundsText = ({ low, high }, factor, unit) =>
-  `${low === null ? "−∞" : low * factor} and ${high === null ? "∞" : high * factor}${unit ? ` ${unit}` : ""}`;
+/**
+ * @param {Parameter} item
+ * @param {number} factor
+ * @param {string} unit
+ * @returns {string}
+ */
+const boundsText = ({ low, high }, factor, unit) => {
+  const [least, most] = [low === null ? "−∞" : low * factor, high === null ? "∞" : high * factor];
+  return `${least} and ${most}${unit ? ` ${unit}` : ""}`;
+};
 
+/**
+ * Give the focus to the slider with a label.
+ * @param {string} label
+ */
 const refocus = (label) =>
-  [...box.querySelectorAll("input[type=range]")]
+  /** @type {HTMLInputElement[]} */ ([...box.querySelectorAll("input[type=range]")])
     .find((bar) => bar.getAttribute("aria-label") === label)
     ?.focus();
 
+/**
+ * Add a cause with its initial values.
+ * @param {string} name
+ */
 function addCause(name) {
-  const beginning = sequenceModel.beginnings.find(({ effect }) => effect === name);
-  if (beginning)
+  const initial = sequenceModel?.beginnings.find(({ effect }) => effect === name);
+  if (initial)
     applyChange(() => {
-      rows = [...rows, { effect: name, on: true, parameters: { ...beginning.parameters } }];
+      rows = [...rows, { effect: name, on: true, parameters: { ...initial.parameters } }];
     });
 }
 
+/** Draw the errors of the solved frame as bars. */
 function drawAnswer() {
   if (!document.getElementById("whatif-answer")) return;
   if (answer?.problem) {
@@ -439,6 +531,7 @@ function drawAnswer() {
     outcome,
     waiting,
   } = answer;
+  /** @type {[string, number | null | undefined, string][]} */
   const steps = [
     ["Raw model", raw, "raw"],
     ["Extended", extended, "extended"],
@@ -455,16 +548,16 @@ function drawAnswer() {
       element(
         "div",
         { class: "ladder" },
-        steps.flatMap(([label, value, thing]) => [
+        steps.flatMap(([label, value, name]) => [
           element("span", {}, label),
           element(
             "div",
             { class: "bar" },
             element("i", {
-              style: { width: `${(100 * (value ?? 0)) / most}%`, background: `var(--${thing})` },
+              style: { width: `${(100 * (value ?? 0)) / most}%`, background: `var(--${name})` },
             }),
           ),
-          element("span", { class: "bar-value", "data-model": thing }, formatMm(value)),
+          element("span", { class: "bar-value", "data-model": name }, formatMm(value)),
         ]),
       ),
       converged
@@ -473,7 +566,7 @@ function drawAnswer() {
             "div",
             { class: "note-card bad" },
             element("strong", {}, "No equilibrium"),
-            `${capitalise(outcome)}.`,
+            `${capitalise(outcome ?? "")}.`,
           ),
     ),
   );
