@@ -7,6 +7,8 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 PIP := $(VENV)/bin/python -m pip
 ARGS ?=
+PAGE := .ci/page
+PAGE_TOOLS := $(PAGE)/node_modules/.bin
 # Two workers, a file to each, the longest first. One that dies ends the run at once with the name of its test: replaced, it would
 # leave tests that nobody is given, and the run would wait for ever.
 SPREAD := -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart=0
@@ -17,7 +19,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 export NUMBA_NUM_THREADS ?= 1
 
-.PHONY: demo test bench check types-of-code types-of-tests clean install develop
+.PHONY: demo test bench check check-page types-of-code types-of-tests clean install develop
 .DELETE_ON_ERROR:
 
 demo: install
@@ -29,10 +31,17 @@ test: develop
 bench: $(VENV)/.peers
 	$(VENV)/bin/python -m benchmarks $(ARGS)
 
-check: develop
+check: develop check-page
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(MAKE) --no-print-directory -j2 --output-sync=target types-of-code types-of-tests
+
+# The page is plain ES modules: the tools only check it.
+check-page: $(PAGE)/node_modules/.installed
+	$(PAGE_TOOLS)/eslint --config $(PAGE)/eslint.config.mjs static/js
+	$(PAGE_TOOLS)/tsc --project $(PAGE)/tsconfig.json
+	$(PAGE_TOOLS)/prettier --config $(PAGE)/prettier.json --log-level warn --check \
+	    'static/**/*.{js,ts,css,html}' '!static/vendor/**'
 
 # Side by side, each with a cache of its own: they check by other rules.
 types-of-code:
@@ -43,7 +52,7 @@ types-of-tests:
 	    --allow-incomplete-defs --allow-untyped-calls --no-warn-return-any --no-warn-unused-ignores tests benchmarks
 
 clean:
-	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(PAGE)/node_modules build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find app core tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
 
 install: $(VENV)/.system-demo $(VENV)/.installed
@@ -76,4 +85,8 @@ $(VENV)/.peers: pyproject.toml constraints.txt $(VENV)/.system-bench $(VENV)/.in
 
 $(VENV)/.developed: pyproject.toml constraints.txt $(VENV)/.installed
 	$(PIP) install --quiet -e ".[test,check,shapes,cluster]" -c constraints.txt
+	@touch $@
+
+$(PAGE)/node_modules/.installed: $(PAGE)/package.json $(PAGE)/package-lock.json | $(VENV)/.system-test
+	npm ci --prefix $(PAGE) --no-progress
 	@touch $@

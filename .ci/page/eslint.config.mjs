@@ -1,0 +1,41 @@
+import js from "@eslint/js";
+import globals from "globals";
+
+export default [
+  { ignores: ["static/vendor/"] },
+  js.configs.recommended,
+  {
+    files: ["static/js/**/*.js"],
+    languageOptions: { ecmaVersion: 2023, sourceType: "module", globals: globals.browser },
+    linterOptions: { reportUnusedDisableDirectives: "error" },
+    rules: {
+      "array-callback-return": "error",
+      "consistent-return": "error",
+      "default-param-last": "error",
+      "dot-notation": "error",
+      eqeqeq: "error",
+      "max-len": ["error", { code: 100 }],
+      "no-else-return": "error",
+      "no-eval": "error",
+      "no-implicit-coercion": ["error", { number: false }],
+      "no-implied-eval": "error",
+      "no-param-reassign": "error",
+      "no-return-assign": "error",
+      "no-self-compare": "error",
+      "no-sequences": "error",
+      "no-shadow": ["error", { builtinGlobals: false }],
+      "no-throw-literal": "error",
+      "no-undef-init": "error",
+      "no-unused-expressions": "error",
+      "no-unused-vars": ["error", { args: "all", argsIgnorePattern: "^_" }],
+      "no-use-before-define": ["error", { functions: false, variables: false }],
+      "no-useless-return": "error",
+      "no-var": "error",
+      "object-shorthand": "error",
+      "prefer-const": "error",
+      "prefer-template": "error",
+      radix: "error",
+      yoda: "error",
+    },
+  },
+];
