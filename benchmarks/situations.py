@@ -138,7 +138,7 @@ def faults(situation: Situation, frames: list[Equilibrium]) -> list[str]:
             found.append(f"frame {number}: not a number")
         elif frame.outcome is Outcome.CONVERGED:
             model, positions = block.model(frame.mesh), frame.mesh.nodes + frame.displacement
-            probe = ToolSphere(frame.probe.centre - np.append(frame.slip, 0.0), frame.probe.radius)
+            probe = ToolSphere(frame.tool.centre - np.append(frame.slip, 0.0), frame.tool.radius)
             if not np.isfinite(model.energy(positions, probe)):
                 found.append(f"frame {number}: converged with an inverted element")
             points = np.einsum(

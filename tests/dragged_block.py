@@ -38,7 +38,7 @@ def dragged(
     times = np.unique(np.round(np.concatenate([np.arange(LOOKS[0], LOOKS[-1], DENSE), LOOKS]), 6))
     frames = (
         replay(truth, centres(times, turn), GRID, times=times)
-        if truth.remembers
+        if truth.has_history
         else replay(truth, centres(times, turn), GRID)
     )
     seen = [frames[int(np.argmin(np.abs(times - look)))] for look in LOOKS]

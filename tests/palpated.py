@@ -26,7 +26,7 @@ def _resisting(
     """Force on the tool (d, 3) [N] at these depths (d,) [m]."""
     block, found, frame = Replay(setup, mesh, 3e-4), [], None
     for depth in depths:
-        frame = block.sought(place + (setup.tool.radius - depth) * normal, (frame,))
+        frame = block.solve_from_any(place + (setup.tool.radius - depth) * normal, (frame,))
         found.append(frame.force)
     return np.array(found)
 

@@ -7,7 +7,7 @@ import trimesh
 
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.mesh.gmsh_fill import TetSpec, fill
-from palpate.mesh.tet_mesh import SolidMesh
+from palpate.mesh.tet_mesh import TetMesh
 from palpate.setup.fixed_region import FixedRegion, Plane
 from palpate.setup.setup import Shape
 
@@ -20,7 +20,7 @@ def box_surface(size: tuple[float, float, float]) -> tuple[FloatArray, IntArray]
     return np.array(box.vertices) + np.array([0.0, 0.0, size[2] / 2]), np.array(box.faces)
 
 
-def filled_box(size: tuple[float, float, float], spacing: float) -> SolidMesh:
+def filled_box(size: tuple[float, float, float], spacing: float) -> TetMesh:
     """A block of tetrahedra, evenly spaced [m]."""
     return fill(
         Shape(*box_surface(size)), TetSpec(path=(), radius=1e-3, spacing=spacing, coarsest=spacing)

@@ -20,7 +20,7 @@ from palpate.app.services import Desk, DeskOf
 from palpate.foundation.errors import PalpateError
 
 if TYPE_CHECKING:
-    from palpate.recording.interactive import Felt
+    from palpate.recording.interactive import InteractiveFrame
 
 __all__ = ["router"]
 
@@ -147,7 +147,7 @@ def _led(desk: Desk, page: str, hands: dict[str, Hand], request: LedRequest) -> 
     }
 
 
-def told(felt: Felt) -> dict[str, Any]:
+def told(felt: InteractiveFrame) -> dict[str, Any]:
     """What was felt, plain values, SI."""
     return {
         "depth": finite(felt.depth),

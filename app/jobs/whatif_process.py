@@ -12,8 +12,8 @@ from palpate.app.storage.run_store import Run
 from palpate.foundation.errors import RunError
 
 if TYPE_CHECKING:
-    from palpate.recording.interactive import Felt, Live
-    from palpate.recording.resolve_frame import Moment
+    from palpate.recording.interactive import InteractiveFrame, InteractiveReplay
+    from palpate.recording.resolve_frame import ResolvedFrame
 
 __all__ = ["Hand", "Lives", "WhatIfs"]
 
@@ -31,7 +31,7 @@ class WhatIfs(Solver):
 
     def solve(
         self, run: Run, sequence: str, frame: int, effects: list[dict[str, Any]], tuned: bool
-    ) -> Moment:
+    ) -> ResolvedFrame:
         """The frame with these effects; RunError where the solve takes too long or its process
         ends.
         """
@@ -60,7 +60,7 @@ class Hand:
 class Lives(Solver):
     """Blocks under tools that hands lead, all in one process of their own."""
 
-    def at(self, hand: Hand, centre: tuple[float, float, float], within: bool = False) -> Felt:
+    def at(self, hand: Hand, centre: tuple[float, float, float], within: bool = False) -> InteractiveFrame:
         """What the block answers with the tool there [m]; RunError where it takes too long or the
         process ends.
         """
@@ -86,9 +86,9 @@ def _key(run: Run, sequence: str) -> tuple[str, str, tuple[int, ...], str]:
 def _beginnings(
     folder: str, sequence: str, clouds: tuple[int, ...], model: str
 ) -> list[dict[str, Any]]:
-    from palpate.recording.resolve_frame import opened
+    from palpate.recording.resolve_frame import open_resolver
 
-    return opened(folder, sequence, clouds, model).beginnings()
+    return open_resolver(folder, sequence, clouds, model).beginnings()
 
 
 def _solve(
@@ -99,26 +99,26 @@ def _solve(
     frame: int,
     effects: list[dict[str, Any]],
     tuned: bool,
-) -> Moment:
-    from palpate.recording.resolve_frame import opened
+) -> ResolvedFrame:
+    from palpate.recording.resolve_frame import open_resolver
     from palpate.recording.saved_model import effects_from
 
-    return opened(folder, sequence, clouds, model).solve(frame, effects_from(effects), tuned)
+    return open_resolver(folder, sequence, clouds, model).solve(frame, effects_from(effects), tuned)
 
 
-_hands: OrderedDict[str, Live] = OrderedDict()
+_hands: OrderedDict[str, InteractiveReplay] = OrderedDict()
 
 
-def _felt(hand: Hand, centre: tuple[float, float, float], within: bool) -> Felt:
+def _felt(hand: Hand, centre: tuple[float, float, float], within: bool) -> InteractiveFrame:
     import numpy as np
 
-    from palpate.recording.resolve_frame import opened
+    from palpate.recording.resolve_frame import open_resolver
     from palpate.recording.saved_model import effects_from
 
     key = json.dumps([hand.name, hand.key, hand.effects, hand.tuned])
     live = _hands.pop(key, None)
     if live is None:
-        live = opened(*hand.key).live(effects_from(hand.effects), hand.tuned)
+        live = open_resolver(*hand.key).live(effects_from(hand.effects), hand.tuned)
     _hands[key] = live
     while len(_hands) > MOST_HANDS:
         _hands.popitem(last=False)

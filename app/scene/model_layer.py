@@ -14,7 +14,7 @@ from palpate.app.scene.view import MODELS, Model, Quantity
 from palpate.app.storage.run_store import Replay
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
-from palpate.recording.interior_fields import Inside
+from palpate.recording.interior_fields import InteriorFields
 
 __all__ = ["NO_INSIDE", "Found", "Side", "end_of_scale", "sides_of"]
 
@@ -26,7 +26,7 @@ to nothing."""
 
 class Found(Protocol):
     """A frame solved again, in place of a recorded one: arrays as in
-    `palpate.recording.resolve_frame.Moment`.
+    `palpate.recording.resolve_frame.ResolvedFrame`.
     """
 
     @property
@@ -45,7 +45,7 @@ class Found(Protocol):
     def camera(self) -> FloatArray: ...
 
     @property
-    def inside(self) -> Inside | None: ...
+    def inside(self) -> InteriorFields | None: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Side:
 
     replay: Replay
     model: Model
-    inside: Inside | None
+    inside: InteriorFields | None
     instead: int | None = None
     found: Found | None = None
 
@@ -115,7 +115,7 @@ class Side:
         inside, at = self._inside(frame)
         return None if inside is None else places + inside.displacement(at, places)
 
-    def _inside(self, frame: int) -> tuple[Inside | None, int]:
+    def _inside(self, frame: int) -> tuple[InteriorFields | None, int]:
         return (self._found(frame).inside, 0) if frame == self.instead else (self.inside, frame)
 
     def _found(self, frame: int) -> Found:
@@ -134,7 +134,7 @@ def sides_of(replay: Replay) -> dict[Model, Side]:
     held = [
         model for model in MODELS if model in replay.arrays and f"error_{model}" in replay.arrays
     ]
-    return {model: Side(replay, model, Inside.read(replay.arrays, model)) for model in held}
+    return {model: Side(replay, model, InteriorFields.read(replay.arrays, model)) for model in held}
 
 
 def end_of_scale(replay: Replay, quantity: Quantity) -> float | None:
@@ -146,7 +146,7 @@ def end_of_scale(replay: Replay, quantity: Quantity) -> float | None:
         return nice_limit(replay["error_raw"])
     if quantity == "displacement":
         return nice_end(np.linalg.norm(replay["raw"] - replay["rest"], axis=2), share, 1e-4, 1e-3)
-    inside = Inside.read(replay.arrays, "raw")
+    inside = InteriorFields.read(replay.arrays, "raw")
     if inside is None:
         return None
     energy = np.asarray(inside.energy, dtype=float)

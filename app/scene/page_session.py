@@ -25,8 +25,8 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import PalpateError
 
 if TYPE_CHECKING:
-    from palpate.recording.interactive import Felt
-    from palpate.recording.resolve_frame import Moment
+    from palpate.recording.interactive import InteractiveFrame
+    from palpate.recording.resolve_frame import ResolvedFrame
 
 __all__ = ["Session", "Sessions", "Touch", "Trial"]
 
@@ -42,7 +42,7 @@ class Trial:
     run: str
     sequence: str
     frame: int
-    moment: Moment
+    moment: ResolvedFrame
 
     def fits(self, view: View, frame: int) -> bool:
         """Whether it is of what this view shows."""
@@ -58,7 +58,7 @@ class Touch:
     run: str
     sequence: str
     model: Model
-    felt: Felt
+    felt: InteractiveFrame
 
     def seen(self, view: View) -> View:
         """The view as it is shown: nobody measured this push, so that there is no cloud and no

@@ -21,10 +21,10 @@ from scipy.linalg import cho_factor, cho_solve
 
 from palpate.fem.contact import assemble_contact, contact_energy
 from palpate.fem.linalg.direct_solver import NotPositiveDefinite
-from palpate.fem.model import CONTACT_STIFFNESS, BlockModel, Probe
+from palpate.fem.model import CONTACT_STIFFNESS, BlockModel, ToolSphere
 from palpate.foundation.arrays import FloatArray, IntArray
 
-__all__ = ["Compliance"]
+__all__ = ["CondensedContact"]
 
 _MARGIN, _EDGES = 5e-4, 0.3
 """Surface nodes this far from the ball [m], or this share of their side's length, may come to touch
@@ -34,7 +34,7 @@ _INNER_STEPS = 25
 _INNER_TOLERANCE = 1e-8
 
 
-class Compliance:
+class CondensedContact:
     """The answer of a body to forces near the tool, linearised at one state; `at` makes one."""
 
     def __init__(
@@ -43,7 +43,7 @@ class Compliance:
         faces: IntArray,
         nodes: IntArray,
         positions: FloatArray,
-        probe: Probe,
+        tool: ToolSphere,
     ) -> None:
         self._faces, self._nodes = faces, nodes
         self._unknown = model.topology.unknown[nodes].ravel()
@@ -51,8 +51,8 @@ class Compliance:
         where[nodes] = np.arange(len(nodes))
         self._local = np.ascontiguousarray(where[model.topology.surface[faces]])
         self._slots = _dense_slots(self._local, len(nodes))
-        self._share = self._contact(model, positions[nodes], probe, bending=False)[1]
-        self._held = np.linalg.inv(model.topology.factor.answers(self._unknown))
+        self._share = self._contact(model, positions[nodes], tool, bending=False)[1]
+        self._held = np.linalg.inv(model.topology.factor.inverse_entries(self._unknown))
         self._stiffness = self._held - self._share
         self._topology, self._generation = model.topology, model.topology.factor.generation
 
@@ -64,32 +64,32 @@ class Compliance:
         )
 
     @classmethod
-    def at(cls, model: BlockModel, positions: FloatArray, probe: Probe) -> Self | None:
+    def at(cls, model: BlockModel, positions: FloatArray, tool: ToolSphere) -> Self | None:
         """Linearise at these positions (n, 3) [m]; None when nothing is near the tool or the
         tangent has no factor.
         """
         top = model.topology
-        distance = np.linalg.norm(positions[top.surface] - probe.centre, axis=2)
+        distance = np.linalg.norm(positions[top.surface] - tool.centre, axis=2)
         edges = np.linalg.norm(positions[top.surface] - positions[top.surface[:, :1]], axis=2).max(
             axis=1
         )
         near = np.flatnonzero(
-            distance.min(axis=1) < probe.radius + np.maximum(_MARGIN, _EDGES * edges)
+            distance.min(axis=1) < tool.radius + np.maximum(_MARGIN, _EDGES * edges)
         )
         nodes = np.unique(top.surface[near])
         nodes = nodes[top.free[nodes].all(axis=1)]
         near = near[np.isin(top.surface[near], nodes).all(axis=1)]
         if not len(near):
             return None
-        state = model.assemble(positions, probe, bending=False)
+        state = model.assemble(positions, tool, bending=False)
         try:
             model.factorise(state.data)
         except NotPositiveDefinite:
             return None
-        return cls(model, near, nodes, positions, probe)
+        return cls(model, near, nodes, positions, tool)
 
     def _contact(
-        self, model: BlockModel, positions: FloatArray, probe: Probe, *, bending: bool = True
+        self, model: BlockModel, positions: FloatArray, tool: ToolSphere, *, bending: bool = True
     ) -> tuple[FloatArray, FloatArray]:
         """Contact force (m,) and its tangent (m, m) on the nodes near the tool, at these positions
         of theirs.
@@ -101,8 +101,8 @@ class Compliance:
             model.face.shapes,
             model.face.gradients,
             positions,
-            probe.centre,
-            probe.radius,
+            tool.centre,
+            tool.radius,
             False,
             not model.dense,
             CONTACT_STIFFNESS,
@@ -112,13 +112,13 @@ class Compliance:
             data,
             np.zeros(3),
         )
-        if model.grip is not None:
-            grip = model.grip.of(self._faces)
+        if model.friction_potential is not None:
+            grip = model.friction_potential.of(self._faces)
             grip.assemble(
                 self._local,
                 model.face,
                 positions,
-                probe.centre,
+                tool.centre,
                 self._slots,
                 force,
                 data,
@@ -127,16 +127,16 @@ class Compliance:
         return force.ravel(), data.reshape(positions.size, positions.size)
 
     def step(
-        self, model: BlockModel, positions: FloatArray, residual: FloatArray, probe: Probe
+        self, model: BlockModel, positions: FloatArray, residual: FloatArray, tool: ToolSphere
     ) -> FloatArray | None:
         """Positions after one step; None when the contact finds no balance."""
         free = model.topology.factor.approximate(residual)
         here = positions[self._nodes]
-        touched, _ = self._contact(model, here, probe)
-        change = self._balance(model, here, probe, self._held @ free[self._unknown] - touched)
+        touched, _ = self._contact(model, here, tool)
+        change = self._balance(model, here, tool, self._held @ free[self._unknown] - touched)
         if change is None:
             return None
-        force, _ = self._contact(model, here + change.reshape(-1, 3), probe)
+        force, _ = self._contact(model, here + change.reshape(-1, 3), tool)
         moved = positions.copy()
         further = np.zeros_like(residual)
         further[self._unknown] = force - touched - self._share @ change
@@ -144,18 +144,18 @@ class Compliance:
         return moved
 
     def _balance(
-        self, model: BlockModel, here: FloatArray, probe: Probe, load: FloatArray
+        self, model: BlockModel, here: FloatArray, tool: ToolSphere, load: FloatArray
     ) -> FloatArray | None:
         """The change (m,) that minimises the condensed body's energy and the contact's, by Newton's
         method with a line search.
         """
         change = np.zeros(len(load))
-        energy = self._energy(model, here, probe, load, change)
+        energy = self._energy(model, here, tool, load, change)
         for _ in range(_INNER_STEPS):
-            slope, move = self._move(model, here, probe, load, change)
+            slope, move = self._move(model, here, tool, load, change)
             length = 1.0
             while length > 1e-3:
-                value = self._energy(model, here, probe, load, change + length * move)
+                value = self._energy(model, here, tool, load, change + length * move)
                 if value <= energy + 1e-4 * length * float(slope @ move) + model.rounding:
                     break
                 length /= 2
@@ -168,27 +168,27 @@ class Compliance:
         self,
         model: BlockModel,
         here: FloatArray,
-        probe: Probe,
+        tool: ToolSphere,
         load: FloatArray,
         change: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
         """Gradient of the condensed energy (m,) and Newton's step; without the contact's bending
         where that is not positive.
         """
-        force, tangent = self._contact(model, here + change.reshape(-1, 3), probe)
+        force, tangent = self._contact(model, here + change.reshape(-1, 3), tool)
         slope = self._stiffness @ change + load + force
         try:
             factor = cho_factor(self._stiffness + tangent, check_finite=False)
             return slope, np.asarray(-cho_solve(factor, slope, check_finite=False))
         except LinAlgError:
-            _, tangent = self._contact(model, here + change.reshape(-1, 3), probe, bending=False)
+            _, tangent = self._contact(model, here + change.reshape(-1, 3), tool, bending=False)
             return slope, np.asarray(-np.linalg.solve(self._stiffness + tangent, slope))
 
     def _energy(
         self,
         model: BlockModel,
         here: FloatArray,
-        probe: Probe,
+        tool: ToolSphere,
         load: FloatArray,
         change: FloatArray,
     ) -> float:
@@ -199,15 +199,15 @@ class Compliance:
             model.face.shapes,
             model.face.gradients,
             here + change.reshape(-1, 3),
-            probe.centre,
-            probe.radius,
+            tool.centre,
+            tool.radius,
             False,
             not model.dense,
             CONTACT_STIFFNESS,
         )
-        if model.grip is not None:
-            touched += model.grip.of(self._faces).energy(
-                self._local, model.face, here + change.reshape(-1, 3), probe.centre
+        if model.friction_potential is not None:
+            touched += model.friction_potential.of(self._faces).energy(
+                self._local, model.face, here + change.reshape(-1, 3), tool.centre
             )
         return float(0.5 * change @ self._stiffness @ change + load @ change + touched)
 

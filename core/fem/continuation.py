@@ -8,20 +8,20 @@ from itertools import pairwise
 
 import numpy as np
 
-from palpate.fem.model import BlockModel, Probe
-from palpate.fem.modified_newton import Follower
-from palpate.fem.newton import MAX_PENETRATION, Outcome, Solution, misfit, solve
+from palpate.fem.model import BlockModel, ToolSphere
+from palpate.fem.modified_newton import ModifiedNewton
+from palpate.fem.newton import MAX_PENETRATION, Outcome, Solution, relative_residual, solve
 from palpate.foundation.arrays import FloatArray
 from palpate.setup.setup import Box, Shape
 
-__all__ = ["DEEPEST", "FREE_STEP", "STAGE_TOLERANCE", "first_touch", "lead"]
+__all__ = ["FREE_STEP", "HARDENING_PENETRATION", "STAGE_TOLERANCE", "first_touch", "move_tool"]
 
 FREE_STEP = 1.5e-3
 """Longest motion in contact [m] that is tried at once."""
 STAGE_TOLERANCE = 0.2
 """Residual at which a place on the way counts as reached: the next stage only begins from it."""
 
-DEEPEST = 2e-4
+HARDENING_PENETRATION = 2e-4
 """Penetration [m] from which on the contact is hardened, by _HARDER at a time, to _HARDEST times
 what it is at first."""
 _HARDER, _HARDEST = 4.0, 64.0
@@ -30,30 +30,34 @@ _HALVINGS = 40
 changes."""
 
 
-def lead(
+def move_tool(
     model: BlockModel,
     positions: FloatArray,
-    before: Probe,
-    probe: Probe,
+    before: ToolSphere,
+    tool: ToolSphere,
     tolerance: float,
-    follower: Follower,
+    quick_solver: ModifiedNewton,
     *,
     haste: bool = False,
 ) -> Solution:
-    """Equilibrium at `probe`, led there from an equilibrium (n, 3) [m] with the tool at `before`;
+    """Equilibrium at `tool`, led there from an equilibrium (n, 3) [m] with the tool at `before`;
     in haste only if that is easy.
 
     Where the tool is pressed in so hard that the contact's penalty gives way, the contact is
     hardened step by step.
     """
     model.harden(1.0)
-    solution = _led(model, positions, (before, probe), tolerance, follower, haste)
-    while solution.converged and model.notice(solution.positions, probe):
-        wary = solve(model, probe, solution.positions, probe, tolerance)
+    solution = _move_in_stages(model, positions, (before, tool), tolerance, quick_solver, haste)
+    while solution.converged and model.add_penetrated(solution.positions, tool):
+        wary = solve(model, tool, solution.positions, tool, tolerance)
         solution = replace(wary, iterations=solution.iterations + wary.iterations)
-    while solution.converged and solution.penetration > DEEPEST and model.hardness < _HARDEST:
+    while (
+        solution.converged
+        and solution.penetration > HARDENING_PENETRATION
+        and model.hardness < _HARDEST
+    ):
         model.harden(_HARDER * model.hardness)
-        harder = solve(model, probe, solution.positions, probe, tolerance)
+        harder = solve(model, tool, solution.positions, tool, tolerance)
         solution = replace(harder, iterations=solution.iterations + harder.iterations)
     if (
         solution.converged and solution.penetration > MAX_PENETRATION
@@ -62,38 +66,44 @@ def lead(
     return solution
 
 
-def _led(
+def _move_in_stages(
     model: BlockModel,
     positions: FloatArray,
-    probes: tuple[Probe, Probe],
+    tools: tuple[ToolSphere, ToolSphere],
     tolerance: float,
-    follower: Follower,
+    quick_solver: ModifiedNewton,
     haste: bool,
 ) -> Solution:
     """Places on the way are reached roughly at first; where that leads astray, the way is gone
     again with care.
     """
-    before, probe = probes
-    steps = max(1, int(np.ceil(float(np.linalg.norm(probe.centre - before.centre)) / FREE_STEP)))
+    before, tool = tools
+    steps = max(1, int(np.ceil(float(np.linalg.norm(tool.centre - before.centre)) / FREE_STEP)))
     if steps == 1:
-        near = follower.solve(model, probe, _carried(model, positions, before, probe), tolerance)
+        near = quick_solver.solve(
+            model, tool, _predicted_positions(model, positions, before, tool), tolerance
+        )
         return (
             near
             if near is not None
-            else solve(model, probe, positions, None if haste else before, tolerance)
+            else solve(model, tool, positions, None if haste else before, tolerance)
         )
     stages = [
-        Probe(before.centre + share * (probe.centre - before.centre), probe.radius)
+        ToolSphere(before.centre + share * (tool.centre - before.centre), tool.radius)
         for share in np.arange(1, steps) / steps
     ]
-    hasty = _through(model, positions, [before, *stages, probe], tolerance, follower, careful=False)
+    hasty = _pass_stages(
+        model, positions, [before, *stages, tool], tolerance, quick_solver, careful=False
+    )
     if hasty.converged or haste:
         return hasty
-    careful = _through(model, positions, [before, *stages, probe], tolerance, None, careful=True)
+    careful = _pass_stages(model, positions, [before, *stages, tool], tolerance, None, careful=True)
     return replace(careful, iterations=hasty.iterations + careful.iterations)
 
 
-def _carried(model: BlockModel, positions: FloatArray, before: Probe, probe: Probe) -> FloatArray:
+def _predicted_positions(
+    model: BlockModel, positions: FloatArray, before: ToolSphere, tool: ToolSphere
+) -> FloatArray:
     """Positions (n, 3) [m] from which a step begins: those given, or with the surface carried along
     as the ball moves and grows.
 
@@ -104,35 +114,39 @@ def _carried(model: BlockModel, positions: FloatArray, before: Probe, probe: Pro
     distance = np.linalg.norm(arm, axis=1, keepdims=True)
     reach = np.exp(-((np.maximum(distance / before.radius - 1.0, 0.0)) ** 2))
     move = reach * (
-        probe.centre
+        tool.centre
         - before.centre
-        + (probe.radius - before.radius) * arm / np.maximum(distance, 1e-12)
+        + (tool.radius - before.radius) * arm / np.maximum(distance, 1e-12)
     )
     carried = np.where(model.topology.free, positions + move, positions)
-    there, here = (model.assemble(place, probe, tangent=False) for place in (carried, positions))
-    return carried if misfit(model, there) < misfit(model, here) else positions
+    there, here = (model.assemble(place, tool, tangent=False) for place in (carried, positions))
+    return (
+        carried if relative_residual(model, there) < relative_residual(model, here) else positions
+    )
 
 
-def _through(
+def _pass_stages(
     model: BlockModel,
     positions: FloatArray,
-    probes: list[Probe],
+    tools: list[ToolSphere],
     tolerance: float,
-    follower: Follower | None,
+    quick_solver: ModifiedNewton | None,
     careful: bool,
 ) -> Solution:
     """The last of the solutions at each place after the first, or the first that is none."""
     rough = tolerance if careful else max(tolerance, STAGE_TOLERANCE)
     iterations = 0
-    for last, probe in pairwise(probes):
-        wanted = tolerance if probe is probes[-1] else rough
+    for last, tool in pairwise(tools):
+        wanted = tolerance if tool is tools[-1] else rough
         near = None
-        if follower is not None:
-            near = follower.solve(model, probe, _carried(model, positions, last, probe), wanted)
+        if quick_solver is not None:
+            near = quick_solver.solve(
+                model, tool, _predicted_positions(model, positions, last, tool), wanted
+            )
         solution = (
             near
             if near is not None
-            else solve(model, probe, positions, last if careful else None, wanted)
+            else solve(model, tool, positions, last if careful else None, wanted)
         )
         iterations += solution.iterations
         if not solution.converged:
@@ -142,18 +156,18 @@ def _through(
 
 
 def first_touch(
-    before: Probe, probe: Probe, body: Box | Shape, away: Callable[[Probe], bool]
-) -> Probe:
-    """The last place on the way to `probe` that is clear of the body at rest, as `away` tells."""
+    before: ToolSphere, tool: ToolSphere, body: Box | Shape, away: Callable[[ToolSphere], bool]
+) -> ToolSphere:
+    """The last place on the way to `tool` that is clear of the body at rest, as `away` tells."""
     low, high = 0.0, 1.0
-    if np.linalg.norm(before.centre - probe.centre) > 1.0 or not away(before):
+    if np.linalg.norm(before.centre - tool.centre) > 1.0 or not away(before):
         middle = (body.low + body.high) / 2
-        before = Probe(
-            probe.centre + (probe.centre - middle) / np.linalg.norm(probe.centre - middle) * 0.05,
-            probe.radius,
+        before = ToolSphere(
+            tool.centre + (tool.centre - middle) / np.linalg.norm(tool.centre - middle) * 0.05,
+            tool.radius,
         )
     for _ in range(_HALVINGS):
         share = (low + high) / 2
-        clear = away(Probe(before.centre + share * (probe.centre - before.centre), probe.radius))
+        clear = away(ToolSphere(before.centre + share * (tool.centre - before.centre), tool.radius))
         low, high = (share, high) if clear else (low, share)
-    return Probe(before.centre + low * (probe.centre - before.centre), probe.radius)
+    return ToolSphere(before.centre + low * (tool.centre - before.centre), tool.radius)

@@ -21,7 +21,7 @@ from scipy.spatial import cKDTree
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.mesh.elements import Face
 
-__all__ = ["STICK_STIFFNESS", "Grip", "Hold"]
+__all__ = ["STICK_STIFFNESS", "FrictionHistory", "FrictionPotential"]
 
 STICK_STIFFNESS = 5e4
 """Tangential traction over E per way from the anchor [1/m], times the surface's stiffness over
@@ -30,7 +30,7 @@ _NEIGHBOURS = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Grip:
+class FrictionPotential:
     """What holds the surface while one equilibrium is sought, at the quadrature points (g, p) of
     those faces that touch.
 
@@ -97,7 +97,7 @@ class Grip:
 
 
 @dataclass(frozen=True, eq=False)
-class Hold:
+class FrictionHistory:
     """What one frame leaves to the next: points of the surface at rest (m, 3) [m], tangential ways
     from their anchors (m, 3) [m], which of them (m,) are touched, and what friction holds at most,
     over E and area (m,) [1]; none touched is a fresh start.
@@ -209,7 +209,7 @@ def _assemble(
     data: Any,
     resultant: Any,
 ) -> None:
-    """As `Grip.assemble`, for the faces (g, b) and slots (g, 3 b, 3 b) of the grip; the tangent is
+    """As `FrictionPotential.assemble`, for the faces (g, b) and slots (g, 3 b, 3 b) of the grip; the tangent is
     never negative.
     """
     way = np.empty(3)

@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from palpate.fem.model import rule_of
+from palpate.fem.model import element_quadrature
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import MeshError
 from palpate.mesh.box_mesh import BoxMesh, GridSpec
@@ -54,7 +54,7 @@ def quadrature_tangents(mesh: Mesh, positions: FloatArray) -> FloatArray:
     """Derivatives (e, q, 3, 3) of the positions (n, 3) along x, y, z, one row each, at the
     quadrature points [1].
     """
-    gradients = rule_of(mesh).gradients
+    gradients = element_quadrature(mesh).gradients
     return np.asarray(np.swapaxes(gradients, 2, 3) @ positions[mesh.connectivity.elements][:, None])
 
 
@@ -78,7 +78,7 @@ class QuadraturePoints:
     def read(self, mesh: Mesh, field: FloatArray) -> FloatArray:
         """As `MaterialPoints` has it."""
         self._same(mesh)
-        return field.reshape(*rule_of(mesh).weights.shape, -1)
+        return field.reshape(*element_quadrature(mesh).weights.shape, -1)
 
 
 class CellPoints:
@@ -133,7 +133,7 @@ def _elements(mesh: BoxMesh) -> tuple[int, int, int]:
 
 def _points_along(mesh: BoxMesh) -> int:
     """Of the quadrature of an element, along one edge."""
-    return round(float(np.cbrt(rule_of(mesh).weights.shape[1])))
+    return round(float(np.cbrt(element_quadrature(mesh).weights.shape[1])))
 
 
 @lru_cache(maxsize=96)
@@ -155,7 +155,7 @@ def _reading(cells: CellPoints, mesh: BoxMesh, axis: int) -> FloatArray:
     """
     corners, points = cells._corners[axis], _points_along(mesh)
     middles = (corners[1:] + corners[:-1]) / 2
-    apart = rule_of(mesh).places.reshape(*_elements(mesh)[::-1], *([points] * 3), 3)
+    apart = element_quadrature(mesh).places.reshape(*_elements(mesh)[::-1], *([points] * 3), 3)
     places = np.moveaxis(apart[..., axis], (2 - axis, 5 - axis), (0, 1))[:, :, 0, 0, 0, 0].ravel()
     found = np.zeros((len(places), len(middles)))
     index = np.clip(np.searchsorted(middles, places) - 1, 0, len(middles) - 2)

@@ -14,24 +14,28 @@ from typing import Any, Protocol
 import numpy as np
 
 from palpate.fem.constitutive.elastic import Law, assemble_elastic, elastic_energy, lame
-from palpate.fem.constitutive.stiffness_field import SurfaceSpots, log_stiffness, surface_stiffness
+from palpate.fem.constitutive.stiffness_field import (
+    SurfaceQuadrature,
+    log_stiffness,
+    surface_stiffness,
+)
 from palpate.fem.contact import assemble_contact, contact_energy
-from palpate.fem.friction import Grip
+from palpate.fem.friction import FrictionPotential
 from palpate.fem.linalg.sparsity import face_slots, factor_of, upper_pattern
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.elements import Face, Quadrature, face_weights, quadrature
 from palpate.mesh.protocol import Connectivity, Mesh
-from palpate.setup.closest_point import turns_around
+from palpate.setup.closest_point import winding_number
 from palpate.setup.setup import Box, Detachment, Setup, Shape, Support
 
 __all__ = [
     "CONTACT_STIFFNESS",
     "Assembly",
     "BlockModel",
-    "Probe",
+    "ToolSphere",
     "Topology",
-    "rule_of",
-    "surface_spots",
+    "element_quadrature",
+    "surface_quadrature",
     "topology",
 ]
 
@@ -48,14 +52,14 @@ BoolArray = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 @dataclass(frozen=True, eq=False)
-class Probe:
+class ToolSphere:
     """The tool at one instant: centre (3,) [m] in the phantom frame, radius [m]."""
 
     centre: FloatArray
     radius: float
 
 
-class Carried(Protocol):
+class AddedPotential(Protocol):
     """A quadratic potential of the unknowns' displacements that one step in time adds
     (`palpate.fem.history_stress`).
     """
@@ -136,24 +140,24 @@ def _sprung(support: Support) -> bool:
 
 
 @lru_cache(maxsize=12)
-def rule_of(mesh: Mesh) -> Quadrature:
+def element_quadrature(mesh: Mesh) -> Quadrature:
     """Quadrature of the elements: the mesh's alone."""
     shared = mesh.connectivity
     return quadrature(shared.element, mesh.nodes[shared.elements])
 
 
 @lru_cache(maxsize=12)
-def surface_spots(mesh: Mesh, face: Face) -> SurfaceSpots:
+def surface_quadrature(mesh: Mesh, face: Face) -> SurfaceQuadrature:
     """The free surface's points in this quadrature of the elements' sides."""
     corners = mesh.nodes[mesh.connectivity.surface]
-    return SurfaceSpots(
+    return SurfaceQuadrature(
         np.einsum("qa,fai->fqi", face.shapes, corners), np.sqrt(face_weights(face, corners))
     )
 
 
 class BlockModel:
     """One block on one mesh: energy, residual and tangent as functions of the node positions (n, 3)
-    [m] and the probe.
+    [m] and the tool.
 
     Attributes:
         mu, bulk: (e, q) over E at the quadrature points [1].
@@ -173,7 +177,7 @@ class BlockModel:
         element, height = self.topology.element, setup.geometry.height
         self.law, self.dense = Law.of(setup.material), dense
         self.face, self._base_face = element.dense_face if dense else element.face, element.face
-        self.rule, spots = rule_of(mesh), surface_spots(mesh, self.face)
+        self.rule, spots = element_quadrature(mesh), surface_quadrature(mesh, self.face)
         self.areas, self.hardness = (
             spots.edges**2 * surface_stiffness(setup.material, spots, height),
             1.0,
@@ -186,8 +190,8 @@ class BlockModel:
         # Sums of squares near three lose their last digits when three is taken off, in proportion
         # to this stiffness times volume.
         self.rounding = 4e-16 * float(np.vdot(self.mu, self.rule.weights))
-        self.carried: Carried | None = None
-        self.grip: Grip | None = None
+        self.added_potential: AddedPotential | None = None
+        self.friction_potential: FrictionPotential | None = None
         self.weight_force = self._weight(setup.load.specific_weight_over_stiffness)
         self._prepare_base(setup)
 
@@ -201,32 +205,32 @@ class BlockModel:
         if hardness != self.hardness:
             self.areas, self.hardness = self.areas * (hardness / self.hardness), hardness
 
-    def expect(self, positions: FloatArray, probes: tuple[Probe, ...]) -> None:
+    def restrict_to_facing(self, positions: FloatArray, tools: tuple[ToolSphere, ...]) -> None:
         """Feel these tools at all points that face one of them from positions (n, 3) [m], however
         they turn; only if dense.
         """
         if self.dense:
-            facing = np.any([self.facing(positions, probe)[0] for probe in probes], axis=0)
+            facing = np.any([self.facing(positions, tool)[0] for tool in tools], axis=0)
             self.areas = np.where(facing, self._all_areas * self.hardness, 0.0)
 
-    def notice(self, positions: FloatArray, probe: Probe) -> bool:
+    def add_penetrated(self, positions: FloatArray, tool: ToolSphere) -> bool:
         """Feel the tool also at points that have come to face it from within; whether there are
         any.
         """
         if not self.dense:
             return False
-        facing, depth = self.facing(positions, probe)
+        facing, depth = self.facing(positions, tool)
         new = facing & (depth > 0) & (self.areas == 0)
         self.areas = np.where(new, self._all_areas * self.hardness, self.areas)
         return bool(new.any())
 
-    def facing(self, positions: FloatArray, probe: Probe) -> tuple[BoolArray, FloatArray]:
+    def facing(self, positions: FloatArray, tool: ToolSphere) -> tuple[BoolArray, FloatArray]:
         """Which points (f, p) of the surface face a tool, and how deep they lie in it [m]."""
         corners = positions[self.topology.surface]
-        seen = np.einsum("qa,fai->fqi", self.face.shapes, corners) - probe.centre
+        seen = np.einsum("qa,fai->fqi", self.face.shapes, corners) - tool.centre
         tangents = np.einsum("qac,fai->fqci", self.face.gradients, corners)
         facing = np.einsum("fqi,fqi->fq", np.cross(tangents[:, :, 0], tangents[:, :, 1]), seen) < 0
-        return facing, probe.radius - np.linalg.norm(seen, axis=2)
+        return facing, tool.radius - np.linalg.norm(seen, axis=2)
 
     def _weight(self, specific: float) -> FloatArray:
         """Weight at the nodes over E (n,) [m^2]."""
@@ -255,30 +259,32 @@ class BlockModel:
         moved = (positions - self.mesh.nodes)[self.topology.base]
         return np.asarray(np.einsum("fab,fbi->fai", self.bond, moved))
 
-    def energy(self, positions: FloatArray, probe: Probe | None) -> float:
+    def energy(self, positions: FloatArray, tool: ToolSphere | None) -> float:
         """Total potential over E [m^3]; infinite when an element is inverted."""
         top = self.topology
         total = elastic_energy(self.law, self.rule, top.elements, self.mu, self.bulk, positions)
         if not np.isfinite(total):
             return np.inf
         total += float(self.weight_force @ (positions[:, 2] - self.mesh.nodes[:, 2]))
-        if self.carried is not None:
-            total += self.carried.energy((positions - self.mesh.nodes)[top.free])
-        if probe is not None:
+        if self.added_potential is not None:
+            total += self.added_potential.energy((positions - self.mesh.nodes)[top.free])
+        if tool is not None:
             total += contact_energy(
                 top.surface,
                 self.areas,
                 self.face.shapes,
                 self.face.gradients,
                 positions,
-                probe.centre,
-                probe.radius,
+                tool.centre,
+                tool.radius,
                 False,
                 not self.dense,
                 CONTACT_STIFFNESS,
             )
-            if self.grip is not None:
-                total += self.grip.energy(top.surface, self.face, positions, probe.centre)
+            if self.friction_potential is not None:
+                total += self.friction_potential.energy(
+                    top.surface, self.face, positions, tool.centre
+                )
         if self.sprung:
             moved = (positions - self.mesh.nodes)[top.base]
             total += 0.5 * float(np.vdot(moved, self._bond_gradient(positions)))
@@ -300,7 +306,7 @@ class BlockModel:
     def assemble(
         self,
         positions: FloatArray,
-        probe: Probe | None,
+        tool: ToolSphere | None,
         *,
         tangent: bool = True,
         bending: bool = True,
@@ -316,15 +322,15 @@ class BlockModel:
             self.law, self.rule, top.elements, self.mu, self.bulk, positions, top.slots, force, data
         )
         force[:, 2] += self.weight_force
-        if probe is not None:
+        if tool is not None:
             penetration = assemble_contact(
                 top.surface,
                 self.areas,
                 self.face.shapes,
                 self.face.gradients,
                 positions,
-                probe.centre,
-                probe.radius,
+                tool.centre,
+                tool.radius,
                 False,
                 not self.dense,
                 CONTACT_STIFFNESS,
@@ -334,12 +340,12 @@ class BlockModel:
                 data,
                 push,
             )
-            if self.grip is not None:
-                self.grip.assemble(
+            if self.friction_potential is not None:
+                self.friction_potential.assemble(
                     top.surface,
                     self.face,
                     positions,
-                    probe.centre,
+                    tool.centre,
                     top.surface_slots,
                     force,
                     data,
@@ -348,9 +354,9 @@ class BlockModel:
         if self.sprung:
             self._assemble_base(positions, force, data)
         residual = force[top.free]
-        if self.carried is not None:
-            residual += self.carried.force((positions - self.mesh.nodes)[top.free])
-            data = data + self.carried.data if tangent else data
+        if self.added_potential is not None:
+            residual += self.added_potential.force((positions - self.mesh.nodes)[top.free])
+            data = data + self.added_potential.data if tangent else data
         return Assembly(residual, data, push, penetration)
 
     def _assemble_base(self, positions: FloatArray, force: FloatArray, data: FloatArray) -> None:
@@ -383,14 +389,14 @@ class BlockModel:
             np.zeros(3),
         )
 
-    def depth_inside(self, positions: FloatArray, probe: Probe) -> float:
+    def depth_inside(self, positions: FloatArray, tool: ToolSphere) -> float:
         """How deep the deepest node of the free surface lies inside the tool [m], whichever way it
         faces.
         """
-        distance = np.linalg.norm(positions[self.topology.surface.ravel()] - probe.centre, axis=1)
-        return max(0.0, probe.radius - float(distance.min()))
+        distance = np.linalg.norm(positions[self.topology.surface.ravel()] - tool.centre, axis=1)
+        return max(0.0, tool.radius - float(distance.min()))
 
-    def encloses(self, positions: FloatArray, probe: Probe) -> bool:
+    def encloses(self, positions: FloatArray, tool: ToolSphere) -> bool:
         """Whether the tool's centre lies within the deformed block, where no contact would be
         felt."""
-        return bool(turns_around(self.topology.hull, positions, probe.centre) > 0.5)
+        return bool(winding_number(self.topology.hull, positions, tool.centre) > 0.5)

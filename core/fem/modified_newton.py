@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from palpate.fem.contact_condensation import Compliance
-from palpate.fem.model import BlockModel, Probe
-from palpate.fem.newton import Outcome, Solution, misfit, verdict
+from palpate.fem.contact_condensation import CondensedContact
+from palpate.fem.model import BlockModel, ToolSphere
+from palpate.fem.newton import Outcome, Solution, contact_outcome, relative_residual
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["Follower"]
+__all__ = ["ModifiedNewton"]
 
 _MOST_STEPS = 12
 _TIRED = 5
@@ -21,13 +21,13 @@ _ATTEMPTS = 4
 _LONGEST_PAUSE = 4
 
 
-class Follower:
+class ModifiedNewton:
     """Keeps the body's linearisation from frame to frame for as long as its steps shrink the
     residual.
     """
 
     def __init__(self) -> None:
-        self._compliance: Compliance | None = None
+        self._condensed: CondensedContact | None = None
         self._failures = self._pause = 0
 
     @property
@@ -36,7 +36,7 @@ class Follower:
         return self._failures > 0
 
     def solve(
-        self, model: BlockModel, probe: Probe, start: FloatArray, tolerance: float
+        self, model: BlockModel, tool: ToolSphere, start: FloatArray, tolerance: float
     ) -> Solution | None:
         """Equilibrium near `start` (n, 3) [m]; None where it takes a full Newton method to find it.
 
@@ -47,47 +47,47 @@ class Follower:
             return None
         positions, taken = start, 0
         for attempt in range(_ATTEMPTS):
-            compliance = self._compliance
-            if attempt or compliance is None or not compliance.fits(model):
-                compliance = Compliance.at(model, positions, probe)
-            if compliance is None:
+            condensed = self._condensed
+            if attempt or condensed is None or not condensed.fits(model):
+                condensed = CondensedContact.at(model, positions, tool)
+            if condensed is None:
                 break
-            solution = self._steps(compliance, model, probe, positions, tolerance)
+            solution = self._steps(condensed, model, tool, positions, tolerance)
             positions, taken = solution.positions, taken + solution.iterations
             if solution.converged:
-                self._compliance = compliance if solution.iterations <= _TIRED else None
+                self._condensed = condensed if solution.iterations <= _TIRED else None
                 self._failures = 0
                 return replace(solution, iterations=taken)
             if attempt and not solution.iterations:
                 break
-        self._compliance = None
+        self._condensed = None
         self._failures += 1
         self._pause = min(self._failures - 1, _LONGEST_PAUSE)
         return None
 
     def _steps(
         self,
-        compliance: Compliance,
+        condensed: CondensedContact,
         model: BlockModel,
-        probe: Probe,
+        tool: ToolSphere,
         positions: FloatArray,
         tolerance: float,
     ) -> Solution:
         """Step while the residual shrinks; the best positions met when that does not reach the
         tolerance.
         """
-        state = model.assemble(positions, probe, tangent=False)
-        best, residual = state, misfit(model, state)
+        state = model.assemble(positions, tool, tangent=False)
+        best, residual = state, relative_residual(model, state)
         for number in range(_MOST_STEPS):
             if residual <= tolerance:
-                finite = bool(np.isfinite(model.energy(positions, probe)))
-                outcome = verdict(model, probe, positions) if finite else Outcome.INVERTED
+                finite = bool(np.isfinite(model.energy(positions, tool)))
+                outcome = contact_outcome(model, tool, positions) if finite else Outcome.INVERTED
                 return Solution(positions, best.push, outcome, number, residual, best.penetration)
-            trial = compliance.step(model, positions, best.residual, probe)
+            trial = condensed.step(model, positions, best.residual, tool)
             if trial is None:
                 break
-            state = model.assemble(trial, probe, tangent=False)
-            now = misfit(model, state)
+            state = model.assemble(trial, tool, tangent=False)
+            now = relative_residual(model, state)
             if not now < _SHRINKING * residual:
                 break
             positions, best, residual = trial, state, now

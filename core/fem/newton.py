@@ -10,10 +10,18 @@ from enum import Enum
 import numpy as np
 
 from palpate.fem.linalg.direct_solver import NotPositiveDefinite
-from palpate.fem.model import Assembly, BlockModel, Probe
+from palpate.fem.model import Assembly, BlockModel, ToolSphere
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["MAX_PENETRATION", "Outcome", "Solution", "blocked", "misfit", "solve", "verdict"]
+__all__ = [
+    "MAX_PENETRATION",
+    "Outcome",
+    "Solution",
+    "blocked_by_base",
+    "contact_outcome",
+    "relative_residual",
+    "solve",
+]
 
 RELATIVE_TOLERANCE = 1e-6
 """Converged: the residual's norm is below this share of the tool's push and of the body's internal
@@ -63,45 +71,45 @@ class Solution:
         return self.outcome is Outcome.CONVERGED
 
 
-def misfit(model: BlockModel, state: Assembly) -> float:
+def relative_residual(model: BlockModel, state: Assembly) -> float:
     """The residual's norm over the push, the weight, and a tiny share of E times the base."""
     size = model.setup.geometry.size
     scale = np.linalg.norm(state.push) + model.weight_force.sum() + 1e-5 * size[0] * size[1]
     return float(np.linalg.norm(state.residual) / scale)
 
 
-def verdict(model: BlockModel, probe: Probe | None, positions: FloatArray) -> Outcome:
+def contact_outcome(model: BlockModel, tool: ToolSphere | None, positions: FloatArray) -> Outcome:
     """What a balance of forces is worth: it must not be with the material on the wrong side of the
     tool.
     """
-    if probe is None:
+    if tool is None:
         return Outcome.CONVERGED
     inside = (
-        model.depth_inside(positions, probe) > MAX_PENETRATION
-        or _unfelt_depth(model, positions, probe) > MAX_PENETRATION
+        model.depth_inside(positions, tool) > MAX_PENETRATION
+        or _unfelt_depth(model, positions, tool) > MAX_PENETRATION
     )
-    return Outcome.INSIDE_TOOL if inside or model.encloses(positions, probe) else Outcome.CONVERGED
+    return Outcome.INSIDE_TOOL if inside or model.encloses(positions, tool) else Outcome.CONVERGED
 
 
-def _unfelt_depth(model: BlockModel, positions: FloatArray, probe: Probe) -> float:
+def _unfelt_depth(model: BlockModel, positions: FloatArray, tool: ToolSphere) -> float:
     """How deep the deepest point of the surface lies inside the tool [m] that does not feel it,
     such as one in a fold.
     """
-    apart = model.face.shapes @ positions[model.topology.surface] - probe.centre
+    apart = model.face.shapes @ positions[model.topology.surface] - tool.centre
     if (
-        np.einsum("fqi,fqi->fq", apart, apart).min() > max(0.0, probe.radius - MAX_PENETRATION) ** 2
+        np.einsum("fqi,fqi->fq", apart, apart).min() > max(0.0, tool.radius - MAX_PENETRATION) ** 2
     ):  # the usual, and cheap
         return 0.0
-    facing, depth = model.facing(positions, probe)
+    facing, depth = model.facing(positions, tool)
     return float(depth[~(model.areas > 0 if model.dense else facing)].max(initial=0.0))
 
 
-def blocked(model: BlockModel, positions: FloatArray, probe: Probe) -> Solution | None:
+def blocked_by_base(model: BlockModel, positions: FloatArray, tool: ToolSphere) -> Solution | None:
     """What there is to say where the tool reaches into nodes that are held: no equilibrium, at
     these positions (n, 3) [m].
     """
     held = model.mesh.nodes[~model.topology.free.any(axis=1)]
-    depth = probe.radius - float(np.linalg.norm(held - probe.centre, axis=1).min(initial=np.inf))
+    depth = tool.radius - float(np.linalg.norm(held - tool.centre, axis=1).min(initial=np.inf))
     return (
         Solution(positions, np.zeros(3), Outcome.BASE_IN_TOOL, 0, np.inf, depth)
         if depth > MAX_PENETRATION
@@ -110,7 +118,7 @@ def blocked(model: BlockModel, positions: FloatArray, probe: Probe) -> Solution 
 
 
 def _direction(
-    model: BlockModel, probe: Probe | None, positions: FloatArray, state: Assembly
+    model: BlockModel, tool: ToolSphere | None, positions: FloatArray, state: Assembly
 ) -> tuple[FloatArray, bool] | None:
     """Newton step of the unknowns, and whether it is exact: an indefinite tangent loses the
     contact's curvature, then is shifted until it has a factor.
@@ -119,7 +127,7 @@ def _direction(
     data = state.data
     for shift in (None, 0.0, 1e-2, 1e-1, 1.0, 10.0):
         if shift == 0.0:
-            data = model.assemble(positions, probe, bending=False).data
+            data = model.assemble(positions, tool, bending=False).data
         elif shift is not None:
             data = data.copy()
             data[top.diagonal] += shift * float(np.median(np.abs(data[top.diagonal])))
@@ -133,7 +141,7 @@ def _direction(
 
 def _search(
     model: BlockModel,
-    probe: Probe | None,
+    tool: ToolSphere | None,
     positions: FloatArray,
     step: FloatArray,
     slope: float,
@@ -151,19 +159,17 @@ def _search(
     # Nothing moves by more than half the tool's radius at once: beyond its centre no contact would
     # be felt.
     longest = (
-        np.inf
-        if probe is None
-        else _LONGEST * probe.radius / max(float(np.abs(step).max()), 1e-300)
+        np.inf if tool is None else _LONGEST * tool.radius / max(float(np.abs(step).max()), 1e-300)
     )
     length = min(1.0, longest)
     for halvings in range(12):
         trial = positions + length * move
-        value = model.energy(trial, probe)
+        value = model.energy(trial, tool)
         if value <= energy + 1e-4 * length * slope + model.rounding:
             return (
                 (trial, value)
                 if exact or halvings
-                else _stretched(model, probe, positions, move, (length, longest), value)
+                else _stretched(model, tool, positions, move, (length, longest), value)
             )
         length /= 2
     return positions, energy
@@ -171,7 +177,7 @@ def _search(
 
 def _stretched(
     model: BlockModel,
-    probe: Probe | None,
+    tool: ToolSphere | None,
     positions: FloatArray,
     move: FloatArray,
     lengths: tuple[float, float],
@@ -182,7 +188,7 @@ def _stretched(
     """
     length, longest = lengths
     while 2 * length < longest:
-        value = model.energy(positions + 2 * length * move, probe)
+        value = model.energy(positions + 2 * length * move, tool)
         if not value < energy:
             break
         length, energy = 2 * length, value
@@ -190,39 +196,39 @@ def _stretched(
 
 
 def _step(
-    model: BlockModel, probe: Probe | None, positions: FloatArray, energy: float
+    model: BlockModel, tool: ToolSphere | None, positions: FloatArray, energy: float
 ) -> tuple[FloatArray, float, Outcome | None]:
     """One Newton step with a line search; an outcome when there is none."""
-    state = model.assemble(positions, probe)
-    found = _direction(model, probe, positions, state)
+    state = model.assemble(positions, tool)
+    found = _direction(model, tool, positions, state)
     if found is None:
         return positions, energy, Outcome.INDEFINITE
     step, exact = found
     trial, value = _search(
-        model, probe, positions, step, float(state.residual @ step), energy, exact
+        model, tool, positions, step, float(state.residual @ step), energy, exact
     )
     return trial, value, Outcome.ITERATIONS if trial is positions else None
 
 
 def _newton(
-    model: BlockModel, probe: Probe | None, start: FloatArray, tolerance: float
+    model: BlockModel, tool: ToolSphere | None, start: FloatArray, tolerance: float
 ) -> Solution:
-    positions, energy = start, model.energy(start, probe)
+    positions, energy = start, model.energy(start, tool)
     if not np.isfinite(energy):
         return Solution(start, np.zeros(3), Outcome.INVERTED, 0, np.inf, 0.0)
     outcome, iteration = Outcome.ITERATIONS, 0
     while True:
-        if probe is not None and model.notice(positions, probe):
-            energy = model.energy(positions, probe)
-        state = model.assemble(positions, probe, tangent=False)
-        residual = misfit(model, state)
+        if tool is not None and model.add_penetrated(positions, tool):
+            energy = model.energy(positions, tool)
+        state = model.assemble(positions, tool, tangent=False)
+        residual = relative_residual(model, state)
         if residual <= tolerance:
-            outcome = verdict(model, probe, positions)
+            outcome = contact_outcome(model, tool, positions)
             break
         if iteration == MAX_ITERATIONS:
             break
         iteration += 1
-        positions, energy, stopped = _step(model, probe, positions, energy)
+        positions, energy, stopped = _step(model, tool, positions, energy)
         if stopped is not None:
             outcome = stopped
             break
@@ -231,16 +237,16 @@ def _newton(
 
 def solve(
     model: BlockModel,
-    probe: Probe | None,
+    tool: ToolSphere | None,
     start: FloatArray,
-    before: Probe | None = None,
+    before: ToolSphere | None = None,
     tolerance: float = RELATIVE_TOLERANCE,
 ) -> Solution:
-    """Find the equilibrium next to `start` with the tool at `probe`.
+    """Find the equilibrium next to `start` with the tool at `tool`.
 
     Args:
         model: the block.
-        probe: the tool, or None without one.
+        tool: the tool, or None without one.
         start: (n, 3) positions [m] to begin from, usually those of the frame before.
         before: the tool in that frame; when the whole motion at once finds no equilibrium, it is
             split between the two.
@@ -249,15 +255,15 @@ def solve(
     Returns:
         the solution; look at `outcome`. With a failure the positions are the last ones reached.
     """
-    solution = _newton(model, probe, start, tolerance)
-    if solution.converged or before is None or probe is None or before is probe:
+    solution = _newton(model, tool, start, tolerance)
+    if solution.converged or before is None or tool is None or before is tool:
         return solution
-    return _split(model, (before, probe), start, tolerance, solution)
+    return _split(model, (before, tool), start, tolerance, solution)
 
 
 def _split(
     model: BlockModel,
-    probes: tuple[Probe, Probe],
+    tools: tuple[ToolSphere, ToolSphere],
     start: FloatArray,
     tolerance: float,
     solution: Solution,
@@ -265,14 +271,14 @@ def _split(
     """The motion between two places of the tool in parts, halved where one fails and doubled after
     two that do not.
     """
-    before, probe = probes
+    before, tool = tools
     done, part, eased, iterations = 0.0, 0.5, False, solution.iterations
     while done < 1.0 and part >= 0.5**MAX_SPLITS and iterations < _MOST_ITERATIONS:
         share = min(done + part, 1.0)
-        centre = before.centre + share * (probe.centre - before.centre)
+        centre = before.centre + share * (tool.centre - before.centre)
         solution = _newton(
             model,
-            Probe(centre, before.radius + share * (probe.radius - before.radius)),
+            ToolSphere(centre, before.radius + share * (tool.radius - before.radius)),
             start,
             tolerance,
         )

@@ -6,9 +6,9 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
-__all__ = ["USERS", "source_digest"]
+__all__ = ["EXCLUDED", "source_digest"]
 
-USERS = (
+EXCLUDED = (
     "app",
     "blind",
     "correction",
@@ -25,12 +25,12 @@ USERS = (
 def source_digest() -> str:
     """Digest (12 hex digits) of all sources that a diagnosis or a virtual dataset depends on.
 
-    The folders in `USERS` are left out: they may change without making old results invalid.
+    The folders in `EXCLUDED` are left out: they may change without making old results invalid.
     """
     root = Path(__file__).parent.parent
     digest = hashlib.sha256()
     for path in sorted(root.rglob("*.py")):
         name = path.relative_to(root).as_posix()
-        if not any(name == user or name.startswith(f"{user}/") for user in USERS):
+        if not any(name == user or name.startswith(f"{user}/") for user in EXCLUDED):
             digest.update(f"{name}\n".encode() + path.read_bytes())
     return digest.hexdigest()[:12]

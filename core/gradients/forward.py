@@ -15,30 +15,30 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.fem.linalg.direct_solver import NotPositiveDefinite
-from palpate.fem.model import BlockModel, Probe
+from palpate.fem.model import BlockModel, ToolSphere
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SetupError
 from palpate.foundation.threads import on_one_thread
 from palpate.mesh.box_mesh import BoxMesh
 from palpate.mesh.protocol import Mesh
-from palpate.replay.material_history import refuse_memory
+from palpate.replay.material_history import require_memoryless
 from palpate.replay.replay import Equilibrium, Replay
 from palpate.setup.setup import Setup
 
 __all__ = [
     "TOOL_STEP",
     "Change",
-    "GivingTool",
+    "CompliantTool",
     "displacement_changes",
     "factorise_at",
     "force_changes",
-    "gives",
-    "local_probe",
+    "is_compliant",
+    "local_tool",
     "mesh_in",
-    "refuse_histories",
-    "refuse_other_grid",
+    "require_history_free",
+    "require_same_grid",
     "same_body",
-    "tool_slopes",
+    "tool_derivatives",
 ]
 
 Change = tuple[Setup, FloatArray]
@@ -59,11 +59,11 @@ def factorise_at(block: Replay, frame: Equilibrium) -> BlockModel | None:
     block.dense = frame.dense
     model = block.model(frame.mesh)
     model.harden(frame.hardness)
-    model.expect(frame.mesh.nodes + frame.displacement, (local_probe(frame),))
+    model.restrict_to_facing(frame.mesh.nodes + frame.displacement, (local_tool(frame),))
     known = (frame, model, model.topology.factor.generation)
-    if block.memory is None and block.factorised == known:
+    if block.material_history is None and block.factorised == known:
         return model
-    state = model.assemble(frame.mesh.nodes + frame.displacement, local_probe(frame))
+    state = model.assemble(frame.mesh.nodes + frame.displacement, local_tool(frame))
     try:
         model.factorise(state.data)
     except NotPositiveDefinite:
@@ -72,12 +72,12 @@ def factorise_at(block: Replay, frame: Equilibrium) -> BlockModel | None:
     return model
 
 
-def local_probe(frame: Equilibrium) -> Probe:
+def local_tool(frame: Equilibrium) -> ToolSphere:
     """The tool as the slid block sees it."""
-    return Probe(frame.probe.centre - np.append(frame.slip, 0.0), frame.probe.radius)
+    return ToolSphere(frame.tool.centre - np.append(frame.slip, 0.0), frame.tool.radius)
 
 
-def refuse_other_grid(block: Replay, setups: Sequence[Setup]) -> None:
+def require_same_grid(block: Replay, setups: Sequence[Setup]) -> None:
     """Raise SetupError where a change asks for another grid."""
     for setup in setups:
         if setup.element_size != block.setup.element_size:
@@ -90,12 +90,12 @@ def _holds(block: Replay, frame: Equilibrium) -> bool:
     return bool(frame.in_contact or block.setup.load.specific_weight_over_stiffness)
 
 
-def refuse_histories(*setups: Setup) -> None:
+def require_history_free(*setups: Setup) -> None:
     """Raise SetupError where a frame hangs on those before it."""
     told = "a frame that hangs on those before it has no first-order changes of its own; ask for those of the whole replay"
     for setup in setups:
-        refuse_memory(setup.material, f"{told}, or")
-        if setup.remembers:
+        require_memoryless(setup.material, f"{told}, or")
+        if setup.has_history:
             raise SetupError(told, key="friction_coefficient")
 
 
@@ -105,14 +105,14 @@ def _unbalanced(
     """At the frame's displacement, minus the changes of the residual (u, len(changes)) and of the
     tool's push (3, len(changes)).
 
-    Both over E [m^2]. A tool that gives way stays where it is here; `GivingTool` moves it.
+    Both over E [m^2]. A tool that gives way stays where it is here; `CompliantTool` moves it.
     """
-    positions, here = frame.mesh.nodes + frame.displacement, local_probe(frame)
+    positions, here = frame.mesh.nodes + frame.displacement, local_tool(frame)
     state = model.assemble(positions, here, tangent=False)
     right, eased = np.zeros((len(state.residual), len(changes))), np.zeros((3, len(changes)))
     for column, (setup, move) in enumerate(changes):
         same = same_body(block, setup)
-        shift = np.zeros(3) if gives(block.setup, setup) else _shift(block, setup, move)
+        shift = np.zeros(3) if is_compliant(block.setup, setup) else _shift(block, setup, move)
         if (
             same and setup.tool.radius == block.setup.tool.radius and not shift.any()
         ):  # only the sensor differs
@@ -122,11 +122,11 @@ def _unbalanced(
         )
         there = other.mesh.nodes + frame.displacement
         other.harden(frame.hardness)
-        other.expect(there, (here,))
-        probe = Probe(
+        other.restrict_to_facing(there, (here,))
+        tool = ToolSphere(
             here.centre + shift, here.radius + setup.tool.radius - block.setup.tool.radius
         )
-        changed = other.assemble(there, probe, tangent=False)
+        changed = other.assemble(there, tool, tangent=False)
         right[:, column], eased[:, column] = (
             state.residual - changed.residual,
             state.push - changed.push,
@@ -158,27 +158,29 @@ def _shift(block: Replay, setup: Setup, move: FloatArray) -> FloatArray:
     return np.asarray(np.array(setup.tool.offset) - np.array(block.setup.tool.offset) + move)
 
 
-def gives(*setups: Setup) -> bool:
+def is_compliant(*setups: Setup) -> bool:
     """Whether the tool gives way in any of them."""
     return any(setup.tool.compliance_times_stiffness for setup in setups)
 
 
-def tool_slopes(
-    model: BlockModel, positions: FloatArray, probe: Probe
+def tool_derivatives(
+    model: BlockModel, positions: FloatArray, tool: ToolSphere
 ) -> tuple[FloatArray, FloatArray]:
     """Of the residual (u, 3) and of minus the force on the tool (3, 3), both over E, by the tool's
     motion [m].
     """
     residuals, forces = np.empty((int(model.topology.free.sum()), 3)), np.empty((3, 3))
     for column, axis in enumerate(np.eye(3)):
-        ways = [Probe(probe.centre + sign * _SLOPE_STEP * axis, probe.radius) for sign in (1, -1)]
+        ways = [
+            ToolSphere(tool.centre + sign * _SLOPE_STEP * axis, tool.radius) for sign in (1, -1)
+        ]
         ahead, behind = (model.assemble(positions, way, tangent=False) for way in ways)
         residuals[:, column] = (ahead.residual - behind.residual) / (2 * _SLOPE_STEP)
         forces[:, column] = (ahead.push - behind.push) / (2 * _SLOPE_STEP)
     return residuals, forces
 
 
-class GivingTool:
+class CompliantTool:
     """How a tool on a spring takes part in a change, at a frame whose tangent is factorised; changes without one move nothing here.
 
     With y its centre, s its stated one, c its compliance times E and f the force on it over E, y = s + c f. So, with B the change
@@ -192,13 +194,13 @@ class GivingTool:
     """
 
     def __init__(self, block: Replay, frame: Equilibrium, model: BlockModel) -> None:
-        self._block, self._model, self._here = block, model, local_probe(frame)
+        self._block, self._model, self._here = block, model, local_tool(frame)
         self._frame = frame
         self._positions = frame.mesh.nodes + frame.displacement
         self._compliance = block.setup.tool.compliance_times_stiffness
         state = model.assemble(self._positions, self._here, tangent=False)
         self._force = -state.push
-        self.coupling, harder = tool_slopes(model, self._positions, self._here)
+        self.coupling, harder = tool_derivatives(model, self._positions, self._here)
         self.answer = model.topology.factor.solve(self.coupling)
         self._inverse = np.linalg.inv(
             np.eye(3) + self._compliance * (harder - self.answer.T @ self.coupling)
@@ -215,7 +217,7 @@ class GivingTool:
         """ds + dc f + c df (3, len(changes)) [m]."""
         found = np.zeros((3, len(changes)))
         for column, (setup, move) in enumerate(changes):
-            if not gives(self._block.setup, setup):
+            if not is_compliant(self._block.setup, setup):
                 continue
             softer = setup.tool.compliance_times_stiffness - self._compliance
             found[:, column] = (
@@ -238,7 +240,7 @@ class GivingTool:
             model.harden(self._model.hardness)
         positions = self._positions + (mesh.nodes - self._model.mesh.nodes)
         state = model.assemble(
-            positions, Probe(self._here.centre, self._here.radius + wider), tangent=False
+            positions, ToolSphere(self._here.centre, self._here.radius + wider), tangent=False
         )
         return np.asarray(-state.push - self._force)
 
@@ -261,16 +263,16 @@ def displacement_changes(
         (len(changes), n, 3) changes of the nodes' displacement from where they are at rest [m];
         zero where nothing holds the tool against the block.
     """
-    refuse_histories(block.setup, *(setup for setup, _ in changes))
-    refuse_other_grid(block, [setup for setup, _ in changes])
+    require_history_free(block.setup, *(setup for setup, _ in changes))
+    require_same_grid(block, [setup for setup, _ in changes])
     result = np.zeros((len(changes), *frame.displacement.shape))
     model = factorise_at(block, frame) if _holds(block, frame) else None
     if model is None or not changes:
         return result
     factor, right = model.topology.factor, _unbalanced(block, frame, model, changes)[0]
     free = factor.solve(right) if exact else factor.approximate(right)
-    if gives(block.setup, *(setup for setup, _ in changes)):
-        free = GivingTool(block, frame, model).moved(changes, free)
+    if is_compliant(block.setup, *(setup for setup, _ in changes)):
+        free = CompliantTool(block, frame, model).moved(changes, free)
     result[:, model.topology.free] = free.T
     return result
 
@@ -287,7 +289,7 @@ def force_changes(
         displacements: (len(changes), n, 3) what these changes bring about, as from
             `displacement_changes` [m].
     """
-    refuse_histories(block.setup, *(setup for setup, _ in changes))
+    require_history_free(block.setup, *(setup for setup, _ in changes))
     found = np.zeros((len(changes), 3))
     if not frame.in_contact or not changes:
         return found
@@ -296,18 +298,18 @@ def force_changes(
     model.harden(frame.hardness)
     positions, here, modulus = (
         frame.mesh.nodes + frame.displacement,
-        local_probe(frame),
+        local_tool(frame),
         block.setup.material.young_modulus,
     )
-    model.expect(positions, (here,))
-    coupling, harder = tool_slopes(model, positions, here)
+    model.restrict_to_facing(positions, (here,))
+    coupling, harder = tool_derivatives(model, positions, here)
     found = (
         _unbalanced(block, frame, model, changes)[1].T
         - displacements[:, model.topology.free] @ coupling
     )
     for number, (setup, move) in enumerate(changes):
-        if gives(block.setup, setup):
-            # The tool's own way is ds + dc f + c df, as `GivingTool` has it, and pushes it by H of
+        if is_compliant(block.setup, setup):
+            # The tool's own way is ds + dc f + c df, as `CompliantTool` has it, and pushes it by H of
             # that.
             giving = block.setup.tool.compliance_times_stiffness
             driven = (

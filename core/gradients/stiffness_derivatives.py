@@ -10,7 +10,12 @@ import scipy.sparse as sp
 from palpate.fem.constitutive.elastic import assemble_elastic
 from palpate.fem.model import BlockModel
 from palpate.foundation.arrays import FloatArray
-from palpate.gradients.forward import GivingTool, factorise_at, gives, refuse_histories
+from palpate.gradients.forward import (
+    CompliantTool,
+    factorise_at,
+    is_compliant,
+    require_history_free,
+)
 from palpate.replay.replay import Equilibrium, Replay
 
 __all__ = ["point_forces", "stiffness_changes"]
@@ -28,7 +33,7 @@ def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray
         (m, n, 3) [m], to five digits; cheap in m, since a point's share of the residual is what it
         alone would resist with.
     """
-    refuse_histories(block.setup)
+    require_history_free(block.setup)
     result = np.zeros((len(log_factors), *frame.displacement.shape))
     model = factorise_at(block, frame) if frame.in_contact else None
     if model is None:
@@ -48,8 +53,8 @@ def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray
     )
     right = gather @ sp.csc_matrix(log_factors.reshape(len(log_factors), -1).T)
     free = -model.topology.factor.approximate(right.toarray())
-    if gives(block.setup):
-        free = GivingTool(block, frame, model).moved(
+    if is_compliant(block.setup):
+        free = CompliantTool(block, frame, model).moved(
             [(block.setup, np.zeros(3))] * len(log_factors), free
         )
     result[:, model.topology.free] = free.T

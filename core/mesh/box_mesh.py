@@ -22,7 +22,7 @@ from palpate.mesh.protocol import FINER, Connectivity, Meshing
 if TYPE_CHECKING:
     from palpate.setup.setup import Setup
 
-__all__ = ["BoxMesh", "GridSpec", "box_mesh", "focus_of", "meshing_for", "with_middles"]
+__all__ = ["BoxMesh", "GridSpec", "box_mesh", "focus_of", "meshing_for", "with_midpoints"]
 
 _FOCUS_STEP = 2e-4
 
@@ -113,7 +113,7 @@ def _quadratic(local: FloatArray) -> list[FloatArray]:
     return [(1 - local) * (1 - 2 * local), 4 * local * (1 - local), local * (2 * local - 1)]
 
 
-def with_middles(ends: FloatArray) -> FloatArray:
+def with_midpoints(ends: FloatArray) -> FloatArray:
     """Coordinates with the middle of each interval between them."""
     return np.insert(ends, np.arange(1, len(ends)), (ends[1:] + ends[:-1]) / 2)
 
@@ -310,7 +310,7 @@ def box_mesh(
             for low, high, n, at in zip(lows, highs, ends, centre, strict=True)
         ]
     if grid.order == 2:
-        axes = [with_middles(axis) for axis in axes]
+        axes = [with_midpoints(axis) for axis in axes]
     return BoxMesh((axes[0], axes[1], axes[2]), centre, grid.order)
 
 

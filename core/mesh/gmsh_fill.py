@@ -20,7 +20,7 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import MeshError, SetupError
 from palpate.mesh.protocol import FINER
-from palpate.mesh.tet_mesh import SolidMesh, sides_of
+from palpate.mesh.tet_mesh import TetMesh, sides_of
 from palpate.setup.closest_point import nearest
 from palpate.setup.shape import Shape
 
@@ -86,7 +86,7 @@ class TetSpec:
             **spacings,
         )
 
-    def mesh(self, setup: Setup, centre: FloatArray) -> SolidMesh:
+    def mesh(self, setup: Setup, centre: FloatArray) -> TetMesh:
         """The same mesh for all places of the tool's centre."""
         return fill(setup.shape, self)
 
@@ -109,7 +109,7 @@ def touched(shape: Shape, spec: TetSpec) -> FloatArray:
 
 
 @lru_cache(maxsize=8)
-def fill(shape: Shape, spec: TetSpec) -> SolidMesh:
+def fill(shape: Shape, spec: TetSpec) -> TetMesh:
     """Fill a shape with tetrahedra; the same input gives the same mesh."""
     with _gmsh() as gmsh:
         try:
@@ -224,7 +224,7 @@ def _taken(gmsh: Any) -> tuple[FloatArray, IntArray]:
     ], tetrahedra.reshape(-1, 4).astype(np.int64)
 
 
-def _checked(shape: Shape, spec: TetSpec, corners: FloatArray, tetrahedra: IntArray) -> SolidMesh:
+def _checked(shape: Shape, spec: TetSpec, corners: FloatArray, tetrahedra: IntArray) -> TetMesh:
     """The mesh, if it fills the surface; a side is held where the surface next to it is."""
     edges = corners[tetrahedra[:, 1:]] - corners[tetrahedra[:, :1]]
     volumes = np.linalg.det(edges) / 6
@@ -245,4 +245,4 @@ def _checked(shape: Shape, spec: TetSpec, corners: FloatArray, tetrahedra: IntAr
             file=shape.name,
             held=int(held.sum()),
         )
-    return SolidMesh(corners, tetrahedra, held)
+    return TetMesh(corners, tetrahedra, held)

@@ -20,7 +20,7 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import MeshError
-from palpate.mesh.box_mesh import BoxMesh, focus_of, with_middles
+from palpate.mesh.box_mesh import BoxMesh, focus_of, with_midpoints
 from palpate.mesh.grid_axes import sized_axis, split_near
 from palpate.mesh.protocol import FINER
 
@@ -118,7 +118,7 @@ def _mesh(
         for number, place in loose:
             if number == len(axes):
                 axis = split_near(axis, place, _LOOSE * grading.spacing, _LOOSE_GROWTH)
-        axes.append(with_middles(axis) if grading.order == 2 else axis)
+        axes.append(with_midpoints(axis) if grading.order == 2 else axis)
     return BoxMesh((axes[0], axes[1], axes[2]), np.array(focus), grading.order)
 
 

@@ -11,7 +11,7 @@ from numba import njit
 
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["grid_shapes", "means_around", "patch_rows", "weighted_nodes"]
+__all__ = ["grid_shapes", "neighbourhood_means", "patch_rows", "weighted_nodes"]
 
 
 @njit(cache=True)
@@ -82,7 +82,7 @@ def patch_rows(
     return entries[:used].copy(), columns[:used].copy(), rows
 
 
-def means_around(
+def neighbourhood_means(
     places: FloatArray, points: FloatArray, values: FloatArray, reach: float, least: int
 ) -> FloatArray:
     """Mean (m,) of the values (n,) of points (n, 3) nearer than `reach` to each place (m, 3); NaN

@@ -18,14 +18,14 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import MeshError
 from palpate.mesh.gmsh_fill import TetSpec, check_spacing, fill
 from palpate.mesh.protocol import FINER
-from palpate.mesh.tet_mesh import SolidMesh
+from palpate.mesh.tet_mesh import TetMesh
 from palpate.setup.closest_point import nearest
 from palpate.setup.shape import Shape
 
 if TYPE_CHECKING:
     from palpate.setup.setup import Setup
 
-__all__ = ["FINE_PUSHES", "REPLAY_PUSHES", "SCREEN_PUSHES", "PushedSpec"]
+__all__ = ["FINE_PUSHES", "REPLAY_PUSHES", "SCREEN_PUSHES", "PushMeshSpec"]
 
 _SLENDER = 0.2
 """Of the body's shortest extent, half of the longest edge anywhere: fewer elements would cut its
@@ -35,7 +35,7 @@ _KEPT = 256
 
 
 @dataclass(frozen=True, kw_only=True)
-class PushedSpec:
+class PushMeshSpec:
     """How a shape is meshed under pushes.
 
     Attributes:
@@ -55,11 +55,11 @@ class PushedSpec:
     def __post_init__(self) -> None:
         check_spacing(self.spacing, self.coarsest)
 
-    def at(self, places: FloatArray) -> PushedSpec:
+    def at(self, places: FloatArray) -> PushMeshSpec:
         """The same for pushes at these places (k, 3) [m]."""
         return replace(self, places=tuple((float(x), float(y), float(z)) for x, y, z in places))
 
-    def for_tool(self, radius: float) -> PushedSpec:
+    def for_tool(self, radius: float) -> PushMeshSpec:
         """What this is for a ball of 5 mm, for one of another radius [m]."""
         factor = radius / 5e-3
         spacing = self.spacing * factor
@@ -67,7 +67,7 @@ class PushedSpec:
             self, reach=self.reach * factor, spacing=spacing, coarsest=max(self.coarsest, spacing)
         )
 
-    def mesh(self, setup: Setup, centre: FloatArray) -> SolidMesh:
+    def mesh(self, setup: Setup, centre: FloatArray) -> TetMesh:
         """That of the push nearest to a tool's centre (3,) [m]."""
         if not self.places:
             raise MeshError(
@@ -83,7 +83,7 @@ class PushedSpec:
 
 
 @lru_cache(maxsize=_KEPT)
-def _filled(shape: Shape, place: tuple[float, float, float], spec: PushedSpec) -> SolidMesh:
+def _filled(shape: Shape, place: tuple[float, float, float], spec: PushMeshSpec) -> TetMesh:
     _, (centre,) = nearest(np.array([place]), shape.corners)
     size = TetSpec(
         path=((float(centre[0]), float(centre[1]), float(centre[2])),),
@@ -95,8 +95,8 @@ def _filled(shape: Shape, place: tuple[float, float, float], spec: PushedSpec) -
     return fill(shape, size)
 
 
-REPLAY_PUSHES = PushedSpec()
-FINE_PUSHES = PushedSpec(spacing=1.25e-3, growth=0.55, coarsest=3.5e-3)
-SCREEN_PUSHES = PushedSpec(spacing=2.2e-3, growth=0.8, coarsest=5e-3)
+REPLAY_PUSHES = PushMeshSpec()
+FINE_PUSHES = PushMeshSpec(spacing=1.25e-3, growth=0.55, coarsest=3.5e-3)
+SCREEN_PUSHES = PushMeshSpec(spacing=2.2e-3, growth=0.8, coarsest=5e-3)
 """For a ball of 5 mm; `for_tool` has those of others. A diagnosis takes the first, the fine one to
 say how far that is off, and the coarse one for what an effect would do."""

@@ -15,7 +15,7 @@ from palpate.mesh.protocol import Connectivity
 from palpate.setup.closest_point import containing, nearest
 from palpate.setup.fixed_region import BoolArray
 
-__all__ = ["SolidMesh", "sides_of"]
+__all__ = ["TetMesh", "sides_of"]
 
 _SIDES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
 """Corners of a tetrahedron's sides, counter-clockwise from outside."""
@@ -38,7 +38,7 @@ def sides_of(tetrahedra: IntArray) -> IntArray:
 
 
 @dataclass(frozen=True, eq=False)
-class SolidMesh:
+class TetMesh:
     """Corners and tetrahedra of a body, to which the nodes in the middle of the edges are added.
 
     Attributes:

@@ -14,13 +14,13 @@ from palpate.foundation.arrays import FloatArray
 from palpate.measurement.camera_model import sight_of
 from palpate.measurement.surface_gaps import Surface
 from palpate.mesh.protocol import Meshing
-from palpate.recording.interior_fields import Inside
+from palpate.recording.interior_fields import InteriorFields
 from palpate.recording.record_sequence import VERTEX_SPACING
 from palpate.replay.equilibrium import Equilibrium
 from palpate.replay.replay import Replay
 from palpate.setup.setup import Setup
 
-__all__ = ["DEEPEST", "Felt", "Live"]
+__all__ = ["DEEPEST", "InteractiveFrame", "InteractiveReplay"]
 
 DEEPEST = 0.25
 """Of the block's shortest side, how far a hand may push: beyond, an answer takes longer than a hand
@@ -31,7 +31,7 @@ _TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Felt:
+class InteractiveFrame:
     """What the block answers, phantom frame, SI; the arrays are as a recording has them.
 
     Attributes:
@@ -53,7 +53,7 @@ class Felt:
     tool: FloatArray
     radius: float
     camera: FloatArray
-    inside: Inside | None
+    inside: InteriorFields | None
     depth: float
     force: FloatArray
     converged: bool
@@ -61,7 +61,7 @@ class Felt:
     seconds: float
 
 
-class Live:
+class InteractiveReplay:
     """A setup whose tool is led by hand; what it remembers (a material's past, friction) is that of
     the hand's way.
     """
@@ -76,24 +76,24 @@ class Live:
         self._last: Equilibrium = self._replay.free
         self._begun = time.monotonic()
 
-    def at(self, centre: FloatArray, *, within: bool = False) -> Felt:
+    def at(self, centre: FloatArray, *, within: bool = False) -> InteractiveFrame:
         """The block with the tool's centre (3,) [m] there, or where `reachable` puts it; `within`
         asks for its inside, too.
         """
         start, wanted = time.perf_counter(), self.reachable(centre)
-        frame = self._replay.sought(wanted, (self._last,), time.monotonic() - self._begun)
+        frame = self._replay.solve_from_any(wanted, (self._last,), time.monotonic() - self._begun)
         converged = frame.outcome is Outcome.CONVERGED
         if converged:
             self._last = frame
         shown = self._last
         surface = shown.move(self._surface.vertices)
-        inside = Inside.of(self.setup, [shown]) if within else None
-        tool = frame.probe.centre
-        return Felt(
+        inside = InteriorFields.of(self.setup, [shown]) if within else None
+        tool = frame.tool.centre
+        return InteractiveFrame(
             surface,
             np.full(len(surface), np.nan),
             tool,
-            frame.probe.radius,
+            frame.tool.radius,
             self._camera,
             inside,
             self.depth(tool),

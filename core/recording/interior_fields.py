@@ -22,13 +22,13 @@ from palpate.mesh.box_mesh import BoxMesh
 from palpate.replay.equilibrium import Equilibrium
 from palpate.setup.setup import Setup
 
-__all__ = ["Inside"]
+__all__ = ["InteriorFields"]
 
 _PARTS = ("inside_counts", "inside_axes", "inside_moved", "inside_energy", "inside_modulus")
 
 
 @dataclass(frozen=True, eq=False)
-class Inside:
+class InteriorFields:
     """Nodes of the block in each of f frames, phantom frame.
 
     Attributes:

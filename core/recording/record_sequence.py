@@ -20,13 +20,13 @@ from palpate.measurement.phantom_drift import camera_of
 from palpate.measurement.segmentation import Cleaner, tool_poses
 from palpate.measurement.surface_gaps import Gaps, Surface, gaps
 from palpate.measurement.touch_correction import touch_correction
-from palpate.mesh.interpolation import means_around
+from palpate.mesh.interpolation import neighbourhood_means
 from palpate.mesh.protocol import Meshing
-from palpate.recording.interior_fields import Inside
+from palpate.recording.interior_fields import InteriorFields
 from palpate.replay.replay import Equilibrium, replay
 from palpate.setup.setup import Setup
 
-__all__ = ["Recorded", "observed", "record"]
+__all__ = ["ModelRecording", "compare_with_clouds", "record"]
 
 MOST_FRAMES = 100
 VERTEX_SPACING = 2.5e-3
@@ -35,7 +35,7 @@ _LEAST = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
+class ModelRecording:
     """One model's side of a recording; arrays over frames (f, ...), SI, phantom frame.
 
     `distance` is the RMS of `error`, `force` the size of the block's force on the tool.
@@ -50,7 +50,7 @@ class Recorded:
     free: FloatArray
     force: FloatArray
     iterations: FloatArray
-    inside: Inside
+    inside: InteriorFields
 
 
 def _vertex_errors(seen: Gaps, surface: Surface) -> FloatArray:
@@ -62,7 +62,7 @@ def _vertex_errors(seen: Gaps, surface: Surface) -> FloatArray:
     for number in np.unique(seen.side):
         own = np.unique(surface.faces[surface.side == number])
         here = seen.side == number
-        errors[own] = means_around(
+        errors[own] = neighbourhood_means(
             surface.vertices[own], seen.foot[here], seen.gap[here], _REACH, _LEAST
         )
     return errors
@@ -76,12 +76,12 @@ def _rms(errors: FloatArray) -> float:
     return float(np.sqrt(np.mean(seen**2))) if len(seen) else np.nan
 
 
-def observed(
+def compare_with_clouds(
     setup: Setup,
     frames: Sequence[Equilibrium],
     clouds: Sequence[FloatArray],
-    other: tuple[Setup, Recorded] | None = None,
-) -> Recorded:
+    other: tuple[Setup, ModelRecording] | None = None,
+) -> ModelRecording:
     """These frames of a setup against cleaned clouds, (n, 3) each, camera frame [m].
 
     Frames at rest, which are half of them, need not be looked at again where the `other` setup has
@@ -101,9 +101,9 @@ def observed(
         errors.append(_vertex_errors(gaps(points, sight.pose.translation, frame, surface), surface))
         distance.append(_rms(errors[-1]))
         paper.append(paper_distance(points[::2], frame, surface))
-    return Recorded(
+    return ModelRecording(
         np.array(moved),
-        np.array([frame.probe.centre for frame in frames]),
+        np.array([frame.tool.centre for frame in frames]),
         np.array(errors),
         np.array(distance),
         np.array(paper),
@@ -113,7 +113,7 @@ def observed(
         np.array([not frame.in_contact for frame in frames]),
         np.array([np.linalg.norm(frame.force) for frame in frames]),
         np.array([frame.iterations for frame in frames], dtype=np.int32),
-        Inside.of(setup, frames),
+        InteriorFields.of(setup, frames),
     )
 
 
@@ -143,7 +143,7 @@ def record(
     clouds = [
         cloud[cleaner.clean(cloud, pose).indices] for cloud, pose in zip(raw, poses, strict=True)
     ]
-    sides: dict[str, Recorded] = {}
+    sides: dict[str, ModelRecording] = {}
     frames: list[Equilibrium] = []
     for model, setup in (("raw", stated), ("extended", found)):
         if sides and found is stated:
@@ -152,7 +152,7 @@ def record(
         robot = touch_correction(setup, grid) @ setup.phantom_from_robot
         centres = robot.apply(smooth_centres(sequence.kinematics, times - setup.sensor.time_offset))
         # What hangs on the past is replayed in the order of time, and from frame to frame.
-        starts = None if setup.remembers else frames or None
+        starts = None if setup.has_history else frames or None
         frames = replay(
             setup,
             centres,
@@ -161,7 +161,9 @@ def record(
             starts=starts,
             tolerance=1e-3,
         )
-        sides[model] = observed(setup, frames, clouds, (stated, sides["raw"]) if sides else None)
+        sides[model] = compare_with_clouds(
+            setup, frames, clouds, (stated, sides["raw"]) if sides else None
+        )
     before, after = sides["raw"], sides["extended"]
     surface = Surface.of(stated, VERTEX_SPACING)
     floor = after.distance[after.free] if after.free.any() else after.distance

@@ -25,23 +25,23 @@ from palpate.measurement.phantom_drift import as_it_stood
 from palpate.measurement.segmentation import cleaner_for, find_shaft_axis, tool_poses
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import PAGE_GRID
-from palpate.recording.interactive import Live
-from palpate.recording.interior_fields import Inside
-from palpate.recording.record_sequence import Recorded, observed
-from palpate.recording.saved_model import tuned_as
+from palpate.recording.interactive import InteractiveReplay
+from palpate.recording.interior_fields import InteriorFields
+from palpate.recording.record_sequence import ModelRecording, compare_with_clouds
+from palpate.recording.saved_model import with_fitted_values
 from palpate.registration.registration import register, setup_from
 from palpate.replay.equilibrium import Equilibrium
 from palpate.replay.replay import replay
 from palpate.setup.setup import Setup, Shape
 
-__all__ = ["Moment", "WhatIf", "opened"]
+__all__ = ["FrameResolver", "ResolvedFrame", "open_resolver"]
 
 _TOLERANCE = 1e-3
 """Residual over the push at which a frame counts as converged; that of the recording."""
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
+class ResolvedFrame:
     """One frame under one's own causes, phantom frame, SI.
 
     Attributes:
@@ -64,10 +64,10 @@ class Moment:
     outcome: str
     converged: bool
     camera: FloatArray
-    inside: Inside
+    inside: InteriorFields
 
 
-class WhatIf:
+class FrameResolver:
     """A recorded sequence whose frames can be solved again.
 
     Args:
@@ -91,7 +91,7 @@ class WhatIf:
             )
         dataset, registration = as_it_stood(dataset, register(dataset))
         self.stated = setup_from(dataset, registration)
-        self.tuned = tuned_as(self.stated, extended)
+        self.tuned = with_fitted_values(self.stated, extended)
         self._sequence = dataset.sequence(sequence)
         self._clouds = np.asarray(clouds, dtype=int)
         self._times = np.asarray(self._sequence.cloud_times)[self._clouds]
@@ -119,11 +119,11 @@ class WhatIf:
         """The stated setup with these causes; `tuned` as in `solve`."""
         return with_effects(self.tuned if tuned else self.stated, effects)
 
-    def live(self, effects: Sequence[Effect], tuned: bool = True) -> Live:
+    def live(self, effects: Sequence[Effect], tuned: bool = True) -> InteractiveReplay:
         """The same block under a tool that a hand leads."""
-        return Live(self.setup(effects, tuned), self._grid)
+        return InteractiveReplay(self.setup(effects, tuned), self._grid)
 
-    def solve(self, frame: int, effects: Sequence[Effect], tuned: bool = True) -> Moment:
+    def solve(self, frame: int, effects: Sequence[Effect], tuned: bool = True) -> ResolvedFrame:
         """The frame with these causes added to the stated setup.
 
         Args:
@@ -141,8 +141,8 @@ class WhatIf:
             )
         setup = self.setup(effects, tuned)
         solved = self._solved(setup, frame)
-        side: Recorded = observed(setup, [solved], [self._cloud(frame)])
-        return Moment(
+        side: ModelRecording = compare_with_clouds(setup, [solved], [self._cloud(frame)])
+        return ResolvedFrame(
             side.surface[0],
             side.error[0],
             float(side.distance[0]),
@@ -156,12 +156,12 @@ class WhatIf:
 
     def _solved(self, setup: Setup, frame: int) -> Equilibrium:
         robot = touch_correction(setup, self._grid) @ setup.phantom_from_robot
-        picked = slice(0, frame + 1) if setup.remembers else slice(frame, frame + 1)
+        picked = slice(0, frame + 1) if setup.has_history else slice(frame, frame + 1)
         times = self._times[picked] - setup.sensor.time_offset
         centres = robot.apply(smooth_centres(self._sequence.kinematics, times))
         warm = (
             None
-            if setup.remembers or self._last is None or self._last[0] != frame
+            if setup.has_history or self._last is None or self._last[0] != frame
             else [self._last[1]]
         )
         found = replay(setup, centres, self._grid, times=times, starts=warm, tolerance=_TOLERANCE)[
@@ -184,6 +184,8 @@ class WhatIf:
 
 
 @lru_cache(maxsize=4)
-def opened(folder: str, sequence: str, clouds: tuple[int, ...], extended: str) -> WhatIf:
+def open_resolver(
+    folder: str, sequence: str, clouds: tuple[int, ...], extended: str
+) -> FrameResolver:
     """The same, kept for the next question; `extended` is the text of model.json."""
-    return WhatIf(Path(folder), sequence, clouds, json.loads(extended))
+    return FrameResolver(Path(folder), sequence, clouds, json.loads(extended))

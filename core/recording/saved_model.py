@@ -14,10 +14,10 @@ from palpate.foundation.errors import EffectError
 from palpate.foundation.frames import Transform
 from palpate.setup.setup import Setup
 
-__all__ = ["effects_from", "kept_setup", "tuned_as"]
+__all__ = ["effects_from", "setup_of_model", "with_fitted_values"]
 
 
-def tuned_as(stated: Setup, model: Mapping[str, Any]) -> Setup:
+def with_fitted_values(stated: Setup, model: Mapping[str, Any]) -> Setup:
     """The stated setup with the robot's pose, the tool's radius and Poisson's ratio of a model,
     where no cause of it sets them.
     """
@@ -39,9 +39,9 @@ def tuned_as(stated: Setup, model: Mapping[str, Any]) -> Setup:
     )
 
 
-def kept_setup(stated: Setup, model: Mapping[str, Any]) -> Setup:
+def setup_of_model(stated: Setup, model: Mapping[str, Any]) -> Setup:
     """The setup of a model: its causes, and what is known only to its accuracy as it was fitted."""
-    tuned = tuned_as(stated, model)
+    tuned = with_fitted_values(stated, model)
     found = with_effects(tuned, effects_from(model["effects"]))
     # Tuning went on from the causes, so that these values stand even where a cause sets them, too.
     return replace(

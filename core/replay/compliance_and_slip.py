@@ -12,7 +12,15 @@ from palpate.foundation.arrays import FloatArray
 from palpate.replay.equilibrium import Equilibrium
 from palpate.setup.setup import Setup
 
-__all__ = ["GRAVITY", "give_way", "nearest_node", "reach_of", "slide", "slide_by", "weight_of"]
+__all__ = [
+    "GRAVITY",
+    "nearest_node",
+    "sideways_indentation",
+    "slip_from_force",
+    "slip_step",
+    "solve_compliant_tool",
+    "weight_of",
+]
 
 GRAVITY = 9.81
 """Acceleration of free fall [m/s^2]."""
@@ -29,7 +37,7 @@ the depth to the power 1.5 (Hertz); of deeper ones it is less. A slide by this f
 friction holds; one that went beyond would stay there."""
 
 
-def give_way(
+def solve_compliant_tool(
     centre: FloatArray,
     start: Equilibrium,
     setup: Setup,
@@ -63,7 +71,7 @@ def give_way(
     return replace(frame, outcome=Outcome.TOOL_SWINGS)
 
 
-def slide(frame: Equilibrium, friction: float, weight: float) -> FloatArray | None:
+def slip_step(frame: Equilibrium, friction: float, weight: float) -> FloatArray | None:
     """How far the base moves on (2,) [m] where Coulomb's friction does not hold it; None where it
     does.
 
@@ -73,10 +81,10 @@ def slide(frame: Equilibrium, friction: float, weight: float) -> FloatArray | No
     """
     if _excess(frame.force, friction, weight) <= _HELD * friction * weight:
         return None
-    return slide_by(frame.force, reach_of(frame), friction, weight)
+    return slip_from_force(frame.force, sideways_indentation(frame), friction, weight)
 
 
-def slide_by(force: FloatArray, reach: float, friction: float, weight: float) -> FloatArray:
+def slip_from_force(force: FloatArray, reach: float, friction: float, weight: float) -> FloatArray:
     """The same of a base that does slide, by the force on the tool (3,) [N] and the sideways
     indentation [m] it stands for.
     """
@@ -102,12 +110,12 @@ def nearest_node(frame: Equilibrium) -> int:
     surface = frame.mesh.nodes + frame.displacement
     return int(
         np.argmin(
-            np.linalg.norm(surface - (frame.probe.centre - np.append(frame.slip, 0.0)), axis=1)
+            np.linalg.norm(surface - (frame.tool.centre - np.append(frame.slip, 0.0)), axis=1)
         )
     )
 
 
-def reach_of(frame: Equilibrium) -> float:
+def sideways_indentation(frame: Equilibrium) -> float:
     """Sideways indentation [m] that the push stands for: the tool's displacement of the material it
     touches.
     """

@@ -9,14 +9,14 @@ from functools import cached_property
 import numpy as np
 
 from palpate.fem.continuation import FREE_STEP
-from palpate.fem.friction import Hold
-from palpate.fem.model import BlockModel, Probe
+from palpate.fem.friction import FrictionHistory
+from palpate.fem.model import BlockModel, ToolSphere
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SolveError
 from palpate.mesh.protocol import Mesh
 
-__all__ = ["Equilibrium", "extrapolated", "require_converged", "taught"]
+__all__ = ["Equilibrium", "extrapolated", "predict_from_similar", "require_converged"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,30 +27,30 @@ class Equilibrium:
         mesh: its elements.
         displacement: (n, 3) of the nodes against the stated shape [m], without `slip`.
         slip: (2,) how far the base has slid along x and y [m].
-        probe: the tool (true centre and radius), phantom frame.
+        tool: the tool (true centre and radius), phantom frame.
         force: (3,) of the block on the tool [N].
         outcome, iterations, residual, penetration: how it was reached.
         hardness: of the contact, see `palpate.fem.model.BlockModel.harden`.
         dense: whether the surface felt the tool at many points, see `palpate.fem.model.BlockModel`.
-        hold: what friction leaves to the next frame; None without.
-        way: with friction at the tool or under the base, equilibria on the way from the frame
+        friction_history: what friction leaves to the next frame; None without.
+        path: with friction at the tool or under the base, equilibria on the way from the frame
             before.
     """
 
     mesh: Mesh
     displacement: FloatArray
     slip: FloatArray
-    probe: Probe
+    tool: ToolSphere
     force: FloatArray
     outcome: Outcome
     iterations: int
     residual: float
     penetration: float
     in_contact: bool
-    hold: Hold | None = None
+    friction_history: FrictionHistory | None = None
     hardness: float = 1.0
     dense: bool = False
-    way: tuple[Equilibrium, ...] = ()
+    path: tuple[Equilibrium, ...] = ()
 
     @cached_property
     def _moved(self) -> FloatArray:
@@ -80,31 +80,34 @@ def require_converged(frames: Sequence[Equilibrium]) -> None:
 
 
 def extrapolated(
-    model: BlockModel, last: tuple[Equilibrium, Equilibrium], positions: FloatArray, probe: Probe
+    model: BlockModel,
+    last: tuple[Equilibrium, Equilibrium],
+    positions: FloatArray,
+    tool: ToolSphere,
 ) -> FloatArray:
     """Where the last two frames point to (n, 3) [m], if that lies lower in energy than the last
     one's `positions`.
 
-    `probe` is the tool's next place, seen from the slid block.
+    `tool` is the tool's next place, seen from the slid block.
     """
     earlier, start = last
     if not (earlier.in_contact and earlier.mesh is start.mesh is model.mesh):
         return positions
-    here = start.probe.centre - np.append(start.slip, 0.0)
-    way, now = here - (earlier.probe.centre - np.append(earlier.slip, 0.0)), probe.centre - here
+    here = start.tool.centre - np.append(start.slip, 0.0)
+    way, now = here - (earlier.tool.centre - np.append(earlier.slip, 0.0)), tool.centre - here
     if not way.any() or max(np.linalg.norm(way), np.linalg.norm(now)) > FREE_STEP:
         return positions
     share = float(now @ way / (way @ way))
     guess = positions + min(max(share, -1.0), 1.5) * (start.displacement - earlier.displacement)
-    return guess if model.energy(guess, probe) < model.energy(positions, probe) else positions
+    return guess if model.energy(guess, tool) < model.energy(positions, tool) else positions
 
 
-def taught(
+def predict_from_similar(
     model: BlockModel,
     lesson: tuple[Equilibrium, Equilibrium],
     start: Equilibrium,
     positions: FloatArray,
-    probe: Probe,
+    tool: ToolSphere,
 ) -> FloatArray:
     """Where a frame of a similar setup points to (n, 3) [m], together with what the last one was
     found to be off by.
@@ -113,15 +116,15 @@ def taught(
         lesson: the last frame's start, and what was found from there.
         start: of the frame that is sought, whose `positions` are on the model's mesh; they are
             returned where the lesson leads to no lower energy.
-        probe: as for `extrapolated`.
+        tool: as for `extrapolated`.
     """
     other, found = lesson
-    here = start.probe.centre - np.append(start.slip, 0.0)
+    here = start.tool.centre - np.append(start.slip, 0.0)
     useful = (
         other.in_contact
         and found.in_contact
         and start.in_contact
-        and np.linalg.norm(probe.centre - here) <= FREE_STEP
+        and np.linalg.norm(tool.centre - here) <= FREE_STEP
     )
     if not useful or found.outcome is not Outcome.CONVERGED:
         return positions
@@ -131,4 +134,4 @@ def taught(
         for one in (found, other)
     ]
     guess = np.where(model.topology.free, positions + moved[0] - moved[1], positions)
-    return guess if model.energy(guess, probe) < model.energy(positions, probe) else positions
+    return guess if model.energy(guess, tool) < model.energy(positions, tool) else positions

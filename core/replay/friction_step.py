@@ -10,15 +10,24 @@ from typing import Self
 
 import numpy as np
 
-from palpate.fem.continuation import lead
-from palpate.fem.friction import STICK_STIFFNESS, Grip, Hold
-from palpate.fem.model import CONTACT_STIFFNESS, BlockModel, Probe, surface_spots
-from palpate.fem.modified_newton import Follower
-from palpate.fem.newton import Outcome, Solution, misfit
+from palpate.fem.continuation import move_tool
+from palpate.fem.friction import STICK_STIFFNESS, FrictionHistory, FrictionPotential
+from palpate.fem.model import CONTACT_STIFFNESS, BlockModel, ToolSphere, surface_quadrature
+from palpate.fem.modified_newton import ModifiedNewton
+from palpate.fem.newton import Outcome, Solution, relative_residual
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.replay.equilibrium import Equilibrium
 
-__all__ = ["Past", "drag", "gripped", "hold_of", "pressed", "renewed", "seen_from", "ways_left"]
+__all__ = [
+    "FrictionState",
+    "contact_depth",
+    "friction_history_of",
+    "friction_potential_of",
+    "points_from_tool",
+    "remaining_slip",
+    "solve_with_friction",
+    "updated_friction",
+]
 
 _AGREED = 1e-4
 """Residual with the renewed grip, over the push, at which pressure and friction agree."""
@@ -32,64 +41,63 @@ where `_AGREED` is enough."""
 
 
 @dataclass(frozen=True, eq=False)
-class Past:
+class FrictionState:
     """The step's beginning, at the quadrature points (f, p) of the model's surface: where they were
     seen from the tool's centre (f, p, 3) [m], and what held them, seen there, too.
     """
 
     seen: FloatArray
-    hold: Hold
+    friction_history: FrictionHistory
 
     @classmethod
-    def of(cls, model: BlockModel, start: Equilibrium, before: Probe) -> Self:
+    def of(cls, model: BlockModel, start: Equilibrium, before: ToolSphere) -> Self:
         """As the frame before left it, in which the tool was at `before`."""
-        places = surface_spots(model.mesh, model.face).places
+        places = surface_quadrature(model.mesh, model.face).places
         flat = places.reshape(-1, 3)
         seen = (flat + start.mesh.interpolate(start.displacement, flat)).reshape(
             places.shape
         ) - before.centre
-        return cls(seen, (start.hold or Hold.nothing()).at(places))
+        return cls(seen, (start.friction_history or FrictionHistory.nothing()).at(places))
 
     def on(self, faces: IntArray) -> Self:
         """The part of it on these faces (g,)."""
-        return type(self)(self.seen[faces], self.hold.on(faces))
+        return type(self)(self.seen[faces], self.friction_history.on(faces))
 
 
-def seen_from(model: BlockModel, positions: FloatArray, probe: Probe) -> FloatArray:
+def points_from_tool(model: BlockModel, positions: FloatArray, tool: ToolSphere) -> FloatArray:
     """The surface's quadrature points (f, p, 3) from the tool's centre [m]."""
     return np.asarray(
-        np.einsum("qa,fai->fqi", model.face.shapes, positions[model.topology.surface])
-        - probe.centre
+        np.einsum("qa,fai->fqi", model.face.shapes, positions[model.topology.surface]) - tool.centre
     )
 
 
-def pressed(model: BlockModel, positions: FloatArray, probe: Probe) -> FloatArray:
+def contact_depth(model: BlockModel, positions: FloatArray, tool: ToolSphere) -> FloatArray:
     """How deep each point is pressed (f, p) [m]; zero where it is not touched or not felt."""
-    facing, depth = model.facing(positions, probe)
+    facing, depth = model.facing(positions, tool)
     return np.where(model.areas > 0 if model.dense else facing, np.maximum(depth, 0.0), 0.0)
 
 
-def renewed(
-    model: BlockModel, positions: FloatArray, probe: Probe, past: Past, friction: float
-) -> Grip:
+def updated_friction(
+    model: BlockModel, positions: FloatArray, tool: ToolSphere, past: FrictionState, friction: float
+) -> FrictionPotential:
     """The grip that goes with the pressure at these positions."""
-    seen = seen_from(model, positions, probe)
-    depth = pressed(model, positions, probe)
+    seen = points_from_tool(model, positions, tool)
+    depth = contact_depth(model, positions, tool)
     faces = np.flatnonzero((depth > 0).any(axis=1))
-    return gripped(
-        faces, seen[faces], depth[faces], past.on(faces), model.areas[faces], probe.radius, friction
+    return friction_potential_of(
+        faces, seen[faces], depth[faces], past.on(faces), model.areas[faces], tool.radius, friction
     )
 
 
-def gripped(
+def friction_potential_of(
     faces: IntArray,
     seen: FloatArray,
     depth: FloatArray,
-    past: Past,
+    past: FrictionState,
     areas: FloatArray,
     radius: float,
     friction: float,
-) -> Grip:
+) -> FrictionPotential:
     """The grip of faces (g,) whose points are seen from the tool here (g, p, 3) [m], pressed in by
     `depth` (g, p) [m].
 
@@ -97,11 +105,14 @@ def gripped(
     that came after. As that place moves while the equilibrium is sought, its stick is given that
     share of the stiffness instead, and the whole way.
     """
-    gap, held = np.maximum(np.linalg.norm(past.seen, axis=2) - radius, 0.0), past.hold.touched
+    gap, held = (
+        np.maximum(np.linalg.norm(past.seen, axis=2) - radius, 0.0),
+        past.friction_history.touched,
+    )
     late = np.where(held, 1.0, depth / np.maximum(depth + gap, 1e-12))
-    anchors = np.where(held[..., None], past.seen - past.hold.ways, past.seen)
+    anchors = np.where(held[..., None], past.seen - past.friction_history.ways, past.seen)
     normals = seen / np.linalg.norm(seen, axis=2, keepdims=True)
-    return Grip(
+    return FrictionPotential(
         faces,
         anchors,
         normals,
@@ -110,17 +121,17 @@ def gripped(
     )
 
 
-def _kept(model: BlockModel, past: Past) -> Grip | None:
+def _initial_friction(model: BlockModel, past: FrictionState) -> FrictionPotential | None:
     """The grip that the step begins with: of those points that were held, as they were; None of
     none.
     """
-    held = past.hold
+    held = past.friction_history
     faces = np.flatnonzero(held.touched.any(axis=1))
     if not len(faces):
         return None
-    here, areas = past.seen[faces], surface_spots(model.mesh, model.face).edges[faces] ** 2
+    here, areas = past.seen[faces], surface_quadrature(model.mesh, model.face).edges[faces] ** 2
     normals = here / np.linalg.norm(here, axis=2, keepdims=True)
-    return Grip(
+    return FrictionPotential(
         faces,
         here - held.ways[faces],
         normals,
@@ -129,7 +140,7 @@ def _kept(model: BlockModel, past: Past) -> Grip | None:
     )
 
 
-def ways_left(seen: FloatArray, grip: Grip, areas: FloatArray) -> FloatArray:
+def remaining_slip(seen: FloatArray, grip: FrictionPotential, areas: FloatArray) -> FloatArray:
     """Ways from the anchors (g, p, 3) [m] of the grip's points, seen from the tool here (g, p, 3),
     once the anchors were dragged along as far as their points slip; their tangential force is that
     times the area and the stick's stiffness.
@@ -144,32 +155,37 @@ def ways_left(seen: FloatArray, grip: Grip, areas: FloatArray) -> FloatArray:
     return np.asarray(ways * share[..., None])
 
 
-def hold_of(model: BlockModel, positions: FloatArray, probe: Probe, grip: Grip) -> Hold:
+def friction_history_of(
+    model: BlockModel, positions: FloatArray, tool: ToolSphere, grip: FrictionPotential
+) -> FrictionHistory:
     """What is left to the next step."""
-    seen, spots = seen_from(model, positions, probe), surface_spots(model.mesh, model.face)
+    seen, spots = (
+        points_from_tool(model, positions, tool),
+        surface_quadrature(model.mesh, model.face),
+    )
     whole, limits = np.zeros_like(seen), np.zeros(seen.shape[:2])
-    whole[grip.faces] = ways_left(seen[grip.faces], grip, model.areas[grip.faces])
+    whole[grip.faces] = remaining_slip(seen[grip.faces], grip, model.areas[grip.faces])
     limits[grip.faces] = grip.limits / spots.edges[grip.faces] ** 2
-    return Hold(
+    return FrictionHistory(
         spots.places.reshape(-1, 3), whole.reshape(-1, 3), limits.ravel() > 0, limits.ravel()
     )
 
 
-def drag(
+def solve_with_friction(
     model: BlockModel,
     positions: FloatArray,
-    probes: tuple[Probe, Probe],
-    past: Past,
+    tools: tuple[ToolSphere, ToolSphere],
+    past: FrictionState,
     friction: float,
     tolerance: float,
-    follower: Follower,
+    quick_solver: ModifiedNewton,
     recall: Callable[[BlockModel, FloatArray], None] | None = None,
-) -> tuple[Solution, Hold]:
+) -> tuple[Solution, FrictionHistory]:
     """Equilibrium with friction.
 
     Args:
         positions: (n, 3) to begin from [m].
-        probes: the tool before and now.
+        tools: the tool before and now.
         past: the step's beginning.
         friction: coefficient [1].
         tolerance: residual of each equilibrium; the last one's, with pressure and friction in
@@ -179,49 +195,59 @@ def drag(
     Returns:
         the solution, whose push has the drag in it, and what the step leaves to the next.
     """
-    before, probe = probes
+    before, tool = tools
     iterations, share, last = 0, _FIRST_SHARE, np.inf
-    model.grip = _kept(model, past)
+    model.friction_potential = _initial_friction(model, past)
     wanted = _ROUGH if tolerance >= _AGREED else tolerance
     try:
-        solution = lead(
-            model, positions, before, probe, max(wanted, tolerance), follower, haste=not model.dense
+        solution = move_tool(
+            model,
+            positions,
+            before,
+            tool,
+            max(wanted, tolerance),
+            quick_solver,
+            haste=not model.dense,
         )
         for _ in range(_MOST_TURNS):
             iterations += solution.iterations
             if not solution.converged:
-                return replace(solution, iterations=iterations), Hold.nothing()
-            grip = renewed(model, solution.positions, probe, past, friction)
+                return replace(solution, iterations=iterations), FrictionHistory.nothing()
+            grip = updated_friction(model, solution.positions, tool, past, friction)
             if recall is not None:
                 recall(model, solution.positions)
-            old: Grip | None = model.grip
-            model.grip = grip
-            residual = misfit(model, model.assemble(solution.positions, probe, tangent=False))
+            old: FrictionPotential | None = model.friction_potential
+            model.friction_potential = grip
+            residual = relative_residual(
+                model, model.assemble(solution.positions, tool, tangent=False)
+            )
             if residual <= max(tolerance, _AGREED):
-                return replace(solution, iterations=iterations, residual=residual), hold_of(
-                    model, solution.positions, probe, grip
-                )
+                return replace(
+                    solution, iterations=iterations, residual=residual
+                ), friction_history_of(model, solution.positions, tool, grip)
             share = (
                 max(share / 2, 0.1) if residual > last else min(1.5 * share, 1.0)
             )  # halves, where they go to and fro
             last = residual
-            model.grip = _mixed(old, grip, share)
-            solution = lead(
+            model.friction_potential = _blended(old, grip, share)
+            solution = move_tool(
                 model,
                 solution.positions,
-                probe,
-                probe,
+                tool,
+                tool,
                 max(min(wanted, _CLOSER * residual), tolerance),
-                follower,
+                quick_solver,
             )
         return replace(
             solution, outcome=Outcome.GRIP_SWINGS, iterations=iterations, residual=residual
-        ), Hold.nothing()
+        ), FrictionHistory.nothing()
     finally:
-        model.grip = None
+        model.friction_potential = None
 
 
-def _mixed(old: Grip | None, new: Grip, share: float) -> Grip:
+def _blended(
+    old: FrictionPotential | None, new: FrictionPotential, share: float
+) -> FrictionPotential:
     """The new grip with limits only part of the way from the old ones'."""
     if old is None or share == 1.0:
         return new

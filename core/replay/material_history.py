@@ -27,7 +27,7 @@ from typing import Self
 import numpy as np
 
 from palpate.fem.constitutive.elastic import Law
-from palpate.fem.continuation import lead
+from palpate.fem.continuation import move_tool
 from palpate.fem.history_stress import (
     ConstantStress,
     cauchy_green,
@@ -36,16 +36,16 @@ from palpate.fem.history_stress import (
     shear_stress,
 )
 from palpate.fem.material_points import MaterialPoints, material_points
-from palpate.fem.model import BlockModel, Probe
-from palpate.fem.modified_newton import Follower
-from palpate.fem.newton import Outcome, Solution, misfit, solve
+from palpate.fem.model import BlockModel, ToolSphere
+from palpate.fem.modified_newton import ModifiedNewton
+from palpate.fem.newton import Outcome, Solution, relative_residual, solve
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SetupError
 from palpate.mesh.protocol import Mesh, Meshing
 from palpate.replay.equilibrium import Equilibrium
 from palpate.setup.setup import Material, Setup
 
-__all__ = ["History", "Memory", "State", "Step", "refuse_memory"]
+__all__ = ["HistoryVariables", "MaterialHistory", "ReplayState", "TimeStep", "require_memoryless"]
 
 _MOST_ROUNDS = 100
 """Equilibria in one frame until one brings its own set: each leaves about the retained share of
@@ -53,7 +53,7 @@ what the last one missed by."""
 
 
 @dataclass(frozen=True, eq=False)
-class History:
+class HistoryVariables:
     """What is remembered after a frame, at the material's points; stresses are over the local shear
     modulus [1].
 
@@ -77,17 +77,17 @@ class History:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class ReplayState:
     """From where a replay can go on: its last frame, and what the material remembers then; None for
     one without memory.
     """
 
     frame: Equilibrium
-    history: History | None
+    history: HistoryVariables | None
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class TimeStep:
     """One step in time: what is left of each h (k,), what it takes from the change of S - T (k,),
     and S's factor in the stress.
     """
@@ -97,14 +97,14 @@ class Step:
     factor: float
 
 
-def refuse_memory(material: Material, what: str) -> None:
+def require_memoryless(material: Material, what: str) -> None:
     """Raise SetupError that says what knows nothing of the past, when the material remembers it."""
-    if material.remembers:
+    if material.has_history:
         key = "relaxation" if material.relaxation else "retained_fraction"
         raise SetupError(f"{what} leave out the material's {key}", key=key)
 
 
-class Memory:
+class MaterialHistory:
     """The memory of one block: `begin` a step in time, let the models `recall`, and `end` it with
     what was found.
 
@@ -122,7 +122,7 @@ class Memory:
         self._times = np.array([term.time_constant for term in material.relaxation])
         count, terms = len(points.tangents(mesh, mesh.nodes)), len(self._times)
         none = np.zeros((count, 6))
-        self.history = History(
+        self.history = HistoryVariables(
             None, False, np.zeros((terms, count, 6)), none, np.zeros(count), none, none
         )
         self.rest()
@@ -134,7 +134,7 @@ class Memory:
         """
         return (
             cls(setup, material_points(setup, grid, mesh), mesh)
-            if setup.material.remembers
+            if setup.material.has_history
             else None
         )
 
@@ -146,7 +146,7 @@ class Memory:
     def rest(self) -> None:
         """Set out for the long rest before the first frame, in which all relaxes that can."""
         none = np.zeros(len(self._times))
-        self.step, self._time = Step(none, none, 1 - float(self._shares.sum())), 0.0
+        self.step, self._time = TimeStep(none, none, 1 - float(self._shares.sum())), 0.0
 
     def start(self, rest: Equilibrium) -> None:
         """Begin with a block that has long been at rest like this."""
@@ -171,9 +171,9 @@ class Memory:
             spans > 0, -np.expm1(-spans) / np.where(spans > 0, spans, 1.0), 1.0
         )
         factor = float(1 - self._shares.sum() + taken.sum())
-        self.step, self._time = Step(np.exp(-spans), taken, factor), float(time)
+        self.step, self._time = TimeStep(np.exp(-spans), taken, factor), float(time)
 
-    def recall(self, model: BlockModel, positions: FloatArray | None = None) -> None:
+    def apply_to(self, model: BlockModel, positions: FloatArray | None = None) -> None:
         """Put the step into a model; with positions (n, 3) [m], with the set that they bring."""
         past, step, mesh = self.history, self.step, model.mesh
         fixed = np.einsum("k,kmc->mc", step.left, past.delayed) - step.taken.sum() * past.driving
@@ -182,9 +182,9 @@ class Memory:
             kept = self._set(cauchy_green(self.points.tangents(mesh, positions)))
         stress = self.points.read(mesh, fixed - step.factor * kept.free)
         model.mu = step.factor * model.unrelaxed
-        model.carried = ConstantStress.of(model, stress * model.unrelaxed[..., None])
+        model.added_potential = ConstantStress.of(model, stress * model.unrelaxed[..., None])
 
-    def _set(self, strained: FloatArray) -> History:
+    def _set(self, strained: FloatArray) -> HistoryVariables:
         """The history with the set that these C (m, 6) bring."""
         past = self.history
         if not self.fraction:
@@ -197,7 +197,7 @@ class Memory:
         free[growing] = shear_stress(self.law, from_log_strain(self.fraction * kept[growing]))
         return replace(past, largest=np.maximum(size, past.largest), kept=kept, free=free)
 
-    def after(self, frame: Equilibrium) -> History:
+    def after(self, frame: Equilibrium) -> HistoryVariables:
         """The history with a frame in it, at the end of the step that is under way."""
         past, step = self.history, self.step
         strained = cauchy_green(
@@ -211,13 +211,13 @@ class Memory:
         touched = past.touched or frame.in_contact
         return replace(found, time=self._time, touched=touched, delayed=delayed, driving=driving)
 
-    def settled(
+    def with_permanent_set(
         self,
         model: BlockModel,
-        probe: Probe | None,
+        tool: ToolSphere | None,
         solution: Solution,
         tolerance: float,
-        follower: Follower,
+        quick_solver: ModifiedNewton,
     ) -> Solution:
         """The equilibrium that brings its own set, from one under the set that was, with the tool
         where it is.
@@ -229,14 +229,14 @@ class Memory:
             if not solution.converged:
                 return replace(solution, iterations=iterations)
             positions = solution.positions
-            self.recall(model, positions)
-            residual = misfit(model, model.assemble(positions, probe, tangent=False))
+            self.apply_to(model, positions)
+            residual = relative_residual(model, model.assemble(positions, tool, tangent=False))
             if residual <= tolerance:
                 return replace(solution, iterations=iterations, residual=residual)
-            if probe is None:
+            if tool is None:
                 solution = solve(model, None, positions, None, tolerance)
             else:
-                solution = lead(model, positions, probe, probe, tolerance, follower)
+                solution = move_tool(model, positions, tool, tool, tolerance, quick_solver)
             iterations += solution.iterations
         return replace(solution, iterations=iterations, outcome=Outcome.ITERATIONS)
 

@@ -20,15 +20,15 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.progress import Report, silent
 from palpate.mesh.box_mesh import meshing_for
 from palpate.mesh.protocol import Meshing
-from palpate.replay.material_history import refuse_memory
+from palpate.replay.material_history import require_memoryless
 from palpate.replay.replay import Equilibrium, Replay
 from palpate.setup.setup import Setup
 
-__all__ = ["MeshError", "hardest_frames", "mesh_errors"]
+__all__ = ["MeshErrorEstimate", "hardest_frames", "mesh_errors"]
 
 
 @dataclass(frozen=True)
-class MeshError:
+class MeshErrorEstimate:
     """What the grid leaves out in one frame.
 
     Attributes:
@@ -63,7 +63,7 @@ def hardest_frames(frames: Sequence[Equilibrium]) -> list[int]:
 
 def mesh_errors(
     setup: Setup, frames: Sequence[Equilibrium], grid: Meshing, *, report: Report = silent
-) -> tuple[MeshError, ...]:
+) -> tuple[MeshErrorEstimate, ...]:
     """Estimate the grid's error in the hardest frame of each touch.
 
     Args:
@@ -72,7 +72,7 @@ def mesh_errors(
     A touch that finds no equilibrium on the finer grid is left out: `hardest_frames` tells how many
     there are.
     """
-    refuse_memory(
+    require_memoryless(
         setup.material,
         "the mesh's error is estimated in single frames, which do not know those before;",
     )
@@ -87,7 +87,7 @@ def mesh_errors(
         report(done / len(keys), f"mesh error in touch {done + 1} of {len(keys)}")
         frame = frames[number]
         block.slip = frame.slip.copy()
-        other = block.held(frame.probe, frame)
+        other = block.solve_with_fixed_base(frame.tool, frame)
         if other.outcome is not Outcome.CONVERGED:
             continue
         here, there = frame.move(points), other.move(points)
@@ -95,7 +95,7 @@ def mesh_errors(
         force = float(np.linalg.norm(other.force - frame.force)) / max(
             float(np.linalg.norm(frame.force)), 1e-12
         )
-        found.append(MeshError(number, error, error / max(size, 1e-12), force))
+        found.append(MeshErrorEstimate(number, error, error / max(size, 1e-12), force))
     return tuple(found)
 
 

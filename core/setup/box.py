@@ -10,7 +10,7 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.setup.bounds import within
 
-__all__ = ["CLEARANCE", "Box", "clear_of"]
+__all__ = ["CLEARANCE", "Box", "distance_to_block"]
 
 _SAMPLING = (35, 21, 19)
 """Points along the edges where the surface is sampled."""
@@ -83,7 +83,7 @@ CLEARANCE = 1.5e-3
 wrong."""
 
 
-def clear_of(size: tuple[float, float, float], centres: FloatArray) -> FloatArray:
+def distance_to_block(size: tuple[float, float, float], centres: FloatArray) -> FloatArray:
     """Distance (m,) [m] of points (m, 3) to the stated block; zero inside."""
     low, high = (
         np.array([-size[0] / 2, -size[1] / 2, 0.0]),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-__all__ = ["containing", "nearest", "turns_around"]
+__all__ = ["containing", "nearest", "winding_number"]
 
 
 @njit(cache=True)
@@ -104,7 +104,7 @@ def containing(
 
 
 @njit(cache=True)
-def turns_around(faces: Any, positions: Any, point: Any) -> float:
+def winding_number(faces: Any, positions: Any, point: Any) -> float:
     """How often flat polygons (f, 3) or (f, 4) wind around a point (3,): over a closed surface 1
     inside and 0 outside.
 

@@ -116,11 +116,11 @@ class Material:
             "",
         )
         _within("retained_fraction", self.retained_fraction, 0.0, 0.9, "")
-        if self.remembers and self.law == "corotational":
+        if self.has_history and self.law == "corotational":
             key = "relaxation" if self.relaxation else "retained_fraction"
             raise SetupError(f"the corotational law has no {key}; use neo_hooke with it", key=key)
 
     @property
-    def remembers(self) -> bool:
+    def has_history(self) -> bool:
         """Whether its stress depends on what was done to it before."""
         return bool(self.relaxation or self.retained_fraction)

@@ -286,16 +286,16 @@ class Setup:
         return self.geometry
 
     @property
-    def remembers(self) -> bool:
+    def has_history(self) -> bool:
         """Whether a frame depends on all those before it, so that none may be left out."""
-        return bool(self.tool.friction_coefficient) or self.material.remembers
+        return bool(self.tool.friction_coefficient) or self.material.has_history
 
     @property
-    def marked_by_pushes(self) -> bool:
+    def pushes_leave_traces(self) -> bool:
         """Whether a push leaves something when the tool is gone: a dent in a material that
         remembers, or a block that slid.
         """
-        return self.support.friction_coefficient is not None or self.material.remembers
+        return self.support.friction_coefficient is not None or self.material.has_history
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON, SI units."""

@@ -107,11 +107,11 @@ class Shape:
         """Places of the body (m, 3) [m] nearest to points (m, 3) [m]: the points themselves within
         it.
         """
-        from palpate.setup.closest_point import nearest, turns_around
+        from palpate.setup.closest_point import nearest, winding_number
 
         _, places = nearest(np.ascontiguousarray(points, float), self.corners)
         inside = np.array(
-            [turns_around(self.triangles, self.vertices, point) > 0.5 for point in points],
+            [winding_number(self.triangles, self.vertices, point) > 0.5 for point in points],
             dtype=bool,
         )
         return np.where(inside[:, None], points, places)

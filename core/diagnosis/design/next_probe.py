@@ -113,7 +113,7 @@ def next_probe(
     bench.tell("which push would tell most")
     setups = [model.setup for pair in pairs for model in pair.models]
     clocks = len({setup.sensor.time_offset for setup in setups}) > 1
-    memory = any(setup.material.remembers for setup in setups)
+    memory = any(setup.material.has_history for setup in setups)
     drags = any(
         setup.support.friction_coefficient is not None or setup.tool.friction_coefficient
         for setup in setups

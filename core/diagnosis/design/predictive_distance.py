@@ -27,7 +27,7 @@ from palpate.effects.elastic_material import PoissonRatio
 from palpate.effects.support import BaseSlip
 from palpate.effects.tool import ToolRadius
 from palpate.fem.constitutive.stiffness_field import lump_share
-from palpate.fem.model import rule_of
+from palpate.fem.model import element_quadrature
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.gradients.forward import TOOL_STEP, displacement_changes
@@ -148,19 +148,19 @@ class _Replayed:
         centres = touch_correction(model.setup, scene.grid).apply(
             push.centres(stated.tool.radius, late)
         )
-        slides = model.setup.support.friction_coefficient is not None or model.setup.remembers
+        slides = model.setup.support.friction_coefficient is not None or model.setup.has_history
         self.late = [(0.0 if row else -push.speed) * push.direction for row in range(len(centres))]
         used = [
             0,
             1,
-            *([2] if any(push.along) or model.setup.material.remembers else []),
+            *([2] if any(push.along) or model.setup.material.has_history else []),
             *([3] if slides else []),
         ]
         self.frames: dict[int, Equilibrium] = {}
         previous: Equilibrium | None = None
         for row in used:
-            near = None if like is None or model.setup.remembers else like.frames.get(row)
-            previous = self.frames[row] = self.block.sought(
+            near = None if like is None or model.setup.has_history else like.frames.get(row)
+            previous = self.frames[row] = self.block.solve_from_any(
                 centres[row], (near, previous), float(push.times[row])
             )
         self._engine: dict[int, FloatArray] = {}
@@ -183,7 +183,7 @@ class _Replayed:
     @property
     def has_columns(self) -> bool:
         """Whether a frame hangs on nothing but itself, so that it has derivatives of its own."""
-        return not self.model.setup.remembers
+        return not self.model.setup.has_history
 
     def _along_normals(self, frame: Equilibrium, fields: FloatArray) -> FloatArray:
         changed = [frame.mesh.interpolate(field, self.scene.centres) for field in fields]
@@ -209,7 +209,7 @@ class _Replayed:
         changed = displacement_changes(self.block, frame, steps)
         tool = changed[:3] / TOOL_STEP
         turned = [
-            np.tensordot(np.cross(axis, frame.probe.centre - self.scene.pivot), tool, axes=1)
+            np.tensordot(np.cross(axis, frame.tool.centre - self.scene.pivot), tool, axes=1)
             for axis in np.eye(3)
         ]
         scaled = changed[3:] / np.array([step for _, step in ways])[:, None, None]
@@ -228,7 +228,7 @@ class _Replayed:
         frame = self.frames.get(row)
         if frame is None or not frame.in_contact or not self.has_columns or not self.scene.lumps:
             return np.concatenate([*found, np.zeros((len(size), len(self.scene.lumps)))], axis=1)
-        factors = np.array([lump_share(lump, rule_of(frame.mesh)) for lump in self.scene.lumps])
+        factors = np.array([lump_share(lump, element_quadrature(frame.mesh)) for lump in self.scene.lumps])
         found.append(
             STIFFNESS_ERROR
             * self._along_normals(frame, stiffness_changes(self.block, frame, factors))

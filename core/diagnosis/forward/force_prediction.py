@@ -54,7 +54,7 @@ def predict_forces(
         begin = [frames[-1]] if same and frames[-1].outcome is Outcome.CONVERGED else []
         if starts is not None and starts[number].in_contact:
             begin.insert(0, starts[number])
-        frame = block.sought(centre, begin or [None])
+        frame = block.solve_from_any(centre, begin or [None])
         frames.append(frame)
         if columns is not None:
             changed = columns.of_group(frame, way.moves[:, number])

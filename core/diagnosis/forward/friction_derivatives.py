@@ -18,8 +18,8 @@ from palpate.diagnosis.forward.loading_history import Timeline
 from palpate.effects.tool import ToolFriction
 from palpate.fem.model import CONTACT_STIFFNESS, BlockModel
 from palpate.foundation.arrays import FloatArray
-from palpate.gradients.forward import local_probe
-from palpate.replay.friction_step import pressed, seen_from
+from palpate.gradients.forward import local_tool
+from palpate.replay.friction_step import contact_depth, points_from_tool
 from palpate.replay.replay import Equilibrium
 
 __all__ = ["Spot", "pulls", "spot_of"]
@@ -45,9 +45,9 @@ class Spot:
 
 def spot_of(model: BlockModel, frame: Equilibrium) -> Spot | None:
     """Of a frame whose tangent is factorised; None where nothing is felt."""
-    positions, probe = frame.mesh.nodes + frame.displacement, local_probe(frame)
-    seen = seen_from(model, positions, probe)
-    pushes = CONTACT_STIFFNESS * model.areas * pressed(model, positions, probe)
+    positions, probe = frame.mesh.nodes + frame.displacement, local_tool(frame)
+    seen = points_from_tool(model, positions, probe)
+    pushes = CONTACT_STIFFNESS * model.areas * contact_depth(model, positions, probe)
     held = float(pushes.sum())
     faces = np.flatnonzero(pushes.any(axis=1))
     if held <= 0.0 or not len(faces):

@@ -29,7 +29,7 @@ from palpate.fem.linalg.direct_solver import NotPositiveDefinite
 from palpate.fem.model import BlockModel
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
-from palpate.gradients.forward import factorise_at, local_probe, tool_slopes
+from palpate.gradients.forward import factorise_at, local_tool, tool_derivatives
 from palpate.measurement.surface_gaps import Surface
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.protocol import Meshing
@@ -71,8 +71,8 @@ class _Look:
     @cached_property
     def coupling(self) -> FloatArray:
         """How the residual changes with the tool's place (u, 3), over E [m]."""
-        return tool_slopes(
-            self.model, self.frame.mesh.nodes + self.frame.displacement, local_probe(self.frame)
+        return tool_derivatives(
+            self.model, self.frame.mesh.nodes + self.frame.displacement, local_tool(self.frame)
         )[0]
 
 

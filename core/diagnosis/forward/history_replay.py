@@ -20,7 +20,7 @@ from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.replay.replay import Equilibrium, Replay
-from palpate.setup.box import CLEARANCE, clear_of
+from palpate.setup.box import CLEARANCE, distance_to_block
 from palpate.setup.setup import Setup
 
 __all__ = ["TRACED", "Past", "forgetful", "travel"]
@@ -48,7 +48,7 @@ def forgetful(setup: Setup) -> Setup:
 
 def travel(setup: Setup) -> float:
     """Longest motion between two places [m]."""
-    return TRAVEL if setup.material.remembers else DRAG
+    return TRAVEL if setup.material.has_history else DRAG
 
 
 class Past:
@@ -66,7 +66,7 @@ class Past:
         self._frame: Equilibrium | None = None
         self._times, way = data.way(block.setup)
         self._way = moved.apply(way)
-        self._near = clear_of(block.setup.box.size, self._way) < block.setup.tool.radius + CLEARANCE
+        self._near = distance_to_block(block.setup.box.size, self._way) < block.setup.tool.radius + CLEARANCE
 
     def reach(self, centre: FloatArray, time: float | None) -> Equilibrium:
         """What is found with the tool's stated centre here (3,) [m] at a group's time [s]; None for
@@ -81,7 +81,7 @@ class Past:
         return self._step(centre, self._last)
 
     def _step(self, centre: FloatArray, time: float) -> Equilibrium:
-        frame = self._block.sought(centre, (self._frame,), time)
+        frame = self._block.solve_from_any(centre, (self._frame,), time)
         if frame.outcome is Outcome.CONVERGED:
             self._frame = frame
         return frame

@@ -13,7 +13,7 @@ from palpate.diagnosis.forward.ray_comparison import Compared, observe
 from palpate.diagnosis.forward.slip_derivatives import Sliding
 from palpate.effects.base import LOG_PER_CONTRAST
 from palpate.fem.constitutive.stiffness_field import lump_share
-from palpate.fem.model import rule_of
+from palpate.fem.model import element_quadrature
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.gradients.forward import TOOL_STEP, Change, displacement_changes, force_changes
@@ -92,13 +92,13 @@ class Columns:
         tool = changed[:3] / TOOL_STEP
         for axis in np.flatnonzero(np.abs(tool[:, :-1]).max(axis=(1, 2)) > _MOST_RESPONSE):
             self._span(frame, int(axis), tool, changed[3:], moves)
-        arm = frame.probe.centre - wanted.pivot
+        arm = frame.tool.centre - wanted.pivot
         turned = [np.tensordot(np.cross(axis, arm), tool, axes=1) for axis in np.eye(3)]
         scaled = (
             changed[3:] / np.array(wanted.steps)[:, None, None] if wanted.steps else changed[3:]
         )
         factors = LOG_PER_CONTRAST * np.array(
-            [lump_share(lump, rule_of(frame.mesh)) for lump in wanted.lumps]
+            [lump_share(lump, element_quadrature(frame.mesh)) for lump in wanted.lumps]
         )
         still = [(setup, np.zeros(3))] * len(factors)
         lumps = (
@@ -154,7 +154,7 @@ class Columns:
         """
         step = _SPAN * np.eye(3)[axis]
         sides = [
-            self.block.held(replace(frame.probe, centre=frame.probe.centre + sign * step), frame)
+            self.block.solve_with_fixed_base(replace(frame.tool, centre=frame.tool.centre + sign * step), frame)
             for sign in (1, -1)
         ]
         if any(side.outcome is not Outcome.CONVERGED for side in sides):
@@ -174,7 +174,7 @@ class Columns:
     def of_ball(self, frame: Equilibrium, moves: FloatArray) -> tuple[FloatArray, FloatArray]:
         """How the ball's centre (k, 3) and radius (k,) change, in the order of `displacement`."""
         stated, steps = self.block.setup.tool, np.array(self.wanted.steps)[:, None]
-        arm = frame.probe.centre - self.wanted.pivot
+        arm = frame.tool.centre - self.wanted.pivot
         shifts = [np.subtract(other.tool.offset, stated.offset) for other in self.wanted.setups]
         growth = [other.tool.radius - stated.radius for other in self.wanted.setups]
         own = (moves + np.array(shifts)) / steps if shifts else np.zeros((0, 3))

@@ -93,7 +93,7 @@ def timeline_of(
         if frame.in_contact and np.isfinite(seen[number])
     )
     depths = np.maximum(-box_gap(places, setup.box.size, setup.tool.radius), 0.0)
-    own = np.array([frames[number].probe.centre for number in touched]).reshape(-1, 3)
+    own = np.array([frames[number].tool.centre for number in touched]).reshape(-1, 3)
     reached = np.maximum(-box_gap(own, setup.box.size, setup.tool.radius), 1e-6)
     shares = np.zeros((len(times), len(touched)))
     for begin, end in _pushes(depths):

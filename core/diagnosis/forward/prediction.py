@@ -159,10 +159,10 @@ def predict(
         way.measured,
     )
     columns = (
-        Columns(block, wanted, measured is not None) if wanted and not setup.remembers else None
+        Columns(block, wanted, measured is not None) if wanted and not setup.has_history else None
     )
     gap, count, spread, changes, pressed, frames, chosen, elsewhere = [], [], [], [], [], [], [], []
-    past = Past(data, block, true_from_stated) if setup.remembers else None
+    past = Past(data, block, true_from_stated) if setup.has_history else None
     previous: Equilibrium | None = None
     for number, (group, centre, turn) in enumerate(
         zip(data.groups, centres, way.turns, strict=True)
@@ -175,7 +175,7 @@ def predict(
             frame = past.reach(centre, data.instant(group, setup))
         else:
             start = starts[number] if starts is not None and starts[number].in_contact else previous
-            frame = block.sought(centre, (start, previous))
+            frame = block.solve_from_any(centre, (start, previous))
         previous = frame if frame.outcome is Outcome.CONVERGED else None
         sample = samples[number] if samples is not None else choose(group, setup, frame, surface)
         compared = compare(group, setup, frame, surface, sample)

@@ -240,9 +240,9 @@ def compare(
     values = sample.gap.astype(float)
     near = np.abs(seen.gap - values[seen.index]) < FARTHEST_CHANGE
     values[seen.index[near]] = seen.gap[near]
-    arm = points - frame.probe.centre
+    arm = points - frame.tool.centre
     distance = np.linalg.norm(arm, axis=1)
-    off_tool = sight.scale * (distance - frame.probe.radius)
+    off_tool = sight.scale * (distance - frame.tool.radius)
     on_tool = (np.abs(off_tool) < TOOL_REACH) & (np.abs(off_tool) < np.abs(values) - CLEARLY)
     values[on_tool] = off_tool[on_tool]
     kept, tool = ~on_tool[seen.index], np.flatnonzero(on_tool)

@@ -65,7 +65,7 @@ def _turns(
     data: Observations, setup: Setup, grid: Meshing, wanted: Wanted | None
 ) -> list[tuple[FloatArray, FloatArray] | None]:
     """As `Led.turns`; another clock says when a cloud was taken, not where the tool turned."""
-    if setup.support.friction_coefficient is None or setup.remembers:
+    if setup.support.friction_coefficient is None or setup.has_history:
         return [None] * len(data.groups)
     chosen, clock = data.turns(setup), setup.sensor.time_offset
     setups = (setup, *(wanted.setups if wanted else ()))

@@ -61,7 +61,7 @@ def ladder(
     Groups in touch count, and where a push leaves something (a dent, a block that slid) also those
     after it.
     """
-    sums = probe_sums(data, (baseline, extended), found.marked_by_pushes)
+    sums = probe_sums(data, (baseline, extended), found.pushes_leave_traces)
     drawn, whole = sums.rms(sums.draws(seed)), sums.rms()[0]
     low, high = np.quantile(removed_share(*drawn.T), [0.025, 0.975])
     return Ladder(

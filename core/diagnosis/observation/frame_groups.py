@@ -20,7 +20,7 @@ from palpate.foundation.processes import at_once
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.segmentation import Cleaner, cleaner_for, find_shaft_axis, tool_poses
 from palpate.registration.registration import Registration
-from palpate.setup.box import CLEARANCE, clear_of
+from palpate.setup.box import CLEARANCE, distance_to_block
 from palpate.setup.setup import Setup
 
 __all__ = ["Group", "Observations", "observe", "observe_all"]
@@ -46,7 +46,7 @@ def _depth(size: tuple[float, float, float], centres: FloatArray) -> FloatArray:
     """
     sides = np.array([size[0] / 2, size[1] / 2]) - np.abs(centres[:, :2])
     inside = np.minimum(sides.min(axis=1), size[2] - centres[:, 2])
-    return np.where(inside > 0, inside, -clear_of(size, centres))
+    return np.where(inside > 0, inside, -distance_to_block(size, centres))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +125,7 @@ class Observations:
         places = self._places(setup)
         for group, centre in zip(self.groups, self.centres(setup), strict=True):
             own = places[list(group.frames)]
-            if group.free and (clear_of(setup.box.size, own) < setup.tool.radius).any():
+            if group.free and (distance_to_block(setup.box.size, own) < setup.tool.radius).any():
                 return False
             if not group.free and (np.linalg.norm(own - centre, axis=1) > TRAVEL).any():
                 return False
@@ -242,7 +242,7 @@ def observe(
     kinematics, times = sequence.kinematics, np.asarray(sequence.cloud_times)
     instants = times - setup.sensor.time_offset
     centres = setup.phantom_from_robot.apply(smooth_centres(kinematics, instants))
-    free = clear_of(setup.box.size, centres) > setup.tool.radius + CLEARANCE
+    free = distance_to_block(setup.box.size, centres) > setup.tool.radius + CLEARANCE
     poses = tool_poses(kinematics, instants, setup.phantom_from_robot, shaft)
     groups = (
         [Group((), rest[cleaner.clean(rest).indices], True, True, lowest=cleaner.lowest)]
@@ -289,7 +289,7 @@ def _forces(sequence: Sequence, setup: Setup) -> ForceRecord | None:
         smooth_centres(sequence.kinematics, sequence.forces.time)
     )
     return ForceRecord.of(
-        sequence.forces, clear_of(setup.box.size, centres) > setup.tool.radius + CLEARANCE
+        sequence.forces, distance_to_block(setup.box.size, centres) > setup.tool.radius + CLEARANCE
     )
 
 

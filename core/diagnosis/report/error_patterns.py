@@ -61,7 +61,7 @@ def patterns(bench: Bench, data: Sequence[Observations], baseline: Model, found:
         for row in zip(data, baseline.predictions, found.predictions, strict=True)
         if not row[0].unseen
     ]
-    lasting = found.setup.marked_by_pushes
+    lasting = found.setup.pushes_leave_traces
     compared = [
         _compare(item, before, after, whole=False, lasting=lasting) for item, before, after in pairs
     ]

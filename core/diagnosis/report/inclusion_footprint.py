@@ -22,7 +22,7 @@ from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.effects.elastic_material import StiffInclusion
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.protocol import Meshing
-from palpate.mesh.push_meshes import PushedSpec
+from palpate.mesh.push_meshes import PushMeshSpec
 from palpate.replay.replay import Replay
 from palpate.setup.setup import Setup
 
@@ -83,7 +83,7 @@ def footprint_of(
     centre = np.array([[lump.x, lump.y, lump.z]])
     middle, normal = _on_surface(bench, centre)
     places, normals = _rings(bench, middle[0], normal[0], lump.radius)
-    grid = bench.rough.at(places) if isinstance(bench.rough, PushedSpec) else bench.rough
+    grid = bench.rough.at(places) if isinstance(bench.rough, PushMeshSpec) else bench.rough
     with_lump = lump.apply(without)
     pending = [
         bench.workers.run(_resisting, (without, with_lump), grid, place, out, depth)
@@ -165,7 +165,7 @@ def _resisting(
     found = []
     for setup in setups:
         block = Replay(setup, grid, 1e-3)
-        frame = block.sought(place + (setup.tool.radius - depth) * normal, (None,))
+        frame = block.solve_from_any(place + (setup.tool.radius - depth) * normal, (None,))
         found.append(
             float(frame.force @ normal) if frame.outcome.name == "CONVERGED" else float("nan")
         )

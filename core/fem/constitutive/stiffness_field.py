@@ -15,7 +15,7 @@ from palpate.setup.setup import Inclusion, Layer, Material
 
 __all__ = [
     "Spots",
-    "SurfaceSpots",
+    "SurfaceQuadrature",
     "layer_share",
     "log_stiffness",
     "lump_share",
@@ -36,7 +36,7 @@ class Spots(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class SurfaceSpots:
+class SurfaceQuadrature:
     """Points of the surface at rest (f, p, 3) [m], and the edge of the part of it that each stands
     for (f, p) [m].
     """

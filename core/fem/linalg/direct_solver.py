@@ -25,11 +25,11 @@ class Factor(Protocol):
 
     generation: int
 
-    def factorise(self, data: FloatArray, asked: IntArray | None = None) -> None:
+    def factorise(self, data: FloatArray, requested: IntArray | None = None) -> None:
         """Factorise the matrix with these entries of its upper triangle; raises
         NotPositiveDefinite.
 
-        `answers` between unknowns that are among those `asked` (m,) may be had for less; others are
+        `inverse_entries` between unknowns that are among those `requested` (m,) may be had for less; others are
         as right.
         """
 
@@ -43,7 +43,7 @@ class Factor(Protocol):
         """
         ...
 
-    def answers(self, unknowns: IntArray) -> FloatArray:
+    def inverse_entries(self, unknowns: IntArray) -> FloatArray:
         """The inverse's entries (m, m) between these unknowns (m,): how each answers to a unit
         load, to the factor's precision.
         """

@@ -70,11 +70,11 @@ class _Handle:
 
     Args:
         pattern: as of `Pardiso`.
-        asked: (m,) unknowns between which entries of the inverse will be wanted.
+        requested: (m,) unknowns between which entries of the inverse will be wanted.
         single: precision.
     """
 
-    def __init__(self, pattern: sp.csr_matrix, asked: IntArray, single: bool) -> None:
+    def __init__(self, pattern: sp.csr_matrix, requested: IntArray, single: bool) -> None:
         self.kind: np.dtype[Any] = np.dtype(np.float32 if single else np.float64)
         self.entries = np.asarray(pattern.data, dtype=self.kind)
         self.size = pattern.shape[0]
@@ -87,21 +87,21 @@ class _Handle:
         self.options[_CHOSEN], self.options[_ORDERING] = 1, _NESTED_DISSECTION
         self.options[_PRECISION] = _SINGLE if single else 0
         self.order = np.zeros(self.size, dtype=np.int32)
-        self.asked = np.zeros(self.size, dtype=bool)
-        self.asked[asked] = True
-        if len(asked):
+        self.requested = np.zeros(self.size, dtype=bool)
+        self.requested[requested] = True
+        if len(requested):
             # Of MKL's two ways to factorise, the usual one answers sparse right sides wrongly, and
             # takes ten times as long.
             self.options[_ALGORITHM] = _TWO_LEVEL
         self.call = _pardiso()
-        self.run(_ANALYSE, np.zeros(self.size), asked)
+        self.run(_ANALYSE, np.zeros(self.size), requested)
 
     def run(self, phase: int, right: FloatArray, sparse: IntArray = _NONE) -> FloatArray:
         """Carry out a phase; returns the solution (n,) or (n, m) in column order and this precision
         where the phase has one.
 
         Of right sides that are empty but in the unknowns `sparse` the solution is right only there.
-        These are among those asked for, all of which are to be named when the matrix is analysed
+        These are among those requested, all of which are to be named when the matrix is analysed
         and when it is factorised.
         """
         self.options[_PARTIAL] = _SPARSE_RIGHT_SIDES if len(sparse) else 0
@@ -168,37 +168,37 @@ class Pardiso:
         self.generation = 0
         self._trusted, self._current = True, False
         _pardiso()  # where it is missing, that is said here and now
-        self._asked: IntArray | None = None
+        self._requested: IntArray | None = None
 
-    def _analyse(self, asked: IntArray) -> None:
+    def _analyse(self, requested: IntArray) -> None:
         """Analyse the pattern, with cheap answers between these unknowns (m,): in which order they
         are eliminated hangs on it.
         """
-        self._handle, self._asked, self._checked = (
-            _Handle(self._matrix, asked, self._single),
-            asked,
+        self._handle, self._requested, self._checked = (
+            _Handle(self._matrix, requested, self._single),
+            requested,
             False,
         )
         self._forget = weakref.finalize(self, _release, self._handle)
         # At interpreter exit the memory goes anyway, and the library may be gone first.
         self._forget.atexit = False
 
-    def factorise(self, data: FloatArray, asked: IntArray | None = None) -> None:
+    def factorise(self, data: FloatArray, requested: IntArray | None = None) -> None:
         """Factorise the matrix with these entries of its upper triangle; raises
         NotPositiveDefinite.
 
-        `answers` between unknowns that are all among those `asked` (m,) take a fifth of the time;
+        `inverse_entries` between unknowns that are all among those `requested` (m,) take a fifth of the time;
         asking for others than the last time takes an analysis. The factor there is stays where it
         is of these very entries.
         """
-        wanted = asked if asked is not None and self._trusted else _NONE
-        same = self._asked is not None and np.array_equal(wanted, self._asked)
+        wanted = requested if requested is not None and self._trusted else _NONE
+        same = self._requested is not None and np.array_equal(wanted, self._requested)
         if same and self._current and np.array_equal(data, self._matrix.data):
             return
         self.generation += 1
         self._current = False
         if not same:
-            if self._asked is not None:
+            if self._requested is not None:
                 self._forget()
             self._analyse(wanted)
         self._matrix.data[:] = data
@@ -235,23 +235,23 @@ class Pardiso:
             "a stiffness matrix is too ill-conditioned for single precision: solving in double takes about twice as long"
         )
         self._forget()
-        self._single, self._current, asked = False, False, self._asked
-        self._asked = None
-        self.factorise(self._matrix.data, asked)
+        self._single, self._current, requested = False, False, self._requested
+        self._requested = None
+        self.factorise(self._matrix.data, requested)
         return self.solve(right)
 
-    def answers(self, unknowns: IntArray) -> FloatArray:
+    def inverse_entries(self, unknowns: IntArray) -> FloatArray:
         """The inverse's entries (m, m) between these unknowns (m,): with A = L L^T they are those
         of Y^T Y, Y = L^-1 of unit loads.
 
         Half a solution is half the work, and most rows of Y are empty; but where these unknowns
-        were asked for, MKL passes over all that is empty itself.
+        were requested, MKL passes over all that is empty itself.
         """
         if not len(unknowns):
             return np.empty((0, 0))
         unit = np.zeros((self._handle.size, len(unknowns)), dtype=self._handle.kind, order="F")
         unit[unknowns, np.arange(len(unknowns))] = 1.0
-        if self._handle.asked[unknowns].all():
+        if self._handle.requested[unknowns].all():
             found = self._handle.run(_SOLVE, unit, unknowns)[unknowns]
             if self._believed(found, unknowns):
                 return np.asarray(found, dtype=float)

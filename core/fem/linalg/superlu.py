@@ -33,9 +33,9 @@ class SuperLUFactor:
         self._lu: SuperLU | None = None
         self.generation = 0
 
-    def factorise(self, data: FloatArray, asked: IntArray | None = None) -> None:
+    def factorise(self, data: FloatArray, requested: IntArray | None = None) -> None:
         """Factorise the matrix with these entries of its upper triangle; raises
-        NotPositiveDefinite. All `asked` cost alike.
+        NotPositiveDefinite. All `requested` cost alike.
         """
         self.generation += 1
         matrix = sp.csc_matrix(
@@ -67,6 +67,6 @@ class SuperLUFactor:
         """As `solve`."""
         return self.solve(right)
 
-    def answers(self, unknowns: IntArray) -> FloatArray:
+    def inverse_entries(self, unknowns: IntArray) -> FloatArray:
         """The inverse's entries (m, m) between these unknowns (m,)."""
         return self.solve(np.eye(self._shape[0])[:, unknowns])[unknowns]

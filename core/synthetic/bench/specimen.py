@@ -5,7 +5,6 @@ or on springs, its past in it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator
@@ -13,50 +12,43 @@ from scipy.spatial import Delaunay
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SolveError
-from palpate.synthetic.bench.motion_plan import Probe
-from palpate.synthetic.bench.solved_track import Moment, Passage
-from palpate.synthetic.bench.true_body import creep_of, solid_of, true_offset, true_radius
+from palpate.synthetic.bench.solved_track import KeyFrame
+from palpate.synthetic.bench.true_body import creep_velocity, solid_model, true_offset, true_radius
 from palpate.synthetic.scenario.scenario import Scenario
-from palpate.synthetic.solver.coulomb_friction import Dragging, Rub
-from palpate.synthetic.solver.inelastic_history import Past, Remembering
-from palpate.synthetic.solver.shaft_compliance import give_way
-from palpate.synthetic.solver.tet_block import Block
-from palpate.synthetic.solver.tet_equilibrium import Equilibrium, GivesWay, State
-from palpate.synthetic.solver.tool_clearance import Reach
+from palpate.synthetic.solver.coulomb_friction import CoulombFriction, FrictionContact
+from palpate.synthetic.solver.inelastic_history import InelasticHistory, InelasticState
+from palpate.synthetic.solver.shaft_compliance import solve_compliant_shaft
+from palpate.synthetic.solver.tet_block import TetBlock
+from palpate.synthetic.solver.tet_equilibrium import InstabilityError, TetSolver, TetState
+from palpate.synthetic.solver.tool_clearance import ToolClearance
 
-__all__ = ["Specimen", "Standing"]
+__all__ = ["Specimen", "SpecimenSnapshot"]
 
-KEY_SPACING, SLIDING_SPACING, DRAGGED_SPACING = 1.0e-3, 1.3e-3, 0.8e-3
-"""Way between two keys [m]: of a tool that presses, that slides along, and that drags the surface
-along."""
 GRAVITY = 9.81
 _MOST_HALVED = 3
 """How often a step of a tool that drags the surface along is halved, where it is too long."""
 _SET, _MOST_SETS = 2e-6, 12
 """Change of the displacement [m] at which an equilibrium and the set that it brings agree."""
-_FIRST_WAIT, _LONGER = (0.1, 0.25), 1.6
-"""First step of a rest: least [s], and share of the time constant; each further one is so much
-longer."""
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class SpecimenSnapshot:
     """What a block is left with, from which it can go on."""
 
     slip: FloatArray
-    last: State
-    before: State
-    past: Past | None
+    last: TetState
+    before: TetState
+    inelastic_state: InelasticState | None
 
 
 class Specimen:
     """One block with its solver, how far it has slipped, and what it remembers."""
 
     def __init__(
-        self, scenario: Scenario, block: Block, slip: FloatArray, axis: FloatArray | None = None
+        self, scenario: Scenario, block: TetBlock, slip: FloatArray, axis: FloatArray | None = None
     ) -> None:
         self.block = block
-        self.solver = Equilibrium(block, solid_of(scenario, block, axis))
+        self.solver = TetSolver(block, solid_model(scenario, block, axis))
         self.offset = true_offset(scenario)
         self.radius = true_radius(scenario)
         hidden = scenario.hidden("base_slip")
@@ -67,19 +59,21 @@ class Specimen:
             giving.value("compliance_times_stiffness") / scenario.true_modulus if giving else 0.0
         )
         self.slip = slip
-        self.creep = creep_of(scenario)
-        lasting = scenario.remembers
-        self.memory = Remembering(scenario, block) if lasting else None
+        self.creep = creep_velocity(scenario)
+        lasting = scenario.has_history
+        self.memory = InelasticHistory(scenario, block) if lasting else None
         if self.memory is not None:
             self.memory.settle(self.solver.rest.displacement)
         rough = scenario.hidden("tool_friction")
         self.drag = (
-            Dragging(block, rough.value("friction_coefficient"), self.radius, self.solver.hardest)
+            CoulombFriction(
+                block, rough.value("friction_coefficient"), self.radius, self.solver.hardest
+            )
             if rough
             else None
         )
         self.settled = np.asarray(block.surface @ self.solver.rest.displacement)
-        self._reach = Reach(
+        self.clearance = ToolClearance(
             block.surface_rest + self.settled,
             block.surface_normals,
             self.radius,
@@ -93,17 +87,20 @@ class Specimen:
         self.solver.close()
 
     @property
-    def standing(self) -> Standing:
+    def snapshot(self) -> SpecimenSnapshot:
         """As it is now."""
-        return Standing(
-            self.slip, self._last, self._before, None if self.memory is None else self.memory.past
+        return SpecimenSnapshot(
+            self.slip,
+            self._last,
+            self._before,
+            None if self.memory is None else self.memory.inelastic_state,
         )
 
-    def resume(self, standing: Standing) -> None:
+    def restore(self, snapshot: SpecimenSnapshot) -> None:
         """Go on from there."""
-        self.slip, self._last, self._before = standing.slip, standing.last, standing.before
-        if self.memory is not None and standing.past is not None:
-            self.memory.past = standing.past
+        self.slip, self._last, self._before = snapshot.slip, snapshot.last, snapshot.before
+        if self.memory is not None and snapshot.inelastic_state is not None:
+            self.memory.inelastic_state = snapshot.inelastic_state
 
     @property
     def surface(self) -> FloatArray:
@@ -113,140 +110,68 @@ class Specimen:
         return np.asarray(self.block.surface @ self._last.displacement) + self.slip
 
     @property
-    def _ordered(self) -> bool:
+    def path_dependent(self) -> bool:
         """Whether the way back is another than the way in."""
         return (
-            self._goes_on
+            self.changes_at_rest
             or self.friction is not None
             or self.memory is not None
             or self.drag is not None
         )
 
     @property
-    def _goes_on(self) -> bool:
+    def changes_at_rest(self) -> bool:
         """Whether something happens while the tool stands still."""
-        return bool(self.creep.any()) or (self.memory is not None and self.memory.delays)
+        return bool(self.creep.any()) or (self.memory is not None and self.memory.relaxes)
 
-    def passages(self, probe: Probe, until: float) -> tuple[Passage, ...]:
-        """All passages of one probe in order of time, and the rest after it `until` the next [s],
-        if anything goes on there.
-        """
-        passages: list[Passage] = []
-        for number, (first, last) in enumerate(pairwise(probe.arcs)):
-            if first == last:
-                if self._goes_on:
-                    passages.append(self._wait(probe, number, float(probe.times[number + 1])))
-                continue
-            low, high = float(min(first, last)), float(max(first, last))
-            known = next(
-                (
-                    one
-                    for one in passages
-                    if not self._ordered and (one.arcs[0], one.arcs[-1]) == (low, high)
-                ),
-                None,
-            )
-            if known is None:
-                arcs = self._keys(probe, low, high)
-                ordered = arcs if first < last else arcs[::-1]
-                times = probe.when(number, ordered)
-                moments = [
-                    self.moment(place + self.offset, float(time))
-                    for place, time in zip(probe.place(ordered), times, strict=True)
-                ]
-                moments = moments if first < last else moments[::-1]
-            else:
-                arcs, moments = known.arcs, list(known.moments)
-            passages.append(
-                Passage(
-                    float(probe.times[number]), float(probe.times[number + 1]), arcs, tuple(moments)
-                )
-            )
-        if self._goes_on:
-            passages.append(self._wait(probe, len(probe.times) - 1, until))
-        return tuple(passages)
-
-    def _wait(self, probe: Probe, number: int, until: float) -> Passage:
-        """The tool stands where it was at a knot of the probe; keys lie the farther apart the
-        longer it has stood.
-        """
-        centre, times = (
-            probe.place(probe.arcs[number : number + 1])[0] + self.offset,
-            [float(probe.times[number])],
-        )
-        step = (
-            _FIRST_WAIT[1]
-            if self.memory is None
-            else max(_FIRST_WAIT[0], _FIRST_WAIT[1] * self.memory.time_constant)
-        )
-        while times[-1] + 1.3 * step < until:
-            times.append(times[-1] + step)
-            step *= _LONGER
-        times.append(until)
-        moments = tuple(self.moment(centre, time) for time in times)
-        return Passage(times[0], until, np.array(times), moments, timed=True)
-
-    def _keys(self, probe: Probe, low: float, high: float) -> FloatArray:
-        """Where to solve: evenly while the tool presses, and once more just after contact
-        begins."""
-        fine = np.linspace(low, high, 2 + int((high - low) / 5e-5))
-        touching = np.nonzero(self._reach.gap(probe.place(fine) + self.offset - self.slip) < 0)[0]
-        if not len(touching):
-            return np.linspace(low, high, 5) if self._goes_on else np.array([low, high])
-        begin, end = fine[max(touching[0] - 1, 0)], fine[min(touching[-1] + 1, len(fine) - 1)]
-        sliding = begin == low and end == high
-        spacing = SLIDING_SPACING if sliding else KEY_SPACING
-        spacing = DRAGGED_SPACING if self.drag is not None else spacing
-        keys = [np.array([low, high]), np.linspace(begin, end, 2 + int((end - begin) / spacing))]
-        keys += [begin + np.array([0.3e-3])] if begin > low else []
-        keys += [end - np.array([0.3e-3])] if end < high else []
-        keys += [np.linspace(low, begin, 4)] if self._goes_on else []
-        return np.unique(np.clip(np.concatenate(keys), low, high))
-
-    def moment(self, centre: FloatArray, time: float | None = None) -> Moment:
+    def solve_key_frame(self, centre: FloatArray, time: float | None = None) -> KeyFrame:
         """With the tool's stated centre here (3,) [m], at a time [s] for a block that remembers or
         creeps.
         """
         before = self._last
         if time is not None and self.creep.any():
             self.slip = self.creep * time
-        state = self._lived(centre, time) if self.memory is not None else self._reached(centre)
+        state = (
+            self._solve_with_history(centre, time)
+            if self.memory is not None
+            else self._solve_in_substeps(centre)
+        )
         if self.drag is not None:
-            self.drag.leave(state.displacement, state.centre)
+            self.drag.finish_step(state.displacement, state.centre)
         if self.memory is not None or self.drag is not None:
             # The next place is guessed from the last two that were found, not from two on the way
             # to one.
             self._before, self._last = before, state
         self._stated = centre
         surface = np.asarray(self.block.surface @ state.displacement) + self.slip
-        return Moment(
+        return KeyFrame(
             surface,
             self.slip[:2].copy(),
-            state.push,
+            state.tool_force,
             state.penetration,
             state.centre + self.slip - centre,
         )
 
-    def _lived(self, centre: FloatArray, time: float | None) -> State:
+    def _solve_with_history(self, centre: FloatArray, time: float | None) -> TetState:
         """With what the material remembers, its own set included."""
         memory = self.memory
         assert memory is not None
         self.solver.metric = memory.metric(time)
-        state = self._reached(centre)
+        state = self._solve_in_substeps(centre)
         for _ in range(_MOST_SETS if memory.fraction else 0):
             self.solver.metric = memory.metric(time, memory.after(state.displacement, time).natural)
-            before, state = state, self._found(centre)
+            before, state = state, self._solve_with_base_friction(centre)
             if np.abs(state.displacement - before.displacement).max() < _SET:
                 break
-        memory.past = memory.after(state.displacement, time)
+        memory.inelastic_state = memory.after(state.displacement, time)
         return state
 
-    def _reached(self, centre: FloatArray, depth: int = 0) -> State:
+    def _solve_in_substeps(self, centre: FloatArray, depth: int = 0) -> TetState:
         """By way of nearer places, where friction and pressure find no agreement in one step."""
-        standing = self.standing
+        snapshot = self.snapshot
         try:
-            return self._found(centre)
-        except GivesWay:
+            return self._solve_with_base_friction(centre)
+        except InstabilityError:
             raise
         except SolveError as error:
             if self.drag is None or self._stated is None:
@@ -254,39 +179,39 @@ class Specimen:
             if (
                 depth >= _MOST_HALVED
             ):  # as deep as this tool can be led: the operator stops short of it
-                raise GivesWay(str(error)) from error
-        self.resume(standing)
+                raise InstabilityError(str(error)) from error
+        self.restore(snapshot)
         middle = 0.5 * (self._stated + centre)
-        state = self._reached(middle, depth + 1)
-        self.drag.leave(state.displacement, state.centre)
+        state = self._solve_in_substeps(middle, depth + 1)
+        self.drag.finish_step(state.displacement, state.centre)
         self._stated = middle
-        return self._reached(centre, depth + 1)
+        return self._solve_in_substeps(centre, depth + 1)
 
-    def _found(self, centre: FloatArray) -> State:
+    def _solve_with_base_friction(self, centre: FloatArray) -> TetState:
         """With friction under the base holding."""
-        state = self._balanced(centre - self.slip)
+        state = self._solve_with_compliant_shaft(centre - self.slip)
         return (
             self._slide(centre, state)
-            if self.friction is not None and self._excess(state) > 0
+            if self.friction is not None and self._excess_force(state) > 0
             else state
         )
 
-    def _excess(self, state: State) -> float:
+    def _excess_force(self, state: TetState) -> float:
         """Sideways push beyond what friction holds [N]."""
         assert self.friction is not None
-        return float(np.linalg.norm(state.push[:2])) - self.friction * max(
-            self.weight - float(state.push[2]), 0.0
+        return float(np.linalg.norm(state.tool_force[:2])) - self.friction * max(
+            self.weight - float(state.tool_force[2]), 0.0
         )
 
-    def _slide(self, centre: FloatArray, state: State) -> State:
+    def _slide(self, centre: FloatArray, state: TetState) -> TetState:
         """Move the base along the push until friction holds it: Newton on the length of the slide,
         within a bracket.
         """
         assert self.friction is not None
-        direction = np.array([*state.push[:2], 0.0]) / np.linalg.norm(state.push[:2])
+        direction = np.array([*state.tool_force[:2], 0.0]) / np.linalg.norm(state.tool_force[:2])
         start, length, short, long = self.slip, 0.0, 0.0, np.inf
         for _ in range(40):
-            excess = self._excess(state)
+            excess = self._excess_force(state)
             if abs(excess) < 1e-3 * self.friction * self.weight or (
                 excess < 0 and long - short < 1e-6
             ):
@@ -299,79 +224,85 @@ class Specimen:
             if not short < length < long:
                 length = 0.5 * (short + long) if np.isfinite(long) else short + 0.3e-3
             self.slip = start + length * direction
-            state = self._balanced(centre - self.slip)
+            state = self._solve_with_compliant_shaft(centre - self.slip)
         raise SolveError(
             f"the base of the virtual block finds no rest after sliding {length * 1e3:.2g} mm",
             residual=excess,
         )
 
-    def _balanced(self, centre: FloatArray) -> State:
+    def _solve_with_compliant_shaft(self, centre: FloatArray) -> TetState:
         """With the tool, or the end of the shaft on which it gives way, at `centre` (3,) [m] in the
         frame of the slid block.
         """
         if not self.softness:
             return self._elastic(centre)
         before = self._last
-        state = give_way(centre, self.softness, centre - self.softness * before.push, self._elastic)
+        state = solve_compliant_shaft(
+            centre, self.softness, centre - self.softness * before.tool_force, self._elastic
+        )
         # The next place is guessed from the last two that were balanced, not from two on the way to
         # one.
         self._before, self._last = before, state
         return state
 
-    def _elastic(self, centre: FloatArray) -> State:
-        if self._reach.gap(centre[None])[0] > 0.1e-3:
-            state = self._alone(centre)
+    def _elastic(self, centre: FloatArray) -> TetState:
+        if self.clearance.gap(centre[None])[0] > 0.1e-3:
+            state = self._solve_without_tool(centre)
         elif self.drag is not None:
-            state = self._dragged(self.drag, centre)
+            state = self._solve_with_tool_friction(self.drag, centre)
         else:
-            state = self._from_last(centre)
+            state = self._solve_from_last(centre)
         self._before, self._last = self._last, state
         return state
 
-    def _alone(self, centre: FloatArray) -> State:
+    def _solve_without_tool(self, centre: FloatArray) -> TetState:
         """Without the tool: as it settled, or, with a memory, on its way there."""
-        still = State(self.solver.rest.displacement, centre, np.zeros(3), np.zeros((3, 3)), 0.0)
-        if self.memory is None or self.memory.untouched:
+        still = TetState(self.solver.rest.displacement, centre, np.zeros(3), np.zeros((3, 3)), 0.0)
+        if self.memory is None or self.memory.is_initial:
             return still
         return self.solver.state(
-            centre, State(self._last.displacement, centre, np.zeros(3), np.zeros((3, 3)), 0.0)
+            centre, TetState(self._last.displacement, centre, np.zeros(3), np.zeros((3, 3)), 0.0)
         )
 
-    def _dragged(self, drag: Dragging, centre: FloatArray) -> State:
+    def _solve_with_tool_friction(self, drag: CoulombFriction, centre: FloatArray) -> TetState:
         """With the tool dragging the surface along."""
-        state: State | None = None
+        state: TetState | None = None
 
-        def solve(rub: Rub | None) -> FloatArray:
+        def solve(friction_contact: FrictionContact | None) -> FloatArray:
             nonlocal state
-            self.solver.rub = rub
-            state = self._from_last(centre) if state is None else self.solver.state(centre, state)
+            self.solver.friction_contact = friction_contact
+            state = (
+                self._solve_from_last(centre) if state is None else self.solver.state(centre, state)
+            )
             return state.displacement
 
         try:
-            drag.found(centre, solve)
+            drag.solve(centre, solve)
         finally:
-            self.solver.rub = None
+            self.solver.friction_contact = None
         assert state is not None
         return state
 
-    def _from_last(self, centre: FloatArray) -> State:
+    def _solve_from_last(self, centre: FloatArray) -> TetState:
         step, before = centre - self._last.centre, self._last.centre - self._before.centre
         if np.linalg.norm(step) > 2e-3:
             start = self.solver.rest if self.memory is None else self._last
-            self._last = State(start.displacement, centre, np.zeros(3), np.zeros((3, 3)), 0.0)
+            self._last = TetState(start.displacement, centre, np.zeros(3), np.zeros((3, 3)), 0.0)
             return self.solver.state(centre, self._last)
-        push = self._last.push
-        if np.any(push) and abs(step @ push) < 0.3 * np.linalg.norm(step) * np.linalg.norm(push):
-            return self.solver.state(centre, self._last, self._carried(step))
+        tool_force = self._last.tool_force
+        if np.any(tool_force) and abs(step @ tool_force) < 0.3 * np.linalg.norm(
+            step
+        ) * np.linalg.norm(tool_force):
+            return self.solver.state(centre, self._last, self._advected_guess(step))
         ratio = float(step @ before) / max(float(before @ before), 1e-12)
-        if not (0.2 < ratio < 2.5 and np.any(self._before.push)):
+        if not (0.2 < ratio < 2.5 and np.any(self._before.tool_force)):
             return self.solver.state(centre, self._last)
         guess = self._last.displacement + ratio * (
             self._last.displacement - self._before.displacement
         )
         return self.solver.state(centre, self._last, guess)
 
-    def _carried(self, step: FloatArray) -> FloatArray:
+    def _advected_guess(self, step: FloatArray) -> FloatArray:
         """The last displacement, moved along with the tool: near the truth while the tool
         slides."""
         nodes = self.block.nodes

@@ -11,30 +11,35 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.foundation.arrays import FloatArray
-from palpate.synthetic.bench.motion_plan import Motion, Probe
-from palpate.synthetic.bench.solved_track import Stretch, Track
-from palpate.synthetic.bench.specimen import Specimen
-from palpate.synthetic.bench.true_body import levels_of, seams_of, true_offset, true_radius
 from palpate.synthetic.scenario.scenario import Scenario
-from palpate.synthetic.solver.tet_block import Block, Grading, IntArray, mesh_block
-from palpate.synthetic.solver.tet_equilibrium import GivesWay
+from palpate.synthetic.solver.tet_block import IntArray, TetBlock, TetGrading, mesh_block
+from palpate.synthetic.solver.tet_equilibrium import InstabilityError
+from palpate.synthetic.bench.motion_plan import MotionPlan, PlannedPush
+from palpate.synthetic.bench.solved_track import SolvedPush, SolvedTrack
+from palpate.synthetic.bench.specimen import Specimen
+from palpate.synthetic.bench.true_body import (
+    base_seams,
+    material_levels,
+    true_offset,
+    true_radius,
+)
 
 __all__ = ["neutral_displacement", "perform", "rest_surface"]
 
 SHORTER, MOST_SHORT = 1.0e-3, 4.5e-3
 
 
-Mesher = Callable[[Scenario, Probe, float], Block]
+Mesher = Callable[[Scenario, PlannedPush, float], TetBlock]
 """A body for one probe of a scenario, fine where it touches."""
 
 
-def perform(
+def solve_motion(
     scenario: Scenario,
-    motion: Motion,
+    motion: MotionPlan,
     fine: float | None = None,
     body: Mesher | None = None,
     begun: tuple[float, float] = (0.0, 0.0),
-) -> Track:
+) -> SolvedTrack:
     """Solve one motion of a scenario; every probe gets a grid that is fine where it touches, a
     block that remembers one for all.
 
@@ -46,100 +51,100 @@ def perform(
     is the one that was carried out.
     """
     fine = fine or scenario.fine
-    ends = [*(float(probe.times[0]) for probe in motion.probes[1:]), motion.duration]
+    ends = [*(float(push.times[0]) for push in motion.pushes[1:]), motion.duration]
     slip = np.array([*begun, 0.0])
-    if scenario.remembers:
-        stretches = _lasting(scenario, motion.probes, ends, fine, slip)
+    if scenario.has_history:
+        solved_pushes = _solve_on_one_mesh(scenario, motion.pushes, ends, fine, slip)
     else:
-        stretches = _apart(scenario, motion, ends, fine, body or _block, slip)
-    return Track(
-        replace(motion, probes=tuple(stretch.probe for stretch in stretches)), tuple(stretches)
+        solved_pushes = _solve_separately(scenario, motion, ends, fine, body or _block, slip)
+    return SolvedTrack(
+        replace(motion, pushes=tuple(solved.push for solved in solved_pushes)), tuple(solved_pushes)
     )
 
 
-def _apart(
+def _solve_separately(
     scenario: Scenario,
-    motion: Motion,
+    motion: MotionPlan,
     ends: Sequence[float],
     fine: float,
     body: Mesher,
     slip: FloatArray,
-) -> list[Stretch]:
+) -> list[SolvedPush]:
     """Each probe on a grid of its own: of those before only the base's slip is left."""
-    stretches = []
-    for probe, end in zip(motion.probes, ends, strict=True):
-        stretch, slip = _as_deep_as_it_goes(scenario, probe, motion.axis, slip, fine, end, body)
-        stretches.append(stretch)
-    return stretches
+    solved_pushes = []
+    for push, end in zip(motion.pushes, ends, strict=True):
+        solved, slip = _solve_push(scenario, push, motion.axis, slip, fine, end, body)
+        solved_pushes.append(solved)
+    return solved_pushes
 
 
-def _as_deep_as_it_goes(
+def _solve_push(
     scenario: Scenario,
-    probe: Probe,
+    push: PlannedPush,
     axis: FloatArray,
     slip: FloatArray,
     fine: float,
     end: float,
     body: Mesher,
-) -> tuple[Stretch, FloatArray]:
+) -> tuple[SolvedPush, FloatArray]:
     """One probe from a base that has slipped by `slip` (3,) [m], and the slip after it."""
     for short in np.arange(0.0, MOST_SHORT, SHORTER):
-        tried = probe.shallower(float(short))
+        tried = push.shallower(float(short))
         block = body(scenario, tried, fine)
-        bench = Specimen(scenario, block, slip, axis)
+        specimen = Specimen(scenario, block, slip, axis)
         try:
-            creep = bench.creep
-            settled = bench.settled + (creep * float(tried.times[0]) if creep.any() else slip)
+            creep = specimen.creep
+            settled = specimen.settled + (creep * float(tried.times[0]) if creep.any() else slip)
             drawn = (
                 block.surface_rest,
                 block.surface_faces,
                 settled,
-                bench.passages(tried, end),
+                solve_segments(specimen, tried, end),
                 (tried,),
                 creep,
             )
-            return Stretch(tried, *drawn), bench.slip
-        except GivesWay as error:
+            return SolvedPush(tried, *drawn), specimen.slip
+        except InstabilityError as error:
             failure = error
         finally:
-            bench.close()
+            specimen.close()
     raise failure
 
 
-def _lasting(
+def _solve_on_one_mesh(
     scenario: Scenario,
-    probes: Sequence[Probe],
+    pushes: Sequence[PlannedPush],
     ends: Sequence[float],
     fine: float,
     slip: FloatArray,
-) -> list[Stretch]:
+) -> list[SolvedPush]:
     """All probes on one grid, on which the block remembers."""
-    block = mesh_block(scenario.true_size, _grading(scenario, probes, fine))
-    bench, stretches = Specimen(scenario, block, slip), []
+    block = mesh_block(scenario.true_size, _grading(scenario, pushes, fine))
+    specimen, solved_pushes = Specimen(scenario, block, slip), []
     try:
-        for probe, end in zip(probes, ends, strict=True):
-            settled, standing = bench.surface, bench.standing
+        for push, end in zip(pushes, ends, strict=True):
+            settled, snapshot = specimen.surface, specimen.snapshot
             for short in np.arange(0.0, MOST_SHORT, SHORTER):
-                tried = probe.shallower(float(short))
-                bench.resume(standing)
+                tried = push.shallower(float(short))
+                specimen.restore(snapshot)
                 try:
-                    passages = bench.passages(tried, end)
+                    segments = solve_segments(specimen, tried, end)
                     break
-                except GivesWay as error:
+                except InstabilityError as error:
                     failure = error
             else:
                 raise failure
-            stretches.append(
-                Stretch(
-                    tried, block.surface_rest, block.surface_faces, settled, passages, tuple(probes)
+            solved_pushes.append(
+                SolvedPush(
+                    tried, block.surface_rest, block.surface_faces, settled, segments, tuple(pushes)
                 )
             )
     finally:
-        bench.close()
-    return stretches
+        specimen.close()
+    return solved_pushes
 
 
-def neutral_displacement(scenario: Scenario, stretch: Stretch, centre: FloatArray) -> FloatArray:
+def neutral_displacement(scenario: Scenario, solved: SolvedPush, centre: FloatArray) -> FloatArray:
     """Displacement (s, 3) [m] of the drawn surface of `stretch` with no hidden effect and the
     tool's stated centre (3,) [m].
 
@@ -149,41 +154,40 @@ def neutral_displacement(scenario: Scenario, stretch: Stretch, centre: FloatArra
     believed = replace(scenario, effects=())
     low, high = _bounds(believed)
     grading = _grading(
-        scenario if scenario.true_size == scenario.size else believed, stretch.meshed, scenario.fine
+        scenario if scenario.true_size == scenario.size else believed, solved.meshed, scenario.fine
     )
-    bench = Specimen(believed, mesh_block(scenario.size, grading), np.zeros(3))
+    specimen = Specimen(believed, mesh_block(scenario.size, grading), np.zeros(3))
     try:
         outwards = centre - np.clip(centre, low, high)
-        outwards = (
-            outwards / np.linalg.norm(outwards) if np.any(outwards) else stretch.probe.outwards
-        )
+        outwards = outwards / np.linalg.norm(outwards) if np.any(outwards) else solved.push.outwards
         surface = [
-            bench.moment(centre + outwards * clear) for clear in np.arange(8e-3, -1e-9, -1.6e-3)
+            specimen.solve_key_frame(centre + outwards * clear)
+            for clear in np.arange(8e-3, -1e-9, -1.6e-3)
         ][-1].surface
         if scenario.true_size == scenario.size:
             return surface
-        places = stretch.rest * (np.array(scenario.size) / np.array(scenario.true_size))
-        nearest = cKDTree(bench.block.surface_rest).query(places)[1]
-        return np.asarray(places + surface[nearest] - stretch.rest)
+        places = solved.rest * (np.array(scenario.size) / np.array(scenario.true_size))
+        nearest = cKDTree(specimen.block.surface_rest).query(places)[1]
+        return np.asarray(places + surface[nearest] - solved.rest)
     finally:
-        bench.close()
+        specimen.close()
 
 
 def rest_surface(scenario: Scenario) -> tuple[FloatArray, FloatArray, IntArray]:
     """The untouched block: drawn surface of the true shape (s, 3), its displacement (s, 3) [m], and
     triangles (t, 3).
     """
-    grading = Grading(
-        np.zeros((1, 3)), np.zeros(1), np.full(1, 8e-3), 8e-3, 0.5, levels_of(scenario)
+    grading = TetGrading(
+        np.zeros((1, 3)), np.zeros(1), np.full(1, 8e-3), 8e-3, 0.5, material_levels(scenario)
     )
     block = mesh_block(scenario.true_size, grading)
-    bench = Specimen(scenario, block, np.zeros(3))
-    bench.close()
-    return block.surface_rest, bench.settled, block.surface_faces
+    specimen = Specimen(scenario, block, np.zeros(3))
+    specimen.close()
+    return block.surface_rest, specimen.settled, block.surface_faces
 
 
-def _block(scenario: Scenario, probe: Probe, fine: float) -> Block:
-    return mesh_block(scenario.true_size, _grading(scenario, (probe,), fine))
+def _block(scenario: Scenario, push: PlannedPush, fine: float) -> TetBlock:
+    return mesh_block(scenario.true_size, _grading(scenario, (push,), fine))
 
 
 def _bounds(scenario: Scenario) -> tuple[FloatArray, FloatArray]:
@@ -191,38 +195,40 @@ def _bounds(scenario: Scenario) -> tuple[FloatArray, FloatArray]:
     return np.array([-x / 2, -y / 2, 0.0]), np.array([x / 2, y / 2, z])
 
 
-def _grading(scenario: Scenario, probes: Sequence[Probe], fine: float) -> Grading:
+def _grading(scenario: Scenario, pushes: Sequence[PlannedPush], fine: float) -> TetGrading:
     """Fine where each of the probes first touches, and along a drag; a lump gets elements smaller
     than its radius.
     """
-    parts = [_touched(scenario, probe, fine) for probe in probes]
+    parts = [_touched(scenario, push, fine) for push in pushes]
     points, reach, edges = (np.concatenate([part[number] for part in parts]) for number in range(3))
     lump = scenario.hidden("stiff_inclusion")
     if lump is not None:
         points = np.concatenate([points, [[lump.value(axis) for axis in "xyz"]]])
         reach = np.append(reach, lump.value("radius"))
         edges = np.append(edges, max(fine, 0.7 * lump.value("radius")))
-    return Grading(points, reach, edges, levels=levels_of(scenario), seams=seams_of(scenario))
+    return TetGrading(
+        points, reach, edges, levels=material_levels(scenario), seams=base_seams(scenario)
+    )
 
 
 def _touched(
-    scenario: Scenario, probe: Probe, fine: float
+    scenario: Scenario, push: PlannedPush, fine: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Points (n, 3) where a probe touches, how far the grid is fine around them (n,), and how fine
     (n,), all in [m].
     """
     low, high = _bounds(scenario)
     radius = true_radius(scenario)
-    way = probe.place(np.arange(0.0, probe.corners[-1] + 1e-3, 1.0e-3)) + true_offset(scenario)
+    way = push.place(np.arange(0.0, push.corners[-1] + 1e-3, 1.0e-3)) + true_offset(scenario)
     touching = way[np.linalg.norm(way - np.clip(way, low, high), axis=1) < radius]
     touching = touching if len(touching) else way[-1:]
     shallow = (
         touching[:1]
-        if len(probe.waypoints) == 2
+        if len(push.waypoints) == 2
         else touching[touching[:, 2] < touching[:, 2].min() + 1e-4]
     )
     points = _on_surface(shallow, low, high)
-    if scenario.disturbance("shaft_contact") is not None and abs(probe.outwards[2]) < 0.5:
+    if scenario.disturbance("shaft_contact") is not None and abs(push.outwards[2]) < 0.5:
         points = np.concatenate([points, np.clip([[*way[-1][:2], high[2]]], low, high)])
         return points, np.full(2, 0.8 * radius), np.array([fine, 1.2 * fine])
     reach = np.full(len(points), (0.8 if len(points) == 1 else 0.5) * radius)

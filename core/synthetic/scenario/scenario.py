@@ -172,7 +172,7 @@ class Scenario:
         return next((one for one in self.disturbances if one.name == name), None)
 
     @property
-    def remembers(self) -> bool:
+    def has_history(self) -> bool:
         """Whether the material keeps something of what was done to it."""
         return any(self.hidden(name) for name in ("viscoelasticity", "permanent_set"))
 

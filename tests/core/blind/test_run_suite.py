@@ -20,7 +20,7 @@ import palpate
 from palpate.blind import Case, run_suite
 from palpate.blind.case_results import add_result
 from palpate.foundation.errors import Cancelled, RunError
-from palpate.foundation.source_digest import USERS, source_digest
+from palpate.foundation.source_digest import EXCLUDED, source_digest
 
 TESTS = Path(blind_processes.__file__).parent
 
@@ -166,12 +166,12 @@ def _gone(pid: int) -> bool:
 
 
 def test_sources_of_a_result_import_nothing_that_its_digest_leaves_out() -> None:
-    names = "|".join(name.removesuffix(".py").replace("/", r"\.") for name in USERS)
+    names = "|".join(name.removesuffix(".py").replace("/", r"\.") for name in EXCLUDED)
     using = re.compile(rf"^\s*(from|import) palpate\.({names})\b", re.MULTILINE)
     root = Path(palpate.__file__).parent
     parts = [
         path
         for path in root.rglob("*.py")
-        if not path.relative_to(root).as_posix().startswith(USERS)
+        if not path.relative_to(root).as_posix().startswith(EXCLUDED)
     ]
     assert len(parts) > 100 and [path for path in parts if using.search(path.read_text())] == []

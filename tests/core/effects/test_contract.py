@@ -195,7 +195,7 @@ def test_example_changes_replay_or_sensor(effect):
         assert _setup_as_text(setup) != _setup_as_text(SETUP)
         assert effect is TimeOffset or not sight_of(setup).same(sight_of(SETUP))
         return
-    way = side if effect.enters is Slot.SUPPORT else RELEASE if setup.material.remembers else POKE
+    way = side if effect.enters is Slot.SUPPORT else RELEASE if setup.material.has_history else POKE
     found, without = (
         replay(one, touch_correction(one, GRID).apply(way), GRID, times=TIMES[: len(way)])[-1]
         for one in (setup, SETUP)
@@ -282,7 +282,7 @@ def _kinds(setup: Setup) -> tuple[bool, ...]:
     return (
         moves,
         support.friction_coefficient is not None,
-        setup.remembers,
+        setup.has_history,
         material.fibres is not None,
     )
 

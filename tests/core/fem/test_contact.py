@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.fem.contact import assemble_contact, contact_energy
-from palpate.fem.model import CONTACT_STIFFNESS, BlockModel, Probe
+from palpate.fem.model import CONTACT_STIFFNESS, BlockModel, ToolSphere
 from palpate.mesh.box_mesh import GridSpec, box_mesh
 from palpate.mesh.elements import HEXAHEDRA
 from palpate.replay.replay import replay
@@ -20,7 +20,7 @@ def _model(setup: Setup = SETUP, nodes: tuple[int, int, int] = (9, 7, 4)) -> Blo
     return BlockModel(setup, box_mesh(SIZE, GridSpec(nodes=nodes, spacing=1e-3)))
 
 
-def _dented(model: BlockModel, seed: int) -> tuple[np.ndarray, Probe]:
+def _dented(model: BlockModel, seed: int) -> tuple[np.ndarray, ToolSphere]:
     """The top sunk in a little irregularly, and a ball that reaches 2 mm into where it was, so that
     some points lie inside.
     """
@@ -29,7 +29,7 @@ def _dented(model: BlockModel, seed: int) -> tuple[np.ndarray, Probe]:
     sunk = np.zeros_like(nodes)
     sunk[:, 2] = -1.6e-3 * np.exp(-((distance / 3e-3) ** 2)) * nodes[:, 2] / SIZE[2]
     sunk += 1e-5 * np.random.default_rng(seed).normal(size=nodes.shape)
-    return nodes + sunk, Probe(np.array([1e-3, 0.0, SIZE[2] + 3e-3]), 5e-3)
+    return nodes + sunk, ToolSphere(np.array([1e-3, 0.0, SIZE[2] + 3e-3]), 5e-3)
 
 
 @pytest.mark.parametrize("order", HEXAHEDRA)
@@ -42,7 +42,7 @@ def test_areas_of_the_quadrature_points_add_up_to_the_surface(order):
 
 
 def _contact_force(
-    model: BlockModel, positions: np.ndarray, probe: Probe
+    model: BlockModel, positions: np.ndarray, tool: ToolSphere
 ) -> tuple[np.ndarray, np.ndarray]:
     force, push = np.zeros_like(positions), np.zeros(3)
     assemble_contact(
@@ -51,8 +51,8 @@ def _contact_force(
         model.face.shapes,
         model.face.gradients,
         positions,
-        probe.centre,
-        probe.radius,
+        tool.centre,
+        tool.radius,
         False,
         True,
         CONTACT_STIFFNESS,
@@ -67,8 +67,8 @@ def _contact_force(
 
 def test_contact_force_is_the_gradient_of_its_energy_and_pushes_back_on_the_tool():
     model = _model()
-    positions, probe = _dented(model, 0)
-    force, push = _contact_force(model, positions, probe)
+    positions, tool = _dented(model, 0)
+    force, push = _contact_force(model, positions, tool)
 
     def energy(at: np.ndarray) -> float:
         return contact_energy(
@@ -77,8 +77,8 @@ def test_contact_force_is_the_gradient_of_its_energy_and_pushes_back_on_the_tool
             model.face.shapes,
             model.face.gradients,
             at,
-            probe.centre,
-            probe.radius,
+            tool.centre,
+            tool.radius,
             False,
             True,
             CONTACT_STIFFNESS,
@@ -99,15 +99,15 @@ def test_contact_force_is_the_gradient_of_its_energy_and_pushes_back_on_the_tool
 )
 def test_tangent_with_the_ball_s_curvature_is_the_derivative_of_the_residual(detached):
     model = _model(replace(SETUP, support=Support(detached=detached)))
-    positions, probe = _dented(model, 2)
+    positions, tool = _dented(model, 2)
     free = model.topology.free
     tangent = model.topology.pattern.copy()
-    tangent.data = model.assemble(positions, probe).data
+    tangent.data = model.assemble(positions, tool).data
     direction = np.random.default_rng(3).normal(size=free.sum())
     wanted = tangent @ direction + tangent.T @ direction - tangent.diagonal() * direction
     move, step = np.zeros_like(positions), 1e-10
     move[free] = step * direction
-    ahead, behind = (model.assemble(positions + sign * move, probe).residual for sign in (1, -1))
+    ahead, behind = (model.assemble(positions + sign * move, tool).residual for sign in (1, -1))
     assert np.abs((ahead - behind) / (2 * step) - wanted).max() < 1e-5 * np.abs(wanted).max()
 
 
@@ -121,24 +121,24 @@ def test_residual_of_the_whole_block_is_the_gradient_of_its_energy(detached):
         load=replace(SETUP.load, specific_weight_over_stiffness=2.0),
     )
     model = _model(setup)
-    positions, probe = _dented(model, 4)
+    positions, tool = _dented(model, 4)
     direction = np.random.default_rng(5).normal(size=positions.shape) * model.topology.free
     step = 1e-9
     slope = (
-        model.energy(positions + step * direction, probe)
-        - model.energy(positions - step * direction, probe)
+        model.energy(positions + step * direction, tool)
+        - model.energy(positions - step * direction, tool)
     ) / (2 * step)
     assert slope == pytest.approx(
-        model.assemble(positions, probe).residual @ direction[model.topology.free], rel=1e-5
+        model.assemble(positions, tool).residual @ direction[model.topology.free], rel=1e-5
     )
 
 
 def test_a_surface_that_faces_away_from_the_centre_is_not_pushed():
     model = _model()
-    under = Probe(np.array([0.0, 0.0, SIZE[2] - 2e-3]), 5e-3)
+    under = ToolSphere(np.array([0.0, 0.0, SIZE[2] - 2e-3]), 5e-3)
     _, push = _contact_force(model, model.mesh.nodes, under)
     assert not push.any()
-    over = Probe(np.array([0.0, 0.0, SIZE[2] + 2e-3]), 5e-3)
+    over = ToolSphere(np.array([0.0, 0.0, SIZE[2] + 2e-3]), 5e-3)
     _, push = _contact_force(model, model.mesh.nodes, over)
     assert push[2] < 0
 

@@ -7,13 +7,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.fem.friction import STICK_STIFFNESS, Grip, Hold
-from palpate.fem.model import BlockModel, Probe
+from palpate.fem.friction import STICK_STIFFNESS, FrictionHistory, FrictionPotential
+from palpate.fem.model import BlockModel, ToolSphere
 from palpate.mesh.box_mesh import GridSpec, box_mesh
 from palpate.setup.setup import Box, Setup, Tool
 
 SETUP = Setup(geometry=Box(size=(0.03, 0.03, 0.02)), tool=Tool(radius=5e-3))
-PROBE = Probe(np.array([1e-3, -5e-4, 0.024]), 5e-3)
+TOOL = ToolSphere(np.array([1e-3, -5e-4, 0.024]), 5e-3)
 
 
 def _gripped(order: int) -> tuple[BlockModel, np.ndarray]:
@@ -29,30 +29,32 @@ def _gripped(order: int) -> tuple[BlockModel, np.ndarray]:
     faces = np.arange(6)
     seen = (
         np.einsum("qa,fai->fqi", model.face.shapes, positions[model.topology.surface[faces]])
-        - PROBE.centre
+        - TOOL.centre
     )
     normals = seen / np.linalg.norm(seen, axis=2, keepdims=True)
     areas = model.areas[faces]
     anchors = seen + 1e-4 * random.standard_normal(seen.shape)
     limits = STICK_STIFFNESS * areas * random.uniform(0, 2.5e-4, areas.shape)
-    model.grip = Grip(faces, anchors, normals, limits, STICK_STIFFNESS * areas)
+    model.friction_potential = FrictionPotential(
+        faces, anchors, normals, limits, STICK_STIFFNESS * areas
+    )
     return model, positions
 
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_force_is_the_slope_of_the_energy_and_tangent_that_of_the_force(order):
     model, positions = _gripped(order)
-    free, grip = model.topology.free, model.grip
+    free, grip = model.topology.free, model.friction_potential
     assert grip is not None
     drag = grip.stiffness * 1e-4
     assert (drag > grip.limits).any() and (drag < grip.limits).any()
     direction = np.random.default_rng(2).standard_normal(positions.shape) * free
-    away = Probe(
+    away = ToolSphere(
         np.array([0.0, 0.0, 0.1]), 5e-3
     )  # far from the block, so that nothing but the grip feels it
-    model.grip = Grip(
+    model.friction_potential = FrictionPotential(
         grip.faces,
-        grip.anchors + PROBE.centre - away.centre,
+        grip.anchors + TOOL.centre - away.centre,
         grip.normals,
         grip.limits,
         grip.stiffness,
@@ -71,10 +73,10 @@ def test_force_is_the_slope_of_the_energy_and_tangent_that_of_the_force(order):
 
 def test_drag_on_the_body_is_within_the_limits_and_adds_to_the_push():
     model, positions = _gripped(1)
-    held = model.assemble(positions, PROBE)
-    grip, model.grip = model.grip, None
+    held = model.assemble(positions, TOOL)
+    grip, model.friction_potential = model.friction_potential, None
     assert grip is not None
-    free = model.assemble(positions, PROBE)
+    free = model.assemble(positions, TOOL)
     drag = held.push - free.push
     assert 0 < np.linalg.norm(drag) <= grip.limits.sum()
     force = np.zeros_like(positions)
@@ -87,7 +89,7 @@ def test_a_hold_is_read_at_its_own_points_and_between_them():
     places = np.append(random.uniform(0, 1e-2, (400, 2)), np.zeros((400, 1)), axis=1)
     touched = places[:, 0] < 5e-3
     ways = np.where(touched[:, None], 0.01 * places, 0.0)
-    hold = Hold(places, ways, touched, np.where(touched, 2.0, 0.0))
+    hold = FrictionHistory(places, ways, touched, np.where(touched, 2.0, 0.0))
     found = hold.at(places.reshape(20, 20, 3))
     assert (
         np.allclose(found.ways.reshape(-1, 3), ways, atol=1e-8)
@@ -96,5 +98,5 @@ def test_a_hold_is_read_at_its_own_points_and_between_them():
     assert np.allclose(found.limits.ravel(), 2.0 * touched, atol=1e-3)
     between = hold.at(np.array([[2e-3, 4e-3, 0.0]]))
     assert np.allclose(between.ways, 0.01 * np.array([2e-3, 4e-3, 0.0]), atol=5e-6)
-    nothing = Hold.nothing().at(places)
+    nothing = FrictionHistory.nothing().at(places)
     assert not nothing.ways.any() and not nothing.touched.any() and not nothing.limits.any()

@@ -10,13 +10,13 @@ import pytest
 from palpate.fem.constitutive.elastic import Law
 from palpate.fem.history_stress import ConstantStress, cauchy_green, shear_stress
 from palpate.fem.material_points import CellPoints, QuadraturePoints
-from palpate.fem.model import BlockModel, Probe
+from palpate.fem.model import BlockModel, ToolSphere
 from palpate.fem.newton import Outcome, solve
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import MeshError
 from palpate.mesh.box_mesh import GridSpec, box_mesh
 from palpate.replay.equilibrium import Equilibrium
-from palpate.replay.material_history import Memory
+from palpate.replay.material_history import MaterialHistory
 from palpate.setup.setup import (
     Box,
     Fibres,
@@ -69,20 +69,20 @@ class Held:
         )
         self.mesh = box_mesh(SIZE, GridSpec(nodes=(5, 5, 3), order=order))
         self.model = BlockModel(self.setup, self.mesh)
-        self.memory = Memory(
+        self.material_history = MaterialHistory(
             self.setup,
             CellPoints(SIZE, (8, 6, 4)) if cells else QuadraturePoints(self.mesh),
             self.mesh,
         )
-        self.memory.start(self._frame(self.mesh.nodes, Outcome.CONVERGED))
+        self.material_history.start(self._frame(self.mesh.nodes, Outcome.CONVERGED))
 
     def _frame(self, positions: FloatArray, outcome: Outcome) -> Equilibrium:
-        probe, nothing = Probe(np.zeros(3), 5e-3), np.zeros(3)
+        tool, nothing = ToolSphere(np.zeros(3), 5e-3), np.zeros(3)
         return Equilibrium(
             self.mesh,
             positions - self.mesh.nodes,
             np.zeros(2),
-            probe,
+            tool,
             nothing,
             outcome,
             0,
@@ -95,10 +95,10 @@ class Held:
         self, positions: FloatArray, time: float, outcome: Outcome = Outcome.CONVERGED
     ) -> FloatArray:
         """Of the unknowns (u,) over E [m^2], and remember."""
-        self.memory.begin(time)
-        self.memory.recall(self.model, positions)
+        self.material_history.begin(time)
+        self.material_history.apply_to(self.model, positions)
         found = self.model.assemble(positions, None, tangent=False).residual
-        self.memory.end(self._frame(positions, outcome))
+        self.material_history.end(self._frame(positions, outcome))
         return found
 
 
@@ -155,9 +155,9 @@ def test_force_is_the_gradient_of_the_energy_and_tangent_that_of_the_force(order
     way = np.array(np.random.default_rng(2).standard_normal(held.mesh.nodes.shape))
     way[held.mesh.base_nodes] = 0.0
     held.force(_bent(held, 3), 0.0)
-    held.memory.begin(1.0)
-    held.memory.recall(model)
-    assert model.carried is not None
+    held.material_history.begin(1.0)
+    held.material_history.apply_to(model)
+    assert model.added_potential is not None
     step = 1e-7
     ahead, behind = positions + step * way, positions - step * way
     wanted = (model.energy(ahead, None) - model.energy(behind, None)) / (2 * step)
@@ -230,7 +230,7 @@ def test_history_knows_nothing_of_how_the_body_is_turned():
     for number in range(3):
         held.force(_bent(held, number), float(number))
         turned.force(_bent(turned, number) @ (turn.T if number else np.eye(3)), float(number))
-    here, there = held.memory.history, turned.memory.history
+    here, there = held.material_history.history, turned.material_history.history
     assert (
         there.delayed == pytest.approx(here.delayed, abs=1e-12) and np.abs(here.delayed).max() > 0.1
     )
@@ -267,11 +267,11 @@ def test_memory_in_cells_relaxes_as_at_the_quadrature_points_where_the_strain_is
 def test_frame_without_equilibrium_is_not_remembered():
     held = Held(replace(MADE_OF["two terms"], retained_fraction=0.2))
     held.force(_bent(held, 1), 0.0)
-    before = held.memory.history
+    before = held.material_history.history
     held.force(_bent(held, 2), 1.0, Outcome.ITERATIONS)
-    assert held.memory.history is before
+    assert held.material_history.history is before
     held.force(_bent(held, 2), 1.0)
-    assert held.memory.history.time == 1.0
+    assert held.material_history.history.time == 1.0
 
 
 @ORDERS
@@ -292,8 +292,8 @@ def test_bar_that_was_stretched_stays_stretched_by_the_retained_share_of_the_log
         for number, stretch in enumerate(stretches):
             positions = held.mesh.nodes * [stretch, stretch**-0.5, stretch**-0.5]
             held.force(positions, float(number))
-        held.memory.begin(1e4)  # whatever was to relax has
-        held.memory.recall(held.model)
+        held.material_history.begin(1e4)  # whatever was to relax has
+        held.material_history.apply_to(held.model)
         free = solve(held.model, None, positions)
         assert free.converged
         spans = np.ptp(free.positions, axis=0) / np.ptp(held.mesh.nodes, axis=0)
@@ -306,30 +306,30 @@ def test_set_makes_the_first_push_softer_by_its_share_and_the_second_not():
     whole = _elastic(held, small)
 
     def resists(amount: float, time: float) -> FloatArray:
-        held.memory.begin(time)
-        held.memory.recall(held.model, _sheared(held, amount))
-        held.memory.end(held._frame(_sheared(held, amount), Outcome.CONVERGED))
+        held.material_history.begin(time)
+        held.material_history.apply_to(held.model, _sheared(held, amount))
+        held.material_history.end(held._frame(_sheared(held, amount), Outcome.CONVERGED))
         return held.model.assemble(_sheared(held, amount), None, tangent=False).residual
 
     assert resists(1e-4, 0.0) == pytest.approx(
         0.7 * whole, rel=1e-3, abs=1e-3 * np.abs(whole).max()
     )
-    kept = held.memory.history.kept
+    kept = held.material_history.history.kept
     assert resists(0.3e-4, 1.0) == pytest.approx(0.0 * whole, abs=1e-3 * np.abs(whole).max())
     assert resists(1e-4, 2.0) == pytest.approx(
         0.7 * whole, rel=1e-3, abs=1e-3 * np.abs(whole).max()
     )
-    assert np.array_equal(held.memory.history.kept, kept)
+    assert np.array_equal(held.material_history.history.kept, kept)
 
 
 def test_set_goes_on_smoothly_where_the_strain_turns_past_its_largest():
     """At the largest strain so far, in another direction, nothing jumps."""
     held = Held(Material(retained_fraction=0.5))
     held.force(_sheared(held, 0.5), 0.0)
-    count, before = len(held.memory.history.kept), held.memory.history.free
+    count, before = len(held.material_history.history.kept), held.material_history.history.free
     turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]) @ (SHEAR - np.eye(3))
     less, more = (
-        held.memory._set(
+        held.material_history._set(
             cauchy_green(np.tile((np.eye(3) + 0.5 * amount * turned).T, (count, 1, 1)))
         ).free
         for amount in (0.999, 1.001)
@@ -341,4 +341,4 @@ def test_grid_that_moves_cannot_hold_what_its_quadrature_points_remember():
     held = Held(MADE_OF["neo_hooke"])
     other = box_mesh(SIZE, GridSpec(nodes=(5, 5, 3), spacing=2e-3), np.array([0.01, 0.0, 0.02]))
     with pytest.raises(MeshError, match="moves"):
-        held.memory.recall(BlockModel(held.setup, other))
+        held.material_history.apply_to(BlockModel(held.setup, other))

@@ -3,10 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.fem.contact_condensation import Compliance
-from palpate.fem.model import BlockModel, Probe
-from palpate.fem.modified_newton import Follower
-from palpate.fem.newton import misfit, solve
+from palpate.fem.contact_condensation import CondensedContact
+from palpate.fem.model import BlockModel, ToolSphere
+from palpate.fem.modified_newton import ModifiedNewton
+from palpate.fem.newton import relative_residual, solve
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.box_mesh import GridSpec
 from palpate.mesh.elements import HEXAHEDRA
@@ -20,12 +20,12 @@ PLACE = np.array([4e-3, 2e-3, SIZE[2] + 5e-3 - 3e-3])
 ORDERS = pytest.mark.parametrize("order", HEXAHEDRA)
 
 
-def _pressed(order: int) -> tuple[BlockModel, FloatArray, Probe]:
+def _pressed(order: int) -> tuple[BlockModel, FloatArray, ToolSphere]:
     """A block at rest under a tool 3 mm deep: model, positions (n, 3) [m] and tool."""
     block = Replay(SETUP, GridSpec(nodes=(9, 9, 5), spacing=2e-3, order=order), 1e-10)
     frame = block.step(PLACE)
     assert frame.outcome.name == "CONVERGED"
-    return block.model(frame.mesh), frame.mesh.nodes + frame.displacement, frame.probe
+    return block.model(frame.mesh), frame.mesh.nodes + frame.displacement, frame.tool
 
 
 @ORDERS
@@ -33,11 +33,11 @@ def _pressed(order: int) -> tuple[BlockModel, FloatArray, Probe]:
     "motion", [(0, 0, -2e-4), (3e-4, 0, 0), (0, -2e-4, 4e-4)], ids=["deeper", "along", "back"]
 )
 def test_following_finds_what_newton_finds(order, motion):
-    model, positions, probe = _pressed(order)
-    moved = Probe(probe.centre + motion, probe.radius)
+    model, positions, tool = _pressed(order)
+    moved = ToolSphere(tool.centre + motion, tool.radius)
     found, wanted = (
-        Follower().solve(model, moved, positions, 1e-9),
-        solve(model, moved, positions, probe, 1e-9),
+        ModifiedNewton().solve(model, moved, positions, 1e-9),
+        solve(model, moved, positions, tool, 1e-9),
     )
     assert found is not None
     assert found.converged and wanted.converged
@@ -48,33 +48,33 @@ def test_following_finds_what_newton_finds(order, motion):
 
 @ORDERS
 def test_one_step_takes_the_contact_to_its_balance(order):
-    model, positions, probe = _pressed(order)
-    compliance = Compliance.at(model, positions, probe)
-    assert compliance is not None
-    moved = Probe(probe.centre - (0, 0, 5e-5), probe.radius)
+    model, positions, tool = _pressed(order)
+    condensed = CondensedContact.at(model, positions, tool)
+    assert condensed is not None
+    moved = ToolSphere(tool.centre - (0, 0, 5e-5), tool.radius)
     before = model.assemble(positions, moved, tangent=False)
-    stepped = compliance.step(model, positions, before.residual, moved)
+    stepped = condensed.step(model, positions, before.residual, moved)
     assert stepped is not None
     after = model.assemble(stepped, moved, tangent=False)
-    assert misfit(model, after) < 2e-3 * misfit(model, before)
+    assert relative_residual(model, after) < 2e-3 * relative_residual(model, before)
 
 
 def test_body_in_balance_stays_where_it_is():
-    model, positions, probe = _pressed(1)
-    compliance = Compliance.at(model, positions, probe)
-    assert compliance is not None
-    residual = model.assemble(positions, probe, tangent=False).residual
-    stepped = compliance.step(model, positions, residual, probe)
+    model, positions, tool = _pressed(1)
+    condensed = CondensedContact.at(model, positions, tool)
+    assert condensed is not None
+    residual = model.assemble(positions, tool, tangent=False).residual
+    stepped = condensed.step(model, positions, residual, tool)
     assert stepped is not None
     assert np.abs(stepped - positions).max() < 1e-9
 
 
 def test_linearisation_is_given_up_with_its_factor():
-    model, positions, probe = _pressed(1)
-    compliance = Compliance.at(model, positions, probe)
-    assert compliance is not None and compliance.fits(model)
-    model.topology.factor.factorise(model.assemble(positions, probe).data)
-    assert not compliance.fits(model)
+    model, positions, tool = _pressed(1)
+    condensed = CondensedContact.at(model, positions, tool)
+    assert condensed is not None and condensed.fits(model)
+    model.topology.factor.factorise(model.assemble(positions, tool).data)
+    assert not condensed.fits(model)
 
 
 @pytest.mark.parametrize(
@@ -83,28 +83,28 @@ def test_linearisation_is_given_up_with_its_factor():
 def test_what_a_tool_presses_on_is_what_the_graded_mesh_says_is_near(place):
     block = Replay(SETUP, REPLAY_GRID, 1e-6)
     frame = block.step(place)
-    compliance = Compliance.at(
-        block.model(frame.mesh), frame.mesh.nodes + frame.displacement, frame.probe
+    condensed = CondensedContact.at(
+        block.model(frame.mesh), frame.mesh.nodes + frame.displacement, frame.tool
     )
-    assert frame.in_contact and compliance is not None
-    assert np.isin(compliance._nodes, frame.mesh.near_focus).all()
+    assert frame.in_contact and condensed is not None
+    assert np.isin(condensed._nodes, frame.mesh.near_focus).all()
     assert len(frame.mesh.near_focus) < 0.1 * len(frame.mesh.nodes)
     assert not len(GridSpec(nodes=(9, 9, 5), order=2).mesh(SETUP, place).near_focus)
 
 
 def test_tool_that_is_far_away_leaves_nothing_to_linearise():
     model, positions, _ = _pressed(1)
-    far = Probe(np.array([0.0, 0.0, 0.2]), 5e-3)
-    assert Compliance.at(model, positions, far) is None
-    assert Follower().solve(model, far, positions, 1e-9) is None
+    far = ToolSphere(np.array([0.0, 0.0, 0.2]), 5e-3)
+    assert CondensedContact.at(model, positions, far) is None
+    assert ModifiedNewton().solve(model, far, positions, 1e-9) is None
 
 
 def test_many_small_steps_take_few_factors():
-    model, positions, probe = _pressed(1)
-    follower, before = Follower(), model.topology.factor.generation
+    model, positions, tool = _pressed(1)
+    quick_solver, before = ModifiedNewton(), model.topology.factor.generation
     for number in range(1, 21):
-        moved = Probe(probe.centre - (0, 0, 3e-5 * number), probe.radius)
-        solution = follower.solve(model, moved, positions, 1e-6)
+        moved = ToolSphere(tool.centre - (0, 0, 3e-5 * number), tool.radius)
+        solution = quick_solver.solve(model, moved, positions, 1e-6)
         assert solution is not None and solution.converged
         positions = solution.positions
     assert model.topology.factor.generation - before <= 4

@@ -44,9 +44,9 @@ PUSHES = """
 import numpy as np
 from pushed_block import SETUP, poke
 from palpate.mesh.graded_mesh import PAGE_GRID
-from palpate.recording.interactive import Live
+from palpate.recording.interactive import InteractiveReplay
 
-live = Live(SETUP, PAGE_GRID.for_tool(SETUP.tool.radius))
+live = InteractiveReplay(SETUP, PAGE_GRID.for_tool(SETUP.tool.radius))
 print(all(live.at(np.array(poke(depth))).converged for depth in (-1e-3, 1e-3, 2e-3, 4e-3, 3e-3, 5e-3)))
 """
 

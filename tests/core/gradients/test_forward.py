@@ -10,7 +10,7 @@ from pushed_block import GRID, SETUP, SIZE, poke
 
 from palpate.fem.constitutive.elastic import elastic_energy
 from palpate.fem.constitutive.stiffness_field import lump_share
-from palpate.fem.model import BlockModel, rule_of
+from palpate.fem.model import BlockModel, element_quadrature
 from palpate.fem.newton import solve
 from palpate.foundation.arrays import FloatArray
 from palpate.gradients.forward import TOOL_STEP, displacement_changes, factorise_at
@@ -38,14 +38,14 @@ def _stiffened(frame: Equilibrium, log_factor: FloatArray) -> FloatArray:
     """Displacement (n, 3) [m] when the points' stiffness is multiplied, by a full solve."""
     model = BlockModel(SETUP, frame.mesh)
     model.mu, model.bulk = model.mu * np.exp(log_factor), model.bulk * np.exp(log_factor)
-    solution = solve(model, frame.probe, frame.mesh.nodes + frame.displacement, None, TIGHT)
+    solution = solve(model, frame.tool, frame.mesh.nodes + frame.displacement, None, TIGHT)
     assert solution.converged
     return solution.positions - frame.mesh.nodes
 
 
 def test_stiffness_changes_are_those_of_full_solves(pushed):
     block, frame = pushed
-    rule = rule_of(frame.mesh)
+    rule = element_quadrature(frame.mesh)
     alone = np.zeros(rule.weights.shape)
     alone.flat[np.argmin(np.linalg.norm(rule.places - poke(14e-3), axis=2))] = 1.0
     lump = lump_share(Inclusion(x=8e-3, y=0.0, z=0.022, radius=7e-3, stiffness_ratio=math.e), rule)
@@ -60,7 +60,9 @@ def test_stiffness_changes_are_those_of_full_solves(pushed):
 
 def test_stiffness_everywhere_the_same_moves_only_against_the_contact(pushed):
     block, frame = pushed
-    whole = stiffness_changes(block, frame, np.ones((1, *rule_of(frame.mesh).weights.shape)))[0]
+    whole = stiffness_changes(
+        block, frame, np.ones((1, *element_quadrature(frame.mesh).weights.shape))
+    )[0]
     # Position-driven: a stiffer block takes the same shape, but for the softness of the contact.
     assert np.abs(whole).max() < 0.05 * np.abs(frame.displacement).max()
 
@@ -71,7 +73,9 @@ def test_lump_of_the_setup_is_what_its_column_says(compliance):
     block = Replay(stated, GRID, TIGHT)
     frame = block.step(poke(4e-3), block.step(poke(2e-3)))
     lump = Inclusion(x=8e-3, y=0.0, z=0.022, radius=7e-3, stiffness_ratio=math.e)
-    found = stiffness_changes(block, frame, lump_share(lump, rule_of(frame.mesh))[None])[0]
+    found = stiffness_changes(block, frame, lump_share(lump, element_quadrature(frame.mesh))[None])[
+        0
+    ]
     setups = [
         replace(
             stated,
@@ -163,9 +167,9 @@ def test_tangent_at_a_frame_is_made_once_until_another_takes_its_place(monkeypat
     steps = [(block.setup, TOOL_STEP * np.array([0.0, 0.0, 1.0]))]
     tangents, assemble = [], BlockModel.assemble
 
-    def counted(self, positions, probe, *, tangent=True, bending=True):
+    def counted(self, positions, tool, *, tangent=True, bending=True):
         tangents.append(tangent)
-        return assemble(self, positions, probe, tangent=tangent, bending=bending)
+        return assemble(self, positions, tool, tangent=tangent, bending=bending)
 
     monkeypatch.setattr(BlockModel, "assemble", counted)
     block.factorised = None
@@ -187,7 +191,7 @@ def test_untouched_block_answers_to_weight_only():
     frame = block.step(poke(-9e-3))
     assert not displacement_changes(block, frame, [(SETUP, np.array([0.0, 0.0, TOOL_STEP]))]).any()
     assert not stiffness_changes(
-        block, frame, np.ones((2, *rule_of(frame.mesh).weights.shape))
+        block, frame, np.ones((2, *element_quadrature(frame.mesh).weights.shape))
     ).any()
     sagging = Replay(replace(SETUP, load=Load(specific_weight_over_stiffness=1.5)), GRID)
     heavier = replace(SETUP, load=Load(specific_weight_over_stiffness=1.501))
@@ -217,7 +221,7 @@ def test_base_that_slid_stays_where_it_is_in_the_changes_of_one_frame():
     assert frame is not None and frame.slip[0] > 5e-4
     other = Replay(softer, GRID, TIGHT)
     other.slip = frame.slip.copy()
-    wanted = other.held(frame.probe, frame).displacement - frame.displacement
+    wanted = other.solve_with_fixed_base(frame.tool, frame).displacement - frame.displacement
     assert _relative(displacement_changes(block, frame, [(softer, np.zeros(3))])[0], wanted) < 0.02
     slippery = replace(loose, support=Support(friction_coefficient=0.099))
     assert not displacement_changes(block, frame, [(slippery, np.zeros(3))]).any()

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 
 from palpate.measurement.patch_averages import patch_medians
-from palpate.mesh.interpolation import means_around, patch_rows, weighted_nodes
+from palpate.mesh.interpolation import neighbourhood_means, patch_rows, weighted_nodes
 
 RANDOM = np.random.default_rng(3)
 NODES, WEIGHTS, NORMALS = (
@@ -56,11 +56,11 @@ def test_means_around_places_are_those_of_the_points_within_reach():
         rng.uniform(-1.5, 1.5, (60, 3)),
     )
     near = np.linalg.norm(places[:, None] - points, axis=2) < 0.4
-    found = means_around(places, points, values, 0.4, 3)
+    found = neighbourhood_means(places, points, values, 0.4, 3)
     enough = near.sum(axis=1) >= 3
     assert 5 < enough.sum() < 55
     assert np.array_equal(np.isfinite(found), enough)
     assert np.allclose(found[enough], [values[row].mean() for row in near[enough]])
-    assert np.isnan(means_around(places, points[:0], values[:0], 0.4, 3)).all()
+    assert np.isnan(neighbourhood_means(places, points[:0], values[:0], 0.4, 3)).all()
     flat = np.column_stack([points[:, :2], np.full(400, 0.7)])
-    assert np.allclose(means_around(flat[:5], flat, values, 5.0, 3), values.mean())
+    assert np.allclose(neighbourhood_means(flat[:5], flat, values, 5.0, 3), values.mean())

@@ -8,7 +8,7 @@ from shapes import dome
 
 from palpate.foundation.errors import MeshError
 from palpate.mesh.gmsh_fill import TetSpec
-from palpate.mesh.push_meshes import REPLAY_PUSHES, SCREEN_PUSHES, PushedSpec
+from palpate.mesh.push_meshes import REPLAY_PUSHES, SCREEN_PUSHES, PushMeshSpec
 from palpate.replay.replay import Replay
 from palpate.setup.setup import Setup, Tool
 
@@ -29,10 +29,10 @@ def test_each_push_has_its_own_mesh_that_is_small_there() -> None:
 
 def test_push_resists_as_on_one_mesh_for_all() -> None:
     centre = PLACES[0] + np.array([0.0, 0.0, 5e-3 - 3e-3])
-    own = Replay(DOME, REPLAY_PUSHES.at(PLACES), 1e-4).sought(centre, (None,))
+    own = Replay(DOME, REPLAY_PUSHES.at(PLACES), 1e-4).solve_from_any(centre, (None,))
     whole = Replay(
         DOME, TetSpec.along(centre[None], 5e-3, spacing=1.2e-3, coarsest=3e-3), 1e-4
-    ).sought(centre, (None,))
+    ).solve_from_any(centre, (None,))
     assert own.force[2] == pytest.approx(whole.force[2], rel=0.04)
 
 
@@ -46,6 +46,6 @@ def test_tool_of_another_size_gets_meshes_in_proportion() -> None:
 
 def test_spec_without_places_or_with_spacings_out_of_order_is_refused() -> None:
     with pytest.raises(MeshError, match="no place that is pushed was named"):
-        PushedSpec().mesh(DOME, PLACES[0])
+        PushMeshSpec().mesh(DOME, PLACES[0])
     with pytest.raises(MeshError, match="not in this order"):
-        replace(PushedSpec(), spacing=5e-3)
+        replace(PushMeshSpec(), spacing=5e-3)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.mesh.graded_mesh import PAGE_GRID
-from palpate.recording.interactive import DEEPEST, Live
+from palpate.recording.interactive import DEEPEST, InteractiveReplay
 from palpate.replay.replay import replay
 from palpate.setup.setup import Box, Setup, Tool
 
@@ -17,15 +17,15 @@ ABOVE = np.array([0.0, 0.0, SIZE[2] + 2 * RADIUS])
 
 
 @pytest.fixture(scope="module")
-def live() -> Live:
-    return Live(SETUP, PAGE_GRID)
+def live() -> InteractiveReplay:
+    return InteractiveReplay(SETUP, PAGE_GRID)
 
 
 def pushed(depth: float, x: float = 0.0) -> np.ndarray:
     return np.array([x, 0.0, SIZE[2] + RADIUS - depth])
 
 
-def test_answer_is_that_of_a_replay_and_no_point_lies_in_the_tool(live: Live) -> None:
+def test_answer_is_that_of_a_replay_and_no_point_lies_in_the_tool(live: InteractiveReplay) -> None:
     live.at(ABOVE)
     live.at(pushed(0.002, -0.003))
     felt = live.at(pushed(0.004), within=True)
@@ -40,7 +40,7 @@ def test_answer_is_that_of_a_replay_and_no_point_lies_in_the_tool(live: Live) ->
     assert down == pytest.approx(-0.004, rel=0.02)
 
 
-def test_lifted_tool_feels_nothing(live: Live) -> None:
+def test_lifted_tool_feels_nothing(live: InteractiveReplay) -> None:
     live.at(pushed(0.003))
     felt = live.at(ABOVE)
     assert felt.depth == 0.0 and not felt.force.any() and felt.inside is None
@@ -57,14 +57,14 @@ def test_lifted_tool_feels_nothing(live: Live) -> None:
     ],
 )
 def test_tool_is_led_no_further_than_it_may_go(
-    live: Live, wanted: tuple[float, ...], reached: tuple[float, ...]
+    live: InteractiveReplay, wanted: tuple[float, ...], reached: tuple[float, ...]
 ) -> None:
     assert live.reachable(np.array(wanted)) == pytest.approx(reached, abs=1e-9)
 
 
 def test_frame_without_equilibrium_says_so_and_shows_the_last_one() -> None:
     """A tool whose tip is lower than stated runs into the held edge of the base."""
-    live = Live(
+    live = InteractiveReplay(
         Setup(geometry=Box(size=SIZE), tool=Tool(radius=RADIUS, offset=(0.0, 0.0, -2e-3))),
         PAGE_GRID,
     )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from palpate.mesh.graded_mesh import PAGE_GRID
-from palpate.recording.interior_fields import Inside, trilinear
+from palpate.recording.interior_fields import InteriorFields, trilinear
 from palpate.replay.replay import replay
 from palpate.setup.setup import Box, Setup, Tool
 
@@ -16,7 +16,7 @@ SIZE = (0.0687, 0.0393, 0.0358)
 
 
 @pytest.fixture(scope="module")
-def pushed() -> tuple[Setup, Inside]:
+def pushed() -> tuple[Setup, InteriorFields]:
     """A block that is 2 % longer than stated: untouched, then 4 mm deep."""
     longer = Setup(
         geometry=Box(size=(1.02 * SIZE[0], *SIZE[1:])),
@@ -24,17 +24,19 @@ def pushed() -> tuple[Setup, Inside]:
         tool=Tool(radius=5e-3),
     )
     centres = np.array([[0.0, 0.0, 0.1], [0.0, 0.0, SIZE[2] + 1e-3]])
-    return longer, Inside.of(longer, replay(longer, centres, PAGE_GRID))
+    return longer, InteriorFields.of(longer, replay(longer, centres, PAGE_GRID))
 
 
-def test_another_size_counts_as_motion_from_the_stated_place(pushed: tuple[Setup, Inside]) -> None:
+def test_another_size_counts_as_motion_from_the_stated_place(
+    pushed: tuple[Setup, InteriorFields],
+) -> None:
     moved = pushed[1].displacement(0, np.array([[SIZE[0] / 2, 0.0, 0.01], [0.0, 0.0, 0.01]]))
     assert moved[0] == pytest.approx([0.01 * SIZE[0], 0.0, 0.0], rel=1e-3, abs=1e-9)
     assert moved[1] == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
 
 
 def test_material_below_the_tool_moves_down_with_it_and_less_the_deeper(
-    pushed: tuple[Setup, Inside],
+    pushed: tuple[Setup, InteriorFields],
 ) -> None:
     below = np.array([[0.0, 0.0, height] for height in (SIZE[2], 0.025, 0.015, 0.0)])
     down = -pushed[1].displacement(1, below)[:, 2]
@@ -42,10 +44,10 @@ def test_material_below_the_tool_moves_down_with_it_and_less_the_deeper(
     assert np.all(np.diff(down) < 0) and down[-1] == 0.0
 
 
-def test_it_outlives_a_file(pushed: tuple[Setup, Inside], tmp_path) -> None:
+def test_it_outlives_a_file(pushed: tuple[Setup, InteriorFields], tmp_path) -> None:
     np.savez(tmp_path / "kept.npz", **pushed[1].arrays("raw"))
     with np.load(tmp_path / "kept.npz") as stored:
-        found, missing = Inside.read(stored, "raw"), Inside.read(stored, "extended")
+        found, missing = InteriorFields.read(stored, "raw"), InteriorFields.read(stored, "extended")
     assert missing is None and found is not None
     places = np.random.default_rng(1).uniform(-0.01, 0.03, (20, 3))
     for frame in (0, 1):

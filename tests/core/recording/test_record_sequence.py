@@ -9,7 +9,7 @@ from pushed_block import GRID, SETUP, TOP, poke, seen_points
 
 from palpate.foundation.frames import Transform
 from palpate.measurement.surface_gaps import gaps
-from palpate.recording.record_sequence import Recorded, observed
+from palpate.recording.record_sequence import ModelRecording, compare_with_clouds
 from palpate.replay.replay import replay
 from palpate.setup.setup import Material, Sensor
 
@@ -27,8 +27,8 @@ def _clouds() -> list[np.ndarray]:
     ]
 
 
-def _same(one: Recorded, other: Recorded) -> bool:
-    names = [part.name for part in fields(Recorded) if part.name != "inside"]
+def _same(one: ModelRecording, other: ModelRecording) -> bool:
+    names = [part.name for part in fields(ModelRecording) if part.name != "inside"]
     return all(
         np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True) for name in names
     )
@@ -48,9 +48,9 @@ def _looks(monkeypatch) -> list[int]:
 
 def test_frames_at_rest_are_as_the_other_setup_saw_them(monkeypatch):
     clouds, frames = _clouds(), replay(SOFTER, CENTRES, GRID)
-    stated = observed(SETUP, replay(SETUP, CENTRES, GRID), clouds)
-    alone, looks = observed(SOFTER, frames, clouds), _looks(monkeypatch)
-    after = observed(SOFTER, frames, clouds, (SETUP, stated))
+    stated = compare_with_clouds(SETUP, replay(SETUP, CENTRES, GRID), clouds)
+    alone, looks = compare_with_clouds(SOFTER, frames, clouds), _looks(monkeypatch)
+    after = compare_with_clouds(SOFTER, frames, clouds, (SETUP, stated))
     assert len(looks) == 1  # of the frame that is pushed
     assert _same(after, alone)
     assert not np.array_equal(after.error[2], stated.error[2], equal_nan=True)
@@ -58,9 +58,9 @@ def test_frames_at_rest_are_as_the_other_setup_saw_them(monkeypatch):
 
 def test_frames_are_looked_at_anew_from_another_place(monkeypatch):
     clouds, frames = _clouds(), replay(ELSEWHERE, CENTRES, GRID)
-    stated = observed(SETUP, replay(SETUP, CENTRES, GRID), clouds)
-    alone, looks = observed(ELSEWHERE, frames, clouds), _looks(monkeypatch)
-    after = observed(ELSEWHERE, frames, clouds, (SETUP, stated))
+    stated = compare_with_clouds(SETUP, replay(SETUP, CENTRES, GRID), clouds)
+    alone, looks = compare_with_clouds(ELSEWHERE, frames, clouds), _looks(monkeypatch)
+    after = compare_with_clouds(ELSEWHERE, frames, clouds, (SETUP, stated))
     assert len(looks) == 3
     assert _same(after, alone)
     assert np.nanmean(np.abs(after.error[0] - stated.error[0])) > 1e-4
@@ -70,7 +70,7 @@ def test_frame_that_one_setup_has_at_rest_and_the_other_pressed_is_looked_at(mon
     barely = np.array([[4e-3, -2e-3, TOP + 5.3e-3]])
     clouds = [seen_points(frame, 3000, 2e-4, 0) for frame in replay(SETUP, barely, GRID)]
     larger = replace(SETUP, tool=replace(SETUP.tool, radius=6.5e-3))
-    pressed = observed(larger, replay(larger, barely, GRID), clouds)
+    pressed = compare_with_clouds(larger, replay(larger, barely, GRID), clouds)
     looks = _looks(monkeypatch)
-    observed(SETUP, replay(SETUP, barely, GRID), clouds, (larger, pressed))
+    compare_with_clouds(SETUP, replay(SETUP, barely, GRID), clouds, (larger, pressed))
     assert pressed.force[0] > 0 and len(looks) == 1

@@ -13,8 +13,8 @@ import pytest
 from recorded_run import RADIUS, SEQUENCE, write_recorded_run
 
 from palpate.foundation.errors import EffectError, RunError
-from palpate.recording.interior_fields import Inside
-from palpate.recording.resolve_frame import WhatIf
+from palpate.recording.interior_fields import InteriorFields
+from palpate.recording.resolve_frame import FrameResolver
 from palpate.recording.saved_model import effects_from
 
 LARGER = {"effect": "tool_radius", "parameters": {"radius": RADIUS}}
@@ -32,9 +32,9 @@ def replay(run: Path) -> dict[str, Any]:
         return {name: stored[name] for name in stored.files}
 
 
-def opened(run: Path, replay: dict[str, Any]) -> WhatIf:
+def opened(run: Path, replay: dict[str, Any]) -> FrameResolver:
     folder = Path(json.loads((run / "origin.json").read_text())["dataset"])
-    return WhatIf(
+    return FrameResolver(
         folder,
         SEQUENCE,
         replay["cloud_index"].tolist(),
@@ -43,7 +43,7 @@ def opened(run: Path, replay: dict[str, Any]) -> WhatIf:
 
 
 @pytest.fixture(scope="module")
-def what(run: Path, replay: dict[str, Any]) -> WhatIf:
+def what(run: Path, replay: dict[str, Any]) -> FrameResolver:
     return opened(run, replay)
 
 
@@ -53,7 +53,7 @@ def deepest(replay: dict[str, Any]) -> int:
 
 
 def test_no_cause_is_the_stated_model_and_the_models_causes_are_the_extended_one(
-    what: WhatIf, replay: dict[str, Any], deepest: int
+    what: FrameResolver, replay: dict[str, Any], deepest: int
 ) -> None:
     for name, rows in (("raw", []), ("extended", [LARGER])):
         moment = what.solve(deepest, effects_from(rows))
@@ -65,7 +65,7 @@ def test_no_cause_is_the_stated_model_and_the_models_causes_are_the_extended_one
         assert moment.converged and moment.outcome == "converged"
 
 
-def test_true_cause_lies_nearest_to_what_was_measured(what: WhatIf, deepest: int) -> None:
+def test_true_cause_lies_nearest_to_what_was_measured(what: FrameResolver, deepest: int) -> None:
     off = {
         radius: what.solve(deepest, effects_from([_radius(radius)])).distance
         for radius in (5e-3, RADIUS, 9e-3)
@@ -74,7 +74,7 @@ def test_true_cause_lies_nearest_to_what_was_measured(what: WhatIf, deepest: int
 
 
 def test_answer_does_not_hang_on_what_was_asked_before(
-    run: Path, replay: dict[str, Any], what: WhatIf, deepest: int
+    run: Path, replay: dict[str, Any], what: FrameResolver, deepest: int
 ) -> None:
     for radius in (4e-3, 8e-3):
         what.solve(deepest, effects_from([_radius(radius)]))
@@ -83,20 +83,20 @@ def test_answer_does_not_hang_on_what_was_asked_before(
     assert np.abs(warm.surface - cold.surface).max() < 2e-3 * push
 
 
-def test_what_remembers_is_led_along_all_frames_before(what: WhatIf, deepest: int) -> None:
+def test_what_remembers_is_led_along_all_frames_before(what: FrameResolver, deepest: int) -> None:
     relaxing = {"effect": "permanent_set", "parameters": {"retained_fraction": 0.4}}
     after = len(what) - 1
     dent = what.solve(after, effects_from([relaxing])).surface - what.solve(after, []).surface
     assert np.abs(dent).max() > 1e-4
 
 
-def test_every_effect_has_a_beginning_that_can_be_asked_for(what: WhatIf) -> None:
+def test_every_effect_has_a_beginning_that_can_be_asked_for(what: FrameResolver) -> None:
     rows = what.beginnings()
     assert {"stiff_inclusion", "gravity", "time_offset"} <= {row["effect"] for row in rows}
     assert [effect.name for effect in effects_from(rows)] == [row["effect"] for row in rows]
 
 
-def test_frame_that_is_not_there_is_refused(what: WhatIf) -> None:
+def test_frame_that_is_not_there_is_refused(what: FrameResolver) -> None:
     with pytest.raises(RunError, match="no frame 999"):
         what.solve(999, [])
 
@@ -123,7 +123,7 @@ def _radius(value: float) -> dict[str, Any]:
 def test_recorded_inside_meets_the_recorded_surface(
     replay: dict[str, Any], model: str, deepest: int
 ) -> None:
-    inside = Inside.read(replay, model)
+    inside = InteriorFields.read(replay, model)
     assert inside is not None
     push = replay[model][deepest] - replay["rest"]
     off = np.linalg.norm(inside.displacement(deepest, replay["rest"]) - push, axis=1)
@@ -135,7 +135,7 @@ def test_recorded_inside_meets_the_recorded_surface(
 def test_recorded_energy_is_highest_below_the_tool_and_none_is_negative(
     replay: dict[str, Any], deepest: int
 ) -> None:
-    inside = Inside.read(replay, "raw")
+    inside = InteriorFields.read(replay, "raw")
     assert inside is not None
     energy = inside.energy_density(deepest, replay["rest"])
     assert energy.min() >= 0.0 and energy.max() > 10 * np.median(energy)

@@ -68,7 +68,7 @@ def test_share_of_nothing_leaves_the_plain_replay(grid):
     """Through all of the memory's parts, which a share of zero alone does not switch off."""
     way = _way(*DEPTHS, 2e-3, -6e-3)
     plain = replay(SETUP, way, grid, tolerance=1e-9)
-    assert _relaxing(0.0).remembers
+    assert _relaxing(0.0).has_history
     found = replay(_relaxing(0.0), way, grid, times=np.arange(len(way)), tolerance=1e-9)
     for frame, wanted in zip(found, plain, strict=True):
         _same(frame, wanted, 1e-9, 1e-6)

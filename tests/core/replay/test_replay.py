@@ -10,7 +10,7 @@ from palpate.fem.model import BlockModel
 from palpate.fem.newton import Outcome
 from palpate.foundation.errors import SolveError
 from palpate.mesh.box_mesh import GridSpec
-from palpate.replay.equilibrium import taught
+from palpate.replay.equilibrium import predict_from_similar
 from palpate.replay.replay import GRAVITY, Equilibrium, Replay, replay, require_converged, rest
 from palpate.setup.setup import Box, Detachment, Load, Material, Setup, Support, Tool
 
@@ -178,11 +178,11 @@ def test_mirrored_poke_gives_the_mirrored_shape():
 
 def test_energy_stored_is_the_work_of_the_tool():
     block, frames = Replay(SETUP, GRADED), replay(SETUP, _poke(5e-3, 21), GRADED)
-    heights = np.array([frame.probe.centre[2] for frame in frames])
+    heights = np.array([frame.tool.centre[2] for frame in frames])
     work = -np.trapezoid([frame.force[2] for frame in frames], heights)
     last = frames[-1]
     stored = (
-        block.model(last.mesh).energy(last.mesh.nodes + last.displacement, last.probe)
+        block.model(last.mesh).energy(last.mesh.nodes + last.displacement, last.tool)
         * SETUP.material.young_modulus
     )
     assert stored == pytest.approx(work, rel=0.01)
@@ -195,7 +195,7 @@ def test_way_to_a_place_does_not_change_what_is_found_there():
         _way((-6e-3, 0, TOP + 5e-3), (-6e-3, 0, TOP + 1e-3), (0, 0, TOP + 1e-3), frames=12),
         GRADED,
     )[-1]
-    assert np.allclose(straight.probe.centre, aside.probe.centre)
+    assert np.allclose(straight.tool.centre, aside.tool.centre)
     assert _relative(aside.displacement, straight.displacement) < 1e-4
 
 
@@ -221,7 +221,8 @@ def test_what_one_frame_was_off_by_begins_the_next_where_the_base_comes_loose(mo
     led = replay(loose, centres, GRADED, starts=starts)
     factors.append(0)
     monkeypatch.setattr(
-        "palpate.replay.replay.taught", lambda model, lesson, start, positions, probe: positions
+        "palpate.replay.replay.predict_from_similar",
+        lambda model, lesson, start, positions, tool: positions,
     )
     alone = replay(loose, centres, GRADED, starts=starts)
     require_converged([*led, *alone])
@@ -239,10 +240,10 @@ def test_a_frame_that_is_far_from_its_start_is_begun_without_what_the_last_one_t
     way = _poke(4e-3, 5)
     first, near = replay(SETUP, way, GRADED)[-2:]
     model, positions = Replay(SETUP, GRADED).model(near.mesh), near.mesh.nodes + near.displacement
-    far = replace(near.probe, centre=near.probe.centre + np.array([2e-3, 0.0, 0.0]))
-    assert taught(model, (first, near), near, positions, far) is positions
+    far = replace(near.tool, centre=near.tool.centre + np.array([2e-3, 0.0, 0.0]))
+    assert predict_from_similar(model, (first, near), near, positions, far) is positions
     failed = replace(near, outcome=Outcome.ITERATIONS)
-    assert taught(model, (first, failed), near, positions, near.probe) is positions
+    assert predict_from_similar(model, (first, failed), near, positions, near.tool) is positions
 
 
 @pytest.mark.parametrize("poisson_ratio", [0.44, 0.45])

@@ -11,7 +11,7 @@ import pytest
 from shapes import box_surface, dome
 
 from benchmarks.reference import SETUP, compared, reference
-from palpate.fem.model import BlockModel, Probe
+from palpate.fem.model import BlockModel, ToolSphere
 from palpate.foundation.arrays import FloatArray
 from palpate.gradients.forward import displacement_changes
 from palpate.mesh.gmsh_fill import TetSpec
@@ -135,7 +135,7 @@ def test_force_on_the_tool_is_the_slope_of_the_energy():
 
     def energy(shift: FloatArray) -> float:
         near = Replay(DOME, spec, tolerance=1e-10).step(centres[1] + shift, frame)
-        return model.energy(near.mesh.nodes + near.displacement, near.probe)
+        return model.energy(near.mesh.nodes + near.displacement, near.tool)
 
     for axis in (0, 2):
         shift = step * np.eye(3)[axis]
@@ -149,12 +149,12 @@ def test_residual_is_the_gradient_of_the_whole_energy():
     soft = replace(
         DOME, load=Load(specific_weight_over_stiffness=2.0), support=Support(stiffness_over_E=100.0)
     )
-    model, probe = BlockModel(soft, mesh), Probe(centres[0], 5e-3)
+    model, tool = BlockModel(soft, mesh), ToolSphere(centres[0], 5e-3)
     random = np.random.default_rng(0)
     positions = mesh.nodes + 1e-5 * random.normal(size=mesh.nodes.shape)
-    state, way = model.assemble(positions, probe), np.asarray(random.normal(size=mesh.nodes.shape))
+    state, way = model.assemble(positions, tool), np.asarray(random.normal(size=mesh.nodes.shape))
     slope = (
-        model.energy(positions + 1e-9 * way, probe) - model.energy(positions - 1e-9 * way, probe)
+        model.energy(positions + 1e-9 * way, tool) - model.energy(positions - 1e-9 * way, tool)
     ) / 2e-9
     assert state.penetration > 1e-4
     assert slope == pytest.approx(float(state.residual @ way[model.topology.free]), rel=1e-5)

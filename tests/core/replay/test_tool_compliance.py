@@ -32,13 +32,13 @@ def test_tool_is_where_its_spring_balances_the_block(way, compliance):
     require_converged(frames)
     for stated, frame in zip(way, frames, strict=True):
         wanted = stated + compliance / setup.material.young_modulus * frame.force
-        assert frame.probe.centre == pytest.approx(wanted, abs=2e-8)
-    assert np.linalg.norm(frames[-1].probe.centre - way[-1]) > 1e-5
+        assert frame.tool.centre == pytest.approx(wanted, abs=2e-8)
+    assert np.linalg.norm(frames[-1].tool.centre - way[-1]) > 1e-5
 
 
 def test_tool_pushes_as_one_stated_where_it_came_to_be():
     frames = replay(_giving(60.0), POKE, GRID)
-    stiff = replay(SETUP, np.array([frame.probe.centre for frame in frames]), GRID)
+    stiff = replay(SETUP, np.array([frame.tool.centre for frame in frames]), GRID)
     for soft, hard in zip(frames, stiff, strict=True):
         assert soft.displacement == pytest.approx(hard.displacement, abs=1e-7)
         assert soft.force == pytest.approx(hard.force, rel=1e-4, abs=1e-6)
@@ -71,4 +71,4 @@ def test_gives_way_together_with_gravity_and_a_sliding_base():
     require_converged(frames)
     assert np.linalg.norm(frames[-1].slip) > 1e-4
     wanted = SIDE[-1] + 30.0 / setup.material.young_modulus * frames[-1].force
-    assert frames[-1].probe.centre == pytest.approx(wanted, abs=1e-6)
+    assert frames[-1].tool.centre == pytest.approx(wanted, abs=1e-6)

@@ -86,7 +86,7 @@ def test_no_friction_is_the_plain_replay_and_a_trace_of_it_hardly_differs():
     way = _pushed(4e-3, np.array([1e-3]))
     plain, traced = replay(BLOCK, way, GRID), replay(_rough(1e-6), way, GRID)
     for frame, other in zip(plain, traced, strict=True):
-        assert frame.hold is None and other.hold is not None
+        assert frame.friction_history is None and other.friction_history is not None
         assert np.abs(frame.displacement - other.displacement).max() < 1e-7
 
 
@@ -99,9 +99,7 @@ def test_a_push_out_and_back_costs_work():
         loop = [frames[3 + index] for index in range(9)]
         pull = np.array([-frame.force[0] for frame in loop])
         return float(
-            (
-                0.5 * (pull[1:] + pull[:-1]) * np.diff([frame.probe.centre[0] for frame in loop])
-            ).sum()
+            (0.5 * (pull[1:] + pull[:-1]) * np.diff([frame.tool.centre[0] for frame in loop])).sum()
         )
 
     force = replay(BLOCK, way, GRID)[3].force[2]

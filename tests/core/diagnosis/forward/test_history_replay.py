@@ -137,5 +137,5 @@ def test_forgetful_setup_keeps_everything_else():
     setup = replace(SETUP, phantom_from_camera=POSE)
     for effect in EFFECTS.values():
         setup = effect.apply(setup)
-    assert setup.remembers and not forgetful(setup).remembers
+    assert setup.has_history and not forgetful(setup).has_history
     assert forgetful(setup) == forgetful(replace(SETUP, phantom_from_camera=POSE))

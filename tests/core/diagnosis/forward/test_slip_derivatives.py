@@ -111,7 +111,7 @@ def test_how_far_it_slides_hangs_not_on_how_often_one_looks(steps):
     block = Replay(SLIDING, GRID, 1e-6)
     frame = block.free
     for depth in np.linspace(0.0, 6e-3, steps + 1)[1:]:
-        frame = block.sought(_pushed(float(depth)), (frame,))
+        frame = block.solve_from_any(_pushed(float(depth)), (frame,))
     assert frame.outcome is Outcome.CONVERGED
     held = SLIDING.support.friction_coefficient * (SLIDING.mass * 9.81 + frame.force[2])
     assert np.linalg.norm(frame.force[:2]) == pytest.approx(held, rel=2e-3)

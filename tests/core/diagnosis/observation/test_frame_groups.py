@@ -24,7 +24,7 @@ from palpate.measurement.segmentation import Cleaner
 from palpate.mesh.box_mesh import GridSpec
 from palpate.registration.registration import small_motion
 from palpate.replay.replay import rest
-from palpate.setup.box import clear_of
+from palpate.setup.box import distance_to_block
 from palpate.setup.setup import Sensor
 
 CLEANER = Cleaner(size=SIZE, phantom_from_camera=POSE, tool_radius=5e-3, noise=4e-4)
@@ -99,7 +99,7 @@ def test_distance_to_the_stated_block():
             [0, SIZE[1] / 2 + 2e-3, 0.01],
         ]
     )
-    assert np.allclose(clear_of(SIZE, points), [0, 3e-3, 5e-3, 2e-3])
+    assert np.allclose(distance_to_block(SIZE, points), [0, 3e-3, 5e-3, 2e-3])
 
 
 def test_groups_hold_frames_of_one_place_in_the_order_of_time(sequence):
@@ -114,7 +114,7 @@ def test_groups_hold_frames_of_one_place_in_the_order_of_time(sequence):
     assert later == [(10, 3)]
     for group in groups:
         here = centres[list(group.frames)]
-        clear = clear_of(SIZE, here) > 6.5e-3
+        clear = distance_to_block(SIZE, here) > 6.5e-3
         assert (clear == group.free).all()
         assert group.free or np.linalg.norm(here - here[0], axis=1).max() < TRAVEL
     assert any(len(group.frames) > 1 for group in groups if not group.free)
@@ -144,7 +144,7 @@ def test_points_of_all_frames_of_a_group_are_cleaned_and_joined(sequence):
         raw = sum(sequence.count(frame) for frame in group.frames)
         assert min(0.5 * raw, MOST_UNTOUCHED) <= len(group.points) <= raw
         assert len(group.points) <= MOST_UNTOUCHED or not group.free
-        assert clear_of(SIZE, POSE.apply(group.points)).max() < 0.01
+        assert distance_to_block(SIZE, POSE.apply(group.points)).max() < 0.01
 
 
 def test_rest_cloud_becomes_the_first_group(sequence):
@@ -174,7 +174,7 @@ def test_frames_near_one_another_by_one_clock_are_not_by_another(sequence):
     moved = _two_pushes(np.arange(FRAMES) / RATE - 0.12)
     for group in found.groups:
         here = moved[list(group.frames)]
-        assert ((clear_of(SIZE, here) > 6.5e-3) == group.free).all()
+        assert ((distance_to_block(SIZE, here) > 6.5e-3) == group.free).all()
         assert group.free or np.linalg.norm(here - here[0], axis=1).max() < TRAVEL
 
 

@@ -75,19 +75,19 @@ def _grid(count: int) -> sp.csr_matrix:
 def test_answers_are_the_inverses_entries_whether_they_were_asked_for_or_not(solver):
     upper = _grid(9)
     factor, inverse = factor_of(upper.copy(), solver), np.linalg.inv(_whole(upper))
-    asked, others = np.arange(700, 729), np.array([5, 300, 720])
-    for wanted in (None, asked, others, np.empty(0, dtype=int)):
+    requested, others = np.arange(700, 729), np.array([5, 300, 720])
+    for wanted in (None, requested, others, np.empty(0, dtype=int)):
         for scale in (1.0, 3.0):
             factor.factorise(scale * upper.data, wanted)
             for unknowns in (
-                asked,
-                asked[4:9],
+                requested,
+                requested[4:9],
                 others,
                 np.arange(695, 710),
                 np.empty(0, dtype=int),
             ):
                 assert np.allclose(
-                    scale * factor.answers(unknowns),
+                    scale * factor.inverse_entries(unknowns),
                     inverse[np.ix_(unknowns, unknowns)],
                     atol=1e-13,
                 )
@@ -98,18 +98,18 @@ def test_answers_are_the_inverses_entries_whether_they_were_asked_for_or_not(sol
 def test_what_is_asked_for_is_eliminated_in_the_same_order_whatever_was_asked_before():
     pardiso = pytest.importorskip("palpate.fem.linalg.pardiso")
     upper, right = _grid(9), np.random.default_rng(1).normal(size=729)
-    asked, others = np.arange(700, 729), np.arange(50)
+    requested, others = np.arange(700, 729), np.arange(50)
     fresh, used = pardiso.Pardiso(upper.copy()), pardiso.Pardiso(upper.copy())
-    for wanted in (others, None, asked):
+    for wanted in (others, None, requested):
         used.factorise(upper.data, wanted)
-    fresh.factorise(upper.data, asked)
+    fresh.factorise(upper.data, requested)
     assert np.array_equal(fresh.solve(right), used.solve(right))
-    assert np.array_equal(fresh.answers(asked), used.answers(asked))
+    assert np.array_equal(fresh.inverse_entries(requested), used.inverse_entries(requested))
 
 
 def test_wrong_answers_to_sparse_loads_are_told_and_done_without(monkeypatch, caplog):
     pardiso = pytest.importorskip("palpate.fem.linalg.pardiso")
-    upper, asked = _grid(7), np.arange(300, 343)
+    upper, requested = _grid(7), np.arange(300, 343)
     factor, inverse = pardiso.Pardiso(upper.copy()), np.linalg.inv(_whole(upper))
     carry_out = pardiso._Handle.run
 
@@ -119,19 +119,21 @@ def test_wrong_answers_to_sparse_loads_are_told_and_done_without(monkeypatch, ca
 
     monkeypatch.setattr(pardiso._Handle, "run", wrong)
     for _ in range(2):
-        factor.factorise(upper.data, asked)
-        assert np.allclose(factor.answers(asked), inverse[np.ix_(asked, asked)], atol=1e-13)
+        factor.factorise(upper.data, requested)
+        assert np.allclose(
+            factor.inverse_entries(requested), inverse[np.ix_(requested, requested)], atol=1e-13
+        )
     assert caplog.text.count("wrong on this machine") == 1
 
 
 def test_factor_stays_while_the_entries_do_and_one_that_there_was_none_of_is_not_taken_for_one():
     pardiso = pytest.importorskip("palpate.fem.linalg.pardiso")
-    upper, asked = _grid(7), np.arange(300, 343)
+    upper, requested = _grid(7), np.arange(300, 343)
     factor, numbers, indefinite = pardiso.Pardiso(upper.copy()), [], -upper.data
     for data, wanted in (
-        (upper.data, asked),
-        (upper.data.copy(), asked),
-        (2 * upper.data, asked),
+        (upper.data, requested),
+        (upper.data.copy(), requested),
+        (2 * upper.data, requested),
         (2 * upper.data, None),
     ):
         factor.factorise(data, wanted)
@@ -147,13 +149,13 @@ def test_factor_stays_while_the_entries_do_and_one_that_there_was_none_of_is_not
 
 def test_factor_of_single_precision_answers_to_its_own_precision_and_solves_to_a_doubles():
     pardiso = pytest.importorskip("palpate.fem.linalg.pardiso")
-    upper, asked, right = (
+    upper, requested, right = (
         _grid(9),
         np.arange(700, 729),
         np.random.default_rng(3).normal(size=(729, 3)),
     )
     factor, inverse = pardiso.Pardiso(upper.copy(), single=True), np.linalg.inv(_whole(upper))
-    for wanted in (None, asked):
+    for wanted in (None, requested):
         for scale in (1.0, 3.0):
             factor.factorise(scale * upper.data, wanted)
             near, exact = factor.approximate(right), factor.solve(right)
@@ -163,7 +165,11 @@ def test_factor_of_single_precision_answers_to_its_own_precision_and_solves_to_a
             assert np.abs(scale * exact - inverse @ right).max() < 1e-12
             assert np.abs(scale * factor.solve(right[:, 0]) - inverse @ right[:, 0]).max() < 1e-12
             assert (
-                np.abs(scale * factor.answers(asked) - inverse[np.ix_(asked, asked)]).max() < 1e-6
+                np.abs(
+                    scale * factor.inverse_entries(requested)
+                    - inverse[np.ix_(requested, requested)]
+                ).max()
+                < 1e-6
             )
     with pytest.raises(NotPositiveDefinite):
         factor.factorise(-upper.data)
