@@ -17,6 +17,8 @@ from palpate.foundation.errors import EffectError
 __all__ = ["GROUP", "checked", "outside_effects"]
 
 GROUP = "palpate.effects"
+_OLD_NAMES = ("core", "app")
+"""Import names of Palpate's folders before they were installed as `palpate`."""
 
 
 def outside_effects(
@@ -38,11 +40,7 @@ def outside_effects(
         try:
             effect = checked(point.load(), taken)
         except Exception as error:  # whatever a stranger's module does on import
-            reason = (
-                error.message
-                if isinstance(error, EffectError)
-                else f"{type(error).__name__}: {error}"
-            )
+            reason = _reason(error)
             warnings.warn(
                 f"the effect {point.name} = {point.value} is left out: {reason}", stacklevel=2
             )
@@ -50,6 +48,19 @@ def outside_effects(
         taken.add(effect.name)
         found.append(effect)
     return tuple(found)
+
+
+def _reason(error: Exception) -> str:
+    """What went wrong, and what to write where a package imports Palpate by its old names."""
+    if isinstance(error, EffectError):
+        return error.message
+    reason = f"{type(error).__name__}: {error}"
+    if isinstance(error, ImportError) and (error.name or "").partition(".")[0] in _OLD_NAMES:
+        reason += (
+            "; Palpate is imported as 'palpate': write 'from palpate.effects import Effect' in "
+            "place of 'from core.effects import Effect'"
+        )
+    return reason
 
 
 def checked(effect: object, taken: Iterable[str]) -> type[Effect]:

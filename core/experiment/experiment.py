@@ -1,0 +1,219 @@
+"""One measured experiment: a dataset whose robot, camera and phantom are related, with its model.
+
+Everything that compares a simulation with measurements starts here: diagnosis, sweeps, correction,
+evaluation, the page and a user's own script. The steps are always the same: register, align each
+sequence with where the phantom stood when it began, state the setup, and prepare the segmentation
+of the clouds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from palpate.dataset import Dataset, Sequence, open_dataset
+from palpate.dataset.accepted_registration import Accepted
+from palpate.dataset.tool_smoothing import smooth_centres
+from palpate.effects import Effect
+from palpate.effects.base import with_effects
+from palpate.experiment.observed_clouds import ObservedClouds, segment_clouds
+from palpate.experiment.replayed_sequence import ReplayedSequence
+from palpate.foundation.arrays import FloatArray, IntArray
+from palpate.foundation.errors import DatasetError
+from palpate.foundation.progress import Report, silent
+from palpate.measurement.phantom_drift import as_it_stood
+from palpate.measurement.segmentation import Cleaner, cleaner_for, find_shaft_axis
+from palpate.measurement.touch_correction import touch_correction
+from palpate.mesh.graded_mesh import REPLAY_GRID
+from palpate.mesh.protocol import Meshing
+from palpate.mesh.push_meshes import REPLAY_PUSHES
+from palpate.registration.registration import Registration, setup_from
+from palpate.registration.registration import register as relate_frames
+from palpate.replay.replay import replay
+from palpate.setup.setup import Setup, Shape
+
+__all__ = ["Experiment", "register"]
+
+_RATE = 30.0
+"""Frames a second of a replay without clouds [1/s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """A registered dataset and what is believed of it. Make one with `Experiment.of(dataset)`.
+
+    Attributes:
+        dataset: the sequences, each aligned with where the phantom stood when it began.
+        registration: how robot, camera and phantom relate, with uncertainties and warnings.
+        setup: the model that `replay` solves: as stated, plus the effects of `with_effects`.
+        effects: the effects in `setup` beyond what is stated.
+    """
+
+    dataset: Dataset
+    registration: Registration
+    setup: Setup
+    effects: tuple[Effect, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        dataset: Dataset | Path | str,
+        *,
+        accepted: Accepted | None = None,
+        report: Report = silent,
+    ) -> Self:
+        """Relate robot, camera and phantom of a dataset.
+
+        Args:
+            dataset: as opened, or the path of its folder.
+            accepted: a camera registration made by hand, used in place of the automatic one.
+            report: progress.
+
+        Raises RegistrationError where the frames cannot be related, DatasetError for a dataset
+        that is off.
+        """
+        opened = dataset if isinstance(dataset, Dataset) else open_dataset(Path(dataset))
+        if accepted is not None:
+            opened = opened.registered(accepted)
+        return cls.registered(opened, relate_frames(opened, report))
+
+    @classmethod
+    def registered(cls, dataset: Dataset, registration: Registration) -> Self:
+        """The experiment of a dataset whose registration is known already."""
+        aligned, registration = as_it_stood(dataset, registration)
+        return cls(aligned, registration, setup_from(aligned, registration))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is doubtful about the registration, one sentence each."""
+        return self.registration.warnings
+
+    @property
+    def sequences(self) -> tuple[str, ...]:
+        """Names of the sequences that have clouds."""
+        return tuple(name for name in self.dataset.sequences if len(self.dataset.sequence(name)))
+
+    @cached_property
+    def stated(self) -> Setup:
+        """The setup as the dataset states it, without effects."""
+        return setup_from(self.dataset, self.registration)
+
+    @cached_property
+    def cleaner(self) -> Cleaner:
+        """Segmentation of the phantom in the raw clouds."""
+        return cleaner_for(self.dataset, self.registration)
+
+    @cached_property
+    def shaft(self) -> FloatArray | None:
+        """Direction (3,) of the tool's shaft in the tool's frame; None where no cloud shows one."""
+        return find_shaft_axis(self.dataset, self.registration.mended)
+
+    def with_effects(self, *effects: Effect) -> Self:
+        """The same experiment with these effects added to its model.
+
+        Raises EffectError where an effect does not fit the setup.
+        """
+        return replace(
+            self, setup=with_effects(self.setup, effects), effects=(*self.effects, *effects)
+        )
+
+    def choose(self, names: tuple[str, ...] | list[str] = ()) -> tuple[str, ...]:
+        """These sequences without repeats, or all that have clouds where none is named.
+
+        Raises DatasetError where a sequence has no clouds, or none of the dataset has.
+        """
+        chosen = tuple(dict.fromkeys(names)) or self.sequences
+        if not chosen:
+            raise DatasetError(
+                "no sequence has clouds to compare a simulation with; record some", key="sequences"
+            )
+        for name in chosen:
+            if not len(self.dataset.sequence(name)):
+                raise DatasetError(
+                    f"{name} has no clouds to compare with; choose other sequences",
+                    file=f"sequences/{name}",
+                    key="sequences",
+                )
+        return chosen
+
+    def grid(self, centres: FloatArray) -> Meshing:
+        """The mesh of a replay of tool centres (f, 3) [m], phantom frame."""
+        radius = self.setup.tool.radius
+        if isinstance(self.setup.geometry, Shape):
+            return REPLAY_PUSHES.for_tool(radius).at(centres)
+        return REPLAY_GRID.for_tool(radius)
+
+    def observe(
+        self, sequence: str, frames: IntArray | None = None, report: Report = silent
+    ) -> ObservedClouds:
+        """The phantom's points in the clouds of a sequence.
+
+        Args:
+            sequence: name.
+            frames: indices of the clouds; all of them where none is given.
+            report: progress.
+        """
+        recorded = self.dataset.sequence(sequence)
+        chosen = np.arange(len(recorded)) if frames is None else np.asarray(frames, dtype=int)
+        return segment_clouds(
+            recorded, chosen, self.cleaner, self.stated.phantom_from_robot, self.shaft, report
+        )
+
+    def centres(self, sequence: Sequence, times: FloatArray, grid: Meshing) -> FloatArray:
+        """Tool centres (f, 3) [m] under the model at cloud stamps (f,) [s], phantom frame."""
+        robot = touch_correction(self.setup, grid) @ self.setup.phantom_from_robot
+        clock = times - self.setup.sensor.time_offset
+        return robot.apply(smooth_centres(sequence.kinematics, clock))
+
+    def replay(
+        self,
+        sequence: str,
+        *,
+        every: int = 1,
+        grid: Meshing | None = None,
+        tolerance: float = 1e-3,
+        report: Report = silent,
+    ) -> ReplayedSequence:
+        """Simulate one sequence: one equilibrium per cloud, or thirty a second without clouds.
+
+        Args:
+            sequence: name.
+            every: every how many frames one is solved.
+            grid: the mesh; graded around the tool where none is given.
+            tolerance: residual over the push at which a frame counts as converged [1].
+            report: progress.
+
+        A frame without equilibrium is kept with its outcome: look at `ReplayedSequence.failed`.
+        """
+        recorded = self.dataset.sequence(sequence)
+        stamps = np.asarray(recorded.cloud_times)
+        observed = len(stamps) > 0
+        if not observed:
+            stamps = _thinned(np.asarray(recorded.kinematics.time))
+        index = np.arange(0, len(stamps), every)
+        times = stamps[index]
+        rough = self.stated.phantom_from_robot.apply(recorded.kinematics.position_at(times))
+        mesh = grid or self.grid(rough)
+        centres = self.centres(recorded, times, mesh)
+        clock = times - self.setup.sensor.time_offset
+        frames = replay(self.setup, centres, mesh, times=clock, tolerance=tolerance, report=report)
+        return ReplayedSequence(
+            self, sequence, times, index if observed else None, centres, tuple(frames)
+        )
+
+
+def _thinned(times: FloatArray) -> FloatArray:
+    """Stamps (n,) [s] of a robot stream at no more than `_RATE` a second."""
+    slots = np.floor((times - times[0]) * _RATE)
+    return times[np.unique(slots, return_index=True)[1]]
+
+
+def register(
+    dataset: Dataset | Path | str, *, accepted: Accepted | None = None, report: Report = silent
+) -> Experiment:
+    """Relate robot, camera and phantom of a dataset; see `Experiment.of`."""
+    return Experiment.of(dataset, accepted=accepted, report=report)
