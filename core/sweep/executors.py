@@ -1,6 +1,4 @@
-"""Who does the replays: processes of this machine, or the workers of a dask cluster, through one
-call.
-"""
+"""Executors of a sweep's replays: processes of this machine or the workers of a dask cluster."""
 
 from __future__ import annotations
 
@@ -22,38 +20,39 @@ __all__ = ["ReplayExecutor", "Task", "make_executor", "run_tasks"]
 Task = tuple[Setup, int]
 """A setup, and the number of the sequence that is replayed under it."""
 _ATTEMPTS = 2
-_HELD: tuple[tuple[SweepSequence, ...], Meshing] | None = None
+"""Attempts at a task before it counts as failed."""
+_SHARED: tuple[tuple[SweepSequence, ...], Meshing] | None = None
 
 
 def _begin(data: tuple[SweepSequence, ...], grid: Meshing) -> None:
-    global _HELD  # noqa: PLW0603 (what a process is given once)
-    _HELD = (data, grid)
+    global _SHARED  # noqa: PLW0603 (set once, when a process starts)
+    _SHARED = (data, grid)
 
 
-def _measured(setup: Setup, number: int) -> ReplayResult:
-    assert _HELD is not None
-    return replay_errors(setup, _HELD[0][number], _HELD[1])
+def _run_in_process(setup: Setup, number: int) -> ReplayResult:
+    assert _SHARED is not None
+    return replay_errors(setup, _SHARED[0][number], _SHARED[1])
 
 
-def _on_worker(setup: Setup, seen: SweepSequence, grid: Meshing) -> ReplayResult:
+def _run_on_worker(setup: Setup, sequence: SweepSequence, grid: Meshing) -> ReplayResult:
     keeping_memory()
-    return replay_errors(setup, seen, grid)
+    return replay_errors(setup, sequence, grid)
 
 
 class ReplayExecutor(Protocol):
-    """Something that replays tasks, at most `places` at a time."""
+    """Runs replay tasks asynchronously, at most `slots` of them at a time."""
 
     slots: int
 
     def submit(self, task: Task) -> Future[ReplayResult]:
-        """Begin one."""
+        """Start a task and return its future."""
 
     def close(self) -> None:
-        """Stop what runs."""
+        """Stop all running tasks."""
 
 
 class ProcessExecutor:
-    """A process for each place, used again; one that dies takes no other's work along."""
+    """Local processes, one pool per process: a process that dies interrupts no other task."""
 
     def __init__(self, count: int, data: tuple[SweepSequence, ...], grid: Meshing) -> None:
         self.slots, self._given = count, (data, grid)
@@ -61,7 +60,7 @@ class ProcessExecutor:
         self._busy: dict[Future[ReplayResult], ProcessPool] = {}
 
     def submit(self, task: Task) -> Future[ReplayResult]:
-        """Begin one in a process that is free."""
+        """Start a task in an idle process, or in a new one."""
         for future in [future for future in self._busy if future.done()]:
             pool = self._busy.pop(future)
             if isinstance(future.exception(), BrokenProcessPool):
@@ -75,19 +74,21 @@ class ProcessExecutor:
                 1, start="forkserver", preload=[__name__], begin=_begin, args=self._given
             )
         )
-        future = pool.submit(_measured, *task)
+        future = pool.submit(_run_in_process, *task)
         self._busy[future] = pool
         return future
 
     def close(self) -> None:
-        """End all processes."""
+        """Terminate all processes."""
         for pool in (*self._idle, *self._busy.values()):
             pool.terminate()
 
 
 class DaskExecutor:
-    """Workers of a dask cluster (`distributed`), which need this package and nothing of this
-    machine's disk.
+    """Workers of a dask cluster (`distributed`).
+
+    The workers need this package installed, but no access to this machine's disk: the data are
+    sent to them.
     """
 
     def __init__(self, address: str, data: tuple[SweepSequence, ...], grid: Meshing) -> None:
@@ -107,7 +108,8 @@ class DaskExecutor:
         if not threads:
             self._client.close()
             raise SetupError(
-                f"the dask scheduler at {address} has no workers; start some with: dask worker {address}",
+                f"the dask scheduler at {address} has no workers; "
+                f"start some with: dask worker {address}",
                 key="scheduler",
             )
         self.slots = 2 * threads
@@ -116,15 +118,15 @@ class DaskExecutor:
         self._grid = grid
 
     def submit(self, task: Task) -> Future[ReplayResult]:
-        """Begin one on some worker."""
+        """Start a task on any worker."""
         setup, number = task
         future: Future[ReplayResult] = self._executor.submit(
-            _on_worker, setup, self._data[number], self._grid
+            _run_on_worker, setup, self._data[number], self._grid
         )
         return future
 
     def close(self) -> None:
-        """Leave the cluster; its workers stay."""
+        """Disconnect from the cluster; its workers keep running."""
         self._executor.shutdown(wait=False)
         self._client.close()
 
@@ -132,7 +134,14 @@ class DaskExecutor:
 def make_executor(
     workers: int, scheduler: str | None, data: tuple[SweepSequence, ...], grid: Meshing
 ) -> ReplayExecutor:
-    """ProcessExecutor here, or the cluster whose scheduler is at this address."""
+    """Return an executor: local processes, or a dask cluster where a scheduler is given.
+
+    Args:
+        workers: number of local processes.
+        scheduler: address of a dask scheduler, or None.
+        data: the sequences that tasks refer to by number.
+        grid: the mesh protocol of all replays.
+    """
     return (
         ProcessExecutor(workers, data, grid)
         if scheduler is None
@@ -143,10 +152,10 @@ def make_executor(
 def run_tasks(
     executor: ReplayExecutor, tasks: Sequence[Task], pause: float = 1.0
 ) -> Iterator[tuple[int, ReplayResult] | None]:
-    """The number of each task with what it gave, as they come; None after each `pause` [s] in which
-    none did.
+    """Yield the number and the result of each task as it finishes.
 
-    A task whose process died is tried once more, and then a failure.
+    Yields None after each `pause` [s] in which no task finished. A task whose process died is
+    tried once more; then its result is a failure.
     """
     waiting = deque((number, 1) for number in range(len(tasks)))
     running: dict[Future[ReplayResult], tuple[int, int]] = {}
@@ -168,8 +177,7 @@ def run_tasks(
                 yield (
                     number,
                     ReplayResult(
-                        failure="its process was ended from outside twice, or by running out of memory",
-                        lost=True,
+                        failure="its process was killed twice, or ran out of memory", lost=True
                     ),
                 )
             else:

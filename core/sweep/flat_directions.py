@@ -1,5 +1,6 @@
-"""Along which parameters the error says nothing: it changes there by no more than resampling whole
-probes lets it.
+"""Flat directions of a sweep: parameters along which the error does not change significantly.
+
+The change is compared with its bootstrap distribution over whole pushes.
 """
 
 from __future__ import annotations
@@ -16,21 +17,24 @@ from palpate.sweep.sweep_error import error_from_sums
 __all__ = ["Direction", "assess_direction"]
 
 _DRAWS, _LEVEL = 2000, 0.05
-_LEAST = 1e-6
-"""Of the error [m]: what the solver's own tolerance leaves is no change."""
+"""Bootstrap samples, and the significance level before the Bonferroni correction [1]."""
+_SMALLEST_CHANGE = 1e-6
+"""Changes of the error below this [m] count as none: the solver's tolerance allows them."""
 
 
 @dataclass(frozen=True)
 class Direction:
-    """What one parameter does to the error.
+    """The error along one parameter.
 
     Attributes:
-        values: (k) along it.
-        errors: (k) [m] there.
-        change: of the error [m] from the best value to the worst;
-        low, high: its interval.
-        flat: whether it may be nothing. None where fewer than two probes were compared, so that
-            nobody knows.
+        name: the parameter, as `effect.parameter`.
+        values: (k) values of the parameter [its own unit].
+        errors: (k) errors at these values [m].
+        change: error at the worst value minus error at the best [m].
+        low: lower end of the change's confidence interval [m].
+        high: upper end of the change's confidence interval [m].
+        flat: whether the change may be zero; None with fewer than two pushes, which cannot be
+            resampled.
     """
 
     name: str
@@ -42,18 +46,25 @@ class Direction:
     flat: bool | None
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """Return plain values for JSON."""
         return {**vars(self), "values": list(self.values), "errors": list(self.errors)}
 
 
 def assess_direction(
     name: str, values: Sequence[float], sums: FloatArray, measure: str, seed: int
 ) -> Direction:
-    """From the sums (k, probes, 4) of `palpate.sweep.sweep_error` at k values of a parameter.
+    """Test whether the error changes along a parameter.
 
-    The same probes are drawn for all values, so what they share cancels. The best and the worst
-    value are chosen from these same data, therefore the interval's level is shared out over all
-    that could have been chosen (Bonferroni).
+    The same pushes are drawn for all values, so the variation they have in common cancels. The
+    best and the worst value are selected on the same data; the level of the interval is therefore
+    divided by the number of possible choices (Bonferroni).
+
+    Args:
+        name: the parameter.
+        values: (k) values of the parameter.
+        sums: (k, p, 4) sums over each of p pushes at each value, see `palpate.sweep.sweep_error`.
+        measure: "distance" or "paper", see `error_from_sums`.
+        seed: seed of the bootstrap.
     """
     whole = error_from_sums(sums.sum(axis=1), measure)
     best, worst = int(whole.argmin()), int(whole.argmax())
@@ -64,7 +75,7 @@ def assess_direction(
     )
     level = _LEVEL / max(1, len(values) - 1)
     low, high = (float(edge) for edge in np.quantile(differences, [level / 2, 1 - level / 2]))
-    flat: bool | None = change < _LEAST or low < _LEAST
-    if probes < 2 and change >= _LEAST:
+    flat: bool | None = change < _SMALLEST_CHANGE or low < _SMALLEST_CHANGE
+    if probes < 2 and change >= _SMALLEST_CHANGE:
         flat = None
     return Direction(name, tuple(values), tuple(whole.tolist()), change, low, high, flat)

@@ -1,5 +1,6 @@
-"""What a sweep moves: parameters of effects. The setup's own have their names, too:
-`poisson_ratio.nu`, `tool_radius.radius`.
+"""The parameter space of a sweep: parameters of effects, named `effect.parameter`.
+
+Parameters of the setup itself belong to effects too: `poisson_ratio.nu`, `tool_radius.radius`.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ Values = Mapping[str, float | str]
 
 
 def _parameter(name: str) -> tuple[type[Effect], Parameter]:
-    """The effect and the parameter of `effect.parameter`; EffectError where there is none."""
+    """Return the effect and the parameter of `effect.parameter`; EffectError if unknown."""
     cause, _, key = name.partition(".")
     effect = effect_named(cause)
     for item in effect.parameters():
@@ -33,8 +34,14 @@ def _parameter(name: str) -> tuple[type[Effect], Parameter]:
 
 @dataclass(frozen=True)
 class Axis:
-    """One parameter that is swept from `low` to `high` (SI), by `effect.parameter`; the catalogue's
-    bounds hold.
+    """One swept parameter and its range.
+
+    Attributes:
+        name: the parameter, as `effect.parameter`.
+        low: lower end of the range [SI unit of the parameter].
+        high: upper end of the range [SI unit of the parameter].
+
+    EffectError for a parameter that is not a number or a range outside the effect's bounds.
     """
 
     name: str
@@ -45,17 +52,20 @@ class Axis:
         item = self.parameter
         if item.choices:
             raise EffectError(
-                f"{self.name} is a word, which cannot be swept; fix it to one of {', '.join(item.choices)}",
+                f"{self.name} is not a number and cannot be swept; "
+                f"fix it to one of {', '.join(item.choices)}",
                 parameter=self.name,
             )
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
             raise EffectError(
-                f"{self.name}: {self.low:g} to {self.high:g} is no range; give the lower bound first",
+                f"{self.name}: {self.low:g} to {self.high:g} is no range; "
+                "give the lower bound first",
                 parameter=self.name,
             )
         if self.low < item.low or self.high > item.high:
             raise EffectError(
-                f"{self.name}: {self.low:g} to {self.high:g} {item.unit} leaves {item.low:g} to {item.high:g} {item.unit}",
+                f"{self.name}: {self.low:g} to {self.high:g} {item.unit} is outside "
+                f"{item.low:g} to {item.high:g} {item.unit}",
                 parameter=self.name,
                 low=item.low,
                 high=item.high,
@@ -63,28 +73,30 @@ class Axis:
 
     @property
     def parameter(self) -> Parameter:
-        """As the catalogue has it."""
+        """The parameter as the effect declares it."""
         return _parameter(self.name)[1]
 
     @property
     def ends(self) -> tuple[float, float]:
-        """The bounds as search coordinates (`Parameter.coordinate`)."""
+        """The range in search coordinates (`Parameter.coordinate`)."""
         return self.parameter.coordinate(self.low), self.parameter.coordinate(self.high)
 
     def value(self, coordinate: float) -> float:
-        """Of a search coordinate, inside the bounds."""
+        """Return the value at a search coordinate, clipped to the range."""
         return float(min(max(self.parameter.value(coordinate), self.low), self.high))
 
     def line(self, count: int) -> list[float]:
-        """Values evenly spread over the bounds in the search coordinate; both ends are among
-        them."""
+        """Return `count` values, evenly spaced in the search coordinate, both ends included."""
         return [self.value(float(place)) for place in np.linspace(*self.ends, count)]
 
 
 @dataclass(frozen=True)
 class ParameterSpace:
-    """The axes of a sweep, and parameters of effects that are held at other values than the setup's
-    own.
+    """The axes of a sweep and parameters that are fixed at given values.
+
+    Attributes:
+        axes: the swept parameters.
+        fixed: values of other parameters, which replace those of the setup.
     """
 
     axes: tuple[Axis, ...]
@@ -93,7 +105,7 @@ class ParameterSpace:
     def __post_init__(self) -> None:
         names = [axis.name for axis in self.axes]
         if not names:
-            raise EffectError("nothing is swept; name a parameter, such as poisson_ratio.nu")
+            raise EffectError("no parameter is swept; name one, such as poisson_ratio.nu")
         for name in (*names, *self.fixed):
             if names.count(name) + (name in self.fixed) > 1:
                 raise EffectError(
@@ -103,13 +115,14 @@ class ParameterSpace:
             _parameter(name)
 
     def setup(self, stated: Setup, values: Values) -> Setup:
-        """The stated setup with these values of the axes in it; what an effect leaves unnamed is
-        what the setup has.
+        """Return the stated setup with these parameter values and the fixed ones.
+
+        Parameters of an effect that are not named keep the values of the setup.
         """
-        wanted: dict[str, dict[str, Any]] = {}
+        by_effect: dict[str, dict[str, Any]] = {}
         for name, value in {**self.fixed, **values}.items():
             cause, _, key = name.partition(".")
-            wanted.setdefault(cause, {})[key] = value
-        for cause, parameters in wanted.items():
+            by_effect.setdefault(cause, {})[key] = value
+        for cause, parameters in by_effect.items():
             stated = replace(effect_named(cause).neutral(stated), **parameters).apply(stated)
         return stated

@@ -1,4 +1,4 @@
-"""Replays on disk, each under the digest of what it follows from."""
+"""Cache of replay results on disk, each stored under a digest of its inputs."""
 
 from __future__ import annotations
 
@@ -17,20 +17,28 @@ from palpate.sweep.sweep_error import TOLERANCE, ReplayResult
 __all__ = ["ReplayCache", "replay_key"]
 
 _DIGITS = 9
+"""Decimals to which numbers enter the digest; lengths are in metres."""
 
 
 def replay_key(setup: Setup, digest: str, grid: Meshing) -> str:
-    """Of one setup on one sequence (`SweepSequence.digest`): the same for whatever gives the same replay
-    under the same code.
+    """Return the cache key of one setup on one sequence.
+
+    Args:
+        setup: the setup of the replay.
+        digest: `SweepSequence.digest` of the sequence.
+        grid: the mesh protocol.
+
+    Equal inputs under the same version of the code have equal keys.
     """
-    said = {"setup": _rounded(setup.as_dict()), "watched": digest, "grid": repr(grid)}
-    said |= {"tolerance": TOLERANCE, "code": source_digest()}
-    return hashlib.sha256(json.dumps(said, sort_keys=True, default=repr).encode()).hexdigest()
+    content = {"setup": _rounded(setup.as_dict()), "watched": digest, "grid": repr(grid)}
+    content |= {"tolerance": TOLERANCE, "code": source_digest()}
+    return hashlib.sha256(json.dumps(content, sort_keys=True, default=repr).encode()).hexdigest()
 
 
 def _rounded(value: Any) -> Any:
-    """Numbers of the registrations differ in their last digits from run to run; a billionth (of a
-    metre) is no other setup.
+    """Round all numbers in nested containers.
+
+    A registration differs in its last digits from run to run.
     """
     if isinstance(value, float):
         return round(value, _DIGITS) + 0.0
@@ -40,28 +48,31 @@ def _rounded(value: Any) -> Any:
 
 
 class ReplayCache:
-    """One small file for each replay, below `folder`; several sweeps may share it at the same
-    time."""
+    """A folder with one small file per replay; several sweeps may use it at the same time.
+
+    Args:
+        folder: where the files are.
+    """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
     def get(self, key: str) -> ReplayResult | None:
-        """What is known; a file that cannot be read is as good as none."""
+        """Return the stored result; None where there is none or it cannot be read."""
         path = self._path(key)
         try:
-            found = ReplayResult.from_json(json.loads(path.read_text()))
-            os.utime(path)  # what is used last is dropped last
-            return found
+            result = ReplayResult.from_json(json.loads(path.read_text()))
+            os.utime(path)  # the least recently used files are deleted first
+            return result
         except (OSError, ValueError, KeyError, TypeError):
             return None
 
-    def put(self, key: str, found: ReplayResult) -> None:
-        """Keep it: whole or not at all."""
+    def put(self, key: str, result: ReplayResult) -> None:
+        """Store a result atomically."""
         path = self._path(key)
         path.parent.mkdir(parents=True, exist_ok=True)
         aside = path.with_name(f".{uuid4().hex}")
-        aside.write_text(json.dumps(found.to_json()))
+        aside.write_text(json.dumps(result.to_json()))
         os.replace(aside, path)
 
     def _path(self, key: str) -> Path:

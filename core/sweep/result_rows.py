@@ -1,4 +1,4 @@
-"""The rows of a sweep on disk, as its points end."""
+"""The result rows of a sweep on disk, appended as its points finish."""
 
 from __future__ import annotations
 
@@ -14,14 +14,19 @@ __all__ = ["ResultRows"]
 
 
 class ResultRows:
-    """The rows of one sweep, one JSON object a line, each on the disk before the next begins."""
+    """The rows of one sweep: one JSON object a line, each flushed to disk before the next.
+
+    Args:
+        file: the file of the rows.
+    """
 
     def __init__(self, file: Path) -> None:
         self._file = file
 
     def read(self) -> list[dict[str, Any]]:
-        """All whole rows; a last one that is torn, as a kill while writing leaves it, does not
-        count.
+        """Return all complete rows; an incomplete last line, left by a kill, is ignored.
+
+        Raises RunError for a complete line that is not JSON.
         """
         if not self._file.is_file():
             return []
@@ -38,13 +43,13 @@ class ResultRows:
         return rows
 
     def start(self, rows: Sequence[dict[str, Any]]) -> None:
-        """Write what is whole anew, so that nothing follows a torn row."""
+        """Replace the file by these rows, so that no row follows an incomplete one."""
         aside = self._file.with_name(f".{self._file.name}.part")
         aside.write_text("".join(json.dumps(row) + "\n" for row in rows))
         os.replace(aside, self._file)
 
     def add(self, row: dict[str, Any]) -> None:
-        """One more."""
+        """Append one row."""
         with self._file.open("a") as stream:
             stream.write(json.dumps(row) + "\n")
             stream.flush()

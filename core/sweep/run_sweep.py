@@ -1,6 +1,4 @@
-"""A sweep at work: points asked for, replays done once each, rows written as they come, and what
-the whole says.
-"""
+"""Execution of a sweep: sample points, replay each setup once, write rows, and summarise."""
 
 from __future__ import annotations
 
@@ -32,8 +30,7 @@ from palpate.sweep.sweep_spec import SweepSpec
 __all__ = ["run_sweep"]
 
 _SCAN = 5
-"""Values along each parameter through the best point, where the method itself leaves no line
-through it."""
+"""Values along each parameter through the best point, after a method that is not a grid."""
 
 
 def run_sweep(
@@ -47,16 +44,21 @@ def run_sweep(
     grid: Meshing | None = None,
     report: Report = silent,
 ) -> dict[str, Any]:
-    """Do a sweep, or go on with it, in `folder`: request.json, points.jsonl as points end, and
-    summary.json at the end.
+    """Run a sweep in `folder`, or resume the one that is there; return its summary.
+
+    Writes request.json, a row of points.jsonl as each point finishes, and summary.json at the end.
 
     Args:
-        store: folder of replays that are known, for all sweeps.
-        workers: processes.
-        scheduler: address of a dask scheduler instead.
-        grid: the mesh; that of all replays unless given.
+        dataset: the dataset.
+        request: what to sweep.
+        folder: folder of this sweep.
+        store: folder of the replay cache, which all sweeps share.
+        workers: number of local processes.
+        scheduler: address of a dask scheduler, which is used instead of local processes.
+        grid: mesh protocol; REPLAY_GRID if None.
+        report: receives the progress.
 
-    RunError where the folder has another sweep.
+    Raises RunError where the folder holds another sweep.
     """
     registered = {"registration": dataset.accepted.name} if dataset.accepted else {}
     _claim(folder, {**request.to_json(), "dataset": str(dataset.path.name), **registered})
@@ -66,7 +68,7 @@ def run_sweep(
     grid = grid or REPLAY_GRID.for_tool(stated.tool.radius)
     executor = make_executor(workers, scheduler, data, grid)
     try:
-        run = _Run(
+        run = _SweepRun(
             request,
             stated,
             data,
@@ -76,7 +78,7 @@ def run_sweep(
             ResultRows(folder / "points.jsonl"),
             part(report, 0.05, 1.0),
         )
-        summary = run.whole()
+        summary = run.run()
     finally:
         executor.close()
     _write(folder / "summary.json", summary)
@@ -84,12 +86,12 @@ def run_sweep(
     return summary
 
 
-def _claim(folder: Path, said: dict[str, Any]) -> None:
+def _claim(folder: Path, content: dict[str, Any]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / "request.json"
-    if file.is_file() and json.loads(file.read_text()) != said:
-        raise RunError(f"{folder} has another sweep; name another folder", file="request.json")
-    _write(file, said)
+    if file.is_file() and json.loads(file.read_text()) != content:
+        raise RunError(f"{folder} holds another sweep; name another folder", file="request.json")
+    _write(file, content)
 
 
 def _write(file: Path, value: Any) -> None:
@@ -98,9 +100,15 @@ def _write(file: Path, value: Any) -> None:
     os.replace(aside, file)
 
 
-class _Run:
-    """One sweep under way; `sums` are those of each point that has an error, over the probes of all
-    sequences.
+class _SweepRun:
+    """One running sweep.
+
+    Attributes:
+        points: the rows of all points so far.
+        sums: sums (p, 4) over the pushes of all sequences, by the number of each solved point.
+        old: rows of an earlier, interrupted run by number.
+        computed: number of replays that were not in the cache.
+        planned: number of points, for the progress.
     """
 
     def __init__(
@@ -126,14 +134,14 @@ class _Run:
         scans = 0 if request.method == "grid" else _SCAN * len(axes)
         self.planned = 1 + request.planned + scans
 
-    def whole(self) -> dict[str, Any]:
-        """All points, then the lines through the best one, then the summary."""
-        asked = point_batches(self.request)
-        # Along with the first batch, so that no process waits for the stated setup alone.
-        errors = self._batch([None, *next(asked)], "search")[1:]
+    def run(self) -> dict[str, Any]:
+        """Evaluate all points, then lines through the best one, and return the summary."""
+        sampler = point_batches(self.request)
+        # The stated setup joins the first batch, so that no process waits for it alone.
+        errors = self._batch([None, *next(sampler)], "search")[1:]
         while True:
             try:
-                points = asked.send(errors)
+                points = sampler.send(errors)
             except StopIteration:
                 break
             errors = self._batch(points, "search")
@@ -164,8 +172,10 @@ class _Run:
         return min(known, key=lambda row: (row["error"], row["number"]), default=None)
 
     def _direction(self, axis: Axis, best: dict[str, Any]) -> dict[str, Any] | None:
-        """Of a grid the best point at each value of its first level; else a line through the best
-        point.
+        """Assess one parameter; None with fewer than two solved points along it.
+
+        Uses the best point at each value of a grid's first level, or else a line of new points
+        through the best one.
         """
         if self.request.method == "grid":
             first = self.points[1 : 1 + self.request.steps ** len(self.request.space.axes)]
@@ -189,8 +199,9 @@ class _Run:
         ).to_json()
 
     def _batch(self, points: Sequence[Values | None], kind: str) -> list[float | None]:
-        """Errors [m] of these points, in their order; None is the stated setup, and a kind of its
-        own.
+        """Evaluate points and return their errors [m] in order; None for a failed point.
+
+        The point None is the stated setup; its row has the kind "stated".
         """
         begin = len(self.points)
         setups = [self._setup(point) for point in points]
@@ -207,20 +218,21 @@ class _Run:
             if isinstance(setup, str):
                 continue
             for number, key in enumerate(own):
-                found = known.get(key) or self.store.get(key)
-                if found is not None:
-                    known[key] = found
+                stored = known.get(key) or self.store.get(key)
+                if stored is not None:
+                    known[key] = stored
                 else:
                     tasks.setdefault(key, (setup, number))
         open_rows = dict(enumerate(keys))
         self._settle(open_rows, known, begin, points, setups, kind)
         names = list(tasks)
-        for told in run_tasks(self.executor, list(tasks.values())):
-            if told is not None:
-                known[names[told[0]]] = told[1]
+        for finished in run_tasks(self.executor, list(tasks.values())):
+            if finished is not None:
+                key, result = names[finished[0]], finished[1]
+                known[key] = result
                 self.computed += 1
-                if not told[1].lost:
-                    self.store.put(names[told[0]], told[1])
+                if not result.lost:
+                    self.store.put(key, result)
                 self._settle(open_rows, known, begin, points, setups, kind)
             done = begin + len(points) - len(open_rows)
             self.report(min(1.0, done / self.planned), f"{done} of {self.planned} points")
@@ -235,7 +247,7 @@ class _Run:
         setups: Sequence[Setup | str],
         kind: str,
     ) -> None:
-        """Write the rows of those points of a batch whose replays are all there."""
+        """Write the rows of the points of a batch whose replays have all finished."""
         for place in [
             place for place, keys in waiting.items() if all(key in known for key in keys)
         ]:
@@ -265,7 +277,7 @@ class _Run:
                 self.rows.add(row)
 
     def _setup(self, point: Values | None) -> Setup | str:
-        """The setup of a point, or why there is none."""
+        """Return the setup of a point, or the reason why it is invalid."""
         try:
             return self.stated if point is None else self.request.space.setup(self.stated, point)
         except PalpateError as error:
@@ -273,9 +285,9 @@ class _Run:
 
 
 def _by_value(rows: Iterable[dict[str, Any]], name: str) -> list[list[dict[str, Any]]]:
-    """Points with an error, parted by the value of one parameter."""
-    parted: dict[float, list[dict[str, Any]]] = {}
+    """Group the solved points by the value of one parameter, in increasing order."""
+    groups: dict[float, list[dict[str, Any]]] = {}
     for row in rows:
         if row["error"] is not None:
-            parted.setdefault(row["values"][name], []).append(row)
-    return [parted[value] for value in sorted(parted)]
+            groups.setdefault(row["values"][name], []).append(row)
+    return [groups[value] for value in sorted(groups)]

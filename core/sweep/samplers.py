@@ -1,7 +1,8 @@
-"""Where a sweep looks: batches of points out, their errors in.
+"""Sampling methods of a sweep: grid, random, TPE and CMA-ES.
 
-A batch does not depend on how many workers there are or which ends first, so a sweep that is taken
-up again walks the same way.
+A sampler is a generator that yields batches of points and is sent their errors. A batch does not
+depend on the number of workers or on the order in which they finish, so a resumed sweep visits the
+same points.
 """
 
 from __future__ import annotations
@@ -19,19 +20,20 @@ __all__ = ["PointBatches", "point_batches"]
 
 Point = dict[str, float]
 PointBatches = Generator[list[Point], Sequence[float | None], None]
-"""Yields points by name; is sent the error [m] of each, None where a point failed."""
+"""Yields points as values by parameter name; is sent their errors [m], None for a failed point."""
 _BATCH = 8
+"""Points per batch of TPE and CMA-ES."""
 
 
 def point_batches(request: SweepSpec) -> PointBatches:
-    """The points of a request."""
+    """Return the sampler of a sweep."""
     if request.method == "grid":
         return _grid(request)
-    return _random(request) if request.method == "random" else _told(request)
+    return _random(request) if request.method == "random" else _optuna(request)
 
 
 def _grid(request: SweepSpec) -> PointBatches:
-    """Each level spans one step of the last to both sides of the best point so far."""
+    """Refine a grid: each level spans one step of the last to both sides of the best point."""
     axes = request.space.axes
     spans = [axis.ends for axis in axes]
     best: tuple[float, tuple[float, ...]] | None = None
@@ -39,10 +41,10 @@ def _grid(request: SweepSpec) -> PointBatches:
         lines = [np.linspace(*span, request.steps) for span in spans]
         places = [tuple(float(value) for value in place) for place in itertools.product(*lines)]
         errors = yield [_point(axes, place) for place in places]
-        found = [
+        solved = [
             (error, place) for error, place in zip(errors, places, strict=True) if error is not None
         ]
-        best = min([*found, *([best] if best else [])], default=None)
+        best = min([*solved, *([best] if best else [])], default=None)
         if best is None:
             return
         spans = [
@@ -66,8 +68,8 @@ def _random(request: SweepSpec) -> PointBatches:
     ]
 
 
-def _told(request: SweepSpec) -> PointBatches:
-    """TPE (Bergstra et al. 2011) or CMA-ES (Hansen 2016) as Optuna has them."""
+def _optuna(request: SweepSpec) -> PointBatches:
+    """Sample by Optuna's TPE (Bergstra et al. 2011) or CMA-ES (Hansen 2016)."""
     import optuna
 
     optuna.logging.set_verbosity(optuna.logging.WARNING)

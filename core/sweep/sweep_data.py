@@ -1,4 +1,4 @@
-"""What the points of a sweep are compared with: the cleaned clouds of chosen frames, read once."""
+"""The data of a sweep: segmented clouds of selected frames, read once."""
 
 from __future__ import annotations
 
@@ -22,16 +22,19 @@ from palpate.setup.setup import Setup
 __all__ = ["SweepSequence", "read_sweep_data"]
 
 _MOST_POINTS = 6000
+"""Points kept of a cloud."""
 
 
 @dataclass(frozen=True, eq=False)
 class SweepSequence:
-    """Chosen frames of one sequence, in the order of time.
+    """Selected frames of one sequence, in the order of time.
 
     Attributes:
+        name: name of the sequence.
+        kinematics: recorded motion of the tool, robot frame.
         times: (f,) cloud stamps [s].
-        clouds: of each frame the cleaned points (n, 3) [m], camera frame.
-        probes: (f,) which push of the sequence each belongs to.
+        clouds: segmented points (n, 3) [m] of each frame, camera frame.
+        probes: (f,) number of the push that each frame belongs to.
     """
 
     name: str
@@ -42,7 +45,7 @@ class SweepSequence:
 
     @property
     def digest(self) -> str:
-        """Of everything that a replay and its error take from here; the name is not among it."""
+        """Digest of all data that a replay and its error depend on; the name is not included."""
         digest = hashlib.sha256()
         for array in (
             self.kinematics.time,
@@ -58,11 +61,15 @@ class SweepSequence:
 def read_sweep_data(
     dataset: Dataset, names: Sequence[str], frames: int, report: Report = silent
 ) -> tuple[Setup, tuple[SweepSequence, ...]]:
-    """The stated setup with its registrations, and the touched frames of these sequences, at most
-    `frames` of each.
+    """Return the stated setup with its registrations, and frames in which the tool touches.
 
-    Of no name all sequences with clouds are taken. DatasetError where a sequence has none, or none
-    in which the tool touches.
+    Args:
+        dataset: the dataset.
+        names: sequences to use; all with clouds if empty.
+        frames: most frames of each sequence, evenly spread.
+        report: receives the progress.
+
+    Raises DatasetError where a sequence has no clouds, or none in which the tool touches.
     """
     names = tuple(dict.fromkeys(names)) or tuple(
         name for name in dataset.sequences if len(dataset.sequence(name))
@@ -78,11 +85,11 @@ def read_sweep_data(
                 file=f"sequences/{name}",
                 key="sequences",
             )
-    report(0.0, "relating robot, camera and phantom")
+    report(0.0, "registering robot, camera and phantom")
     dataset, registration = as_it_stood(dataset, register(dataset))
     setup = setup_from(dataset, registration)
     cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration)
-    found = []
+    sequences = []
     for number, name in enumerate(names):
         report((number + 1) / (len(names) + 1), f"reading {name}")
         sequence = dataset.sequence(name)
@@ -103,8 +110,8 @@ def read_sweep_data(
         clouds = []
         for frame, pose in zip(chosen, poses, strict=True):
             raw = sequence.cloud(int(frame))
-            clouds.append(_thinned(raw[cleaner.clean(raw, pose).indices]))
-        found.append(
+            clouds.append(_subsampled(raw[cleaner.clean(raw, pose).indices]))
+        sequences.append(
             SweepSequence(
                 name,
                 sequence.kinematics,
@@ -113,11 +120,11 @@ def read_sweep_data(
                 probes[chosen].astype(float),
             )
         )
-    return setup, tuple(found)
+    return setup, tuple(sequences)
 
 
-def _thinned(points: FloatArray) -> FloatArray:
-    """At most so many points, always the same ones."""
+def _subsampled(points: FloatArray) -> FloatArray:
+    """Return at most _MOST_POINTS points, drawn with a fixed seed."""
     if len(points) <= _MOST_POINTS:
         return points
     return points[

@@ -1,4 +1,4 @@
-"""What is asked of a sweep, as plain values that REST, terminal and records share."""
+"""The specification of a sweep, as plain values that REST, command line and records share."""
 
 from __future__ import annotations
 
@@ -15,23 +15,24 @@ Method = Literal["grid", "random", "tpe", "cmaes"]
 Measure = Literal["distance", "paper"]
 METHODS: tuple[str, ...] = get_args(Method)
 MOST_POINTS = 20000
+"""Most points of a sweep."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SweepSpec:
-    """One sweep.
+    """The specification of one sweep.
 
     Attributes:
-        space: what is moved.
+        space: the swept parameters and the fixed ones.
         method: grid (coarse to fine), random, TPE or CMA-ES.
-        steps: of a grid along each axis.
-        levels: of a grid: each spans one step to both sides of the best point before.
-        points: of the other methods.
-        sequences: which; all with clouds where none is named.
-        frames: touched clouds of each, evenly spread.
-        measure: of the error: RMS of patch averages of signed distance, or the paper's mean
-            distance.
-        seed: of all draws.
+        steps: points of a grid along each axis.
+        levels: levels of a grid; each spans one step to both sides of the best point before.
+        points: number of points of the other methods.
+        sequences: names of the sequences; all with clouds if empty.
+        frames: most clouds of each sequence in which the tool touches, evenly spread.
+        measure: the error: "distance", the RMS of patch averages of the signed distance, or
+            "paper", the mean distance of Wu, Kazanzides and Unberath (2020).
+        seed: seed of all random draws.
     """
 
     space: ParameterSpace
@@ -63,18 +64,22 @@ class SweepSpec:
                     high=high,
                 )
         if self.method == "grid" and self.planned > MOST_POINTS:
-            text = f"a grid of {self.planned} points; expected at most {MOST_POINTS}: take fewer steps, or random, tpe or cmaes"
-            raise SetupError(text, key="steps", value=self.steps)
+            raise SetupError(
+                f"a grid of {self.planned} points; expected at most {MOST_POINTS}: "
+                "take fewer steps, or random, tpe or cmaes",
+                key="steps",
+                value=self.steps,
+            )
         if self.method == "cmaes" and len(self.space.axes) < 2:
             raise SetupError(
-                "CMA-ES moves two parameters or more; take tpe or grid for one",
+                "CMA-ES needs two parameters or more; take tpe or grid for one",
                 key="method",
                 value="cmaes",
             )
 
     @property
     def planned(self) -> int:
-        """Points that the method itself asks for."""
+        """Number of points that the method visits."""
         return (
             self.levels * self.steps ** len(self.space.axes)
             if self.method == "grid"
@@ -82,7 +87,7 @@ class SweepSpec:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """Return plain values for JSON."""
         plain = {
             key: getattr(self, key)
             for key in ("method", "steps", "levels", "points", "frames", "measure", "seed")
@@ -99,7 +104,7 @@ class SweepSpec:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> SweepSpec:
-        """The inverse; what is left out has its default."""
+        """Return the specification that `to_json` wrote; missing keys have their defaults."""
         axes = tuple(
             Axis(one["parameter"], float(one["low"]), float(one["high"]))
             for one in data["parameters"]

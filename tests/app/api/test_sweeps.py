@@ -51,7 +51,7 @@ def ended(client: httpx.Client, identity: str) -> dict[str, Any]:
         ({"parameters": []}, "parameters"),
         (
             {"parameters": [{"parameter": "poisson_ratio.nu", "low": 0.4, "high": 0.9}]},
-            "leaves 0 to 0.495",
+            "outside 0 to 0.495",
         ),
         (
             {"parameters": [{"parameter": "nothing.at_all", "low": 0.4, "high": 0.9}]},

@@ -1,6 +1,4 @@
-"""Sweeps of a virtual phantom with a known fault: what is found, what is flat, what survives a
-kill, and who may do the work.
-"""
+"""Sweeps of a virtual phantom with a known error: optimum, flat directions, resumption, executors."""
 
 from __future__ import annotations
 
@@ -38,9 +36,7 @@ def rows(folder: Path) -> list[dict[str, Any]]:
 
 
 def same(some: list[dict[str, Any]], others: list[dict[str, Any]]) -> bool:
-    """Whether these are the same points with the same errors, in any order; a registration's last
-    digits differ from run to run.
-    """
+    """Compare points and errors in any order, to the digits in which registrations agree."""
     pairs = zip(
         *(sorted(points, key=lambda row: row["number"]) for points in (some, others)), strict=True
     )
@@ -52,71 +48,70 @@ def same(some: list[dict[str, Any]], others: list[dict[str, Any]]) -> bool:
     )
 
 
-def test_a_grid_from_coarse_to_fine_finds_the_hidden_radius_and_says_that_it_matters(
+def test_refined_grid_finds_the_hidden_radius_and_it_is_not_flat(
     phantom: Path, tmp_path: Path
 ) -> None:
-    found = sweep(
+    summary = sweep(
         phantom, tmp_path, SweepSpec(space=ParameterSpace((RADIUS,)), steps=5, levels=3, frames=6)
     )
-    assert found["best"]["values"]["tool_radius.radius"] == pytest.approx(6e-3, abs=0.6e-3)
-    assert found["best"]["error"] < found["stated"]
-    (direction,) = found["directions"]
+    assert summary["best"]["values"]["tool_radius.radius"] == pytest.approx(6e-3, abs=0.6e-3)
+    assert summary["best"]["error"] < summary["stated"]
+    (direction,) = summary["directions"]
     assert direction["flat"] is False
     assert 0 < direction["low"] < direction["change"] < direction["high"]
-    # Two of five places of each later level are those of the level before.
-    assert found["points"] == 16 and found["replays_computed"] < 13
+    # Two of five points of each later level repeat points of the level before.
+    assert summary["points"] == 16 and summary["replays_computed"] < 13
 
 
 @pytest.mark.parametrize("method", ["random", "tpe", "cmaes"])
-def test_other_methods_call_the_modulus_flat_and_not_the_radius(
+def test_other_methods_report_the_modulus_flat_and_not_the_radius(
     phantom: Path, tmp_path: Path, method: Any
 ) -> None:
     space = ParameterSpace((RADIUS, Axis("young_modulus.E", 2e3, 2e5)))
-    found = sweep(phantom, tmp_path, SweepSpec(space=space, method=method, points=16, frames=4))
-    flat = {one["name"]: one["flat"] for one in found["directions"]}
+    summary = sweep(phantom, tmp_path, SweepSpec(space=space, method=method, points=16, frames=4))
+    flat = {one["name"]: one["flat"] for one in summary["directions"]}
     assert flat == {"tool_radius.radius": False, "young_modulus.E": True}
-    assert found["best"]["values"]["tool_radius.radius"] == pytest.approx(6e-3, abs=1.2e-3)
+    assert summary["best"]["values"]["tool_radius.radius"] == pytest.approx(6e-3, abs=1.2e-3)
 
 
-def test_what_cannot_be_is_kept_with_its_reason(phantom: Path, tmp_path: Path) -> None:
+def test_failed_points_are_stored_with_their_reason(phantom: Path, tmp_path: Path) -> None:
     buried = ParameterSpace(
         (Axis("stiff_inclusion.z", 0.005, 0.4),),
         {"stiff_inclusion.stiffness_ratio": 5.0, "stiff_inclusion.radius": 0.5},
     )
-    found = sweep(phantom, tmp_path, SweepSpec(space=buried, steps=2, frames=1))
-    assert found["failed"] == 2 and found["best"] is None
+    summary = sweep(phantom, tmp_path, SweepSpec(space=buried, steps=2, frames=1))
+    assert summary["failed"] == 2 and summary["best"] is None
     searched = [row for row in rows(tmp_path) if row["kind"] == "search"]
     assert len(searched) == 2 and all(
         "radius" in row["failure"] and row["error"] is None for row in searched
     )
 
 
-def test_a_process_that_is_killed_costs_nothing(phantom: Path) -> None:
+def test_task_of_a_killed_process_is_repeated(phantom: Path) -> None:
     stated, data = read_sweep_data(open_dataset(phantom), (), 2)
     tasks = [(RADIUS_SPACE.setup(stated, {RADIUS.name: value}), 0) for value in RADIUS.line(4)]
-    executor, found, killed = ProcessExecutor(2, data, GRID), {}, False
+    executor, results, killed = ProcessExecutor(2, data, GRID), {}, False
     try:
-        for told in run_tasks(executor, tasks):
-            if told is not None:
-                found[told[0]] = told[1]
-            if len(found) == 1 and not killed:
+        for finished in run_tasks(executor, tasks):
+            if finished is not None:
+                results[finished[0]] = finished[1]
+            if len(results) == 1 and not killed:
                 killed = True
                 for pool in executor._busy.values():
                     for process in (pool._processes or {}).values():
                         process.kill()
     finally:
         executor.close()
-    assert sorted(found) == list(range(4))
-    for number, (setup, _) in enumerate(
-        tasks
-    ):  # another process has another memory, and sums in it another last digit
+    assert sorted(results) == list(range(4))
+    for number, (setup, _) in enumerate(tasks):
+        # Sums differ in the last digit between processes, whose arrays are aligned differently.
         alone = replay_errors(setup, data[0], GRID)
         assert (
-            (found[number].failure, found[number].lost)
+            (results[number].failure, results[number].lost)
             == (alone.failure, alone.lost)
             == ("", False)
         )
-        np.testing.assert_allclose(found[number].sums, alone.sums, rtol=1e-9)
+        np.testing.assert_allclose(results[number].sums, alone.sums, rtol=1e-9)
 
 
 RADIUS_SPACE = ParameterSpace((RADIUS,))
@@ -128,14 +123,15 @@ from palpate.sweep import SweepSpec
 from palpate.sweep.run_sweep import run_sweep
 import json, sys
 if __name__ == "__main__":
-    data, folder, said = sys.argv[1:]
+    data, folder, text = sys.argv[1:]
     folder = Path(folder)
-    request = SweepSpec.from_json(json.loads(said))
-    run_sweep(open_dataset(Path(data)), request, folder, grid=SCREEN_GRID.for_tool(5e-3), store=folder / "store")
+    request = SweepSpec.from_json(json.loads(text))
+    grid = SCREEN_GRID.for_tool(5e-3)
+    run_sweep(open_dataset(Path(data)), request, folder, grid=grid, store=folder / "store")
 """
 
 
-def test_a_sweep_that_is_killed_goes_on_where_it_was(phantom: Path, tmp_path: Path) -> None:
+def test_killed_sweep_resumes_where_it_was(phantom: Path, tmp_path: Path) -> None:
     request = SweepSpec(space=RADIUS_SPACE, method="tpe", points=10, frames=3, seed=2)
     folder, script = tmp_path / "killed", tmp_path / "killed.py"
     script.write_text(KILLED)
@@ -152,10 +148,10 @@ def test_a_sweep_that_is_killed_goes_on_where_it_was(phantom: Path, tmp_path: Pa
     before = rows(folder)
     assert 3 <= len(before) < 16
     with file.open("a") as stream:
-        stream.write('{"number": 99, "kin')  # what a kill in the middle of a row leaves
-    taken_up = sweep(phantom, folder, request)
+        stream.write('{"number": 99, "kin')  # left by a kill while a row is written
+    resumed = sweep(phantom, folder, request)
     whole = sweep(phantom, tmp_path / "whole", request)
-    assert taken_up["replays_computed"] <= whole["replays_computed"] - len(before)
+    assert resumed["replays_computed"] <= whole["replays_computed"] - len(before)
     assert rows(folder)[: len(before)] == before
     assert same(rows(folder), rows(tmp_path / "whole"))
     assert (
@@ -163,7 +159,7 @@ def test_a_sweep_that_is_killed_goes_on_where_it_was(phantom: Path, tmp_path: Pa
     )
 
 
-def test_a_dask_cluster_gives_the_same(phantom: Path, tmp_path: Path) -> None:
+def test_dask_cluster_gives_the_same_points(phantom: Path, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
     request = SweepSpec(space=RADIUS_SPACE, steps=4, frames=2)
     with distributed.LocalCluster(
@@ -183,7 +179,7 @@ def test_a_dask_cluster_gives_the_same(phantom: Path, tmp_path: Path) -> None:
     ]
 
 
-def test_the_error_is_that_of_the_sums(phantom: Path) -> None:
+def test_error_is_computed_from_the_sums(phantom: Path) -> None:
     stated, data = read_sweep_data(open_dataset(phantom), (), 3)
     sums = np.array(replay_errors(stated, data[0], GRID).sums)
     assert error_from_sums(sums.sum(axis=0), "distance") == pytest.approx(
