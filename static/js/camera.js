@@ -53,8 +53,8 @@ export function forgetCamera() {
  */
 export async function restoreCamera(page) {
   try {
-    const kept = JSON.parse(localStorage.getItem(KEY) ?? "null");
-    if (kept) await put(`/sessions/${page}/camera`, kept);
+    const stored = JSON.parse(localStorage.getItem(KEY) ?? "null");
+    if (stored) await put(`/sessions/${page}/camera`, stored);
   } catch {
     forgetCamera();
   }

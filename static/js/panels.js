@@ -45,13 +45,13 @@ export function addPanel(id, label, opened, left = null) {
  * @param {string} id
  */
 export function openPanel(id) {
-  const wanted = panels.find((panel) => panel.id === id);
-  if (!wanted) return;
+  const next = panels.find((panel) => panel.id === id);
+  if (!next) return;
   if (id !== current) panels.find((panel) => panel.id === current)?.left?.();
   current = id;
-  for (const panel of panels) panel.box.hidden = panel.id !== id;
+  for (const panel of panels) panel.box.hidden = panel !== next;
   draw();
-  wanted.opened?.(wanted.box);
+  next.opened?.(next.box);
 }
 
 /** Return the id of the panel in front. */

@@ -55,16 +55,17 @@ export function startSweeps() {
 /** Show the form. */
 async function openForm() {
   try {
-    const [catalogue, { datasets, folder }] = await Promise.all([
-      effects.length ? effects : get("/effects"),
-      get("/datasets"),
-    ]);
-    effects = catalogue;
+    const [{ datasets, folder }] = await Promise.all([get("/datasets"), loadEffects()]);
     if (!axes.length) axes = [{ name: "poisson_ratio.nu", low: 0.3, high: 0.49 }];
     await showForm(datasets, folder);
   } catch (problem) {
     fill(box, errorCard(problem));
   }
+}
+
+/** Load the catalogue of effects, which has the parameters' units. */
+async function loadEffects() {
+  if (!effects.length) effects = await get("/effects");
 }
 
 /**
@@ -365,10 +366,11 @@ async function followSweep(id) {
   let next = 0;
   while (followedId === id) {
     try {
-      /** @type {[Sweep, { points: SweepPoint[], next: number }]} */
+      /** @type {[Sweep, { points: SweepPoint[], next: number }, void]} */
       const [sweep, more] = await Promise.all([
         get(`/sweeps/${id}`),
         get(`/sweeps/${id}/points?after=${next}`),
+        loadEffects(),
       ]);
       if (followedId !== id) return;
       points = points.concat(more.points);
