@@ -22,6 +22,7 @@ from palpate.dataset import Dataset
 from palpate.effects.base import with_effects
 from palpate.foundation.errors import CorrectionError, RunError
 from palpate.foundation.progress import Report, part, silent
+from palpate.mesh.stored_label import stored_label
 from palpate.recording.saved_model import effects_from, setup_of_model
 from palpate.registration.registration import Registration, register, setup_from
 from palpate.setup.setup import Setup
@@ -182,7 +183,7 @@ def _samples(
     said = [
         str(dataset.path.resolve()),
         setup.as_dict(),
-        repr(recorder.grid),
+        stored_label(recorder.grid),
         wanted.nodes,
         wanted.every,
         wanted.points,

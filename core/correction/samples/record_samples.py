@@ -34,6 +34,7 @@ from palpate.measurement.segmentation import Cleaner, cleaner_for, find_shaft_ax
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.mesh.protocol import Meshing
+from palpate.mesh.stored_label import stored_label
 from palpate.registration.registration import Registration, register, setup_from
 from palpate.replay.replay import Equilibrium, Replay
 from palpate.setup.box import CLEARANCE, distance_to_block
@@ -340,7 +341,7 @@ def _write_about(
         "points": recorder.points,
         "every": every,
         "force": "measured" if recorder.measured else "simulated",
-        "mesh": repr(recorder.grid),
+        "mesh": stored_label(recorder.grid),
         "seed": recorder.seed,
         "setup": recorder.setup.as_dict(),
         "seen": (np.sum([one.seen for one in made], axis=0) / total).tolist(),
