@@ -20,7 +20,8 @@ from rich.table import Table
 from palpate.blind.calibration import brier, calibration_error
 from palpate.blind.case_results import Result, read_results
 from palpate.blind.proportions import Measured
-from palpate.diagnosis.search.model_probabilities import TEMPERATURE, probabilities
+from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.search.model_probabilities import probabilities
 from palpate.effects.elastic_material import YoungModulus
 from palpate.foundation.arrays import FloatArray
 
@@ -114,7 +115,7 @@ def run(console: Console, file: Path) -> bool:
             console.print(f"{file}: {len(results)} cases with a report are too few for two halves")
             return False
         for source, temperature in (
-            ("in use", TEMPERATURE),
+            ("in use", CRITERIA.naming.probability_temperature),
             (f"{len(chosen)} cases", warmest(chosen)),
         ):
             pairs = first_at(judged, temperature)

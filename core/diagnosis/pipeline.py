@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from palpate.dataset import Dataset
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.gain.test_gain import tuned, worth
 from palpate.diagnosis.inference.inference_problem import Bench
@@ -46,11 +47,6 @@ __all__ = ["diagnose"]
 
 Data = tuple[list[Observations], list[Observations]]
 """Of the sequences that are fitted and of those of the test."""
-
-FIT_GROUPS, FIT_FELT = 14, 24
-TEST_GROUPS, TEST_FELT = 24, 32
-"""Groups of a sequence at most that are fitted, and that the gain is taken of: with clouds, and
-with forces alone."""
 
 
 def diagnose(
@@ -141,7 +137,7 @@ def _observed(
             fitted,
             setup,
             registration,
-            (FIT_GROUPS, FIT_FELT),
+            (CRITERIA.grouping.fitted_groups, CRITERIA.grouping.fitted_force_groups),
             part(report, 0.0, 0.7),
             pool.run,
         ),
@@ -150,7 +146,7 @@ def _observed(
             tested,
             setup,
             registration,
-            (TEST_GROUPS, TEST_FELT),
+            (CRITERIA.grouping.test_groups, CRITERIA.grouping.test_force_groups),
             part(report, 0.7, 1.0),
             pool.run,
         ),

@@ -10,19 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.dataset.tool_motion import ContactKind, box_gap
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray
 from palpate.setup.setup import Setup
 
 __all__ = ["Push", "depth_reached", "pushes", "speed_reached"]
 
-_APART = 0.016
-"""Distance between places that are tried [m], about."""
-_MARGIN = 1.2
-"""Of a place from the edges of its side, in radii of the tool."""
-_HEIGHT = 0.6
-"""Where sides are pushed, over the block's height [1]."""
-_DRAGGED = 0.012
 _SIDES = {"top": (2, 1.0), "-x": (0, -1.0), "+x": (0, 1.0), "-y": (1, -1.0), "+y": (1, 1.0)}
 _NAMED = {
     "top": "on the top",
@@ -155,7 +149,7 @@ def pushes(
     low, high = np.array(setup.box.size[:2]) / -2, np.array(setup.box.size[:2]) / 2
     dragged = []
     for push in straight:
-        for way in np.vstack([np.eye(3)[:2], -np.eye(3)[:2]]) * _DRAGGED:
+        for way in np.vstack([np.eye(3)[:2], -np.eye(3)[:2]]) * CRITERIA.design.drag_length:
             end = np.array(push.place)[:2] + way[:2]
             if (
                 push.side == "top"
@@ -169,16 +163,18 @@ def pushes(
 
 def _places(setup: Setup, side: str) -> list[tuple[float, float, float]]:
     """Where a side is tried: the top on a grid, the others along one line."""
-    size, margin = np.array(setup.box.size), _MARGIN * setup.tool.radius
+    size, margin = np.array(setup.box.size), CRITERIA.design.margin * setup.tool.radius
 
     def spread(axis: int) -> FloatArray:
         half = max(size[axis] / 2 - margin, 0.0)
-        return np.linspace(-half, half, max(1, int(np.ceil(2 * half / _APART)) + (half > 0)))
+        return np.linspace(
+            -half, half, max(1, int(np.ceil(2 * half / CRITERIA.design.spacing)) + (half > 0))
+        )
 
     axis, sign = _SIDES[side]
     if axis == 2:
         return [(float(x), float(y), float(size[2])) for x in spread(0) for y in spread(1)]
-    end, height = float(sign * size[axis] / 2), float(_HEIGHT * size[2])
+    end, height = float(sign * size[axis] / 2), float(CRITERIA.design.side_height * size[2])
     return [
         (end, float(v), height) if axis == 0 else (float(v), end, height) for v in spread(1 - axis)
     ]

@@ -17,29 +17,20 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.design.candidate_pushes import Push, depth_reached, pushes, speed_reached
 from palpate.diagnosis.design.predictive_distance import Scene, Survivor, nats_of, survivor
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.noise_model import patch_variance
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.search.candidates import lump_places
-from palpate.diagnosis.search.findings import RIVAL, Findings, Trial
+from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.identifiability import Told
 from palpate.effects import Effect
 from palpate.measurement.camera_model import sight_of
 
 __all__ = ["Advice", "Pair", "next_probe", "pairs_of"]
 
-SHOWN = 3
-_FAST = 3.0
-"""Of the speed that was usual, where clocks are in question."""
-_ENOUGH = 0.9
-"""Half the depth will do where it gives this share of the nats [1]."""
-_TOLD = 200.0
-"""What is this far behind the best [nats] is no longer asked about: what grew so far apart in one
-visit no push need separate."""
-_IMAGINED = 2
-"""Effects that are imagined at their detection limits where no cause was named."""
 _INSTEAD = {
     frozenset(
         {"viscoelasticity", "permanent_set"}
@@ -119,7 +110,9 @@ def next_probe(
         for setup in setups
     )
     speed = (
-        speed_reached(data, bench.setup) * (_FAST if clocks else 1.0) if clocks or memory else 0.0
+        speed_reached(data, bench.setup) * (CRITERIA.design.fast if clocks else 1.0)
+        if clocks or memory
+        else 0.0
     )
     tried = pushes(
         bench.setup,
@@ -168,7 +161,11 @@ def _advice(push: Push, pairs: Sequence[Pair], nats: list[tuple[float, float]]) 
     half = [pair.part**2 * both[0] for pair, both in zip(pairs, nats, strict=True)]
     chances = [pair.chance(value) for pair, value in zip(pairs, full, strict=True)]
     best = int(np.argmax(full))
-    if half[best] >= _ENOUGH * full[best] and push.kind != "drag" and not push.speed:
+    if (
+        half[best] >= CRITERIA.design.half_depth_share * full[best]
+        and push.kind != "drag"
+        and not push.speed
+    ):
         push, full = push.half(), half
     return Advice(
         push, pairs[best], full[best], float(np.sum(chances)) + 1e-6 * float(np.sum(full))
@@ -186,7 +183,7 @@ def _choices(found: Sequence[Advice]) -> list[Advice]:
         )
         if not same and one.nats > 0:
             chosen.append(one)
-    return chosen[:SHOWN]
+    return chosen[: CRITERIA.design.shown]
 
 
 def _instead(pairs: Sequence[Pair]) -> list[dict[str, Any]]:
@@ -216,10 +213,18 @@ def pairs_of(bench: Bench, findings: Findings) -> list[Pair]:
     mine, name = survivor(bench, best.model), " + ".join(best.model.names)
     pairs = []
     for trial in others:
-        lead = max(best.gain - trial.gain, 0.0) if best.gain - trial.gain < RIVAL else 0.0
+        lead = (
+            max(best.gain - trial.gain, 0.0)
+            if best.gain - trial.gain < CRITERIA.naming.rival
+            else 0.0
+        )
         names = (name, " + ".join(trial.model.names))
         pairs.append(
-            Pair((mine, survivor(bench, trial.model)), names, (RIVAL - lead, RIVAL + lead))
+            Pair(
+                (mine, survivor(bench, trial.model)),
+                names,
+                (CRITERIA.naming.rival - lead, CRITERIA.naming.rival + lead),
+            )
         )
     return pairs or [
         Pair(
@@ -239,7 +244,7 @@ def _next_best(findings: Findings, best: Trial) -> list[Trial]:
         for trial in findings.trials
         if trial.model.names != best.model.names and trial.model.effects
     ]
-    return [trial for trial in others[:1] if best.gain - trial.gain < _TOLD]
+    return [trial for trial in others[:1] if best.gain - trial.gain < CRITERIA.design.settled_gap]
 
 
 def _imagined(bench: Bench, findings: Findings) -> list[Pair]:
@@ -251,7 +256,7 @@ def _imagined(bench: Bench, findings: Findings) -> list[Pair]:
         one for one in findings.told if one.candidate.start.enters.value not in ("load", "sensor")
     ]
     pairs = []
-    for one in sorted(told, key=lambda one: -_hidden(one))[:_IMAGINED]:
+    for one in sorted(told, key=lambda one: -_hidden(one))[: CRITERIA.design.simulated_effects]:
         effect, part = _at_limit(one)
         pairs.append(
             Pair((nothing, Survivor(effect.apply(bench.setup))), ("none", one.effect), needed, part)

@@ -10,18 +10,14 @@ from functools import cached_property
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.design.candidate_pushes import Push
 from palpate.diagnosis.forward.history_replay import TRACED
 from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS
 from palpate.diagnosis.inference.evidence import fit
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import Bench
-from palpate.diagnosis.inference.noise_model import (
-    DISPLACEMENT_ERROR,
-    FIELD_LENGTH,
-    STIFFNESS_ERROR,
-    smooth_basis,
-)
+from palpate.diagnosis.inference.noise_model import smooth_basis
 from palpate.effects.base import with_effects
 from palpate.effects.elastic_material import PoissonRatio
 from palpate.effects.support import BaseSlip
@@ -30,7 +26,8 @@ from palpate.fem.constitutive.stiffness_field import lump_share
 from palpate.fem.model import element_quadrature
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
-from palpate.gradients.forward import TOOL_STEP, displacement_changes
+from palpate.gradients.displacement_changes import displacement_changes
+from palpate.gradients.setup_change import TOOL_STEP
 from palpate.gradients.stiffness_derivatives import stiffness_changes
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.protocol import Meshing
@@ -39,14 +36,8 @@ from palpate.setup.setup import Inclusion, Setup
 
 __all__ = ["Scene", "Survivor", "nats_of", "survivor"]
 
-_SMALL = 1e-3
-_FLOOR = 2e-5
-_TOLERANCE = 1e-3
-"""Residual of an imagined push [1], over the push itself."""
-_LEAST_POINTS = 2
-_SHAFT = np.linspace(0.0, 0.08, 9)
-"""Where along the shaft [m] spheres of the tool's radius stand for it: it leaves the block the way
-the tool came."""
+_SHAFT = np.array(CRITERIA.design.shaft_places)
+"""Places along the shaft [m] at which spheres of the tool's radius stand for it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +76,7 @@ def survivor(bench: Bench, model: Model) -> Survivor:
     kept, varied, at = list(range(TOOL_COLUMNS + 2)), [], len(model.nuisance)
     for index, effect in enumerate(model.effects):
         for number, item in enumerate(effect.numbers()):
-            coordinates, step = effect.coordinates, _SMALL * item.scale
+            coordinates, step = effect.coordinates, CRITERIA.design.step * item.scale
             if item.coordinate(item.high) - coordinates[number] < step:
                 step = -step
             coordinates[number] += step
@@ -127,7 +118,7 @@ class Scene:
     @cached_property
     def basis(self) -> FloatArray:
         """Smooth errors of displacement (p, b)."""
-        return smooth_basis(self.centres, FIELD_LENGTH)
+        return smooth_basis(self.centres, CRITERIA.noise.field_length)
 
 
 class _Replayed:
@@ -141,7 +132,7 @@ class _Replayed:
         self.scene, self.model, self.block = (
             scene,
             model,
-            Replay(model.setup, scene.grid, _TOLERANCE),
+            Replay(model.setup, scene.grid, CRITERIA.replay.design_tolerance),
         )
         stated = scene.stated.setup
         late = model.setup.sensor.time_offset - stated.sensor.time_offset
@@ -224,13 +215,15 @@ class _Replayed:
 
     def _errors(self, row: int) -> FloatArray:
         size = np.linalg.norm(self.moved(row), axis=1)[:, None]
-        found = [DISPLACEMENT_ERROR * size * self.scene.basis]
+        found = [CRITERIA.noise.displacement_error * size * self.scene.basis]
         frame = self.frames.get(row)
         if frame is None or not frame.in_contact or not self.has_columns or not self.scene.lumps:
             return np.concatenate([*found, np.zeros((len(size), len(self.scene.lumps)))], axis=1)
-        factors = np.array([lump_share(lump, element_quadrature(frame.mesh)) for lump in self.scene.lumps])
+        factors = np.array(
+            [lump_share(lump, element_quadrature(frame.mesh)) for lump in self.scene.lumps]
+        )
         found.append(
-            STIFFNESS_ERROR
+            CRITERIA.noise.stiffness_error
             * self._along_normals(frame, stiffness_changes(self.block, frame, factors))
         )
         return np.concatenate(found, axis=1)
@@ -243,14 +236,18 @@ def _root(covariance: FloatArray) -> FloatArray:
 
 def _weights(scene: Scene, push: Push, moved: FloatArray, centre: FloatArray) -> FloatArray:
     """Inverse variances (p,) [1/m^2]; zero where a patch is not seen, or behind the tool."""
-    seen = scene.count >= _LEAST_POINTS
+    seen = scene.count >= CRITERIA.design.least_points
     places = scene.centres + moved
     ray = places - scene.eye
     for stands in centre - _SHAFT[:, None] * push.direction:
         along = np.clip(ray @ (stands - scene.eye) / np.einsum("pi,pi->p", ray, ray), 0.0, 1.0)
         past = np.linalg.norm(scene.eye + along[:, None] * ray - stands, axis=1)
         seen &= (past > scene.stated.setup.tool.radius) | (along >= 1.0)
-    return np.where(seen, 1 / (scene.variance / np.maximum(scene.count, 1) + _FLOOR**2), 0.0)
+    return np.where(
+        seen,
+        1 / (scene.variance / np.maximum(scene.count, 1) + CRITERIA.design.white_floor**2),
+        0.0,
+    )
 
 
 def nats_of(

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.evidence import fit
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import Bench
@@ -24,19 +25,6 @@ from palpate.effects.base import with_effects
 from palpate.foundation.arrays import FloatArray
 
 __all__ = ["Profile", "combination", "profile", "profiles", "vague"]
-
-FALL = 1.92
-"""Fall of the evidence [nats] that ends a 95 % interval: half the quantile of chi squared with one
-degree of freedom."""
-NEAR, FAR = 2.5, 6.0
-"""Deviations of the linearised fit at which it is looked for: a parabola falls by 3.1 and 18 nats
-there."""
-MOST_EVALUATIONS = 6
-"""Of all parameters of a model together: each replays every sequence."""
-_VAGUE = 1.0
-"""Half width of the linearised interval, in search steps that matter, from which on a parameter is
-profiled."""
-_TAKES_PART = 0.3
 
 
 @dataclass(frozen=True)
@@ -72,9 +60,12 @@ def profile(
         # What comes round is farthest off at half a turn.
         room = (item.high - item.low) / 2 if item.periodic else abs(end - at[index])
         falls = False
-        for far in dict.fromkeys(min(reach * deviation, room) for reach in (NEAR, FAR)):
+        for far in dict.fromkeys(
+            min(reach * deviation, room)
+            for reach in (CRITERIA.verdict.profile_near, CRITERIA.verdict.profile_far)
+        ):
             used += 1
-            falls = best - evidence(at + sign * far * along) >= FALL
+            falls = best - evidence(at + sign * far * along) >= CRITERIA.verdict.profile_fall
             if falls:
                 break
         closed.append(falls)
@@ -85,7 +76,7 @@ def profile(
 def vague(covariance: FloatArray, items: Sequence[Parameter]) -> list[int]:
     """Which coordinates the linearised fit knows to no step that matters, the worst first."""
     widths = 1.96 * np.sqrt(np.diag(covariance)) / np.array([item.scale for item in items])
-    return [int(index) for index in np.argsort(-widths) if widths[index] > _VAGUE]
+    return [int(index) for index in np.argsort(-widths) if widths[index] > CRITERIA.verdict.vague]
 
 
 def combination(covariance: FloatArray, items: Sequence[Parameter], index: int) -> str:
@@ -98,7 +89,9 @@ def combination(covariance: FloatArray, items: Sequence[Parameter], index: int) 
     weakest = vectors[:, int(weights.argmax())]
     weakest = weakest * np.sign(weakest[index])
     parts = [
-        n for n in np.argsort(-np.abs(weakest)) if abs(weakest[n]) > _TAKES_PART and n != index
+        n
+        for n in np.argsort(-np.abs(weakest))
+        if abs(weakest[n]) > CRITERIA.verdict.takes_part and n != index
     ]
     if not parts:
         return ""
@@ -150,7 +143,7 @@ def profiles(bench: Bench, model: Model) -> tuple[list[dict[str, str]], list[dic
         (place, effect.name) for place, effect in enumerate(model.effects) for _ in effect.numbers()
     ]
     told: list[dict[str, str]] = [{} for _ in model.effects]
-    unsure, left, rows = vague(covariance, items), MOST_EVALUATIONS, []
+    unsure, left, rows = vague(covariance, items), CRITERIA.verdict.profile_evaluations, []
     for index, (place, item) in enumerate(zip((place for place, _ in names), items, strict=True)):
         if index not in unsure:
             told[place][item.name] = "interval"

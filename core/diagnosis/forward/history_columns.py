@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.friction_derivatives import Spot, pulls, spot_of
 from palpate.diagnosis.forward.history_replay import TRACED
 from palpate.diagnosis.forward.loading_history import Timeline, timeline_of
@@ -29,7 +30,8 @@ from palpate.fem.linalg.direct_solver import NotPositiveDefinite
 from palpate.fem.model import BlockModel
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
-from palpate.gradients.forward import factorise_at, local_tool, tool_derivatives
+from palpate.gradients.compliant_tool import tool_derivatives
+from palpate.gradients.frame_tangent import factorise_at, local_tool
 from palpate.measurement.surface_gaps import Surface
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.protocol import Meshing
@@ -37,11 +39,6 @@ from palpate.replay.replay import Equilibrium, Replay
 from palpate.setup.setup import Setup
 
 __all__ = ["Trace", "moved", "moves", "traces_of", "with_traces"]
-
-_STEP = 0.25
-"""Of a derivative by two traces, in the scale of what is moved."""
-_LEAST_SCALE, _MOST_SCALE = 0.5, 2.0
-"""Of a trace that is drawn to what the replay along the whole way changes [1]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,14 +166,14 @@ def _state(
     if not look.frame.in_contact:
         return
     # Measured minus simulated force on the tool, which the coupling of the residual tells (see
-    # `palpate.gradients.forward.force_changes`).
+    # `palpate.gradients.force_changes.force_changes`).
     trace.force[number] = modulus * (answer @ look.coupling + drag)
 
 
 def moved(effect: Effect, number: int) -> tuple[Effect, float]:
     """With one search coordinate a step further, and the step."""
     item, coordinates = effect.numbers()[number], effect.coordinates
-    step = _STEP * item.scale
+    step = CRITERIA.history.trace_step * item.scale
     step = -step if coordinates[number] + step > item.coordinate(item.high) else step
     coordinates[number] += step
     return effect.at(coordinates), step
@@ -243,8 +240,8 @@ def with_traces(
         scale = float(
             np.clip(
                 np.sum(led.count * changed * whole) / np.sum(led.count * whole**2),
-                _LEAST_SCALE,
-                _MOST_SCALE,
+                CRITERIA.history.least_trace_scale,
+                CRITERIA.history.most_trace_scale,
             )
         )
     for place, effect in enumerate(effects):

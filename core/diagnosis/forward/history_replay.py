@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.frame_groups import FAR, Observations
 from palpate.effects import Effect
 from palpate.effects.time_dependence import PermanentSet, Viscoelasticity
@@ -29,16 +30,6 @@ TRACED: tuple[type[Effect], ...] = (Viscoelasticity, PermanentSet, ToolFriction)
 """Effects whose replays are led along the tool's whole way; what they do is screened by traces of
 the plain replay."""
 
-TRAVEL, HOLD = 1e-3, 0.4
-"""Longest motion [m] and longest time [s] between two places while the tool is near the block."""
-DRAG = 2e-3
-"""The same motion where nothing but the tool's friction remembers: what a drag does to the surface
-is then 8 % off what it is by places of half a millimetre (4 % by those of 1 mm), in half the time.
-"""
-REST = 1.5
-"""Longest time between two places while it is not, as a multiple of the time since it left; a
-shortest one is HOLD [1]."""
-
 
 def forgetful(setup: Setup) -> Setup:
     """The setup without what makes a frame hang on those before it."""
@@ -48,7 +39,9 @@ def forgetful(setup: Setup) -> Setup:
 
 def travel(setup: Setup) -> float:
     """Longest motion between two places [m]."""
-    return TRAVEL if setup.material.has_history else DRAG
+    return (
+        CRITERIA.history.travel if setup.material.has_history else CRITERIA.history.friction_travel
+    )
 
 
 class Past:
@@ -66,7 +59,9 @@ class Past:
         self._frame: Equilibrium | None = None
         self._times, way = data.way(block.setup)
         self._way = moved.apply(way)
-        self._near = distance_to_block(block.setup.box.size, self._way) < block.setup.tool.radius + CLEARANCE
+        self._near = (
+            distance_to_block(block.setup.box.size, self._way) < block.setup.tool.radius + CLEARANCE
+        )
 
     def reach(self, centre: FloatArray, time: float | None) -> Equilibrium:
         """What is found with the tool's stated centre here (3,) [m] at a group's time [s]; None for
@@ -94,12 +89,13 @@ class Past:
             far = float(np.linalg.norm(self._way[number] - self._way[last]))
             long = self._times[number] - self._times[last]
             if self._near[number]:
-                wanted = far > self._travel or long > HOLD or not self._near[last]
+                wanted = far > self._travel or long > CRITERIA.history.hold or not self._near[last]
                 self._left = float(self._times[number])
             else:
                 away = self._times[last] - self._left
                 wanted = np.isfinite(self._left) and (
-                    self._near[last] or long > max(HOLD, REST * away)
+                    self._near[last]
+                    or long > max(CRITERIA.history.hold, CRITERIA.history.rest_growth * away)
                 )
             if wanted:
                 found.append(number)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.ray_comparison import Compared, observe
 from palpate.diagnosis.forward.slip_derivatives import Sliding
 from palpate.effects.base import LOG_PER_CONTRAST
@@ -16,7 +17,9 @@ from palpate.fem.constitutive.stiffness_field import lump_share
 from palpate.fem.model import element_quadrature
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
-from palpate.gradients.forward import TOOL_STEP, Change, displacement_changes, force_changes
+from palpate.gradients.displacement_changes import displacement_changes
+from palpate.gradients.force_changes import force_changes
+from palpate.gradients.setup_change import TOOL_STEP, Change
 from palpate.gradients.stiffness_derivatives import stiffness_changes
 from palpate.measurement.camera_model import sight_of
 from palpate.replay.replay import Equilibrium, Replay
@@ -27,11 +30,6 @@ __all__ = ["TOOL_COLUMNS", "Columns", "Wanted"]
 TOOL_COLUMNS = 6
 """Columns that always come first: the tool moved along x, y, z and turned about the robot
 registration's pivot."""
-
-_MOST_RESPONSE = 1.5
-"""Where the body follows the tool by more than this [1], its tangent is about to give way."""
-_SPAN = 4e-4
-"""Half the tool's motion [m] over which the change is taken there."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -90,7 +88,9 @@ class Columns:
             frame, steps, displacement_changes(self.block, frame, steps, exact=False)
         )
         tool = changed[:3] / TOOL_STEP
-        for axis in np.flatnonzero(np.abs(tool[:, :-1]).max(axis=(1, 2)) > _MOST_RESPONSE):
+        for axis in np.flatnonzero(
+            np.abs(tool[:, :-1]).max(axis=(1, 2)) > CRITERIA.derivatives.most_response
+        ):
             self._span(frame, int(axis), tool, changed[3:], moves)
         arm = frame.tool.centre - wanted.pivot
         turned = [np.tensordot(np.cross(axis, arm), tool, axes=1) for axis in np.eye(3)]
@@ -152,9 +152,11 @@ class Columns:
         many times what any motion that matters brings about, and would hide an offset of the tool
         from the screening.
         """
-        step = _SPAN * np.eye(3)[axis]
+        step = CRITERIA.derivatives.tool_span * np.eye(3)[axis]
         sides = [
-            self.block.solve_with_fixed_base(replace(frame.tool, centre=frame.tool.centre + sign * step), frame)
+            self.block.solve_with_fixed_base(
+                replace(frame.tool, centre=frame.tool.centre + sign * step), frame
+            )
             for sign in (1, -1)
         ]
         if any(side.outcome is not Outcome.CONVERGED for side in sides):
@@ -165,7 +167,10 @@ class Columns:
             )
             for side in sides
         )
-        wrong, tool[axis] = tool[axis].copy(), (ahead - behind) / (2 * _SPAN)
+        wrong, tool[axis] = (
+            tool[axis].copy(),
+            (ahead - behind) / (2 * CRITERIA.derivatives.tool_span),
+        )
         stated = np.array(self.block.setup.tool.offset)
         for column, (other, move) in enumerate(zip(self.wanted.setups, moves, strict=True)):
             share = (np.array(other.tool.offset) - stated + move)[axis]

@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from palpate.dataset.tool_motion import box_gap
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
@@ -22,9 +23,6 @@ from palpate.replay.replay import Equilibrium
 from palpate.setup.setup import Setup
 
 __all__ = ["Timeline", "timeline_of"]
-
-_MOST_SCALED = 3.0
-"""How many times what a group shows another instant may have [1]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +108,13 @@ def timeline_of(
             late = (times[rows] - first) / max(last - first, 1e-9)
             scale = depths[rows] / np.maximum((1 - late) * before + late * after, 1e-6)
             if number:
-                shares[rows, inside[number - 1]] = np.minimum(scale * (1 - late), _MOST_SCALED)
+                shares[rows, inside[number - 1]] = np.minimum(
+                    scale * (1 - late), CRITERIA.history.most_interpolated
+                )
             if number < len(inside):
-                shares[rows, inside[number]] = np.minimum(scale * late, _MOST_SCALED)
+                shares[rows, inside[number]] = np.minimum(
+                    scale * late, CRITERIA.history.most_interpolated
+                )
     return Timeline(times, depths, places, seen, touched, shares)
 
 

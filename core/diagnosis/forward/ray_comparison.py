@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import scipy.sparse as sp
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.frame_groups import Group
 from palpate.diagnosis.observation.stray_points import among_neighbours
 from palpate.foundation.arrays import FloatArray, IntArray
@@ -20,21 +21,6 @@ from palpate.replay.replay import Equilibrium
 from palpate.setup.setup import Setup
 
 __all__ = ["Compared", "Sample", "choose", "compare", "observe"]
-
-TOOL_REACH, CLEARLY = 1.5e-3, 5e-4
-"""A point this near to a model's ball [m], and nearer to it by this much than to the model's
-surface, is of the tool: clouds are cleaned of the tool where it was stated to be, and if it is
-somewhere else, some of its points remain."""
-
-JUMP, MUCH_NEARER = 3e-3, 1e-3
-"""A ray whose foot moves by more than this between models [m] has passed over a rim; so much nearer
-[m] must the point lie to the surface beside it, or models would gain by choosing."""
-_MOST_STRETCH = 2.0
-"""A model's surface may turn away from the camera so far that a gap along the ray counts this many
-times the gap itself."""
-FARTHEST_CHANGE = 8e-3
-"""A point's gap that changes by more than this [m] between models has met another side of the
-block: its old gap stands."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +160,7 @@ def _along_rays(seen: Gaps, sample: Sample, scale: float) -> Gaps:
     are [1].
     """
     factor = scale * np.minimum(
-        sample.facing[seen.index] / np.maximum(seen.facing, 1e-6), _MOST_STRETCH
+        sample.facing[seen.index] / np.maximum(seen.facing, 1e-6), CRITERIA.rays.most_stretch
     )
     return replace(seen, gap=seen.gap * factor, normal=seen.normal * factor[:, None])
 
@@ -184,7 +170,9 @@ def _places(points: FloatArray, camera: FloatArray, seen: Gaps, sample: Sample) 
     nothing.
     """
     places, rays = points.copy(), points[seen.index] - camera
-    ahead = seen.gap / np.maximum(seen.facing, sample.facing[seen.index] / _MOST_STRETCH)
+    ahead = seen.gap / np.maximum(
+        seen.facing, sample.facing[seen.index] / CRITERIA.rays.most_stretch
+    )
     places[seen.index] += rays * (ahead / np.linalg.norm(rays, axis=1))[:, None]
     return places
 
@@ -205,7 +193,7 @@ def _met_or_beside(
     """
     met = gaps(points, camera, frame, surface, everything=True)
     usual = surface.own(sample.foot.astype(float))
-    away = np.linalg.norm(met.foot - usual[met.index], axis=1) > JUMP
+    away = np.linalg.norm(met.foot - usual[met.index], axis=1) > CRITERIA.rays.jump
     missed = np.ones(len(points), dtype=bool)
     missed[met.index] = False
     elsewhere = np.concatenate([np.flatnonzero(missed), met.index[away]])
@@ -217,7 +205,7 @@ def _met_or_beside(
     )
     by_ray = np.full(len(points), np.inf)
     by_ray[met.index] = np.abs(met.gap)
-    nearer = np.abs(beside.gap) < by_ray[elsewhere] - MUCH_NEARER
+    nearer = np.abs(beside.gap) < by_ray[elsewhere] - CRITERIA.rays.jump_gain
     given_up = np.zeros(len(points), dtype=bool)
     given_up[elsewhere[nearer]] = True
     kept = ~given_up[met.index]
@@ -238,12 +226,14 @@ def compare(
     met = _met_or_beside(points, camera, frame, surface, sample)
     seen = _along_rays(met, sample, sight.scale)
     values = sample.gap.astype(float)
-    near = np.abs(seen.gap - values[seen.index]) < FARTHEST_CHANGE
+    near = np.abs(seen.gap - values[seen.index]) < CRITERIA.rays.farthest_change
     values[seen.index[near]] = seen.gap[near]
     arm = points - frame.tool.centre
     distance = np.linalg.norm(arm, axis=1)
     off_tool = sight.scale * (distance - frame.tool.radius)
-    on_tool = (np.abs(off_tool) < TOOL_REACH) & (np.abs(off_tool) < np.abs(values) - CLEARLY)
+    on_tool = (np.abs(off_tool) < CRITERIA.rays.tool_reach) & (
+        np.abs(off_tool) < np.abs(values) - CRITERIA.rays.tool_margin
+    )
     values[on_tool] = off_tool[on_tool]
     kept, tool = ~on_tool[seen.index], np.flatnonzero(on_tool)
     index = seen.index[kept]

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.replay.compliance_and_slip import weight_of
@@ -20,9 +21,6 @@ from palpate.replay.replay import Equilibrium
 from palpate.setup.setup import Setup
 
 __all__ = ["Sliding"]
-
-_SHORTEST = 1e-7
-"""A base that moved by less [m] has not slid."""
 
 
 class Sliding:
@@ -51,7 +49,11 @@ class Sliding:
     def slid(self, frame: Equilibrium) -> bool:
         """Whether the base moves on in this frame."""
         moved = float(np.linalg.norm(frame.slip - self._at))
-        return frame.outcome is Outcome.CONVERGED and frame.in_contact and moved > _SHORTEST
+        return (
+            frame.outcome is Outcome.CONVERGED
+            and frame.in_contact
+            and moved > CRITERIA.derivatives.least_slip
+        )
 
     def after(self, frame: Equilibrium, changes: FloatArray) -> FloatArray:
         """Changes (k, n + 1, 3) of the nodes [m] and of the force [N], from those with a base that

@@ -14,6 +14,7 @@ from typing import Generic, ParamSpec, Self, TypeVar
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.force_prediction import predict_forces
 from palpate.diagnosis.forward.history_columns import Trace, traces_of
 from palpate.diagnosis.forward.jacobian import Wanted
@@ -27,10 +28,8 @@ from palpate.mesh.protocol import Meshing
 from palpate.replay.replay import Equilibrium, Replay
 from palpate.setup.setup import Box, Setup, Tool
 
-__all__ = ["TOLERANCE", "Pending", "Workers"]
+__all__ = ["Pending", "Workers"]
 
-TOLERANCE = 3e-4
-"""Residual of a replay over the tool's push [1]."""
 P = ParamSpec("P")
 T = TypeVar("T")
 _READ: dict[Path, Observations] = {}
@@ -41,7 +40,9 @@ def _ready() -> None:
     """Load what every task needs: libraries, and the compiled kernels of a replay."""
     importlib.import_module("open3d")
     block = Replay(
-        Setup(geometry=Box(size=(0.03, 0.03, 0.02)), tool=Tool(radius=5e-3)), SCREEN_GRID, TOLERANCE
+        Setup(geometry=Box(size=(0.03, 0.03, 0.02)), tool=Tool(radius=5e-3)),
+        SCREEN_GRID,
+        CRITERIA.replay.tolerance,
     )
     block.step(np.array([0.0, 0.0, 0.024]))
 
@@ -169,7 +170,7 @@ class Workers:
         grid: Meshing,
         wanted: Wanted | None = None,
         starts: Sequence[Prediction] | None = None,
-        tolerance: float = TOLERANCE,
+        tolerance: float = CRITERIA.replay.tolerance,
         same_points: bool = True,
     ) -> list[Pending]:
         """Begin predicting these sequences under a setup.

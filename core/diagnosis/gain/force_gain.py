@@ -13,16 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DiagnosisError
 
 __all__ = ["FeltLadder", "felt_ladder"]
-
-_DRAWS = 2000
-_LEAST = 1e-12
-"""Mean square [N^2] below which nothing is reducible."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -104,7 +101,9 @@ def felt_ladder(
         )
     names, table = np.array([row[0] for row in rows]), np.array([[*row[1:], 1.0] for row in rows])
     pushes = np.array([table[names == name].sum(axis=0) for name in np.unique(names)])
-    chosen = np.random.default_rng(seed).integers(0, len(pushes), size=(_DRAWS, len(pushes)))
+    chosen = np.random.default_rng(seed).integers(
+        0, len(pushes), size=(CRITERIA.gain.force_draws, len(pushes))
+    )
     drawn, whole = _rms(pushes[chosen].sum(axis=1)), _rms(pushes.sum(axis=0)[None])
     low, high = np.quantile(_share(drawn), [0.025, 0.975])
     return FeltLadder(
@@ -125,7 +124,7 @@ def _share(rms: FloatArray) -> FloatArray:
     """Removed share (d,), at most all; nothing is reducible where the baseline lies at the
     floor."""
     reducible = rms[:, 0] - rms[:, 2]
-    some = reducible > np.sqrt(_LEAST)
+    some = reducible > np.sqrt(CRITERIA.gain.least_reducible_force)
     return np.where(
         some, np.minimum((rms[:, 0] - rms[:, 1]) / np.where(some, reducible, 1.0), 1.0), 0.0
     )

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.noise_model import patch_variance
 from palpate.diagnosis.observation.frame_groups import Observations
@@ -26,14 +27,7 @@ from palpate.measurement.metrics import paper_distance
 from palpate.measurement.surface_gaps import Surface
 from palpate.setup.setup import Setup
 
-__all__ = ["DRAWS", "ProbeSums", "fixed_pattern", "paper_sums", "probe_sums", "removed_share"]
-
-DRAWS = 2000
-_PAPER_POINTS = 4000
-_LEAST_POINTS = 5
-_SAME_PATTERN = 1e-5
-"""Patterns that differ by less than this [m] are one: the models agree about the untouched
-block."""
+__all__ = ["ProbeSums", "fixed_pattern", "paper_sums", "probe_sums", "removed_share"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +68,7 @@ class ProbeSums:
         """
         rows = np.arange(len(self.names))[None] if chosen is None else chosen
         size, points = self.size[rows].sum(axis=1), np.maximum(self.points[rows].sum(axis=1), 1)
-        differ = size > _SAME_PATTERN**2 * points
+        differ = size > CRITERIA.gain.same_pattern**2 * points
         share = self.along[rows].sum(axis=1) / np.where(differ, size, 1.0)[:, None]
         lasting = np.where(differ & still, size, 0.0)[:, None] * share**2
         mean = (
@@ -85,7 +79,7 @@ class ProbeSums:
         )
         return np.asarray(np.sqrt(mean))
 
-    def draws(self, seed: int, draws: int = DRAWS) -> IntArray:
+    def draws(self, seed: int, draws: int = CRITERIA.gain.draws) -> IntArray:
         """Pushes drawn with repetition (draws, k)."""
         return np.random.default_rng(seed).integers(
             0, len(self.names), size=(draws, len(self.names))
@@ -176,7 +170,7 @@ def _rows(
         if (group.free and not left) or any(number in model.failed for model in own):
             continue
         seen = np.all([np.isfinite(model.gap[number]) for model in own], axis=0) & (
-            known >= _LEAST_POINTS
+            known >= CRITERIA.gain.least_points
         )
         count = own[ends[1]].count[number][seen]
         errors = [
@@ -206,7 +200,7 @@ def paper_sums(
             if not item.unseen and not group.free and number not in prediction.failed:
                 name = f"{item.name}/{group.probe}"
                 distance = paper_distance(
-                    sight.place(group.points[:_PAPER_POINTS]),
+                    sight.place(group.points[: CRITERIA.gain.paper_points]),
                     prediction.equilibria[number],
                     surface,
                 )

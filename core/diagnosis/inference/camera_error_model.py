@@ -16,29 +16,16 @@ from itertools import product
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.foundation.arrays import FloatArray
 
 __all__ = ["CALM", "CameraErrors", "Ripple", "camera_errors"]
 
-BIAS_SIZES = np.array([0.15, 0.2, 0.3, 0.4, 0.6, 1.0]) * 1e-3
-BIAS_REACHES = np.array([0.01, 0.014, 0.02, 0.028, 0.04, 0.06])
-WHITE_FACTORS = np.array([1.0, 1.5, 2.2])
-"""Standard deviation and length [m] of the camera's smooth bias, and factor on the scatter's
-variance, that are tried."""
-RIPPLE_SIZES = np.array([0.05, 0.1, 0.2, 0.4, 0.8]) * 1e-3
-RIPPLE_REACHES = np.array([1.5, 2.5, 4.0, 6.0]) * 1e-3
-"""Standard deviation of what waves with the distance, and the distance over which it is alike [m],
-that are tried."""
-LEAST_RIPPLE = 12.0
-"""Gain in restricted log likelihood [nats] for which waves are told.
-
-Of the virtual bench's rest clouds 12 with rippled depth gain 32 to 111, 12 with nothing wrong at
-most 2.2, 28 with another cause at most 2.8; of another solver's five the best gains 0.7.
-"""
-_FLOOR = 2e-5
-_SMOOTH = 2
-"""Waves are tried beside a bias of at least this place in BIAS_REACHES: a rough one imitates
-them."""
+BIAS_SIZES = np.array(CRITERIA.camera_error.bias_sizes)
+BIAS_REACHES = np.array(CRITERIA.camera_error.bias_lengths)
+WHITE_FACTORS = np.array(CRITERIA.camera_error.scatter_factors)
+RIPPLE_SIZES = np.array(CRITERIA.camera_error.ripple_sizes)
+RIPPLE_REACHES = np.array(CRITERIA.camera_error.ripple_lengths)
 
 
 @dataclass(frozen=True)
@@ -59,7 +46,7 @@ class Ripple:
     @property
     def significant(self) -> bool:
         """Whether it is told."""
-        return self.gain > LEAST_RIPPLE
+        return self.gain > CRITERIA.camera_error.least_ripple_gain
 
     @property
     def warning(self) -> str:
@@ -68,7 +55,7 @@ class Ripple:
             return ""
         return (
             f"rest.ply: depth waves with the distance from the camera, by about {self.size * 1e3:.2g} mm (RMS), alike over "
-            f"{self.reach * 1e3:.2g} mm of distance, on top, sides and table together ({self.gain:.0f} nats, {LEAST_RIPPLE:.0f} "
+            f"{self.reach * 1e3:.2g} mm of distance, on top, sides and table together ({self.gain:.0f} nats, {CRITERIA.camera_error.least_ripple_gain:.0f} "
             "are asked): no effect of the catalogue does that; calibrate the camera's depth, or look for another camera's light"
         )
 
@@ -131,7 +118,9 @@ def _climb(cloud: _Cloud) -> tuple[float, tuple[int, ...]]:
     while value > before:
         before = value
         for axis, choices in enumerate(grid):
-            for place in range(_SMOOTH if axis == 0 else 0, len(choices)):
+            for place in range(
+                CRITERIA.camera_error.first_smooth_length if axis == 0 else 0, len(choices)
+            ):
                 trial = (*best[:axis], place, *best[axis + 1 :])
                 if (found := cloud.likelihood(trial)) > value:
                     value, best = found, trial
@@ -163,7 +152,7 @@ class _Cloud:
         """
         reach, size, factor, *waves = model
         covariance = BIAS_SIZES[size] ** 2 * self._near[reach] + np.diag(
-            WHITE_FACTORS[factor] * self._white + _FLOOR**2
+            WHITE_FACTORS[factor] * self._white + CRITERIA.camera_error.white_floor**2
         )
         if waves:
             covariance = covariance + RIPPLE_SIZES[waves[0]] ** 2 * self._alike[waves[1]]

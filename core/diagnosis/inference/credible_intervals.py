@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import t
 
-from palpate.diagnosis.inference.evidence import FLAT, Block, fit
+from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.inference.evidence import Block, fit
 from palpate.diagnosis.inference.hypothesis import TWINS, Model
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.effects.elastic_material import YoungModulus
@@ -16,17 +17,7 @@ from palpate.effects.sensor import CameraRegistration
 from palpate.foundation.arrays import FloatArray
 from palpate.setup.setup import Setup
 
-__all__ = ["INTERVAL_LEVEL", "intervals", "modulus_interval", "spread_of", "stands"]
-
-INTERVAL_LEVEL = 0.95
-"""Share of the intervals that are to hold the truth [1]."""
-_NORMAL_95 = 1.96
-_INTERVAL_STEPS = 400
-_LEAST_FACTOR = 1e-2
-"""Of the stated modulus: forces that fit best with the wrong sign say that there is next to no
-stiffness."""
-_ANY_SHARE = 10.0
-"""Prior deviation of a pattern's share in the data: anything."""
+__all__ = ["intervals", "modulus_interval", "spread_of", "stands"]
 
 
 def _robust(
@@ -53,7 +44,9 @@ def _robust(
     )
     moved = (pulls @ solution.covariance)[:, own]
     deviation = np.sqrt((moved**2).sum(axis=0) * len(sequences) / (len(sequences) - 1))
-    return change, np.maximum(laplace, deviation * t.ppf(0.975, len(sequences) - 1) / _NORMAL_95)
+    return change, np.maximum(
+        laplace, deviation * t.ppf(0.975, len(sequences) - 1) / CRITERIA.intervals.normal_quantile
+    )
 
 
 def spread_of(bench: Bench, model: Model) -> FloatArray:
@@ -80,9 +73,12 @@ def stands(bench: Bench, model: Model, without: Model) -> bool:
     extended = bench.block_with(without, [(model.effects[-1], model.predictions)], without)
     columns = [*extended.nuisance, *extended.columns, *extended.extra["signatures"]]
     precision = np.zeros((len(columns), len(columns)))
-    precision[:-1, :-1], precision[-1, -1] = bench.precision(extended), _ANY_SHARE**-2
+    precision[:-1, :-1], precision[-1, -1] = (
+        bench.precision(extended),
+        CRITERIA.intervals.pattern_share**-2,
+    )
     share, spread = _robust(bench.tempered(extended), columns, precision, slice(-1, None))
-    return bool(share[0] > _NORMAL_95 * spread[0])
+    return bool(share[0] > CRITERIA.intervals.normal_quantile * spread[0])
 
 
 def intervals(bench: Bench, model: Model) -> list[dict[str, dict[str, Any]]]:
@@ -95,7 +91,7 @@ def intervals(bench: Bench, model: Model) -> list[dict[str, dict[str, Any]]]:
         for item, value, sd in zip(
             effect.numbers(), effect.coordinates, spread[at : at + number], strict=True
         ):
-            low, high = item.interval(value, _NORMAL_95 * sd)
+            low, high = item.interval(value, CRITERIA.intervals.normal_quantile * sd)
             entry[item.name] = {
                 "value": item.value(value),
                 "unit": item.unit,
@@ -121,16 +117,16 @@ def modulus_interval(bench: Bench, model: Model) -> tuple[float, float, float] |
         return None
     (own,) = TWINS[YoungModulus]
     nuisances = bench.nuisances.precision.copy()
-    nuisances[own, own] *= FLAT
+    nuisances[own, own] *= CRITERIA.priors.flat_factor
     columns, precision = [*model.nuisance, *model.columns], bench.precision(model, nuisances)
     change, deviation = _robust(bench.tempered(model), columns, precision, slice(own, own + 1))
     # A force is linear in the modulus, so that the fit is exact in it and not in its logarithm.
-    factor = max(1.0 + float(change[0]), _LEAST_FACTOR)
+    factor = max(1.0 + float(change[0]), CRITERIA.intervals.least_modulus_factor)
     spread = float(np.hypot(deviation[0] / factor, YoungModulus.numbers()[0].accuracy))
     low, value, high = (
         model.setup.material.young_modulus
         * factor
-        * np.exp(_NORMAL_95 * spread * np.array([-1.0, 0.0, 1.0]))
+        * np.exp(CRITERIA.intervals.normal_quantile * spread * np.array([-1.0, 0.0, 1.0]))
     )
     return float(value), float(low), float(high)
 
@@ -139,7 +135,7 @@ def _magnitudes(
     effect: CameraRegistration, spread: FloatArray, setup: Setup
 ) -> dict[str, dict[str, Any]]:
     drawn = np.array(effect.coordinates) + spread * np.random.default_rng(0).standard_normal(
-        (_INTERVAL_STEPS, 6)
+        (CRITERIA.intervals.draws, 6)
     )
     magnitudes, found = [effect.moved(one.tolist()).reported(setup) for one in drawn], {}
     for name in ("translation", "rotation"):

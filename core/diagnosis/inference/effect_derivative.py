@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.effects import Effect
 from palpate.setup.setup import Setup
 
-__all__ = ["SMALL", "Tangent", "changed_at_rest"]
-
-SMALL = 1e-3
-"""Step of a derivative, in the scale of what is moved."""
+__all__ = ["Tangent", "changed_at_rest"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -36,7 +34,7 @@ class Tangent:
             return self.effect.apply(setup), 1.0
         coordinates, names = self.effect.coordinates, [item.name for item in self.effect.numbers()]
         place = names.index(self.of)
-        step = SMALL * self.effect.numbers()[place].scale
+        step = CRITERIA.derivatives.step * self.effect.numbers()[place].scale
         coordinates[place] += step
         return self.effect.at(coordinates).apply(setup), step
 

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.foundation.arrays import FloatArray
 
 __all__ = [
-    "FLAT",
     "Block",
     "Fit",
     "draw_rights",
@@ -110,9 +110,6 @@ def fit(
     return Fit(np.asarray(change, dtype=float), np.asarray(covariance, dtype=float), float(misfit))
 
 
-_DAMPINGS = np.geomspace(1e-3, 1e12, 61)
-
-
 def within_reach(
     blocks: Sequence[Block],
     columns: Sequence[int],
@@ -136,7 +133,7 @@ def within_reach(
     if not len(own) or np.abs(change[own] / scales).max() <= reach:
         return change
     index, damped = np.asarray(own), precision.copy()
-    for damping in _DAMPINGS:
+    for damping in CRITERIA.fits.dampings:
         damped[index, index] = precision[index, index] + damping * scales**-2.0
         change = fit(blocks, columns, damped).change
         if np.abs(change[index] / scales).max() <= reach:
@@ -186,10 +183,6 @@ def draw_rights(
     return rights
 
 
-FLAT = 1e-6
-"""Factor on a prior's precision that makes it say nothing."""
-
-
 def predictive_score(
     blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray, stated: int
 ) -> FloatArray:
@@ -206,7 +199,7 @@ def predictive_score(
         for i in range(len(blocks))
     ]
     free = precision.copy()
-    free[:stated, :stated] *= FLAT
+    free[:stated, :stated] *= CRITERIA.priors.flat_factor
     return np.array([*scores, whole - log_evidence(blocks, columns, free)])
 
 

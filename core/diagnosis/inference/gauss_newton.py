@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.evidence import explained, within_reach
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.effects import Effect
@@ -22,20 +23,7 @@ from palpate.foundation.arrays import FloatArray
 if TYPE_CHECKING:
     from palpate.diagnosis.inference.inference_problem import Bench
 
-__all__ = ["SETTLED", "TRUST", "fitted"]
-
-TRUST = 2.5
-"""Longest step of a fit at once, in the scales of what it moves."""
-WORTH, SETTLED = 0.5, 0.02
-"""A step that promises less [nats] is not made, while models are compared and in the last fit: to 1
-and 0.2 deviations."""
-_ITERATIONS = 6
-_OPTIMISM = (10.0, 3.0)
-"""A fit is given up where so many times what its next step promises would not save it, before the
-first step and after it: to first order a tool's shift by millimetres promises a small part of what
-it does."""
-_ASIDE, _POLLS = 0.25, 3
-"""How far to either side of a fit at rest it is asked again, in scales, and how often at most."""
+__all__ = ["fitted"]
 
 
 def fitted(
@@ -43,13 +31,13 @@ def fitted(
     model: Model,
     nuisances: FloatArray,
     hopeless: float = -np.inf,
-    worth: float = WORTH,
+    worth: float = CRITERIA.fits.worth,
 ) -> Model:
     """The best model met from here on; one whose log evidence will hardly reach `hopeless` is given
     up.
     """
     found = _descended(bench, model, nuisances, hopeless, worth)
-    for _ in range(_POLLS):
+    for _ in range(CRITERIA.fits.polls):
         better = _polled(bench, found, nuisances, hopeless, worth)
         if better is None:
             break
@@ -61,10 +49,10 @@ def _descended(
     bench: Bench, model: Model, nuisances: FloatArray, hopeless: float, worth: float
 ) -> Model:
     """Gauss-Newton."""
-    best, radius = bench.objective(model, nuisances), TRUST
-    for iteration in range(_ITERATIONS):
+    best, radius = bench.objective(model, nuisances), CRITERIA.fits.trust
+    for iteration in range(CRITERIA.fits.iterations):
         promised = _promised(bench, model, nuisances)
-        lost = best + _OPTIMISM[min(iteration, 1)] * promised < hopeless or (
+        lost = best + CRITERIA.fits.optimism[min(iteration, 1)] * promised < hopeless or (
             iteration == 2 and best < hopeless
         )
         if lost or promised < worth:
@@ -105,7 +93,7 @@ def _aside(model: Model) -> Iterator[FloatArray]:
     """Steps to either side along each number of an effect that has kinks."""
     kinked = [effect.kinked for effect in model.effects for _ in effect.numbers()]
     for row in np.flatnonzero(kinked):
-        for way in (_ASIDE, -_ASIDE):
+        for way in (CRITERIA.fits.poll_step, -CRITERIA.fits.poll_step):
             step = np.zeros(len(model.scales))
             step[row] = way * model.scales[row]
             yield step

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS
 from palpate.diagnosis.forward.prediction import Prediction
-from palpate.diagnosis.inference.effect_derivative import SMALL, Tangent
+from palpate.diagnosis.inference.effect_derivative import Tangent
 from palpate.diagnosis.inference.evidence import Block
 from palpate.effects import Effect
 from palpate.effects.elastic_material import PoissonRatio, YoungModulus
@@ -21,17 +22,10 @@ from palpate.foundation.arrays import FloatArray
 from palpate.registration.registration import Registration
 from palpate.setup.setup import Setup
 
-__all__ = ["HELD", "TWINS", "Model", "Nuisances", "nuisance_setups"]
+__all__ = ["TWINS", "Model", "Nuisances", "nuisance_setups"]
 
-TIP = 1e-4
-RADIUS = 5e-5
-NU = 0.01
-CAMERA = np.array([1e-4] * 3 + [2e-3] * 3)
-MODULUS = 0.03
-"""Accuracies that are no finding: tool tip and radius [m], Poisson's ratio [1], camera beyond its
-covariance [m, rad], and Young's modulus, relative [1], where forces were measured. A cause is named
-from some seven of these on, so that 3 % make a modulus within a fifth of the stated one no finding:
-data sheets and castings of one gel differ by as much."""
+CAMERA = np.array([CRITERIA.priors.camera_translation] * 3 + [CRITERIA.priors.camera_rotation] * 3)
+"""Accuracies of the camera's pose beyond its covariance [m, rad]."""
 
 
 TWINS: Mapping[type[Effect], tuple[int, ...]] = {
@@ -45,12 +39,6 @@ TWINS: Mapping[type[Effect], tuple[int, ...]] = {
 of their numbers.
 
 The last of them is there only where forces were measured: no surface shows it."""
-_PINNED = 1e6
-HELD = 1e10
-"""Precision of a coordinate that a bound holds, in its scales [1]."""
-_AT_END = 0.05
-"""A coordinate lies at a bound where it is no more of its scales away: shorter steps no fit
-makes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,14 +57,17 @@ class Nuisances:
         With `forces` there is one more before it, of the modulus.
         """
         robot = registration.robot_covariance.copy()
-        robot[:3, :3] += TIP**2 * np.eye(3)
+        robot[:3, :3] += CRITERIA.priors.tool_tip**2 * np.eye(3)
         camera = registration.camera_covariance + np.diag(CAMERA**2)
         precision = np.zeros((15 + forces, 15 + forces))
         precision[:6, :6] = np.linalg.inv(robot)
-        precision[6, 6], precision[7, 7] = RADIUS**-2, NU**-2
+        precision[6, 6], precision[7, 7] = (
+            CRITERIA.priors.tool_radius**-2,
+            CRITERIA.priors.poisson_ratio**-2,
+        )
         precision[8:14, 8:14] = np.linalg.inv(camera)
         if forces:
-            precision[14, 14] = MODULUS**-2
+            precision[14, 14] = CRITERIA.priors.young_modulus**-2
         precision[-1, -1] = 1.0
         return cls(precision)
 
@@ -95,7 +86,7 @@ class Nuisances:
         precision = self.precision.copy()
         for effect in effects:
             own = list(TWINS.get(type(effect), ()))
-            precision[own, own] += _PINNED * np.diag(self.precision)[own]
+            precision[own, own] += CRITERIA.priors.pinned_factor * np.diag(self.precision)[own]
         return precision
 
 
@@ -141,7 +132,7 @@ class Model:
             self.coordinates,
         )
         low, high = np.array([item.ends for item in items]).reshape(-1, 2).T
-        room = _AT_END * self.scales
+        room = CRITERIA.priors.at_bound * self.scales
         return np.where(here - low < room, -1, np.where(high - here < room, 1, 0))
 
     @property
@@ -154,7 +145,7 @@ def nuisance_setups(setup: Setup, forces: bool) -> list[tuple[Setup, float]]:
     """Setups with each nuisance a little changed, and the steps: radius, Poisson's ratio, camera,
     with forces the modulus.
     """
-    step = SMALL * 3e-4
+    step = CRITERIA.derivatives.step * 3e-4
     found: list[tuple[Setup, float]] = [
         (ToolRadius(radius=setup.tool.radius + step).apply(setup), step)
     ]
@@ -164,9 +155,14 @@ def nuisance_setups(setup: Setup, forces: bool) -> list[tuple[Setup, float]]:
     camera = CameraRegistration.neutral(setup)
     for number, item in enumerate(camera.numbers()):
         values = [0.0] * 6
-        values[number] = SMALL * item.scale
+        values[number] = CRITERIA.derivatives.step * item.scale
         found.append((camera.moved(values).apply(setup), values[number]))
     if forces:
         modulus = YoungModulus.neutral(setup)
-        found.append((modulus.at([modulus.coordinates[0] + SMALL]).apply(setup), SMALL))
+        found.append(
+            (
+                modulus.at([modulus.coordinates[0] + CRITERIA.derivatives.step]).apply(setup),
+                CRITERIA.derivatives.step,
+            )
+        )
     return found

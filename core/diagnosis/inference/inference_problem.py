@@ -10,16 +10,17 @@ from functools import cached_property
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.history_replay import TRACED
 from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS, Wanted
 from palpate.diagnosis.forward.prediction import Prediction
-from palpate.diagnosis.forward.worker_pool import TOLERANCE, Pending, Workers
+from palpate.diagnosis.forward.worker_pool import Pending, Workers
 from palpate.diagnosis.inference.applicable_effects import weighed
-from palpate.diagnosis.inference.effect_derivative import SMALL, Tangent, changed_at_rest
+from palpate.diagnosis.inference.effect_derivative import Tangent, changed_at_rest
 from palpate.diagnosis.inference.evaluate import led
 from palpate.diagnosis.inference.evidence import Block, fit, log_evidence, predictive_score
-from palpate.diagnosis.inference.gauss_newton import SETTLED, fitted
-from palpate.diagnosis.inference.hypothesis import HELD, Model, Nuisances, nuisance_setups
+from palpate.diagnosis.inference.gauss_newton import fitted
+from palpate.diagnosis.inference.hypothesis import Model, Nuisances, nuisance_setups
 from palpate.diagnosis.inference.mesh_discrepancy import OWN_GRID, under_stated, with_columns
 from palpate.diagnosis.inference.noise_model import Noise, noises
 from palpate.diagnosis.inference.rest_evidence import Still
@@ -33,10 +34,7 @@ from palpate.mesh.protocol import Meshing
 from palpate.registration.registration import Registration
 from palpate.setup.setup import Inclusion, Setup
 
-__all__ = ["PRIOR_STEPS", "Bench"]
-
-PRIOR_STEPS = 4.0
-"""Prior standard deviation of a search coordinate, in its scales."""
+__all__ = ["Bench"]
 
 
 class Bench:
@@ -96,7 +94,7 @@ class Bench:
     def _moved(self, effects: Sequence[Effect], index: int, number: int) -> tuple[Setup, float]:
         """The setup with one search coordinate a little larger, and the step."""
         effect, item = effects[index], effects[index].numbers()[number]
-        coordinates, step = effect.coordinates, SMALL * item.scale
+        coordinates, step = effect.coordinates, CRITERIA.derivatives.step * item.scale
         if item.coordinate(item.high) - coordinates[number] < step:
             step = -step
         coordinates[number] += step
@@ -129,7 +127,7 @@ class Bench:
         wanted: Wanted | None,
         starts: Sequence[Prediction] | None,
         grid: Meshing | None = None,
-        tolerance: float = TOLERANCE,
+        tolerance: float = CRITERIA.replay.tolerance,
     ) -> list[Pending]:
         """Begin the replays of all sequences with these effects."""
         self.evaluations += 1
@@ -279,7 +277,9 @@ class Bench:
             self.nuisances.precision if nuisances is None else nuisances
         )
         own = np.arange(len(model.nuisance), size)
-        precision[own, own] = (PRIOR_STEPS * model.scales) ** -2 if len(own) else 0
+        precision[own, own] = (
+            (CRITERIA.priors.parameter_steps * model.scales) ** -2 if len(own) else 0
+        )
         return precision
 
     def held(self, model: Model, nuisances: FloatArray | None = None) -> FloatArray:
@@ -299,7 +299,9 @@ class Bench:
             pressed = first + np.flatnonzero(ways * change > 0)
             if not len(pressed):
                 break
-            precision[pressed, pressed] = HELD * model.scales[pressed - first] ** -2
+            precision[pressed, pressed] = (
+                CRITERIA.priors.bound_precision * model.scales[pressed - first] ** -2
+            )
             ways[pressed - first] = 0
         return precision
 
@@ -375,4 +377,6 @@ class Bench:
                 n.remeshed(m, f) for n, m, f in zip(self.noises, here, fine, strict=True)
             ]
         found = self.assemble(model.effects, model.setup, model.predictions, (), 0)
-        return fitted(self, found, self.nuisances.beside(found.effects), worth=SETTLED)
+        return fitted(
+            self, found, self.nuisances.beside(found.effects), worth=CRITERIA.fits.settled
+        )

@@ -18,12 +18,8 @@ from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.noise_model import Noise, rows_of
 from palpate.effects.geometry import MeshResolution
 
-__all__ = ["MESH_SPREAD", "OWN_GRID", "too_coarse", "under_stated", "with_columns"]
+__all__ = ["OWN_GRID", "too_coarse", "under_stated", "with_columns"]
 
-MESH_SPREAD = 4.0
-"""Prior deviation of how often the data may ask for the two grids' difference [1]: edges shrink by
-a fifth to a half between them, and what is left of an error that falls with the edge's length is
-then four times what it fell by."""
 OWN_GRID = MeshResolution(element_size=MeshResolution.numbers()[0].low)
 """A grid so fine is no grid of the setup's any more."""
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.evidence import Block, gram
 from palpate.diagnosis.observation.force_record import (
@@ -24,26 +25,7 @@ from palpate.diagnosis.observation.force_record import (
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.surface_gaps import Surface
 
-__all__ = [
-    "DISPLACEMENT_ERROR",
-    "STIFFNESS_ERROR",
-    "Noise",
-    "noises",
-    "patch_variance",
-    "rows_of",
-    "smooth_basis",
-]
-
-DISPLACEMENT_ERROR = 0.02
-"""Standard deviation of the engine's relative error of displacement, smooth over FIELD_LENGTH along
-the surface [1]."""
-STIFFNESS_ERROR = 0.08
-"""Standard deviation of the logarithm of local stiffness that stands for discretisation and law
-[1]."""
-FIELD_LENGTH = 8e-3
-_WHITE_FLOOR = 2e-5
-_ELSEWHERE = 0.2
-"""A patch is no more what it was where so many of its points meet another side of the model [1]."""
+__all__ = ["Noise", "noises", "patch_variance", "rows_of", "smooth_basis"]
 
 
 def patch_variance(predictions: Sequence[Prediction]) -> FloatArray:
@@ -132,7 +114,7 @@ class Noise:
         seen = np.isfinite(gap) & np.isfinite(finer)
         seen[list(set(baseline.failed) | set(fine.failed))] = False
         mesh = np.where(seen, finer - gap, 0.0)
-        scatter = variance / np.maximum(baseline.count, 1) + _WHITE_FLOOR**2
+        scatter = variance / np.maximum(baseline.count, 1) + CRITERIA.noise.white_floor**2
         if baseline.felt is not None:
             scatter = np.concatenate([scatter, force_scatter(baseline.felt)], axis=1)
         scatter = scatter + (0.5 * mesh) ** 2
@@ -145,12 +127,16 @@ class Noise:
                 for frame in baseline.equilibria
             ]
         )
-        displacement = DISPLACEMENT_ERROR * size[..., None] * smooth_basis(centres, FIELD_LENGTH)
+        displacement = (
+            CRITERIA.noise.displacement_error
+            * size[..., None]
+            * smooth_basis(centres, CRITERIA.noise.field_length)
+        )
         if baseline.felt is not None:
             displacement = _aside(
                 displacement, force_discrepancy(baseline.felt, baseline.equilibria)
             )
-        stiffness = STIFFNESS_ERROR * columns[..., lumps].astype(float)
+        stiffness = CRITERIA.noise.stiffness_error * columns[..., lumps].astype(float)
         weights = np.where(seen, 1 / scatter, 0.0)
         discrepancy = np.concatenate([displacement, stiffness], axis=2)
         return cls(weights, np.where(seen, gap, 0.0), mesh, discrepancy, spots=stiffness.shape[2])
@@ -169,7 +155,7 @@ class Noise:
         parts = [
             force_discrepancy(baseline.felt, baseline.equilibria),
             depth_discrepancy(baseline.felt, baseline.equilibria),
-            STIFFNESS_ERROR * columns[..., lumps].astype(float),
+            CRITERIA.noise.stiffness_error * columns[..., lumps].astype(float),
         ]
         weights = np.where(seen, 1 / scatter, 0.0)
         return cls(
@@ -188,7 +174,9 @@ class Noise:
         seen[list(set(model.failed) | set(fine.failed))] = False
         weights = self.weights.copy()
         if model.elsewhere is not None:
-            weights[:, : model.elsewhere.shape[1]][model.elsewhere > _ELSEWHERE] = 0.0
+            weights[:, : model.elsewhere.shape[1]][
+                model.elsewhere > CRITERIA.noise.other_side_share
+            ] = 0.0
         return replace(self, weights=weights, mesh=np.where(seen, finer - gap, self.mesh))
 
     def block(self, prediction: Prediction) -> Block:

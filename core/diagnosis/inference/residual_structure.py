@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import gamma
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.evidence import Block, draw_rights
 from palpate.diagnosis.inference.hypothesis import Model
@@ -22,21 +23,6 @@ from palpate.diagnosis.inference.noise_model import smooth_basis
 from palpate.foundation.arrays import FloatArray
 
 __all__ = ["NOTHING", "Structure", "explained_by_modes", "structure_of"]
-
-MODE_LENGTH = 12e-3
-"""Distance between surface modes [m]: what a cause inside a block or at its base shows is no finer
-than this."""
-FELT_LENGTH = 12e-3
-"""The same between modes of the force, over the places that are pushed: a share of each push's own
-force."""
-DRAWS = 400
-QUANTILE = 0.999
-"""Of what chance gives; by a gamma distribution with the draws' mean and variance, as a sum of
-squares nearly has. At one in a hundred every tenth suite of ten controls would hold a false alarm,
-and the noise model is not exact."""
-_FAINT = 1e-3
-"""Prior precision of a mode's factor over the largest in the block: keeps modes that nobody saw
-from being divided by nothing."""
 
 
 @dataclass(frozen=True)
@@ -81,9 +67,15 @@ def _depth(item: Prediction) -> FloatArray:
 def _with_modes(model: Model, bench: Bench) -> list[Block]:
     """The model's blocks whose last columns are the modes."""
     seen = (
-        smooth_basis(bench.surface.patch_centres, MODE_LENGTH) if bench.seen else np.zeros((0, 0))
+        smooth_basis(bench.surface.patch_centres, CRITERIA.structure.mode_length)
+        if bench.seen
+        else np.zeros((0, 0))
     )
-    felt = smooth_basis(bench.pushed[0], FELT_LENGTH) if len(bench.pushed[0]) else np.zeros((0, 0))
+    felt = (
+        smooth_basis(bench.pushed[0], CRITERIA.structure.force_mode_length)
+        if len(bench.pushed[0])
+        else np.zeros((0, 0))
+    )
     blocks, at = [], 0
     for noise, item in zip(bench.noises, model.predictions, strict=True):
         modes = max(seen.shape[1], felt.shape[1])
@@ -133,7 +125,7 @@ def explained_by_modes(
     for number, matrix in enumerate(grams):
         left = rights[:, number, own] + factors @ matrix[np.ix_(index, own)]
         inner = matrix[np.ix_(own, own)]
-        inner = inner + _FAINT * np.diag(inner).max() * np.eye(len(own))
+        inner = inner + CRITERIA.structure.least_precision * np.diag(inner).max() * np.eye(len(own))
         found += np.einsum("di,ij,dj->d", left, np.linalg.inv(inner), left)
     return found
 
@@ -147,10 +139,14 @@ def structure_of(bench: Bench, model: Model, seed: int) -> Structure:
     precision = bench.held(model)
     modes = range(first, size - 1)
     data = np.array([[block.gram[1:, 0] for block in blocks]])
-    rights = draw_rights(blocks, fitted, precision, DRAWS, np.random.default_rng(seed))
+    rights = draw_rights(
+        blocks, fitted, precision, CRITERIA.structure.draws, np.random.default_rng(seed)
+    )
     value = float(explained_by_modes(blocks, data, fitted, precision, modes)[0])
     chance = explained_by_modes(blocks, rights, fitted, precision, modes)
     mean, variance = float(chance.mean()), float(chance.var(ddof=1))
     return Structure(
-        value, mean, float(gamma.ppf(QUANTILE, mean**2 / variance, scale=variance / mean))
+        value,
+        mean,
+        float(gamma.ppf(CRITERIA.structure.quantile, mean**2 / variance, scale=variance / mean)),
     )

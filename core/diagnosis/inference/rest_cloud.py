@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.camera_error_model import CameraErrors, camera_errors
 from palpate.diagnosis.inference.evidence import Block
 from palpate.foundation.arrays import FloatArray
@@ -26,10 +27,6 @@ from palpate.replay.replay import rest
 from palpate.setup.setup import Setup
 
 __all__ = ["StaticChannel"]
-
-_TABLE_CELL = 0.012
-_POSE_FREEDOM = 0.05
-_LEAST_POINTS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +59,8 @@ class StaticChannel:
         seen = gaps(
             points, sight.pose.translation, rest(setup, grid), surface, lowest=cleaner.lowest
         )
-        means = patch_means(seen.gap, seen.patch, surface.patches, least=_LEAST_POINTS)
-        used = np.flatnonzero(np.isfinite(means.mean) & (means.count >= _LEAST_POINTS))
+        means = patch_means(seen.gap, seen.patch, surface.patches, least=CRITERIA.rest.least_points)
+        used = np.flatnonzero(np.isfinite(means.mean) & (means.count >= CRITERIA.rest.least_points))
         centres, normals = surface.patch_centres[used], surface.patch_normals[used]
         white = np.concatenate(
             [
@@ -81,7 +78,7 @@ class StaticChannel:
         errors = camera_errors(places, depth, white, residual, free)
         covariance = (
             errors.covariance
-            + _POSE_FREEDOM**2 * moved @ np.diag([1, 1, 1, 100, 100, 100]) @ moved.T
+            + CRITERIA.rest.pose_freedom**2 * moved @ np.diag([1, 1, 1, 100, 100, 100]) @ moved.T
         )
         return cls(centres, normals, table, residual, cho_factor(covariance)[0], errors)
 
@@ -133,7 +130,7 @@ def _table_cells(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
     points (m, 3).
     """
     _, index = np.unique(
-        np.floor(table[:, :2] / _TABLE_CELL).astype(int), axis=0, return_inverse=True
+        np.floor(table[:, :2] / CRITERIA.rest.table_cell).astype(int), axis=0, return_inverse=True
     )
     index = index.ravel()
     count = np.bincount(index)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.evidence import Block
 from palpate.diagnosis.inference.rest_cloud import StaticChannel
 from palpate.foundation.arrays import FloatArray
@@ -21,12 +22,8 @@ from palpate.mesh.protocol import Meshing
 from palpate.registration.registration import motion_jacobian
 from palpate.setup.setup import Setup
 
-__all__ = ["TOUCH", "Still", "touch_block"]
+__all__ = ["Still", "touch_block"]
 
-TOUCH = 5e-4
-"""Standard deviation of one coordinate of a touch [m]: the eye, the hand, and a ball that does not
-stay on a corner."""
-_LEAST_TOUCHES = 3
 
 Varied = dict[int, tuple[Setup, float]]
 """Column to (setup a little changed, step)."""
@@ -64,14 +61,14 @@ def touch_block(setup: Setup, grid: Meshing, columns: int, varied: Varied) -> Bl
     Of three touches or more; fewer registered nothing, and say nothing.
     """
     count = len(setup.landmarks)
-    if count < _LEAST_TOUCHES:
+    if count < CRITERIA.rest.least_touches:
         return Block("touches", np.zeros((1 + columns, 1 + columns)), 0.0)
     here = touch_misses(setup, grid)
     stacked = np.zeros((3 * count, 1 + columns))
     stacked[:, 0] = here.ravel()
     for column, (other, step) in varied.items():
         stacked[:, 1 + column] = (touch_misses(other, grid) - here).ravel() / step
-    stacked = _beside_pose(touched_places(setup), stacked) / TOUCH
+    stacked = _beside_pose(touched_places(setup), stacked) / CRITERIA.rest.touch_deviation
     return Block("touches", stacked.T @ stacked, 3.0 * count - 6.0)
 
 

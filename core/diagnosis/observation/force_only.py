@@ -16,6 +16,7 @@ import numpy as np
 
 from palpate.dataset import Dataset, Sequence
 from palpate.dataset.tool_smoothing import SMOOTHING, smooth_centres
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.force_record import ForceRecord
 from palpate.diagnosis.observation.frame_groups import Group, Observations, observe_all
 from palpate.foundation.arrays import FloatArray
@@ -26,16 +27,8 @@ from palpate.registration.registration import Registration
 from palpate.setup.box import CLEARANCE
 from palpate.setup.setup import Setup
 
-__all__ = ["SHARES", "deepest_rows", "observe_each", "observe_forces", "pushed_places"]
+__all__ = ["deepest_rows", "observe_each", "observe_forces", "pushed_places"]
 
-SHARES = (0.55,)
-"""Depths on the way in that are looked at, over the push's own [1]."""
-_LEAST_DEPTH = 0.5e-3
-"""Shallower contacts [m] are no pushes: their depth is hardly known."""
-_HELD = 1.5e-4
-"""Within so much of its full depth [m] the tool is held."""
-_MOST_HELD = 8
-_STEP = 0.02
 _NOTHING = np.empty((0, 3))
 
 
@@ -60,13 +53,13 @@ def observe_forces(sequence: Sequence, setup: Setup, most: int) -> Observations:
             file=f"{home}/forces.csv",
         )
     begin, end = max(clock.time[0], stream.time[0]), min(clock.time[-1], stream.time[-1])
-    times = np.arange(begin, end, _STEP)
+    times = np.arange(begin, end, CRITERIA.force_only.time_step)
     depth = -_gap(setup, smooth_centres(clock, times)) if len(times) else np.empty(0)
     pushes = _pushes(depth)
     if not pushes:
         deepest = 1e3 * float(depth.max(initial=-np.inf))
         raise DiagnosisError(
-            f"{home}: nothing is pressed by {1e3 * _LEAST_DEPTH:.1f} mm or more (at most {deepest:.2f} mm into the phantom as "
+            f"{home}: nothing is pressed by {1e3 * CRITERIA.force_only.least_depth:.1f} mm or more (at most {deepest:.2f} mm into the phantom as "
             "stated); check touches.csv and the surface, or leave it out of [splits]",
             file=home,
         )
@@ -86,12 +79,12 @@ def _pushes(depth: FloatArray) -> list[slice]:
     touching = np.concatenate([[False], depth > 0, [False]])
     edges = np.flatnonzero(np.diff(touching.astype(int)))
     runs = [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    return [run for run in runs if depth[run].max() >= _LEAST_DEPTH]
+    return [run for run in runs if depth[run].max() >= CRITERIA.force_only.least_depth]
 
 
 def _kept(pushes: list[slice], most: int) -> list[slice]:
     """As many pushes as `most` groups hold, evenly spread."""
-    count = max(1, most // (1 + len(SHARES)))
+    count = max(1, most // (1 + len(CRITERIA.force_only.depth_shares)))
     chosen = np.unique(np.linspace(0, len(pushes) - 1, min(count, len(pushes))).round().astype(int))
     return [pushes[number] for number in chosen]
 
@@ -104,7 +97,7 @@ def _instants(
     for probe, run in enumerate(pushes, start=1):
         own, when = depth[run], times[run]
         full = int(own.argmax())
-        for share in SHARES:
+        for share in CRITERIA.force_only.depth_shares:
             # The last time that it was shallower: a tool may hover and come back.
             before = np.flatnonzero(own[: full + 1] < share * own[full])
             if len(before) and before[-1] + 1 < full:
@@ -123,12 +116,18 @@ def _held(when: FloatArray, depth: FloatArray, full: int) -> FloatArray:
     share no sample.
     """
     low = high = full
-    while low > 0 and depth[low - 1] > depth[full] - _HELD:
+    while low > 0 and depth[low - 1] > depth[full] - CRITERIA.force_only.hold_tolerance:
         low -= 1
-    while high < len(depth) - 1 and depth[high + 1] > depth[full] - _HELD:
+    while (
+        high < len(depth) - 1 and depth[high + 1] > depth[full] - CRITERIA.force_only.hold_tolerance
+    ):
         high += 1
     room = when[high] - when[low] - 2 * SMOOTHING
-    count = int(np.clip(room // (2 * SMOOTHING) + 1, 1, _MOST_HELD)) if room > 0 else 1
+    count = (
+        int(np.clip(room // (2 * SMOOTHING) + 1, 1, CRITERIA.force_only.most_hold_instants))
+        if room > 0
+        else 1
+    )
     return (
         np.linspace(when[low] + SMOOTHING, when[high] - SMOOTHING, count)
         if count > 1

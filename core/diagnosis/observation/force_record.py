@@ -17,13 +17,11 @@ import numpy as np
 
 from palpate.dataset import Forces
 from palpate.dataset.tool_smoothing import SMOOTHING, averaged
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.replay.replay import Equilibrium
 
 __all__ = [
-    "CONTACT_DEPTH",
-    "FORCE_ERROR",
-    "FORCE_SCATTER",
     "Felt",
     "ForceRecord",
     "depth_discrepancy",
@@ -32,19 +30,6 @@ __all__ = [
     "rms_force",
 ]
 
-FORCE_ERROR, FORCE_SCATTER = 0.03, 0.01
-"""Standard deviations of the engine's relative error of the force: of a push as a whole, and of
-each place on its own [1].
-
-The mesh of a replay is 1 to 2 % off, as much as its law and that of another program are apart at
-these depths, and sensors are calibrated to 1 %."""
-CONTACT_DEPTH = 1e-4
-"""Standard deviation of how deep a push went against what robot, registration and surface say, one
-for each push [m]: of the surface's triangles, of what a hand takes for the first touch, of a tool
-that is not quite a ball."""
-_CELL = 1.0
-"""Longest stretch [s] over which an untouched sensor is averaged to one reading of its bias."""
-_LEAST_SAMPLES = 20
 
 BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
@@ -105,13 +90,18 @@ def _readings(
     run = np.cumsum(np.diff(untouched.astype(int), prepend=0) == 1)
     start = np.full(run.max() + 1, time[0])
     start[run[::-1]] = time[::-1]
-    cell = np.stack([run, (time - start[run]) // _CELL], axis=1)[untouched]
+    cell = np.stack([run, (time - start[run]) // CRITERIA.force_error.bias_interval], axis=1)[
+        untouched
+    ]
     _, index, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
     sums = [
         np.bincount(index.ravel(), weights=values, minlength=len(count))
         for values in (time[untouched], *force[untouched].T)
     ]
-    means, enough = np.stack(sums, axis=-1) / np.maximum(count, 1)[:, None], count >= _LEAST_SAMPLES
+    means, enough = (
+        np.stack(sums, axis=-1) / np.maximum(count, 1)[:, None],
+        count >= CRITERIA.force_error.least_samples,
+    )
     return means[enough, 0], means[enough, 1:], count[enough].astype(float)
 
 
@@ -141,7 +131,11 @@ def _white(time: FloatArray, force: FloatArray, untouched: BoolArray, sample: fl
     whole = len(time) // width * width
     clear = untouched[:whole].reshape(-1, width).all(axis=1)
     windows = force[:whole].reshape(-1, width, 3).mean(axis=1)[clear]
-    return float(np.mean(windows**2)) if len(windows) >= _LEAST_SAMPLES else sample / width
+    return (
+        float(np.mean(windows**2))
+        if len(windows) >= CRITERIA.force_error.least_samples
+        else sample / width
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,13 +195,15 @@ class Felt:
 
 def force_scatter(felt: Felt) -> FloatArray:
     """Variance (g, 3) [N^2] of each measured force: the sensor's, and the engine's own."""
-    engine = FORCE_SCATTER * np.linalg.norm(felt.force, axis=1)
+    engine = CRITERIA.force_error.group_error * np.linalg.norm(felt.force, axis=1)
     return np.repeat((felt.noise**2 + engine**2)[:, None], 3, axis=1)
 
 
 def force_discrepancy(felt: Felt, frames: Sequence[Equilibrium]) -> FloatArray:
     """Columns (g, 3, pushes) [N] of the engine's own error, one for each push, of unit variance."""
-    return np.asarray(FORCE_ERROR * felt.force[:, :, None] * _pushes(felt, frames)[:, None, :])
+    return np.asarray(
+        CRITERIA.force_error.push_error * felt.force[:, :, None] * _pushes(felt, frames)[:, None, :]
+    )
 
 
 def depth_discrepancy(felt: Felt, frames: Sequence[Equilibrium]) -> FloatArray:
@@ -216,7 +212,9 @@ def depth_discrepancy(felt: Felt, frames: Sequence[Equilibrium]) -> FloatArray:
     """
     along = felt.force / np.maximum(np.linalg.norm(felt.force, axis=1, keepdims=True), 1e-12)
     deeper = np.einsum("gik,gk->gi", felt.columns[..., :3], along)
-    return np.asarray(CONTACT_DEPTH * deeper[:, :, None] * _pushes(felt, frames)[:, None, :])
+    return np.asarray(
+        CRITERIA.force_error.contact_depth * deeper[:, :, None] * _pushes(felt, frames)[:, None, :]
+    )
 
 
 def _pushes(felt: Felt, frames: Sequence[Equilibrium]) -> BoolArray:

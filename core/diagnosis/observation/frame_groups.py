@@ -13,6 +13,7 @@ import numpy as np
 
 from palpate.dataset import Dataset, Kinematics, Sequence
 from palpate.dataset.tool_smoothing import smooth_centres
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.force_record import ForceRecord
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
@@ -25,17 +26,6 @@ from palpate.setup.setup import Setup
 
 __all__ = ["Group", "Observations", "observe", "observe_all"]
 
-TRAVEL = 7e-4
-"""Frames whose tool moved less than this [m] are one group."""
-MOST_POINTS, MOST_UNTOUCHED = 20000, 6000
-"""Points of a group, and of one with the tool clear of the block: there are many of those, and
-together they say how the camera sees the block at rest."""
-_RECOVERY = (0.5, 1.5, 5.0)
-"""Time since the tool was last near the block [s] at which untouched frames part: a material may
-recover in the meantime."""
-_TURN, _TURN_STEP = 5e-5, 0.02
-"""A place counts as deeper than a group's own from this difference on [m]; time between the places
-that are looked at [s]."""
 FAR = np.array([0.0, 0.0, 10.0])
 """Where the tool is said to be when there is none [m]."""
 
@@ -127,7 +117,10 @@ class Observations:
             own = places[list(group.frames)]
             if group.free and (distance_to_block(setup.box.size, own) < setup.tool.radius).any():
                 return False
-            if not group.free and (np.linalg.norm(own - centre, axis=1) > TRAVEL).any():
+            if (
+                not group.free
+                and (np.linalg.norm(own - centre, axis=1) > CRITERIA.grouping.travel).any()
+            ):
                 return False
         return True
 
@@ -135,7 +128,10 @@ class Observations:
         """Times (t,) [s] of the recording, on the robot's clock, and stated tool centres (t, 3)
         [m], phantom frame.
         """
-        times = np.arange(self.times[0], self.times[-1], _TURN_STEP) - setup.sensor.time_offset
+        times = (
+            np.arange(self.times[0], self.times[-1], CRITERIA.grouping.path_step)
+            - setup.sensor.time_offset
+        )
         return times, setup.phantom_from_robot.apply(smooth_centres(self.kinematics, times))
 
     def felt(
@@ -179,7 +175,8 @@ class Observations:
             deepest = int(between[np.argmax(depths[between])]) if len(between) else None
             deeper = (
                 deepest is not None
-                and depths[deepest] > _depth(setup.box.size, centre[None])[0] + _TURN
+                and depths[deepest]
+                > _depth(setup.box.size, centre[None])[0] + CRITERIA.grouping.deeper_by
             )
             found.append(deepest if deeper else None)
         return found
@@ -195,7 +192,7 @@ def _split(centres: FloatArray, free: np.ndarray, times: FloatArray) -> list[lis
     for frame, centre in enumerate(centres):
         last = runs[-1] if runs else None
         released = released if free[frame] else times[frame]
-        since[frame] = np.searchsorted(_RECOVERY, times[frame] - released)
+        since[frame] = np.searchsorted(CRITERIA.grouping.recovery_times, times[frame] - released)
         joins = (
             last is not None
             and free[last[0]] == free[frame]
@@ -204,7 +201,9 @@ def _split(centres: FloatArray, free: np.ndarray, times: FloatArray) -> list[lis
         if (
             joins
             and last is not None
-            and (free[frame] or np.linalg.norm(centre - centres[last[0]]) < TRAVEL)
+            and (
+                free[frame] or np.linalg.norm(centre - centres[last[0]]) < CRITERIA.grouping.travel
+            )
         ):
             last.append(frame)
         else:
@@ -264,7 +263,11 @@ def observe(
                 for frame, raw in zip(picked, clouds, strict=True)
             ]
         )
-        room = MOST_UNTOUCHED if free[run[0]] else MOST_POINTS
+        room = (
+            CRITERIA.grouping.most_points_untouched
+            if free[run[0]]
+            else CRITERIA.grouping.most_points
+        )
         if len(points) > room:
             points = points[np.random.default_rng(number).choice(len(points), room, replace=False)]
         groups.append(

@@ -10,23 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.measurement.patch_averages import MaskArray, patch_medians
 from palpate.measurement.surface_gaps import Surface
 
 __all__ = ["among_neighbours"]
-
-_FEW, _FEWEST = 0.35, 4
-"""With less than this share of the points that the patches of a group usually have [1], or fewer
-than so many, a patch is nearly hidden."""
-_AROUND = 9e-3
-"""Patches this near [m] say where a nearly hidden one should lie."""
-_APART = 1e-3
-"""So far from its neighbours' median [m] it cannot lie: a model's error is as smooth as the
-surface."""
-_NEVER = 6e-3
-"""The same of a patch that is seen well: a dent at another time or place is a step of some
-millimetres, and no more."""
 
 
 def among_neighbours(gap: FloatArray, patch: IntArray, surface: Surface) -> MaskArray:
@@ -39,15 +28,22 @@ def among_neighbours(gap: FloatArray, patch: IntArray, surface: Surface) -> Mask
     seen = np.flatnonzero(count)
     if not len(seen):
         return np.ones(0, dtype=bool)
-    well = count[seen] >= max(_FEW * float(np.median(count[seen])), _FEWEST)
+    well = count[seen] >= max(
+        CRITERIA.outliers.hidden_share * float(np.median(count[seen])),
+        CRITERIA.outliers.hidden_points,
+    )
     middle = patch_medians(gap, patch, surface.patches)[seen]
     centres, normals = surface.patch_centres[seen], surface.patch_normals[seen]
     near = (
-        (np.linalg.norm(centres[:, None] - centres, axis=2) < _AROUND)
+        (np.linalg.norm(centres[:, None] - centres, axis=2) < CRITERIA.outliers.neighbour_distance)
         & (normals @ normals.T > 0.5)
         & well
     )
     np.fill_diagonal(near, False)
     expected = np.array([np.median(middle[around]) if around.any() else 0.0 for around in near])
-    far = np.where(well, np.where(near.any(axis=1), _NEVER, np.inf), _APART)
+    far = np.where(
+        well,
+        np.where(near.any(axis=1), CRITERIA.outliers.seen_offset, np.inf),
+        CRITERIA.outliers.hidden_offset,
+    )
     return ~np.isin(patch, seen[np.abs(middle - expected) > far])

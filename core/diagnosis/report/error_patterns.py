@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.gain.probe_errors import fixed_pattern
 from palpate.diagnosis.inference.hypothesis import Model
@@ -21,9 +22,6 @@ from palpate.foundation.errors import DiagnosisError
 from palpate.measurement.surface_gaps import SIDES, Surface
 
 __all__ = ["Patterns", "draw_patterns", "patterns"]
-
-_SMOOTHING = 3.5e-3
-_LEAST_POINTS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +83,7 @@ def patterns(bench: Bench, data: Sequence[Observations], baseline: Model, found:
     points, error, change = best[1].points, best[1].error, best[1].change
     near, weight = _kernel(bench.surface), points.sum(axis=0)
     total = near @ weight
-    shown = np.where((total >= _LEAST_POINTS) & (weight > 0), total, np.nan)
+    shown = np.where((total >= CRITERIA.figures.least_points) & (weight > 0), total, np.nan)
     measured, predicted = (
         near @ (points * values).sum(axis=0) / shown for values in (error, change)
     )
@@ -115,13 +113,15 @@ def _compare(
         fixed_pattern(item, before, lasting),
         fixed_pattern(item, after, lasting)[0],
     )
-    seen = np.isfinite(before.gap) & np.isfinite(after.gap) & (known >= _LEAST_POINTS)
+    seen = (
+        np.isfinite(before.gap) & np.isfinite(after.gap) & (known >= CRITERIA.figures.least_points)
+    )
     counts = [not group.free or (lasting and group.probe > 0) for group in item.groups]
     touched = np.array(
         [1 + group.probe if one else 0 for group, one in zip(item.groups, counts, strict=True)]
     )
     points = np.where(seen & (touched > 0)[:, None], before.count, 0.0)
-    still = np.where(known >= _LEAST_POINTS, own - other, 0.0)
+    still = np.where(known >= CRITERIA.figures.least_points, own - other, 0.0)
     error, change = np.where(seen, before.gap, 0.0), np.where(seen, before.gap - after.gap, 0.0)
     if not whole:
         error, change = error - np.where(seen, own, 0.0), change - np.where(seen, still, 0.0)
@@ -132,7 +132,10 @@ def _kernel(surface: Surface) -> FloatArray:
     """Gaussian weights (p, p) between patches of one side."""
     centres, normals = surface.patch_centres, surface.patch_normals
     distance = np.linalg.norm(centres[:, None] - centres, axis=2)
-    return np.asarray(np.exp(-0.5 * (distance / _SMOOTHING) ** 2) * (normals @ normals.T > 0.5))
+    return np.asarray(
+        np.exp(-0.5 * (distance / CRITERIA.figures.pattern_smoothing) ** 2)
+        * (normals @ normals.T > 0.5)
+    )
 
 
 def draw_patterns(found: Patterns, surface: Surface, path: Path) -> None:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.credible_intervals import spread_of
 from palpate.diagnosis.inference.evidence import fit
 from palpate.diagnosis.inference.hypothesis import Model
@@ -27,12 +28,6 @@ from palpate.replay.replay import Replay
 from palpate.setup.setup import Setup
 
 __all__ = ["Footprint", "depth_of", "footprint_of", "outline"]
-
-RINGS = (0.7, 1.3, 2.0, 2.8)
-"""Distances of the rings of pushes from the middle, in radii of the lump."""
-WAYS = 10
-HALF = 0.5
-_DRAWS = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +90,11 @@ def footprint_of(
     if not change.max(initial=0.0) > 0:
         return None
     reach = (
-        outline(change[0], change[1:].reshape(len(RINGS), WAYS), HALF * float(change.max()))
+        outline(
+            change[0],
+            change[1:].reshape(len(CRITERIA.footprint.rings), CRITERIA.footprint.directions),
+            CRITERIA.footprint.level * float(change.max()),
+        )
         * lump.radius
     )
     flat = middle[0] + reach[:, None] * _ways(normal[0])
@@ -112,7 +111,7 @@ def outline(middle: float, rings: FloatArray, level: float) -> FloatArray:
     The first fall counts that is followed by no rise above the level; at most the last ring, at
     least half of the first.
     """
-    radii = np.array([0.0, *RINGS])
+    radii = np.array([0.0, *CRITERIA.footprint.rings])
     found = np.empty(rings.shape[1])
     for way, values in enumerate(rings.T):
         along = np.append(middle, values)
@@ -121,18 +120,18 @@ def outline(middle: float, rings: FloatArray, level: float) -> FloatArray:
         if last == len(radii) - 1:
             found[way] = radii[-1]
         elif not len(above):
-            found[way] = RINGS[0] / 2
+            found[way] = CRITERIA.footprint.rings[0] / 2
         else:
             share = (along[last] - level) / max(along[last] - along[last + 1], 1e-12)
             found[way] = radii[last] + share * (radii[last + 1] - radii[last])
-    return np.maximum(found, RINGS[0] / 2)
+    return np.maximum(found, CRITERIA.footprint.rings[0] / 2)
 
 
 def _ways(normal: FloatArray) -> FloatArray:
     """Unit vectors (w, 3) along the surface, evenly around the normal."""
     first = np.cross(normal, [0.0, 1.0, 0.0] if abs(normal[1]) < 0.9 else [1.0, 0.0, 0.0])
     first /= np.linalg.norm(first)
-    turn = 2 * np.pi * np.arange(WAYS) / WAYS
+    turn = 2 * np.pi * np.arange(CRITERIA.footprint.directions) / CRITERIA.footprint.directions
     return np.asarray(
         np.outer(np.cos(turn), first) + np.outer(np.sin(turn), np.cross(normal, first))
     )
@@ -143,7 +142,9 @@ def _rings(
 ) -> tuple[FloatArray, FloatArray]:
     """The middle and the rings around it, on the surface, and its normals there (1 + r w, 3)."""
     ways = _ways(normal)
-    flat = np.concatenate([middle[None], *(middle + ring * radius * ways for ring in RINGS)])
+    flat = np.concatenate(
+        [middle[None], *(middle + ring * radius * ways for ring in CRITERIA.footprint.rings)]
+    )
     distance, out = bench.setup.geometry.facing(flat)
     return flat - distance[:, None] * out, out
 
@@ -201,7 +202,7 @@ def _drawn(bench: Bench, model: Model, own: slice) -> FloatArray:
     part = covariance[shift + own.start : shift + own.stop, shift + own.start : shift + own.stop]
     wider = spread_of(bench, model)[own] / np.sqrt(np.diag(part))
     draws = np.random.default_rng(0).multivariate_normal(
-        np.zeros(len(part)), part * np.outer(wider, wider), size=_DRAWS
+        np.zeros(len(part)), part * np.outer(wider, wider), size=CRITERIA.footprint.draws
     )
     return np.asarray(model.coordinates[own] + draws)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.report.force_report import Pushes
 from palpate.diagnosis.report.inclusion_footprint import Footprint
 from palpate.foundation.arrays import FloatArray
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 __all__ = ["draw_palpation", "section"]
 
 INK, FAINT, FOUND = "#2b2f36", "#c9cdd3", "#0f766e"
-_LEAST = 5.0
-"""Smallest change that fills the colour scale [%]."""
 
 
 def draw_palpation(
@@ -60,7 +59,7 @@ def _from_above(
     _relief(axes, body)
     change = 100 * (pushes.measured / pushes.stated - 1)
     known = np.isfinite(change)
-    limit = max(float(np.abs(change[known]).max(initial=0.0)), _LEAST)
+    limit = max(float(np.abs(change[known]).max(initial=0.0)), CRITERIA.figures.least_force_change)
     place = 1e3 * pushes.place
     if (~known).any():
         axes.scatter(place[~known, 0], place[~known, 1], s=50, marker="x", c=FAINT, zorder=3)

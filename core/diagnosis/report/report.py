@@ -9,13 +9,10 @@ from typing import Any
 import numpy as np
 
 from palpate.dataset import Dataset
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.gain.force_gain import FeltLadder
 from palpate.diagnosis.gain.gain_ladder import Ladder
-from palpate.diagnosis.inference.credible_intervals import (
-    INTERVAL_LEVEL,
-    intervals,
-    modulus_interval,
-)
+from palpate.diagnosis.inference.credible_intervals import intervals, modulus_interval
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.mesh_discrepancy import too_coarse
 from palpate.diagnosis.search.findings import Findings, Trial
@@ -24,14 +21,8 @@ from palpate.diagnosis.validation.worst_location import worst_patch, worst_push
 from palpate.effects.elastic_material import YoungModulus
 from palpate.effects.geometry import MeshResolution
 
-__all__ = ["UNEXPLAINED_MISFIT", "report_of", "verdict_of"]
+__all__ = ["report_of", "verdict_of"]
 
-UNEXPLAINED_MISFIT = 1.25
-"""Misfit per value above which structured error is left: the engine's own accuracy is in the noise
-already."""
-MOST_DOUBT = 2.0
-"""A modulus whose interval reaches up to more than this many times its value is not identified
-[1]."""
 
 _NOT_FITTED = ", on which nothing was fitted"
 
@@ -40,7 +31,9 @@ def verdict_of(findings: Findings) -> str:
     """One of found, none, ambiguous, unexplained."""
     if findings.best is None:
         return (
-            "unexplained" if findings.structured or findings.misfit > UNEXPLAINED_MISFIT else "none"
+            "unexplained"
+            if findings.structured or findings.misfit > CRITERIA.verdict.unexplained_misfit
+            else "none"
         )
     if findings.rivals():
         return "ambiguous"
@@ -205,7 +198,7 @@ def report_of(
         "dataset": dataset.name,
         "verdict": verdict,
         "causes": causes,
-        "interval_level": INTERVAL_LEVEL,
+        "interval_level": CRITERIA.intervals.level,
         "ranking": _ranking(bench, findings, named),
         "models": [_model(trial) for trial in findings.trials],
         "identified": known,
@@ -276,7 +269,7 @@ def _modulus(
             )
         ]
     value, low, high = interval
-    if high > MOST_DOUBT * value:
+    if high > CRITERIA.verdict.most_modulus_ratio * value:
         why = f"the measured forces leave anything between {low:.3g} and {high:.3g} Pa open: they hardly stand out of their noise"
         return [], [_unknown(why, "deeper pushes, or with a sensor of less noise")]
     stated = bench.setup.material.young_modulus

@@ -10,14 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.history_replay import TRACED
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.effect_derivative import Tangent
 from palpate.diagnosis.inference.evidence import within_reach
-from palpate.diagnosis.inference.gauss_newton import TRUST
 from palpate.diagnosis.inference.hypothesis import TWINS, Model
-from palpate.diagnosis.inference.inference_problem import PRIOR_STEPS, Bench
-from palpate.diagnosis.inference.mesh_discrepancy import MESH_SPREAD, OWN_GRID
+from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.mesh_discrepancy import OWN_GRID
 from palpate.diagnosis.search.inclusion_grid import lumps_under
 from palpate.diagnosis.search.screening import Candidate
 from palpate.effects import OUTSIDE, Effect
@@ -58,21 +58,8 @@ have other unknowns, and sag moves the registration, too."""
 _SUPPORTS: tuple[type[Effect], ...] = (BaseSlip, BaseDetachment, BaseCompliance)
 """What lets the base move: how it does hangs on the block's weight, and how the block sags on
 it."""
-_LIMITED = 6.0
-"""J_m [1] whose whole action, to first order, is the column of a material that stiffens."""
 _TOGETHER: tuple[type[Effect], ...] = (DepthBias, GeometryScale, LandmarkMismatch)
 """Effects whose numbers are one candidate: what each does alone is as good as any."""
-_TOLERANCE = 1e-2
-"""Residual of a replay that screens [1], over the tool's push: its pattern has a correlation of
-0.999 with that at 3e-4."""
-_LEAST_SHARE, _MOST_SHARE = 0.2, 4.0
-"""Of a finite size's action: what of it a refit may begin with [1]."""
-_FARTHEST = 1.8
-"""Change of a logarithm that a refit may begin with [1]."""
-_STARKEST = 0.7
-"""The same of a ratio's contrast: to 6.8 times as stiff."""
-_LUMP = 0.8
-"""Prior deviation of a lump's contrast [1]."""
 
 
 def lump_places(bench: Bench) -> tuple[Inclusion, ...]:
@@ -103,7 +90,7 @@ def tangents(
             for thickness in (2e-3, 5e-3)
         ),
         _step(StiffnessGradient.neutral(setup), "log_ratio"),
-        Tangent(effect=StrainStiffening(J_m=_LIMITED), spread=1.0),
+        Tangent(effect=StrainStiffening(J_m=CRITERIA.screening.strain_limit), spread=1.0),
         *(_step(replace(start, stiffness_ratio=1.0), *ratio) for start in Anisotropy.starts(setup)),
         _step(ToolCompliance.neutral(setup), "compliance_times_stiffness"),
         *(_step(kind.neutral(setup), item.name) for kind in _TOGETHER for item in kind.numbers()),
@@ -118,7 +105,11 @@ def tangents(
 
 def _step(effect: Effect, name: str, spread: float | None = None) -> Tangent:
     scale = next(item.scale for item in effect.numbers() if item.name == name)
-    return Tangent(effect=effect, of=name, spread=PRIOR_STEPS * scale if spread is None else spread)
+    return Tangent(
+        effect=effect,
+        of=name,
+        spread=CRITERIA.priors.parameter_steps * scale if spread is None else spread,
+    )
 
 
 def signatures(bench: Bench, baseline: Model) -> list[Signature]:
@@ -173,7 +164,9 @@ def _replayed(
         ]
     known = [model.predictions if mesh is bench.grid else rough for mesh in meshes]
     pending = [
-        bench.predict([*model.effects, effect], None, without, mesh, _TOLERANCE)
+        bench.predict(
+            [*model.effects, effect], None, without, mesh, CRITERIA.replay.screening_tolerance
+        )
         for effect, without, mesh in zip(starts, known, meshes, strict=True)
     ]
     found: list[Signature] = []
@@ -219,7 +212,7 @@ def candidates_of(model: Model, bench: Bench, finite: Sequence[Signature]) -> li
         if kind not in bench.weighed:
             continue
         effect = kind.neutral(setup)
-        spreads = [PRIOR_STEPS * item.scale for item in effect.numbers()]
+        spreads = [CRITERIA.priors.parameter_steps * item.scale for item in effect.numbers()]
         names = tuple(item.name for item in effect.numbers())
         found.append(
             Candidate(start=effect, of=names, widened=dict(zip(columns, spreads, strict=True)))
@@ -242,7 +235,12 @@ def candidates_of(model: Model, bench: Bench, finite: Sequence[Signature]) -> li
             x=lump.x, y=lump.y, z=lump.z, radius=lump.radius, stiffness_ratio=1.0
         )
         found.append(
-            Candidate(start=start, of=("stiffness_ratio",), columns=(place,), spread=(_LUMP,))
+            Candidate(
+                start=start,
+                of=("stiffness_ratio",),
+                columns=(place,),
+                spread=(CRITERIA.screening.inclusion_contrast,),
+            )
         )
     for place, (effect, predictions) in zip(model.extra.get("signatures", ()), finite, strict=True):
         if any(
@@ -287,7 +285,9 @@ def begin(
         place: scale for one in (candidate, beside) if one for place, scale in _limited(one).items()
     }
     own, scales = [columns.index(place) for place in limits], np.array(list(limits.values()))
-    asked = within_reach(bench.tempered(model), columns, precision, own, scales, TRUST)
+    asked = within_reach(
+        bench.tempered(model), columns, precision, own, scales, CRITERIA.fits.trust
+    )
     if limited := _limited(candidate):
         changes = asked[[columns.index(place) for place in limited]]
         return start.at((np.array(start.coordinates) + changes).tolist())
@@ -329,7 +329,7 @@ def _limited(candidate: Candidate) -> dict[int, float]:
 
 
 def _share(change: float) -> float:
-    return float(np.clip(change, _LEAST_SHARE, _MOST_SHARE))
+    return float(np.clip(change, CRITERIA.screening.least_share, CRITERIA.screening.most_share))
 
 
 def _moved(start: Effect, name: str, change: float) -> Effect:
@@ -337,7 +337,13 @@ def _moved(start: Effect, name: str, change: float) -> Effect:
     coordinates = start.coordinates
     for number, item in enumerate(start.numbers()):
         if item.name == name:
-            farthest = _FARTHEST if item.log else _STARKEST if item.contrast else math.inf
+            farthest = (
+                CRITERIA.screening.farthest_log
+                if item.log
+                else CRITERIA.screening.farthest_contrast
+                if item.contrast
+                else math.inf
+            )
             coordinates[number] += float(np.clip(change, -farthest, farthest))
     return start.at(coordinates)
 
@@ -345,5 +351,6 @@ def _moved(start: Effect, name: str, change: float) -> Effect:
 def mesh_candidate(model: Model) -> Candidate:
     """The diagnosis's own grid as a cause: its column is the last nuisance, with a wider prior."""
     return Candidate(
-        start=MeshResolution.neutral(model.setup), widened={model.nuisance[-1]: MESH_SPREAD}
+        start=MeshResolution.neutral(model.setup),
+        widened={model.nuisance[-1]: CRITERIA.priors.mesh_multiple},
     )

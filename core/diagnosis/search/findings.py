@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.camera_error_model import CALM, Ripple
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.residual_structure import NOTHING, Structure
@@ -14,18 +15,7 @@ from palpate.diagnosis.validation.held_out_test import HeldOut
 from palpate.diagnosis.validation.stiffness_error_test import Asked
 from palpate.effects import Effect
 
-__all__ = ["LEAST_GAIN", "RIVAL", "Findings", "Trial"]
-
-LEAST_GAIN = 25.0
-"""No cause is named for less [nats], whatever the null says: the noise model itself is only known
-so well.
-
-Of twenty controls of the virtual bench one offered 23, a weak lump of half the block's width such
-as the grid's own error looks like, and no other more than 10; the least that a hidden cause of
-clear size gained was 28, a lump that few pushes came near."""
-RIVAL = 8.0
-"""Rivals this close to the best [nats] are named too: the difference of two log densities that
-differ by d has a spread of about sqrt(2 d), so 8 nats are two of its standard deviations."""
+__all__ = ["Findings", "Trial"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +65,7 @@ class Findings:
     baseline: Model
     best: Trial | None = None
     trials: list[Trial] = field(default_factory=list)
-    bound: float = LEAST_GAIN
+    bound: float = CRITERIA.naming.least_gain
     misfit: float = 1.0
     screened: dict[str, float] = field(default_factory=dict)
     structure: Structure = NOTHING
@@ -135,7 +125,7 @@ class Findings:
             if (
                 len(names) == len(best.model.names)
                 and names not in named
-                and best.gain - trial.gain < RIVAL
+                and best.gain - trial.gain < CRITERIA.naming.rival
             ):
                 named.add(names)
                 close.append(trial)

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.history_replay import TRACED
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.camera_error_model import CALM
@@ -26,7 +27,7 @@ from palpate.diagnosis.search.candidates import (
     signatures,
     tangents,
 )
-from palpate.diagnosis.search.findings import LEAST_GAIN, Findings, Trial
+from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.identifiability import ambiguity_map
 from palpate.diagnosis.search.screening import (
     Candidate,
@@ -40,26 +41,7 @@ from palpate.diagnosis.search.touch_pairing import mispaired
 from palpate.effects import Effect
 from palpate.effects.base import with_effects
 
-__all__ = ["MOST_CAUSES", "search"]
-
-MOST_CAUSES = 3
-NULL_DRAWS = 400
-NULL_QUANTILE = 0.99
-PROMISING = 0.5
-"""Share of the bound that a first cause must reach in the linear screening to be refitted; its
-refit may find more."""
-SECOND_FACTOR, SECOND_SHARE = 2.0, 0.1
-HOPELESS = 60.0
-"""A candidate this far behind the best one [nats] after two steps of its fit, or behind the model
-without it, is given up."""
-DEAR_OPTIMISM = 2.0
-"""What is replayed along the tool's whole way, several times as dear as others, comes last, and not
-at all where so many times its linear gain would leave it that far behind."""
-
-RIVALS = 2
-"""Causes that are tried in the place of another one, at most."""
-PAIRS = 2
-"""Pairs that are fitted at once, at most, where causes one after another leave structure."""
+__all__ = ["search"]
 
 
 Screening = tuple[Model, list[Candidate], np.ndarray]
@@ -90,7 +72,7 @@ def _trial(
 
 
 def search(bench: Bench, seed: int) -> Findings:
-    """Find up to MOST_CAUSES causes."""
+    """Find the causes, one after another, up to `CRITERIA.naming.most_causes`."""
     bench.tell("replaying the stated setup on two meshes", 0.02)
     known = mispaired(bench.setup, bench.grid, bench.registration.repair)
     names = [effect.name for effect in known]
@@ -104,8 +86,12 @@ def search(bench: Bench, seed: int) -> Findings:
     finite = signatures(bench, origin)
     first = screened, candidates, gains = _screen(bench, origin, finite, origin)
     blocks, nuisance = bench.tempered(screened), (*screened.nuisance, *screened.columns)
-    chance = null_gains(blocks, nuisance, bench.precision(screened), candidates, NULL_DRAWS, seed)
-    findings.bound = max(float(np.quantile(chance, NULL_QUANTILE)), LEAST_GAIN)
+    chance = null_gains(
+        blocks, nuisance, bench.precision(screened), candidates, CRITERIA.naming.null_draws, seed
+    )
+    findings.bound = max(
+        float(np.quantile(chance, CRITERIA.naming.null_quantile)), CRITERIA.naming.least_gain
+    )
     findings.told = ambiguity_map(
         blocks, nuisance, bench.precision(screened), candidates, findings.bound
     )
@@ -118,7 +104,7 @@ def search(bench: Bench, seed: int) -> Findings:
             _trial(bench, known, origin.predictions, baseline), asked=findings.bound
         )
         findings.trials.append(current)
-    for order in range(len(known), MOST_CAUSES):
+    for order in range(len(known), CRITERIA.naming.most_causes):
         bench.tell(
             "looking for a second cause" if order else "fitting the most promising causes",
             0.45 + 0.25 * order,
@@ -168,7 +154,7 @@ def _forward(
         if _asks_for_more(findings, current, gains)
         else []
     )
-    chosen = shortlist(gains, candidates, PROMISING * needed, settled)
+    chosen = shortlist(gains, candidates, CRITERIA.naming.promising * needed, settled)
     before, linear = (
         bench.objective(current.model),
         {id(one): gain for one, gain in zip(candidates, gains, strict=True)},
@@ -178,10 +164,12 @@ def _forward(
     for candidate in sorted(
         chosen, key=lambda one: (isinstance(one.start, TRACED), one in settled)
     ):
-        hopeless = max([before, *(bench.objective(trial.model) - HOPELESS for trial in trials)])
+        hopeless = max(
+            [before, *(bench.objective(trial.model) - CRITERIA.naming.hopeless for trial in trials)]
+        )
         if (
             isinstance(candidate.start, TRACED)
-            and before + DEAR_OPTIMISM * linear[id(candidate)] < hopeless
+            and before + CRITERIA.naming.history_optimism * linear[id(candidate)] < hopeless
         ):
             continue
         effects = [*current.model.effects, begin(candidate, screened, bench)]
@@ -204,7 +192,7 @@ def _asks_for_more(findings: Findings, current: Trial, gains: np.ndarray) -> boo
     else loses unseen to another size of the block, which moves the sides that are seen by about as
     much.
     """
-    promising = bool((gains > PROMISING * _needed(findings, current)).any())
+    promising = bool((gains > CRITERIA.naming.promising * _needed(findings, current)).any())
     return current.model.names == _known(findings) or findings.left.significant or promising
 
 
@@ -221,19 +209,19 @@ def _paired(
     """
     screened, candidates, _ = screening
     blocks, nuisance = bench.tempered(screened), (*screened.nuisance, *screened.columns)
-    more = PROMISING * SECOND_FACTOR * findings.bound
+    more = CRITERIA.naming.promising * CRITERIA.naming.second_factor * findings.bound
     ranked = pair_gains(
         blocks, right_sides(blocks), nuisance, bench.precision(screened), candidates, more
     )
-    for _, one, other in ranked[:PAIRS]:
+    for _, one, other in ranked[: CRITERIA.naming.most_pairs]:
         bench.tell(f"trying {one.start.name} and {other.start.name} at once")
         effects = [begin(one, screened, bench, other), begin(other, screened, bench, one)]
-        hopeless = bench.objective(current.model) - HOPELESS
+        hopeless = bench.objective(current.model) - CRITERIA.naming.hopeless
         trial = _trial(bench, effects, findings.baseline.predictions, findings.baseline, hopeless)
-        trial = replace(trial, asked=current.asked + SECOND_FACTOR * findings.bound)
+        trial = replace(trial, asked=current.asked + CRITERIA.naming.second_factor * findings.bound)
         gain = predictive_gain(bench.score(trial.model), bench.score(current.model))[0]
         left = structure_of(bench, trial.model, seed)
-        if gain > SECOND_FACTOR * findings.bound and not left.significant:
+        if gain > CRITERIA.naming.second_factor * findings.bound and not left.significant:
             findings.trials.append(trial)
             findings.best, findings.left = trial, left
             bench.temperature = max(1.0, trial.misfit)
@@ -260,8 +248,8 @@ def _needed(findings: Findings, current: Trial) -> float:
     """
     if current.model.names == _known(findings):
         return findings.bound
-    share = 0.0 if findings.left.significant else SECOND_SHARE
-    return max(SECOND_FACTOR * findings.bound, share * current.gain)
+    share = 0.0 if findings.left.significant else CRITERIA.naming.second_share
+    return max(CRITERIA.naming.second_factor * findings.bound, share * current.gain)
 
 
 def _reconsidered(
@@ -315,8 +303,8 @@ def _exchanged(
         if candidate.start.name not in best.model.names
     ]
     for candidate in shortlist(
-        gains[others], [candidates[number] for number in others], PROMISING * lost
-    )[:RIVALS]:
+        gains[others], [candidates[number] for number in others], CRITERIA.naming.promising * lost
+    )[: CRITERIA.naming.most_rivals]:
         effects = [*without.model.effects, begin(candidate, screened, bench)]
         bench.tell(f"trying {candidate.start.name} instead")
         other = _trial(
@@ -324,7 +312,7 @@ def _exchanged(
             effects,
             without.model.predictions,
             findings.baseline,
-            bench.objective(best.model) - HOPELESS,
+            bench.objective(best.model) - CRITERIA.naming.hopeless,
         )
         other = replace(other, asked=best.asked)
         better = predictive_gain(bench.score(other.model), bench.score(best.model))[0] > 0

@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.foundation.arrays import FloatArray
 from palpate.setup.setup import Box, Inclusion, Shape
 
-__all__ = ["DEPTHS", "lumps_under"]
-
-RADIUS, RATIO = 7e-3, 5.0
-DEPTHS = (9e-3, 14e-3)
-"""Of a lump's centre below the surface [m] that are tried; a push of some millimetres hardly feels
-what lies deeper."""
-_APART = 7e-3
-"""Pushes nearer to one another than this [m] share their places."""
+__all__ = ["lumps_under"]
 
 
 def lumps_under(
@@ -25,12 +19,23 @@ def lumps_under(
     """
     kept: list[int] = []
     for number, place in enumerate(places):
-        if all(np.linalg.norm(place - places[other]) >= _APART for other in kept):
+        if all(
+            np.linalg.norm(place - places[other]) >= CRITERIA.inclusion_grid.spacing
+            for other in kept
+        ):
             kept.append(number)
     found = []
     for number in kept:
-        for depth in DEPTHS:
+        for depth in CRITERIA.inclusion_grid.depths:
             x, y, z = (float(value) for value in places[number] - depth * normals[number])
             if z > 0 and body.facing(np.array([[x, y, z]]))[0][0] < 0:
-                found.append(Inclusion(x=x, y=y, z=z, radius=RADIUS, stiffness_ratio=RATIO))
+                found.append(
+                    Inclusion(
+                        x=x,
+                        y=y,
+                        z=z,
+                        radius=CRITERIA.inclusion_grid.radius,
+                        stiffness_ratio=CRITERIA.inclusion_grid.stiffness_ratio,
+                    )
+                )
     return tuple(found)

@@ -6,17 +6,16 @@ from collections.abc import Mapping
 
 import numpy as np
 
-__all__ = ["TEMPERATURE", "probabilities"]
+from palpate.diagnosis.criteria import CRITERIA
 
-TEMPERATURE = 4.0
-"""Gains are divided by this before they become probabilities: predictive densities of a model that
-is not true are over-sure."""
+__all__ = ["probabilities"]
+
 
 Names = tuple[str, ...]
 
 
 def probabilities(
-    surplus: Mapping[Names, float], temperature: float = TEMPERATURE
+    surplus: Mapping[Names, float], temperature: float = CRITERIA.naming.probability_temperature
 ) -> dict[Names, float]:
     """Softmax over sets of causes, and the set without any, of what each gains beyond what is asked
     of it [nats].

@@ -14,7 +14,8 @@ from itertools import combinations
 
 import numpy as np
 
-from palpate.diagnosis.inference.evidence import FLAT, Block, draw_rights
+from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.inference.evidence import Block, draw_rights
 from palpate.effects import Effect
 from palpate.foundation.arrays import FloatArray
 
@@ -88,7 +89,7 @@ def _values(
         total -= evidence(matrix - grams[number], right - rights[:, number], precision)
     # The same flat prior for every candidate, whatever it widens, so that the scores compare.
     free = precision.copy()
-    free[: len(known), : len(known)] = FLAT * known
+    free[: len(known), : len(known)] = CRITERIA.priors.flat_factor * known
     return np.asarray(total - evidence(matrix, right, free))
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import chi2, norm
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.evidence import fit
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import Bench
@@ -16,16 +17,10 @@ from palpate.effects.elastic_material import StiffInclusion
 from palpate.effects.geometry import MeshResolution
 from palpate.effects.tool import ToolOffset, ToolRadius
 
-__all__ = ["SHORTLIST", "beyond_first_order", "shortlist"]
+__all__ = ["beyond_first_order", "shortlist"]
 
 _FAR_FROM_LINEAR: tuple[type[Effect], ...] = (ToolOffset, ToolRadius)
 """What moves where the tool meets the block."""
-SHORTLIST = 3
-"""Effects that are refitted, at most, beside those that are whatever their linear gain."""
-STRAINED = 4.0
-"""A cause that only widens a stated accuracy is refitted, whatever its linear gain, when the data
-pull its numbers as improbably far as one number by this many standard deviations: to first order
-the nuisance explains most of it already, and hides the rest."""
 
 
 def beyond_first_order(
@@ -41,7 +36,7 @@ def beyond_first_order(
     """
     change = fit(bench.tempered(model), [*model.nuisance, *model.columns], bench.held(model)).change
     covariance = np.linalg.inv(bench.nuisances.precision)
-    least, strained = 2 * float(norm.sf(STRAINED)), []
+    least, strained = 2 * float(norm.sf(CRITERIA.screening.strained)), []
     for candidate in candidates:
         own = [model.nuisance.index(column) for column in candidate.widened]
         pull = float(change[own] @ np.linalg.solve(covariance[np.ix_(own, own)], change[own]))
@@ -62,7 +57,7 @@ def shortlist(
     """The settled ones, then the best start of each promising effect, best first; two places for a
     lump.
     """
-    chosen, names = list(settled), SHORTLIST + len(settled)
+    chosen, names = list(settled), CRITERIA.screening.shortlist + len(settled)
     for number in np.argsort(-gains):
         candidate = candidates[number]
         taken = [c for c in chosen if c.start.name == candidate.start.name]

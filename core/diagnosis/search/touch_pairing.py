@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from palpate.diagnosis.inference.rest_evidence import TOUCH
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.effects.tool import LandmarkMismatch
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.touch_correction import touch_misses
@@ -20,14 +20,13 @@ from palpate.mesh.protocol import Meshing
 from palpate.registration.landmark_repair import Repair, pairings_for
 from palpate.setup.setup import Setup
 
-__all__ = ["FEW", "fitted", "mismatches", "mispaired"]
+__all__ = ["fitted", "mismatches", "mispaired"]
 
-FEW = 3
-"""How many pairings are worth more than their misfit."""
-_SPREADS = np.array([0.08, 2e-3])
-"""Prior deviation of scale [1] and inset [m]: four steps that matter, as for any search
-coordinate."""
-_ROUNDS, _STEPS = 8, np.array([1e-4, 1e-6])
+_SPREADS = np.array(
+    [CRITERIA.touch_pairing.scale_deviation, CRITERIA.touch_pairing.inset_deviation]
+)
+"""Prior deviations of scale [1] and inset [m]."""
+_STEPS = np.array([CRITERIA.touch_pairing.scale_step, CRITERIA.touch_pairing.inset_step])
 
 
 def fitted(setup: Setup, grid: Meshing, pairing: str) -> tuple[LandmarkMismatch, float]:
@@ -38,9 +37,11 @@ def fitted(setup: Setup, grid: Meshing, pairing: str) -> tuple[LandmarkMismatch,
 
     def misses(one: LandmarkMismatch) -> FloatArray:
         own = (np.array([one.scale - 1.0, one.inset])) / _SPREADS
-        return np.concatenate([touch_misses(one.apply(setup), grid).ravel() / TOUCH, own])
+        return np.concatenate(
+            [touch_misses(one.apply(setup), grid).ravel() / CRITERIA.rest.touch_deviation, own]
+        )
 
-    for _ in range(_ROUNDS):
+    for _ in range(CRITERIA.touch_pairing.rounds):
         here = misses(effect)
         near = [
             effect.moved([effect.scale + _STEPS[0], effect.inset]),
@@ -58,12 +59,12 @@ def fitted(setup: Setup, grid: Meshing, pairing: str) -> tuple[LandmarkMismatch,
 
 
 def mismatches(setup: Setup, grid: Meshing) -> list[tuple[LandmarkMismatch, float]]:
-    """The FEW pairings whose touches cost least, best first, with what that is less than as stated
-    [nats].
+    """The best pairings of the touches, best first, and how much less each costs than the stated
+    pairing [nats].
     """
-    stated = 0.5 * float(((touch_misses(setup, grid) / TOUCH) ** 2).sum())
+    stated = 0.5 * float(((touch_misses(setup, grid) / CRITERIA.rest.touch_deviation) ** 2).sum())
     found = [fitted(setup, grid, pairing) for pairing in pairings_for(len(setup.landmarks))]
-    ranked = sorted(found, key=lambda row: row[1])[:FEW]
+    ranked = sorted(found, key=lambda row: row[1])[: CRITERIA.touch_pairing.most_pairings]
     return [(effect, stated - cost) for effect, cost in ranked]
 
 

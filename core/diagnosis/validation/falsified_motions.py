@@ -15,6 +15,7 @@ import numpy as np
 
 from palpate.dataset import Kinematics
 from palpate.dataset.tool_motion import box_gap
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray
 from palpate.setup.setup import Setup
@@ -24,10 +25,6 @@ __all__ = ["FALSIFIED", "mirrored", "shifted", "swapped"]
 MIRROR = np.array([-1.0, -1.0, 1.0])
 """Both ends and both sides of the block change places: a push near one of its middle planes would
 meet its own mirror image."""
-_TURNS = np.arange(0.2, 0.81, 0.05)
-_STILL_PUSHES = 0.5
-"""Shares of the recording by which a clock is turned on; of the deepest push that the clouds must
-then still see [1]."""
 
 
 def _with_path(item: Observations, position: FloatArray) -> Observations:
@@ -64,10 +61,10 @@ def shifted(data: Sequence[Observations], setup: Setup) -> list[Observations]:
     found = []
     for item in data:
         true, best = _depths(item, setup), (np.inf, item)
-        for share in _TURNS:
+        for share in CRITERIA.controls.clock_shifts:
             other = _turned(item, float(share))
             depths = _depths(other, setup)
-            shallow = depths.max() < _STILL_PUSHES * true.max()
+            shallow = depths.max() < CRITERIA.controls.least_depth_share * true.max()
             agreement = (
                 float(depths @ true)
                 / max(float(np.linalg.norm(depths) * np.linalg.norm(true)), 1e-12)

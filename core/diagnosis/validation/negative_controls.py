@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction, predict
 from palpate.diagnosis.forward.ray_comparison import Sample
 from palpate.diagnosis.inference.evidence import Block, fit
@@ -33,22 +34,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.mesh.protocol import Meshing
 from palpate.setup.setup import Setup
 
-__all__ = ["ALIKE", "KEPT", "Control", "controls", "judge", "warnings_of"]
-
-MOST_SEQUENCES, MOST_GROUPS = 3, 6
-"""Sequences that are falsified, and groups near the block in each: those in which the causes change
-most."""
-ALIKE = 0.5
-"""Share of the cause's pattern that falsified motions may imitate [1]; beyond it the control says
-nothing about the cause."""
-KEPT = 0.5
-"""Share of its gain that a cause may keep [1]: falsified motions that are `ALIKE` would leave a
-true one as much."""
-_TOLERANCE = 2e-3
-"""Residual of a falsified replay [1], over the tool's push; its mesh is the rough one."""
-FAINT = 8.0
-"""Gains up to this [nats] are as good as none: two standard deviations of a difference of log
-densities of that size."""
+__all__ = ["Control", "controls", "judge", "warnings_of"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,22 +58,26 @@ class Control:
     @property
     def passed(self) -> bool | None:
         """Whether the gain was lost; None where the control says nothing of this cause."""
-        return None if self.why else self.gain < max(KEPT * self.true, FAINT)
+        return (
+            None
+            if self.why
+            else self.gain < max(CRITERIA.controls.retained * self.true, CRITERIA.controls.faint)
+        )
 
     @property
     def why(self) -> str:
         """Why the control says nothing; empty where it does."""
-        if self.alike > ALIKE:
+        if self.alike > CRITERIA.controls.alike:
             return f"with these motions {self.effect} would look {100 * self.alike:.0f} % as it does with the true ones"
         return (
             f"{self.effect} gains too little on these frames to lose it"
-            if self.true <= FAINT
+            if self.true <= CRITERIA.controls.faint
             else ""
         )
 
     def to_json(self) -> dict[str, Any]:
         """As the report has it."""
-        kept = None if self.true <= FAINT else round(self.gain / self.true, 4)
+        kept = None if self.true <= CRITERIA.controls.faint else round(self.gain / self.true, 4)
         return {
             "control": self.control,
             "effect": self.effect,
@@ -156,11 +146,11 @@ def _chosen(
         for number in np.argsort([-size.sum() for size in shown]).tolist()
         if not data[number].unseen
     ]
-    for number in sorted(order[:MOST_SEQUENCES]):
+    for number in sorted(order[: CRITERIA.controls.most_sequences]):
         groups = data[number].groups
         clear = [row for row, group in enumerate(groups) if group.free or group.reference]
         near = [row for row in np.argsort(-shown[number]).tolist() if row not in clear]
-        chosen[number] = sorted([*clear, *near[:MOST_GROUPS]])
+        chosen[number] = sorted([*clear, *near[: CRITERIA.controls.most_groups]])
     return chosen
 
 
@@ -179,9 +169,13 @@ def _false_patterns(
     """What tells the first setup from each of the others (g, r) along falsified motions, at points
     that are settled.
     """
-    whole = predict(item, setups[0], grid, tolerance=_TOLERANCE, samples=samples)
+    whole = predict(
+        item, setups[0], grid, tolerance=CRITERIA.replay.control_tolerance, samples=samples
+    )
     others = [
-        predict(item, setup, grid, None, whole.equilibria, _TOLERANCE, samples)
+        predict(
+            item, setup, grid, None, whole.equilibria, CRITERIA.replay.control_tolerance, samples
+        )
         for setup in setups[1:]
     ]
     return [_pattern(whole, other) for other in others]

@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.gain.force_gain import FeltLadder
 from palpate.diagnosis.gain.gain_ladder import Ladder
 from palpate.diagnosis.inference.residual_structure import Structure
 from palpate.diagnosis.search.findings import Findings
 
 __all__ = ["leaves_most", "objection"]
-
-_WORSE = 0.1
-"""Share of the reducible error that a cause surely adds on test sequences before it is withdrawn
-[1]: less may be the mesh's."""
-_LEFT = 0.5
-"""Share of the structure over chance that a cause may leave at most [1], where it leaves as much of
-the reducible error on test sequences. A softer lump had stood for a second body against the block's
-side: it removed 29 % (23 to 47 %) there, and a quarter of the structure. Where a cause was rightly
-named, nothing significant was left, or less than a seventh of what there was."""
 
 
 def objection(findings: Findings, gain: Ladder | FeltLadder | None) -> str:
@@ -29,7 +21,7 @@ def objection(findings: Findings, gain: Ladder | FeltLadder | None) -> str:
 
 def _harm(names: str, gain: Ladder | FeltLadder | None) -> str:
     """They do not carry over: the test sequences get worse."""
-    if gain is None or gain.removed[2] > -_WORSE:
+    if gain is None or gain.removed[2] > -CRITERIA.rejection.added_error:
         return ""
     value, low, high = gain.removed
     return (
@@ -62,8 +54,10 @@ def leaves_most(before: Structure, left: Structure, removed: float | None) -> bo
     it, and of the reducible error on test sequences no more than the smaller part is `removed` [1];
     None without such sequences.
     """
-    stays = left.significant and left.ratio - 1.0 >= _LEFT * max(before.ratio - 1.0, 0.0)
-    return stays and (removed is None or removed <= 1.0 - _LEFT)
+    stays = left.significant and left.ratio - 1.0 >= CRITERIA.rejection.left_share * max(
+        before.ratio - 1.0, 0.0
+    )
+    return stays and (removed is None or removed <= 1.0 - CRITERIA.rejection.left_share)
 
 
 def _share(gain: Ladder | FeltLadder) -> str:

@@ -19,28 +19,15 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.evidence import Block, fit, less_constants, log_evidence
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import Bench
-from palpate.diagnosis.inference.noise_model import STIFFNESS_ERROR, Noise
+from palpate.diagnosis.inference.noise_model import Noise
 from palpate.diagnosis.validation.worst_location import Worst, gathered
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["USUAL", "Asked", "asked_of", "bound_for", "most_asked"]
-
-USUAL = 0.5
-"""Of the deviation of local stiffness that the noise allows: what replays have asked for where
-nothing was hidden, at most [1].
-
-Six controls of the virtual bench (24 sequences) and block 01 of another solver ask for less, or by
-less than 1.2 nats for more."""
-_MOVES = (0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0)
-_SPOTS = (0.05, 0.1, 0.2, 0.35, USUAL)
-_MORE = (0.7, 1.0, 1.4, 2.0, 3.0, 4.0, 6.0)
-"""Deviations that are tried, of the allowed ones [1]: of displacement, of local stiffness as usual,
-and above."""
-FALSE = 1e-3
-"""How often some sequence of a dataset may ask for more by chance."""
+__all__ = ["Asked", "asked_of", "bound_for", "most_asked"]
 
 
 @dataclass(frozen=True)
@@ -76,7 +63,7 @@ class Asked:
         """For people; empty where nothing unusual is asked for."""
         if not self.significant:
             return ""
-        usual = 100 * USUAL * STIFFNESS_ERROR
+        usual = 100 * CRITERIA.stiffness_error.usual * CRITERIA.noise.stiffness_error
         return (
             f"{self.sequence} would need local stiffness that is off by {usual * self.factor:.0f} %, in a pattern of its own; a "
             f"replay's own error is like {usual:.0f} % at most: something acts there that is not modelled"
@@ -84,11 +71,11 @@ class Asked:
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
-        deviation = USUAL * STIFFNESS_ERROR * self.factor
+        deviation = CRITERIA.stiffness_error.usual * CRITERIA.noise.stiffness_error * self.factor
         return {
             "sequence": self.sequence,
             "deviation": round(deviation, 4),
-            "usual": USUAL * STIFFNESS_ERROR,
+            "usual": CRITERIA.stiffness_error.usual * CRITERIA.noise.stiffness_error,
             "gain_nats": round(self.gain, 2),
             "bound_nats": round(self.bound, 2),
         }
@@ -128,7 +115,7 @@ def bound_for(sequences: int) -> float:
     Half of the time less than the usual fits best, which gains nothing, and else as chi squared of
     one freedom does (Self and Liang 1987, case 5).
     """
-    return 0.5 * float(chi2.isf(2 * FALSE / sequences, 1))
+    return 0.5 * float(chi2.isf(2 * CRITERIA.stiffness_error.false_alarms / sequences, 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,9 +146,19 @@ def asked_of(
         found[fixed:, fixed:] = np.diag(deviation**-2)
         return found
 
-    usual = max(log_evidence([block], columns, prior(*pair)) for pair in product(_MOVES, _SPOTS))
+    usual = max(
+        log_evidence([block], columns, prior(*pair))
+        for pair in product(
+            CRITERIA.stiffness_error.displacement_deviations,
+            CRITERIA.stiffness_error.usual_deviations,
+        )
+    )
     more, move, spot = max(
-        (log_evidence([block], columns, prior(*pair)), *pair) for pair in product(_MOVES, _MORE)
+        (log_evidence([block], columns, prior(*pair)), *pair)
+        for pair in product(
+            CRITERIA.stiffness_error.displacement_deviations,
+            CRITERIA.stiffness_error.larger_deviations,
+        )
     )
     errors = fit([block], columns, prior(move, spot)).change[-spots:]
-    return Wanted(spot / USUAL, max(more - usual, 0.0), errors)
+    return Wanted(spot / CRITERIA.stiffness_error.usual, max(more - usual, 0.0), errors)

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.foundation.arrays import FloatArray
 
 __all__ = ["Worst", "gathered", "worst_patch", "worst_push"]
-
-_AROUND = 8e-3
 
 
 @dataclass(frozen=True)
@@ -25,12 +24,14 @@ class Worst:
 
     def __str__(self) -> str:
         x, y, z = (1e3 * part for part in self.place)
-        return f"{100 * self.share:.0f} % of it within {1e3 * _AROUND:.0f} mm of ({x:.0f}, {y:.0f}, {z:.0f}) mm"
+        return f"{100 * self.share:.0f} % of it within {1e3 * CRITERIA.verdict.location_radius:.0f} mm of ({x:.0f}, {y:.0f}, {z:.0f}) mm"
 
 
 def gathered(centres: FloatArray, total: FloatArray) -> Worst:
     """Of places (p, 3) [m] that with the most of a total (p,) around it."""
-    around = (np.linalg.norm(centres[:, None] - centres, axis=2) < _AROUND) @ total
+    around = (
+        np.linalg.norm(centres[:, None] - centres, axis=2) < CRITERIA.verdict.location_radius
+    ) @ total
     worst = int(around.argmax())
     x, y, z = (float(part) for part in centres[worst])
     return Worst((x, y, z), float(around[worst] / max(total.sum(), 1e-300)))

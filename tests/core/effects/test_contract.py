@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pushed_block import looking_at
 
-from palpate.diagnosis.inference.effect_derivative import SMALL
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.effects import CATALOGUE, Effect, Slot, effect_named, from_json
 from palpate.effects.elastic_material import StiffInclusion, YoungModulus
 from palpate.effects.heterogeneity import Anisotropy
@@ -299,7 +299,7 @@ def test_small_step_from_the_end_of_what_a_search_reaches_gives_and_takes_nothin
             coordinates[number] = item.coordinate(far)
             end = start.at(coordinates)
             beside = end.coordinates
-            beside[number] += back * SMALL * item.scale
+            beside[number] += back * CRITERIA.derivatives.step * item.scale
             assert _kinds(end.apply(SETUP)) == _kinds(end.at(beside).apply(SETUP)), item.name
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pushed_block import EYE, GRID, SETUP, TOP, prediction, registration
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.design.candidate_pushes import Push, pushes
 from palpate.diagnosis.design.next_probe import Pair, _advice, _choices, _instead, pairs_of
 from palpate.diagnosis.design.predictive_distance import Scene, Survivor, _divergence, nats_of
@@ -16,7 +17,7 @@ from palpate.diagnosis.inference.evidence import Block, gram
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.residual_structure import Structure
-from palpate.diagnosis.search.findings import RIVAL, Findings, Trial
+from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.identifiability import Limit, Told
 from palpate.diagnosis.search.screening import Candidate
 from palpate.effects import Effect
@@ -171,8 +172,8 @@ def test_rivals_are_told_apart_and_the_best_needs_less_to_win(bench):
     ]
     (pair,) = pairs_of(bench, _findings(bench, *trials))
     assert pair.names == ("tool_radius", "stiff_inclusion") and pair.needed == (
-        RIVAL - 5,
-        RIVAL + 5,
+        CRITERIA.naming.rival - 5,
+        CRITERIA.naming.rival + 5,
     )
     known, open_numbers = pair.models[0].covariance, pair.models[1].varied
     assert known is not None and known.shape == (9, 9) and len(open_numbers) == 5

@@ -17,6 +17,7 @@ from pushed_block import (
     seen_points,
 )
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward import jacobian as columns_module
 from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS, Wanted
 from palpate.diagnosis.forward.prediction import Prediction, predict
@@ -217,7 +218,8 @@ def test_where_a_grid_is_about_to_give_way_the_column_is_the_difference_over_a_m
 
     assert miss(here.columns[..., 1]) < 0.35
     assert miss(here.columns[..., TOOL_COLUMNS]) < 0.35
-    monkeypatch.setattr(columns_module, "_MOST_RESPONSE", np.inf)
+    criteria = replace(CRITERIA, derivatives=replace(CRITERIA.derivatives, most_response=np.inf))
+    monkeypatch.setattr(columns_module, "CRITERIA", criteria)
     assert miss(predict(item, SETUP, grid, wanted, tolerance=TIGHT).columns[..., 1]) > 1.0
 
 

@@ -5,8 +5,8 @@ import pytest
 from scipy.linalg import null_space
 from scipy.stats import multivariate_normal
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.evidence import (
-    FLAT,
     Block,
     fit,
     gram,
@@ -125,7 +125,7 @@ def test_predictive_score_is_the_density_of_each_block_given_the_others():
             whole - others, abs=1e-9
         )
     assert scores[-1] == pytest.approx(
-        whole - _density(values, np.diag([4.0 * FLAT, 2.0])), abs=1e-6
+        whole - _density(values, np.diag([4.0 * CRITERIA.priors.flat_factor, 2.0])), abs=1e-6
     )
 
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from pushed_block import CORNERS, SETUP, observed, poke, registration
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import Bench
-from palpate.diagnosis.inference.mesh_discrepancy import MESH_SPREAD, OWN_GRID, too_coarse
+from palpate.diagnosis.inference.mesh_discrepancy import OWN_GRID, too_coarse
 from palpate.diagnosis.search.candidates import (
     _same_effect,
     begin,
@@ -67,7 +68,7 @@ def test_grid_that_is_good_enough_is_not_named_and_costs_no_column():
     _, model, candidates, gains = _screened(STATED)
     assert gains["mesh_resolution"] < 5.0
     (own,) = [candidate for candidate in candidates if candidate.start.name == "mesh_resolution"]
-    assert own.columns == () and own.widened == {model.nuisance[-1]: MESH_SPREAD}
+    assert own.columns == () and own.widened == {model.nuisance[-1]: CRITERIA.priors.mesh_multiple}
     sizes = [rows for rows in _same_effect(model) if isinstance(rows[0][1].effect, GeometryScale)]
     assert [[tangent.of for _, tangent in rows] for rows in sizes] == [
         ["scale_x", "scale_y", "scale_z"]
@@ -77,7 +78,9 @@ def test_grid_that_is_good_enough_is_not_named_and_costs_no_column():
 def test_candidate_of_the_own_grid_is_the_last_nuisance_with_a_wider_prior():
     model = Model((), SETUP, (), (), (), {}, (0, 1, 2))
     columns, precision = mesh_candidate(model).precision([0, 1, 2], np.eye(3))
-    assert columns == [0, 1, 2] and precision[2, 2] == pytest.approx(1 / (1 + MESH_SPREAD**2))
+    assert columns == [0, 1, 2] and precision[2, 2] == pytest.approx(
+        1 / (1 + CRITERIA.priors.mesh_multiple**2)
+    )
     assert mesh_candidate(model).start == MeshResolution.neutral(SETUP)
 
 

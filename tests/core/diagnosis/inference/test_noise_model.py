@@ -7,13 +7,8 @@ import pytest
 from pushed_block import GRID, SETUP, poke, prediction
 from scipy.linalg import null_space
 
-from palpate.diagnosis.inference.noise_model import (
-    DISPLACEMENT_ERROR,
-    STIFFNESS_ERROR,
-    Noise,
-    noises,
-    patch_variance,
-)
+from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.inference.noise_model import Noise, noises, patch_variance
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.surface_gaps import Surface
 from palpate.replay.replay import replay
@@ -151,9 +146,11 @@ def test_noise_states_the_engines_accuracy_at_every_touched_patch():
     )[0]
     moved = np.linalg.norm(frames[1].move(surface.patch_centres) - surface.patch_centres, axis=1)
     displacement, stiffness = noise.discrepancy[..., :-2], noise.discrepancy[..., -2:]
-    assert np.allclose(np.linalg.norm(displacement[1], axis=1), DISPLACEMENT_ERROR * moved)
+    assert np.allclose(
+        np.linalg.norm(displacement[1], axis=1), CRITERIA.noise.displacement_error * moved
+    )
     assert not displacement[0].any()
-    assert np.allclose(stiffness, STIFFNESS_ERROR * columns[..., 3:])
+    assert np.allclose(stiffness, CRITERIA.noise.stiffness_error * columns[..., 3:])
     assert (noise.weights[1, [7, 9]] == 0).all() and (noise.residual[1, [7, 9]] == 0).all()
     assert noise.weights[0, 0] < (0.5 * 2e-4) ** -2  # half the meshes' difference counts as scatter
     assert np.allclose(noise.mesh[0], 2e-4)

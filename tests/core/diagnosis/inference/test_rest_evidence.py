@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from pushed_block import CORNERS, GRID, SETUP
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.evidence import Block, fit
-from palpate.diagnosis.inference.rest_evidence import TOUCH, touch_block
+from palpate.diagnosis.inference.rest_evidence import touch_block
 from palpate.effects import Effect
 from palpate.effects.geometry import GeometryScale
 from palpate.effects.tool import LandmarkMismatch
@@ -51,7 +52,10 @@ def _block(setup: Setup, effect: Effect | None = None, name: str = "", step: flo
 
 
 def test_right_touches_cost_what_their_noise_does():
-    costs = [_block(_registered(STATED, TOUCH, seed)).gram[0, 0] for seed in range(200)]
+    costs = [
+        _block(_registered(STATED, CRITERIA.rest.touch_deviation, seed)).gram[0, 0]
+        for seed in range(200)
+    ]
     assert np.mean(costs) == pytest.approx(_block(STATED).values, rel=0.15)
     assert _block(STATED).values == 3 * 4 - 6
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from palpate.dataset import Forces, Kinematics, Sequence
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.applicable_effects import FELT, weighed
 from palpate.diagnosis.observation.force_only import deepest_rows, observe_forces, pushed_places
-from palpate.diagnosis.search.inclusion_grid import DEPTHS, lumps_under
+from palpate.diagnosis.search.inclusion_grid import lumps_under
 from palpate.effects import DIAGNOSED
 from palpate.effects.elastic_material import StiffInclusion, YoungModulus
 from palpate.effects.heterogeneity import SurfaceLayer
@@ -101,7 +102,7 @@ def test_lumps_are_looked_for_below_the_pushes_and_within_the_body() -> None:
     places = np.array([[0.0, 0.0, 0.03], [0.002, 0.0, 0.03], [0.02, 0.0, 0.03]])
     found = lumps_under(places, np.tile([0.0, 0.0, 1.0], (3, 1)), SETUP.box)
     assert [(lump.x, round(0.03 - lump.z, 6)) for lump in found] == [
-        (x, depth) for x in (0.0, 0.02) for depth in DEPTHS
+        (x, depth) for x in (0.0, 0.02) for depth in CRITERIA.inclusion_grid.depths
     ]
     flat = lumps_under(
         np.array([[0.0, 0.0, 0.01]]), np.array([[0.0, 0.0, 1.0]]), Box(size=(0.06, 0.04, 0.01))

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from pushed_block import GRID, POSE, SETUP, SIZE, TOP, dwelling, observed, poke, registration
 from small_dataset import write_valid_dataset
-from virtual_push import hide, push
+from virtual_push import hide, simulate_push
 
 from palpate.dataset import Forces, open_dataset
 from palpate.dataset.tool_smoothing import SMOOTHING
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS, Wanted
 from palpate.diagnosis.forward.prediction import predict
 from palpate.diagnosis.forward.worker_pool import Workers
@@ -18,7 +19,6 @@ from palpate.diagnosis.inference.credible_intervals import modulus_interval
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.observation.force_record import (
-    FORCE_ERROR,
     Felt,
     ForceRecord,
     force_discrepancy,
@@ -164,9 +164,9 @@ CHANGED = {
 
 @pytest.mark.parametrize("name", CHANGED)
 def test_column_of_the_force_is_the_difference_of_two_predictions(item, name):
-    column, changed, step = CHANGED[name]
+    column, mean_square_change, step = CHANGED[name]
     here = predict(item, SETUP, GRID, WANTED, tolerance=TIGHT)
-    there = predict(item, changed, GRID, None, here.equilibria, TIGHT, here.samples)
+    there = predict(item, mean_square_change, GRID, None, here.equilibria, TIGHT, here.samples)
     assert here.felt is not None and there.felt is not None
     wanted, found = (there.felt.gap - here.felt.gap) / step, here.felt.columns[..., column]
     assert np.linalg.norm(wanted) > 0
@@ -196,8 +196,14 @@ def test_engines_own_error_is_one_factor_for_each_push():
     still, pressed = (replay(SETUP, centre[None], GRID)[0] for centre in (poke(-8e-3), poke(2e-3)))
     columns = force_discrepancy(felt, [still, pressed, pressed, still, pressed])
     assert columns.shape == (5, 3, 2)
-    assert np.allclose(columns[1:3, :, 0], FORCE_ERROR * force[1:3]) and not columns[3:, :, 0].any()
-    assert np.allclose(columns[4, :, 1], FORCE_ERROR * force[4]) and not columns[:4, :, 1].any()
+    assert (
+        np.allclose(columns[1:3, :, 0], CRITERIA.force_error.push_error * force[1:3])
+        and not columns[3:, :, 0].any()
+    )
+    assert (
+        np.allclose(columns[4, :, 1], CRITERIA.force_error.push_error * force[4])
+        and not columns[:4, :, 1].any()
+    )
     assert np.allclose(force_scatter(felt)[0], 1e-6)
 
 
@@ -210,16 +216,18 @@ def _sequence(name: str, side: bool, depth: float) -> Observations:
     """A block of TRUE stiffness as the virtual bench knows it: another mesh, element and law than
     the replay's.
     """
-    (stretch,) = push(hide("young_modulus", E=TRUE), depth=depth, side=side, fine=2.8e-3).stretches
-    arcs = stretch.passages[0].arcs[-1] - np.array([depth + 3e-3, depth - DEPTHS[0], 0.0])
-    times, stream = dwelling(stretch.probe.place(arcs))
+    (solved,) = simulate_push(
+        hide("young_modulus", E=TRUE), depth=depth, side=side, fine=2.8e-3
+    ).solved_pushes
+    arcs = solved.segments[0].arcs[-1] - np.array([depth + 3e-3, depth - DEPTHS[0], 0.0])
+    times, stream = dwelling(solved.push.place(arcs))
     groups = []
     for number, arc in enumerate(arcs):
         points = _cloud(
-            stretch.rest, stretch.faces, stretch.passages[0].surface(float(arc)), 10 * side + number
+            solved.rest, solved.faces, solved.segments[0].surface(float(arc)), 10 * side + number
         )
-        groups.append(Group((number,), points, number == 0, probe=min(number, 1)))
-    force = -stretch.passages[0].push(arcs)
+        groups.append(Group((number,), points, number == 0, push=min(number, 1)))
+    force = -solved.segments[0].tool_force(arcs)
     item = Observations(name, times, stream, tuple(groups))
     return _felt(item, force + 3e-3 * np.random.default_rng(int(side)).standard_normal(force.shape))
 

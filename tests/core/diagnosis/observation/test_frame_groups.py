@@ -11,13 +11,8 @@ from small_dataset import ply_bytes
 
 from palpate.dataset import Kinematics, Sequence
 from palpate.dataset.tool_smoothing import SMOOTHING, smooth_centres
-from palpate.diagnosis.observation.frame_groups import (
-    FAR,
-    MOST_UNTOUCHED,
-    TRAVEL,
-    Observations,
-    observe,
-)
+from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.observation.frame_groups import FAR, Observations, observe
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.segmentation import Cleaner
@@ -116,7 +111,7 @@ def test_groups_hold_frames_of_one_place_in_the_order_of_time(sequence):
         here = centres[list(group.frames)]
         clear = distance_to_block(SIZE, here) > 6.5e-3
         assert (clear == group.free).all()
-        assert group.free or np.linalg.norm(here - here[0], axis=1).max() < TRAVEL
+        assert group.free or np.linalg.norm(here - here[0], axis=1).max() < CRITERIA.grouping.travel
     assert any(len(group.frames) > 1 for group in groups if not group.free)
 
 
@@ -142,8 +137,8 @@ def test_thinning_keeps_untouched_groups_and_the_whole_range_of_touched_ones(seq
 def test_points_of_all_frames_of_a_group_are_cleaned_and_joined(sequence):
     for group in _observed(sequence).groups:
         raw = sum(sequence.count(frame) for frame in group.frames)
-        assert min(0.5 * raw, MOST_UNTOUCHED) <= len(group.points) <= raw
-        assert len(group.points) <= MOST_UNTOUCHED or not group.free
+        assert min(0.5 * raw, CRITERIA.grouping.most_points_untouched) <= len(group.points) <= raw
+        assert len(group.points) <= CRITERIA.grouping.most_points_untouched or not group.free
         assert distance_to_block(SIZE, POSE.apply(group.points)).max() < 0.01
 
 
@@ -175,7 +170,7 @@ def test_frames_near_one_another_by_one_clock_are_not_by_another(sequence):
     for group in found.groups:
         here = moved[list(group.frames)]
         assert ((distance_to_block(SIZE, here) > 6.5e-3) == group.free).all()
-        assert group.free or np.linalg.norm(here - here[0], axis=1).max() < TRAVEL
+        assert group.free or np.linalg.norm(here - here[0], axis=1).max() < CRITERIA.grouping.travel
 
 
 def test_centres_follow_the_robots_registration(sequence):

@@ -12,12 +12,13 @@ import pytest
 from palpated import write_palpation
 
 from palpate.dataset import open_dataset
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.gain.force_gain import felt_ladder
 from palpate.diagnosis.observation.force_record import Felt
 from palpate.diagnosis.observation.frame_groups import Group, Observations
 from palpate.diagnosis.pipeline import diagnose
-from palpate.diagnosis.report.inclusion_footprint import HALF, RINGS, WAYS, outline
+from palpate.diagnosis.report.inclusion_footprint import outline
 from palpate.diagnosis.report.palpation_figure import section
 from palpate.diagnosis.validation.force_controls import exchanged
 from palpate.foundation.arrays import FloatArray
@@ -75,7 +76,9 @@ def test_lump_is_felt_placed_and_marked(tmp_path: Path) -> None:
         cause["depth"]["value"] - found["radius"], abs=1e-6
     )
     contour = np.array(cause["footprint"]["contour"])
-    assert contour.shape == (WAYS, 3) and contour[:, 2] == pytest.approx(SIZE[2])
+    assert contour.shape == (CRITERIA.footprint.directions, 3) and contour[:, 2] == pytest.approx(
+        SIZE[2]
+    )
     assert np.linalg.norm(contour[:, :2].mean(axis=0) - (LUMP.x, LUMP.y)) < 3e-3
     told = report["palpation"]["young_modulus"]
     assert told["low"] < E < told["high"] and not report["not_identifiable"]
@@ -88,12 +91,18 @@ def test_lump_is_felt_placed_and_marked(tmp_path: Path) -> None:
 
 
 def test_outline_is_where_the_change_falls_to_the_level() -> None:
-    change = np.tile(np.array([0.7, 0.3, 0.0, 0.0])[:, None], WAYS)
+    change = np.tile(np.array([0.7, 0.3, 0.0, 0.0])[:, None], CRITERIA.footprint.directions)
     change[2, 0] = change[3, 0] = 0.9  # one way on which it never falls
-    found = outline(1.0, change, HALF)
-    halfway = RINGS[0] + (0.7 - HALF) / (0.7 - 0.3) * (RINGS[1] - RINGS[0])
-    assert found[1:] == pytest.approx(halfway) and found[0] == RINGS[-1]
-    assert outline(0.1, np.zeros((len(RINGS), WAYS)), HALF) == pytest.approx(RINGS[0] / 2)
+    found = outline(1.0, change, CRITERIA.footprint.level)
+    halfway = CRITERIA.footprint.rings[0] + (0.7 - CRITERIA.footprint.level) / (0.7 - 0.3) * (
+        CRITERIA.footprint.rings[1] - CRITERIA.footprint.rings[0]
+    )
+    assert found[1:] == pytest.approx(halfway) and found[0] == CRITERIA.footprint.rings[-1]
+    assert outline(
+        0.1,
+        np.zeros((len(CRITERIA.footprint.rings), CRITERIA.footprint.directions)),
+        CRITERIA.footprint.level,
+    ) == pytest.approx(CRITERIA.footprint.rings[0] / 2)
 
 
 def test_cut_through_a_body_is_its_outline() -> None:

@@ -10,12 +10,13 @@ from noisy_model import LUMP, RADIUS, noisy_model, stated_bench
 from small_dataset import write_valid_dataset
 
 from palpate.dataset import Dataset, open_dataset
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.gain.gain_ladder import Ladder
 from palpate.diagnosis.inference.camera_error_model import Ripple
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.residual_structure import Structure
-from palpate.diagnosis.report.report import UNEXPLAINED_MISFIT, report_of, verdict_of
-from palpate.diagnosis.search.findings import RIVAL, Findings, Trial
+from palpate.diagnosis.report.report import report_of, verdict_of
+from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.validation.held_out_test import HeldOut
 from palpate.diagnosis.validation.rejection import objection
 from palpate.diagnosis.validation.stiffness_error_test import Asked
@@ -64,14 +65,22 @@ def _findings(bench: Bench, *trials: Tried, accepted: bool = True, misfit: float
 
 def test_one_cause_far_ahead_is_found(bench):
     assert (
-        verdict_of(_findings(bench, ((LUMP,), 90.0, 1.05), ((RADIUS,), 90.0 - 1.1 * RIVAL, 1.4)))
+        verdict_of(
+            _findings(
+                bench, ((LUMP,), 90.0, 1.05), ((RADIUS,), 90.0 - 1.1 * CRITERIA.naming.rival, 1.4)
+            )
+        )
         == "found"
     )
 
 
 def test_two_causes_about_as_good_are_ambiguous(bench):
     assert (
-        verdict_of(_findings(bench, ((LUMP,), 90.0, 1.05), ((RADIUS,), 90.0 - 0.9 * RIVAL, 1.1)))
+        verdict_of(
+            _findings(
+                bench, ((LUMP,), 90.0, 1.05), ((RADIUS,), 90.0 - 0.9 * CRITERIA.naming.rival, 1.1)
+            )
+        )
         == "ambiguous"
     )
 
@@ -87,7 +96,7 @@ def test_part_of_a_pair_is_no_rival(bench):
 
 
 @pytest.mark.parametrize(
-    ("left", "wanted"), [(1.02, "none"), (UNEXPLAINED_MISFIT + 0.2, "unexplained")]
+    ("left", "wanted"), [(1.02, "none"), (CRITERIA.verdict.unexplained_misfit + 0.2, "unexplained")]
 )
 def test_without_a_cause_it_depends_on_what_is_left(bench, left, wanted):
     assert verdict_of(_findings(bench, ((LUMP,), 3.0, 1.0), accepted=False, misfit=left)) == wanted

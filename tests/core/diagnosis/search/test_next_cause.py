@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from pushed_block import SETUP
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.residual_structure import Structure
-from palpate.diagnosis.search.findings import LEAST_GAIN, Findings, Trial
-from palpate.diagnosis.search.forward_selection import PROMISING, _asks_for_more, _needed
+from palpate.diagnosis.search.findings import Findings, Trial
+from palpate.diagnosis.search.forward_selection import _asks_for_more, _needed
 from palpate.effects.support import BaseCompliance
 
 STATED = Model((), SETUP, (), (), (), {}, ())
@@ -40,14 +41,14 @@ def test_nothing_is_named_beside_an_only_cause(only: float, best: float):
 
 
 def test_where_structure_is_left_a_fainter_second_cause_is_let_in():
-    assert _second(2508.0, LOUD) == 2 * LEAST_GAIN < _second(2508.0)
+    assert _second(2508.0, LOUD) == 2 * CRITERIA.naming.least_gain < _second(2508.0)
 
 
 def test_what_tangents_know_little_of_is_refitted_beside_a_cause_only_where_another_might_be_named():
     needed = _second(994.0)
     quiet, promising = (
-        np.array([3.0, 0.9 * PROMISING * needed]),
-        np.array([3.0, 1.1 * PROMISING * needed]),
+        np.array([3.0, 0.9 * CRITERIA.naming.promising * needed]),
+        np.array([3.0, 1.1 * CRITERIA.naming.promising * needed]),
     )
     assert _asks_for_more(Findings(STATED), Trial(STATED, 0.0, 1.2), quiet)
     soft = Trial(SOFT, 994.0, 1.06)

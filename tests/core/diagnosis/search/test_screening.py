@@ -6,7 +6,8 @@ from linear_blocks import linear_blocks
 from pushed_block import SETUP
 from scipy.stats import ks_2samp
 
-from palpate.diagnosis.inference.evidence import FLAT, Block, log_evidence, predictive_score
+from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.inference.evidence import Block, log_evidence, predictive_score
 from palpate.diagnosis.search.screening import (
     Candidate,
     linear_gains,
@@ -80,7 +81,7 @@ def test_wider_prior_is_judged_against_the_same_flat_one():
         assert found[number] == pytest.approx(
             scores[0] + evidence[0] - scores[1] - evidence[1], abs=1e-8
         )
-    assert log_evidence(blocks, NUISANCE, FLAT * KNOWN) < evidence[0]
+    assert log_evidence(blocks, NUISANCE, CRITERIA.priors.flat_factor * KNOWN) < evidence[0]
 
 
 def test_chance_stays_below_its_own_quantile_in_fresh_data():

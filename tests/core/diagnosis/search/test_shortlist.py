@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from pushed_block import SETUP, prediction, registration
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.inference.evidence import Block, gram
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.search.screening import Candidate
-from palpate.diagnosis.search.shortlist import SHORTLIST, beyond_first_order, shortlist
+from palpate.diagnosis.search.shortlist import beyond_first_order, shortlist
 from palpate.effects.elastic_material import PoissonRatio, StiffInclusion
 from palpate.effects.load import Gravity
 from palpate.effects.sensor import CameraRegistration, TimeOffset
@@ -82,7 +83,9 @@ def test_what_lies_within_the_stated_accuracy_is_not_refitted_for_it(bench):
 def test_settled_one_comes_first_and_takes_nobodys_place():
     candidates = [SAG, CLOCK, SLIDING, NU, RADIUS]
     gains = np.array([30.0, 50.0, 40.0, 20.0, -3.0])
-    assert shortlist(gains, candidates, 10.0) == [CLOCK, SLIDING, SAG][:SHORTLIST]
+    assert (
+        shortlist(gains, candidates, 10.0) == [CLOCK, SLIDING, SAG][: CRITERIA.screening.shortlist]
+    )
     assert shortlist(gains, candidates, 10.0, [RADIUS]) == [RADIUS, CLOCK, SLIDING, SAG]
     assert shortlist(gains, candidates, 10.0, [CLOCK]) == [CLOCK, SLIDING, SAG, NU]
 

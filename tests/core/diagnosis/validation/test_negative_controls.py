@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pushed_block import GRID, SETUP, observed, poke, registration
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.inference.evidence import Block, gram
@@ -14,14 +15,7 @@ from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.noise_model import Noise
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.validation.falsified_motions import FALSIFIED
-from palpate.diagnosis.validation.negative_controls import (
-    ALIKE,
-    FAINT,
-    Control,
-    controls,
-    judge,
-    warnings_of,
-)
+from palpate.diagnosis.validation.negative_controls import Control, controls, judge, warnings_of
 from palpate.effects.tool import ToolRadius
 from palpate.mesh.box_mesh import GridSpec
 
@@ -57,7 +51,7 @@ def _judged(bench: Bench, true: float, false: float, alike: float = 0.0) -> Cont
 
 def test_cause_whose_pattern_the_data_hold_loses_its_gain(bench):
     control = _judged(bench, 1.0, 0.0)
-    assert control.true > 20 and control.gain < FAINT and control.passed
+    assert control.true > 20 and control.gain < CRITERIA.controls.faint and control.passed
     assert control.to_json()["kept"] < 0.1 and warnings_of([control]) == []
 
 
@@ -75,7 +69,9 @@ def test_opposite_of_the_cause_gains_nothing(bench):
 
 def test_motions_that_look_the_same_say_nothing(bench):
     control = _judged(bench, 1.0, 0.0, alike=0.8)
-    assert control.alike > ALIKE and control.passed is None and "80 %" in control.why
+    assert (
+        control.alike > CRITERIA.controls.alike and control.passed is None and "80 %" in control.why
+    )
 
 
 def test_cause_without_a_gain_has_none_to_lose(bench):

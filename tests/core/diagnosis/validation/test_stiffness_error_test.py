@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 from pushed_block import CORNERS, SETUP, TOP, observed, poke, registration
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.inference.evidence import Block, gram
 from palpate.diagnosis.inference.inference_problem import Bench
-from palpate.diagnosis.inference.noise_model import STIFFNESS_ERROR
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.search.candidates import lump_places
 from palpate.diagnosis.validation.stiffness_error_test import (
-    USUAL,
     Asked,
     Wanted,
     asked_of,
@@ -97,14 +96,14 @@ def _asked(deviation: float, seed: int) -> Wanted:
     return asked_of(block, FITTED, np.eye(NUISANCES), OWN, SPOTS)
 
 
-@pytest.mark.parametrize("deviation", [0.05, USUAL])
+@pytest.mark.parametrize("deviation", [0.05, CRITERIA.stiffness_error.usual])
 def test_what_is_usual_is_rarely_too_much(deviation: float) -> None:
     gains = np.array([_asked(deviation, seed).gain for seed in range(200)])
     assert (gains > bound_for(1)).sum() <= 2 and np.median(gains) < 0.5
 
 
 def test_more_than_usual_is_measured() -> None:
-    found = [_asked(4 * USUAL, seed) for seed in range(20)]
+    found = [_asked(4 * CRITERIA.stiffness_error.usual, seed) for seed in range(20)]
     assert all(one.gain > bound_for(4) for one in found)
     assert np.median([one.factor for one in found]) == pytest.approx(4.0, rel=0.5)
 
@@ -116,8 +115,11 @@ def test_more_sequences_ask_for_more_by_chance() -> None:
 def test_factor_is_said_in_percent_of_stiffness() -> None:
     found = Asked("poke-side-01", 4.0, 13.2, 6.1, Worst((0.0, 0.0, 0.0), 1.0))
     assert (
-        f"off by {100 * 4 * USUAL * STIFFNESS_ERROR:.0f} %" in found.warning
+        f"off by {100 * 4 * CRITERIA.stiffness_error.usual * CRITERIA.noise.stiffness_error:.0f} %"
+        in found.warning
         and found.share == 1 - 1 / 16
     )
-    assert found.to_json()["deviation"] == pytest.approx(4 * USUAL * STIFFNESS_ERROR)
+    assert found.to_json()["deviation"] == pytest.approx(
+        4 * CRITERIA.stiffness_error.usual * CRITERIA.noise.stiffness_error
+    )
     assert replace(found, gain=5.0).warning == ""

@@ -1,0 +1,131 @@
+"""Thresholds of the report: verdict, figures, footprint, profiles, and the next probe."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.diagnosis.criteria.threshold import threshold
+
+__all__ = ["DesignCriteria", "FigureCriteria", "FootprintCriteria", "VerdictCriteria"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class VerdictCriteria:
+    """When something is unexplained, and which parameters are determined."""
+
+    unexplained_misfit: float = threshold(
+        1.25,
+        "1",
+        "Misfit per value above which structured error is left. The engine's own accuracy is in "
+        "the noise already.",
+    )
+    most_modulus_ratio: float = threshold(
+        2.0,
+        "1",
+        "Young's modulus is not identified if its interval reaches above this many times its "
+        "value.",
+    )
+    location_radius: float = threshold(
+        8e-3, "m", "Radius of the place around which most of an error is reported."
+    )
+    profile_fall: float = threshold(
+        1.92,
+        "nat",
+        "Fall of the evidence that ends a 95 % interval.",
+        "derived: half the quantile of chi squared with one degree of freedom",
+    )
+    profile_near: float = threshold(
+        2.5,
+        "1",
+        "First distance at which that fall is looked for, in deviations of the linearised fit.",
+        "derived: a parabola falls by 3.1 nats there",
+    )
+    profile_far: float = threshold(
+        6.0,
+        "1",
+        "Second distance at which that fall is looked for, in deviations of the linearised fit.",
+        "derived: a parabola falls by 18 nats there",
+    )
+    profile_evaluations: int = threshold(
+        6, "1", "Largest number of evaluations for all profiles of a model."
+    )
+    vague: float = threshold(
+        1.0,
+        "1",
+        "Half width of the linearised interval, in the parameter's scale, from which on a "
+        "parameter is profiled.",
+    )
+    takes_part: float = threshold(
+        0.3, "1", "Smallest component of a parameter that is named in the weakest direction."
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FigureCriteria:
+    """What the report's figures show."""
+
+    pattern_smoothing: float = threshold(
+        3.5e-3, "m", "Standard deviation of the smoothing of error patterns along a side."
+    )
+    least_points: int = threshold(5, "1", "Fewest points behind a shown value of a pattern.")
+    least_force_change: float = threshold(
+        5.0, "%", "Smallest change of the force that fills the colour scale."
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FootprintCriteria:
+    """The outline of where an inclusion changes the force of a push."""
+
+    rings: tuple[float, ...] = threshold(
+        (0.7, 1.3, 2.0, 2.8),
+        "1",
+        "Distances of the rings of pushes from the middle, in radii of the inclusion.",
+    )
+    directions: int = threshold(10, "1", "Number of pushes on each ring.")
+    level: float = threshold(
+        0.5, "1", "The outline lies where the change falls to this share of the largest."
+    )
+    draws: int = threshold(2000, "1", "Draws of an inclusion for the interval of its depth.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignCriteria:
+    """Candidates for the next probe, and how they are judged."""
+
+    shown: int = threshold(3, "1", "Largest number of probes that are proposed.")
+    fast: float = threshold(3.0, "1", "Factor on the usual speed where clocks are in question.")
+    half_depth_share: float = threshold(
+        0.9, "1", "Half the depth is proposed where it gives this share of the nats."
+    )
+    settled_gap: float = threshold(
+        200.0,
+        "nat",
+        "A rival this far behind the best is not tested: one visit separated the two by so much "
+        "that no push needs to.",
+    )
+    simulated_effects: int = threshold(
+        2, "1", "Number of effects at their detection limits that are tested if none was named."
+    )
+    hold: float = threshold(10.0, "s", "Hold that is tried where a material may have history.")
+    spacing: float = threshold(0.016, "m", "Distance between places that are tried, about.")
+    margin: float = threshold(
+        1.2, "1", "Distance of a place from the edges of its side, in radii of the tool."
+    )
+    side_height: float = threshold(
+        0.6, "1", "Height at which sides are pushed, over the block's height."
+    )
+    drag_length: float = threshold(0.012, "m", "Length of a drag.")
+    step: float = threshold(1e-3, "1", "Step of a derivative, in the parameter's scale.")
+    white_floor: float = threshold(
+        2e-5, "m", "Standard deviation of a patch's average that no number of points reduces."
+    )
+    least_points: int = threshold(2, "1", "Fewest points of a patch that counts as seen.")
+    shaft_places: tuple[float, ...] = threshold(
+        tuple(np.linspace(0.0, 0.08, 9).tolist()),
+        "m",
+        "Places along the shaft at which spheres of the tool's radius stand for it.",
+        "derived: the shaft leaves the block the way the tool came",
+    )
