@@ -1,7 +1,6 @@
-"""Evaluation: what a network, a named cause and both are worth on sequences that nothing was fitted
-on.
+"""Evaluation of the stated model, named causes and correction networks on test sequences.
 
-`palpate.evaluation.run_evaluation.evaluate` is the ladder of a dataset,
-`palpate.evaluation.paper_tables.run_paper` the three tables of Wu, Kazanzides and Unberath (2020);
-both are heavy to import.
+`palpate.evaluation.run_evaluation.evaluate` compares models on the test sequences of a dataset.
+`palpate.evaluation.paper_tables.run_paper` makes the three tables of Wu, Kazanzides and Unberath
+(2020). Both are imported separately because they load the solver and torch.
 """

@@ -1,6 +1,4 @@
-"""A model's prediction of a sequence with a network's correction on top, which is compared with
-clouds as any other is.
-"""
+"""Predictions of a sequence whose frames a network has corrected."""
 
 from __future__ import annotations
 
@@ -20,20 +18,23 @@ from palpate.setup.setup import Setup
 __all__ = ["FrameCorrection", "corrected_prediction", "tool_inputs"]
 
 FrameCorrection = Callable[[Equilibrium, FloatArray], Equilibrium]
-"""A frame, and the tool (13,) there as in `palpate.correction.samples.sample_store`, to the frame
-with its shape corrected."""
+"""Corrects a frame. Takes the frame and the tool (13,) as in
+`palpate.correction.samples.sample_store`; returns the frame with its shape corrected."""
 
 
 def corrected_prediction(
     model: Prediction, data: Observations, setup: Setup, correct: FrameCorrection, tools: FloatArray
 ) -> Prediction:
-    """A model's prediction of one sequence with its frames corrected; the same points are averaged
-    in the same patches.
+    """Return a prediction of one sequence with its frames corrected.
+
+    The same measured points are averaged over the same patches.
 
     Args:
-        model: with its samples.
-        setup: under which it was made.
-        tools: (g, 13) of each group, see `tool_inputs`.
+        model: the model's prediction, with its samples.
+        data: the observations that it predicts.
+        setup: the setup of the prediction.
+        correct: the correction of a frame.
+        tools: (g, 13) tool of each group, see `tool_inputs`.
     """
     surface = Surface.of(setup)
     frames = [correct(frame, tool) for frame, tool in zip(model.equilibria, tools, strict=True)]
@@ -50,10 +51,13 @@ def corrected_prediction(
 
 
 def tool_inputs(data: Observations, columns: FloatArray) -> FloatArray:
-    """What a network is told of the tool in each group (g, 13): the mean over its frames, of
-    `columns` (f, 13) of all frames.
+    """Return the network's tool input for each group (g, 13), the mean over the group's frames.
 
-    The rest cloud has no tool; it is told the one of the first untouched group.
+    The rest cloud has no tool; its input is that of the first untouched group.
+
+    Args:
+        data: the observations of one sequence.
+        columns: (f, 13) tool inputs of all frames of the sequence.
     """
     first: Sequence[int] = next(
         (group.frames for group in data.groups if group.free and group.frames),

@@ -1,4 +1,4 @@
-"""A trained network as an evaluation and a recording use it."""
+"""A trained network, loaded to correct the frames of an evaluation or of a recording."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class LoadedNetwork:
     """One trained network of a block.
 
     Attributes:
-        trained: as it was kept.
-        about: what a reader wants to know of it, plain values.
-        feedback: whether the simulation answers for the points that the network does not see
-            ("follow") or not ("none"), see `palpate.correction.corrected_replay`.
+        trained: the network as it was saved.
+        about: description for reports, plain values.
+        feedback: "follow" where the simulation moves the points that the network does not correct,
+            "none" where they stay; see `palpate.correction.corrected_replay`.
     """
 
     trained: TrainedNetwork
@@ -40,11 +40,11 @@ class LoadedNetwork:
 
     @classmethod
     def load(cls, folder: Path, feedback: Feedback = "none") -> Self:
-        """From the folder of a training that is finished; RunError where there is none."""
+        """Load the network of a finished training; RunError where there is none."""
         from palpate.correction import TrainedNetwork
 
         try:
-            asked = json.loads((folder / REQUEST).read_text())
+            request = json.loads((folder / REQUEST).read_text())
         except (OSError, ValueError) as error:
             raise RunError(
                 f"{folder} holds no training ({error}); train first", path=str(folder)
@@ -56,7 +56,7 @@ class LoadedNetwork:
             "features": spec["network"]["features"],
             "trust": spec["network"]["trust"],
             "hold": spec["hold"],
-            "every": asked["every"],
+            "every": request["every"],
             "seed": spec["seed"],
             "epoch": known["epoch"],
             "validation_error": known["error"],
@@ -66,7 +66,7 @@ class LoadedNetwork:
         return cls(trained, about, feedback)
 
     def corrector(self, setup: Setup) -> FrameCorrection:
-        """What corrects a frame of this setup."""
+        """Return the correction of frames of this setup."""
         from palpate.correction import Corrector
 
         return Corrector(self.trained, setup, feedback=self.feedback).correct
@@ -74,7 +74,7 @@ class LoadedNetwork:
     def columns(
         self, sequence: Recording, times: FloatArray, setup: Setup, grid: Meshing
     ) -> FloatArray:
-        """What it is told of the tool (n, 13) at cloud stamps (n,) [s] under a setup."""
+        """Return the tool inputs (n, 13) at cloud stamps (n,) [s] under a setup."""
         from palpate.correction.samples.record_samples import tool_columns
 
         robot = touch_correction(setup, grid) @ setup.phantom_from_robot

@@ -1,4 +1,4 @@
-"""Kinds of motion: of each push of a sequence, and of those that were trained on."""
+"""Kinds of motion (top, side, drag) of sequences and of their pushes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["kinds_in", "kinds_of_pushes"]
 
 
 def kinds_in(dataset: Dataset, names: Iterable[str], setup: Setup) -> set[ContactKind]:
-    """Kinds of motion (top, side, drag) that these sequences have."""
+    """Return the kinds of motion in these sequences."""
     motions = (
         motion_of(dataset, dataset.sequence(name), setup.phantom_from_robot) for name in names
     )
@@ -25,10 +25,11 @@ def kinds_in(dataset: Dataset, names: Iterable[str], setup: Setup) -> set[Contac
 def kinds_of_pushes(
     dataset: Dataset, data: Sequence[Observations], setup: Setup
 ) -> dict[str, ContactKind]:
-    """The kind of each push, by "sequence/number": that of the contact nearest in time, for a push
-    may begin before it touches.
+    """Return the kind of each push by "sequence/number".
+
+    It is the kind of the contact nearest in time: a push may begin before the tool touches.
     """
-    found: dict[str, ContactKind] = {}
+    kinds: dict[str, ContactKind] = {}
     for item in data:
         contacts = motion_of(
             dataset, dataset.sequence(item.name), setup.phantom_from_robot
@@ -44,5 +45,5 @@ def kinds_of_pushes(
                 for frame in group.frames
             ]
             nearest = int(np.abs(middles - item.times[frames].mean()).argmin())
-            found[f"{item.name}/{probe}"] = contacts[nearest].kind
-    return found
+            kinds[f"{item.name}/{probe}"] = contacts[nearest].kind
+    return kinds

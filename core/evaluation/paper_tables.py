@@ -1,10 +1,11 @@
-"""The three tables of Wu, Kazanzides and Unberath (2020): a coarse and a fine search for the
-modulus, and what networks correct.
+"""The three tables of Wu, Kazanzides and Unberath (2020).
 
-The paper searches for Young's modulus on its training data and finds errors that differ from
-modulus to modulus. In a replay that converges they do not: the tool is driven by position, and a
-homogeneous block that is pushed slowly takes one shape whatever its stiffness. The search is done
-all the same, and what it shows is said beside it.
+They are a coarse and a fine search for Young's modulus, and the errors that networks remove.
+
+The paper searches for the modulus on its training data and finds errors that differ between moduli.
+In a converged quasi-static replay they do not: the tool is driven by position, and the shape of a
+homogeneous block then does not depend on its stiffness. The search is done nevertheless, and the
+result says what it shows.
 """
 
 from __future__ import annotations
@@ -25,24 +26,26 @@ from palpate.setup.setup import Setup
 from palpate.sweep import Axis, ParameterSpace, SweepSpec
 from palpate.sweep.run_sweep import run_sweep
 
-__all__ = ["MODULI", "PaperRequest", "run_paper", "interpret_search"]
+__all__ = ["MODULI", "PaperRequest", "interpret_search", "run_paper"]
 
 MODULI = (5e3, 1e4, 1e1)
 """Young's moduli at which the paper corrects the simulation [Pa]."""
 KINDS = ("unet2d", "unet3d")
 COARSE, DECADES = (1e1, 1e5), 5
+"""Range [Pa] of the coarse search, and its number of moduli."""
 FINE_STEPS = 7
+"""Number of moduli of the fine search."""
 _NAME = "young_modulus.E"
 
 
 @dataclass(frozen=True, kw_only=True)
 class PaperRequest:
-    """How thoroughly the tables are made.
+    """The effort that the tables are made with.
 
     Attributes:
-        frames: clouds of each sequence that a search compares with.
-        training: of each network, see `palpate.evaluation.train_network`.
-        moduli: at which networks are trained [Pa].
+        frames: most clouds of each sequence that a search compares with.
+        training: the training of each network.
+        moduli: Young's moduli at which networks are trained [Pa].
     """
 
     frames: int = 8
@@ -61,56 +64,31 @@ def run_paper(
     seed: int = 0,
     report: Report = silent,
 ) -> dict[str, Any]:
-    """The three tables, as plain values; written to `folder`/paper.json at the end. What was begun
-    there goes on.
+    """Make the three tables, or resume; return plain values, and write them to paper.json.
 
     Args:
-        store: folder of replays that are known.
+        dataset: the dataset.
+        folder: folder of searches, trainings and the result.
+        store: folder of the replay cache.
         samples: folder of samples for all trainings.
+        request: the effort.
+        workers: number of processes.
+        seed: seed of the resampling.
+        report: receives the progress.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    coarse = _search(
-        dataset,
-        folder / "coarse",
-        COARSE,
-        DECADES,
-        request.frames,
-        store,
-        workers,
-        part(report, 0.0, 0.08),
+    search = _ModulusSearch(dataset, request.frames, store, workers)
+    coarse = search.run(folder / "coarse", COARSE, DECADES, part(report, 0.0, 0.08))
+    fine = search.run(
+        folder / "fine", _fine_range(dataset, coarse), FINE_STEPS, part(report, 0.08, 0.18)
     )
-    flat = all(one["flat"] for one in coarse["directions"])
-    best = (
-        dataset.config.young_modulus if flat else coarse["best"]["values"][_NAME]
-    )  # of a flat search any modulus is the best
-    near = (max(COARSE[0], best / 10**0.5), best * 10**0.5)
-    fine = _search(
-        dataset,
-        folder / "fine",
-        near,
-        FINE_STEPS,
-        request.frames,
-        store,
-        workers,
-        part(report, 0.08, 0.18),
-    )
-    bench = EvaluationData.read(dataset, report=part(report, 0.18, 0.2))
+    data = EvaluationData.read(dataset, report=part(report, 0.18, 0.2))
+    corrections = _Corrections(data, folder, samples, request.training, workers, seed)
     rows = []
     for number, modulus in enumerate(request.moduli):
         low, width = 0.2 + 0.8 * number / len(request.moduli), 0.8 / len(request.moduli)
-        rows.append(
-            _corrected(
-                bench,
-                modulus,
-                folder,
-                samples,
-                request.training,
-                workers,
-                seed,
-                part(report, low, low + width),
-            )
-        )
-    found = {
+        rows.append(corrections.row(modulus, part(report, low, low + width)))
+    result = {
         "format": 1,
         "dataset": dataset.name,
         "unit": "mm",
@@ -120,36 +98,61 @@ def run_paper(
         "correction": rows,
     }
     aside = folder / ".paper.json.part"
-    aside.write_text(json.dumps(found, indent=1) + "\n")
+    aside.write_text(json.dumps(result, indent=1) + "\n")
     os.replace(aside, folder / "paper.json")
     report(1.0, "done")
-    return found
+    return result
 
 
-def _search(
-    dataset: Dataset,
-    folder: Path,
-    span: tuple[float, float],
-    steps: int,
-    frames: int,
-    store: Path,
-    workers: int,
-    report: Report,
-) -> dict[str, Any]:
-    """A search over the modulus on the sequences that validate, by the paper's metric; with all of
-    its points.
+def _fine_range(dataset: Dataset, coarse: Mapping[str, Any]) -> tuple[float, float]:
+    """Return the range [Pa] of the fine search: half a decade to both sides of the best modulus.
+
+    In a flat search every modulus is the best; the stated one is taken.
     """
-    names = tuple(name for name in dataset.config.validation if len(dataset.sequence(name)))
-    space = ParameterSpace((Axis(_NAME, *span),))
-    request = SweepSpec(space=space, steps=steps, sequences=names, frames=frames, measure="paper")
-    found = run_sweep(dataset, request, folder, store=store, workers=workers, report=report)
-    rows = [json.loads(line) for line in (folder / "points.jsonl").read_text().splitlines()]
-    last = {row["number"]: row for row in rows}
-    return {**found, "rows": [row for row in last.values() if row["kind"] != "stated"]}
+    flat = all(one["flat"] for one in coarse["directions"])
+    best = dataset.config.young_modulus if flat else coarse["best"]["values"][_NAME]
+    return max(COARSE[0], best / 10**0.5), best * 10**0.5
+
+
+@dataclass(frozen=True, eq=False)
+class _ModulusSearch:
+    """A search for Young's modulus on the validation sequences, by the paper's metric.
+
+    Attributes:
+        dataset: the dataset.
+        frames: most clouds of each sequence.
+        store: folder of the replay cache.
+        workers: number of processes.
+    """
+
+    dataset: Dataset
+    frames: int
+    store: Path
+    workers: int
+
+    def run(
+        self, folder: Path, span: tuple[float, float], steps: int, report: Report
+    ) -> dict[str, Any]:
+        """Search the range `span` [Pa]; return the summary of the sweep with all its rows."""
+        config = self.dataset.config
+        names = tuple(name for name in config.validation if len(self.dataset.sequence(name)))
+        spec = SweepSpec(
+            space=ParameterSpace((Axis(_NAME, *span),)),
+            steps=steps,
+            sequences=names,
+            frames=self.frames,
+            measure="paper",
+        )
+        summary = run_sweep(
+            self.dataset, spec, folder, store=self.store, workers=self.workers, report=report
+        )
+        rows = [json.loads(line) for line in (folder / "points.jsonl").read_text().splitlines()]
+        last = {row["number"]: row for row in rows}
+        return {**summary, "rows": [row for row in last.values() if row["kind"] != "stated"]}
 
 
 def _table(search: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Modulus [Pa] and mean distance [mm], None where a point failed."""
+    """Return modulus [Pa] and mean distance [mm] of each point; None where it failed."""
     rows = sorted(search["rows"], key=lambda row: float(row["values"][_NAME]))
     return [
         {
@@ -161,67 +164,81 @@ def _table(search: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def interpret_search(coarse: Mapping[str, Any], fine: Mapping[str, Any]) -> str:
-    """What the two searches mean."""
+    """Return a text that says what the two searches mean."""
     changes = [one["change"] * 1e3 for search in (coarse, fine) for one in search["directions"]]
     most = max(changes, default=0.0)
     if not all(one["flat"] for search in (coarse, fine) for one in search["directions"]):
-        return f"The mean distance changes by up to {most:.3g} mm with Young's modulus: something has a force scale of its own."
+        return (
+            f"The mean distance changes by up to {most:.3g} mm with Young's modulus: something has "
+            "a force scale of its own."
+        )
     change = "less than 0.001 mm" if most < 1e-3 else f"no more than {most:.1g} mm"
     return (
-        f"Both searches are flat: from {COARSE[0]:.0f} to {COARSE[1]:.0f} Pa the mean distance changes by {change}. "
-        "Driven by position and slowly, a homogeneous block takes one shape whatever its stiffness: the modulus cancels, and "
-        "clouds cannot tell it. Where a search like this finds a best modulus, the replay had not converged."
+        f"Both searches are flat: from {COARSE[0]:.0f} to {COARSE[1]:.0f} Pa the mean distance "
+        f"changes by {change}. Driven by position and slowly, a homogeneous block takes the same "
+        "shape whatever its stiffness: the modulus cancels, and clouds cannot determine it. Where "
+        "a search like this finds a best modulus, the replay had not converged."
     )
 
 
-def _corrected(
-    bench: EvaluationData,
-    modulus: float,
-    folder: Path,
-    samples: Path,
-    training: TrainingPlan,
-    workers: int,
-    seed: int,
-    report: Report,
-) -> dict[str, Any]:
-    """Train both networks on the stated model with this modulus, and compare on the test
-    sequences."""
-    setup = _with_modulus(bench.stated, modulus)
-    networks = {}
-    for number, kind in enumerate(KINDS):
-        spec = {
-            **training.spec,
-            "network": {**dict(training.spec.get("network", {})), "kind": kind},
-        }
-        place = folder / f"E-{modulus:.0e}-{kind}"
-        told = part(report, 0.45 * number, 0.45 * (number + 1))
-        train_network(
-            bench.dataset,
-            replace(training, spec=spec),
-            place,
-            store=samples,
-            setup=setup,
-            workers=workers,
-            report=told,
+@dataclass(frozen=True, eq=False)
+class _Corrections:
+    """Networks that are trained on the stated model with another modulus.
+
+    Attributes:
+        data: the test sequences.
+        folder: folder of the trainings.
+        samples: folder of samples for all trainings.
+        training: the training of each network.
+        workers: number of processes.
+        seed: seed of the resampling.
+    """
+
+    data: EvaluationData
+    folder: Path
+    samples: Path
+    training: TrainingPlan
+    workers: int
+    seed: int
+
+    def row(self, modulus: float, report: Report) -> dict[str, Any]:
+        """Train both networks at a modulus [Pa] and compare them on the test sequences."""
+        setup = _with_modulus(self.data.stated, modulus)
+        networks = {}
+        for number, kind in enumerate(KINDS):
+            folder = self.folder / f"E-{modulus:.0e}-{kind}"
+            train_network(
+                self.data.dataset,
+                self._plan(kind),
+                folder,
+                store=self.samples,
+                setup=setup,
+                workers=self.workers,
+                report=part(report, 0.45 * number, 0.45 * (number + 1)),
+            )
+            networks[kind] = LoadedNetwork.load(folder)
+        ladder = self.data.compute_ladder(
+            [LadderStep("simulation", "simulation", setup, networks)],
+            workers=self.workers,
+            seed=self.seed,
+            report=part(report, 0.9, 1.0),
         )
-        networks[kind] = LoadedNetwork.load(place)
-    climbed = bench.compute_ladder(
-        [LadderStep("simulation", "simulation", setup, networks)],
-        workers=workers,
-        seed=seed,
-        report=part(report, 0.9, 1.0),
-    )
-    return {"young_modulus": modulus, "parts": [_row(one) for one in _of(climbed["parts"])]}
+        return {
+            "young_modulus": modulus,
+            "parts": [_row(one) for one in _reported(ladder["parts"])],
+        }
+
+    def _plan(self, kind: str) -> TrainingPlan:
+        network = {**dict(self.training.spec.get("network", {})), "kind": kind}
+        return replace(self.training, spec={**self.training.spec, "network": network})
 
 
-def _of(parts: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+def _reported(parts: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     return [one for one in parts if one["part"] in ("all", "kind")]
 
 
 def _row(one: Mapping[str, Any]) -> dict[str, Any]:
-    """Of one part: the paper's metric of the simulation and of both networks, and how much nearer
-    the 3D one is than the 2D one.
-    """
+    """Return the paper's metric of simulation and networks, and of 3D beyond 2D, for one part."""
     errors = one["errors"]
     return {
         "name": one["name"],

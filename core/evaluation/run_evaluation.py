@@ -1,6 +1,4 @@
-"""A ladder from a dataset: its test sequences under the stated model, under others, and with
-networks on top of each.
-"""
+"""Evaluation of a dataset: models and networks compared on its test sequences."""
 
 from __future__ import annotations
 
@@ -35,7 +33,7 @@ from palpate.recording.saved_model import effects_from, setup_of_model
 from palpate.registration.registration import register, setup_from
 from palpate.setup.setup import Setup
 
-__all__ = ["FILE", "MODELS", "EvaluationSpec", "EvaluationData", "LadderStep", "evaluate"]
+__all__ = ["FILE", "MODELS", "EvaluationData", "EvaluationSpec", "LadderStep", "evaluate"]
 
 FILE = "evaluation.json"
 MODELS = {
@@ -45,19 +43,19 @@ MODELS = {
 }
 KINDS = {"unet2d": "2D network", "unet3d": "3D network", "graph": "graph network"}
 TEST_GROUPS, TEST_FELT = 24, 32
-"""Groups of a sequence at most."""
+"""Most groups of a sequence: with clouds, and of the force record."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluationSpec:
-    """What stands on the ladder beside the stated model.
+    """The models that are compared with the stated one.
 
     Attributes:
-        model: model.json of a diagnosis, the extended model.
-        truth: effects as `Effect.to_json` has them.
-        networks: folders of trainings by the model they were trained on, "baseline", "extended" or
-            "true", and further ones on the same model as "baseline:name".
-        feedback: see `Network`.
+        model: the extended model, model.json of a diagnosis.
+        truth: the true effects of a virtual dataset, as `Effect.to_json` writes them.
+        networks: folders of trainings, by the model they were trained on ("baseline", "extended"
+            or "true"); further ones on the same model as "baseline:name".
+        feedback: see `LoadedNetwork`.
     """
 
     model: Mapping[str, Any] | None = None
@@ -71,11 +69,12 @@ class EvaluationData:
     """The test sequences of a dataset, ready to be compared with models.
 
     Attributes:
-        stated: the setup that is believed.
-        data: one for each test sequence.
-        kinds: of motion, of each push.
-        trained: kinds that networks and causes are fitted on.
-        grid: the mesh of all models, on which networks were trained, too.
+        dataset: the dataset, with sequences as seen from the block where it stood.
+        stated: the stated setup.
+        data: observations of each test sequence.
+        kinds: kind of motion of each push.
+        trained: kinds of motion that networks and causes are fitted on.
+        grid: mesh protocol of all models, on which networks are trained as well.
     """
 
     dataset: Dataset
@@ -86,23 +85,24 @@ class EvaluationData:
     grid: Meshing
 
     @classmethod
-    def of(
-        cls, dataset: Dataset, asked: EvaluationSpec | None = None, report: Report = silent
+    def read(
+        cls, dataset: Dataset, spec: EvaluationSpec | None = None, report: Report = silent
     ) -> EvaluationData:
-        """Reads the clouds, and groups them by the clock of the best model that is asked for.
+        """Read the clouds and group them by the clock of the best model in the specification.
 
         Raises DiagnosisError where no test sequence has clouds.
         """
         tested = [name for name in dataset.config.test if len(dataset.sequence(name))]
         if not tested:
             raise DiagnosisError(
-                "no sequence of [splits] test has clouds, so there is nothing to evaluate on; name one",
+                "no sequence of [splits] test has clouds, so there is nothing to evaluate on; "
+                "name one",
                 key="splits",
             )
-        report(0.0, "relating robot, camera and phantom")
+        report(0.0, "registering robot, camera and phantom")
         dataset, registration = as_it_stood(dataset, register(dataset))
         stated, mended = setup_from(dataset, registration), registration.mended
-        *_, believed = _setups(stated, asked or EvaluationSpec()).values()
+        *_, believed = _setups(stated, spec or EvaluationSpec()).values()
         seen_from = replace(setup_from(dataset, mended), sensor=believed.sensor)
         data = observe_each(
             dataset, tested, seen_from, mended, (TEST_GROUPS, TEST_FELT), part(report, 0.1, 1.0)
@@ -119,8 +119,9 @@ class EvaluationData:
         seed: int = 0,
         report: Report = silent,
     ) -> dict[str, Any]:
-        """The ladder of these steps; the first model is the baseline, and networks stand after the
-        model they correct.
+        """Return the error ladder of these models.
+
+        The first model is the baseline; networks follow the model that they correct.
         """
         names, rungs = [item.name for item in self.data], list[Rung]()
         with Workers(self.data, workers) as pool:
@@ -158,7 +159,14 @@ class EvaluationData:
 
 @dataclass(frozen=True, eq=False)
 class LadderStep:
-    """A model of the ladder, and networks on top of it by the names of their rungs."""
+    """A model of the ladder and networks on top of it.
+
+    Attributes:
+        name: name of the model's rung.
+        label: name for readers.
+        setup: the setup of the model.
+        networks: networks by the names of their rungs.
+    """
 
     name: str
     label: str
@@ -168,15 +176,22 @@ class LadderStep:
 
 def evaluate(
     dataset: Dataset,
-    asked: EvaluationSpec,
+    spec: EvaluationSpec,
     out: Path,
     *,
     workers: int = 2,
     seed: int = 0,
     report: Report = silent,
 ) -> dict[str, Any]:
-    """The ladder on the test sequences; written to `out` (evaluation.json), which is whole or not
-    there.
+    """Compare models on the test sequences; return the ladder, and write it to `out` atomically.
+
+    Args:
+        dataset: the dataset.
+        spec: the models that are compared.
+        out: folder of the result, which has evaluation.json.
+        workers: number of processes.
+        seed: seed of the resampling.
+        report: receives the progress.
 
     Raises RunError where `out` exists or a network is missing, DiagnosisError where no test
     sequence has clouds.
@@ -185,55 +200,54 @@ def evaluate(
     if out.exists():
         raise RunError(f"{out} exists already; name another folder or move it away", file=str(out))
     networks = {
-        name: LoadedNetwork.load(folder, asked.feedback) for name, folder in asked.networks.items()
+        name: LoadedNetwork.load(folder, spec.feedback) for name, folder in spec.networks.items()
     }
-    bench = EvaluationData.read(dataset, asked, part(report, 0.0, 0.2))
+    data = EvaluationData.read(dataset, spec, part(report, 0.0, 0.2))
     steps = [
         LadderStep(name, MODELS[name], setup, _own(name, networks))
-        for name, setup in _setups(bench.stated, asked).items()
+        for name, setup in _setups(data.stated, spec).items()
     ]
-    climbed = bench.compute_ladder(
-        steps, workers=workers, seed=seed, report=part(report, 0.2, 0.95)
-    )
-    found = {
+    ladder = data.compute_ladder(steps, workers=workers, seed=seed, report=part(report, 0.2, 0.95))
+    result = {
         "format": 1,
         "dataset": dataset.name,
         "folder": dataset.path.resolve().name,
         "split": "test",
-        **climbed,
+        **ladder,
     }
-    found["sentence"] = summary_sentence(found)
-    _write(out, found)
+    result["sentence"] = summary_sentence(result)
+    _write(out, result)
     report(1.0, "done")
-    return found
+    return result
 
 
 def _own(model: str, networks: Mapping[str, LoadedNetwork]) -> dict[str, LoadedNetwork]:
-    """Those of one model by the names of their rungs; the first is called "network", others by what
-    they are.
+    """Return the networks of one model by the names of their rungs.
+
+    The first is called "network", others by their kind.
     """
-    found: dict[str, LoadedNetwork] = {}
+    rungs: dict[str, LoadedNetwork] = {}
     for key, network in networks.items():
         if key.partition(":")[0] == model:
-            rung = f"{model}_network" if not found else f"{model}_{network.about['kind']}"
-            found[rung if rung not in found else f"{model}_{key.partition(':')[2]}"] = network
-    return found
+            rung = f"{model}_network" if not rungs else f"{model}_{network.about['kind']}"
+            rungs[rung if rung not in rungs else f"{model}_{key.partition(':')[2]}"] = network
+    return rungs
 
 
-def _setups(stated: Setup, asked: EvaluationSpec) -> dict[str, Setup]:
-    found = {"baseline": stated}
-    if asked.model is not None:
-        found["extended"] = setup_of_model(stated, asked.model)
-    if asked.truth is not None:
-        found["true"] = with_effects(stated, effects_from(asked.truth))
-    return found
+def _setups(stated: Setup, spec: EvaluationSpec) -> dict[str, Setup]:
+    setups = {"baseline": stated}
+    if spec.model is not None:
+        setups["extended"] = setup_of_model(stated, spec.model)
+    if spec.truth is not None:
+        setups["true"] = with_effects(stated, effects_from(spec.truth))
+    return setups
 
 
-def _write(out: Path, found: dict[str, Any]) -> None:
+def _write(out: Path, result: dict[str, Any]) -> None:
     out.parent.mkdir(parents=True, exist_ok=True)
     aside = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
     try:
-        (aside / FILE).write_text(json.dumps(found, indent=1) + "\n")
+        (aside / FILE).write_text(json.dumps(result, indent=1) + "\n")
         aside.chmod(0o755)
         os.rename(aside, out)
     finally:

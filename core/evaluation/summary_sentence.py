@@ -1,4 +1,4 @@
-"""One sentence that says what a ladder means."""
+"""A sentence that summarises an error ladder."""
 
 from __future__ import annotations
 
@@ -15,29 +15,33 @@ _WHO = {
     "true_network": "these with a network",
 }
 
-_STILL = "What is as wrong in untouched frames may be the camera's, and counts only once a second model says it is not."
+_CAMERA_REMARK = (
+    "Error that untouched frames show as well may be the camera's, and counts only once a second "
+    "model shows that it is not."
+)
 
 
 def summary_sentence(ladder: Mapping[str, Any]) -> str:
-    """Shares of the error that can be removed, on kinds of motion that were trained on and on those
-    that were not.
+    """Return a sentence with the share of the reducible error that each model removes.
 
-    Intervals stand in the ladder, beside each share.
+    Shares are of kinds of motion that were trained on and of those that were not; their intervals
+    are in the ladder.
     """
     parts = {
         part["part"]: part for part in ladder["parts"] if part["part"] in ("all", "seen", "unseen")
     }
     names = [rung["name"] for rung in ladder["rungs"] if rung["name"] in _WHO]
     if not names:
-        return f"The stated model is off by {parts['all']['errors']['baseline']['error']:.2f} mm; nothing stands beside it yet."
-    told = [parts[key] for key in ("seen", "unseen") if key in parts]
+        error = parts["all"]["errors"]["baseline"]["error"]
+        return f"The stated model is off by {error:.2f} mm; there is no other model to compare yet."
+    both = [parts[key] for key in ("seen", "unseen") if key in parts]
     alone = not any(rung["network"] is None for rung in ladder["rungs"][1:])
-    error = "the error that moves with the tool" if alone else "the error that can be removed"
+    kind = "the error that moves with the tool" if alone else "the error that can be removed"
     first, *rest = names
-    text = f"{_WHO[first]} removes {_shares(first, told)} of {error}{_where(parts)}"
-    more = ", ".join(f"{_WHO[name]} {_shares(name, told)}" for name in rest)
-    said = (text[0].upper() + text[1:] + (f"; {more}" if more else "")) + "."
-    return f"{said} {_STILL}" if alone else said
+    text = f"{_WHO[first]} removes {_shares(first, both)} of {kind}{_where(parts)}"
+    more = ", ".join(f"{_WHO[name]} {_shares(name, both)}" for name in rest)
+    sentence = (text[0].upper() + text[1:] + (f"; {more}" if more else "")) + "."
+    return f"{sentence} {_CAMERA_REMARK}" if alone else sentence
 
 
 def _shares(name: str, parts: Sequence[Mapping[str, Any]]) -> str:

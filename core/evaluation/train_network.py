@@ -1,10 +1,13 @@
-"""A training from a dataset: samples of one model are made once, kept for all trainings on it, and learned from.
+"""Training of a correction network on a dataset.
+
+Samples of one model are made once and used by all trainings on it.
 
 folder/             one training
-  request.json      what is trained, on what
-  checkpoint.pt     where it is; a training that was stopped goes on from there
+  request.json      what is trained, and on which model of which dataset
+  checkpoint.pt     state of the training, from which it resumes
   history.json      [loss, validation error [mm], rate] of each epoch so far
-  network.pt        the best network, and training.json what came of it, once it is finished
+  network.pt        the best network, once finished
+  training.json     the summary, once finished
 """
 
 from __future__ import annotations
@@ -30,23 +33,23 @@ from palpate.setup.setup import Setup
 if TYPE_CHECKING:
     from palpate.correction import Samples
 
-__all__ = ["REQUEST", "SUMMARY", "TrainingPlan", "train_network", "complete_samples"]
+__all__ = ["REQUEST", "SUMMARY", "TrainingPlan", "complete_samples", "train_network"]
 
 REQUEST, SUMMARY = "request.json", "training.json"
 _SAMPLING = 0.4
-"""Share of the time that replaying takes, for the progress."""
+"""Share of the time that making the samples takes, for the progress [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingPlan:
-    """What is trained.
+    """A training and the samples that it uses.
 
     Attributes:
-        spec: see `palpate.correction.training_spec.TrainingSpec`, plain values; what is left out
-            has its default.
-        nodes: of the grid that is sampled, along x, y, z.
-        every: each how many clouds one is learned from.
-        points: kept of a cloud.
+        spec: plain values of a `palpate.correction.training_spec.TrainingSpec`; missing keys have
+            their defaults.
+        nodes: points of the sampled grid along x, y, z.
+        every: interval between the clouds that are used.
+        points: most points of a cloud.
     """
 
     spec: Mapping[str, Any] = field(default_factory=dict)
@@ -69,7 +72,7 @@ class TrainingPlan:
                 )
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """Return plain values for JSON."""
         return {
             "spec": dict(self.spec),
             "nodes": list(self.nodes),
@@ -79,7 +82,7 @@ class TrainingPlan:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Self:
-        """The inverse."""
+        """Return the plan that `to_json` wrote; missing keys have their defaults."""
         nx, ny, nz = data.get("nodes", (13, 5, 5))
         return cls(
             spec=data.get("spec", {}),
@@ -91,7 +94,7 @@ class TrainingPlan:
 
 def train_network(
     dataset: Dataset,
-    wanted: TrainingPlan,
+    plan: TrainingPlan,
     folder: Path,
     *,
     store: Path,
@@ -102,36 +105,44 @@ def train_network(
     workers: int = 2,
     report: Report = silent,
 ) -> dict[str, Any]:
-    """Train on the stated model of a dataset, or on another one; returns what training.json says.
+    """Train on the stated model of a dataset or on another one; return the summary.
+
+    A training that was interrupted in `folder` resumes; the summary of a finished one is returned.
 
     Args:
+        dataset: the dataset.
+        plan: the training.
+        folder: folder of the training.
         store: folder of samples for all trainings.
-        model: model.json of a diagnosis, of the `run` of this name.
-        truth: effects of a virtual dataset's truth file instead, as plain values.
-        setup: instead of all these.
+        model: model.json of a diagnosis, to train on its extended model.
+        run: name of this diagnosis.
+        truth: effects of a virtual dataset's truth file, to train on the true model.
+        setup: setup to train on, instead of all these.
+        workers: number of processes that make samples.
+        report: receives the progress.
 
-    What was begun in `folder` goes on, and what is finished there is returned. RunError where
-    another training is in it, CorrectionError for values or data that cannot be trained with.
+    Raises RunError where the folder holds another training, CorrectionError for values or data
+    that cannot be trained with.
     """
     from palpate.correction import Split, TrainingSpec, train
 
-    spec = TrainingSpec.from_json(wanted.spec)
+    spec = TrainingSpec.from_json(plan.spec)
     effects = truth if model is None else model["effects"]
     on = "extended" if model is not None else "baseline" if truth is None else "true"
-    said = {
+    source = {
         "dataset": str(dataset.path.resolve()),
         "run": run,
         "model": on,
         "effects": None if effects is None else list(effects),
     }
-    _claim(folder, {**wanted.to_json(), **said})
+    _claim(folder, {**plan.to_json(), **source})
     if (folder / SUMMARY).is_file():
         return dict(json.loads((folder / SUMMARY).read_text()))
     registration = register(dataset)
     if setup is None:
         setup = _setup(setup_from(dataset, registration), model, truth)
     samples = _samples(
-        dataset, wanted, store, registration, setup, workers, part(report, 0.0, _SAMPLING)
+        dataset, plan, store, registration, setup, workers, part(report, 0.0, _SAMPLING)
     )
     trained = train(samples, Split.of(samples), spec, folder, part(report, _SAMPLING, 1.0))
     about = trained.about
@@ -162,54 +173,53 @@ def _setup(
 
 def _samples(
     dataset: Dataset,
-    wanted: TrainingPlan,
+    plan: TrainingPlan,
     store: Path,
     registration: Registration,
     setup: Setup,
     workers: int,
     report: Report,
 ) -> Samples:
-    """Made once for each model, motion and density of a dataset."""
+    """Return the samples of a model; made where the store does not have them."""
     from palpate.correction import make_samples, recorder_for
 
     recorder = recorder_for(
-        dataset, setup=setup, nodes=wanted.nodes, points=wanted.points, registration=registration
+        dataset, setup=setup, nodes=plan.nodes, points=plan.points, registration=registration
     )
     names = [
         name
         for name in (*dataset.config.train, *dataset.config.validation)
         if len(dataset.sequence(name))
     ]
-    said = [
+    content = [
         str(dataset.path.resolve()),
         setup.as_dict(),
         stored_label(recorder.grid),
-        wanted.nodes,
-        wanted.every,
-        wanted.points,
+        plan.nodes,
+        plan.every,
+        plan.points,
         names,
     ]
-    folder = (
-        store
-        / hashlib.sha256(json.dumps(said, sort_keys=True, default=repr).encode()).hexdigest()[:16]
-    )
+    digest = hashlib.sha256(json.dumps(content, sort_keys=True, default=repr).encode()).hexdigest()
+    folder = store / digest[:16]
     known = complete_samples(folder)
     if known is not None:
         return known
     try:
         return make_samples(
-            folder, recorder, sequences=names, every=wanted.every, workers=workers, report=report
+            folder, recorder, sequences=names, every=plan.every, workers=workers, report=report
         )
     except RunError:
-        known = complete_samples(folder)  # another training may have made the same in the meantime
+        known = complete_samples(folder)  # another training may have made them in the meantime
         if known is None:
             raise
         return known
 
 
 def complete_samples(folder: Path) -> Samples | None:
-    """Samples that are all there; what is left of others, of which files were dropped for want of
-    room, is taken away.
+    """Return the samples in a folder; None where there are none.
+
+    Samples with missing files, which a full cache deletes one by one, are removed.
     """
     from palpate.correction import open_samples
     from palpate.correction.samples.sample_arrays import ARRAYS
@@ -227,12 +237,12 @@ def complete_samples(folder: Path) -> Samples | None:
     return samples
 
 
-def _claim(folder: Path, said: dict[str, Any]) -> None:
+def _claim(folder: Path, content: dict[str, Any]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / REQUEST
-    if file.is_file() and json.loads(file.read_text()) != said:
-        raise RunError(f"{folder} has another training; name another folder", file=REQUEST)
-    _write(file, said)
+    if file.is_file() and json.loads(file.read_text()) != content:
+        raise RunError(f"{folder} holds another training; name another folder", file=REQUEST)
+    _write(file, content)
 
 
 def _write(file: Path, value: Any) -> None:

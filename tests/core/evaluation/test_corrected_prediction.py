@@ -1,6 +1,4 @@
-"""A corrected prediction: compared with clouds as any other, at the tool that each group's frames
-had.
-"""
+"""Predictions whose frames a network has corrected, and the network's tool input by group."""
 
 from __future__ import annotations
 
@@ -24,13 +22,13 @@ LIFT = 5e-4
 
 
 def _lifted(frame: Equilibrium, _: FloatArray) -> Equilibrium:
-    """Higher by LIFT at the top, and by less below it."""
+    """Lift the frame by LIFT at the top, and in proportion to the height below it."""
     step = np.zeros_like(frame.displacement)
     step[:, 2] = LIFT * frame.mesh.nodes[:, 2] / SIZE[2]
     return replace(frame, displacement=frame.displacement + step)
 
 
-def test_cloud_that_lies_higher_is_met_by_a_surface_that_is_lifted():
+def test_lifted_surface_matches_a_lifted_cloud():
     tool = np.zeros((1, 13))
     points = seen_points(_lifted(rest(SETUP, GridSpec()), tool[0]), 3000, 0.0, 1)
     times, stream = dwelling(np.array([poke(-20e-3)]))
@@ -47,7 +45,7 @@ def test_cloud_that_lies_higher_is_met_by_a_surface_that_is_lifted():
     assert after < before
 
 
-def test_group_is_told_the_mean_tool_of_its_frames_and_the_rest_cloud_that_of_the_first_untouched_group():
+def test_tool_input_is_the_mean_over_a_group_and_of_the_first_untouched_group_at_rest():
     times, stream = dwelling(np.array([poke(-20e-3), poke(2e-3), poke(2e-3)]))
     none = np.zeros((0, 3))
     groups = (
@@ -56,5 +54,5 @@ def test_group_is_told_the_mean_tool_of_its_frames_and_the_rest_cloud_that_of_th
         Group((1, 2), none, False, probe=1),
     )
     columns = np.arange(39.0).reshape(3, 13)
-    told = tool_inputs(Observations("told", times, stream, groups), columns)
-    np.testing.assert_array_equal(told, [columns[0], columns[0], columns[1:].mean(axis=0)])
+    inputs = tool_inputs(Observations("push-01", times, stream, groups), columns)
+    np.testing.assert_array_equal(inputs, [columns[0], columns[0], columns[1:].mean(axis=0)])

@@ -1,6 +1,4 @@
-"""The ladder: shares and intervals of known errors, kinds of motion told apart, and what a network
-gets no credit for.
-"""
+"""Error ladders of known errors: shares, intervals, kinds of motion, and the camera's pattern."""
 
 from __future__ import annotations
 
@@ -25,7 +23,7 @@ PROBES = [0, 1, 2, 3, 4]
 KINDS = {"push-01/1": "top", "push-01/2": "top", "push-01/3": "drag", "push-01/4": "drag"}
 SIGNS = np.array([1.0, -1.0, 1.0, -1.0])
 PATTERN = np.array([1.0, 1.0, -1.0, -1.0])
-"""Of the camera: at right angles to what the models are wrong by."""
+"""Fixed pattern of the camera, orthogonal to the models' errors."""
 
 
 def _observations() -> Observations:
@@ -38,9 +36,7 @@ def _observations() -> Observations:
 
 
 def _rung(name: str, gap: FloatArray, network: bool = False) -> Rung:
-    """A model with these gaps (5, 4) [m], whose single points scatter such that the noise floor is
-    FLOOR.
-    """
+    """Return a model with gaps (5, 4) [m] and points whose scatter gives the noise floor FLOOR."""
     model: Prediction = prediction(gap, name="push-01", count=POINTS)
     scatter = np.full(gap.shape, FLOOR / np.sqrt(2 / POINTS))
     return Rung(
@@ -52,28 +48,28 @@ def _rung(name: str, gap: FloatArray, network: bool = False) -> Rung:
     )
 
 
-def _sized(*sizes: float) -> FloatArray:
+def _gaps(*sizes: float) -> FloatArray:
     return np.array([0.0, *sizes])[:, None] * SIGNS
 
 
-def _climbed(*rungs: Rung, **more: Any) -> dict[str, Any]:
+def _ladder(*rungs: Rung, **more: Any) -> dict[str, Any]:
     return build_ladder([_observations()], rungs, KINDS, {"top"}, **more)
 
 
-def _part(found: dict[str, Any], part: str) -> dict[str, Any]:
-    return next(one for one in found["parts"] if one["part"] == part)
+def _part(result: dict[str, Any], part: str) -> dict[str, Any]:
+    return next(one for one in result["parts"] if one["part"] == part)
 
 
 THREE = (
-    _rung("baseline", _sized(3e-3, 3e-3, 3e-3, 3e-3)),
-    _rung("baseline_network", _sized(2e-3, 2e-3, 3e-3, 3e-3), network=True),
-    _rung("extended", _sized(1.5e-3, 1.5e-3, 1.5e-3, 1.5e-3)),
+    _rung("baseline", _gaps(3e-3, 3e-3, 3e-3, 3e-3)),
+    _rung("baseline_network", _gaps(2e-3, 2e-3, 3e-3, 3e-3), network=True),
+    _rung("extended", _gaps(1.5e-3, 1.5e-3, 1.5e-3, 1.5e-3)),
 )
 
 
-def test_kinds_that_were_trained_on_are_told_from_those_that_were_not():
-    found = _climbed(*THREE)
-    seen, unseen = _part(found, "seen"), _part(found, "unseen")
+def test_trained_and_untrained_kinds_of_motion_are_reported_apart():
+    result = _ladder(*THREE)
+    seen, unseen = _part(result, "seen"), _part(result, "unseen")
     assert (seen["kinds"], unseen["kinds"]) == (["top"], ["drag"]) and (
         seen["probes"],
         unseen["probes"],
@@ -85,41 +81,40 @@ def test_kinds_that_were_trained_on_are_told_from_those_that_were_not():
         assert part["noise_floor"] == pytest.approx(1.0)
 
 
-def test_share_over_all_pushes_has_an_interval_from_drawing_pushes_anew():
-    share = _part(_climbed(*THREE), "all")["errors"]["baseline_network"]["removed"]
-    wanted = (3 - np.sqrt((4 + 4 + 9 + 9) / 4)) / 2
-    assert share["value"] == pytest.approx(wanted, abs=1e-4)
+def test_share_over_all_pushes_has_a_bootstrap_interval():
+    share = _part(_ladder(*THREE), "all")["errors"]["baseline_network"]["removed"]
+    expected = (3 - np.sqrt((4 + 4 + 9 + 9) / 4)) / 2
+    assert share["value"] == pytest.approx(expected, abs=1e-4)
     assert 0.0 == share["low"] < share["value"] < share["high"] == 0.5
 
 
-def test_difference_to_the_second_rung_is_of_the_same_draws():
-    beyond = _part(_climbed(*THREE), "unseen")["beyond_second"]["extended"]["removed"]
+def test_difference_to_the_second_rung_uses_the_same_bootstrap_samples():
+    beyond = _part(_ladder(*THREE), "unseen")["beyond_second"]["extended"]["removed"]
     assert beyond == pytest.approx({"value": 0.75, "low": 0.75, "high": 0.75})
 
 
-def test_cameras_pattern_that_a_network_learned_counts_for_nothing():
-    touched = _sized(3e-3, 3e-3, 3e-3, 3e-3)
+def test_learned_pattern_of_the_camera_gets_no_credit():
+    touched = _gaps(3e-3, 3e-3, 3e-3, 3e-3)
     still = 2e-3 * PATTERN
-    learned = _rung(
-        "baseline_network", touched, network=True
-    )  # the pattern is gone everywhere, and nothing else
-    found = _climbed(
+    # The network removes the pattern everywhere, and nothing else.
+    learned = _rung("baseline_network", touched, network=True)
+    result = _ladder(
         _rung("baseline", touched + still),
         learned,
         _rung("extended", touched / 2 + still),
         ends=(0, 2),
     )
-    errors = _part(found, "all")["errors"]
+    errors = _part(result, "all")["errors"]
     assert errors["baseline"]["error"] == errors["baseline_network"]["error"] == 3.0
 
 
-def test_sag_that_a_model_names_counts_and_also_when_a_network_learned_it():
-    touched, sag = _sized(1e-3, 1e-3, 1e-3, 1e-3), 3e-3 * np.ones(4)
+def test_sag_that_a_model_explains_counts_for_models_and_networks():
+    touched, sag = _gaps(1e-3, 1e-3, 1e-3, 1e-3), 3e-3 * np.ones(4)
     learned = _rung("baseline_network", touched + sag / 3, network=True)
-    found = _climbed(
+    result = _ladder(
         _rung("baseline", touched + sag), learned, _rung("extended", touched), ends=(0, 2)
     )
-    errors = _part(found, "all")["errors"]
+    errors = _part(result, "all")["errors"]
     assert errors["baseline"]["error"] == pytest.approx(1e3 * np.hypot(1e-3, 3e-3), abs=1e-4)
     assert errors["baseline_network"]["error"] == pytest.approx(
         1e3 * np.hypot(1e-3, 1e-3), abs=1e-4
@@ -128,51 +123,45 @@ def test_sag_that_a_model_names_counts_and_also_when_a_network_learned_it():
     assert {errors[name]["moving"]["error"] for name in errors} == {1.0}
 
 
-def test_sentence_says_both_shares_on_both_kinds():
-    assert summary_sentence(_climbed(*THREE)) == (
-        "The network alone removes 50 % and 0 % of the error that can be removed on kinds of motion that training has, and on "
-        "others; naming the cause alone 75 % and 75 %."
+def test_sentence_has_both_shares_on_both_kinds():
+    assert summary_sentence(_ladder(*THREE)) == (
+        "The network alone removes 50 % and 0 % of the error that can be removed on kinds of "
+        "motion that training has, and on others; naming the cause alone 75 % and 75 %."
     )
 
 
-def test_sentence_of_a_lone_model_asks_for_another():
-    assert "nothing stands beside it yet" in summary_sentence(_climbed(THREE[0]))
+def test_sentence_of_a_single_model_says_that_there_is_no_other():
+    assert "no other model to compare yet" in summary_sentence(_ladder(THREE[0]))
 
 
-def test_sentence_of_a_network_alone_says_what_cannot_be_told_without_a_second_model():
-    text = summary_sentence(_climbed(*THREE[:2], ends=(0, 0)))
+def test_sentence_of_a_network_alone_says_that_a_second_model_is_needed():
+    text = summary_sentence(_ladder(*THREE[:2], ends=(0, 0)))
     assert (
         "50 % and 0 % of the error that moves with the tool" in text
         and "may be the camera's" in text
     )
 
 
-def test_block_that_stays_where_it_slid_is_no_pattern_of_the_cameras():
+def test_displaced_block_is_not_taken_for_the_cameras_pattern():
     item = _observations()
-    after = (
-        False,
-        False,
-        True,
-        False,
-        True,
-    )  # the second and the fourth look are at a block that was left
+    # The second and the fourth look are at a displaced block after a push.
+    after = (False, False, True, False, True)
     rows = zip(item.groups, after, (0, 1, 1, 2, 2), strict=True)
     groups = tuple(
         replace(group, free=free or not probe, probe=probe) for group, free, probe in rows
     )
-    slid, corrected = _sized(3e-3, 3e-3, 3e-3, 3e-3), _sized(1e-3, 3e-3, 1e-3, 3e-3)
+    slid, corrected = _gaps(3e-3, 3e-3, 3e-3, 3e-3), _gaps(1e-3, 3e-3, 1e-3, 3e-3)
     rungs = [
         _rung("baseline", slid),
         _rung("baseline_network", corrected, network=True),
-        _rung("true", _sized(0, 0, 0, 0)),
+        _rung("true", _gaps(0, 0, 0, 0)),
     ]
-    found = _part(build_ladder([replace(item, groups=groups)], rungs, KINDS, {"top"}), "all")[
+    result = _part(build_ladder([replace(item, groups=groups)], rungs, KINDS, {"top"}), "all")[
         "errors"
     ]
-    assert found["baseline"]["error"] == pytest.approx(3.0)
-    # It is right while the tool is there to tell it, and pays for what it leaves, not for what it
-    # mends.
-    assert found["baseline_network"]["error"] == pytest.approx(np.sqrt((1 + 9) / 2), abs=1e-3)
-    assert found["baseline_network"]["removed"]["value"] == pytest.approx(
+    assert result["baseline"]["error"] == pytest.approx(3.0)
+    # The network is right while the tool touches, and is charged for the error that it leaves.
+    assert result["baseline_network"]["error"] == pytest.approx(np.sqrt((1 + 9) / 2), abs=1e-3)
+    assert result["baseline_network"]["removed"]["value"] == pytest.approx(
         (3 - np.sqrt(5)) / 2, abs=1e-3
     )

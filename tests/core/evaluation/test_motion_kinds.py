@@ -1,4 +1,4 @@
-"""Kinds of motion of pushes, by the contact that is nearest in time."""
+"""Kinds of motion of sequences and of pushes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from palpate.setup.setup import Setup
 
 
 def _dragged(folder: Path, setup: Setup) -> None:
-    """Have the tool of a sequence travel 15 mm along the top while it is 3 mm deep."""
+    """Let the tool of a sequence travel 15 mm along the top at a depth of 3 mm."""
     file = folder / "kinematics.csv"
     header, *rows = file.read_text().splitlines()
     back = setup.phantom_from_robot.inverse()
@@ -32,7 +32,7 @@ def _dragged(folder: Path, setup: Setup) -> None:
     file.write_text("\n".join([header, *moved]) + "\n")
 
 
-def test_push_and_drag_are_told_apart(tmp_path: Path):
+def test_pushes_and_drags_are_distinguished(tmp_path: Path):
     folder = write_valid_dataset(tmp_path / "block")
     dataset = open_dataset(folder)
     setup = setup_from(dataset, register(dataset))

@@ -1,6 +1,4 @@
-"""The paper's three tables: what a search for the modulus shows, and a whole run of them on a small
-phantom.
-"""
+"""The paper's three tables: interpretation of the modulus search, and a run on a small phantom."""
 
 from __future__ import annotations
 
@@ -18,7 +16,7 @@ def _search(change: float, flat: bool) -> dict[str, object]:
     return {"directions": [{"change": change, "flat": flat}]}
 
 
-def test_flat_search_is_explained_by_the_modulus_that_cancels():
+def test_flat_search_is_explained_by_the_cancelling_modulus():
     text = interpret_search(_search(2e-9, True), _search(4e-9, True))
     assert (
         "Both searches are flat" in text
@@ -27,7 +25,7 @@ def test_flat_search_is_explained_by_the_modulus_that_cancels():
     )
 
 
-def test_search_that_changes_something_is_not_called_flat():
+def test_search_with_a_change_is_not_called_flat():
     assert "changes by up to 0.31 mm" in interpret_search(
         _search(3.1e-4, False), _search(1e-5, True)
     )

@@ -1,4 +1,4 @@
-"""Sweeps of a virtual phantom with a known error: optimum, flat directions, resumption, executors."""
+"""Sweeps of a virtual phantom with a known error: optimum, flat directions, resuming, executors."""
 
 from __future__ import annotations
 
