@@ -18,7 +18,7 @@ from palpate.fem.linalg.direct_solver import Factor
 from palpate.fem.linalg.sparsity import SOLVERS, factor_of
 from palpate.fem.model import BlockModel
 from palpate.foundation.arrays import FloatArray
-from palpate.gradients.forward import local_tool
+from palpate.gradients.frame_tangent import local_tool
 from palpate.mesh.graded_mesh import REPLAY_GRID
 from palpate.replay.replay import replay
 

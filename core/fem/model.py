@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from palpate.fem.constitutive.stiffness_field import (
 from palpate.fem.contact import assemble_contact, contact_energy
 from palpate.fem.friction import FrictionPotential
 from palpate.fem.linalg.sparsity import face_slots, factor_of, upper_pattern
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import BoolArray, FloatArray
 from palpate.mesh.elements import Face, Quadrature, face_weights, quadrature
 from palpate.mesh.protocol import Connectivity, Mesh
 from palpate.setup.closest_point import winding_number
@@ -47,8 +47,6 @@ _BOND_EDGE = 1e-3
 """Width over which a bond ends at a detached strip's edge [m]: the result changes smoothly with the
 strip's extent."""
 _EMPTY = np.empty(0)
-
-BoolArray = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 @dataclass(frozen=True, eq=False)

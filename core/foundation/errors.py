@@ -1,16 +1,19 @@
-"""Everything that can go wrong, as one tree.
+"""The errors of the package, as one tree.
 
-PalpateError                 a problem a user can act on; the message says what was found, expected, and what to do
-├── DatasetError             a file of a dataset is missing or off: names file, row and key
-├── RegistrationError        frames could not be related, or only doubtfully
-├── SetupError               a belief about the experiment is impossible: names key, value and bounds
-├── MeshError                a surface, shape or grid that cannot be filled with elements: names file, numbers and place
-├── SolveError               a frame without equilibrium: names frame, residual and cause
-├── EffectError              an unknown effect, or a parameter out of bounds: names parameter, value and bounds
-├── DiagnosisError           data that cannot carry a diagnosis
-├── CorrectionError          samples, networks and trainings that do not fit together: names key and value
-└── RunError                 a result on disk that is missing or not whole
-Cancelled                    the user stopped a long verb (not an error)
+PalpateError: a problem a user can act on. The message says what was found, what was expected, and
+what to do.
+
+- DatasetError: a file of a dataset is missing or wrong; names file, row and key.
+- RegistrationError: frames could not be related to one another, or only doubtfully.
+- SetupError: an assumption about the experiment is impossible; names key, value and bounds.
+- MeshError: a surface, shape or grid cannot be filled with elements; names file, numbers and place.
+- SolveError: a frame has no equilibrium; names frame, residual and cause.
+- EffectError: an unknown effect, or a parameter out of bounds; names parameter, value and bounds.
+- DiagnosisError: the data cannot carry a diagnosis.
+- CorrectionError: samples, networks and trainings do not fit together; names key and value.
+- RunError: a result on disk is missing or incomplete.
+
+Cancelled is no error: the user stopped a long command.
 """
 
 from __future__ import annotations
@@ -33,8 +36,11 @@ __all__ = [
 
 
 class PalpateError(Exception):
-    """A problem a user can act on; `where` holds its place as plain values (file, row, key,
-    frame...).
+    """A problem a user can act on.
+
+    Attributes:
+        message: one sentence for the user.
+        where: the place of the problem as plain values (file, row, key, frame ...).
     """
 
     def __init__(self, message: str, **where: Any) -> None:
@@ -44,7 +50,9 @@ class PalpateError(Exception):
 
 
 class DatasetError(PalpateError):
-    """A file of a dataset is missing or off; `where` has file, row and key as far as they apply."""
+    """A file of a dataset is missing or wrong; `where` has file, row and key as far as they
+    apply.
+    """
 
 
 class RegistrationError(PalpateError):
@@ -52,12 +60,13 @@ class RegistrationError(PalpateError):
 
 
 class SetupError(PalpateError):
-    """An impossible belief about the experiment; `where` has key, value, low and high."""
+    """An impossible assumption about the experiment; `where` has key, value, low and high."""
 
 
 class MeshError(PalpateError):
-    """A surface, shape or grid that cannot be filled with elements; `where` has file and what was
-    counted.
+    """A surface, shape or grid that cannot be filled with elements.
+
+    `where` has the file and what was counted.
     """
 
 
@@ -66,12 +75,14 @@ class SolveError(PalpateError):
 
 
 class EffectError(PalpateError):
-    """An unknown effect or a parameter out of bounds; `where` has parameter, value, low and
-    high."""
+    """An unknown effect or a parameter out of bounds.
+
+    `where` has parameter, value, low and high.
+    """
 
 
 class DiagnosisError(PalpateError):
-    """Data that cannot carry a diagnosis, with what is lacking."""
+    """Data that cannot carry a diagnosis; the message says what is missing."""
 
 
 class CorrectionError(PalpateError):
@@ -79,8 +90,8 @@ class CorrectionError(PalpateError):
 
 
 class RunError(PalpateError):
-    """A result on disk that is missing or not whole."""
+    """A result on disk that is missing or incomplete."""
 
 
 class Cancelled(Exception):
-    """Raised out of `report(...)` when the user stopped a long verb."""
+    """Raised by `report(...)` when the user stopped a long command."""

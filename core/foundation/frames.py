@@ -1,11 +1,13 @@
 """Rigid transforms between the three frames of an experiment.
 
-phantom  origin at the centre of the phantom's base, z up, x along the long side; the simulation lives here
-robot    the manipulator's base frame
-camera   the depth camera's optical frame: x right, y down, z forward
+phantom: origin at the centre of the phantom's base, z up, x along the long side; the simulation
+runs in it.
+robot: the manipulator's base frame.
+camera: the depth camera's optical frame, x right, y down, z forward.
 
-A transform is named `target_from_source`: `phantom_from_camera.apply(points_in_camera)` gives points in the phantom frame,
-and `a_from_b @ b_from_c` is `a_from_c`. Lengths are metres; quaternions are (x, y, z, w), the last one real.
+A transform is named `target_from_source`: `phantom_from_camera.apply(points_in_camera)` gives
+points in the phantom frame, and `a_from_b @ b_from_c` is `a_from_c`. Lengths are metres;
+quaternions are (x, y, z, w), the last one real.
 """
 
 from __future__ import annotations
@@ -21,23 +23,24 @@ from palpate.foundation.errors import SetupError
 
 __all__ = ["Transform"]
 
-_ALMOST = 1e-4
-"""How far R R^T may be from one [1], and a tenth farther on its diagonal."""
+_ROTATION_TOLERANCE = 1e-4
+"""Largest deviation of an entry of R R^T from the identity [1]; 10 % more on its diagonal."""
 
 
 def _is_rotation(matrix: FloatArray) -> bool:
-    """Whether a (3, 3) matrix is one, to 1e-4; thousands are made in a diagnosis, and NumPy takes
-    eight times as long to tell.
+    """Whether a (3, 3) matrix is a proper rotation, to 1e-4.
+
+    Eight times as fast as NumPy: a diagnosis makes thousands of transforms.
     """
     rows = matrix.tolist()
     (a, b, c), (d, e, f), (g, h, i) = rows
     for number, one in enumerate(rows):
         for other in range(number, 3):
-            wanted, product = (
+            expected, product = (
                 float(number == other),
                 sum(x * y for x, y in zip(one, rows[other], strict=True)),
             )
-            if not abs(product - wanted) <= _ALMOST * (1 + 0.1 * wanted):
+            if not abs(product - expected) <= _ROTATION_TOLERANCE * (1 + 0.1 * expected):
                 return False
     return bool(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0)
 
@@ -59,12 +62,12 @@ class Transform:
         translation = np.array(self.translation, dtype=float)
         if rotation.shape != (3, 3) or translation.shape != (3,):
             raise SetupError(
-                f"a transform needs a 3x3 rotation and 3 numbers, got {rotation.shape} and {translation.shape}"
+                "a transform needs a 3x3 rotation and 3 numbers, "
+                f"got {rotation.shape} and {translation.shape}"
             )
         if not _is_rotation(rotation):
-            raise SetupError(
-                f"not a rotation: R R^T differs from 1 by {np.abs(rotation @ rotation.T - np.eye(3)).max():.2g}"
-            )
+            deviation = np.abs(rotation @ rotation.T - np.eye(3)).max()
+            raise SetupError(f"not a rotation: R R^T differs from 1 by {deviation:.2g}")
         rotation.setflags(write=False)
         translation.setflags(write=False)
         object.__setattr__(self, "rotation", rotation)
@@ -72,8 +75,9 @@ class Transform:
 
     @classmethod
     def from_matrix(cls, matrix: Any) -> Transform:
-        """From a 4x4 homogeneous matrix, row major; its rotation is orthonormalised (rounded
-        files).
+        """Make a transform from a row-major 4x4 homogeneous matrix.
+
+        The rotation is orthonormalised, because numbers in files are rounded.
         """
         array = np.asarray(matrix, dtype=float)
         if array.shape != (4, 4):
@@ -85,7 +89,7 @@ class Transform:
 
     @classmethod
     def from_vector(cls, translation: Any, rotation_vector: Any) -> Transform:
-        """From a translation [m] and a rotation vector [rad], each (3,)."""
+        """Make a transform from a translation [m] and a rotation vector [rad], each (3,)."""
         return cls(
             Rotation.from_rotvec(np.asarray(rotation_vector, dtype=float)).as_matrix(),
             np.asarray(translation, dtype=float),
@@ -109,11 +113,11 @@ class Transform:
         return np.asarray(points) @ self.rotation.T + self.translation
 
     def rotate(self, vectors: FloatArray) -> FloatArray:
-        """Turn directions (..., 3), without the translation."""
+        """Rotate directions (..., 3), without the translation."""
         return np.asarray(vectors) @ self.rotation.T
 
     def inverse(self) -> Transform:
-        """The transform back."""
+        """The inverse transform."""
         return Transform(self.rotation.T, -self.rotation.T @ self.translation)
 
     def __matmul__(self, other: Transform) -> Transform:

@@ -1,5 +1,4 @@
-"""How a long computation tells where it is: `report(fraction, text)`, which may raise
-`Cancelled`."""
+"""Progress reports of long computations: `report(fraction, text)`, which may raise `Cancelled`."""
 
 from __future__ import annotations
 
@@ -11,11 +10,11 @@ Report = Callable[[float, str], None]
 
 
 def silent(fraction: float, text: str) -> None:
-    """Report to nobody."""
+    """Discard a report."""
 
 
 def part(report: Report, low: float, high: float) -> Report:
-    """A report whose 0..1 fills `low`..`high` of the given one."""
+    """Map the fractions 0..1 of a part to `low`..`high` of the given report."""
 
     def scaled(fraction: float, text: str) -> None:
         report(low + (high - low) * fraction, text)
@@ -24,14 +23,15 @@ def part(report: Report, low: float, high: float) -> Report:
 
 
 def rising(report: Report) -> Report:
-    """A report that never falls back: a part that is gone through again stays where the whole has
-    come.
+    """Wrap a report so that its fraction never falls.
+
+    A part that is repeated keeps the fraction the whole had reached.
     """
     most = 0.0
 
-    def held(fraction: float, text: str) -> None:
+    def raised(fraction: float, text: str) -> None:
         nonlocal most
         most = max(most, fraction)
         report(most, text)
 
-    return held
+    return raised

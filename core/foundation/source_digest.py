@@ -1,4 +1,4 @@
-"""A digest of the sources, by which stored results say what code they come from."""
+"""Digest of the sources, which tells stored results by the code that made them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ EXCLUDED = (
 
 @cache
 def source_digest() -> str:
-    """Digest (12 hex digits) of all sources that a diagnosis or a virtual dataset depends on.
+    """Compute the digest (12 hex digits) of all sources that a diagnosis or a virtual dataset uses.
 
     The folders in `EXCLUDED` are left out: they may change without making old results invalid.
     """

@@ -1,8 +1,8 @@
-"""One thread for the small dense products of a solve.
+"""One BLAS thread for the small dense products of a solve.
 
-A replay multiplies thousands of matrices of a few hundred rows a second. OpenBLAS hands each to
+A replay multiplies thousands of matrices of a few hundred rows a second. OpenBLAS gives each to
 threads that wait for one another in a busy loop; on cores that also do other work such a replay
-takes 20 to 40 times as long. Frames and sequences are what runs side by side, in processes.
+takes 20 to 40 times as long. Frames and sequences run in parallel in processes instead.
 """
 
 from __future__ import annotations
@@ -20,14 +20,15 @@ _R = TypeVar("_R")
 
 @cache
 def _pools(with_mkl: bool) -> ThreadpoolController:
-    """Of the libraries loaded by now: NumPy's and SciPy's always, MKL once a matrix was factorised
-    with it.
+    """The thread pools of the libraries loaded so far.
+
+    NumPy's and SciPy's are always loaded, MKL's once a matrix was factorised with it.
     """
     return ThreadpoolController()
 
 
 def on_one_thread(solve: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Bound BLAS to one thread for the length of each call; 9 us a call."""
+    """Limit BLAS to one thread for the length of each call; costs 9 us a call."""
 
     @wraps(solve)
     def bounded(*args: _P.args, **kwargs: _P.kwargs) -> _R:

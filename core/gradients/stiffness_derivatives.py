@@ -1,5 +1,6 @@
-"""How a frame changes with the stiffness of any part of the body: many parts for the price of one
-assembly.
+"""First-order changes of a frame with the stiffness of any part of the body.
+
+Many parts cost one assembly.
 """
 
 from __future__ import annotations
@@ -10,12 +11,9 @@ import scipy.sparse as sp
 from palpate.fem.constitutive.elastic import assemble_elastic
 from palpate.fem.model import BlockModel
 from palpate.foundation.arrays import FloatArray
-from palpate.gradients.forward import (
-    CompliantTool,
-    factorise_at,
-    is_compliant,
-    require_history_free,
-)
+from palpate.gradients.compliant_tool import CompliantTool
+from palpate.gradients.frame_tangent import factorise_at
+from palpate.gradients.setup_change import is_compliant, require_history_free
 from palpate.replay.replay import Equilibrium, Replay
 
 __all__ = ["point_forces", "stiffness_changes"]
@@ -25,13 +23,17 @@ def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray
     """Displacements that small changes of the stiffness within the body bring about, to first
     order.
 
+    The cost grows slowly with m: a point's share of the residual is the force that its stiffness
+    alone resists with.
+
     Args:
+        block: the replay that made the frame.
+        frame: an equilibrium.
         log_factors: (m, e, q) logarithm of new over old stiffness, at the quadrature points of the
             frame's mesh.
 
     Returns:
-        (m, n, 3) [m], to five digits; cheap in m, since a point's share of the residual is what it
-        alone would resist with.
+        (m, n, 3) [m], to five digits.
     """
     require_history_free(block.setup)
     result = np.zeros((len(log_factors), *frame.displacement.shape))
@@ -63,9 +65,17 @@ def stiffness_changes(block: Replay, frame: Equilibrium, log_factors: FloatArray
 
 def point_forces(model: BlockModel, positions: FloatArray) -> FloatArray:
     """Internal forces over E that the stiffness at each quadrature point puts on its element's
-    nodes (e, q, a, 3) [m^2].
+    nodes.
 
-    Forces are linear in the stiffness, so each point's are those of a body that has none elsewhere.
+    Forces are linear in the stiffness, so each point's are those of a body without stiffness
+    elsewhere.
+
+    Args:
+        model: the body.
+        positions: (n, 3) [m].
+
+    Returns:
+        (e, q, a, 3) [m^2].
     """
     elements, points = model.mu.shape
     corners = model.topology.elements.shape[1]

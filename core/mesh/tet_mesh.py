@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from palpate.foundation.arrays import FloatArray, IntArray
+from palpate.foundation.arrays import BoolArray, FloatArray, IntArray
 from palpate.mesh.elements import EDGES, TET10, shapes_of
 from palpate.mesh.interpolation import weighted_nodes
 from palpate.mesh.protocol import Connectivity
 from palpate.setup.closest_point import containing, nearest
-from palpate.setup.fixed_region import BoolArray
 
 __all__ = ["TetMesh", "sides_of"]
 

@@ -52,7 +52,7 @@ class Replay:
 
     Attributes:
         factorised: the frame of which a model holds the factor, and the factor's number
-            (`palpate.gradients.forward.factorise_at`).
+            (`palpate.gradients.frame_tangent.factorise_at`).
     """
 
     def __init__(

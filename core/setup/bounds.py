@@ -1,4 +1,4 @@
-"""Bounds that a belief about the experiment must keep."""
+"""Check of the bounds of a value of the setup."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import math
 
 from palpate.foundation.errors import SetupError
 
-__all__ = ["within"]
+__all__ = ["require_within"]
 
 
-def within(key: str, value: float, low: float, high: float, unit: str) -> None:
-    """Raise SetupError with key, value and bounds where the value is outside, or not finite."""
+def require_within(key: str, value: float, low: float, high: float, unit: str) -> None:
+    """Raise SetupError with key, value and bounds if the value is outside them, or not finite."""
     if not (math.isfinite(value) and low <= value <= high):
         message = f"{key} = {value:g} {unit} is outside {low:g} to {high:g} {unit}"
         raise SetupError(message, key=key, value=value, low=low, high=high)

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from palpate.foundation.arrays import FloatArray
-from palpate.setup.bounds import within
+from palpate.setup.bounds import require_within
 
 __all__ = ["CLEARANCE", "Box", "distance_to_block"]
 
 _SAMPLING = (35, 21, 19)
-"""Points along the edges where the surface is sampled."""
+"""Number of points along x, y, z at which the surface is sampled."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +24,7 @@ class Box:
 
     def __post_init__(self) -> None:
         for axis, length in zip("xyz", self.size, strict=True):
-            within(f"size {axis}", length, 1e-3, 2.0, "m")
+            require_within(f"size {axis}", length, 1e-3, 2.0, "m")
 
     @property
     def low(self) -> FloatArray:
@@ -38,18 +38,25 @@ class Box:
 
     @property
     def height(self) -> float:
-        """[m]."""
+        """Height [m]."""
         return self.size[2]
 
     def nearest(self, points: FloatArray) -> FloatArray:
-        """Places of the block (m, 3) [m] nearest to points (m, 3) [m]: the points themselves within
-        it.
+        """Points of the block (m, 3) [m] nearest to points (m, 3) [m]; points inside stay where
+        they are.
         """
         return np.clip(points, self.low, self.high)
 
     def facing(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Distance (m,) [m] of points (m, 3) [m] to top and sides, negative within, and the normals
-        (m, 3) of the side that faces them; the base is no face.
+        """Signed distance to top and sides, and the normal of the side that faces each point.
+
+        The base is not one of these sides.
+
+        Args:
+            points: (m, 3) [m].
+
+        Returns:
+            distances (m,) [m], negative inside, and unit normals (m, 3).
         """
         beyond = np.concatenate(
             [np.abs(points[:, :2]) - self.high[:2], points[:, 2:] - self.size[2]], axis=1
@@ -79,8 +86,8 @@ class Box:
 
 
 CLEARANCE = 1.5e-3
-"""A tool farther than this from the stated block [m] does not touch it, whatever is slightly
-wrong."""
+"""A tool farther than this from the stated block [m] does not touch it, even if size or pose are
+slightly wrong."""
 
 
 def distance_to_block(size: tuple[float, float, float], centres: FloatArray) -> FloatArray:

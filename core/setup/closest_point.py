@@ -1,5 +1,6 @@
-"""Where points lie among triangles and tetrahedra: kernels that try them all, which for some
-thousands is fast enough.
+"""Closest points on triangles, containing tetrahedra, and winding numbers.
+
+The kernels try all triangles or tetrahedra, which is fast enough for some thousands of them.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ __all__ = ["containing", "nearest", "winding_number"]
 
 @njit(cache=True)
 def _shares(p: Any, a: Any, b: Any, c: Any) -> tuple[float, float, float]:  # noqa: PLR0911 (one for each corner, edge and the inside)
-    """Barycentric coordinates of the triangle's point nearest to p (Ericson, Real-Time Collision
-    Detection, 2005, 5.1.5).
+    """Barycentric coordinates of the triangle's point nearest to p.
+
+    Source: Ericson, Real-Time Collision Detection, 2005, 5.1.5.
     """
     ab, ac, ap, bp, cp = b - a, c - a, p - a, p - b, p - c
     d1, d2, d3 = np.dot(ab, ap), np.dot(ac, ap), np.dot(ab, bp)
@@ -42,8 +44,10 @@ def _shares(p: Any, a: Any, b: Any, c: Any) -> tuple[float, float, float]:  # no
 
 @njit(cache=True)
 def nearest(points: Any, corners: Any) -> tuple[Any, Any]:
-    """The nearest of triangles (t, 3, 3) [m] to each point (m, 3) [m], (m,), and the place on it
-    (m, 3) [m].
+    """Find the nearest of triangles (t, 3, 3) [m] to each point (m, 3) [m].
+
+    Returns:
+        number (m,) of the triangle, and the nearest point on it (m, 3) [m].
     """
     numbers, places = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
     middles = np.empty((len(corners), 3))
@@ -72,11 +76,19 @@ def nearest(points: Any, corners: Any) -> tuple[Any, Any]:
 def containing(
     points: Any, lows: Any, highs: Any, origins: Any, inverses: Any, tolerance: float
 ) -> Any:
-    """The tetrahedron that holds each point (m, 3) [m], (m,); -1 where none does.
+    """Find the tetrahedron that contains each point; -1 if none does.
 
-    `lows`, `highs` (e, 3) bound the tetrahedra [m]; `inverses` (e, 3, 3) [1/m] turn a place seen
-    from `origins` (e, 3) [m] into barycentric coordinates 1 to 3, each of which may be so far below
-    zero.
+    Args:
+        points: (m, 3) [m].
+        lows: (e, 3) lower bounds of the tetrahedra [m].
+        highs: (e, 3) upper bounds [m].
+        origins: (e, 3) first corners [m].
+        inverses: (e, 3, 3) [1/m], which turn a vector from the origin into barycentric coordinates
+            1 to 3.
+        tolerance: each coordinate may be so far below zero [1].
+
+    Returns:
+        numbers (m,).
     """
     numbers = np.full(len(points), -1)
     for m in range(len(points)):
@@ -105,10 +117,16 @@ def containing(
 
 @njit(cache=True)
 def winding_number(faces: Any, positions: Any, point: Any) -> float:
-    """How often flat polygons (f, 3) or (f, 4) wind around a point (3,): over a closed surface 1
-    inside and 0 outside.
+    """Winding number of flat polygons around a point (3,): over a closed surface 1 inside, 0
+    outside.
 
-    Sum of the triangles' solid angles (van Oosterom and Strackee 1983) over that of the sphere.
+    It is the sum of the triangles' solid angles (van Oosterom and Strackee 1983) over that of the
+    sphere.
+
+    Args:
+        faces: (f, 3) or (f, 4) nodes of the polygons.
+        positions: (n, 3) of the nodes [m].
+        point: (3,) [m].
     """
     total, arms, lengths = 0.0, np.empty((3, 3)), np.empty(3)
     for f in range(faces.shape[0]):

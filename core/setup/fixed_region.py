@@ -1,4 +1,4 @@
-"""Which part of a surface is held: a plane, named triangles, or painted vertices."""
+"""The part of a surface that is held: below a plane, or named by triangles or by vertices."""
 
 from __future__ import annotations
 
@@ -8,40 +8,52 @@ from typing import Protocol
 
 import numpy as np
 
-from palpate.foundation.arrays import FloatArray, IntArray
+from palpate.foundation.arrays import BoolArray, FloatArray, IntArray
 from palpate.foundation.errors import MeshError
 
-__all__ = ["BoolArray", "Faces", "FixedRegion", "Painted", "Plane"]
-
-BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+__all__ = ["Faces", "FixedRegion", "Painted", "Plane"]
 
 
 class FixedRegion(Protocol):
-    """A way to say what is held."""
+    """A rule for what is held."""
 
     def mask(self, name: str, vertices: FloatArray, triangles: IntArray) -> BoolArray:
-        """Which triangles (t, 3) of the vertices (v, 3) [m] are held (t,); MeshError, with the
-        file's name, if none can be.
+        """Mark the triangles that are held.
+
+        Raises MeshError, with the file's name, if none can be.
+
+        Args:
+            name: of the file, for messages.
+            vertices: (v, 3) [m].
+            triangles: (t, 3).
+
+        Returns:
+            (t,) True for held triangles.
         """
 
 
 @dataclass(frozen=True)
 class Plane:
-    """All triangles that lie within `tolerance` [m] of the plane z = `height` [m], or below it:
-    what stands on a table.
+    """All triangles below a horizontal plane: what stands on a table.
+
+    Attributes:
+        height: z of the plane [m].
+        tolerance: a triangle may reach so far above the plane [m].
     """
 
     height: float = 0.0
     tolerance: float = 1e-4
 
     def mask(self, name: str, vertices: FloatArray, triangles: IntArray) -> BoolArray:
-        """Which triangles are held (t,)."""
+        """Mark the triangles that are held (t,)."""
         tops = vertices[triangles, 2].max(axis=1)
         held = tops <= self.height + self.tolerance
         if not held.any():
             raise MeshError(
-                f"{name}: no triangle lies below z = {self.height:g} m within {self.tolerance:g} m, the lowest reaches up to "
-                f"{tops.min():.4g} m; expected a base there: move the surface, or raise height or tolerance",
+                f"{name}: no triangle lies below z = {self.height:g} m within {self.tolerance:g} "
+                "m, "
+                f"the lowest reaches up to {tops.min():.4g} m; expected a base there: "
+                "move the surface, or raise height or tolerance",
                 file=name,
                 height=self.height,
                 tolerance=self.tolerance,
@@ -52,31 +64,31 @@ class Plane:
 
 @dataclass(frozen=True)
 class Faces:
-    """Triangles by number, as they stand in the file."""
+    """Triangles by number, in the order of the file."""
 
     triangles: tuple[int, ...]
 
     @classmethod
     def of(cls, triangles: Sequence[int] | IntArray) -> Faces:
-        """From any sequence of numbers."""
+        """Make a region from any sequence of numbers."""
         return cls(tuple(int(number) for number in triangles))
 
     def mask(self, name: str, vertices: FloatArray, triangles: IntArray) -> BoolArray:
-        """Which triangles are held (t,)."""
+        """Mark the triangles that are held (t,)."""
         return _marked(name, "triangle", self.triangles, len(triangles))
 
 
 @dataclass(frozen=True)
 class Painted:
-    """All triangles whose three vertices are painted; vertices by number, as they stand in the
-    file.
+    """All triangles whose three vertices are painted; vertices by number, in the order of
+    the file.
     """
 
     vertices: tuple[int, ...]
 
     @classmethod
     def of(cls, paint: Sequence[int] | IntArray | BoolArray) -> Painted:
-        """From numbers, or from one truth value per vertex (v,)."""
+        """Make a region from vertex numbers, or from one truth value per vertex (v,)."""
         numbers = np.asarray(paint)
         return cls(
             tuple(
@@ -86,14 +98,15 @@ class Painted:
         )
 
     def mask(self, name: str, vertices: FloatArray, triangles: IntArray) -> BoolArray:
-        """Which triangles are held (t,)."""
+        """Mark the triangles that are held (t,)."""
         held = np.asarray(
             _marked(name, "vertex", self.vertices, len(vertices))[triangles].all(axis=1)
         )
         if not held.any():
             raise MeshError(
-                f"{name}: the {len(self.vertices)} painted vertices are nowhere all three corners of a triangle; expected an "
-                "area: paint whole triangles",
+                f"{name}: the {len(self.vertices)} painted vertices are nowhere all three corners "
+                "of "
+                "a triangle; expected an area: paint whole triangles",
                 file=name,
                 painted=len(self.vertices),
             )

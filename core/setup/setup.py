@@ -1,5 +1,6 @@
-"""What the experimenter believes, as one frozen description. An effect replaces a part of it; the
-solver reads nothing else.
+"""The experiment as assumed, in one frozen description.
+
+An effect replaces a part of it; the solver reads nothing else.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SetupError
 from palpate.foundation.frames import Transform
-from palpate.setup.bounds import within as _within
+from palpate.setup.bounds import require_within
 from palpate.setup.box import Box
 from palpate.setup.material import Fibres, Inclusion, Layer, Material, MaterialLaw, Relaxation
 from palpate.setup.shape import Shape
@@ -51,21 +52,30 @@ PAIRINGS = (
     "turn-3",
     "reversed",
 )
-"""How touches can really be paired with landmarks: as stated, two rows of touches.csv for each
-other, or each with the landmark of the row so many further on, after the last with the first, or
-all in the reverse order."""
+"""Possible true pairings of touches with landmarks: as stated, two rows of touches.csv exchanged,
+each touch with the landmark so many rows further on (cyclic), or all in the reverse order."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Load:
-    """Own weight per volume over Young's modulus, rho g / E [1/m]; zero leaves gravity out."""
+    """Gravity.
+
+    Attributes:
+        specific_weight_over_stiffness: weight per volume over Young's modulus, rho g / E [1/m];
+            zero leaves gravity out.
+    """
 
     specific_weight_over_stiffness: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Detachment:
-    """A strip of the base along one edge that is not held, `extent` inwards from it [m]."""
+    """A strip of the base along one edge that is not held.
+
+    Attributes:
+        edge: of the base.
+        extent: width of the strip, inwards from the edge [m].
+    """
 
     edge: Edge
     extent: float
@@ -73,14 +83,14 @@ class Detachment:
 
 @dataclass(frozen=True, kw_only=True)
 class Support:
-    """How the base is held.
+    """The support of the base.
 
     Attributes:
-        friction_coefficient: of a base that slides as a whole, Coulomb's [1]; None for one that
-            does not.
+        friction_coefficient: Coulomb coefficient of a base that can slip as a whole [1]; None for a
+            base that cannot.
         detached: strips that are not held.
-        stiffness_over_E: springs per area under the base, in all directions, over Young's modulus
-            [1/m]; None for a rigid support.
+        stiffness_over_E: stiffness of springs under the base, per area and in all directions, over
+            Young's modulus [1/m]; None for a rigid support.
     """
 
     friction_coefficient: float | None = None
@@ -89,7 +99,7 @@ class Support:
 
     def __post_init__(self) -> None:
         if self.stiffness_over_E is not None:
-            _within("support stiffness_over_E", self.stiffness_over_E, 1e-2, 1e6, "1/m")
+            require_within("support stiffness_over_E", self.stiffness_over_E, 1e-2, 1e6, "1/m")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,11 +108,10 @@ class Tool:
 
     Attributes:
         radius: [m].
-        offset: where its centre is against the stated one before anything is touched, phantom frame
-            [m].
-        compliance_times_stiffness: how far the force F on it moves its centre, C F: C times Young's
-            modulus [1/m].
-        friction_coefficient: Coulomb's, of the tool on the surface [1].
+        offset: true minus stated position of its centre without load, phantom frame [m].
+        compliance_times_stiffness: compliance C of its mount times Young's modulus [1/m]; the force
+            F on the tool moves its centre by C F.
+        friction_coefficient: Coulomb coefficient of the tool on the surface [1].
     """
 
     radius: float
@@ -111,9 +120,11 @@ class Tool:
     friction_coefficient: float = 0.0
 
     def __post_init__(self) -> None:
-        _within("tool radius", self.radius, 1e-4, 0.2, "m")
-        _within("tool compliance_times_stiffness", self.compliance_times_stiffness, 0.0, 1e3, "1/m")
-        _within("tool friction_coefficient", self.friction_coefficient, 0.0, 10.0, "")
+        require_within("tool radius", self.radius, 1e-4, 0.2, "m")
+        require_within(
+            "tool compliance_times_stiffness", self.compliance_times_stiffness, 0.0, 1e3, "1/m"
+        )
+        require_within("tool friction_coefficient", self.friction_coefficient, 0.0, 10.0, "")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,10 +134,10 @@ class Sensor:
     Attributes:
         depth_sigma: the maker's stated accuracy [m].
         time_offset: cloud stamp minus robot stamp of the same instant [s].
-        depth_offset, depth_scale: what it reads of a depth z along its axis: depth_scale z +
-            depth_offset [m], [1].
-        camera_shift: where the camera registration is off: true phantom_from_camera = camera_shift
-            @ stated one.
+        camera_shift: error of the camera registration: true phantom_from_camera = camera_shift @
+            stated one.
+        depth_offset: b in the reading a z + b of a depth z along the camera's axis [m].
+        depth_scale: a in the same [1].
     """
 
     depth_sigma: float = 0.002
@@ -136,22 +147,22 @@ class Sensor:
     depth_scale: float = 1.0
 
     def __post_init__(self) -> None:
-        _within("sensor depth_offset", self.depth_offset, -0.2, 0.2, "m")
-        _within("sensor depth_scale", self.depth_scale, 0.5, 2.0, "")
+        require_within("sensor depth_offset", self.depth_offset, -0.2, 0.2, "m")
+        require_within("sensor depth_scale", self.depth_scale, 0.5, 2.0, "")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Touching:
-    """How the landmarks were touched, which gave phantom_from_robot.
+    """The landmark touches from which phantom_from_robot was computed.
 
     Attributes:
-        misses: (x, y, z) [m] of each moved touch minus its landmark under the stated registration,
-            phantom frame; none were any.
+        misses: (x, y, z) [m] of each touch minus its landmark under the stated registration,
+            phantom frame; empty if no touch is off.
         lift: height of the tool's centre over the landmark at a touch [m].
-        pairing: which landmark each touch was really of, one of PAIRINGS.
-        scale: of the touched polygon over that of the landmarks [1].
-        inset: how far inside each touch was made, along x and along y [m]: a ball does not stay on
-            a corner.
+        pairing: the true pairing of touches with landmarks, one of PAIRINGS.
+        scale: size of the touched polygon over that of the landmarks [1].
+        inset: distance of each touch inwards from its landmark, along x and along y [m]: a ball
+            does not stay on a corner.
     """
 
     misses: tuple[tuple[float, float, float], ...] = ()
@@ -167,11 +178,12 @@ class Touching:
                 key="pairing",
                 value=self.pairing,
             )
-        _within("touching scale", self.scale, 0.1, 10.0, "")
+        require_within("touching scale", self.scale, 0.1, 10.0, "")
 
     def order(self, count: int) -> list[int]:
-        """The landmark, by its row, that each of `count` touches was really of; SetupError where
-        there are too few.
+        """The landmark, by its row, that each of `count` touches truly belongs to.
+
+        Raises SetupError if there are too few touches for the pairing.
         """
         order, (kind, *words) = list(range(count)), self.pairing.split("-")
         if kind == "as":
@@ -194,18 +206,23 @@ class Touching:
 
 @dataclass(frozen=True, kw_only=True)
 class Setup:
-    """One experiment as believed: geometry, material, load, support, tool, sensor and
-    registrations.
+    """One experiment as assumed.
 
     Attributes:
-        mass: of the phantom [kg].
         geometry: of the body.
-        registered: what the registrations took it for; None where that is `geometry`.
-        landmarks: (x, y, z) [m] of the points whose touches gave phantom_from_robot, on what was
-            registered; they sag with the block.
-        touching: how they were touched.
-        phantom_from_robot, phantom_from_camera: the stated registrations.
-        element_size: edges of the even grid that replaces whatever a replay is meshed with [m];
+        tool: the sphere that pushes.
+        material: of the body.
+        load: gravity.
+        support: of the base.
+        sensor: the depth camera.
+        mass: of the phantom [kg].
+        registered: the block that the registrations assumed; None if that is `geometry`.
+        landmarks: (x, y, z) [m] of the points whose touches gave phantom_from_robot, on the
+            registered block; they sag with it.
+        touching: how the landmarks were touched.
+        phantom_from_robot: the stated registration of the robot.
+        phantom_from_camera: the stated registration of the camera.
+        element_size: edge length of the even grid that replaces any other mesh of a replay [m];
             None for none.
     """
 
@@ -225,24 +242,29 @@ class Setup:
 
     def __post_init__(self) -> None:
         if self.element_size is not None:
-            _within("element_size", self.element_size, 5e-4, 1.0, "m")
+            require_within("element_size", self.element_size, 5e-4, 1.0, "m")
         if self.touching.misses and len(self.touching.misses) != len(self.landmarks):
-            told = f"{len(self.touching.misses)} touches miss {len(self.landmarks)} landmarks; state one miss for each"
-            raise SetupError(told, key="misses")
+            message = (
+                f"{len(self.touching.misses)} touches miss {len(self.landmarks)} landmarks; "
+                "state one miss for each"
+            )
+            raise SetupError(message, key="misses")
         if isinstance(self.geometry, Shape):
             self._check_shape(self.geometry)
 
     def _check_shape(self, shape: Shape) -> None:
-        """What is said of a block's flat sides makes no sense of every shape."""
+        """Refuse properties of a block's flat sides for a body that lacks them."""
         if self.material.layer is not None:
             raise SetupError(
-                f"{shape.name}: a layer lies on the flat top of a block; leave it out for other shapes",
+                f"{shape.name}: a layer lies on the flat top of a block; "
+                "leave it out for other shapes",
                 key="layer",
             )
         if self.support.detached and not shape.flat_base:
+            heights = shape.corners[shape.held][..., 2]
             raise SetupError(
-                f"{shape.name}: only a base that lies in z = 0 can be detached; what is held here reaches from "
-                f"{shape.corners[shape.held][..., 2].min():.4g} to {shape.corners[shape.held][..., 2].max():.4g} m",
+                f"{shape.name}: only a base that lies in z = 0 can be detached; what is held here "
+                f"reaches from {heights.min():.4g} to {heights.max():.4g} m",
                 key="detached",
             )
 
@@ -258,12 +280,12 @@ class Setup:
 
     @property
     def stated_geometry(self) -> Box | Shape:
-        """What the registrations took the geometry for."""
+        """The geometry that the registrations assumed."""
         return self.registered or self.geometry
 
     @property
     def stated_box(self) -> Box:
-        """The same of a block; SetupError for other shapes."""
+        """The block that the registrations assumed; SetupError for other shapes."""
         return self.registered or self.box
 
     @property
@@ -277,7 +299,7 @@ class Setup:
 
     @property
     def shape(self) -> Shape:
-        """The geometry of a body that is no block; SetupError for a block."""
+        """The geometry of a body that is not a block; SetupError for a block."""
         if isinstance(self.geometry, Box):
             raise SetupError(
                 "tetrahedra fill closed surfaces; mesh a block with a grid of hexahedra",
@@ -292,8 +314,9 @@ class Setup:
 
     @property
     def pushes_leave_traces(self) -> bool:
-        """Whether a push leaves something when the tool is gone: a dent in a material that
-        remembers, or a block that slid.
+        """Whether a push has an effect after the tool is gone.
+
+        Either a material with history keeps a dent, or the block has slipped.
         """
         return self.support.friction_coefficient is not None or self.material.has_history
 

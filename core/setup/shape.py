@@ -1,4 +1,4 @@
-"""A body of any shape: a closed surface and what of it is held."""
+"""A body of any shape: a closed surface and the part of it that is held."""
 
 from __future__ import annotations
 
@@ -9,28 +9,29 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.foundation.arrays import FloatArray, IntArray
+from palpate.foundation.arrays import BoolArray, FloatArray, IntArray
 from palpate.foundation.errors import MeshError
-from palpate.setup.fixed_region import BoolArray, FixedRegion, Plane
+from palpate.setup.fixed_region import FixedRegion, Plane
 from palpate.setup.surface_file import check_surface, read_surface
 
 __all__ = ["Shape", "load_shape"]
 
 _SAMPLES = 2000
 _FLAT = 1e-4
-"""How far a base may lie from z = 0 [m] to count as standing on the table."""
+"""A base may lie so far from z = 0 [m] and still count as standing on the table."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A body within a closed surface, which is checked when it is made; equal to another with the
-    same surface held the same way.
+    """A body within a closed surface, which is checked when the body is made.
+
+    Two bodies are equal if they have the same surface, held in the same place.
 
     Attributes:
-        vertices: (v, 3) [m], phantom frame: z up, the base's height about zero.
+        vertices: (v, 3) [m], phantom frame: z up, the base near z = 0.
         triangles: (t, 3), counter-clockwise from outside.
-        fixed: what is held.
-        name: for sentences, the file's.
+        fixed: the part that is held.
+        name: of the file, for messages.
     """
 
     vertices: FloatArray
@@ -63,7 +64,7 @@ class Shape:
 
     @cached_property
     def held(self) -> BoolArray:
-        """Which triangles are held (t,)."""
+        """Mark the triangles that are held (t,)."""
         return self.fixed.mask(self.name, self.vertices, self.triangles)
 
     @cached_property
@@ -84,28 +85,28 @@ class Shape:
 
     @property
     def height(self) -> float:
-        """Of the highest point [m]."""
+        """Height of the highest point [m]."""
         return float(self.high[2])
 
     @property
     def corners(self) -> FloatArray:
-        """(t, 3, 3) of the triangles [m]."""
+        """Corners (t, 3, 3) of the triangles [m]."""
         return np.asarray(self.vertices[self.triangles])
 
     @cached_property
     def volume(self) -> float:
-        """[m^3]."""
+        """Enclosed volume [m^3]."""
         a, b, c = self.corners.transpose(1, 0, 2)
         return float(np.einsum("ti,ti->", a, np.cross(b, c)) / 6)
 
     @cached_property
     def flat_base(self) -> bool:
-        """Whether all that is held lies in z = 0."""
+        """Whether everything that is held lies in z = 0."""
         return bool(np.abs(self.corners[self.held][..., 2]).max() <= _FLAT)
 
     def nearest(self, points: FloatArray) -> FloatArray:
-        """Places of the body (m, 3) [m] nearest to points (m, 3) [m]: the points themselves within
-        it.
+        """Points of the body (m, 3) [m] nearest to points (m, 3) [m]; points inside stay where they
+        are.
         """
         from palpate.setup.closest_point import nearest, winding_number
 
@@ -117,8 +118,13 @@ class Shape:
         return np.where(inside[:, None], points, places)
 
     def facing(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Distance (m,) [m] of points (m, 3) [m] to the surface, negative within, and the surface's
-        normals (m, 3) next to them.
+        """Signed distance to the surface, and the surface's normal next to each point.
+
+        Args:
+            points: (m, 3) [m].
+
+        Returns:
+            distances (m,) [m], negative inside, and unit normals (m, 3).
         """
         from palpate.setup.closest_point import nearest
 
@@ -131,21 +137,21 @@ class Shape:
 
     @cached_property
     def _normals(self) -> FloatArray:
-        """Outwards, of unit length (t, 3)."""
+        """Outward unit normals (t, 3)."""
         a, b, c = self.corners.transpose(1, 0, 2)
         normals = np.cross(b - a, c - a)
         return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
     def surface_points(self) -> FloatArray:
-        """Rest positions (m, 3) [m] spread evenly over the free surface, without chance."""
+        """Rest positions (m, 3) [m] spread evenly over the free surface; the same at every call."""
         corners = self.corners[~self.held]
         areas = np.linalg.norm(
             np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
         ).cumsum()
         step = np.arange(_SAMPLES) + 0.5
         chosen = np.searchsorted(areas, step / _SAMPLES * areas[-1])
-        # Two irrational steps fill the square evenly (Roberts 2018); what lies beyond its diagonal
-        # is folded back.
+        # Two irrational steps fill the square evenly (Roberts 2018). Points beyond its diagonal are
+        # folded back.
         shares = np.stack([step * 0.7548776662466927, step * 0.5698402909980532], axis=1) % 1.0
         shares = np.where(shares.sum(axis=1, keepdims=True) > 1, 1 - shares, shares)
         weights = np.concatenate([1 - shares.sum(axis=1, keepdims=True), shares], axis=1)
@@ -162,11 +168,12 @@ class Shape:
 
 
 def load_shape(path: Path, *, scale: float = 1.0, fixed: FixedRegion | None = None) -> Shape:
-    """A body from a closed surface in a file (STL, PLY, OBJ), phantom frame.
+    """Load a body from a closed surface in a file (STL, PLY, OBJ), phantom frame.
 
     Args:
+        path: the file.
         scale: the file's unit of length [m]; it is never guessed.
-        fixed: what is held, everything at z = 0 when left out.
+        fixed: the part that is held; everything at z = 0 by default.
     """
     vertices, triangles = read_surface(path, scale)
     return Shape(vertices, triangles, fixed or Plane(), path.name)

@@ -1,6 +1,4 @@
-"""Closed surfaces from files, and the checks that one has to pass before it is filled: each failure
-is one sentence.
-"""
+"""Closed surfaces from files, and the checks before one is filled with elements."""
 
 from __future__ import annotations
 
@@ -17,19 +15,22 @@ __all__ = ["FORMATS", "check_surface", "read_surface"]
 
 FORMATS = (".stl", ".ply", ".obj")
 _SMALLEST, _LARGEST = 1e-3, 2.0
-"""Extent [m] that a phantom may have along any axis, and must not exceed: as for a block."""
+"""Smallest and largest extent of a phantom along any axis [m]: as for a block."""
 
 
 def read_surface(path: Path, scale: float = 1.0) -> tuple[FloatArray, IntArray]:
-    """Vertices (v, 3) [m] and triangles (t, 3) of a file, unchecked; `scale` is its unit of length
-    in metres.
+    """Read vertices (v, 3) [m] and triangles (t, 3) of a file, without checks.
 
-    Vertices that stand several times in the same place are one, numbered by the first, so that
-    STL's triangles hang together.
+    Equal vertices are merged into the first of them, so that an STL file's triangles are connected.
+
+    Args:
+        path: the file.
+        scale: its unit of length [m].
     """
     if path.suffix.lower() not in FORMATS:
         raise MeshError(
-            f"{path.name}: a surface is read from {', '.join(FORMATS)}, not from {path.suffix or 'this'}",
+            f"{path.name}: a surface is read from {', '.join(FORMATS)}, "
+            f"not from {path.suffix or 'this'}",
             file=str(path),
         )
     if not path.is_file():
@@ -40,20 +41,20 @@ def read_surface(path: Path, scale: float = 1.0) -> tuple[FloatArray, IntArray]:
     import trimesh
 
     try:
-        found = trimesh.load_mesh(path, process=False, maintain_order=True)
+        loaded = trimesh.load_mesh(path, process=False, maintain_order=True)
         vertices, triangles = (
-            np.array(found.vertices, dtype=float),
-            np.array(found.faces, dtype=np.int64),
+            np.array(loaded.vertices, dtype=float),
+            np.array(loaded.faces, dtype=np.int64),
         )
     except Exception as error:  # whatever a reader of three formats meets in a broken file
         raise MeshError(
             f"{path.name}: cannot be read as a surface ({error}); export it anew", file=str(path)
         ) from error
-    return merged(scale * vertices.reshape(-1, 3), triangles.reshape(-1, 3))
+    return merge_vertices(scale * vertices.reshape(-1, 3), triangles.reshape(-1, 3))
 
 
-def merged(vertices: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
-    """Equal vertices made one, in the order of their first appearance."""
+def merge_vertices(vertices: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
+    """Merge equal vertices, in the order of their first appearance."""
     _, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty_like(order)
@@ -62,11 +63,12 @@ def merged(vertices: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntAr
 
 
 def check_surface(name: str, vertices: FloatArray, triangles: IntArray) -> None:
-    """Raise MeshError where vertices (v, 3) [m] and triangles (t, 3) are not one closed surface
-    that turns outwards.
+    """Raise MeshError if vertices and triangles are not one closed surface that faces outwards.
 
     Args:
-        name: of the file, for the sentence.
+        name: of the file, for messages.
+        vertices: (v, 3) [m].
+        triangles: (t, 3).
     """
     _check_numbers(name, vertices, triangles)
     _check_size(name, vertices)
@@ -80,7 +82,7 @@ def check_surface(name: str, vertices: FloatArray, triangles: IntArray) -> None:
 
 
 def _at(place: FloatArray) -> str:
-    """A place [m] as a sentence shows it."""
+    """Format a place [m] for a message."""
     return "(" + ", ".join(f"{value:.4f}" for value in place) + ") m"
 
 
@@ -94,8 +96,9 @@ def _check_numbers(name: str, vertices: FloatArray, triangles: IntArray) -> None
     broken = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
     if len(broken):
         raise MeshError(
-            f"{name}: {len(broken)} of {len(vertices)} vertices are not finite, the first is number {broken[0]}: "
-            f"{vertices[broken[0]].tolist()}; expected metres: export it anew",
+            f"{name}: {len(broken)} of {len(vertices)} vertices are not finite, "
+            f"the first is number {broken[0]}: {vertices[broken[0]].tolist()}; expected metres: "
+            "export it anew",
             file=name,
             count=len(broken),
             vertex=int(broken[0]),
@@ -109,8 +112,8 @@ def _check_numbers(name: str, vertices: FloatArray, triangles: IntArray) -> None
     flat = np.flatnonzero((np.diff(ordered, axis=1) == 0).any(axis=1))
     if len(flat):
         raise MeshError(
-            f"{name}: {len(flat)} of {len(triangles)} triangles have a corner twice, the first is number {flat[0]}; "
-            "expected triangles with an area: remove them",
+            f"{name}: {len(flat)} of {len(triangles)} triangles have a corner twice, "
+            f"the first is number {flat[0]}; expected triangles with an area: remove them",
             file=name,
             count=len(flat),
             triangle=int(flat[0]),
@@ -121,7 +124,7 @@ def _check_size(name: str, vertices: FloatArray) -> None:
     size = np.ptp(vertices, axis=0)
     if size.max() <= _LARGEST and size.min() >= _SMALLEST:
         return
-    found = " x ".join(f"{length:.4g}" for length in size)
+    lengths = " x ".join(f"{length:.4g}" for length in size)
     hints = {1e-3: "it is in millimetres", 1e3: "it was scaled from millimetres twice"}
     fitting = [
         scale
@@ -135,7 +138,8 @@ def _check_size(name: str, vertices: FloatArray) -> None:
             f"if {hints[fitting[0]]}, say so with scale = {fitting[0]:g}, which makes it {metres} m"
         )
     raise MeshError(
-        f"{name}: measures {found} m along x, y, z; expected {_SMALLEST:g} to {_LARGEST:g} m: {hint}",
+        f"{name}: measures {lengths} m along x, y, z; "
+        f"expected {_SMALLEST:g} to {_LARGEST:g} m: {hint}",
         file=name,
         size=size.tolist(),
         scale=fitting[0] if fitting else None,
@@ -143,7 +147,14 @@ def _check_size(name: str, vertices: FloatArray) -> None:
 
 
 def _check_closed(name: str, vertices: FloatArray, ends: IntArray, uses: IntArray) -> None:
-    """Every edge belongs to two triangles. `ends` (k, 2) vertices and `uses` (k,) of the edges."""
+    """Check that every edge belongs to two triangles.
+
+    Args:
+        name: of the file.
+        vertices: (v, 3) [m].
+        ends: (k, 2) vertices of the edges.
+        uses: (k,) number of triangles at each edge.
+    """
     lone = ends[uses == 1]
     if len(lone):
         graph = sp.coo_matrix(
@@ -153,8 +164,9 @@ def _check_closed(name: str, vertices: FloatArray, ends: IntArray, uses: IntArra
         names, sizes = np.unique(hole, return_counts=True)
         largest = np.unique(lone[hole == names[np.argmax(sizes)]])
         raise MeshError(
-            f"{name}: is open: {len(lone)} of {len(ends)} edges belong to one triangle only, around {len(names)} hole(s), the "
-            f"largest of {sizes.max()} edges at {_at(vertices[largest].mean(axis=0))}; expected a closed surface: close it",
+            f"{name}: is open: {len(lone)} of {len(ends)} edges belong to one triangle only, "
+            f"around {len(names)} hole(s), the largest of {sizes.max()} edges at "
+            f"{_at(vertices[largest].mean(axis=0))}; expected a closed surface: close it",
             file=name,
             open_edges=len(lone),
             holes=len(names),
@@ -164,7 +176,8 @@ def _check_closed(name: str, vertices: FloatArray, ends: IntArray, uses: IntArra
     if len(shared):
         place = vertices[shared[0]].mean(axis=0)
         raise MeshError(
-            f"{name}: {len(shared)} edges belong to more than two triangles, the first at {_at(place)}; expected a surface without "
+            f"{name}: {len(shared)} edges belong to more than two triangles, "
+            f"the first at {_at(place)}; expected a surface without "
             "inner walls or doubled triangles: remove them",
             file=name,
             edges=len(shared),
@@ -175,8 +188,14 @@ def _check_closed(name: str, vertices: FloatArray, ends: IntArray, uses: IntArra
 def _check_winding(
     name: str, vertices: FloatArray, triangles: IntArray, directed: IntArray, edge: IntArray
 ) -> None:
-    """One body, all of whose triangles turn outwards. `directed` (3 t, 2) sides of the triangles,
-    `edge` (3 t,) their edges.
+    """Check that the surface is one body whose triangles all face outwards.
+
+    Args:
+        name: of the file.
+        vertices: (v, 3) [m].
+        triangles: (t, 3).
+        directed: (3 t, 2) sides of the triangles.
+        edge: (3 t,) edge of each side.
     """
     count = len(triangles)
     pairs = np.argsort(edge, kind="stable").reshape(-1, 2)
@@ -192,13 +211,13 @@ def _check_winding(
         )
         shown = ", ".join(f"{size:.3g}" for size in sizes[:3])
         raise MeshError(
-            f"{name}: holds {bodies} separate surfaces (the largest enclose {shown} cm3); expected one body without cavities: "
-            "keep one of them, or join them",
+            f"{name}: holds {bodies} separate surfaces (the largest enclose {shown} cm3); "
+            "expected one body without cavities: keep one of them, or join them",
             file=name,
             bodies=bodies,
         )
-    # Each triangle stands in the graph as it is and turned over; sides that run the same way join
-    # one's face to the other's back.
+    # Each triangle is two nodes of the graph, as it is and turned over. Sides that run the same way
+    # join one triangle's front to the other's back.
     turned = (directed[pairs[:, 0], 0] == directed[pairs[:, 1], 0]).astype(int)
     rows = np.concatenate([first, first + count])
     columns = np.concatenate([second + count * turned, second + count * (1 - turned)])
@@ -211,8 +230,9 @@ def _check_winding(
     if len(flipped):
         place = vertices[triangles[flipped[0]]].mean(axis=0)
         raise MeshError(
-            f"{name}: {len(flipped)} of {count} triangles are flipped against the rest, the first is number {flipped[0]} at "
-            f"{_at(place)}; expected all to turn outwards: make the normals consistent",
+            f"{name}: {len(flipped)} of {count} triangles are flipped against the rest, "
+            f"the first is number {flipped[0]} at {_at(place)}; "
+            "expected all to turn outwards: make the normals consistent",
             file=name,
             flipped=len(flipped),
             triangle=int(flipped[0]),
@@ -221,7 +241,8 @@ def _check_winding(
     volume = _volume(vertices, triangles)
     if volume <= 0:
         raise MeshError(
-            f"{name}: all {count} triangles turn inwards (volume {1e6 * volume:.3g} cm3); expected outwards: flip the normals",
+            f"{name}: all {count} triangles turn inwards (volume {1e6 * volume:.3g} cm3); "
+            "expected outwards: flip the normals",
             file=name,
             flipped=count,
             volume=volume,
@@ -229,7 +250,7 @@ def _check_winding(
 
 
 def _volume(vertices: FloatArray, triangles: IntArray) -> float:
-    """Enclosed volume [m^3], negative inside out."""
+    """Enclosed volume [m^3]; negative if the surface is inside out."""
     a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
     return float(np.einsum("ti,ti->", a, np.cross(b, c)) / 6)
 
@@ -237,7 +258,7 @@ def _volume(vertices: FloatArray, triangles: IntArray) -> float:
 def _check_crossings(name: str, vertices: FloatArray, triangles: IntArray) -> None:
     import open3d as o3d
 
-    # Its tests compare with absolute numbers made for bodies of about one.
+    # Open3D's tests use absolute tolerances made for bodies of size one.
     spread = (vertices - vertices.mean(axis=0)) / np.ptp(vertices, axis=0).max()
     mesh = o3d.geometry.TriangleMesh(
         o3d.utility.Vector3dVector(spread), o3d.utility.Vector3iVector(triangles.astype(np.int32))
@@ -247,8 +268,9 @@ def _check_crossings(name: str, vertices: FloatArray, triangles: IntArray) -> No
         one, other = (int(number) for number in pairs[0])
         place = vertices[triangles[one]].mean(axis=0)
         raise MeshError(
-            f"{name}: {len(pairs)} pairs of triangles cross, the first are numbers {one} and {other} at {_at(place)}; expected a "
-            "surface that does not cut itself: repair it there",
+            f"{name}: {len(pairs)} pairs of triangles cross, the first are numbers {one} and "
+            f"{other} "
+            f"at {_at(place)}; expected a surface that does not cut itself: repair it there",
             file=name,
             crossings=len(pairs),
             triangles=[one, other],

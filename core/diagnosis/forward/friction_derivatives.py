@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.diagnosis.forward.loading_history import Timeline
+from palpate.diagnosis.forward.loading_history import LoadingHistory
 from palpate.effects.tool import ToolFriction
 from palpate.fem.model import CONTACT_STIFFNESS, BlockModel
 from palpate.foundation.arrays import FloatArray
-from palpate.gradients.forward import local_tool
+from palpate.gradients.frame_tangent import local_tool
 from palpate.replay.friction_step import contact_depth, points_from_tool
 from palpate.replay.replay import Equilibrium
 
@@ -64,7 +64,7 @@ def spot_of(model: BlockModel, frame: Equilibrium) -> Spot | None:
     return Spot(answer, pull.T @ answer, normal / np.linalg.norm(normal), held)
 
 
-def pulls(effect: ToolFriction, time: Timeline, spots: Sequence[Spot | None]) -> FloatArray:
+def pulls(effect: ToolFriction, time: LoadingHistory, spots: Sequence[Spot | None]) -> FloatArray:
     """The drag on the block over E (k, 3) [m^2] at each of the groups in contact, whose spots these
     are.
     """

@@ -19,10 +19,10 @@ import numpy as np
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.friction_derivatives import Spot, pulls, spot_of
 from palpate.diagnosis.forward.history_replay import TRACED
-from palpate.diagnosis.forward.loading_history import Timeline, timeline_of
+from palpate.diagnosis.forward.loading_history import LoadingHistory, loading_history_of
 from palpate.diagnosis.forward.memory_derivatives import Recollection
 from palpate.diagnosis.forward.prediction import Prediction
-from palpate.diagnosis.forward.ray_comparison import Sample, compare, observe
+from palpate.diagnosis.forward.ray_comparison import PointSample, averaging_matrix, compare
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.effects import Effect
 from palpate.effects.tool import ToolFriction
@@ -52,8 +52,12 @@ class Trace:
 
     def on(self, plain: Prediction) -> Prediction:
         """The plain prediction with the change in it."""
-        felt = None if plain.felt is None else replace(plain.felt, gap=plain.felt.gap + self.force)
-        return replace(plain, gap=plain.gap + self.gap, felt=felt)
+        forces = (
+            None
+            if plain.forces is None
+            else replace(plain.forces, gap=plain.forces.gap + self.force)
+        )
+        return replace(plain, gap=plain.gap + self.gap, forces=forces)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +82,7 @@ def traces_of(
     setup: Setup,
     grid: Meshing,
     frames: Sequence[Equilibrium],
-    samples: Sequence[Sample],
+    samples: Sequence[PointSample],
     effects: Sequence[Effect],
 ) -> list[Trace]:
     """One trace of each effect, of the size that it has.
@@ -89,7 +93,7 @@ def traces_of(
         samples: the points that are averaged.
     """
     block, surface = Replay(setup, grid), Surface.of(setup)
-    time = timeline_of(data, setup, touch_correction(setup, grid), tuple(frames))
+    time = loading_history_of(data, setup, touch_correction(setup, grid), tuple(frames))
     rough = [effect for effect in effects if isinstance(effect, ToolFriction)]
     lasting = [effect for effect in effects if not isinstance(effect, ToolFriction)]
     past = Recollection(block, frames, time)
@@ -104,7 +108,9 @@ def traces_of(
         look = _look(block, frames, number, time) if touched or missing else None
         if look is None:
             continue
-        seen = observe(look.frame, compare(group, setup, look.frame, surface, samples[number]))
+        seen = averaging_matrix(
+            look.frame, compare(group, setup, look.frame, surface, samples[number])
+        )
         answers = {
             name: look.model.topology.factor.approximate(
                 past.load(look.model, stress, look.frame.displacement)
@@ -126,7 +132,7 @@ def traces_of(
 
 
 def _look(
-    block: Replay, frames: Sequence[Equilibrium], number: int, time: Timeline
+    block: Replay, frames: Sequence[Equilibrium], number: int, time: LoadingHistory
 ) -> _Look | None:
     """None where no equilibrium, or no factor, is to be had."""
     frame = frames[number]
@@ -212,11 +218,11 @@ def with_traces(
     """
     columns = (
         plain.columns
-        if plain.felt is None
-        else np.concatenate([plain.columns, plain.felt.columns], axis=1)
+        if plain.forces is None
+        else np.concatenate([plain.columns, plain.forces.columns], axis=1)
     )
     rows = [
-        trace.gap if plain.felt is None else np.concatenate([trace.gap, trace.force], axis=1)
+        trace.gap if plain.forces is None else np.concatenate([trace.gap, trace.force], axis=1)
         for trace in traces
     ]
     parts, own, at = [columns[..., :first]], 0, first
@@ -235,7 +241,7 @@ def with_traces(
             )
         )
         own += 1 + count
-    changed = led.less(plain)[0]
+    changed = led.change_from(plain)[0]
     if whole.any():
         scale = float(
             np.clip(
@@ -246,4 +252,4 @@ def with_traces(
         )
     for place, effect in enumerate(effects):
         parts[1 + place] = parts[1 + place] * (scale if isinstance(effect, TRACED) else 1.0)
-    return led.with_rows(np.concatenate([*parts, columns[..., at : at + extra]], axis=2))
+    return led.replace_columns(np.concatenate([*parts, columns[..., at : at + extra]], axis=2))

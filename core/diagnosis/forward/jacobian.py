@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.forward.ray_comparison import Compared, observe
+from palpate.diagnosis.forward.ray_comparison import PointComparison, averaging_matrix
 from palpate.diagnosis.forward.slip_derivatives import Sliding
 from palpate.effects.base import LOG_PER_CONTRAST
 from palpate.fem.constitutive.stiffness_field import lump_share
@@ -21,7 +21,7 @@ from palpate.gradients.displacement_changes import displacement_changes
 from palpate.gradients.force_changes import force_changes
 from palpate.gradients.setup_change import TOOL_STEP, Change
 from palpate.gradients.stiffness_derivatives import stiffness_changes
-from palpate.measurement.camera_model import sight_of
+from palpate.measurement.camera_model import camera_model_for
 from palpate.replay.replay import Equilibrium, Replay
 from palpate.setup.setup import Inclusion, Setup
 
@@ -55,12 +55,12 @@ class Columns:
     tool, if that is `felt`.
     """
 
-    def __init__(self, block: Replay, wanted: Wanted, felt: bool) -> None:
-        self.block, self.wanted, self.felt = block, wanted, felt
+    def __init__(self, block: Replay, wanted: Wanted, forces: bool) -> None:
+        self.block, self.wanted, self.forces = block, wanted, forces
         here = block.setup
-        self._seen = {at_rest: sight_of(here, reference=at_rest) for at_rest in (False, True)}
+        self._seen = {at_rest: camera_model_for(here, reference=at_rest) for at_rest in (False, True)}
         self._others = [
-            {at_rest: sight_of(other, reference=at_rest) for at_rest in (False, True)}
+            {at_rest: camera_model_for(other, reference=at_rest) for at_rest in (False, True)}
             for other in wanted.setups
         ]
         self._grown = [other.scale / here.scale - 1.0 for other in wanted.setups]
@@ -114,7 +114,7 @@ class Columns:
         """Displacements (k, n, 3) [m], and last the forces that come with them [N]; zero where
         nobody asks for them.
         """
-        wanted = self.felt or self._sliding is not None
+        wanted = self.forces or self._sliding is not None
         pressed = (
             force_changes(self.block, frame, steps, moved) if wanted else np.zeros((len(moved), 3))
         )
@@ -218,7 +218,7 @@ class Columns:
         frame: Equilibrium,
         changes: FloatArray,
         moves: FloatArray,
-        compared: Compared,
+        compared: PointComparison,
         reference: bool,
     ) -> FloatArray:
         """(p, k) changes of the patch averages; the reference was seen before the camera could
@@ -226,7 +226,9 @@ class Columns:
         """
         values = np.zeros((len(compared.means.mean), self.count))
         if changes[:, :-1].any():
-            values = -(observe(frame, compared) @ changes[:, :-1].reshape(len(changes), -1).T)
+            values = -(
+                averaging_matrix(frame, compared) @ changes[:, :-1].reshape(len(changes), -1).T
+            )
         if len(compared.tool):
             centre, radius = self.of_ball(frame, moves)
             values -= compared.scale * compared.average(

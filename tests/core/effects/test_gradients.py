@@ -12,7 +12,8 @@ from palpate.effects import CATALOGUE, Slot, from_json
 from palpate.effects.time_dependence import PermanentSet, Viscoelasticity
 from palpate.effects.tool import ToolFriction
 from palpate.foundation.errors import SetupError
-from palpate.gradients.forward import displacement_changes, force_changes
+from palpate.gradients.displacement_changes import displacement_changes
+from palpate.gradients.force_changes import force_changes
 from palpate.mesh.box_mesh import GridSpec
 from palpate.replay.replay import Replay
 from palpate.setup.setup import Box, Load, Material, Setup, Support, Tool

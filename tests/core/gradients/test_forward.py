@@ -13,7 +13,9 @@ from palpate.fem.constitutive.stiffness_field import lump_share
 from palpate.fem.model import BlockModel, element_quadrature
 from palpate.fem.newton import solve
 from palpate.foundation.arrays import FloatArray
-from palpate.gradients.forward import TOOL_STEP, displacement_changes, factorise_at
+from palpate.gradients.displacement_changes import displacement_changes
+from palpate.gradients.frame_tangent import factorise_at
+from palpate.gradients.setup_change import TOOL_STEP
 from palpate.gradients.stiffness_derivatives import point_forces, stiffness_changes
 from palpate.replay.replay import Equilibrium, Replay
 from palpate.setup.setup import Inclusion, Load, Sensor, Setup, Support

@@ -9,7 +9,7 @@ import pytest
 
 from palpate.fem.model import BlockModel
 from palpate.fem.newton import Outcome, relative_residual
-from palpate.gradients.forward import displacement_changes
+from palpate.gradients.displacement_changes import displacement_changes
 from palpate.mesh.box_mesh import GridSpec
 from palpate.replay.replay import Equilibrium, Replay, replay, require_converged
 from palpate.setup.setup import Box, Material, Setup, Support, Tool

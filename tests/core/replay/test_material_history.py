@@ -15,7 +15,7 @@ from palpate.fem.constitutive.elastic import Law, lame
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SetupError
-from palpate.gradients.forward import displacement_changes
+from palpate.gradients.displacement_changes import displacement_changes
 from palpate.gradients.stiffness_derivatives import stiffness_changes
 from palpate.mesh.box_mesh import GridSpec
 from palpate.replay.mesh_convergence import mesh_errors

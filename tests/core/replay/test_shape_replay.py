@@ -13,7 +13,7 @@ from shapes import box_surface, dome
 from benchmarks.reference import SETUP, compared, reference
 from palpate.fem.model import BlockModel, ToolSphere
 from palpate.foundation.arrays import FloatArray
-from palpate.gradients.forward import displacement_changes
+from palpate.gradients.displacement_changes import displacement_changes
 from palpate.mesh.gmsh_fill import TetSpec
 from palpate.replay.mesh_convergence import mesh_errors
 from palpate.replay.replay import Replay, replay, require_converged

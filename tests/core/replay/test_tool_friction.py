@@ -12,7 +12,7 @@ import pytest
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SetupError, SolveError
-from palpate.gradients.forward import displacement_changes
+from palpate.gradients.displacement_changes import displacement_changes
 from palpate.mesh.box_mesh import GridSpec
 from palpate.replay.replay import Equilibrium, Replay, replay, require_converged
 from palpate.setup.setup import Box, Material, Setup, Support, Tool
