@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from palpate.foundation.arrays import FloatArray
-from palpate.synthetic.bench.motion_plan import Motion, Probe
-from palpate.synthetic.bench.solved_track import Track
-from palpate.synthetic.bench.virtual_experiment import perform
+from palpate.synthetic.bench.motion_plan import MotionPlan, PlannedPush
+from palpate.synthetic.bench.solved_track import SolvedTrack
+from palpate.synthetic.bench.virtual_experiment import solve_motion
 from palpate.synthetic.scenario.scenario import HiddenEffect, Scenario
 
 COARSE = 3.6e-3
@@ -30,15 +30,17 @@ def hide(effect: str, **parameters: float | str) -> HiddenEffect:
     return HiddenEffect(effect, parameters)
 
 
-def push(
+def simulate_push(
     *effects: HiddenEffect, depth: float = 4e-3, side: bool = False, fine: float = COARSE
-) -> Track:
+) -> SolvedTrack:
     """In one second, held for another, and back."""
     waypoints = way(depth, side)
     length = CLEAR + depth
-    probe = Probe(waypoints, np.array([1.0, 2.0, 3.0, 4.0]), np.array([0.0, length, length, 0.0]))
-    return perform(
+    push = PlannedPush(
+        waypoints, np.array([1.0, 2.0, 3.0, 4.0]), np.array([0.0, length, length, 0.0])
+    )
+    return solve_motion(
         Scenario(effects=effects),
-        Motion("poke-top-01", np.array([0.0, 0.0, -1.0]), (probe,), 5.0),
+        MotionPlan("poke-top-01", np.array([0.0, 0.0, -1.0]), (push,), 5.0),
         fine,
     )

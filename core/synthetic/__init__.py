@@ -1,5 +1,8 @@
-"""The virtual bench: datasets with known hidden effects, made through another mesh, element and law
-than the replay's.
+"""The virtual bench: datasets with known hidden effects.
+
+`scenario` says what is hidden, `bench` has the block, the tool and the sensors, and `solver` is a
+finite-element solver with another mesh, element and material law than the replay. `make_dataset`
+and `make_palpation` write whole datasets with their truth beside them.
 """
 
 from palpate.synthetic.make_dataset import make_dataset
@@ -19,8 +22,8 @@ from palpate.synthetic.scenario.scenario import (
     WEIGHED,
     HiddenEffect,
     Scenario,
-    draw_scenario,
 )
+from palpate.synthetic.scenario.scenario_draws import draw_scenario
 from palpate.synthetic.scenario.truth import Truth, truth_path
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""A dataset and its truth: both whole or neither."""
+"""Atomic writing of a dataset and its truth."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from pathlib import Path
 from palpate.foundation.errors import RunError
 from palpate.synthetic.scenario.truth import Truth, truth_path
 
-__all__ = ["whole_or_nothing"]
+__all__ = ["write_atomically"]
 
 
-def whole_or_nothing(folder: Path, fill: Callable[[Path], Truth]) -> Truth:
-    """Make the dataset `folder` by filling a folder aside, and its truth beside it: both or
-    neither.
+def write_atomically(folder: Path, fill: Callable[[Path], Truth]) -> Truth:
+    """Fill a temporary folder, then move it to `folder` and write the truth beside it.
 
-    Raises RunError where `folder` exists.
+    Both appear whole or not at all. Raises RunError where `folder` exists.
     """
     if folder.exists():
         raise RunError(

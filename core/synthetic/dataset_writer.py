@@ -1,4 +1,4 @@
-"""The files of a dataset in format 1, written as a bench would export them."""
+"""Writers for the files of a dataset in format 1."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = [
 
 
 def write_ply(path: Path, points: FloatArray) -> None:
-    """A binary cloud (n, 3) [m], little endian, single precision."""
+    """Write a binary cloud (n, 3) [m], little endian, single precision."""
     header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
     header += "property float x\nproperty float y\nproperty float z\nend_header\n"
     path.write_bytes(header.encode() + np.ascontiguousarray(points, dtype="<f4").tobytes())
@@ -31,8 +31,8 @@ def write_ply(path: Path, points: FloatArray) -> None:
 def write_kinematics(
     path: Path, times: FloatArray, positions: FloatArray, quaternion: FloatArray
 ) -> None:
-    """Tool poses: times (n,) [s], positions (n, 3) [m] in the robot frame, one orientation (4,)
-    xyzw.
+    """Write tool poses: times (n,) [s], positions (n, 3) [m] in the robot frame, and one
+    orientation (4,) xyzw.
     """
     turn = ",".join(f"{part:.7f}" for part in quaternion)
     rows = [
@@ -43,7 +43,7 @@ def write_kinematics(
 
 
 def write_forces(path: Path, times: FloatArray, forces: FloatArray) -> None:
-    """Force on the tool: times (n,) [s], forces (n, 3) [N] in the robot frame."""
+    """Write the force on the tool: times (n,) [s], forces (n, 3) [N] in the robot frame."""
     rows = [
         f"{t:.5f},{x:.6f},{y:.6f},{z:.6f}"
         for t, (x, y, z) in zip(times.tolist(), forces.tolist(), strict=True)
@@ -52,7 +52,7 @@ def write_forces(path: Path, times: FloatArray, forces: FloatArray) -> None:
 
 
 def write_clouds(path: Path, times: FloatArray, files: list[str]) -> None:
-    """The list of clouds with their stamps (n,) [s]."""
+    """Write the list of clouds with their time stamps (n,) [s]."""
     path.write_text(
         "\n".join(
             [
@@ -65,7 +65,7 @@ def write_clouds(path: Path, times: FloatArray, files: list[str]) -> None:
 
 
 def write_touches(path: Path, names: list[str], positions: FloatArray) -> None:
-    """Where the tool's centre (n, 3) [m] was as it touched the landmarks, robot frame."""
+    """Write tool centres (n, 3) [m], robot frame, at the touched landmarks."""
     rows = [
         f"{name},{x:.7f},{y:.7f},{z:.7f}"
         for name, (x, y, z) in zip(names, positions.tolist(), strict=True)
@@ -76,7 +76,7 @@ def write_touches(path: Path, names: list[str], positions: FloatArray) -> None:
 def write_config(
     path: Path, name: str, scenario: Scenario, landmarks: dict[str, FloatArray], guess: Transform
 ) -> None:
-    """dataset.toml: what the experimenter believes, and a first guess of the camera's pose."""
+    """Write dataset.toml: the experimenter's beliefs, and a first guess of the camera's pose."""
     matrix = ", ".join(
         "[" + ", ".join(f"{value:.9f}" for value in row) + "]" for row in guess.matrix
     )
@@ -103,7 +103,7 @@ def write_felt_config(
     landmarks: dict[str, FloatArray],
     splits: dict[str, list[str]],
 ) -> None:
-    """dataset.toml of a palpation without a camera, of a box or of what a `surface` encloses."""
+    """Write dataset.toml of a palpation without a camera, of a box or a closed `surface`."""
     path.write_text(
         "\n".join([*_believed(name, scenario, surface, landmarks), *_listed(splits)]) + "\n"
     )
@@ -154,7 +154,7 @@ def _list(values: FloatArray | tuple[float, ...]) -> str:
 
 
 def _splits(sequences: tuple[str, ...]) -> dict[str, list[str]]:
-    """Of each kind the first trains; the second top poke validates; the rest tests."""
+    """Default splits: the first of each kind trains, the second top poke validates, others test."""
     splits: dict[str, list[str]] = {"train": [], "validation": [], "test": []}
     met: dict[str, int] = {}
     for name in sequences:

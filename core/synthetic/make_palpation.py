@@ -1,10 +1,8 @@
-"""Palpation by force alone: many short probes over a block's top or over an organ, as laboratories
-with a force sensor record it.
+"""Palpation by force alone: many short pushes over a block's top or an organ, without a camera.
 
-Each probe comes in along the surface's normal, presses to a depth, holds and lets go. There is no
-camera: what is written is where the tool was, and what it felt, with the faults of real sensors
-(`palpate.synthetic.bench.force_sensor`). The operator finds the surface by feel, so that each depth
-is a little off; kinematics say where the tool was, not where it should have been.
+Each push follows the surface's normal, presses to a depth, holds and retracts. Kinematics and
+forces are written with the errors of real sensors (`palpate.synthetic.bench.force_sensor`). The
+operator finds the surface by feel, so each depth has an error; the kinematics show the true motion.
 """
 
 from __future__ import annotations
@@ -21,9 +19,9 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.foundation.processes import ProcessPool
 from palpate.foundation.progress import Report, silent
-from palpate.synthetic.atomic_write import whole_or_nothing
+from palpate.synthetic.atomic_write import write_atomically
 from palpate.synthetic.bench.force_sensor import FORCE_NOISE, ForceSensor
-from palpate.synthetic.bench.motion_plan import Motion, Probe
+from palpate.synthetic.bench.motion_plan import MotionPlan, PlannedPush
 from palpate.synthetic.bench.organ_shape import (
     AXES,
     organ_block,
@@ -32,7 +30,7 @@ from palpate.synthetic.bench.organ_shape import (
     organ_surface,
     write_surface,
 )
-from palpate.synthetic.bench.virtual_experiment import perform
+from palpate.synthetic.bench.virtual_experiment import solve_motion
 from palpate.synthetic.dataset_writer import (
     write_felt_config,
     write_forces,
@@ -41,13 +39,13 @@ from palpate.synthetic.dataset_writer import (
 )
 from palpate.synthetic.scenario.scenario import HiddenEffect, Scenario
 from palpate.synthetic.scenario.truth import Truth
-from palpate.synthetic.solver.tet_block import Block, Grading
+from palpate.synthetic.solver.tet_block import TetBlock, TetGrading
 
 __all__ = ["Body", "Palpation", "draw_palpation", "make_palpation"]
 
 Body = Literal["box", "organ"]
 HOVER, ABOVE = 5e-3, 12e-3
-"""How far the tool stops before the surface, and how far above everything it travels [m]."""
+"""Distance from the surface before a push, and height of the travel above everything [m]."""
 KINEMATICS_NOISE, TOUCH_NOISE, DEPTH_MISS = 0.05e-3, 0.15e-3, 0.3e-3
 SPLITS = ("train", "validation", "test")
 
@@ -57,16 +55,16 @@ class Palpation:
     """One palpation.
 
     Attributes:
-        body: what is palpated.
-        scenario: beliefs and what is hidden.
-        probes: of each sequence.
-        depth: of a push [m].
+        body: box or organ.
+        scenario: beliefs and hidden effects.
+        pushes: number in each sequence.
+        depth: smallest and largest depth of a push [m].
         splits: number of sequences for train, validation and test.
     """
 
     body: Body
     scenario: Scenario
-    probes: int = 6
+    pushes: int = 6
     depth: tuple[float, float] = (3.2e-3, 4.8e-3)
     splits: tuple[int, int, int] = (2, 1, 2)
 
@@ -79,9 +77,9 @@ class Palpation:
 
 
 def draw_palpation(body: Body, effects: int, seed: int) -> Palpation:
-    """A palpation with one stiff lump, or none where `effects` is 0."""
+    """Draw a palpation with one stiff lump, or none where `effects` is 0."""
     rng = np.random.default_rng([seed, 31])
-    # A force sensor off the vibration of a driven arm is a few times quieter than one on it.
+    # A force sensor that is decoupled from the vibration of a driven arm has less noise.
     scenario = Scenario(force_noise=FORCE_NOISE / 2, robot_rate=250.0, young_modulus=5e3)
     if not effects:
         return Palpation(body=body, scenario=scenario)
@@ -104,10 +102,11 @@ def draw_palpation(body: Body, effects: int, seed: int) -> Palpation:
 def make_palpation(
     folder: Path, palpation: Palpation, seed: int, workers: int = 1, report: Report = silent
 ) -> Truth:
-    """Make the dataset `folder` and its truth beside it: both whole or neither. Raises RunError
-    where `folder` exists.
+    """Make the dataset `folder` and its truth beside it, both whole or neither.
+
+    Raises RunError where `folder` exists.
     """
-    truth = whole_or_nothing(
+    truth = write_atomically(
         folder, lambda aside: _fill(aside, folder.name, palpation, seed, workers, report)
     )
     report(1.0, f"made {folder.name}")
@@ -148,7 +147,7 @@ def _fill(
 
 
 def _landmarks(palpation: Palpation) -> dict[str, FloatArray]:
-    """Corners of a block's top; marks on an organ."""
+    """Landmarks (3,) [m] by name: corners of a block's top, or marks on an organ."""
     if palpation.body == "organ":
         ways = [
             (0.0, 0.0, 1.0),
@@ -168,19 +167,19 @@ def _landmarks(palpation: Palpation) -> dict[str, FloatArray]:
     }
 
 
-def _motions(palpation: Palpation, seed: int) -> list[Motion]:
-    """Each sequence has its own places, spread over all that can be reached."""
+def _motions(palpation: Palpation, seed: int) -> list[MotionPlan]:
+    """Plan the sequences, each with its own places, spread over all that can be reached."""
     names = [name for names in palpation.sequences.values() for name in names]
     found = []
     for name in names:
         rng = np.random.default_rng([seed, 33, *name.encode()])
-        places = _spread(_reachable(palpation, rng), palpation.probes)
+        places = _spread(_reachable(palpation, rng), palpation.pushes)
         found.append(_motion(palpation, name, places[rng.permutation(len(places))], rng))
     return found
 
 
 def _reachable(palpation: Palpation, rng: np.random.Generator) -> FloatArray:
-    """Many places (n, 3) [m] drawn from where a probe may press."""
+    """Draw many places (n, 3) [m] where a push is possible."""
     drawn = rng.uniform(-1, 1, size=(400, 2))
     if palpation.body == "box":
         x, y, z = palpation.scenario.size
@@ -193,7 +192,7 @@ def _reachable(palpation: Palpation, rng: np.random.Generator) -> FloatArray:
 
 
 def _spread(places: FloatArray, count: int) -> FloatArray:
-    """Of the places (n, 3) so many that lie far apart: each next one farthest from those before
+    """Choose `count` of the places (n, 3) far apart: each next one farthest from those before
     (Gonzalez 1985).
     """
     chosen = [0]
@@ -206,7 +205,7 @@ def _spread(places: FloatArray, count: int) -> FloatArray:
 
 def _motion(
     palpation: Palpation, name: str, places: FloatArray, rng: np.random.Generator
-) -> Motion:
+) -> MotionPlan:
     radius, normals = palpation.scenario.tool_radius, _normals(palpation, places)
     top = (
         max(
@@ -216,21 +215,21 @@ def _motion(
         + radius
         + ABOVE
     )
-    time, probes = 2.0, []
+    time, pushes = 2.0, []
     for place, normal in zip(places, normals, strict=True):
         depth = rng.uniform(*palpation.depth) + DEPTH_MISS * rng.normal()
         hover, deep = place + (radius + HOVER) * normal, place + (radius - depth) * normal
         way = np.array(
             [hover, deep] if palpation.body == "box" else [[hover[0], hover[1], top], hover, deep]
         )
-        probes.append(_timed(way, time, rng))
-        time = float(probes[-1].times[-1]) + rng.uniform(0.5, 0.8)
-    return Motion(name, np.array([0.0, 0.0, -1.0]), tuple(probes), time + 1.5)
+        pushes.append(_timed(way, time, rng))
+        time = float(pushes[-1].times[-1]) + rng.uniform(0.5, 0.8)
+    return MotionPlan(name, np.array([0.0, 0.0, -1.0]), tuple(pushes), time + 1.5)
 
 
-def _timed(way: FloatArray, begin: float, rng: np.random.Generator) -> Probe:
-    """Quickly to where the tool stops before the surface, slowly in, a hold, and back."""
-    arcs = Probe(way, np.zeros(1), np.zeros(1)).corners
+def _timed(way: FloatArray, begin: float, rng: np.random.Generator) -> PlannedPush:
+    """Time a push: fast to the stop before the surface, slowly in, a hold, and back."""
+    arcs = PlannedPush(way, np.zeros(1), np.zeros(1)).corners
     far, hover, deep = float(arcs[-2]), float(arcs[-2]), float(arcs[-1])
     steps = [(0.0, 0.0)]
     if far > 0:
@@ -240,7 +239,7 @@ def _timed(way: FloatArray, begin: float, rng: np.random.Generator) -> Probe:
     if far > 0:
         steps += [(far / 40e-3 + 0.2, 0.0)]
     durations, stops = np.array(steps).T
-    return Probe(way, begin + np.cumsum(durations), stops)
+    return PlannedPush(way, begin + np.cumsum(durations), stops)
 
 
 def _normals(palpation: Palpation, places: FloatArray) -> FloatArray:
@@ -251,27 +250,29 @@ def _normals(palpation: Palpation, places: FloatArray) -> FloatArray:
     )
 
 
-def _organ(scenario: Scenario, probe: Probe, fine: float) -> Block:
-    """The organ's body for one probe, small also within a lump."""
+def _organ(scenario: Scenario, push: PlannedPush, fine: float) -> TetBlock:
+    """Mesh the organ for one push, with small elements also in a lump."""
     lump = scenario.hidden("stiff_inclusion")
     within = None
     if lump is not None:
         radius = lump.value("radius")
         centre = np.array([[lump.value(axis) for axis in "xyz"]])
-        within = Grading(
+        within = TetGrading(
             centre, np.array([1.1 * radius]), np.array([0.55 * radius]), coarse=1.0, growth=3.0
         )
-    return organ_block(probe.waypoints[-1:], 0.8 * scenario.tool_radius, fine, within)
+    return organ_block(push.waypoints[-1:], 0.8 * scenario.tool_radius, fine, within)
 
 
 def _record(
-    palpation: Palpation, motion: Motion, robot_from_phantom: Transform, folder: Path, seed: int
+    palpation: Palpation, motion: MotionPlan, robot_from_phantom: Transform, folder: Path, seed: int
 ) -> dict[str, list[float]]:
-    """Solve one sequence, write its files, and say how far each probe stopped short [m], where one
-    did.
+    """Solve one sequence and write its files.
+
+    Returns:
+        by sequence, how much shallower than planned each push was [m]; empty if none was.
     """
     scenario = palpation.scenario
-    track = perform(scenario, motion, body=_organ if palpation.body == "organ" else None)
+    track = solve_motion(scenario, motion, body=_organ if palpation.body == "organ" else None)
     rng = np.random.default_rng([seed, 34, *motion.name.encode()])
     folder.mkdir(parents=True)
     start = rng.uniform(5.0, 45.0)
@@ -288,13 +289,13 @@ def _record(
     )
     sensor = ForceSensor.draw(scenario.force_noise or FORCE_NOISE, np.random.default_rng([seed, 4]))
     stamps = sensor.instants(motion.duration, rng)
-    on_tool = -track.push(stamps) @ robot_from_phantom.rotation.T
+    on_tool = -track.tool_force(stamps) @ robot_from_phantom.rotation.T
     write_forces(folder / "forces.csv", start + stamps, sensor.read(stamps, on_tool, rng))
-    short = _short(motion.probes, track.motion.probes)
+    short = _short(motion.pushes, track.motion.pushes)
     return {motion.name: short} if any(short) else {}
 
 
-def _short(planned: Sequence[Probe], made: Sequence[Probe]) -> list[float]:
+def _short(planned: Sequence[PlannedPush], made: Sequence[PlannedPush]) -> list[float]:
     return [
         float(np.linalg.norm(one.waypoints[-1] - other.waypoints[-1]))
         for one, other in zip(planned, made, strict=True)

@@ -1,6 +1,4 @@
-"""A virtual depth camera: perspective, occluded by tool, shaft and block, noisy, biased, and
-dropping points.
-"""
+"""A virtual depth camera with perspective, occlusion, noise, smooth bias and missing points."""
 
 from __future__ import annotations
 
@@ -15,22 +13,26 @@ from palpate.foundation.frames import Transform
 from palpate.synthetic.scenario.disturbance import Disturbance, rippled
 from palpate.synthetic.solver.obstacles import shaft_radius
 
-__all__ = ["DepthCamera", "Scene", "place_camera", "tool_solid"]
+__all__ = ["CameraScene", "DepthCamera", "place_camera", "tool_solid"]
 
 TABLE = 0.13
+"""Half the edge length of the visible table [m]."""
 SHAFT_LENGTH = 0.16
+"""Length of the visible shaft [m]."""
 QUANTUM = 0.125e-3
+"""Resolution of a depth reading [m]."""
 EDGE = 4e-3
+"""Step in depth between neighbouring pixels that makes an edge [m]."""
 
 
 @dataclass(frozen=True)
-class Scene:
-    """What stands before the camera, phantom frame.
+class CameraScene:
+    """Objects in front of the camera, phantom frame.
 
     Attributes:
         block: vertices (s, 3) [m] and triangles (t, 3).
-        centre: (3,) of the tool [m], or None where there is no tool.
-        axis: (3,) from the shaft towards the tip.
+        centre: (3,) of the tool [m]; None without a tool.
+        axis: (3,) unit vector from the shaft towards the tip.
         radius: of the tool [m].
     """
 
@@ -42,15 +44,19 @@ class Scene:
 
 @dataclass(frozen=True)
 class DepthCamera:
-    """A camera at `phantom_from_camera`; its pixels are rays (n, 3) with z = 1.
+    """A depth camera.
 
     Attributes:
+        phantom_from_camera: its pose.
+        rays: (n, 3) directions of the pixels with z = 1.
+        shape: rows and columns of the image.
         bias: (n,) depth error fixed in the image [m].
-        sigma: of the depth noise at 0.35 m; it grows with the distance squared [m].
-        density: points on the block in one cloud, about.
+        sigma: standard deviation of a depth at 0.35 m [m]; it grows with the distance squared.
+        density: approximate number of points on the block in one cloud.
         on_block: (n,) bool, pixels that see the block at rest.
         disturbances: of the depth.
-        offset, scale: a depth z is read as scale z + offset, before what disturbs it [m], [1].
+        offset: a depth z is read as scale z + offset [m], before disturbances.
+        scale: see `offset` [1].
     """
 
     phantom_from_camera: Transform
@@ -64,9 +70,12 @@ class DepthCamera:
     offset: float = 0.0
     scale: float = 1.0
 
-    def depth(self, scene: Scene) -> tuple[FloatArray, Any]:
-        """True depth of each pixel [m], infinite for nothing, and what it sees: 0 block, 1 table,
-        more the tool, -1 nothing.
+    def depth(self, scene: CameraScene) -> tuple[FloatArray, Any]:
+        """Cast all rays.
+
+        Returns:
+            true depth (n,) [m], infinite without a hit, and the object hit (n,): 0 block, 1 table,
+            above 1 tool, -1 none.
         """
         import open3d as o3d
 
@@ -81,8 +90,8 @@ class DepthCamera:
         hit = cast.cast_rays(_tensor(rays), nthreads=1)
         return hit["t_hit"].numpy().astype(float), hit["geometry_ids"].numpy().astype(np.int32)
 
-    def cloud(self, scene: Scene, rng: np.random.Generator) -> FloatArray:
-        """One raw cloud (k, 3), camera frame [m]: block, table, tool and stray points together."""
+    def cloud(self, scene: CameraScene, rng: np.random.Generator) -> FloatArray:
+        """Draw one raw cloud (k, 3) [m], camera frame, of block, table, tool and stray points."""
         depth, what = self.depth(scene)
         depth = self._flying(depth, rng)
         keep = rng.random(len(depth)) < self._chance(what)
@@ -98,15 +107,15 @@ class DepthCamera:
         return self.rays[seen] * z[:, None]
 
     def _chance(self, what: Any) -> FloatArray:
-        """How likely each pixel is kept: the table is thinned, so that most of a cloud is block and
-        tool.
+        """Probability (n,) of keeping each pixel; the table is thinned, so that block and tool make
+        most of a cloud.
         """
         on_block = min(1.0, self.density / max(int(self.on_block.sum()), 1))
         others = min(1.0, 0.45 * self.density / max(int((~self.on_block).sum()), 1))
         return np.where(what == 1, others, on_block)
 
     def _flying(self, depth: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """Pixels at an edge that mix what lies before and behind it."""
+        """Mix depths before and behind an edge in some pixels (flying pixels)."""
         image = np.where(np.isfinite(depth), depth, np.nan).reshape(self.shape)
         mixed = image.copy()
         for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
@@ -124,8 +133,15 @@ def place_camera(
     density: int,
     sigma: float,
 ) -> DepthCamera:
-    """A camera 0.3 to 0.42 m away, above to one side, so that the top and the two sides with the
-    signs `seen` are visible.
+    """Draw a camera pose 0.3 to 0.42 m away that sees the top and the sides with the signs `seen`.
+
+    Args:
+        rng: random generator.
+        size: of the block [m].
+        block: vertices (s, 3) [m] and triangles (t, 3) at rest.
+        seen: (2,) signs of the visible x and y sides.
+        density: approximate number of points on the block in one cloud.
+        sigma: depth noise at 0.35 m [m].
     """
     away = rng.uniform(0.30, 0.42)
     turn, up = np.deg2rad(rng.uniform(35, 58)), np.deg2rad(rng.uniform(40, 54))
@@ -150,8 +166,8 @@ def _with_pixels(
     sigma: float,
     rng: np.random.Generator,
 ) -> DepthCamera:
-    """Choose the pitch of the pixels so that the block covers 1.3 times the wanted points, over a
-    window with the table around.
+    """Choose the pixel pitch so that the block covers 1.3 x `density` pixels; the image also shows
+    the table around it.
     """
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0.0, 1.0)]) * (
         size[0],
@@ -161,7 +177,7 @@ def _with_pixels(
     flat = pose.inverse().apply(corners)
     flat = flat[:, :2] / flat[:, 2:]
     low, high = flat.min(axis=0), flat.max(axis=0)
-    scene = Scene(block, None, np.array([0.0, 0.0, -1.0]), 1.0)
+    scene = CameraScene(block, None, np.array([0.0, 0.0, -1.0]), 1.0)
     pitch = float(np.sqrt(np.prod(high - low) / 20_000))
     camera = _grid(pose, low, high, pitch, sigma, density)
     share = (camera.depth(scene)[1] == 0).mean()
@@ -192,7 +208,7 @@ def _grid(
 def _smooth(
     places: FloatArray, width: float, rng: np.random.Generator, amplitude: float = 0.3e-3
 ) -> FloatArray:
-    """A random smooth field (n,) of the given root mean square [m], with waves of a third of the
+    """Draw a smooth random field (n,) [m] of RMS `amplitude`, with wavelengths of a third of the
     image and longer.
     """
     waves = rng.normal(size=(24, 2)) * 2 * np.pi * 1.3 / width
@@ -202,7 +218,9 @@ def _smooth(
 
 
 def tool_solid(centre: FloatArray, axis: FloatArray, radius: float) -> list[tuple[FloatArray, Any]]:
-    """Triangles of the ball and of the shaft that rises from it, away from the tip."""
+    """Vertices and triangles of the tool's ball and of its shaft, which leaves it opposite to
+    `axis`.
+    """
     import open3d as o3d
 
     ball = o3d.geometry.TriangleMesh.create_sphere(radius, resolution=16)
@@ -223,8 +241,8 @@ def _tensor(array: Any) -> Any:
     return o3d.core.Tensor.from_numpy(np.ascontiguousarray(array))
 
 
-def _meshes(scene: Scene) -> list[tuple[FloatArray, Any]]:
-    """The block first, then the table, then the tool."""
+def _meshes(scene: CameraScene) -> list[tuple[FloatArray, Any]]:
+    """Meshes of block, table and tool, in this order."""
     table = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * (TABLE, TABLE, 1.0)
     meshes = [scene.block, (table, np.array([[0, 1, 2], [0, 2, 3]]))]
     return meshes + (

@@ -1,6 +1,4 @@
-"""How the tool moves: pokes from above and from the side, and drags, each at several places, depths
-and speeds, with rests.
-"""
+"""Planned tool motions: pokes from above and from the side, and drags, with rests in between."""
 
 from __future__ import annotations
 
@@ -12,20 +10,21 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SetupError
 
-__all__ = ["Motion", "Probe", "draw_motion"]
+__all__ = ["MotionPlan", "PlannedPush", "draw_motion"]
 
 HOVER = 6.5e-3
+"""Distance between tool and block before a push [m]."""
 
 
 @dataclass(frozen=True)
-class Probe:
-    """One touch: along `waypoints` to their end and back.
+class PlannedPush:
+    """One push: along `waypoints` to their end and back.
 
     Attributes:
         waypoints: (k, 3) of the tool's centre [m], the first one clear of the block.
         times: (m,) knots [s].
-        arcs: (m,) arc length along the waypoints at the knots [m]; the tool starts and stops
-            smoothly at each.
+        arcs: (m,) arc length along the waypoints at the knots [m]. The tool starts and stops
+            smoothly at each knot.
     """
 
     waypoints: FloatArray
@@ -41,7 +40,7 @@ class Probe:
 
     @property
     def outwards(self) -> FloatArray:
-        """(3,) unit vector against the first run: out of the block."""
+        """(3,) unit vector opposite to the first run, out of the block."""
         way = self.waypoints[0] - self.waypoints[1]
         return np.asarray(way / np.linalg.norm(way))
 
@@ -51,18 +50,16 @@ class Probe:
             [np.interp(arcs, self.corners, self.waypoints[:, axis]) for axis in range(3)], axis=-1
         )
 
-    def shallower(self, by: float) -> Probe:
-        """The same touch in the same time, its first run ending `by` [m] earlier and all that
-        follows that much further out.
-        """
+    def shallower(self, by: float) -> PlannedPush:
+        """The same push in the same time, shallower `by` [m] along its first run."""
         waypoints = (
             self.waypoints + by * self.outwards * (np.arange(len(self.waypoints)) > 0)[:, None]
         )
-        return Probe(waypoints, self.times, np.where(self.arcs > 0, self.arcs - by, 0.0))
+        return PlannedPush(waypoints, self.times, np.where(self.arcs > 0, self.arcs - by, 0.0))
 
     def when(self, leg: int, arcs: FloatArray) -> FloatArray:
-        """Times (n,) [s] at which the tool is at these arc lengths (n,) [m] between a knot and the
-        next.
+        """Times (n,) [s] at which the tool is at arc lengths (n,) [m] between knots `leg` and
+        `leg + 1`.
         """
         times = np.linspace(self.times[leg], self.times[leg + 1], 400)
         passed = self.arc(times)
@@ -75,36 +72,36 @@ class Probe:
 
 
 @dataclass(frozen=True)
-class Motion:
-    """One sequence of probes, in the phantom frame.
+class MotionPlan:
+    """One sequence of pushes, in the phantom frame.
 
     Attributes:
         name: of the sequence.
         axis: (3,) unit vector from the shaft towards the tip.
-        probes: in order of time.
+        pushes: in order of time.
         duration: [s].
     """
 
     name: str
     axis: FloatArray
-    probes: tuple[Probe, ...]
+    pushes: tuple[PlannedPush, ...]
     duration: float
 
     def centre(self, times: FloatArray) -> FloatArray:
-        """Tool centre (n, 3) [m] at the times (n,) [s]; between probes it moves from one start to
-        the next.
+        """Tool centre (n, 3) [m] at times (n,) [s]; between pushes it moves from one start to the
+        next.
         """
-        knots = np.concatenate([[probe.times[0], probe.times[-1]] for probe in self.probes])
-        stops = np.repeat([probe.waypoints[0] for probe in self.probes], 2, axis=0)
+        knots = np.concatenate([[push.times[0], push.times[-1]] for push in self.pushes])
+        stops = np.repeat([push.waypoints[0] for push in self.pushes], 2, axis=0)
         centre = np.stack([_eased(times, knots, stops[:, axis]) for axis in range(3)], axis=-1)
-        for probe in self.probes:
-            inside = (times >= probe.times[0]) & (times <= probe.times[-1])
-            centre[inside] = probe.place(probe.arc(times[inside]))
+        for push in self.pushes:
+            inside = (times >= push.times[0]) & (times <= push.times[-1])
+            centre[inside] = push.place(push.arc(times[inside]))
         return centre
 
 
 def _eased(times: FloatArray, knots: FloatArray, values: FloatArray) -> FloatArray:
-    """Interpolation that stands still at each knot."""
+    """Interpolate with zero slope at each knot."""
     index = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
     t = np.clip((times - knots[index]) / (knots[index + 1] - knots[index]), 0.0, 1.0)
     return np.asarray(values[index] + (values[index + 1] - values[index]) * t * t * (3 - 2 * t))
@@ -119,20 +116,20 @@ def draw_motion(
     seed: int,
     rounds: int = 1,
     lean: float | None = None,
-) -> Motion:
-    """The motion of one sequence.
+) -> MotionPlan:
+    """Draw the motion of one sequence; SetupError for an unknown kind.
 
     Args:
-        name: its kind and number, as in "poke-side-02".
-        number: how many of its kind come before, which chooses the place.
+        name: kind and number, as in "poke-side-02".
+        number: how many sequences of its kind come before; chooses the place.
         size: of the block [m].
         tool_radius: stated [m].
         seen: (2,) signs of the x and y sides that the camera sees.
         seed: of this sequence.
-        rounds: of touches; each further one is at the next place. Pushes into sides are into one
-            side in all of them.
-        lean: of the shaft over the block in pushes from the side, from the vertical [rad]; without
-            it the shaft is clear of it.
+        rounds: number of rounds of pushes. Each further round is at the next place; pushes from
+            the side stay on one side.
+        lean: angle of the shaft from the vertical, over the block, in pushes from the side [rad];
+            None keeps the shaft clear of the block.
     """
     rng = np.random.default_rng([seed, *name.encode()])
     kind = name.rpartition("-")[0]
@@ -147,7 +144,8 @@ def draw_motion(
             touched, own = _drag(rng, number + turn, size, tool_radius)
         else:
             raise SetupError(
-                f"sequence {name!r} is of no known kind; known are poke-top, poke-side and drag, with -01 and so on"
+                f"sequence {name!r} is of no known kind; known are poke-top, poke-side and drag, "
+                "with -01 and so on"
             )
         paths += touched
         axes.append(own)
@@ -219,23 +217,23 @@ def _tilted(rng: np.random.Generator) -> FloatArray:
 
 def _timed(
     name: str, paths: list[FloatArray], axis: FloatArray, rng: np.random.Generator
-) -> Motion:
-    """Two seconds and more before the first touch, slow and fast probes in turn, and a long rest at
-    the end.
+) -> MotionPlan:
+    """Time the paths: over 2 s before the first push, slow and fast pushes in turn, and a long rest
+    at the end.
     """
     time = 2.4 + rng.uniform(0, 0.4)
     slow = bool(rng.integers(2))
-    probes = []
+    pushes = []
     for path in paths:
         speed = rng.uniform(4.5e-3, 6.5e-3) if slow else rng.uniform(10e-3, 15e-3)
-        corners = Probe(path, np.zeros(1), np.zeros(1)).corners
+        corners = PlannedPush(path, np.zeros(1), np.zeros(1)).corners
         steps = [(0.0, 0.0)]
         for low, high in pairwise(corners):
             steps += [((high - low) / speed, high), (rng.uniform(0.5, 1.0), high)]
         for high, low in pairwise(corners[::-1]):
             steps += [((high - low) / (1.6 * speed), low)]
         durations, arcs = np.array(steps).T
-        probes.append(Probe(path, time + np.cumsum(durations), arcs))
-        time = float(probes[-1].times[-1]) + rng.uniform(0.7, 1.1)
+        pushes.append(PlannedPush(path, time + np.cumsum(durations), arcs))
+        time = float(pushes[-1].times[-1]) + rng.uniform(0.7, 1.1)
         slow = not slow
-    return Motion(name, axis, tuple(probes), time + 3.0)
+    return MotionPlan(name, axis, tuple(pushes), time + 3.0)

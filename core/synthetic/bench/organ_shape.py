@@ -1,9 +1,8 @@
-"""An organ of the virtual bench: a smooth, lobed dome on a flat base, as a surface to hand out and
-as a body to press.
+"""An organ of the virtual bench: a smooth, lobed dome on a flat base.
 
-Its shape is a formula: how far the surface lies from the middle of the base in every direction. The
-surface that the experimenter is given is a triangulation of it; the body that is pressed is
-another, finer one, whose elements are bent along the formula.
+A formula gives the distance of the surface from the middle of the base in every direction. The
+experimenter is given a triangulation of it. The body that is pressed is another, finer mesh with
+curved elements along the formula.
 """
 
 from __future__ import annotations
@@ -19,23 +18,29 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.mesh.gmsh_fill import TetSpec, fill
 from palpate.setup.setup import Shape
-from palpate.synthetic.solver.tet_block import Block, Grading, block_of, refined_to
+from palpate.synthetic.solver.tet_block import (
+    TetBlock,
+    TetGrading,
+    refine_mesh,
+    tet_block_from_mesh,
+)
 
 __all__ = ["AXES", "organ_block", "organ_normals", "organ_places", "organ_surface", "write_surface"]
 
 AXES = (0.036, 0.027, 0.030)
-"""Semi-axes of the ellipsoid that the lobes are added to [m]."""
+"""Semi-axes of the ellipsoid to which the lobes are added [m]."""
 _LOBES = ((2, 0.05, 0.4), (3, 0.045, 1.9), (1, 0.04, -0.8))
-"""Waves around, their share of the radius at the base, and phase [rad]; they fade towards the
-top."""
+"""Number of waves around, amplitude at the base over the radius [1], and phase [rad]. The lobes
+fade towards the top."""
 _HOLLOW = 0.07
-"""Depth of a shallow groove across the top, as a share of the radius [1]."""
+"""Depth of a shallow groove across the top over the radius [1]."""
 _COARSE = 2.5e-3
+"""Edge length of the surface that is handed out [m]."""
 
 
 def organ_places(directions: FloatArray) -> FloatArray:
-    """Places of the surface (n, 3) [m] in these directions (n, 3) from the middle of the base,
-    upwards or level.
+    """Points of the surface (n, 3) [m] in directions (n, 3) from the middle of the base, upwards or
+    level.
     """
     unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     turn, rise = np.arctan2(unit[:, 1], unit[:, 0]), np.clip(unit[:, 2], 0.0, 1.0)
@@ -46,7 +51,7 @@ def organ_places(directions: FloatArray) -> FloatArray:
 
 
 def organ_normals(places: FloatArray) -> FloatArray:
-    """Outward unit normals (n, 3) at places (n, 3) of the surface [m]."""
+    """Outward unit normals (n, 3) at points (n, 3) [m] of the surface."""
     unit = places / np.linalg.norm(places, axis=1, keepdims=True)
     first = np.cross(
         unit, np.where(np.abs(unit[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
@@ -62,8 +67,8 @@ def organ_normals(places: FloatArray) -> FloatArray:
 
 
 def organ_surface(edge: float = _COARSE) -> tuple[FloatArray, IntArray]:
-    """Vertices (v, 3) [m] and triangles (t, 3), outwards, of about this edge length [m]; closed by
-    the flat base.
+    """Vertices (v, 3) [m] and outward triangles (t, 3) of about this edge length [m], closed by the
+    flat base.
     """
     rings = max(6, round(np.pi / 2 * AXES[2] / edge))
     counts = [
@@ -94,10 +99,8 @@ def _ring(up: float, count: int) -> FloatArray:
 
 
 def _strips(vertices: FloatArray, rings: list[IntArray]) -> IntArray:
-    """Triangles (t, 3) between neighbouring rings, of which the last is one point: each side takes
-    a step where it lags.
-    """
-    found = []
+    """Triangles (t, 3) between neighbouring rings of vertices, of which the last is one point."""
+    triangles = []
     for lower, upper in pairwise(rings):
         here = there = 0
         ends = (len(lower), len(upper) if len(upper) > 1 else 0)
@@ -107,15 +110,15 @@ def _strips(vertices: FloatArray, rings: list[IntArray]) -> IntArray:
                 here < ends[0] and (here + 0.5) / ends[0] <= (there + 0.5) / ends[1]
             ):
                 here += 1
-                found.append((a, lower[here % len(lower)], b))
+                triangles.append((a, lower[here % len(lower)], b))
             else:
                 there += 1
-                found.append((a, upper[there % len(upper)], b))
-    return np.array(found, dtype=np.int64)
+                triangles.append((a, upper[there % len(upper)], b))
+    return np.array(triangles, dtype=np.int64)
 
 
 def write_surface(path: Path, vertices: FloatArray, triangles: IntArray) -> None:
-    """A binary STL, metres."""
+    """Write a binary STL, metres."""
     corners = vertices[triangles].astype("<f4")
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -131,12 +134,15 @@ def write_surface(path: Path, vertices: FloatArray, triangles: IntArray) -> None
 
 
 def organ_block(
-    places: FloatArray, reach: float, fine: float, within: Grading | None = None
-) -> Block:
-    """The body as quadratic tetrahedra whose sides are bent along the formula, with edges of `fine`
-    [m] near places (k, 3) [m].
+    places: FloatArray, reach: float, fine: float, within: TetGrading | None = None
+) -> TetBlock:
+    """Mesh the body with quadratic tetrahedra that are curved along the formula.
 
-    `within` asks for smaller ones inside, where a lump lies.
+    Args:
+        places: (k, 3) points near which the mesh is fine [m].
+        reach: distance up to which it is fine [m].
+        fine: edge length there [m].
+        within: further refinement inside, for a lump; None without.
     """
     from skfem import MeshTet2
 
@@ -146,15 +152,13 @@ def organ_block(
     solid = fill(Shape(*organ_surface(1.6e-3), name="organ"), spec)
     tetrahedra = _linear(solid.corners, solid.tetrahedra)
     bent = _bent(
-        MeshTet2.from_mesh(tetrahedra if within is None else refined_to(tetrahedra, within))
+        MeshTet2.from_mesh(tetrahedra if within is None else refine_mesh(tetrahedra, within))
     )
-    return block_of(bent, _mapped(bent))
+    return tet_block_from_mesh(bent, _mapped(bent))
 
 
 def _mapped(mesh: Any) -> Any:
-    """The mesh's mapping, whose inverse is found to what rounding leaves of it in a slender
-    tetrahedron.
-    """
+    """The mesh's isoparametric mapping with a tolerance that slender tetrahedra can reach."""
     from skfem.mapping import MappingIsoparametric
 
     mapping = MappingIsoparametric(mesh, mesh.elem(), mesh.bndelem)
@@ -169,7 +173,7 @@ def _linear(corners: FloatArray, tetrahedra: IntArray) -> Any:
 
 
 def _bent(mesh: Any) -> Any:
-    """The mesh with all nodes of its free surface on the formula."""
+    """Move all nodes of the free surface onto the formula."""
     from skfem import Basis, ElementTetP2
 
     basis = Basis(mesh, ElementTetP2())
@@ -183,8 +187,8 @@ def _bent(mesh: Any) -> Any:
     return type(mesh)(places, mesh.t)
 
 
-def _same_places(places: FloatArray, wanted: FloatArray) -> IntArray:
-    """The columns of places (3, n) that lie at wanted (3, k)."""
+def _same_places(places: FloatArray, targets: FloatArray) -> IntArray:
+    """Columns of `places` (3, n) that coincide with `targets` (3, k)."""
     from scipy.spatial import cKDTree
 
-    return np.asarray(cKDTree(places.T).query(wanted.T)[1])
+    return np.asarray(cKDTree(places.T).query(targets.T)[1])

@@ -1,4 +1,4 @@
-"""What the block truly does during one motion, at any time between the solved keys."""
+"""The true motion of block and tool during one sequence, interpolated between solved key frames."""
 
 from __future__ import annotations
 
@@ -10,196 +10,211 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from palpate.foundation.arrays import FloatArray
-from palpate.synthetic.bench.motion_plan import Motion, Probe
+from palpate.synthetic.bench.motion_plan import MotionPlan, PlannedPush
 from palpate.synthetic.solver.tet_block import IntArray
 
-__all__ = ["Moment", "Passage", "Stretch", "Track"]
+__all__ = ["KeyFrame", "PathSegment", "SolvedPush", "SolvedTrack"]
 
 
 @dataclass(frozen=True)
-class Moment:
-    """A key of the motion that was solved.
+class KeyFrame:
+    """One solved instant of a motion.
 
     Attributes:
         surface: (s, 3) displacement of the drawn surface from the stated shape, slip included [m].
         slip: (2,) of the base in the plane [m].
-        push: (3,) force of the tool on the block [N].
+        tool_force: (3,) force of the tool on the block [N].
         penetration: the deepest surface point inside the tool [m].
         deflection: (3,) of the tool's centre under load [m].
     """
 
     surface: FloatArray
     slip: FloatArray
-    push: FloatArray
+    tool_force: FloatArray
     penetration: float
     deflection: FloatArray
 
 
 @dataclass(frozen=True)
-class Passage:
-    """One straight run along a probe, from `begin` to `end` [s]: `moments` at growing arc lengths
-    `arcs` [m].
+class PathSegment:
+    """One straight part of a push.
 
-    While the tool stands still and the block does not, `arcs` are times [s] instead: the passage is
-    `timed`.
+    Attributes:
+        begin: time [s].
+        end: time [s].
+        arcs: increasing arc lengths of the key frames [m]; times [s] where `timed`.
+        key_frames: one for each of `arcs`.
+        timed: whether the tool stands still while the block changes.
     """
 
     begin: float
     end: float
     arcs: FloatArray
-    moments: tuple[Moment, ...]
+    key_frames: tuple[KeyFrame, ...]
     timed: bool = False
 
-    def keys(self, probe: Probe, times: FloatArray) -> FloatArray:
-        """What stands in the place of arc lengths (n,) at these times (n,) [s] of the probe."""
-        return times if self.timed else probe.arc(times)
+    def keys(self, push: PlannedPush, times: FloatArray) -> FloatArray:
+        """Interpolation coordinates (n,) at times (n,) [s]: arc lengths [m], or times [s]."""
+        return times if self.timed else push.arc(times)
 
-    def key(self, probe: Probe, time: float) -> float:
-        """The same at one time [s]."""
-        return float(self.keys(probe, np.array([time]))[0])
+    def key(self, push: PlannedPush, time: float) -> float:
+        """Interpolation coordinate at one time [s]."""
+        return float(self.keys(push, np.array([time]))[0])
 
     @cached_property
     def _between(self) -> Any:
-        return PchipInterpolator(self.arcs, np.stack([moment.surface for moment in self.moments]))
+        return PchipInterpolator(
+            self.arcs, np.stack([key_frame.surface for key_frame in self.key_frames])
+        )
 
     @cached_property
-    def _force(self) -> Any:
-        return PchipInterpolator(self.arcs, np.stack([moment.push for moment in self.moments]))
+    def _force_between(self) -> Any:
+        return PchipInterpolator(
+            self.arcs, np.stack([key_frame.tool_force for key_frame in self.key_frames])
+        )
 
     @cached_property
     def _way(self) -> Any:
         return PchipInterpolator(
-            self.arcs, np.stack([moment.deflection for moment in self.moments])
+            self.arcs, np.stack([key_frame.deflection for key_frame in self.key_frames])
         )
 
     def surface(self, arc: float) -> FloatArray:
-        """Displacement (s, 3) [m] at an arc length [m], by monotone cubics between the keys."""
+        """Displacement (s, 3) [m] at a coordinate, by monotone cubics between key frames."""
         return np.asarray(self._between(np.clip(arc, self.arcs[0], self.arcs[-1])))
 
     def deflection(self, arc: float) -> FloatArray:
-        """Of the tool's centre under load (3,) [m] at an arc length [m], likewise."""
+        """Deflection (3,) [m] of the tool's centre under load at a coordinate."""
         return np.asarray(self._way(np.clip(arc, self.arcs[0], self.arcs[-1])))
 
-    def push(self, arcs: FloatArray) -> FloatArray:
-        """Force of the tool on the block (n, 3) [N] at arc lengths (n,) [m], likewise."""
-        return np.asarray(self._force(np.clip(arcs, self.arcs[0], self.arcs[-1])))
+    def tool_force(self, arcs: FloatArray) -> FloatArray:
+        """Force of the tool on the block (n, 3) [N] at coordinates (n,)."""
+        return np.asarray(self._force_between(np.clip(arcs, self.arcs[0], self.arcs[-1])))
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """One probe, solved on a grid of its own.
+class SolvedPush:
+    """One solved push.
 
     Attributes:
+        push: as it was carried out.
         rest: (s, 3) drawn surface of the stated shape [m].
-        faces: (t, 3).
-        settled: (s, 3) displacement before the probe, slip included [m].
-        meshed: the probes for which the grid is fine.
-        creep: (3,) how fast the block moves before the probe [m/s].
+        faces: (t, 3) triangles.
+        settled: (s, 3) displacement before the push, slip included [m].
+        segments: in order of time.
+        meshed: the pushes for which the mesh is fine.
+        creep: (3,) velocity of the block before the push [m/s].
     """
 
-    probe: Probe
+    push: PlannedPush
     rest: FloatArray
     faces: IntArray
     settled: FloatArray
-    passages: tuple[Passage, ...]
-    meshed: tuple[Probe, ...]
+    segments: tuple[PathSegment, ...]
+    meshed: tuple[PlannedPush, ...]
     creep: FloatArray = field(default_factory=lambda: np.zeros(3))
 
     def displacement(self, time: float) -> FloatArray:
         """Displacement (s, 3) from the stated shape [m] at a time [s]."""
         last = self.settled
-        for passage in self.passages:
-            if time < passage.begin:
+        for segment in self.segments:
+            if time < segment.begin:
                 return (
-                    last + (time - self.passages[0].begin) * self.creep
-                    if passage is self.passages[0]
+                    last + (time - self.segments[0].begin) * self.creep
+                    if segment is self.segments[0]
                     else last
                 )
-            instant = min(time, passage.end)
-            last = passage.surface(passage.key(self.probe, instant))
-            if time < passage.end:
+            instant = min(time, segment.end)
+            last = segment.surface(segment.key(self.push, instant))
+            if time < segment.end:
                 return last
         return last
 
     def deflection(self, time: float) -> FloatArray:
-        """Of the tool's centre under load (3,) [m] at a time [s]."""
-        for passage in self.passages:
-            if passage.begin <= time <= passage.end:
-                return passage.deflection(passage.key(self.probe, time))
-        ended = [passage for passage in self.passages if passage.end < time]
+        """Deflection (3,) [m] of the tool's centre under load at a time [s]."""
+        for segment in self.segments:
+            if segment.begin <= time <= segment.end:
+                return segment.deflection(segment.key(self.push, time))
+        ended = [segment for segment in self.segments if segment.end < time]
         return (
-            ended[-1].deflection(ended[-1].key(self.probe, ended[-1].end)) if ended else np.zeros(3)
+            ended[-1].deflection(ended[-1].key(self.push, ended[-1].end)) if ended else np.zeros(3)
         )
 
-    def push(self, times: FloatArray) -> FloatArray:
-        """Force of the tool on the block (n, 3) [N] at times (n,) [s]; while it stands between two
-        passages, that of the first.
+    def tool_force(self, times: FloatArray) -> FloatArray:
+        """Force of the tool on the block (n, 3) [N] at times (n,) [s].
+
+        While the tool stands still between two segments, the force is that at the end of the first.
         """
         found = np.zeros((len(times), 3))
-        for passage in self.passages:
-            begun = times >= passage.begin
-            found[begun] = passage.push(
-                passage.keys(self.probe, np.minimum(times[begun], passage.end))
+        for segment in self.segments:
+            begun = times >= segment.begin
+            found[begun] = segment.tool_force(
+                segment.keys(self.push, np.minimum(times[begun], segment.end))
             )
         return found
 
     @property
     def deepest(self) -> list[float]:
-        """Two instants [s]: on the way in, and half way through."""
-        first = self.passages[0]
+        """Two instants [s] of a deep push: at 85 % of the first segment, and half way through."""
+        first = self.segments[0]
         way = np.linspace(first.begin, first.end, 200)
-        arcs = self.probe.arc(way)
+        arcs = self.push.arc(way)
         return [
             float(way[np.argmax(arcs > 0.85 * arcs.max())]),
-            float(self.probe.times[0] + self.probe.times[-1]) / 2,
+            float(self.push.times[0] + self.push.times[-1]) / 2,
         ]
 
 
 @dataclass(frozen=True)
-class Track:
-    """All probes of one motion, one stretch each."""
+class SolvedTrack:
+    """All solved pushes of one motion.
 
-    motion: Motion
-    stretches: tuple[Stretch, ...]
+    Attributes:
+        motion: as it was carried out.
+        solved_pushes: one for each push.
+    """
 
-    def at(self, time: float) -> Stretch:
-        """The stretch whose grid holds at a time [s]: the last that has begun."""
-        begun = [stretch for stretch in self.stretches if stretch.probe.times[0] <= time]
-        return begun[-1] if begun else self.stretches[0]
+    motion: MotionPlan
+    solved_pushes: tuple[SolvedPush, ...]
+
+    def at(self, time: float) -> SolvedPush:
+        """The push that has begun last at a time [s]."""
+        begun = [solved for solved in self.solved_pushes if solved.push.times[0] <= time]
+        return begun[-1] if begun else self.solved_pushes[0]
 
     def surface(self, time: float) -> tuple[FloatArray, IntArray]:
         """The drawn surface at a time [s]: vertices (s, 3) [m] and triangles (t, 3)."""
-        stretch = self.at(time)
-        return stretch.rest + stretch.displacement(time), stretch.faces
+        solved = self.at(time)
+        return solved.rest + solved.displacement(time), solved.faces
 
-    def push(self, times: FloatArray) -> FloatArray:
+    def tool_force(self, times: FloatArray) -> FloatArray:
         """Force of the tool on the block (n, 3) [N] at times (n,) [s]."""
         found = np.zeros((len(times), 3))
-        for stretch in self.stretches:
-            begun = times >= stretch.probe.times[0]
-            found[begun] = stretch.push(times[begun])
+        for solved in self.solved_pushes:
+            begun = times >= solved.push.times[0]
+            found[begun] = solved.tool_force(times[begun])
         return found
 
     @property
     def slid(self) -> tuple[float, float]:
-        """How far the base lies from where it was put as the motion ends [m]."""
-        x, y = self.moments[-1].slip
+        """Slip of the base (x, y) [m] at the end of the motion."""
+        x, y = self.key_frames[-1].slip
         return float(x), float(y)
 
     @property
-    def moments(self) -> list[Moment]:
-        """All solved keys."""
+    def key_frames(self) -> list[KeyFrame]:
+        """All key frames."""
         return [
-            moment
-            for stretch in self.stretches
-            for passage in stretch.passages
-            for moment in passage.moments
+            key_frame
+            for solved in self.solved_pushes
+            for segment in solved.segments
+            for key_frame in segment.key_frames
         ]
 
     @property
-    def hardest(self) -> Stretch:
-        """The stretch with the strongest push."""
+    def hardest(self) -> SolvedPush:
+        """The push with the largest force."""
         return max(
-            self.stretches,
-            key=lambda stretch: float(np.linalg.norm(stretch.passages[0].moments[-1].push)),
+            self.solved_pushes,
+            key=lambda solved: float(np.linalg.norm(solved.segments[0].key_frames[-1].tool_force)),
         )

@@ -1,5 +1,6 @@
-"""The virtual block on the bench, from one place of the tool to the next: its base held, slipping
-or on springs, its past in it.
+"""The virtual block on the bench: its equilibrium from one tool position to the next.
+
+The base is held, slips with friction or stands on springs; the material may have a history.
 """
 
 from __future__ import annotations
@@ -26,14 +27,22 @@ __all__ = ["Specimen", "SpecimenSnapshot"]
 
 GRAVITY = 9.81
 _MOST_HALVED = 3
-"""How often a step of a tool that drags the surface along is halved, where it is too long."""
+"""How often a step of a tool with friction is halved before it counts as unstable."""
 _SET, _MOST_SETS = 2e-6, 12
-"""Change of the displacement [m] at which an equilibrium and the set that it brings agree."""
+"""Change of the displacement [m] at which equilibrium and permanent set have converged, and the
+largest number of iterations."""
 
 
 @dataclass(frozen=True, eq=False)
 class SpecimenSnapshot:
-    """What a block is left with, from which it can go on."""
+    """State of a specimen to which it can be restored.
+
+    Attributes:
+        slip: (3,) of the base [m].
+        last: the last equilibrium.
+        before: the one before it.
+        inelastic_state: of the material; None without a history.
+    """
 
     slip: FloatArray
     last: TetState
@@ -42,7 +51,7 @@ class SpecimenSnapshot:
 
 
 class Specimen:
-    """One block with its solver, how far it has slipped, and what it remembers."""
+    """One block with its solver, the slip of its base and the history of its material."""
 
     def __init__(
         self, scenario: Scenario, block: TetBlock, slip: FloatArray, axis: FloatArray | None = None
@@ -54,14 +63,13 @@ class Specimen:
         hidden = scenario.hidden("base_slip")
         self.friction = hidden.value("friction_coefficient") if hidden else None
         self.weight = scenario.mass * GRAVITY
-        giving = scenario.hidden("tool_compliance")
+        shaft = scenario.hidden("tool_compliance")
         self.softness = (
-            giving.value("compliance_times_stiffness") / scenario.true_modulus if giving else 0.0
+            shaft.value("compliance_times_stiffness") / scenario.true_modulus if shaft else 0.0
         )
         self.slip = slip
         self.creep = creep_velocity(scenario)
-        lasting = scenario.has_history
-        self.memory = InelasticHistory(scenario, block) if lasting else None
+        self.memory = InelasticHistory(scenario, block) if scenario.has_history else None
         if self.memory is not None:
             self.memory.settle(self.solver.rest.displacement)
         rough = scenario.hidden("tool_friction")
@@ -84,11 +92,12 @@ class Specimen:
         self._stated: FloatArray | None = None
 
     def close(self) -> None:
+        """Free the solver's memory."""
         self.solver.close()
 
     @property
     def snapshot(self) -> SpecimenSnapshot:
-        """As it is now."""
+        """The present state."""
         return SpecimenSnapshot(
             self.slip,
             self._last,
@@ -97,21 +106,21 @@ class Specimen:
         )
 
     def restore(self, snapshot: SpecimenSnapshot) -> None:
-        """Go on from there."""
+        """Continue from an earlier state."""
         self.slip, self._last, self._before = snapshot.slip, snapshot.last, snapshot.before
         if self.memory is not None and snapshot.inelastic_state is not None:
             self.memory.inelastic_state = snapshot.inelastic_state
 
     @property
     def surface(self) -> FloatArray:
-        """Displacement (s, 3) of the drawn surface from the stated shape [m], slip included, as the
-        last key left it.
+        """Displacement (s, 3) of the drawn surface from the stated shape [m], slip included, after
+        the last key frame.
         """
         return np.asarray(self.block.surface @ self._last.displacement) + self.slip
 
     @property
     def path_dependent(self) -> bool:
-        """Whether the way back is another than the way in."""
+        """Whether unloading differs from loading."""
         return (
             self.changes_at_rest
             or self.friction is not None
@@ -121,12 +130,15 @@ class Specimen:
 
     @property
     def changes_at_rest(self) -> bool:
-        """Whether something happens while the tool stands still."""
+        """Whether the block changes while the tool stands still."""
         return bool(self.creep.any()) or (self.memory is not None and self.memory.relaxes)
 
     def solve_key_frame(self, centre: FloatArray, time: float | None = None) -> KeyFrame:
-        """With the tool's stated centre here (3,) [m], at a time [s] for a block that remembers or
-        creeps.
+        """Solve one key frame.
+
+        Args:
+            centre: (3,) stated centre of the tool [m].
+            time: [s], for a block with a history or one that creeps.
         """
         before = self._last
         if time is not None and self.creep.any():
@@ -139,8 +151,7 @@ class Specimen:
         if self.drag is not None:
             self.drag.finish_step(state.displacement, state.centre)
         if self.memory is not None or self.drag is not None:
-            # The next place is guessed from the last two that were found, not from two on the way
-            # to one.
+            # The next guess uses the last two converged key frames, not substeps between them.
             self._before, self._last = before, state
         self._stated = centre
         surface = np.asarray(self.block.surface @ state.displacement) + self.slip
@@ -153,7 +164,7 @@ class Specimen:
         )
 
     def _solve_with_history(self, centre: FloatArray, time: float | None) -> TetState:
-        """With what the material remembers, its own set included."""
+        """Solve with a material that has a history; iterate on the permanent set of this step."""
         memory = self.memory
         assert memory is not None
         self.solver.metric = memory.metric(time)
@@ -167,7 +178,7 @@ class Specimen:
         return state
 
     def _solve_in_substeps(self, centre: FloatArray, depth: int = 0) -> TetState:
-        """By way of nearer places, where friction and pressure find no agreement in one step."""
+        """Solve; halve the step where friction and pressure do not converge in one."""
         snapshot = self.snapshot
         try:
             return self._solve_with_base_friction(centre)
@@ -176,9 +187,7 @@ class Specimen:
         except SolveError as error:
             if self.drag is None or self._stated is None:
                 raise
-            if (
-                depth >= _MOST_HALVED
-            ):  # as deep as this tool can be led: the operator stops short of it
+            if depth >= _MOST_HALVED:  # the operator stops the push before this depth
                 raise InstabilityError(str(error)) from error
         self.restore(snapshot)
         middle = 0.5 * (self._stated + centre)
@@ -188,7 +197,7 @@ class Specimen:
         return self._solve_in_substeps(centre, depth + 1)
 
     def _solve_with_base_friction(self, centre: FloatArray) -> TetState:
-        """With friction under the base holding."""
+        """Solve, and let the base slip where friction does not hold it."""
         state = self._solve_with_compliant_shaft(centre - self.slip)
         return (
             self._slide(centre, state)
@@ -197,15 +206,16 @@ class Specimen:
         )
 
     def _excess_force(self, state: TetState) -> float:
-        """Sideways push beyond what friction holds [N]."""
+        """Tangential force on the base beyond the Coulomb limit [N]; negative where it sticks."""
         assert self.friction is not None
         return float(np.linalg.norm(state.tool_force[:2])) - self.friction * max(
             self.weight - float(state.tool_force[2]), 0.0
         )
 
     def _slide(self, centre: FloatArray, state: TetState) -> TetState:
-        """Move the base along the push until friction holds it: Newton on the length of the slide,
-        within a bracket.
+        """Move the base along the force until friction holds it.
+
+        Newton's method on the length of the slide, within a bracket; SolveError after 40 steps.
         """
         assert self.friction is not None
         direction = np.array([*state.tool_force[:2], 0.0]) / np.linalg.norm(state.tool_force[:2])
@@ -217,7 +227,7 @@ class Specimen:
             ):
                 return state
             short, long = (max(short, length), long) if excess > 0 else (short, min(long, length))
-            change = state.compliance @ direction
+            change = state.contact_stiffness @ direction
             rate = float(change @ direction) + self.friction * float(change[2])
             step = excess / max(rate, 1e-2 * self.solver.modulus * self.radius)
             length += float(np.clip(step, -0.7e-3, 0.7e-3))
@@ -231,7 +241,7 @@ class Specimen:
         )
 
     def _solve_with_compliant_shaft(self, centre: FloatArray) -> TetState:
-        """With the tool, or the end of the shaft on which it gives way, at `centre` (3,) [m] in the
+        """Solve with the tool, or the far end of its compliant shaft, at `centre` (3,) [m] in the
         frame of the slid block.
         """
         if not self.softness:
@@ -240,8 +250,7 @@ class Specimen:
         state = solve_compliant_shaft(
             centre, self.softness, centre - self.softness * before.tool_force, self._elastic
         )
-        # The next place is guessed from the last two that were balanced, not from two on the way to
-        # one.
+        # The next guess uses the last two converged states, not iterates between them.
         self._before, self._last = before, state
         return state
 
@@ -256,7 +265,7 @@ class Specimen:
         return state
 
     def _solve_without_tool(self, centre: FloatArray) -> TetState:
-        """Without the tool: as it settled, or, with a memory, on its way there."""
+        """The state without contact: at rest, or, with a history, on the way there."""
         still = TetState(self.solver.rest.displacement, centre, np.zeros(3), np.zeros((3, 3)), 0.0)
         if self.memory is None or self.memory.is_initial:
             return still
@@ -265,7 +274,7 @@ class Specimen:
         )
 
     def _solve_with_tool_friction(self, drag: CoulombFriction, centre: FloatArray) -> TetState:
-        """With the tool dragging the surface along."""
+        """Solve with Coulomb friction between tool and surface."""
         state: TetState | None = None
 
         def solve(friction_contact: FrictionContact | None) -> FloatArray:
@@ -303,8 +312,7 @@ class Specimen:
         return self.solver.state(centre, self._last, guess)
 
     def _advected_guess(self, step: FloatArray) -> FloatArray:
-        """The last displacement, moved along with the tool: near the truth while the tool
-        slides."""
+        """The last displacement, translated with the tool: a good guess while the tool slides."""
         nodes = self.block.nodes
         if self._mesh is None:
             self._mesh = Delaunay(nodes)

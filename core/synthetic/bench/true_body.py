@@ -1,4 +1,4 @@
-"""What the virtual block is made of and stands on, from what a scenario hides."""
+"""True material, supports and tool of the virtual block, from what a scenario hides."""
 
 from __future__ import annotations
 
@@ -11,16 +11,23 @@ from palpate.synthetic.scenario.scenario import Scenario
 from palpate.synthetic.solver.holzapfel_fibres import fibre_modulus
 from palpate.synthetic.solver.inelastic_history import relaxed_share
 from palpate.synthetic.solver.obstacles import Neighbour, Shaft, shaft_radius
-from palpate.synthetic.solver.solid_model import Solid
-from palpate.synthetic.solver.tet_block import Block
+from palpate.synthetic.solver.solid_model import SolidModel
+from palpate.synthetic.solver.tet_block import TetBlock
 
-__all__ = ["creep_of", "levels_of", "seams_of", "solid_of", "true_offset", "true_radius"]
+__all__ = [
+    "base_seams",
+    "creep_velocity",
+    "material_levels",
+    "solid_model",
+    "true_offset",
+    "true_radius",
+]
 
 BoolArray = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 def true_radius(scenario: Scenario) -> float:
-    """Of the tool [m]."""
+    """True radius of the tool [m]."""
     hidden = scenario.hidden("tool_radius")
     return hidden.value("radius") if hidden else scenario.tool_radius
 
@@ -31,8 +38,8 @@ def true_offset(scenario: Scenario) -> FloatArray:
     return np.array([hidden.value(name) for name in ("dx", "dy", "dz")]) if hidden else np.zeros(3)
 
 
-def creep_of(scenario: Scenario) -> FloatArray:
-    """How fast the block moves on its table (3,) [m/s]."""
+def creep_velocity(scenario: Scenario) -> FloatArray:
+    """Velocity of the block on its table (3,) [m/s]."""
     creep = scenario.disturbance("phantom_creep")
     if creep is None:
         return np.zeros(3)
@@ -40,15 +47,15 @@ def creep_of(scenario: Scenario) -> FloatArray:
     return creep.value("speed") * np.array([np.cos(direction), np.sin(direction), 0.0])
 
 
-def levels_of(scenario: Scenario) -> tuple[float, ...]:
-    """Heights between two materials [m]: under a skin, where there is one."""
+def material_levels(scenario: Scenario) -> tuple[float, ...]:
+    """Heights of boundaries between materials [m]: the lower side of a skin layer, if any."""
     skin = scenario.hidden("surface_layer")
     return (scenario.true_size[2] - skin.value("thickness"),) if skin else ()
 
 
-def seams_of(scenario: Scenario) -> tuple[tuple[int, float], ...]:
-    """Axis and place [m] of the line where a base that is loose begins to be held: between two
-    nodes it would lie anywhere.
+def base_seams(scenario: Scenario) -> tuple[tuple[int, float], ...]:
+    """Axis and position [m] of the edge of a detached strip of the base, to which the mesh is
+    aligned.
     """
     strip = scenario.hidden("base_detachment")
     if strip is None:
@@ -58,13 +65,17 @@ def seams_of(scenario: Scenario) -> tuple[tuple[int, float], ...]:
 
 
 def _side(name: str) -> tuple[int, float]:
-    """Axis and sign of a side called like "-x"."""
+    """Axis and sign of a side named like "-x"."""
     return "xy".index(name[1]), -1.0 if name[0] == "-" else 1.0
 
 
-def solid_of(scenario: Scenario, block: Block, axis: FloatArray | None = None) -> Solid:
-    """The solid that fills `block`, and what touches it; `axis` (3,) points from the tool's shaft
-    towards the tip.
+def solid_model(scenario: Scenario, block: TetBlock, axis: FloatArray | None = None) -> SolidModel:
+    """The solid that fills `block`, with everything that touches it.
+
+    Args:
+        scenario: what is believed and hidden.
+        block: its mesh.
+        axis: (3,) unit vector from the shaft towards the tip; None without a shaft.
     """
     nu, weight = scenario.hidden("poisson_ratio"), scenario.hidden("gravity")
     limit, fibres, springs = (
@@ -73,7 +84,7 @@ def solid_of(scenario: Scenario, block: Block, axis: FloatArray | None = None) -
     poisson_ratio = nu.value("nu") if nu else scenario.poisson_ratio
     angle = fibres.value("direction") if fibres else 0.0
     held = _held(scenario, block.nodes)
-    return Solid(
+    return SolidModel(
         young_modulus=_modulus(scenario, block),
         poisson_ratio=poisson_ratio,
         weight=weight.value("specific_weight_over_stiffness") * scenario.true_modulus
@@ -95,7 +106,7 @@ def solid_of(scenario: Scenario, block: Block, axis: FloatArray | None = None) -
 
 
 def _shaft(scenario: Scenario, axis: FloatArray | None) -> Shaft | None:
-    """Up to well above the block; where nothing is said of it, it touches nothing."""
+    """The shaft as an obstacle; None unless the scenario lets it touch the block."""
     if axis is None or scenario.disturbance("shaft_contact") is None:
         return None
     return Shaft(-axis, shaft_radius(true_radius(scenario)), 2 * scenario.true_size[2])
@@ -111,7 +122,7 @@ def _neighbour(scenario: Scenario) -> Neighbour | None:
     )
 
 
-def _modulus(scenario: Scenario, block: Block) -> FloatArray:
+def _modulus(scenario: Scenario, block: TetBlock) -> FloatArray:
     """Young's modulus (e, 4) at the volume points [Pa]."""
     modulus = np.full(block.weights.shape, scenario.true_modulus)
     lump, skin, slope = (
@@ -133,12 +144,12 @@ def _modulus(scenario: Scenario, block: Block) -> FloatArray:
 
 
 def _held(scenario: Scenario, nodes: FloatArray) -> BoolArray:
-    """Which of the nodes (n, 3) a rigid support holds (n,)."""
+    """Mask (n,) of nodes (n, 3) that a rigid support holds."""
     return (nodes[:, 2] < 1e-9) & _bonded(scenario, nodes)
 
 
 def _bonded(scenario: Scenario, places: FloatArray) -> BoolArray:
-    """Whether the base is fixed to what it stands on at places (..., 3) of it."""
+    """Mask (...) of places (..., 3) [m] of the base that are not detached."""
     strip = scenario.hidden("base_detachment")
     if strip is None:
         return np.ones(places.shape[:-1], dtype=bool)
@@ -148,8 +159,8 @@ def _bonded(scenario: Scenario, places: FloatArray) -> BoolArray:
     )
 
 
-def _springs(scenario: Scenario, block: Block, stiffness_over_modulus: float) -> FloatArray:
-    """Stiffness per area at the points of the sole (f, q) [N/m^3]; none where the base is loose."""
+def _springs(scenario: Scenario, block: TetBlock, stiffness_over_modulus: float) -> FloatArray:
+    """Stiffness per area (f, q) [N/m^3] at the points of the base; zero where it is detached."""
     places = np.einsum(
         "fqa,fai->fqi", block.sole.values, block.nodes[block.elements[block.sole.owner]]
     )

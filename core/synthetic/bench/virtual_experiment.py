@@ -1,5 +1,5 @@
-"""The virtual block under a whole motion: probe by probe, each on a grid of its own, or all on one
-where the block remembers.
+"""The virtual block under a whole motion: each push on a mesh of its own, or all pushes on one mesh
+where the material has a history.
 """
 
 from __future__ import annotations
@@ -11,26 +11,22 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.foundation.arrays import FloatArray
+from palpate.synthetic.bench.motion_plan import MotionPlan, PlannedPush
+from palpate.synthetic.bench.push_segments import solve_segments
+from palpate.synthetic.bench.solved_track import SolvedPush, SolvedTrack
+from palpate.synthetic.bench.specimen import Specimen
+from palpate.synthetic.bench.true_body import base_seams, material_levels, true_offset, true_radius
 from palpate.synthetic.scenario.scenario import Scenario
 from palpate.synthetic.solver.tet_block import IntArray, TetBlock, TetGrading, mesh_block
 from palpate.synthetic.solver.tet_equilibrium import InstabilityError
-from palpate.synthetic.bench.motion_plan import MotionPlan, PlannedPush
-from palpate.synthetic.bench.solved_track import SolvedPush, SolvedTrack
-from palpate.synthetic.bench.specimen import Specimen
-from palpate.synthetic.bench.true_body import (
-    base_seams,
-    material_levels,
-    true_offset,
-    true_radius,
-)
 
-__all__ = ["neutral_displacement", "perform", "rest_surface"]
+__all__ = ["neutral_displacement", "rest_surface", "solve_motion"]
 
 SHORTER, MOST_SHORT = 1.0e-3, 4.5e-3
-
+"""Step by which a push into an unstable block is shortened, and the limit of it [m]."""
 
 Mesher = Callable[[Scenario, PlannedPush, float], TetBlock]
-"""A body for one probe of a scenario, fine where it touches."""
+"""Meshes the body for one push of a scenario, with edges of the given length [m] at the contact."""
 
 
 def solve_motion(
@@ -40,15 +36,18 @@ def solve_motion(
     body: Mesher | None = None,
     begun: tuple[float, float] = (0.0, 0.0),
 ) -> SolvedTrack:
-    """Solve one motion of a scenario; every probe gets a grid that is fine where it touches, a
-    block that remembers one for all.
+    """Solve one motion of a scenario.
 
-    Without a `body` it is the block's; one that remembers is always that. `begun` says how far the
-    base had slid before [m].
+    Every push gets a mesh that is fine at its contact; a material with a history gets one mesh for
+    all. Pressed against a hard lump, the block becomes unstable at some depth and jumps aside. Such
+    a push is shortened; the motion of the result is the one that was carried out.
 
-    Pressed against a hard lump, the block gives way at some depth: it jumps aside, and the tool
-    leads to no equilibrium any more. The operator stops such a push short of it; the track's motion
-    is the one that was carried out.
+    Args:
+        scenario: what is believed and hidden.
+        motion: as planned.
+        fine: longest element edge at the contact [m]; that of the scenario without it.
+        body: meshes the body; a block without it, and always with a history.
+        begun: slip of the base before (x, y) [m].
     """
     fine = fine or scenario.fine
     ends = [*(float(push.times[0]) for push in motion.pushes[1:]), motion.duration]
@@ -70,7 +69,7 @@ def _solve_separately(
     body: Mesher,
     slip: FloatArray,
 ) -> list[SolvedPush]:
-    """Each probe on a grid of its own: of those before only the base's slip is left."""
+    """Solve each push on a mesh of its own; only the slip of the base is passed on."""
     solved_pushes = []
     for push, end in zip(motion.pushes, ends, strict=True):
         solved, slip = _solve_push(scenario, push, motion.axis, slip, fine, end, body)
@@ -87,7 +86,11 @@ def _solve_push(
     end: float,
     body: Mesher,
 ) -> tuple[SolvedPush, FloatArray]:
-    """One probe from a base that has slipped by `slip` (3,) [m], and the slip after it."""
+    """Solve one push from a base that has slipped by `slip` (3,) [m], as deep as it is stable.
+
+    Returns:
+        the solved push and the slip (3,) [m] after it.
+    """
     for short in np.arange(0.0, MOST_SHORT, SHORTER):
         tried = push.shallower(float(short))
         block = body(scenario, tried, fine)
@@ -118,7 +121,7 @@ def _solve_on_one_mesh(
     fine: float,
     slip: FloatArray,
 ) -> list[SolvedPush]:
-    """All probes on one grid, on which the block remembers."""
+    """Solve all pushes on one mesh, which carries the material's history."""
     block = mesh_block(scenario.true_size, _grading(scenario, pushes, fine))
     specimen, solved_pushes = Specimen(scenario, block, slip), []
     try:
@@ -145,11 +148,11 @@ def _solve_on_one_mesh(
 
 
 def neutral_displacement(scenario: Scenario, solved: SolvedPush, centre: FloatArray) -> FloatArray:
-    """Displacement (s, 3) [m] of the drawn surface of `stretch` with no hidden effect and the
-    tool's stated centre (3,) [m].
+    """Displacement (s, 3) [m] of the drawn surface without hidden effects, for a stated tool centre
+    (3,) [m].
 
-    Where the block has another size than believed, it is from the true rest shape to where the
-    believed block would have been.
+    Where the block has another size than believed, the displacement leads from the true rest shape
+    to the believed block.
     """
     believed = replace(scenario, effects=())
     low, high = _bounds(believed)
@@ -174,8 +177,10 @@ def neutral_displacement(scenario: Scenario, solved: SolvedPush, centre: FloatAr
 
 
 def rest_surface(scenario: Scenario) -> tuple[FloatArray, FloatArray, IntArray]:
-    """The untouched block: drawn surface of the true shape (s, 3), its displacement (s, 3) [m], and
-    triangles (t, 3).
+    """The untouched block.
+
+    Returns:
+        drawn surface of the true shape (s, 3) [m], its displacement (s, 3) [m], triangles (t, 3).
     """
     grading = TetGrading(
         np.zeros((1, 3)), np.zeros(1), np.full(1, 8e-3), 8e-3, 0.5, material_levels(scenario)
@@ -196,8 +201,8 @@ def _bounds(scenario: Scenario) -> tuple[FloatArray, FloatArray]:
 
 
 def _grading(scenario: Scenario, pushes: Sequence[PlannedPush], fine: float) -> TetGrading:
-    """Fine where each of the probes first touches, and along a drag; a lump gets elements smaller
-    than its radius.
+    """Refine at the first contact of each push and along a drag; a lump gets elements smaller than
+    its radius.
     """
     parts = [_touched(scenario, push, fine) for push in pushes]
     points, reach, edges = (np.concatenate([part[number] for part in parts]) for number in range(3))
@@ -214,9 +219,7 @@ def _grading(scenario: Scenario, pushes: Sequence[PlannedPush], fine: float) -> 
 def _touched(
     scenario: Scenario, push: PlannedPush, fine: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Points (n, 3) where a probe touches, how far the grid is fine around them (n,), and how fine
-    (n,), all in [m].
-    """
+    """Contact points (n, 3), radius of refinement around them (n,) and edge length (n,) [m]."""
     low, high = _bounds(scenario)
     radius = true_radius(scenario)
     way = push.place(np.arange(0.0, push.corners[-1] + 1e-3, 1.0e-3)) + true_offset(scenario)
@@ -236,7 +239,7 @@ def _touched(
 
 
 def _on_surface(centres: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """The points (n, 3) of the block's faces next to tool centres (n, 3), inside or outside [m]."""
+    """The nearest points (n, 3) [m] of the block's faces to tool centres (n, 3) [m]."""
     points = np.clip(centres, low, high)
     inside = np.all((centres > low) & (centres < high), axis=1)
     points[inside, 2] = high[2]

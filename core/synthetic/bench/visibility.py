@@ -1,4 +1,4 @@
-"""How far hidden effects move the surface that a camera sees."""
+"""Size of hidden effects on the surface that a camera sees."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 
-__all__ = ["changed", "visible_weights"]
+__all__ = ["mean_square_change", "visible_weights"]
 
 
 def visible_weights(
     rest: FloatArray, faces: Any, size: tuple[float, float, float], seen: FloatArray
 ) -> FloatArray:
-    """(s,) area of each drawn point that lies on the top or on one of the two `seen` sides [m^2];
-    zero elsewhere.
+    """Area (s,) [m^2] of each drawn point on the top or on one of the two `seen` sides; zero
+    elsewhere.
     """
     edges = rest[faces[:, 1:]] - rest[faces[:, :1]]
     normals = np.cross(edges[:, 0], edges[:, 1])
@@ -31,7 +31,7 @@ def visible_weights(
     return np.asarray(area, dtype=float)
 
 
-def changed(
+def mean_square_change(
     rest: FloatArray,
     true: FloatArray,
     believed: FloatArray,

@@ -1,10 +1,10 @@
-"""What goes wrong outside the catalogue: nothing there expresses it, so that a diagnosis should
-name nothing alone for it.
+"""Disturbances outside the catalogue of effects.
 
-A camera that warms up turns and shifts while a sequence lasts, registered half way; depth ripples
-with the distance, as interference between cameras leaves it; the phantom creeps sideways on its
-table; another soft body lies against a side that the camera does not see; and the shaft of a tool
-held upright touches the rim of the top while its ball is pushed into a side.
+No effect expresses them, so a diagnosis should name no single cause. A camera that warms up turns
+and shifts during a sequence and is exact half way. Depth ripples with the distance, as interference
+between cameras causes it. The phantom creeps sideways on its table. Another soft body lies against
+a side that the camera does not see. The shaft of an upright tool touches the rim of the top while
+its ball is pushed into a side.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ DISTURBANCES: Mapping[str, Mapping[str, str]] = {
     "second_body": {"overlap": "m", "stiffness_over_E": "1/m", "side": ""},
     "shaft_contact": {"lean": "rad"},
 }
-"""Those the virtual bench can make, with the unit of each parameter.
+"""Disturbances of the virtual bench, with the unit of each parameter.
 
-`camera_drift`: how far the camera is off at a sequence's end, by which it was off the other way at
-its beginning. `depth_ripple`: depth z is read as z (1 + amplitude sin(2 pi z / period)).
-`phantom_creep`: which way in the plane, from x, and how fast the block moves through a sequence; it
-is laid back after each. `second_body`: how far it would stand in the block without giving way, its
-pressure per way that it is pushed back over the block's modulus, and the side it lies against,
-which the camera does not see; it is black, so that nothing is seen of it either. `shaft_contact`:
-how far the shaft leans over the block from the vertical in pushes from the side.
+`camera_drift`: pose error of the camera at the end of a sequence; it is the opposite at the
+beginning. `depth_ripple`: depth z is read as z (1 + amplitude sin(2 pi z / period)).
+`phantom_creep`: speed and direction (in the plane, from x) of the block during a sequence; it is
+put back after each. `second_body`: its overlap with the block if it were rigid, its pressure per
+displacement over the block's modulus, and the side it lies against, which the camera does not see;
+it is black, so the camera does not see it either. `shaft_contact`: angle of the shaft from the
+vertical, over the block, in pushes from the side.
 """
 _Range = tuple[float, float] | tuple[str, str, str, str]
 _CLEAR: Mapping[str, Mapping[str, _Range]] = {
@@ -53,7 +53,12 @@ _CLEAR: Mapping[str, Mapping[str, _Range]] = {
 
 @dataclass(frozen=True)
 class Disturbance:
-    """One by its name, with its parameters in SI units."""
+    """A disturbance.
+
+    Attributes:
+        name: one of DISTURBANCES.
+        parameters: by name, SI units.
+    """
 
     name: str
     parameters: Mapping[str, float | str] = field(default_factory=dict)
@@ -62,18 +67,18 @@ class Disturbance:
         check_named(self.name, self.parameters, DISTURBANCES, "disturb by")
 
     def value(self, name: str) -> float:
-        """A numeric parameter."""
+        """The numeric parameter of this name."""
         return float(self.parameters[name])
 
 
 def draw_disturbance(name: str, seed: int) -> Disturbance:
-    """One of a clear size; EffectError for an unknown name."""
+    """Draw a disturbance of a clear size; EffectError for an unknown name."""
     rng = np.random.default_rng([seed, 104729])
     return Disturbance(name, {key: _drawn(span, rng) for key, span in _CLEAR.get(name, {}).items()})
 
 
 def _drawn(span: _Range, rng: np.random.Generator) -> float | str:
-    """A number between two, with so many decimals as tell them apart, or one of some words."""
+    """Draw a number from a range, rounded, or one of several words."""
     if len(span) > 2:
         return str(rng.choice(np.array(span)))
     low, high = (float(end) for end in span)
@@ -83,8 +88,8 @@ def _drawn(span: _Range, rng: np.random.Generator) -> float | str:
 def drifted(
     disturbances: Sequence[Disturbance], share: float, rng: np.random.Generator
 ) -> Transform:
-    """The camera's motion, phantom frame, when a share [1] of a sequence is over; the same
-    directions from the same generator.
+    """Drift of the camera, phantom frame, after a share [1] of a sequence; generators in the same
+    state give the same directions.
     """
     step, turn = rng.normal(size=(2, 3))
     for one in disturbances:
@@ -98,7 +103,7 @@ def drifted(
 
 
 def rippled(disturbances: Sequence[Disturbance], depth: FloatArray) -> FloatArray:
-    """What a camera reads (n,) [m] for these true depths (n,) [m]."""
+    """Depth readings (n,) [m] of a disturbed camera for true depths (n,) [m]."""
     for one in disturbances:
         if one.name == "depth_ripple":
             depth = depth * (

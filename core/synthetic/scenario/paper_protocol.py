@@ -2,15 +2,15 @@
 gelatin block, 14 minutes.
 
 As in the paper the block measures 68.7 x 39.3 x 35.8 mm, the tool is a sphere on a shaft, one
-sequence of two minutes validates, and test sequences are never trained on. What the paper does not
-have: of the three test sequences two are of kinds of motion that are trained on (pushes from above
-and into a side), and one is of a kind that is not (drags along the top). Hidden are three things at
-once that nobody believes: the tool's true radius, the block's weight, and a base that slides.
+sequence of two minutes validates, and test sequences are never trained on. Unlike in the paper, two
+of the three test sequences are of kinds of motion that are trained on (pushes from above and into a
+side), and one is of a kind that is not (drags along the top). Three effects are hidden at once: the
+tool's true radius, the block's weight, and a base that slides.
 
-The bench solves each touch at places about a millimetre apart along the tool's way, on quadratic
-elements that are fine where it touches and with another law than the replay's; between them the
-surface follows monotone cubics in the way's length (`Passage`). Every cloud is then cast anew from
-the surface at its own instant, with noise, drop-outs and stray points of its own.
+The bench solves each push at key frames about a millimetre apart along the tool's path, on
+quadratic elements that are fine at the contact and with another law than the replay's. Between them
+the surface follows monotone cubics in the arc length (`PathSegment`). Every cloud is then cast from
+the surface at its own instant, with its own noise, missing points and stray points.
 """
 
 from __future__ import annotations
@@ -25,28 +25,28 @@ __all__ = ["PAPER_EFFECTS", "PAPER_SEED", "PAPER_SIZES", "PaperSize", "paper_sce
 
 PaperSize = Literal["short", "medium", "full"]
 PAPER_SEED = 2020
-"""Of everything random in these datasets, so that there is one of each size."""
+"""Seed of these datasets, so that there is one of each size."""
 
 PAPER_EFFECTS = (
     HiddenEffect("tool_radius", {"radius": 0.0065}),
     HiddenEffect("gravity", {"specific_weight_over_stiffness": 2.2}),
     HiddenEffect("base_slip", {"friction_coefficient": 0.12}),
 )
-"""What is hidden: a sphere of 6.5 mm stated as 5 mm, the weight of a gel of 5 kPa, and a base on a
+"""Hidden effects: a sphere of 6.5 mm stated as 5 mm, the weight of a gel of 5 kPa, and a base on a
 wet table."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Plan:
-    """How many sequences of each split and kind, how long they are, and how densely the camera
-    samples.
+    """Number and length of the sequences, and sampling of the camera.
 
     Attributes:
-        train, test: number of sequences by kind.
-        rounds: by kind.
-        validation: rounds of the one that validates.
+        train: number of training sequences by kind.
+        test: number of test sequences by kind.
+        rounds: number of rounds by kind.
+        validation: number of rounds of the validation sequence.
         rate: clouds per second [1/s].
-        density: points on the block in one cloud, about.
+        density: approximate number of points on the block in one cloud.
         fine: longest edge at the contact [m].
     """
 
@@ -95,13 +95,13 @@ def paper_scenario(
     plan = PAPER_SIZES[size]
     counts = dict.fromkeys(plan.rounds, 0)
 
-    def names(wanted: Mapping[str, int]) -> tuple[str, ...]:
-        found = []
-        for kind, count in wanted.items():
+    def names(numbers: Mapping[str, int]) -> tuple[str, ...]:
+        result = []
+        for kind, count in numbers.items():
             for _ in range(count):
                 counts[kind] += 1
-                found.append(f"{kind}-{counts[kind]:02d}")
-        return tuple(found)
+                result.append(f"{kind}-{counts[kind]:02d}")
+        return tuple(result)
 
     splits = {
         "train": names(plan.train),

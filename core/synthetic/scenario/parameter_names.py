@@ -1,6 +1,4 @@
-"""What the virtual bench can do wrong is called by name, with parameters by name, and nothing else
-is taken.
-"""
+"""Check of the names of hidden effects and disturbances, and of their parameters."""
 
 from __future__ import annotations
 
@@ -14,13 +12,18 @@ __all__ = ["check_named"]
 def check_named(
     name: str, parameters: Mapping[str, object], known: Mapping[str, Mapping[str, str]], verb: str
 ) -> None:
-    """EffectError unless `known` has this name with exactly these parameters; `verb` says what the
-    bench does with it.
+    """Raise EffectError unless `known` has this name with exactly these parameters.
+
+    Args:
+        name: of an effect or a disturbance.
+        parameters: by name.
+        known: names and units of the parameters of each name.
+        verb: what the bench does with it, for the message.
     """
     if name not in known:
         raise EffectError(
             f"the virtual bench cannot {verb} {name!r}; it knows {', '.join(known)}", effect=name
         )
     if set(parameters) != set(known[name]):
-        wanted, got = ", ".join(known[name]), ", ".join(parameters) or "none"
-        raise EffectError(f"{name} needs the parameters {wanted}, got {got}", effect=name)
+        expected, given = ", ".join(known[name]), ", ".join(parameters) or "none"
+        raise EffectError(f"{name} needs the parameters {expected}, got {given}", effect=name)

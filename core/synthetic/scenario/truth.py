@@ -1,4 +1,4 @@
-"""What is hidden in a virtual dataset, as the file that stands beside it."""
+"""The truth file of a virtual dataset: hidden effects and true registrations."""
 
 from __future__ import annotations
 
@@ -23,14 +23,13 @@ class Truth:
         effects: empty where the verdict is none.
         visibility: root mean square change of the visible surface by the hidden effects while it is
             touched [m].
-        phantom_from_camera: as `rest.ply` was taken.
-        robot_from_phantom: of the robot's true frame.
+        phantom_from_camera: the camera's pose when `rest.ply` was taken.
+        robot_from_phantom: true pose.
         camera_shift: phantom frame; `camera_shift @ phantom_from_camera` holds in the sequences.
-        disturbances: what no effect of the catalogue expresses; the verdict is then unexplained.
-        begun: by sequence, how far along x and y a block that was not put back lay from its place
-            as it began [m].
-        shortened: by sequence, how far each of its pushes stopped short of its plan because the
-            block gave way [m].
+        shortened: by sequence, how much shallower than planned each push was because the block was
+            unstable [m].
+        disturbances: outside the catalogue of effects; the verdict is then unexplained.
+        begun: by sequence, offset (x, y) of a block that was not put back, at the beginning [m].
     """
 
     effects: tuple[HiddenEffect, ...]
@@ -44,7 +43,7 @@ class Truth:
 
     @property
     def verdict(self) -> str:
-        """What a perfect diagnosis says: found, unexplained or none."""
+        """The verdict of a perfect diagnosis: found, unexplained or none."""
         return "unexplained" if self.disturbances else "found" if self.effects else "none"
 
     def as_dict(self) -> dict[str, Any]:
@@ -72,9 +71,9 @@ class Truth:
         }
 
     def _disturbed(self) -> dict[str, Any]:
-        """Said only where there is something: most truths have no such entry."""
-        found = [_described(one.name, one.parameters, DISTURBANCES) for one in self.disturbances]
-        return {"disturbances": found} if found else {}
+        """The entry of the disturbances; empty without any."""
+        entries = [_described(one.name, one.parameters, DISTURBANCES) for one in self.disturbances]
+        return {"disturbances": entries} if entries else {}
 
     def save(self, path: Path) -> None:
         """Write JSON."""
@@ -82,7 +81,7 @@ class Truth:
 
 
 def truth_path(folder: Path) -> Path:
-    """Where the truth of the dataset in `folder` stands: beside it, never in it."""
+    """Path of the truth of the dataset in `folder`: beside it, never in it."""
     return folder.with_name(folder.name + ".truth.json")
 
 

@@ -1,0 +1,1 @@
+"""Finite elements of the virtual bench: quadratic tetrahedra, independent of `palpate.fem`."""

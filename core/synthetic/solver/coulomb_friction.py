@@ -1,11 +1,10 @@
-"""Coulomb's friction between the virtual tool and the block: from one place of the tool to the next
-the surface slips against it, and what that costs is the energy of an incremental potential (Ortiz
-and Stainier 1999).
+"""Coulomb friction between the virtual tool and the block, as an incremental potential.
 
-Per surface point it is mu p A (sqrt(d^2 + e^2) - e), d the point's tangential way against the tool
-since it was touched, or since the last place; so slip is paid in full, and what sticks creeps by
-about e. Pressure and normals are those of the equilibrium before and are renewed until they stay; e
-is lessened on the way there.
+From one tool position to the next the surface slips against the tool (Ortiz and Stainier 1999). The
+potential per surface point is mu p A (sqrt(d^2 + e^2) - e), with d the tangential way of the point
+against the tool since first contact or since the last position. Slip is dissipated in full, and
+sticking points creep by about e. Pressure p and normals are those of the previous iterate and are
+updated until they converge, while e is reduced.
 """
 
 from __future__ import annotations
@@ -21,28 +20,28 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SolveError
 from palpate.synthetic.solver.mooney_rivlin import spread
 from palpate.synthetic.solver.obstacles import SOFT_GAP
-from palpate.synthetic.solver.tet_block import Block, IntArray
+from palpate.synthetic.solver.tet_block import IntArray, TetBlock
 
-__all__ = ["Dragging", "Rub", "assemble_rub"]
+__all__ = ["CoulombFriction", "FrictionContact", "assemble_friction"]
 
 CREEPS = (1e-4, 3e-5, 1e-5, 4e-6)
-"""e [m], in turn; the last one stays."""
+"""Regularisation length e [m] of each iteration; the last one is kept."""
 _AGREED, _GOOD_ENOUGH, _MOST_TURNS = 0.01, 0.05, 20
-"""Change of what friction holds, over all of it [1], at which pressure and friction agree; the same
-where turns have run out."""
+"""Relative change of the friction limits at which pressure and friction have converged [1], the
+same after the last iteration, and the number of iterations."""
 
 
 @dataclass(frozen=True, eq=False)
-class Rub:
-    """What friction holds while one equilibrium is sought, on those facets of the skin that touch.
+class FrictionContact:
+    """Friction of one iteration, on the facets of the skin that touch the tool.
 
     Attributes:
         facets: (f,) their numbers.
-        owner: (f,) elements.
+        owner: (f,) their elements.
         values: (f, q, 10) shape functions.
         limits: (f, q) mu p A [N].
-        normals: (f, q, 3) from the tool.
-        before: (f, q, 3) from where the way d is counted, seen from the tool's centre [m].
+        normals: (f, q, 3) unit normals away from the tool.
+        before: (f, q, 3) start of the way d, relative to the tool's centre [m].
         creep: e [m].
     """
 
@@ -56,92 +55,103 @@ class Rub:
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
-    """The skin from the tool's centre: places (f, q, 3) [m], depth in the tool (f, q) [m]."""
+class _SkinView:
+    """The skin relative to the tool.
+
+    Attributes:
+        places: (f, q, 3) relative to the tool's centre [m].
+        depth: (f, q) penetration of the tool [m].
+    """
 
     places: FloatArray
     depth: FloatArray
 
 
-class Dragging:
-    """Friction of one tool on one block, from place to place.
+class CoulombFriction:
+    """Friction of one tool on one block, from one tool position to the next.
 
     Args:
+        block: the mesh.
         friction: coefficient [1].
         radius: of the tool [m].
         penalty: of the contact [Pa/m].
     """
 
-    def __init__(self, block: Block, friction: float, radius: float, penalty: float) -> None:
+    def __init__(self, block: TetBlock, friction: float, radius: float, penalty: float) -> None:
         self._block, self._friction, self._radius, self._penalty = block, friction, radius, penalty
-        self._last: _Seen | None = None
+        self._last: _SkinView | None = None
 
-    def leave(self, displacement: FloatArray, centre: FloatArray) -> None:
-        """The step is over: with this displacement (n, 3) and the tool here (3,) [m], seen from the
-        block.
+    def finish_step(self, displacement: FloatArray, centre: FloatArray) -> None:
+        """Store the end of a step: displacement (n, 3) [m] and tool centre (3,) [m] in the block's
+        frame.
         """
-        self._last = self._seen(displacement, centre)
+        self._last = self._skin_view(displacement, centre)
 
-    def found(self, centre: FloatArray, solve: Callable[[Rub | None], FloatArray]) -> None:
-        """Have the equilibrium sought with friction until pressure and friction agree.
+    def solve(
+        self, centre: FloatArray, solve: Callable[[FrictionContact | None], FloatArray]
+    ) -> None:
+        """Solve for the equilibrium until pressure and friction agree; SolveError if they do not.
 
         Args:
-            centre: of the tool (3,) [m].
+            centre: (3,) of the tool [m].
             solve: the displacement (n, 3) [m] under a given friction.
-
-        Raises SolveError where they never do.
         """
         before = self._last
-        # What stuck before sticks first: the tool takes it along.
+        # The first iterate lets sticking points move with the tool.
         seen = (
             before
             if before is not None and (before.depth > 0).any()
-            else self._seen(solve(None), centre)
+            else self._skin_view(solve(None), centre)
         )
-        rub, change, share = self._rub(seen, 0), np.inf, 1.0
+        friction_contact, change, share = self._contact(seen, 0), np.inf, 1.0
         for turn in range(_MOST_TURNS):
-            if rub is None:
+            if friction_contact is None:
                 return
-            seen = self._seen(solve(rub), centre)
-            renewed = self._rub(seen, turn + 1)
-            last, change = change, self._change(rub, renewed)
+            seen = self._skin_view(solve(friction_contact), centre)
+            renewed = self._contact(seen, turn + 1)
+            last, change = change, self._change(friction_contact, renewed)
             if change < _AGREED and turn + 1 >= len(CREEPS):
                 return
-            # Where pressure and friction drive one another to and fro they go only part of the way.
+            # Under-relaxation where pressure and friction oscillate.
             share = (
                 max(0.5 * share, 0.1)
                 if change > last and turn >= len(CREEPS)
                 else min(1.5 * share, 1.0)
             )
-            rub = self._mixed(rub, renewed, share)
+            friction_contact = self._mixed(friction_contact, renewed, share)
         if change > _GOOD_ENOUGH:
-            text = f"friction and pressure of the virtual tool find no agreement: they are {100 * change:.0f} % apart"
-            raise SolveError(text, residual=change)
+            raise SolveError(
+                "friction and pressure of the virtual tool find no agreement: they are "
+                f"{100 * change:.0f} % apart",
+                residual=change,
+            )
 
-    def _mixed(self, old: Rub, new: Rub | None, share: float) -> Rub | None:
-        """The new one, with limits only this share [1] of the way from the old ones'."""
+    def _mixed(
+        self, old: FrictionContact, new: FrictionContact | None, share: float
+    ) -> FrictionContact | None:
+        """The new friction with limits interpolated from the old ones by `share` [1]."""
         if new is None or share == 1.0:
             return new
         limits = np.zeros(self._block.skin.weights.shape)
         limits[old.facets] = old.limits
         return replace(new, limits=share * new.limits + (1 - share) * limits[new.facets])
 
-    def _change(self, before: Rub, now: Rub | None) -> float:
-        """How much of what was held is held otherwise [1]."""
+    def _change(self, before: FrictionContact, now: FrictionContact | None) -> float:
+        """Relative change of the friction limits [1]."""
         limits = np.zeros((2, *self._block.skin.weights.shape))
-        for place, rub in zip(limits, (before, now), strict=True):
-            if rub is not None:
-                place[rub.facets] = rub.limits
+        for place, friction_contact in zip(limits, (before, now), strict=True):
+            if friction_contact is not None:
+                place[friction_contact.facets] = friction_contact.limits
         return float(np.abs(limits[1] - limits[0]).sum() / max(limits[1].sum(), 1e-300))
 
-    def _seen(self, displacement: FloatArray, centre: FloatArray) -> _Seen:
+    def _skin_view(self, displacement: FloatArray, centre: FloatArray) -> _SkinView:
         skin = self._block.skin
         nodes = (self._block.nodes + displacement)[self._block.elements[skin.owner]]
         places = np.einsum("fqa,fai->fqi", skin.values, nodes) - centre
-        return _Seen(places, self._radius - np.linalg.norm(places, axis=2))
+        return _SkinView(places, self._radius - np.linalg.norm(places, axis=2))
 
-    def _rub(self, now: _Seen, turn: int) -> Rub | None:
-        """Of the facets that touch now; None where none does."""
+    def _contact(self, now: _SkinView, turn: int) -> FrictionContact | None:
+        """Friction on the facets that touch now; None without contact."""
         facets = np.flatnonzero((now.depth > 0).any(axis=1))
         if not len(facets):
             return None
@@ -150,14 +160,14 @@ class Dragging:
         pressure = self._penalty * np.where(
             depth < SOFT_GAP, 0.5 * depth**2 / SOFT_GAP, depth - 0.5 * SOFT_GAP
         )
-        # A point that was not touched before is dragged from where it met the tool.
+        # For a new contact point the way d starts where the point met the tool.
         apart = np.maximum(-last.depth[facets], 0.0)
         met = (apart / np.maximum(apart + depth, 1e-12))[..., None]
         before = last.places[facets] + met * (places - last.places[facets])
         normals = places / np.linalg.norm(places, axis=2, keepdims=True)
         limits = self._friction * pressure * skin.weights[facets]
         creep = CREEPS[min(turn, len(CREEPS) - 1)]
-        return Rub(
+        return FrictionContact(
             facets,
             skin.owner[facets],
             np.ascontiguousarray(skin.values[facets]),
@@ -169,7 +179,7 @@ class Dragging:
 
 
 @njit(cache=True, fastmath={"contract", "reassoc", "arcp", "nsz"})
-def assemble_rub(
+def assemble_friction(
     u: Any,
     nodes: Any,
     elements: Any,
@@ -183,12 +193,13 @@ def assemble_rub(
     derivative: bool,
     stiffness: Any,
     force: Any,
-    push: Any,
+    tool_force: Any,
     coupling: Any,
     total: Any,
 ) -> float:
-    """Energy [J] of a `Rub` at displacements u (n, 3) [m]; with `derivative`, adds what
-    `obstacle.assemble_obstacle` adds.
+    """Energy [J] of a `FrictionContact` at displacements u (n, 3) [m].
+
+    With `derivative`, adds to the arrays that `palpate.synthetic.solver.obstacles` documents.
     """
     energy = 0.0
     way = np.empty(3)
@@ -217,7 +228,7 @@ def assemble_rub(
                 continue
             for i in range(3):
                 pull[i] = limit / length * way[i]
-                push[i] -= pull[i]
+                tool_force[i] -= pull[i]
                 for k in range(3):
                     across = (
                         (1.0 if i == k else 0.0) - n[i] * n[k] - way[i] * way[k] / (length * length)

@@ -1,8 +1,9 @@
-"""What strain stiffening adds to the virtual block's law: Gent's limit of stretch, above the part that is there without it.
+"""Strain stiffening of the virtual block: Gent's stretch limit, added to the base law.
 
 W(F) = mu/2 (-J_m ln(1 - x / J_m) - x),   x = J^(-2/3) I1 - 3
 
-The law's own energy stays as it is; this begins with mu x^2 / (4 J_m), as Gent's does over neo-Hooke's, and is infinite at x = J_m.
+The base law is not changed. The added energy begins with mu x^2 / (4 J_m), as Gent's law exceeds
+the neo-Hookean one, and is infinite at x = J_m.
 """
 
 from __future__ import annotations

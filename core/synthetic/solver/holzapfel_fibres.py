@@ -1,10 +1,12 @@
-"""Fibres in the virtual block: along one direction in every point, stiffening with strain as collagen does (Holzapfel et al. 2000).
+"""Fibres in the virtual block along one direction, with exponential stiffening (Holzapfel et al.
+2000).
 
 W(F) = k / (8 c) (exp(c (|F a|^2 - 1)^2) - 1),   a the direction at rest
 
-They resist compression, too, but do not stiffen in it: there W is the limit c = 0, k/8 (|F a|^2 - 1)^2. At small strain k is added
-to the stiffness along a alone, from which Young's moduli along and across follow in closed form; c says how soon they stiffen, by
-which they differ at large strain from those of a replay.
+The fibres also resist compression, without stiffening: there W is the limit c = 0,
+k/8 (|F a|^2 - 1)^2. At small strain k is added to the stiffness along a alone, from which Young's
+moduli along and across follow in closed form. The constant c sets how soon the fibres stiffen; at
+large strain they therefore differ from those of a replay.
 """
 
 from __future__ import annotations
@@ -22,8 +24,7 @@ _FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 
 def fibre_modulus(stiffness_ratio: float, poisson_ratio: float) -> float:
-    """k over E [1] of fibres in a material of this Poisson's ratio whose modulus along is so many
-    times that across.
+    """k over E [1] of fibres that make the modulus along them `stiffness_ratio` times that across.
 
     Stretched along, fibres and matrix add: E_a = E + k. Stretched across, the fibres hinder the
     contraction along them, which turns 1 / E into 1 / E - k nu^2 / (E (E + k)). The ratio of both

@@ -1,15 +1,14 @@
-"""What the virtual block remembers of its past: shear stress that relaxes, and strain that stays.
+"""Internal variables of the virtual block's material: stress relaxation and permanent set.
 
-Relaxation: a share of the shear modulus belongs to chains that flow. Their natural metric A follows
-the inverse of C, the right Cauchy-Green tensor without its part in the volume, A' = (C^-1 - A) /
-tau (Linder, Tkachuk and Miehe 2011): at rest A = C^-1 they are without stress, and in a motion
-faster than tau A stays, so that they are neo-Hookean. Over a step of length t in which C^-1 changes
-evenly, A takes e^(-t/tau) of itself and the rest of C^-1; what it takes of the step's own end has
-no shear stress, and so each step is an equilibrium in a metric that is known before.
+Relaxation: a share of the shear modulus belongs to polymer chains that flow. Their natural metric A
+follows the inverse of C, the isochoric right Cauchy-Green tensor, by A' = (C^-1 - A) / tau (Linder,
+Tkachuk and Miehe 2011). At rest A = C^-1, and the chains carry no stress. In a motion faster than
+tau, A is constant, and the chains are neo-Hookean. Over a step of length t in which C^-1 changes
+linearly, A keeps e^(-t/tau) of itself and takes the rest from C^-1. The part that comes from the
+end of the step carries no shear stress, so each step is an equilibrium in a metric known before.
 
-Permanent set: the natural metric is exp(-2 f M). M is the logarithmic strain where a point was
-strained most; while it is strained further, M goes with it. A step's own M is found by repeating
-its equilibrium.
+Permanent set: the natural metric is exp(-2 f M). M is the logarithmic strain at the largest strain
+that a point has had. The M of a step is found by repeating its equilibrium.
 """
 
 from __future__ import annotations
@@ -21,9 +20,9 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.synthetic.scenario.scenario import Scenario
 from palpate.synthetic.solver.rest_metric import isochoric
-from palpate.synthetic.solver.tet_block import Block
+from palpate.synthetic.solver.tet_block import TetBlock
 
-__all__ = ["Past", "Remembering", "relaxed_share"]
+__all__ = ["InelasticHistory", "InelasticState", "relaxed_share"]
 
 
 def relaxed_share(scenario: Scenario) -> float:
@@ -33,120 +32,133 @@ def relaxed_share(scenario: Scenario) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Past:
-    """What is remembered at an instant [s], at the block's volume points; None for the time of a
-    long rest.
+class InelasticState:
+    """Internal variables at the block's volume points.
 
     Attributes:
-        chains: A (e, q, 3, 3).
-        inverse: C^-1 (e, q, 3, 3).
-        largest: |log strain| (e, q).
-        kept: M (e, q, 3, 3).
-        natural: exp(-2 f M) (e, q, 3, 3).
+        time: [s]; None after a long rest.
+        chains: (e, q, 3, 3) natural metric A of the chains.
+        inverse: (e, q, 3, 3) C^-1.
+        largest: (e, q) largest norm of the logarithmic strain so far.
+        peak_strain: (e, q, 3, 3) M, the logarithmic strain then.
+        natural: (e, q, 3, 3) exp(-2 f M).
     """
 
     time: float | None
     chains: FloatArray
     inverse: FloatArray
     largest: FloatArray
-    kept: FloatArray
+    peak_strain: FloatArray
     natural: FloatArray
 
 
-class Remembering:
-    """The memory of one block: what metric each step has, and what is left after it.
+class InelasticHistory:
+    """The material history of one block.
 
     Attributes:
-        past: after the last step.
+        inelastic_state: after the last step.
+        time_constant: of the relaxation [s]; infinite without.
+        fraction: of the peak strain that stays [1].
     """
 
-    def __init__(self, scenario: Scenario, block: Block) -> None:
-        hidden, kept = scenario.hidden("viscoelasticity"), scenario.hidden("permanent_set")
+    def __init__(self, scenario: Scenario, block: TetBlock) -> None:
+        relaxation, permanent = (
+            scenario.hidden(name) for name in ("viscoelasticity", "permanent_set")
+        )
         self._block = block
         self._share = relaxed_share(scenario)
-        self.time_constant = hidden.value("time_constant") if hidden else np.inf
-        self.fraction = kept.value("retained_fraction") if kept else 0.0
+        self.time_constant = relaxation.value("time_constant") if relaxation else np.inf
+        self.fraction = permanent.value("retained_fraction") if permanent else 0.0
         points = block.weights.shape
         same = np.broadcast_to(np.eye(3), (*points, 3, 3)).copy()
-        self.past = Past(None, same, same, np.zeros(points), np.zeros((*points, 3, 3)), same)
+        self.inelastic_state = InelasticState(
+            None, same, same, np.zeros(points), np.zeros((*points, 3, 3)), same
+        )
 
     @property
-    def delays(self) -> bool:
-        """Whether anything goes on while the tool stands still."""
+    def relaxes(self) -> bool:
+        """Whether stress relaxes while the tool stands still."""
         return self._share > 0
 
     @property
-    def untouched(self) -> bool:
-        """Whether nothing has been done to it yet."""
-        return self.past.time is None
+    def is_initial(self) -> bool:
+        """Whether no step has been made yet."""
+        return self.inelastic_state.time is None
 
     def settle(self, displacement: FloatArray) -> None:
-        """Begin from a block that has long been at rest like this (n, 3) [m]: its sag left
-        nothing."""
+        """Start from a block long at rest with displacement (n, 3) [m]; its sag leaves no set."""
         inverse = np.asarray(
             np.linalg.inv(isochoric(displacement, self._block.elements, self._block.gradients)),
             dtype=float,
         )
-        self.past = replace(self.past, chains=inverse, inverse=inverse)
+        self.inelastic_state = replace(self.inelastic_state, chains=inverse, inverse=inverse)
 
     def metric(self, time: float | None, natural: FloatArray | None = None) -> FloatArray:
-        """G (e, q, 3, 3) of the equilibrium at a time [s] over the shear modulus, beside the law's
-        unrelaxed share of 1 - g.
+        """Metric G (e, q, 3, 3) [1] of the equilibrium at a time [s], over the shear modulus.
 
-        `natural` is the metric that the equilibrium's own set leaves; that of the last step without
-        it.
+        The base law carries the share 1 - g that does not relax.
+
+        Args:
+            time: [s]; None for a long rest.
+            natural: the natural metric at the end of this step; that of the last step without it.
         """
-        past, share = self.past, self._share
-        natural = past.natural if natural is None else natural
-        found = (1 - share) * (natural - np.eye(3))
+        state, share = self.inelastic_state, self._share
+        natural = state.natural if natural is None else natural
+        metric = (1 - share) * (natural - np.eye(3))
         if share and time is not None:
             left, taken = self._shares(time)
             own = (
-                left * past.chains
-                + (taken - left) * past.inverse
-                + taken * (natural - past.natural)
+                left * state.chains
+                + (taken - left) * state.inverse
+                + taken * (natural - state.natural)
             )
-            found = found + share * own
-        return np.asarray(found)
+            metric = metric + share * own
+        return np.asarray(metric)
 
     def _shares(self, time: float) -> tuple[float, float]:
-        """What is left of the chains' metric over the step, and how much of an even change of C^-1
-        they have not followed yet.
+        """Share of the chains' metric that is left after the step [1], and share of a linear change
+        of C^-1 that they have not followed [1].
         """
-        span = 0.0 if self.past.time is None else (time - self.past.time) / self.time_constant
+        span = (
+            0.0
+            if self.inelastic_state.time is None
+            else (time - self.inelastic_state.time) / self.time_constant
+        )
         return float(np.exp(-span)), float(-np.expm1(-span) / span) if span > 0 else 1.0
 
-    def after(self, displacement: FloatArray, time: float | None) -> Past:
-        """What an equilibrium (n, 3) [m] leaves."""
-        past = self.past
+    def after(self, displacement: FloatArray, time: float | None) -> InelasticState:
+        """Internal variables after an equilibrium with displacement (n, 3) [m] at a time [s]."""
+        state = self.inelastic_state
         c = isochoric(displacement, self._block.elements, self._block.gradients)
         inverse = np.asarray(np.linalg.inv(c), dtype=float)
-        largest, kept, natural = self._set(c)
-        chains = past.chains
+        largest, peak_strain, natural = self._set(c)
+        chains = state.chains
         if self._share and time is not None:
             left, taken = self._shares(time)
             chains = (
-                left * past.chains
-                + (1 - left) * past.inverse
-                + (1 - taken) * (inverse - past.inverse)
+                left * state.chains
+                + (1 - left) * state.inverse
+                + (1 - taken) * (inverse - state.inverse)
             )
-            chains = chains + taken * (natural - past.natural)
-        return Past(time, chains, inverse, largest, kept, natural)
+            chains = chains + taken * (natural - state.natural)
+        return InelasticState(time, chains, inverse, largest, peak_strain, natural)
 
     def _set(self, c: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        past = self.past
+        state = self.inelastic_state
         if not self.fraction:
-            return past.largest, past.kept, past.natural
+            return state.largest, state.peak_strain, state.natural
         values, axes = np.linalg.eigh(c)
         logarithms = 0.5 * np.log(values)
         size = np.linalg.norm(logarithms, axis=-1)
-        further = size > past.largest
+        further = size > state.largest
         strain = _along(axes[further], logarithms[further])
-        kept, natural = past.kept.copy(), past.natural.copy()
-        kept[further] += ((size - past.largest)[further] / size[further])[:, None, None] * strain
-        values, axes = np.linalg.eigh(kept[further])
+        peak_strain, natural = state.peak_strain.copy(), state.natural.copy()
+        peak_strain[further] += ((size - state.largest)[further] / size[further])[
+            :, None, None
+        ] * strain
+        values, axes = np.linalg.eigh(peak_strain[further])
         natural[further] = _along(axes, np.exp(-2 * self.fraction * values))
-        return np.maximum(size, past.largest), kept, natural
+        return np.maximum(size, state.largest), peak_strain, natural
 
 
 def _along(axes: FloatArray, values: FloatArray) -> FloatArray:

@@ -1,10 +1,12 @@
-"""Ciarlet's compressible Mooney-Rivlin law on ten-node tetrahedra with a mean dilatation, assembled with numba.
+"""Ciarlet's compressible Mooney-Rivlin law on ten-node tetrahedra with a mean dilatation.
 
-W(F) = c10 (I1 - 3) + c01 (I2 - 3) - (2 c10 + 4 c01) ln J,   plus per element   V U(Jm),   U(J) = l/4 (J^2 - 1 - 2 ln J)
+W(F) = c10 (I1 - 3) + c01 (I2 - 3) - (2 c10 + 4 c01) ln J
 
-with Jm the element's mean of J, which keeps nearly incompressible tetrahedra from locking. At small strain the shear modulus is
-2 (c10 + c01) and Lame's first constant l + 4 c01. A replay that assumes another law with the same E and nu differs from this one at
-large strain only, as it would from a real gel.
+plus per element V U(Jm), U(J) = l/4 (J^2 - 1 - 2 ln J), with Jm the element's mean of J, which
+keeps nearly incompressible tetrahedra from locking. At small strain the shear modulus is
+2 (c10 + c01) and Lame's first constant l + 4 c01. A replay that assumes another law with the same E
+and nu differs from this one at large strain only, as it would from a real gel. The loops are
+compiled by numba.
 """
 
 from __future__ import annotations
@@ -27,14 +29,15 @@ __all__ = [
 ]
 
 SECOND_INVARIANT_SHARE = 0.1
+"""Share of the shear modulus that belongs to the second invariant [1]."""
 _FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 
 def constants(
     young_modulus: FloatArray, poisson_ratio: float, relaxed: float = 0.0
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """c10, c01 and l [Pa] with the given E [Pa] and nu [1] at small strain, once this share of
-    shear [1] has relaxed.
+    """c10, c01 and l [Pa] for E [Pa] and nu [1] at small strain, with a share `relaxed` [1] of the
+    shear modulus removed.
     """
     shear = young_modulus / (2 * (1 + poisson_ratio))
     lame = young_modulus * poisson_ratio / ((1 + poisson_ratio) * (1 - 2 * poisson_ratio))
@@ -64,8 +67,9 @@ def deformation_gradient(u: Any, nodes: Any, g: Any, f: Any) -> float:
 
 @njit(cache=True, fastmath=_FAST)
 def turn_gradients(f: Any, along: Any, g: Any, fa: Any, ha: Any) -> None:
-    """Put F `along` into fa and F^-T g into ha, with F = f (3, 3); all others (10, 3), g the shape
-    gradients [1/m].
+    """Write F `along` to fa and F^-T g to ha, with F = f (3, 3).
+
+    All others are (10, 3); g holds the shape gradients [1/m].
     """
     inverse = np.linalg.inv(f)
     for a in range(10):
@@ -78,11 +82,11 @@ def turn_gradients(f: Any, along: Any, g: Any, fa: Any, ha: Any) -> None:
 def spread(
     shares: Any, nodes: Any, pull: Any, t: Any, stiffness: Any, force: Any, coupling: Any
 ) -> None:
-    """Add what holds a surface point to its nodes (10,) by their shares (10,).
+    """Distribute the force on a surface point to its nodes (10,) by their shape values (10,).
 
-    The force on them is `pull` (3,) [N], its slope t (3, 3) [N/m]. Of the element stiffness (10,
-    10, 3, 3) only upper node pairs are filled; force (n, 3) and coupling (n, 3, 3) are those of all
-    nodes.
+    The force is `pull` (3,) [N], its derivative t (3, 3) [N/m]. Only upper node pairs of the
+    element stiffness (10, 10, 3, 3) are filled; force (n, 3) and coupling (n, 3, 3) are those of
+    all nodes.
     """
     for a in range(10):
         share = shares[a]
@@ -102,9 +106,7 @@ def spread(
 def solid_energy(
     u: Any, elements: Any, gradients: Any, weights: Any, c10: Any, c01: Any, lame: Any
 ) -> float:
-    """Stored energy [J] of displacements u (n, 3) [m]; infinite where an element is turned inside
-    out.
-    """
+    """Stored energy [J] of displacements u (n, 3) [m]; infinite where an element is inverted."""
     f = np.empty((3, 3))
     total = 0.0
     for e in range(elements.shape[0]):
@@ -139,8 +141,8 @@ def _add_stiffness(
     pressed: float,
     turned: float,
 ) -> None:
-    """Add what one point of an element has, with the factors of its four kinds of terms [Pa m^3],
-    to (10, 10, 3, 3) [N/m].
+    """Add one volume point to the element stiffness (10, 10, 3, 3) [N/m]; the four last arguments
+    are the factors of its kinds of terms [Pa m^3].
     """
     for m in range(10):
         for n in range(m, 10):
@@ -177,12 +179,9 @@ def assemble_solid(
     points = weights.shape[1]
     fs = np.empty((points, 3, 3))
     dets = np.empty(points)
-    fa = np.empty((10, 3))
-    ha = np.empty((10, 3))
-    mean_gradient = np.empty((10, 3))
+    fa, ha, mean_gradient = np.empty((10, 3)), np.empty((10, 3)), np.empty((10, 3))
     for e in range(elements.shape[0]):
-        volume = 0.0
-        mean = 0.0
+        volume = mean = 0.0
         for q in range(points):
             dets[q] = deformation_gradient(u, elements[e], gradients[e, q], fs[q])
             volume += weights[e, q]
@@ -191,9 +190,7 @@ def assemble_solid(
         pressure = 0.5 * lame[e] * (mean - 1 / mean)
         mean_gradient[:] = 0.0
         for q in range(points):
-            f = fs[q]
-            det = dets[q]
-            w = weights[e, q]
+            f, det, w = fs[q], dets[q], weights[e, q]
             a10 = 2 * c10[e, q]
             a01 = 2 * c01[e, q]
             d = a10 + 2 * a01

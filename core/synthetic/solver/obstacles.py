@@ -1,6 +1,4 @@
-"""What the virtual block cannot go through, or only against a pressure: the ball, its shaft, the
-table, a body beside it.
-"""
+"""Obstacles in contact with the virtual block: ball, shaft, table and a neighbouring body."""
 
 from __future__ import annotations
 
@@ -12,24 +10,30 @@ from numba import njit
 
 from palpate.foundation.arrays import FloatArray
 from palpate.synthetic.solver.mooney_rivlin import spread
-from palpate.synthetic.solver.tet_block import Block, Sampling
+from palpate.synthetic.solver.tet_block import Sampling, TetBlock
 
 __all__ = ["SOFT_GAP", "Neighbour", "Obstacle", "Shaft", "assemble_obstacle", "shaft_radius"]
 
 SOFT_GAP = 0.03e-3
+"""Depth over which the contact pressure sets in quadratically [m]."""
 CAUTIOUS_GAP = 0.02
+"""Depth over the radius beyond which a `cautious` stiffness leaves out the curvature term [1]."""
 _FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 
 def shaft_radius(ball: float) -> float:
-    """Of the rod on which a ball of this radius sits [m]."""
+    """Radius of the shaft of a ball of this radius [m]."""
     return min(3e-3, 0.8 * ball)
 
 
 @dataclass(frozen=True)
 class Shaft:
-    """A rod that the ball sits on: `away` (3,) unit vector from the ball along it, its `radius` and
-    `length` [m].
+    """The rod that holds the ball.
+
+    Attributes:
+        away: (3,) unit vector from the ball along the rod.
+        radius: [m].
+        length: [m].
     """
 
     away: FloatArray
@@ -39,15 +43,15 @@ class Shaft:
 
 @dataclass(frozen=True)
 class Obstacle:
-    """One of them.
+    """A ball, a shaft or a plane that presses on points of the block.
 
     Attributes:
         sampling: the points on which it acts.
-        centre: of a ball, where a shaft begins, or on a plane (3,) [m].
-        along: (3,) the way of the shaft [m], zero for a ball; normal of a plane, towards the block.
+        centre: (3,) centre of a ball, start of a shaft, or a point of a plane [m].
+        along: (3,) axis of a shaft [m], zero for a ball; normal of a plane, towards the block.
         radius: [m]; 0 for a plane.
         penalty: pressure per depth [Pa/m].
-        of_tool: whether its push is the tool's.
+        of_tool: whether its force belongs to the tool.
     """
 
     sampling: Sampling
@@ -60,14 +64,13 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Neighbour:
-    """A soft body that lies against a face of the block, and gives way like a bed of springs
-    without friction.
+    """A soft body against a face of the block: a bed of springs without friction.
 
     Attributes:
         axis: of the face's normal.
         sign: of its side.
-        overlap: how far it would stand in the block [m].
-        stiffness: pressure per way that it is pushed back [Pa/m].
+        overlap: penetration of the block by the undeformed body [m].
+        stiffness: pressure per displacement of the springs [Pa/m].
     """
 
     axis: int
@@ -75,8 +78,8 @@ class Neighbour:
     overlap: float
     stiffness: float
 
-    def against(self, block: Block) -> Obstacle:
-        """It, pressing on the points of that face."""
+    def against(self, block: TetBlock) -> Obstacle:
+        """The obstacle that presses on the points of that face."""
         skin = block.skin
         places = np.einsum("fqa,fai->fqi", skin.values, block.nodes[block.elements[skin.owner]])
         far = self.sign * places[..., self.axis]
@@ -94,10 +97,10 @@ class Neighbour:
 
 @njit(cache=True, fastmath=_FAST)
 def _depth(x: Any, centre: Any, along: Any, radius: float, n: Any) -> tuple[float, float, bool]:
-    """How deep a point x (3,) is in it [m], its distance from centre or axis [m], and whether it is
-    beside the shaft's length.
+    """Penetration of an obstacle by a point x (3,); fills the normal n (3,) where it is positive.
 
-    Fills the normal n (3,) where it is in it.
+    Returns:
+        depth [m], distance from centre or axis [m], and whether the point is beside the shaft.
     """
     reach = along[0] ** 2 + along[1] ** 2 + along[2] ** 2
     ahead = 0.0
@@ -136,21 +139,23 @@ def assemble_obstacle(
     derivative: bool,
     stiffness: Any,
     force: Any,
-    push: Any,
+    tool_force: Any,
     coupling: Any,
     total: Any,
 ) -> tuple[float, float]:
-    """An `Obstacle` pressing on surface points; frictionless penalty [Pa/m].
+    """Assemble an `Obstacle` that presses on surface points; frictionless penalty [Pa/m].
 
-    The pressure sets in quadratically over SOFT_GAP: a kink there makes Newton jump between sets of
-    touching points.
+    The pressure sets in quadratically over SOFT_GAP, because a kink makes Newton's method jump
+    between sets of contact points. Where the block slides along a sphere, the direction of the
+    pressure changes, and the stiffness can be negative. A `cautious` stiffness leaves that term out
+    where the pressure is high.
 
-    Where the pressure turns as the block slides along a sphere, the stiffness can be negative; a
-    `cautious` one leaves that part out where the pressure is high.
+    With `derivative`, adds to element stiffness (e, 10, 10, 3, 3) [N/m], nodal force (n, 3) [N],
+    tool_force (3,) on the block [N], coupling (n, 3, 3) = -d force / d centre [N/m], and total
+    (3, 3), its sum.
 
-    Adds to element stiffness, nodal force, push (3,) the force on the block [N], coupling (n, 3, 3)
-    = -d force / d centre, and total (3, 3) its sum, where `derivative`; returns energy [J] and
-    deepest penetration [m].
+    Returns:
+        energy [J] and deepest penetration [m].
     """
     energy = 0.0
     deepest = 0.0
@@ -187,12 +192,11 @@ def assemble_obstacle(
                 if radius > 0 and (gap < CAUTIOUS_GAP * radius or not cautious)
                 else 0.0
             )
-            straight = (
-                bend / (reach * reach) if beside else 0.0
-            )  # along its axis a shaft does not turn the pressure
+            # Along its axis a shaft does not change the direction of the pressure.
+            straight = bend / (reach * reach) if beside else 0.0
             for i in range(3):
                 pull[i] = -pressure * n[i]
-                push[i] -= pull[i]
+                tool_force[i] -= pull[i]
                 for k in range(3):
                     t[i, k] = (
                         (slope + bend) * n[i] * n[k]

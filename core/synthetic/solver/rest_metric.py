@@ -1,11 +1,9 @@
-"""What a material's past adds to the virtual block's law: its shape at rest, point by point, is
-another than the stated one.
+"""Energy of a changed rest metric, which a material with a history adds to the base law.
 
 W(F) = w/2 (J^(-2/3) G : F'F - tr G)
 
-with a symmetric G (1 at rest) that stays as it is while an equilibrium is sought: the natural
-metric of the points that remember. Its stress has no pressure, whatever G is; with G = 1 it is
-neo-Hooke's.
+with a symmetric natural metric G (1 at rest) that is constant during an equilibrium. The stress is
+deviatoric for any G; with G = 1 the law is neo-Hookean.
 """
 
 from __future__ import annotations

@@ -1,6 +1,4 @@
-"""A tool whose shaft gives way: where its centre truly comes to rest, by Newton's method on the
-three numbers of its place.
-"""
+"""A tool on a compliant shaft: its equilibrium position by Newton's method."""
 
 from __future__ import annotations
 
@@ -11,36 +9,43 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SolveError
-from palpate.synthetic.solver.tet_equilibrium import State
+from palpate.synthetic.solver.tet_equilibrium import TetState
 
-__all__ = ["give_way"]
+__all__ = ["solve_compliant_shaft"]
 
 PLACED = 1e-7
+"""Residual of the tool's position at which Newton's method has converged [m]."""
 MOST = 25
+"""Largest number of Newton steps."""
 LONGEST = 1.5e-3
+"""Longest Newton step [m]."""
 
 
-def give_way(
-    stated: FloatArray, softness: float, place: FloatArray, solve: Callable[[FloatArray], State]
-) -> State:
-    """The state whose centre is `stated` plus softness times the force on the tool; it answers to a
-    motion of the stated centre.
+def solve_compliant_shaft(
+    stated: FloatArray, softness: float, place: FloatArray, solve: Callable[[FloatArray], TetState]
+) -> TetState:
+    """Solve for the state whose tool centre is `stated` plus softness times the force on the tool.
+
+    Its stiffness is that against a motion of the stated centre. Raises SolveError without
+    convergence.
 
     Args:
-        stated: (3,) [m].
+        stated: (3,) centre of the unloaded tool [m].
         softness: C [m/N].
-        place: (3,) to begin from [m].
-        solve: the state with the tool held at a place.
-
-    Raises SolveError where no such place is found.
+        place: (3,) start of the iteration [m].
+        solve: the state with the tool held at a position (3,) [m].
     """
     for _ in range(MOST):
         state = solve(place)
-        miss = stated - softness * state.push - place
-        slope = np.eye(3) + softness * state.compliance
+        miss = stated - softness * state.tool_force - place
+        slope = np.eye(3) + softness * state.contact_stiffness
         if np.linalg.norm(miss) < PLACED:
-            return replace(state, compliance=state.compliance @ np.linalg.inv(slope))
+            return replace(state, contact_stiffness=state.contact_stiffness @ np.linalg.inv(slope))
         step = np.linalg.solve(slope, miss)
         place = place + step * min(1.0, LONGEST / float(np.linalg.norm(step)))
-    text = f"the tool finds no rest on its shaft: it stands {np.linalg.norm(miss) * 1e3:.2g} mm from where its load would put it"
-    raise SolveError(text, residual=float(np.linalg.norm(miss)))
+    left = float(np.linalg.norm(miss))
+    raise SolveError(
+        f"the tool finds no rest on its shaft: it stands {left * 1e3:.2g} mm from where its load "
+        "would put it",
+        residual=left,
+    )

@@ -1,4 +1,4 @@
-"""What a virtual block really is, and what besides the ball touches it."""
+"""The true material and supports of a virtual block."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 from palpate.foundation.arrays import FloatArray
 from palpate.synthetic.solver.obstacles import Neighbour, Shaft
 
-__all__ = ["Solid"]
+__all__ = ["SolidModel"]
 
 
 @dataclass(frozen=True)
-class Solid:
-    """What the block really is.
+class SolidModel:
+    """True properties of the block.
 
     Attributes:
         young_modulus: (e, 4) at the volume points [Pa].
@@ -22,14 +22,14 @@ class Solid:
         held: (n,) bool, nodes that do not move.
         tool_radius: [m].
         lifts: whether some of the base may lift off the table.
-        stretch_limit: J_m of Gent's law [1]; None for a material without.
-        fibres: (3,) unit vector along them; None for a material without.
-        fibre_modulus: theirs over Young's modulus [1].
-        springs: (f, q) per area, in all directions, at the points of the sole [N/m^3]; None for a
-            base without.
+        stretch_limit: J_m of Gent's law [1]; None without.
+        fibres: (3,) unit vector along the fibres; None without.
+        fibre_modulus: of the fibres over Young's modulus [1].
+        springs: (f, q) stiffness per area, in all directions, at the points of the sole [N/m^3];
+            None without.
         relaxed: share of the shear modulus that has relaxed after a long rest [1].
-        shaft: what of the tool may touch the block beside the ball; None where nothing does.
-        neighbour: what lies against a face; None of none.
+        shaft: the part of the tool beside the ball that may touch the block; None without.
+        neighbour: a body against a face; None without.
     """
 
     young_modulus: FloatArray

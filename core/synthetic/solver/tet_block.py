@@ -1,6 +1,4 @@
-"""The block as quadratic tetrahedra, graded towards where it is touched. Mesh, elements and
-quadrature are scikit-fem's.
-"""
+"""The block as quadratic tetrahedra, graded towards the contact, by scikit-fem."""
 
 from __future__ import annotations
 
@@ -15,7 +13,15 @@ from scipy import sparse
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import MeshError
 
-__all__ = ["Block", "Grading", "Sampling", "block_of", "mesh_block", "refined_to", "shape_values"]
+__all__ = [
+    "Sampling",
+    "TetBlock",
+    "TetGrading",
+    "mesh_block",
+    "refine_mesh",
+    "shape_values",
+    "tet_block_from_mesh",
+]
 
 IntArray = np.ndarray[Any, np.dtype[np.int64]]
 SEAM = 2.5e-3
@@ -24,19 +30,18 @@ _PAIRS = [(a, b) for a in range(4) for b in range(a)]
 
 
 @dataclass(frozen=True)
-class Grading:
-    """How large an element may be: its longest edge is at most `coarse`, and `fine + growth *
-    distance` from each of `points`.
+class TetGrading:
+    """Longest edges of elements: at most `fine + growth * distance` from each of `points`.
 
     Attributes:
-        points: (n, 3) where the grid is fine, phantom frame [m].
-        reach: (n,) [m] distance from each point up to which `fine` holds.
+        points: (n, 3) where the mesh is fine, phantom frame [m].
+        reach: (n,) distance from each point up to which `fine` holds [m].
         fine: (n,) longest edge there [m].
         coarse: longest edge anywhere [m].
         growth: longest edge per distance [1].
         levels: heights between two materials, which no element crosses [m].
-        seams: axis (0 or 1) and place [m] of lines on the base that no element crosses, and where
-            it is `SEAM` at most.
+        seams: axis (0 or 1) and position [m] of lines on the base that no element crosses, with
+            edges of at most `SEAM` there.
     """
 
     points: FloatArray
@@ -62,7 +67,7 @@ class Grading:
 
 @dataclass(frozen=True)
 class Sampling:
-    """Points on the surface that something acts on.
+    """Quadrature points on the surface.
 
     Attributes:
         owner: (f,) element of each facet.
@@ -76,7 +81,7 @@ class Sampling:
 
 
 @dataclass(frozen=True)
-class Block:
+class TetBlock:
     """Quadratic tetrahedra of one block, phantom frame.
 
     Attributes:
@@ -107,17 +112,18 @@ class Block:
     surface_faces: IntArray
 
 
-def mesh_block(size: tuple[float, float, float], grading: Grading) -> Block:
-    """Fill the block with tetrahedra that are as small as `grading` asks; raises MeshError beyond
-    60 000 elements.
-    """
+def mesh_block(size: tuple[float, float, float], grading: TetGrading) -> TetBlock:
+    """Mesh the block with tetrahedra as small as `grading` demands; MeshError beyond 60 000."""
     logging.getLogger("skfem").setLevel(logging.ERROR)
-    return block_of(_refined(size, grading))
+    return tet_block_from_mesh(_refined(size, grading))
 
 
-def block_of(mesh: Any, mapping: Any = None) -> Block:
-    """A body that stands on z = 0 from scikit-fem's mesh of its tetrahedra, and another mapping of
-    these than usual.
+def tet_block_from_mesh(mesh: Any, mapping: Any = None) -> TetBlock:
+    """A body that stands on z = 0 from scikit-fem's mesh of its tetrahedra.
+
+    Args:
+        mesh: scikit-fem's.
+        mapping: scikit-fem's mapping of the elements; its default without it.
     """
     from skfem import Basis, ElementTetP2, FacetBasis
 
@@ -133,7 +139,7 @@ def block_of(mesh: Any, mapping: Any = None) -> Block:
     elements = np.ascontiguousarray(basis.element_dofs.T).astype(np.int64)
     surface = _operator(drawn, elements, len(nodes))
     offsets = np.arange(len(skin))[:, None, None] * lattice.shape[1]
-    return Block(
+    return TetBlock(
         nodes=nodes,
         elements=elements,
         gradients=np.ascontiguousarray(
@@ -154,7 +160,7 @@ def block_of(mesh: Any, mapping: Any = None) -> Block:
     )
 
 
-def _refined(size: tuple[float, float, float], grading: Grading) -> Any:
+def _refined(size: tuple[float, float, float], grading: TetGrading) -> Any:
     from skfem import MeshTet
 
     cells = np.maximum(np.ceil(np.array(size) / grading.coarse).astype(int), 2)
@@ -162,11 +168,13 @@ def _refined(size: tuple[float, float, float], grading: Grading) -> Any:
         _cells(length, int(count), [place for own, place in grading.seams if own == axis])
         for axis, (length, count) in enumerate(zip(size[:2], cells[:2], strict=True))
     )
-    return refined_to(MeshTet.init_tensor(x, y, _heights(size[2], int(cells[2]), grading)), grading)
+    return refine_mesh(
+        MeshTet.init_tensor(x, y, _heights(size[2], int(cells[2]), grading)), grading
+    )
 
 
 def _cells(length: float, count: int, seams: list[float]) -> FloatArray:
-    """Where cells begin and end before they are refined (k,) [m], symmetric but for the seams."""
+    """Boundaries of cells before refinement (k,) [m], symmetric but for the seams."""
     if not seams:
         return np.linspace(0.0, length, count + 1) - length / 2
     ends = [-length / 2, *sorted(seams), length / 2]
@@ -177,9 +185,9 @@ def _cells(length: float, count: int, seams: list[float]) -> FloatArray:
     return np.unique(np.concatenate(parts))
 
 
-def refined_to(mesh: Any, grading: Grading) -> Any:
-    """Scikit-fem's tetrahedra, halved until they are as small as `grading` asks; raises MeshError
-    beyond 60 000.
+def refine_mesh(mesh: Any, grading: TetGrading) -> Any:
+    """Halve scikit-fem's tetrahedra until they are as small as `grading` demands; MeshError beyond
+    60 000.
     """
     for _ in range(40):
         corners = mesh.p[:, mesh.t]
@@ -193,12 +201,13 @@ def refined_to(mesh: Any, grading: Grading) -> Any:
             break
         mesh = mesh.refined(large)
     raise MeshError(
-        f"{mesh.t.shape[1]} elements do not reach edges of {grading.fine.min() * 1e3:.2g} mm; ask for a coarser grid"
+        f"{mesh.t.shape[1]} elements do not reach edges of {grading.fine.min() * 1e3:.2g} mm; "
+        "choose a coarser grid"
     )
 
 
-def _heights(height: float, count: int, grading: Grading) -> FloatArray:
-    """Where layers of elements begin and end before they are refined (k,) [m]."""
+def _heights(height: float, count: int, grading: TetGrading) -> FloatArray:
+    """Boundaries of element layers before refinement (k,) [m]."""
     if not grading.levels:
         return np.linspace(0.0, height, count + 1)
     ends = [0.0, *sorted(grading.levels), height]
@@ -244,7 +253,7 @@ def _lattice(divisions: int) -> tuple[FloatArray, IntArray]:
 
 
 def shape_values() -> FloatArray:
-    """(4, 10) shape functions of the ten-node tetrahedron at its four volume points, scikit-fem's
+    """Shape functions (4, 10) of the ten-node tetrahedron at its volume points, in scikit-fem's
     order.
     """
     from skfem import ElementTetP2

@@ -1,5 +1,6 @@
-"""Equilibria of the block under a rigid sphere that is moved by position: Newton with line search,
-and steps split where needed.
+"""Equilibria of the block under a rigid sphere of prescribed position.
+
+Newton's method with a line search; load steps are split where it does not converge.
 """
 
 from __future__ import annotations
@@ -10,20 +11,19 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SolveError
-from palpate.synthetic.solver.coulomb_friction import Rub, assemble_rub
-from palpate.synthetic.solver.gent_limit import assemble_stiffening, stiffening_energy
-from palpate.synthetic.solver.holzapfel_fibres import assemble_fibres, fibre_energy
-from palpate.synthetic.solver.mooney_rivlin import assemble_solid, constants, solid_energy
+from palpate.synthetic.solver.coulomb_friction import FrictionContact, assemble_friction
+from palpate.synthetic.solver.elastic_body import ElasticBody
 from palpate.synthetic.solver.obstacles import Obstacle, assemble_obstacle
-from palpate.synthetic.solver.rest_metric import assemble_metric, metric_energy
-from palpate.synthetic.solver.solid_model import Solid
-from palpate.synthetic.solver.tet_block import Block, shape_values
-from palpate.synthetic.solver.tet_system import System
+from palpate.synthetic.solver.solid_model import SolidModel
+from palpate.synthetic.solver.tet_block import TetBlock
+from palpate.synthetic.solver.tet_system import TetSystem
 
-__all__ = ["Equilibrium", "GivesWay", "State"]
+__all__ = ["InstabilityError", "TetSolver", "TetState"]
 
 PENALTY_OVER_E = 4.5e4
+"""Contact penalty over Young's modulus [1/m]."""
 SOFTER = 1 / 12
+"""Penalty of the softer contact over the normal one [1]."""
 _UNUSED = (
     np.zeros((1, 10, 10, 3, 3)),
     np.zeros((1, 3)),
@@ -34,56 +34,58 @@ _UNUSED = (
 _NOWHERE = np.array([0.0, 0.0, 10.0])
 
 
-class GivesWay(SolveError):
-    """The block is about to jump: where Newton's method ended, its energy was not convex."""
+class InstabilityError(SolveError):
+    """The block is unstable: the energy was not convex where Newton's method ended."""
 
 
 @dataclass(frozen=True)
-class State:
+class TetState:
     """One equilibrium.
 
     Attributes:
         displacement: (n, 3) [m].
         centre: (3,) of the tool [m].
-        push: (3,) force of the tool on the block [N].
-        compliance: (3, 3) d push / d centre with everything else in equilibrium [N/m].
+        tool_force: (3,) force of the tool on the block [N].
+        contact_stiffness: (3, 3) d tool_force / d centre with all else in equilibrium [N/m].
         penetration: the deepest surface point inside the tool [m].
     """
 
     displacement: FloatArray
     centre: FloatArray
-    push: FloatArray
-    compliance: FloatArray
+    tool_force: FloatArray
+    contact_stiffness: FloatArray
     penetration: float
 
 
-class Equilibrium:
-    """Solves one block for one tool position after the other, starting each from the last.
+class TetSolver:
+    """Solves one block for one tool position after another, each from the previous one.
 
     Attributes:
-        metric: (e, q, 3, 3) of what the material remembers
-            (`palpate.synthetic.solver.rest_metric`), over its shear modulus; None of none.
-        rub: friction of the tool; None without.
+        block: the mesh.
+        solid: material and supports.
+        body: its elastic energy.
+        modulus: median of Young's modulus [Pa].
+        hardest: penalty of the contact [Pa/m].
+        metric: (e, q, 3, 3) natural metric over the shear modulus, of a material with a history
+            (`palpate.synthetic.solver.rest_metric`); None without.
+        friction_contact: friction of the tool; None without.
+        rest: the equilibrium without the tool.
+        iterations: Newton steps so far.
     """
 
-    def __init__(self, block: Block, solid: Solid) -> None:
+    def __init__(self, block: TetBlock, solid: SolidModel) -> None:
         self.block = block
         self.solid = solid
         self.modulus = float(np.median(solid.young_modulus))
         self.metric: FloatArray | None = None
-        self.rub: Rub | None = None
+        self.friction_contact: FrictionContact | None = None
         self.hardest = PENALTY_OVER_E * float(np.sqrt(self.modulus * solid.young_modulus.max()))
-        self._constants = self._elastic()
-        self._shear = 2 * (self._constants[0] + self._constants[1])
-        self._whole = self._shear / (1 - solid.relaxed)
-        self._sole = block.elements[block.sole.owner]
+        self.body = ElasticBody(block, solid)
         free = np.full(len(block.nodes), -1, dtype=np.int64)
         self._free = np.nonzero(~solid.held)[0]
         free[self._free] = np.arange(len(self._free))
-        self._system = System(block.elements, free)
+        self._system = TetSystem(block.elements, free)
         self._stiffness = np.zeros((len(block.elements), 10, 10, 3, 3))
-        self._load = self._own_weight()
-        self._springs = self._under_base()
         self._beside = None if solid.neighbour is None else solid.neighbour.against(block)
         self._tolerance = 1e-4 * self.modulus * solid.tool_radius**2
         self.iterations = 0
@@ -91,36 +93,18 @@ class Equilibrium:
         self._cautious = False
         self.rest = self._advance(np.zeros_like(block.nodes), _NOWHERE, 0)
 
-    def _elastic(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        c10, c01, lame = constants(
-            self.solid.young_modulus, self.solid.poisson_ratio, self.solid.relaxed
-        )
-        return c10, c01, np.average(lame, axis=1, weights=self.block.weights)
+    def state(
+        self, centre: FloatArray, start: TetState, guess: FloatArray | None = None
+    ) -> TetState:
+        """The equilibrium with the tool's centre at `centre` (3,) [m].
 
-    def _own_weight(self) -> FloatArray:
-        load = np.zeros_like(self.block.nodes)
-        bary = shape_values()
-        nodal = np.einsum("eq,qa->ea", self.block.weights, bary)
-        np.add.at(load[:, 2], self.block.elements, -self.solid.weight * nodal)
-        return load
+        Where Newton's method does not converge, it is repeated through a softer contact, and then
+        in smaller steps from `start`.
 
-    def _under_base(self) -> FloatArray:
-        """Stiffness (f, 10, 10) [N/m] of the springs under the facets of the sole, the same in all
-        directions.
-        """
-        sole, springs = self.block.sole, self.solid.springs
-        if springs is None:
-            return np.zeros((0, 10, 10))
-        return np.asarray(
-            np.einsum("fq,fqa,fqb->fab", springs * sole.weights, sole.values, sole.values)
-        )
-
-    def state(self, centre: FloatArray, start: State, guess: FloatArray | None = None) -> State:
-        """The equilibrium with the tool's centre at `centre` [m], from `start` or a nearer `guess`
-        of the displacement (n, 3) [m].
-
-        Where Newton does not get there, it goes through a softer contact, and then in smaller steps
-        from `start`.
+        Args:
+            centre: (3,) [m].
+            start: an equilibrium near by.
+            guess: (n, 3) initial displacement [m]; that of `start` without it.
         """
         displacement = start.displacement if guess is None else guess
         try:
@@ -138,7 +122,7 @@ class Equilibrium:
         centre: FloatArray,
         depth: int,
         before: FloatArray | None = None,
-    ) -> State:
+    ) -> TetState:
         try:
             return self._newton(displacement, centre)
         except SolveError:
@@ -149,19 +133,19 @@ class Equilibrium:
 
     def _newton(
         self, displacement: FloatArray, centre: FloatArray, limit: int = 14, softness: float = 1.0
-    ) -> State:
+    ) -> TetState:
         self._penalty = softness * self.hardest
         u = displacement.copy()
         energy = norm = np.inf
         convex = True
         for iteration in range(limit + 1):
-            energy, force, push, coupling, total, deepest = self._assemble(u, centre)
+            energy, force, tool_force, coupling, total, deepest = self._assemble(u, centre)
             if not np.isfinite(energy):
                 break
             residual = -force[self._free].ravel()
             norm = float(np.linalg.norm(residual))
             if norm < self._tolerance * (1.0 if softness == 1.0 else 30.0):
-                return self._converged(u, centre, push, coupling, total, deepest, iteration)
+                return self._converged(u, centre, tool_force, coupling, total, deepest, iteration)
             if iteration == limit:
                 break
             self.iterations += 1
@@ -174,15 +158,17 @@ class Equilibrium:
             if length == 0.0:
                 break
             u += length * step
-        raise (SolveError if convex else GivesWay)(
-            f"no equilibrium of the virtual block with the tool at {np.round(centre * 1e3, 2)} mm: residual {norm:.2g} N; "
-            "use a finer grid or a shallower push",
+        raise (SolveError if convex else InstabilityError)(
+            f"no equilibrium of the virtual block with the tool at {np.round(centre * 1e3, 2)} mm: "
+            f"residual {norm:.2g} N; use a finer grid or a shallower push",
             residual=norm,
         )
 
     def _factorise(self, u: FloatArray, centre: FloatArray) -> bool:
-        """Factor the tangent of `_assemble`, or the cautious one where the energy is not convex;
-        returns whether it is.
+        """Factor the assembled tangent, or the cautious one where the energy is not convex.
+
+        Returns:
+            whether the energy is convex.
         """
         self._system.factorise(self._stiffness)
         if not self._system.negative:
@@ -197,24 +183,24 @@ class Equilibrium:
         self,
         u: FloatArray,
         centre: FloatArray,
-        push: FloatArray,
+        tool_force: FloatArray,
         coupling: FloatArray,
         total: FloatArray,
         deepest: float,
         iteration: int,
-    ) -> State:
-        compliance = np.zeros((3, 3))
+    ) -> TetState:
+        contact_stiffness = np.zeros((3, 3))
         if np.any(total):
             if iteration == 0:
                 self._system.factorise(self._stiffness)
             right = coupling[self._free].reshape(-1, 3)
-            compliance = total - right.T @ self._system.solve(right)
-        return State(u, centre, push, compliance, deepest)
+            contact_stiffness = total - right.T @ self._system.solve(right)
+        return TetState(u, centre, tool_force, contact_stiffness, deepest)
 
     def _search(
         self, u: FloatArray, step: FloatArray, centre: FloatArray, energy: float, slope: float
     ) -> float:
-        """How much of the step to take: none where even a small part does not lower the energy."""
+        """Length of the step by backtracking [1]; zero where no part of it lowers the energy."""
         length = 1.0
         for _ in range(8):
             trial = self._energy(u + length * step, centre)
@@ -224,76 +210,42 @@ class Equilibrium:
         return 0.0
 
     def _energy(self, u: FloatArray, centre: FloatArray) -> float:
-        energy = self._stored(u)
+        energy = self.body.energy(u, self.metric)
         if np.isfinite(energy):
             for one in self._obstacles(centre):
                 energy += self._press(u, one, False, _UNUSED)[0]
-            energy += self._rubbed(u, centre, False, _UNUSED)
-        return energy - float(np.sum(self._load * u))
+            energy += self._add_friction(u, centre, False, _UNUSED)
+        return energy - float(np.sum(self.body.load * u))
 
     def _assemble(
         self, u: FloatArray, centre: FloatArray
     ) -> tuple[float, FloatArray, FloatArray, FloatArray, FloatArray, float]:
-        force = -self._load
+        force = -self.body.load
         self._stiffness[:] = 0.0
-        energy = self._stored(u)
-        push, coupling, total, deepest = (
+        energy = self.body.energy(u, self.metric)
+        tool_force, coupling, total, deepest = (
             np.zeros(3),
             np.zeros((len(u), 3, 3)),
             np.zeros((3, 3)),
             0.0,
         )
         if np.isfinite(energy):
-            self._resist(u, force)
+            self.body.assemble(u, self.metric, self._stiffness, force)
             for one in self._obstacles(centre):
                 of_tool = (
-                    (push, coupling, total)
+                    (tool_force, coupling, total)
                     if one.of_tool
                     else (np.zeros(3), np.zeros_like(coupling), np.zeros((3, 3)))
                 )
                 part, depth = self._press(u, one, True, (self._stiffness, force, *of_tool))
                 energy += part
-                # What a soft body gives way by is no penetration.
+                # The deformation of a soft neighbour is no penetration.
                 deepest = max(deepest, depth) if one.penalty == self._penalty else deepest
-            energy += self._rubbed(u, centre, True, (self._stiffness, force, push, coupling, total))
-        return energy - float(np.sum(self._load * u)), force, push, coupling, total, deepest
-
-    def _stored(self, u: FloatArray) -> float:
-        """Energy [J] of the block and of the springs under it."""
-        solid, grid = self.solid, (u, self.block.elements, self.block.gradients, self.block.weights)
-        energy = float(solid_energy(*grid, *self._constants))
-        if solid.stretch_limit is not None and np.isfinite(energy):
-            energy += stiffening_energy(*grid, self._shear, solid.stretch_limit)
-        if solid.fibres is not None:
-            energy += fibre_energy(*grid, solid.fibre_modulus * solid.young_modulus, solid.fibres)
-        if self.metric is not None and np.isfinite(energy):
-            energy += metric_energy(*grid, self._whole, self.metric)
-        if len(self._springs):
-            moved = u[self._sole]
-            energy += 0.5 * float(np.einsum("fai,fab,fbi->", moved, self._springs, moved))
-        return energy
-
-    def _resist(self, u: FloatArray, force: FloatArray) -> None:
-        """Add what block and springs do to `force` (n, 3) [N] and to the stiffness."""
-        solid, grid = self.solid, (u, self.block.elements, self.block.gradients, self.block.weights)
-        assemble_solid(*grid, *self._constants, self._stiffness, force)
-        if solid.stretch_limit is not None:
-            assemble_stiffening(*grid, self._shear, solid.stretch_limit, self._stiffness, force)
-        if solid.fibres is not None:
-            assemble_fibres(
-                *grid,
-                solid.fibre_modulus * solid.young_modulus,
-                solid.fibres,
-                self._stiffness,
-                force,
+            energy += self._add_friction(
+                u, centre, True, (self._stiffness, force, tool_force, coupling, total)
             )
-        if self.metric is not None:
-            assemble_metric(*grid, self._whole, self.metric, self._stiffness, force)
-        if len(self._springs):
-            np.add.at(force, self._sole, np.einsum("fab,fbi->fai", self._springs, u[self._sole]))
-            np.add.at(
-                self._stiffness, self.block.sole.owner, self._springs[..., None, None] * np.eye(3)
-            )
+        energy -= float(np.sum(self.body.load * u))
+        return energy, force, tool_force, coupling, total, deepest
 
     def _obstacles(self, centre: FloatArray) -> list[Obstacle]:
         block, solid = self.block, self.solid
@@ -321,25 +273,25 @@ class Equilibrium:
         )
         return float(energy), float(deepest)
 
-    def _rubbed(
+    def _add_friction(
         self, u: FloatArray, centre: FloatArray, derivative: bool, out: tuple[FloatArray, ...]
     ) -> float:
-        rub = self.rub
-        if rub is None:
+        friction_contact = self.friction_contact
+        if friction_contact is None:
             return 0.0
         parts = (
             u,
             self.block.nodes,
             self.block.elements,
-            rub.owner,
-            rub.values,
-            rub.limits,
-            rub.normals,
-            rub.before,
-            rub.creep,
+            friction_contact.owner,
+            friction_contact.values,
+            friction_contact.limits,
+            friction_contact.normals,
+            friction_contact.before,
+            friction_contact.creep,
         )
-        return float(assemble_rub(*parts, centre, derivative, *out))
+        return float(assemble_friction(*parts, centre, derivative, *out))
 
     def close(self) -> None:
-        """Give the factor's memory back."""
+        """Free the factor's memory."""
         self._system.close()

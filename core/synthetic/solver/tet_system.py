@@ -1,6 +1,4 @@
-"""The virtual block's linear systems: one fixed pattern of ten-node tetrahedra, factored by MKL's
-Pardiso.
-"""
+"""Linear systems of the virtual block with one sparsity pattern, factored by MKL's Pardiso."""
 
 from __future__ import annotations
 
@@ -14,10 +12,10 @@ from scipy import sparse
 from palpate.foundation.arrays import FloatArray
 from palpate.synthetic.solver.tet_block import IntArray
 
-__all__ = ["System"]
+__all__ = ["TetSystem"]
 
 
-class System:
+class TetSystem:
     """The upper triangle of the tangent in one fixed pattern, and its factor."""
 
     def __init__(self, elements: IntArray, free: IntArray) -> None:
@@ -57,7 +55,7 @@ class System:
         self._analysed = False
 
     def factorise(self, stiffness: FloatArray) -> None:
-        """Take element stiffness (e, 10, 10, 3, 3) and factor the sum."""
+        """Assemble and factor element stiffness (e, 10, 10, 3, 3) [N/m]."""
         blocks = stiffness.reshape(-1, 9)[self._wanted].ravel()
         size = len(self._matrix.data)
         self._matrix.data[:] = np.bincount(self._scatter, weights=blocks, minlength=size + 1)[:size]
@@ -71,11 +69,11 @@ class System:
 
     @property
     def negative(self) -> int:
-        """How many eigenvalues of what was factored last are negative."""
+        """Number of negative eigenvalues of the factored matrix."""
         return int(self._solver.get_iparm(23))
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """With the last factor; right is (3 free,) or (3 free, k)."""
+        """Solve with the last factor for right-hand sides (3 free,) or (3 free, k)."""
         self._solver.set_phase(33)
         return np.asarray(
             self._solver._call_pardiso(
@@ -84,7 +82,7 @@ class System:
         ).reshape(right.shape)
 
     def close(self) -> None:
-        """Give the factor's memory back."""
+        """Free the factor's memory."""
         self._solver.free_memory(everything=True)
 
 
@@ -96,7 +94,7 @@ def _library() -> Any:
 
 
 def _pardiso() -> Any:
-    """A solver of its own; looking the library up again would take longer than a factorisation."""
+    """A new solver that shares the loaded library; loading takes longer than a factorisation."""
     solver = copy(_library())
     solver.pt, solver.iparm, solver.perm = solver.pt * 0, solver.iparm * 0, solver.perm.copy()
     return solver

@@ -1,4 +1,4 @@
-"""How far the tool is from the block, before anything is solved."""
+"""Distance between the tool and the resting block."""
 
 from __future__ import annotations
 
@@ -8,19 +8,24 @@ from scipy.spatial import cKDTree
 from palpate.foundation.arrays import FloatArray
 from palpate.synthetic.solver.obstacles import Shaft
 
-__all__ = ["Reach"]
+__all__ = ["ToolClearance"]
 
 _SAME = 1e-7
-"""Points of the surface that are no farther apart are one [m]."""
+"""Points of the surface at most this far apart coincide [m]."""
 
 
-class Reach:
-    """Distances to the points of a settled surface (s, 3) [m], of a ball with this radius [m] and,
-    if it may touch, its shaft.
+class ToolClearance:
+    """Signed distance of a ball, and of its shaft if it may touch, to a surface of points.
 
-    They count negative within the surface, whose outward `normals` (s, 3) tell: a ball that is sunk
-    by more than its diameter presses still. At an edge the faces' normals are added, so that
-    nothing beside one face passes for what is under another.
+    The distance is negative inside the surface, so that a ball sunk by more than its diameter still
+    counts as in contact. At an edge the normals of the faces are added; otherwise a point beside
+    one face would count as inside of another.
+
+    Args:
+        surface: (s, 3) points [m].
+        normals: (s, 3) outward normals.
+        radius: of the ball [m].
+        shaft: of the tool; None where it cannot touch.
     """
 
     def __init__(
@@ -34,8 +39,8 @@ class Reach:
         self._shaft = shaft
 
     def gap(self, centres: FloatArray) -> FloatArray:
-        """From the tool with its ball's centre at these places (n, 3) [m] to the surface (n,) [m],
-        negative where it presses.
+        """Gap (n,) [m] between surface and tool with the ball's centre at (n, 3) [m]; negative in
+        contact.
         """
         gap = self._distance(centres) - self._radius
         if self._shaft is None:
@@ -46,7 +51,7 @@ class Reach:
         return np.asarray(np.minimum(gap, beside.min(axis=1) - rod.radius))
 
     def _distance(self, places: FloatArray) -> FloatArray:
-        """(...) [m] of places (..., 3)."""
+        """Signed distance (...) [m] of points (..., 3) [m]."""
         distance, nearest = self._tree.query(places)
         ahead = np.einsum(
             "...i,...i->...", places - self._tree.data[nearest], self._normals[nearest]

@@ -15,10 +15,10 @@ from registering import CORNERS, NODES, Bench, X, Y, Z, off
 from scipy.spatial.transform import Rotation
 from small_dataset import SIZE, ply_bytes, write_valid_dataset
 
-from palpate.app.scene.manual_registration import Phantom
+from palpate.app.scene.phantom import Phantom
 from palpate.app.settings import Settings
 from palpate.foundation.frames import Transform
-from palpate.synthetic.bench.depth_camera import Scene, place_camera
+from palpate.synthetic.bench.depth_camera import CameraScene, place_camera
 
 pytestmark = NEEDS_CHROMIUM
 
@@ -32,7 +32,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Transform]:
     block = Phantom(np.zeros((1, 3)), SIZE, {}, None)
     surface = (block.vertices, block.faces)
     camera = place_camera(rng, SIZE, surface, np.array([1.0, -1.0]), 2600, 0.7e-3)
-    cloud = camera.cloud(Scene(surface, None, np.array([0.0, 0.0, -1.0]), 1.0), rng)
+    cloud = camera.cloud(CameraScene(surface, None, np.array([0.0, 0.0, -1.0]), 1.0), rng)
     (folder / "datasets" / "small" / "rest.ply").write_bytes(ply_bytes(cloud))
     return folder, camera.phantom_from_camera
 

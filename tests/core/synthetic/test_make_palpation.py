@@ -32,7 +32,7 @@ def test_tool_touches_only_where_it_presses(body: str) -> None:
         else:
             depth = radius - shape.facing(centres)[0]
         touching = np.concatenate([[False], depth > 0, [False]])
-        assert (np.diff(touching.astype(int)) == 1).sum() == palpation.probes
+        assert (np.diff(touching.astype(int)) == 1).sum() == palpation.pushes
         assert 2e-3 < depth.max() < 6e-3
         assert not touching[1 : 1 + round(1.5 / 0.02)].any()  # the sensor's bias shows first
 
@@ -55,7 +55,7 @@ def test_dataset_of_a_box_reads_back_with_forces_alone(tmp_path: Path) -> None:
     drawn = draw_palpation("box", 1, seed=2)
     scenario = replace(drawn.scenario, fine=6e-3)
     make_palpation(
-        tmp_path / "felt", replace(drawn, scenario=scenario, probes=1, splits=(1, 0, 0)), seed=2
+        tmp_path / "felt", replace(drawn, scenario=scenario, pushes=1, splits=(1, 0, 0)), seed=2
     )
     dataset = open_dataset(tmp_path / "felt")
     assert dataset.config.train == ("palpation-01",) and not dataset.observed

@@ -19,7 +19,7 @@ from palpate.diagnosis.inference.credible_intervals import modulus_interval
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.observation.force_record import (
-    Felt,
+    ForceComparison,
     ForceRecord,
     force_discrepancy,
     force_scatter,
@@ -167,15 +167,15 @@ def test_column_of_the_force_is_the_difference_of_two_predictions(item, name):
     column, mean_square_change, step = CHANGED[name]
     here = predict(item, SETUP, GRID, WANTED, tolerance=TIGHT)
     there = predict(item, mean_square_change, GRID, None, here.equilibria, TIGHT, here.samples)
-    assert here.felt is not None and there.felt is not None
-    wanted, found = (there.felt.gap - here.felt.gap) / step, here.felt.columns[..., column]
+    assert here.forces is not None and there.forces is not None
+    wanted, found = (there.forces.gap - here.forces.gap) / step, here.forces.columns[..., column]
     assert np.linalg.norm(wanted) > 0
     assert np.linalg.norm(found - wanted) < 0.02 * np.linalg.norm(wanted)
 
 
 def test_wrong_clock_leaves_force_and_place_together(item):
-    felt = predict(item, SETUP, GRID, WANTED).felt
-    assert felt is not None and not felt.columns[..., TOOL_COLUMNS + 2].any()
+    forces = predict(item, SETUP, GRID, WANTED).forces
+    assert forces is not None and not forces.columns[..., TOOL_COLUMNS + 2].any()
 
 
 def test_measured_force_is_turned_into_the_phantoms_frame(item):
@@ -183,8 +183,8 @@ def test_measured_force_is_turned_into_the_phantoms_frame(item):
         SETUP,
         phantom_from_robot=Transform.from_vector(np.zeros(3), np.array([0.0, 0.0, 0.5 * np.pi])),
     )
-    measured, deviation = item.felt(SETUP.phantom_from_robot, 0.0) or (None, None)
-    along, _ = item.felt(turned.phantom_from_robot, 0.0) or (None, None)
+    measured, deviation = item.force_in_groups(SETUP.phantom_from_robot, 0.0) or (None, None)
+    along, _ = item.force_in_groups(turned.phantom_from_robot, 0.0) or (None, None)
     assert measured is not None and along is not None and deviation is not None
     assert np.allclose(along, np.stack([-measured[:, 1], measured[:, 0], measured[:, 2]], axis=1))
     assert np.allclose(deviation, 1e-3)
@@ -192,9 +192,9 @@ def test_measured_force_is_turned_into_the_phantoms_frame(item):
 
 def test_engines_own_error_is_one_factor_for_each_push():
     force = np.array([[0, 0, 0], [0, 0, 0.2], [0, 0.1, 0.3], [0, 0, 0], [0.4, 0, 0]], dtype=float)
-    felt = Felt(0 * force, np.full(5, 1e-3), force, np.zeros((5, 3, 0)))
+    forces = ForceComparison(0 * force, np.full(5, 1e-3), force, np.zeros((5, 3, 0)))
     still, pressed = (replay(SETUP, centre[None], GRID)[0] for centre in (poke(-8e-3), poke(2e-3)))
-    columns = force_discrepancy(felt, [still, pressed, pressed, still, pressed])
+    columns = force_discrepancy(forces, [still, pressed, pressed, still, pressed])
     assert columns.shape == (5, 3, 2)
     assert (
         np.allclose(columns[1:3, :, 0], CRITERIA.force_error.push_error * force[1:3])
@@ -204,7 +204,7 @@ def test_engines_own_error_is_one_factor_for_each_push():
         np.allclose(columns[4, :, 1], CRITERIA.force_error.push_error * force[4])
         and not columns[:4, :, 1].any()
     )
-    assert np.allclose(force_scatter(felt)[0], 1e-6)
+    assert np.allclose(force_scatter(forces)[0], 1e-6)
 
 
 DEPTHS = (2.5e-3, 5e-3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.synthetic.bench.depth_camera import QUANTUM, DepthCamera, Scene, place_camera
+from palpate.synthetic.bench.depth_camera import QUANTUM, CameraScene, DepthCamera, place_camera
 from palpate.synthetic.bench.virtual_experiment import rest_surface
 from palpate.synthetic.scenario.scenario import Scenario
 
@@ -14,18 +14,18 @@ DOWN = np.array([0.0, 0.0, -1.0])
 
 
 @pytest.fixture(scope="module")
-def scene() -> Scene:
+def scene() -> CameraScene:
     rest, settled, faces = rest_surface(Scenario())
-    return Scene((rest + settled, faces), None, DOWN, 0.005)
+    return CameraScene((rest + settled, faces), None, DOWN, 0.005)
 
 
 @pytest.fixture(scope="module")
-def camera(scene: Scene) -> DepthCamera:
+def camera(scene: CameraScene) -> DepthCamera:
     return place_camera(np.random.default_rng(5), Scenario().size, scene.block, SEEN, 2600, 0.7e-3)
 
 
 def test_cloud_has_the_wanted_number_of_points_on_the_block(
-    camera: DepthCamera, scene: Scene
+    camera: DepthCamera, scene: CameraScene
 ) -> None:
     cloud = camera.phantom_from_camera.apply(camera.cloud(scene, np.random.default_rng(0)))
     x, y, z = Scenario().size
@@ -39,7 +39,9 @@ def test_cloud_has_the_wanted_number_of_points_on_the_block(
     assert len(cloud) - inside.sum() > 600
 
 
-def test_camera_sees_the_top_and_the_two_sides_it_should(camera: DepthCamera, scene: Scene) -> None:
+def test_camera_sees_the_top_and_the_two_sides_it_should(
+    camera: DepthCamera, scene: CameraScene
+) -> None:
     depth, what = camera.depth(scene)
     seen = camera.phantom_from_camera.apply(camera.rays[what == 0] * depth[what == 0, None])
     x, y, z = Scenario().size
@@ -48,12 +50,14 @@ def test_camera_sees_the_top_and_the_two_sides_it_should(camera: DepthCamera, sc
     assert np.sum(np.abs(seen[:, 1] + y / 2) < 1e-5) > 200
 
 
-def test_depths_are_multiples_of_the_quantum(camera: DepthCamera, scene: Scene) -> None:
+def test_depths_are_multiples_of_the_quantum(camera: DepthCamera, scene: CameraScene) -> None:
     steps = camera.cloud(scene, np.random.default_rng(0))[:, 2] / QUANTUM
     assert np.allclose(steps, np.round(steps), atol=1e-6)
 
 
-def test_noise_grows_with_the_square_of_the_distance(camera: DepthCamera, scene: Scene) -> None:
+def test_noise_grows_with_the_square_of_the_distance(
+    camera: DepthCamera, scene: CameraScene
+) -> None:
     depth, _ = camera.depth(scene)
     spreads = {}
     for near, far in ((0.0, 0.36), (0.36, 9.0)):
@@ -86,10 +90,10 @@ def test_bias_is_smooth_and_a_third_of_a_millimetre(camera: DepthCamera) -> None
     assert np.abs(np.diff(image, axis=1)).max() < 0.05e-3
 
 
-def test_points_behind_tool_and_shaft_are_not_seen(camera: DepthCamera, scene: Scene) -> None:
+def test_points_behind_tool_and_shaft_are_not_seen(camera: DepthCamera, scene: CameraScene) -> None:
     centre = np.array([0.005, -0.002, Scenario().size[2] + 0.012])
     depth, what = camera.depth(scene)
-    poked = Scene(scene.block, centre, DOWN, 0.005)
+    poked = CameraScene(scene.block, centre, DOWN, 0.005)
     nearer, by = camera.depth(poked)
     hidden = (what == 0) & (by >= 2)
     assert hidden.sum() > 20

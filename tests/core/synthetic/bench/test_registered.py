@@ -13,7 +13,7 @@ from palpate.dataset import Dataset, open_dataset
 from palpate.effects import from_json
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
-from palpate.measurement.camera_model import Sight, sight_of
+from palpate.measurement.camera_model import CameraModel, camera_model_for
 from palpate.measurement.touch_correction import touch_correction, touched_places
 from palpate.mesh.box_mesh import GridSpec
 from palpate.registration.registration import Registration, register, setup_from
@@ -80,7 +80,7 @@ def test_touches_were_made_where_the_effect_says(made):
 def test_clouds_are_read_as_the_effect_says(made):
     dataset, truth, _ = made
     for sight, height, tolerance in (
-        (Sight(truth.phantom_from_camera, 0.0, 1.02), 0.95 * Z, 0.5e-3),
+        (CameraModel(truth.phantom_from_camera, 0.0, 1.02), 0.95 * Z, 0.5e-3),
     ):
         cloud = sight.place(dataset.rest_cloud())
         over = (
@@ -99,7 +99,7 @@ def test_who_knows_the_causes_finds_robot_and_camera_where_they_are(made):
     assert _apart(setup.phantom_from_robot, true_robot) > 5e-3
     assert _apart(robot, true_robot) < 1e-3
     assert _apart(setup.phantom_from_camera, truth.phantom_from_camera) > 4e-3
-    assert _apart(sight_of(setup).pose, truth.phantom_from_camera) < 1.2e-3
+    assert _apart(camera_model_for(setup).pose, truth.phantom_from_camera) < 1.2e-3
 
 
 def test_registration_says_that_two_corners_are_swapped_and_the_polygon_is_small(made):

@@ -5,23 +5,25 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from virtual_push import RADIUS, X, Y, Z, hide, push, way
+from virtual_push import RADIUS, X, Y, Z, hide, simulate_push, way
 
 from palpate.foundation.arrays import FloatArray
-from palpate.synthetic.bench.true_body import levels_of, seams_of, solid_of
+from palpate.synthetic.bench.true_body import base_seams, material_levels, solid_model
 from palpate.synthetic.bench.virtual_experiment import rest_surface
 from palpate.synthetic.scenario.scenario import HiddenEffect, Scenario
-from palpate.synthetic.solver.tet_block import Block, Grading, mesh_block
-from palpate.synthetic.solver.tet_equilibrium import Equilibrium
+from palpate.synthetic.solver.tet_block import TetBlock, TetGrading, mesh_block
+from palpate.synthetic.solver.tet_equilibrium import TetSolver
 
 WEIGHT = 0.02
 """Over E [1/m]: so light that strains add up."""
 
 
-def _block(scenario: Scenario) -> Block:
+def _block(scenario: Scenario) -> TetBlock:
     return mesh_block(
         scenario.size,
-        Grading(np.zeros((1, 3)), np.zeros(1), np.full(1, 8e-3), 8e-3, levels=levels_of(scenario)),
+        TetGrading(
+            np.zeros((1, 3)), np.zeros(1), np.full(1, 8e-3), 8e-3, levels=material_levels(scenario)
+        ),
     )
 
 
@@ -29,7 +31,7 @@ def _modulus(*effects: HiddenEffect) -> tuple[FloatArray, FloatArray]:
     """Over the stated one, and the heights of the points [m]."""
     scenario = Scenario(effects=effects)
     block = _block(scenario)
-    return solid_of(scenario, block).young_modulus / scenario.young_modulus, block.places[..., 2]
+    return solid_model(scenario, block).young_modulus / scenario.young_modulus, block.places[..., 2]
 
 
 def _sag(*effects: HiddenEffect) -> float:
@@ -82,39 +84,37 @@ def test_column_with_a_gradient_sags_as_the_closed_form(log_ratio: float) -> Non
     assert _sag(hide("stiffness_gradient", log_ratio=log_ratio)) == pytest.approx(wanted, rel=5e-3)
 
 
-def test_column_on_springs_sinks_by_its_weight_over_their_stiffness_and_no_further_than_it_sags() -> (
-    None
-):
+def test_column_on_springs_sinks_further_by_its_weight_over_their_stiffness() -> None:
     springs = hide("base_compliance", stiffness_over_E=30.0)
     assert _sag(springs) - _sag() == pytest.approx(WEIGHT * Z / 30.0, rel=2e-3)
 
 
-def _pull(solver: Equilibrium, displacement: FloatArray) -> FloatArray:
+def _pull(solver: TetSolver, displacement: FloatArray) -> FloatArray:
     """Of the springs on the block (3,) [N]."""
-    return -np.einsum("fab,fbi->i", solver._springs, displacement[solver._sole])
+    return -np.einsum("fab,fbi->i", solver.body.springs, displacement[solver.body.sole])
 
 
 def test_springs_carry_what_the_tool_pushes() -> None:
     scenario = Scenario(effects=(hide("base_compliance", stiffness_over_E=30.0),))
     block = mesh_block(
         scenario.size,
-        Grading(np.array([[4e-3, Y / 2, 0.023]]), np.array([0.8 * RADIUS]), np.array([3.6e-3])),
+        TetGrading(np.array([[4e-3, Y / 2, 0.023]]), np.array([0.8 * RADIUS]), np.array([3.6e-3])),
     )
-    solver = Equilibrium(block, solid_of(scenario, block))
+    solver = TetSolver(block, solid_model(scenario, block))
     state = solver.rest
     for depth in (1e-3, 2e-3, 3e-3):
         state = solver.state(way(depth, side=True)[1], state)
     solver.close()
-    assert np.linalg.norm(state.push) > 0.05
+    assert np.linalg.norm(state.tool_force) > 0.05
     assert _pull(solver, state.displacement) == pytest.approx(
-        -state.push, abs=1e-3 * float(np.linalg.norm(state.push))
+        -state.tool_force, abs=1e-3 * float(np.linalg.norm(state.tool_force))
     )
 
 
 def test_springs_hold_only_what_is_not_loose() -> None:
     strip = hide("base_detachment", edge="+x", extent=0.015)
     scenario = Scenario(effects=(strip, hide("base_compliance", stiffness_over_E=30.0)))
-    solid = solid_of(scenario, _block(scenario))
+    solid = solid_model(scenario, _block(scenario))
     assert solid.lifts
     assert solid.springs is not None
     assert 0.1 < float(np.mean(solid.springs == 0)) < 0.5
@@ -133,29 +133,36 @@ NEUTRAL = (
 @pytest.mark.parametrize("effect", NEUTRAL, ids=[one.effect for one in NEUTRAL])
 def test_neutral_effects_change_nothing(effect: HiddenEffect) -> None:
     plain, same = (
-        push(*effects).stretches[0].passages[0].moments[-1] for effects in ((), (effect,))
+        simulate_push(*effects).solved_pushes[0].segments[0].key_frames[-1]
+        for effects in ((), (effect,))
     )
     assert np.abs(plain.surface).max() > 2e-3
     assert same.surface == pytest.approx(plain.surface, abs=3e-7)
-    assert same.push == pytest.approx(plain.push, abs=1e-4 * float(np.linalg.norm(plain.push)))
+    assert same.tool_force == pytest.approx(
+        plain.tool_force, abs=1e-4 * float(np.linalg.norm(plain.tool_force))
+    )
 
 
 def test_skin_as_stiff_as_the_rest_changes_no_more_than_another_grid_does() -> None:
     plain, skin = (
-        push(*effects).stretches[0].passages[0].moments[-1]
+        simulate_push(*effects).solved_pushes[0].segments[0].key_frames[-1]
         for effects in ((), (hide("surface_layer", thickness=2e-3, stiffness_ratio=1.0),))
     )
-    assert np.linalg.norm(skin.push) == pytest.approx(float(np.linalg.norm(plain.push)), rel=0.01)
+    assert np.linalg.norm(skin.tool_force) == pytest.approx(
+        float(np.linalg.norm(plain.tool_force)), rel=0.01
+    )
 
 
 def test_fibres_lie_along_the_stated_direction() -> None:
     def spread(direction: float) -> FloatArray:
         """How far the sides bulge along x and y under a push from above [m]."""
-        stretch = push(hide("anisotropy", direction=direction, stiffness_ratio=4.0)).stretches[0]
-        surface = stretch.passages[0].moments[-1].surface
+        solved = simulate_push(
+            hide("anisotropy", direction=direction, stiffness_ratio=4.0)
+        ).solved_pushes[0]
+        surface = solved.segments[0].key_frames[-1].surface
         return np.array(
             [
-                surface[stretch.rest[:, axis] > half - 1e-9, axis].max()
+                surface[solved.rest[:, axis] > half - 1e-9, axis].max()
                 for axis, half in enumerate((X / 2, Y / 2))
             ]
         )
@@ -171,11 +178,13 @@ def test_a_loose_strip_ends_at_a_row_of_nodes_of_its_own(edge: str, axis: int, s
         effects=(HiddenEffect("base_detachment", {"edge": edge, "extent": 0.0133}),)
     )
     line = side * (scenario.size[axis] / 2 - 0.0133)
-    ((across, place),) = seams_of(scenario)
+    ((across, place),) = base_seams(scenario)
     assert across == axis and place == pytest.approx(line)
-    grading = Grading(np.zeros((1, 3)), np.zeros(1), np.full(1, 8e-3), seams=seams_of(scenario))
+    grading = TetGrading(
+        np.zeros((1, 3)), np.zeros(1), np.full(1, 8e-3), seams=base_seams(scenario)
+    )
     block = mesh_block(scenario.size, grading)
-    held = solid_of(scenario, block).held
+    held = solid_model(scenario, block).held
     base = block.nodes[:, 2] < 1e-9
     inwards = scenario.size[axis] / 2 - side * block.nodes[:, axis]
     assert inwards[held].min() == pytest.approx(0.0133)

@@ -21,9 +21,9 @@ from palpate.synthetic import (
     make_dataset,
     truth_path,
 )
-from palpate.synthetic.bench.motion_plan import Motion
-from palpate.synthetic.bench.solved_track import Track
-from palpate.synthetic.bench.virtual_experiment import perform
+from palpate.synthetic.bench.motion_plan import MotionPlan
+from palpate.synthetic.bench.solved_track import SolvedTrack
+from palpate.synthetic.bench.virtual_experiment import solve_motion
 from palpate.synthetic.make_dataset import motions
 from palpate.synthetic.scenario.disturbance import drifted, rippled
 
@@ -86,23 +86,23 @@ def test_unknown_ones_and_missing_numbers_are_told(
         draw_disturbance("moon", 0)
 
 
-def _performed(sequence: str, *disturbances: Disturbance) -> tuple[Motion, Track]:
+def _performed(sequence: str, *disturbances: Disturbance) -> tuple[MotionPlan, SolvedTrack]:
     """A motion of the coarse bench, as planned and as carried out."""
     scenario = Scenario(disturbances=disturbances, sequences=(sequence,), fine=4.5e-3)
     planned = motions(scenario, np.array([1.0, 1.0]), seed=3)[0]
-    return planned, perform(scenario, planned)
+    return planned, solve_motion(scenario, planned)
 
 
-def _top_rim(track: Track, axis: int) -> FloatArray:
+def _top_rim(track: SolvedTrack, axis: int) -> FloatArray:
     """How far (k, 3) [m] the rim of the top on the positive side of an axis has moved when the
     first push is deepest.
     """
-    stretch = track.stretches[0]
+    solved = track.solved_pushes[0]
     size = Scenario().size
-    rim = (np.abs(stretch.rest[:, axis] - size[axis] / 2) < 1e-6) & (
-        np.abs(stretch.rest[:, 2] - size[2]) < 1e-6
+    rim = (np.abs(solved.rest[:, axis] - size[axis] / 2) < 1e-6) & (
+        np.abs(solved.rest[:, 2] - size[2]) < 1e-6
     )
-    return np.asarray(stretch.displacement(stretch.deepest[1])[rim])
+    return np.asarray(solved.displacement(solved.deepest[1])[rim])
 
 
 def test_phantom_creeps_evenly_all_the_time_and_the_tool_meets_it_where_it_is() -> None:
@@ -111,13 +111,13 @@ def test_phantom_creeps_evenly_all_the_time_and_the_tool_meets_it_where_it_is() 
     for time in (
         0.3,
         1.5,
-        *(float(probe.times[1]) for probe in motion.probes),
+        *(float(push.times[1]) for push in motion.pushes),
         motion.duration - 0.1,
     ):
-        stretch = track.at(time)
-        moved = stretch.displacement(time)[stretch.rest[:, 2] < 1e-6]
+        solved = track.at(time)
+        moved = solved.displacement(time)[solved.rest[:, 2] < 1e-6]
         assert np.allclose(moved, [0.0, 8e-5 * time, 0.0], atol=1.5e-6)
-    last = motion.probes[-1]
+    last = motion.pushes[-1]
     deepest = float(last.times[1]) + 0.1
     surface, ball = track.surface(deepest)[0], motion.centre(np.array([deepest]))[0]
     touching = np.linalg.norm(surface - ball, axis=1).min()
@@ -130,8 +130,8 @@ def test_shaft_that_touches_the_rim_dents_it_and_one_that_is_clear_does_not() ->
         _performed("poke-side-01", SHAFT),
     )
     assert clear.axis[1] < 0 < leaning.axis[1]  # the first push from the side is into the +y face
-    assert [probe.waypoints.tolist() for probe in clear.probes] == [
-        probe.waypoints.tolist() for probe in leaning.probes
+    assert [push.waypoints.tolist() for push in clear.pushes] == [
+        push.waypoints.tolist() for push in leaning.pushes
     ]
     before, after = (float(-_top_rim(track, axis=1)[:, 1].min()) for track in (plain, touched))
     assert after > before + 0.8e-3
@@ -144,16 +144,17 @@ def test_shaft_is_clear_of_a_block_that_is_pushed_from_above() -> None:
 
 def test_second_body_pushes_its_side_in_and_holds_it() -> None:
     (_, plain), (_, pressed) = _performed("poke-side-02"), _performed("poke-side-02", BODY)
-    rest = pressed.stretches[0].rest
+    rest = pressed.solved_pushes[0].rest
     side = np.abs(rest[:, 0] + Scenario().size[0] / 2) < 1e-6
-    settled = pressed.stretches[0].settled[side]
+    settled = pressed.solved_pushes[0].settled[side]
     middle = np.abs(rest[side] - [-Scenario().size[0] / 2, 0.0, 0.02]).max(axis=1) < 8e-3
     assert (settled[middle, 0] > 0.5e-3).all() and settled[
         :, 0
     ].max() < 2e-3  # gives way, and so does the body
-    assert np.abs(plain.stretches[0].settled).max() < 1e-6
+    assert np.abs(plain.solved_pushes[0].settled).max() < 1e-6
     at = [
-        track.stretches[0].displacement(track.stretches[0].deepest[1]) - track.stretches[0].settled
+        track.solved_pushes[0].displacement(track.solved_pushes[0].deepest[1])
+        - track.solved_pushes[0].settled
         for track in (plain, pressed)
     ]
     away = [-float(moved[side][middle, 0].mean()) for moved in at]

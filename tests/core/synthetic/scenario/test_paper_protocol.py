@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from palpate.synthetic import PAPER_SIZES, PaperSize, Scenario, paper_scenario
-from palpate.synthetic.bench.motion_plan import Motion, draw_motion
+from palpate.synthetic.bench.motion_plan import MotionPlan, draw_motion
 
 SEEN = np.array([1.0, -1.0])
 
@@ -17,7 +17,7 @@ def _kind(name: str) -> str:
     return name.rpartition("-")[0]
 
 
-def _motions(scenario: Scenario) -> dict[str, Motion]:
+def _motions(scenario: Scenario) -> dict[str, MotionPlan]:
     numbers = {
         name: [_kind(one) for one in scenario.sequences[:at]].count(_kind(name))
         for at, name in enumerate(scenario.sequences)
@@ -70,11 +70,11 @@ def test_further_rounds_go_on_from_the_first_and_touch_at_other_places():
         draw_motion("poke-top-01", 0, (0.0687, 0.0393, 0.0358), 5e-3, SEEN, 3, rounds)
         for rounds in (1, 3)
     )
-    assert (len(one.probes), len(more.probes)) == (3, 9)
-    firsts = [probe.waypoints[0] for probe in more.probes]
-    np.testing.assert_array_equal(firsts[0], one.probes[0].waypoints[0])
+    assert (len(one.pushes), len(more.pushes)) == (3, 9)
+    firsts = [push.waypoints[0] for push in more.pushes]
+    np.testing.assert_array_equal(firsts[0], one.pushes[0].waypoints[0])
     assert np.ptp([place[0] for place in firsts]) > 0.02  # along the block
-    ends = [float(probe.times[-1]) for probe in more.probes]
+    ends = [float(push.times[-1]) for push in more.pushes]
     assert all(
-        before < float(probe.times[0]) for before, probe in zip(ends, more.probes[1:], strict=False)
+        before < float(push.times[0]) for before, push in zip(ends, more.pushes[1:], strict=False)
     )

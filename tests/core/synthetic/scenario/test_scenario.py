@@ -6,7 +6,8 @@ import pytest
 
 from palpate.effects import effect_named, from_json
 from palpate.foundation.errors import EffectError
-from palpate.synthetic.scenario.scenario import HIDDEN, QUICK, WEIGHED, HiddenEffect, draw_scenario
+from palpate.synthetic.scenario.scenario import HIDDEN, QUICK, WEIGHED, HiddenEffect
+from palpate.synthetic.scenario.scenario_draws import draw_scenario
 
 
 def test_unknown_effect_names_the_known_ones() -> None:

@@ -15,14 +15,14 @@ from palpate.foundation.arrays import FloatArray
 from palpate.mesh.graded_mesh import REPLAY_GRID
 from palpate.replay.replay import Equilibrium, replay, require_converged
 from palpate.setup.setup import Box, Material, Setup, Tool
-from palpate.synthetic.bench.motion_plan import Motion, Probe
-from palpate.synthetic.bench.solved_track import Stretch
-from palpate.synthetic.bench.virtual_experiment import perform
+from palpate.synthetic.bench.motion_plan import MotionPlan, PlannedPush
+from palpate.synthetic.bench.solved_track import SolvedPush
+from palpate.synthetic.bench.virtual_experiment import solve_motion
 from palpate.synthetic.scenario.scenario import HiddenEffect, Scenario
-from palpate.synthetic.solver.inelastic_history import Remembering
+from palpate.synthetic.solver.inelastic_history import InelasticHistory
 from palpate.synthetic.solver.mooney_rivlin import constants, solid_energy
 from palpate.synthetic.solver.rest_metric import assemble_metric, isochoric, metric_energy
-from palpate.synthetic.solver.tet_block import Grading, mesh_block
+from palpate.synthetic.solver.tet_block import TetGrading, mesh_block
 
 RADIUS = Scenario().tool_radius
 DEPTH, CLEAR, AWAY, END = 5e-3, 2e-3, np.array([0.0, 0.0, -1.0]), 5.5
@@ -31,27 +31,29 @@ KEPT = hide("permanent_set", retained_fraction=0.2)
 ROUGH = hide("tool_friction", friction_coefficient=0.5)
 
 
-def _poke() -> Motion:
+def _poke() -> MotionPlan:
     """In one second, held for another, and back."""
     way = np.array([[4e-3, 2e-3, Z + RADIUS + CLEAR], [4e-3, 2e-3, Z + RADIUS - DEPTH]])
     length = CLEAR + DEPTH
-    probe = Probe(way, np.array([1.0, 2.0, 3.0, 4.0]), np.array([0.0, length, length, 0.0]))
-    return Motion("poke-top-01", AWAY, (probe,), END)
+    push = PlannedPush(way, np.array([1.0, 2.0, 3.0, 4.0]), np.array([0.0, length, length, 0.0]))
+    return MotionPlan("poke-top-01", AWAY, (push,), END)
 
 
-def _drag() -> Motion:
+def _drag() -> MotionPlan:
     """Down by 4 mm, 8 mm along x, and up where it went down."""
     low = Z + RADIUS - 4e-3
     way = np.array([[-4e-3, 2e-3, low + 6e-3], [-4e-3, 2e-3, low], [4e-3, 2e-3, low]])
-    probe = Probe(way, np.array([1.0, 2.0, 3.0, 4.0, 5.0]), np.array([0.0, 6e-3, 14e-3, 6e-3, 0.0]))
-    return Motion("drag-01", AWAY, (probe,), END)
+    push = PlannedPush(
+        way, np.array([1.0, 2.0, 3.0, 4.0, 5.0]), np.array([0.0, 6e-3, 14e-3, 6e-3, 0.0])
+    )
+    return MotionPlan("drag-01", AWAY, (push,), END)
 
 
-def _made(motion: Motion, *effects: HiddenEffect) -> Stretch:
-    return perform(Scenario(effects=effects), motion, 2.6e-3).stretches[0]
+def _made(motion: MotionPlan, *effects: HiddenEffect) -> SolvedPush:
+    return solve_motion(Scenario(effects=effects), motion, 2.6e-3).solved_pushes[0]
 
 
-def _replayed(motion: Motion, looks: list[float], *effects: HiddenEffect) -> list[Equilibrium]:
+def _replayed(motion: MotionPlan, looks: list[float], *effects: HiddenEffect) -> list[Equilibrium]:
     """Frames at these instants [s], of a replay that is led along the tool's way between them."""
     stated = Scenario()
     setup = Setup(
@@ -81,16 +83,16 @@ def _size(field: FloatArray) -> float:
 @pytest.mark.parametrize("effect", [DELAYED, KEPT], ids=["viscoelasticity", "permanent_set"])
 def test_bench_and_replay_agree_on_what_a_push_leaves(effect: HiddenEffect) -> None:
     motion, looks = _poke(), [2.5, 4.2, 5.4]
-    stretch = _made(motion, effect)
+    solved = _made(motion, effect)
     frames = _replayed(motion, looks, effect)
     for look, frame in zip(looks, frames, strict=True):
-        true = stretch.displacement(look)
-        assert _size(true - (frame.move(stretch.rest) - stretch.rest)) < 0.09 * _size(true)
-    pushed = stretch.push(np.array([looks[0]]))[0]
+        true = solved.displacement(look)
+        assert _size(true - (frame.move(solved.rest) - solved.rest)) < 0.09 * _size(true)
+    pushed = solved.tool_force(np.array([looks[0]]))[0]
     assert np.linalg.norm(pushed + frames[0].force) < 0.06 * np.linalg.norm(pushed)
-    dent = np.abs(stretch.displacement(looks[1])).max()
+    dent = np.abs(solved.displacement(looks[1])).max()
     assert dent > (0.15 if effect is KEPT else 0.2) * DEPTH
-    last = np.abs(stretch.displacement(looks[2])).max()
+    last = np.abs(solved.displacement(looks[2])).max()
     # A standard linear solid recovers with its retardation time, tau / (1 - relaxed fraction) = 1.6
     # s; a set does not.
     assert last / dent == pytest.approx(1.0 if effect is KEPT else np.exp(-1.2 / 1.6), rel=0.03)
@@ -99,37 +101,39 @@ def test_bench_and_replay_agree_on_what_a_push_leaves(effect: HiddenEffect) -> N
 def test_bench_and_replay_agree_on_a_drag() -> None:
     motion, look = _drag(), [2.8]
     (rough,), (smooth,) = _replayed(motion, look, ROUGH), _replayed(motion, look)
-    stretch, plain = _made(motion, ROUGH), _made(motion)
-    true, without = stretch.displacement(look[0]), plain.displacement(look[0])
-    found = rough.move(stretch.rest) - stretch.rest
+    solved, plain = _made(motion, ROUGH), _made(motion)
+    true, without = solved.displacement(look[0]), plain.displacement(look[0])
+    found = rough.move(solved.rest) - solved.rest
     assert _size(true - found) < 0.09 * _size(true)
-    dragged = np.argmax(np.linalg.norm(true - (smooth.move(stretch.rest) - stretch.rest), axis=1))
+    dragged = np.argmax(np.linalg.norm(true - (smooth.move(solved.rest) - solved.rest), axis=1))
     assert (
         true[dragged, 0] > 0.5e-3 and abs(without).max() > 2e-3
     )  # along with the tool, which goes to +x
-    force = stretch.push(np.array(look))[0]
+    force = solved.tool_force(np.array(look))[0]
     assert force[0] > 0.1 * -force[2] and np.linalg.norm(
         force + rough.force
     ) < 0.12 * np.linalg.norm(force)
-    assert np.allclose(stretch.displacement(END), 0.0, atol=1e-6)
+    assert np.allclose(solved.displacement(END), 0.0, atol=1e-6)
 
 
 def test_what_was_done_before_a_probe_is_there_in_the_next() -> None:
-    way = _poke().probes[0]
-    later = Probe(way.waypoints, way.times + 3.5, way.arcs)
-    motion = Motion("poke-top-01", AWAY, (way, later), 8.5)
-    first, second = perform(Scenario(effects=(KEPT,)), motion, 3.6e-3).stretches
+    way = _poke().pushes[0]
+    later = PlannedPush(way.waypoints, way.times + 3.5, way.arcs)
+    motion = MotionPlan("poke-top-01", AWAY, (way, later), 8.5)
+    first, second = solve_motion(Scenario(effects=(KEPT,)), motion, 3.6e-3).solved_pushes
     assert np.abs(second.settled).max() > 0.15 * DEPTH
     # The second push goes no further than the first, and leaves no more.
     assert np.allclose(second.displacement(8.4), first.displacement(4.4), atol=5e-5)
-    pushes = [-one.push(np.array([time]))[0, 2] for one, time in ((first, 1.5), (second, 5.0))]
+    pushes = [
+        -one.tool_force(np.array([time]))[0, 2] for one, time in ((first, 1.5), (second, 5.0))
+    ]
     assert 0 < pushes[1] < 0.8 * pushes[0]  # half way in, where the dent is there already
 
 
 @pytest.fixture(scope="module")
 def block():
     return mesh_block(
-        (0.03, 0.02, 0.02), Grading(np.zeros((1, 3)), np.zeros(1), np.full(1, 12e-3), 12e-3)
+        (0.03, 0.02, 0.02), TetGrading(np.zeros((1, 3)), np.zeros(1), np.full(1, 12e-3), 12e-3)
     )
 
 
@@ -176,7 +180,7 @@ def test_chains_that_did_not_flow_yet_are_the_share_that_the_law_gave_away(block
         np.full(block.weights.shape, 5e3),
         (block.elements, block.gradients, block.weights),
     )
-    memory, u = Remembering(Scenario(effects=(DELAYED,)), block), 0.05 * _bent(block)
+    memory, u = InelasticHistory(Scenario(effects=(DELAYED,)), block), 0.05 * _bent(block)
     full, part = (constants(modulus, 0.45, share) for share in (0.0, 0.5))
     fast = solid_energy(u, *grid, part[0], part[1], part[2].mean(axis=1))
     fast += metric_energy(u, *grid, 2 * (full[0] + full[1]), memory.metric(0.0))
@@ -188,20 +192,24 @@ def test_chains_that_did_not_flow_yet_are_the_share_that_the_law_gave_away(block
 
 
 def test_chains_follow_a_strain_that_is_held_with_their_time_constant(block) -> None:
-    memory, u = Remembering(Scenario(effects=(DELAYED,)), block), _bent(block)
-    memory.past = memory.after(u, 0.0)
-    assert np.allclose(memory.past.chains, np.eye(3))
+    memory, u = InelasticHistory(Scenario(effects=(DELAYED,)), block), _bent(block)
+    memory.inelastic_state = memory.after(u, 0.0)
+    assert np.allclose(memory.inelastic_state.chains, np.eye(3))
     for time in (0.3, 0.8, 2.0):
-        memory.past = memory.after(u, time)
+        memory.inelastic_state = memory.after(u, time)
     still = np.linalg.inv(isochoric(u, block.elements, block.gradients))
-    assert np.allclose(memory.past.chains, still + (np.eye(3) - still) * np.exp(-2.0 / 0.8))
+    assert np.allclose(
+        memory.inelastic_state.chains, still + (np.eye(3) - still) * np.exp(-2.0 / 0.8)
+    )
 
 
 def test_set_is_the_retained_share_of_the_largest_strain(block) -> None:
-    memory, u = Remembering(Scenario(effects=(KEPT,)), block), block.nodes * (0.2, -0.1, -0.1)
+    memory, u = InelasticHistory(Scenario(effects=(KEPT,)), block), block.nodes * (0.2, -0.1, -0.1)
     for share in (0.5, 1.0, 0.4):
-        memory.past = memory.after(share * u, None)
+        memory.inelastic_state = memory.after(share * u, None)
     strain = np.log([1.2, 0.9, 0.9])
     strain -= strain.mean()
-    assert np.allclose(memory.past.kept, np.diag(strain), atol=2e-3)
-    assert np.allclose(memory.past.natural, np.diag(np.exp(-2 * 0.2 * strain)), atol=2e-3)
+    assert np.allclose(memory.inelastic_state.peak_strain, np.diag(strain), atol=2e-3)
+    assert np.allclose(
+        memory.inelastic_state.natural, np.diag(np.exp(-2 * 0.2 * strain)), atol=2e-3
+    )

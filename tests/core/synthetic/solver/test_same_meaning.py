@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from virtual_push import X, Y, Z, hide, push, way
+from virtual_push import X, Y, Z, hide, simulate_push, way
 
 from palpate.effects import from_json
 from palpate.foundation.arrays import FloatArray
@@ -61,24 +61,27 @@ def _size(field: FloatArray) -> float:
 def test_stiffer_block_takes_the_same_shape_and_pushes_back_in_proportion(side: bool) -> None:
     stiffer = hide("young_modulus", E=8e3)
     (true,), (plain,) = (
-        push(*hidden, depth=DEPTH, side=side, fine=2.6e-3).stretches for hidden in ((stiffer,), ())
+        simulate_push(*hidden, depth=DEPTH, side=side, fine=2.6e-3).solved_pushes
+        for hidden in ((stiffer,), ())
     )
     replayed, force = _replayed((stiffer,), side, true.rest)
-    last, stated = true.passages[0].moments[-1], plain.passages[0].moments[-1]
+    last, stated = true.segments[0].key_frames[-1], plain.segments[0].key_frames[-1]
     assert _size(last.surface - stated.surface) < 2e-3 * _size(stated.surface)
-    assert np.allclose(last.push, 1.6 * stated.push, rtol=5e-3, atol=1e-3)
-    assert np.linalg.norm(last.push - force) < 0.06 * np.linalg.norm(force)
+    assert np.allclose(last.tool_force, 1.6 * stated.tool_force, rtol=5e-3, atol=1e-3)
+    assert np.linalg.norm(last.tool_force - force) < 0.06 * np.linalg.norm(force)
     assert _size(last.surface - replayed) < 0.07 * _size(last.surface)
-    at = true.passages[0]
-    assert np.allclose(true.push(np.array([at.begin, at.end])), [np.zeros(3), last.push])
+    at = true.segments[0]
+    assert np.allclose(
+        true.tool_force(np.array([at.begin, at.end])), [np.zeros(3), last.tool_force]
+    )
 
 
 @pytest.mark.parametrize(("effect", "side"), STRONG, ids=[one.effect for one, _ in STRONG])
 def test_bench_and_replay_agree_on_a_push(effect: HiddenEffect, side: bool) -> None:
-    stretch = push(effect, depth=DEPTH, side=side, fine=2.6e-3).stretches[0]
-    true = stretch.passages[0].moments[-1]
-    replayed, force = _replayed((effect,), side, stretch.rest)
-    without, _ = _replayed((), side, stretch.rest)
+    solved = simulate_push(effect, depth=DEPTH, side=side, fine=2.6e-3).solved_pushes[0]
+    true = solved.segments[0].key_frames[-1]
+    replayed, force = _replayed((effect,), side, solved.rest)
+    without, _ = _replayed((), side, solved.rest)
     assert _size(true.surface - replayed) < 0.07 * _size(true.surface)
     assert _size(true.surface - replayed) < 0.5 * _size(true.surface - without)
-    assert np.linalg.norm(true.push) == pytest.approx(float(np.linalg.norm(force)), rel=0.06)
+    assert np.linalg.norm(true.tool_force) == pytest.approx(float(np.linalg.norm(force)), rel=0.06)

@@ -19,7 +19,7 @@ from palpate.synthetic.solver.holzapfel_fibres import (
     fibre_modulus,
 )
 from palpate.synthetic.solver.mooney_rivlin import assemble_solid, constants, solid_energy
-from palpate.synthetic.solver.tet_block import Block, Grading, mesh_block
+from palpate.synthetic.solver.tet_block import TetBlock, TetGrading, mesh_block
 
 SIZE = (0.03, 0.02, 0.02)
 MODULUS = 5e3
@@ -32,11 +32,11 @@ Assemble = Callable[[FloatArray, FloatArray, FloatArray], None]
 
 
 @pytest.fixture(scope="module")
-def block() -> Block:
-    return mesh_block(SIZE, Grading(np.zeros((1, 3)), np.zeros(1), np.full(1, 12e-3), 12e-3))
+def block() -> TetBlock:
+    return mesh_block(SIZE, TetGrading(np.zeros((1, 3)), np.zeros(1), np.full(1, 12e-3), 12e-3))
 
 
-def _terms(block: Block) -> dict[str, tuple[Energy, Assemble]]:
+def _terms(block: TetBlock) -> dict[str, tuple[Energy, Assemble]]:
     grid = (block.elements, block.gradients, block.weights)
     # Different in every point, as they are with a skin on top.
     stiff = MODULUS * (1 + block.places[..., 2] / SIZE[2])
@@ -52,13 +52,13 @@ def _terms(block: Block) -> dict[str, tuple[Energy, Assemble]]:
     }
 
 
-def _bent(block: Block) -> FloatArray:
+def _bent(block: TetBlock) -> FloatArray:
     """A displacement (n, 3) [m] with stretches between about 0.7 and 1.4 everywhere else."""
     rng = np.random.default_rng(2)
     return block.nodes @ rng.uniform(-0.2, 0.2, (3, 3)) + 3e-4 * rng.normal(size=block.nodes.shape)
 
 
-def _answer(block: Block, assemble: Assemble, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _answer(block: TetBlock, assemble: Assemble, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Element stiffness with its lower half filled in (e, 10, 10, 3, 3) [N/m], and force (n, 3)
     [N].
     """
@@ -70,7 +70,7 @@ def _answer(block: Block, assemble: Assemble, u: FloatArray) -> tuple[FloatArray
 
 
 @pytest.mark.parametrize("term", ["stiffening", "fibres"])
-def test_force_is_the_slope_of_the_energy(block: Block, term: str) -> None:
+def test_force_is_the_slope_of_the_energy(block: TetBlock, term: str) -> None:
     energy, assemble = _terms(block)[term]
     u, rng, step = _bent(block), np.random.default_rng(3), 1e-7
     _, force = _answer(block, assemble, u)
@@ -81,7 +81,7 @@ def test_force_is_the_slope_of_the_energy(block: Block, term: str) -> None:
 
 
 @pytest.mark.parametrize("term", ["stiffening", "fibres"])
-def test_stiffness_is_the_slope_of_the_force(block: Block, term: str) -> None:
+def test_stiffness_is_the_slope_of_the_force(block: TetBlock, term: str) -> None:
     _, assemble = _terms(block)[term]
     u, rng, step = _bent(block), np.random.default_rng(4), 1e-7
     stiffness, _ = _answer(block, assemble, u)
@@ -95,14 +95,14 @@ def test_stiffness_is_the_slope_of_the_force(block: Block, term: str) -> None:
 
 
 @pytest.mark.parametrize("term", ["stiffening", "fibres"])
-def test_turned_block_stores_as_much(block: Block, term: str) -> None:
+def test_turned_block_stores_as_much(block: TetBlock, term: str) -> None:
     energy, _ = _terms(block)[term]
     turn = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
     u = _bent(block)
     assert energy((block.nodes + u) @ turn.T - block.nodes) == pytest.approx(energy(u), rel=1e-10)
 
 
-def test_stiffening_stores_what_gent_does_above_neo_hooke(block: Block) -> None:
+def test_stiffening_stores_what_gent_does_above_neo_hooke(block: TetBlock) -> None:
     grid = (block.elements, block.gradients, block.weights)
     shear, limit, stretch = np.full(block.weights.shape, SHEAR), 2.5, 1.4
     u = block.nodes * (stretch - 1, stretch**-0.5 - 1, stretch**-0.5 - 1)
@@ -116,7 +116,7 @@ def test_stiffening_stores_what_gent_does_above_neo_hooke(block: Block) -> None:
     )
 
 
-def test_block_stretched_to_the_limit_stores_without_bound(block: Block) -> None:
+def test_block_stretched_to_the_limit_stores_without_bound(block: TetBlock) -> None:
     grid, shear = (
         (block.elements, block.gradients, block.weights),
         np.full(block.weights.shape, SHEAR),
@@ -125,7 +125,7 @@ def test_block_stretched_to_the_limit_stores_without_bound(block: Block) -> None
 
 
 def test_material_without_a_limit_or_with_fibres_as_stiff_as_itself_gains_nothing(
-    block: Block,
+    block: TetBlock,
 ) -> None:
     grid, shear = (
         (block.elements, block.gradients, block.weights),
@@ -146,7 +146,7 @@ class _Bar:
 
     def __init__(
         self,
-        block: Block,
+        block: TetBlock,
         angle: float = 0.0,
         ratio: float = 1.0,
         limit: float | None = None,
@@ -185,7 +185,9 @@ class _Bar:
 
 
 @pytest.mark.parametrize("ratio", [1.0, 2.5, 5.0])
-def test_modulus_along_the_fibres_is_so_many_times_that_across(block: Block, ratio: float) -> None:
+def test_modulus_along_the_fibres_is_so_many_times_that_across(
+    block: TetBlock, ratio: float
+) -> None:
     step = 2e-3
     along, across = (
         (bar.pull(1 + step, step / 2) - bar.pull(1 - step, step / 2)) / (2 * step)
@@ -197,7 +199,7 @@ def test_modulus_along_the_fibres_is_so_many_times_that_across(block: Block, rat
 
 @pytest.mark.parametrize("stretch", [0.8, 1.25])
 def test_bar_pulled_along_its_fibres_is_the_bare_bar_and_the_fibres(
-    block: Block, stretch: float
+    block: TetBlock, stretch: float
 ) -> None:
     strain = stretch**2 - 1
     tension = (
@@ -213,7 +215,7 @@ def test_bar_pulled_along_its_fibres_is_the_bare_bar_and_the_fibres(
     )
 
 
-def test_nearly_incompressible_bar_stiffens_as_gents_does(block: Block) -> None:
+def test_nearly_incompressible_bar_stiffens_as_gents_does(block: TetBlock) -> None:
     """What a limit adds to the pull of an incompressible bar is mu (1 / (1 - x / J_m) - 1) (l - 1 /
     l^2).
     """
@@ -224,7 +226,7 @@ def test_nearly_incompressible_bar_stiffens_as_gents_does(block: Block) -> None:
     assert stiffer - bare == pytest.approx(gent, rel=0.01)
 
 
-def test_stretch_at_which_the_limit_is_reached_is_gents(block: Block) -> None:
+def test_stretch_at_which_the_limit_is_reached_is_gents(block: TetBlock) -> None:
     limit = 0.9
     last = brentq(lambda stretch: stretch**2 + 2 / stretch - 3 - limit, 1.0, 3.0)
     bar = _Bar(block, limit=limit)

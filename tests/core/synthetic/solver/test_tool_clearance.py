@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.synthetic.bench.motion_plan import Motion, Probe
-from palpate.synthetic.bench.virtual_experiment import perform
+from palpate.synthetic.bench.motion_plan import MotionPlan, PlannedPush
+from palpate.synthetic.bench.virtual_experiment import solve_motion
 from palpate.synthetic.scenario.scenario import Scenario
-from palpate.synthetic.solver.tet_block import Grading, mesh_block
-from palpate.synthetic.solver.tool_clearance import Reach
+from palpate.synthetic.solver.tet_block import TetGrading, mesh_block
+from palpate.synthetic.solver.tool_clearance import ToolClearance
 
 RADIUS = 0.004
 SIZE = (0.06, 0.05, 0.03)
@@ -17,8 +17,8 @@ SIZE = (0.06, 0.05, 0.03)
 
 @pytest.fixture(scope="module")
 def reach():
-    block = mesh_block(SIZE, Grading(np.zeros((1, 3)), np.zeros(1), np.full(1, 6e-3), 6e-3, 0.5))
-    return Reach(block.surface_rest, block.surface_normals, RADIUS, None)
+    block = mesh_block(SIZE, TetGrading(np.zeros((1, 3)), np.zeros(1), np.full(1, 6e-3), 6e-3, 0.5))
+    return ToolClearance(block.surface_rest, block.surface_normals, RADIUS, None)
 
 
 @pytest.mark.parametrize("depth", [0.001, 0.006, 0.0081, 0.0095, 0.012])
@@ -44,11 +44,15 @@ def test_push_by_more_than_the_ball_presses_to_its_end():
     scenario = Scenario(size=SIZE, tool_radius=RADIUS)
     top, deepest = SIZE[2] + RADIUS + 0.002, SIZE[2] + RADIUS - 0.0088
     way = np.array([[0.0, 0.0, top], [0.0, 0.0, deepest]])
-    probe = Probe(way, np.array([0.0, 1.0, 1.5]), np.array([0.0, top - deepest, top - deepest]))
-    track = perform(
-        scenario, Motion("poke-top-01", np.array([0.0, 0.0, -1.0]), (probe,), 3.0), fine=2.5e-3
+    push = PlannedPush(
+        way, np.array([0.0, 1.0, 1.5]), np.array([0.0, top - deepest, top - deepest])
     )
-    pushes = [-moment.push[2] for moment in track.stretches[0].passages[0].moments]
-    assert track.motion.probes[0].corners[-1] == pytest.approx(top - deepest)  # nothing gave way
+    track = solve_motion(
+        scenario, MotionPlan("poke-top-01", np.array([0.0, 0.0, -1.0]), (push,), 3.0), fine=2.5e-3
+    )
+    pushes = [
+        -key_frame.tool_force[2] for key_frame in track.solved_pushes[0].segments[0].key_frames
+    ]
+    assert track.motion.pushes[0].corners[-1] == pytest.approx(top - deepest)  # nothing gave way
     assert pushes == sorted(pushes)
     assert pushes[-1] > 0.1
