@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from palpate.blind import Case, Result
+from palpate.blind import Case, CaseResult
 from palpate.foundation.source_digest import source_digest
 
 NOTHING: dict[str, Any] = {
@@ -21,19 +21,19 @@ NOTHING: dict[str, Any] = {
 }
 
 
-def finish(case: Case, folder: Path) -> Result:
+def finish(case: Case, folder: Path) -> CaseResult:
     """A case in which nothing is found."""
-    return Result(case, report=NOTHING, code=source_digest())
+    return CaseResult(case, report=NOTHING, code=source_digest())
 
 
-def finish_or_die(case: Case, folder: Path) -> Result:
+def finish_or_die(case: Case, folder: Path) -> CaseResult:
     """Ends its own process as one without memory is ended, if its name says so."""
     if "dies" in case.name:
         os.kill(os.getpid(), signal.SIGKILL)
     return finish(case, folder)
 
 
-def finish_or_wait(case: Case, folder: Path) -> Result:
+def finish_or_wait(case: Case, folder: Path) -> CaseResult:
     """Waits for a minute, if its name says so, and leaves its process number beside the folder;
     others end once it does.
     """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from palpate.blind import Case, Result
+from palpate.blind import Case, CaseResult
 
 UNTOLD = [
     {"effect": "young_modulus", "why": "no force was measured", "measure_instead": "the force"}
@@ -35,7 +35,7 @@ def result(
     untold: bool = True,
     size: float | None = None,
     error: str = "",
-) -> Result:
+) -> CaseResult:
     """What was hidden (names with blanks between them, `truth` their parameters) and what was said;
     ranking: probabilities.
     """
@@ -64,4 +64,4 @@ def result(
         }
     outside = [{"effect": one, "parameters": {}} for one in names] if kind == "outside" else []
     case = Case(name, 0, kind, names)
-    return Result(case, effects, {} if error else report, outside, size, 100.0, "abc", error)
+    return CaseResult(case, effects, {} if error else report, outside, size, 100.0, "abc", error)

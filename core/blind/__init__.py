@@ -6,7 +6,7 @@ what one case gave, and `summary` sums the results up: rates, parameter errors, 
 calibration, against the targets.
 """
 
-from palpate.blind.case_results import RESULTS_FILE, Result, read_results
+from palpate.blind.case_results import RESULTS_FILE, CaseResult, read_results
 from palpate.blind.cases import KINDS, MIX, Case, all_cases, draw_cases, scenario_of
 from palpate.blind.run_suite import known_results, run_case, run_suite
 from palpate.blind.summary import summary_of
@@ -16,7 +16,7 @@ __all__ = [
     "MIX",
     "RESULTS_FILE",
     "Case",
-    "Result",
+    "CaseResult",
     "all_cases",
     "draw_cases",
     "known_results",

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from palpate.blind.case_results import Result
-from palpate.blind.proportions import CONFIDENCE, Measured, rate
+from palpate.blind.case_results import CaseResult
+from palpate.blind.proportions import CONFIDENCE, IntervalEstimate, rate
 from palpate.foundation.arrays import FloatArray
 
 __all__ = ["brier", "calibration_error", "every_effect", "first_effect", "reliability"]
@@ -19,7 +19,7 @@ BINS = 10
 _DRAWS = 1000
 
 
-def first_effect(results: Sequence[Result]) -> tuple[FloatArray, FloatArray]:
+def first_effect(results: Sequence[CaseResult]) -> tuple[FloatArray, FloatArray]:
     """Probability (n,) of the effect that a report thinks most probable, named or not, and whether
     it is hidden (n,) (0 or 1).
 
@@ -35,7 +35,7 @@ def first_effect(results: Sequence[Result]) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def every_effect(results: Sequence[Result]) -> tuple[FloatArray, FloatArray]:
+def every_effect(results: Sequence[CaseResult]) -> tuple[FloatArray, FloatArray]:
     """The same of every effect that is weighed in every case: mostly zeros that are right."""
     pairs = [
         (chance, effect in result.truth)
@@ -66,14 +66,14 @@ def reliability(stated: FloatArray, true: FloatArray) -> list[dict[str, Any]]:
     return rows
 
 
-def brier(stated: FloatArray, true: FloatArray) -> Measured:
+def brier(stated: FloatArray, true: FloatArray) -> IntervalEstimate:
     """Mean squared difference of stated probability and truth (Brier 1950), with a bootstrap
     interval.
     """
     return _resampled(stated, true, lambda p, y: float(((p - y) ** 2).mean()))
 
 
-def calibration_error(stated: FloatArray, true: FloatArray) -> Measured:
+def calibration_error(stated: FloatArray, true: FloatArray) -> IntervalEstimate:
     """Expected calibration error: |mean stated - share true| over tenths, weighted by how many are
     in each; bootstrap interval.
     """
@@ -90,10 +90,10 @@ def _bins(stated: FloatArray) -> Any:
     return np.minimum((stated * BINS + 1e-9).astype(int), BINS - 1)
 
 
-def _resampled(stated: FloatArray, true: FloatArray, figure: Any) -> Measured:
+def _resampled(stated: FloatArray, true: FloatArray, figure: Any) -> IntervalEstimate:
     if not len(stated):
-        return Measured(None, None, None, 0)
+        return IntervalEstimate(None, None, None, 0)
     drawn = np.random.default_rng(0).integers(0, len(stated), size=(_DRAWS, len(stated)))
     values = [figure(stated[one], true[one]) for one in drawn]
     low, high = np.quantile(values, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
-    return Measured(figure(stated, true), float(low), float(high), len(stated))
+    return IntervalEstimate(figure(stated, true), float(low), float(high), len(stated))

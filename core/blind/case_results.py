@@ -12,7 +12,7 @@ from typing import Any
 from palpate.blind.cases import Case
 from palpate.foundation.errors import RunError
 
-__all__ = ["RESULTS_FILE", "STATED_LEVEL", "Result", "add_result", "read_results"]
+__all__ = ["RESULTS_FILE", "STATED_LEVEL", "CaseResult", "add_result", "read_results"]
 
 RESULTS_FILE = "results.jsonl"
 STATED_LEVEL = 0.95
@@ -22,7 +22,7 @@ MODULUS = "young_modulus"
 
 
 @dataclass(frozen=True)
-class Result:
+class CaseResult:
     """What was hidden and what was said.
 
     Attributes:
@@ -84,9 +84,9 @@ class Result:
         if self.case.kind == "twins":
             return self.first or (self.verdict == "ambiguous" and self.inside)
         if self.case.kind == "modulus" and not (
-            self.verdict == "found" and not self.modulus_untold
+            self.verdict == "found" and not self.modulus_not_identifiable
         ):
-            return self.verdict == "none" and self.modulus_untold
+            return self.verdict == "none" and self.modulus_not_identifiable
         return self.exact if self.truth else self.verdict == "none"
 
     @property
@@ -114,7 +114,7 @@ class Result:
         return bool(set(self.named) - self.truth)
 
     @property
-    def modulus_untold(self) -> bool:
+    def modulus_not_identifiable(self) -> bool:
         """Whether the report says that Young's modulus cannot be told."""
         return any(row["effect"] == MODULUS for row in self.report.get("not_identifiable", []))
 
@@ -166,12 +166,12 @@ class Result:
         }
 
     @classmethod
-    def from_json(cls, data: dict[str, Any]) -> Result:
+    def from_json(cls, data: dict[str, Any]) -> CaseResult:
         """The inverse."""
         return cls(**{**data, "case": Case.from_json(data["case"])})
 
 
-def read_results(file: Path, mend: bool = False) -> list[Result]:
+def read_results(file: Path, mend: bool = False) -> list[CaseResult]:
     """All whole rows; a last one that is torn, as a kill while writing leaves it, does not count.
     `mend` cuts it off the file.
 
@@ -183,7 +183,7 @@ def read_results(file: Path, mend: bool = False) -> list[Result]:
     results = []
     for number, line in enumerate(lines, 1):
         try:
-            results.append(Result.from_json(json.loads(line)))
+            results.append(CaseResult.from_json(json.loads(line)))
         except (ValueError, TypeError, KeyError) as error:
             if number == len(lines):
                 if mend:
@@ -194,7 +194,7 @@ def read_results(file: Path, mend: bool = False) -> list[Result]:
     return results
 
 
-def add_result(file: Path, result: Result) -> None:
+def add_result(file: Path, result: CaseResult) -> None:
     """One more row, on disk when this returns."""
     with file.open("a") as stream:
         stream.write(json.dumps(result.to_json()) + "\n")

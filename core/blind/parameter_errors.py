@@ -11,18 +11,18 @@ from typing import Any
 
 from scipy.stats import norm
 
-from palpate.blind.case_results import Result
-from palpate.blind.proportions import Measured, median_of, rate, share_of
+from palpate.blind.case_results import CaseResult
+from palpate.blind.proportions import IntervalEstimate, median_of, rate, share_of
 from palpate.effects import Parameter, effect_named
 from palpate.foundation.errors import EffectError
 
 __all__ = [
     "SCORED_LEVEL",
-    "Said",
+    "ReportedParameter",
     "coverage",
     "distances",
     "parameter_errors",
-    "said_of",
+    "reported_parameters",
     "words_right",
 ]
 
@@ -32,7 +32,7 @@ would be."""
 
 
 @dataclass(frozen=True)
-class Said:
+class ReportedParameter:
     """One number of a rightly named cause.
 
     Attributes:
@@ -70,7 +70,7 @@ class Said:
 
     @property
     def error(self) -> float:
-        """Said minus true."""
+        """Reported minus true value, SI units."""
         return self.value - self.nearest
 
     def covers(self, level: float | None = None) -> bool | None:
@@ -101,7 +101,7 @@ class Said:
         return self.searched.coordinate(max(value, 1e-300) if self.searched.log else value)
 
 
-def said_of(results: Iterable[Result]) -> list[Said]:
+def reported_parameters(results: Iterable[CaseResult]) -> list[ReportedParameter]:
     """Every number of every cause that is named and hidden."""
     found = []
     for result in results:
@@ -110,14 +110,16 @@ def said_of(results: Iterable[Result]) -> list[Said]:
             entries = causes.get(hidden["effect"], {})
             for name, true in hidden["parameters"].items():
                 if name in entries and isinstance(true["value"], (int, float)):
-                    found.append(_said(result, hidden["effect"], name, true, entries[name]))
+                    found.append(
+                        _reported_parameter(result, hidden["effect"], name, true, entries[name])
+                    )
     return found
 
 
-def _said(
-    result: Result, effect: str, name: str, true: dict[str, Any], entry: dict[str, Any]
-) -> Said:
-    return Said(
+def _reported_parameter(
+    result: CaseResult, effect: str, name: str, true: dict[str, Any], entry: dict[str, Any]
+) -> ReportedParameter:
+    return ReportedParameter(
         result.name,
         result.case.kind,
         effect,
@@ -139,7 +141,7 @@ def _parameter(effect: str, name: str) -> Parameter | None:
         return None
 
 
-def parameter_errors(said: Sequence[Said]) -> dict[str, dict[str, Any]]:
+def parameter_errors(said: Sequence[ReportedParameter]) -> dict[str, dict[str, Any]]:
     """By `effect.parameter`: unit, median and largest absolute error, mean signed error, and the
     share of intervals that hold.
     """
@@ -158,24 +160,24 @@ def parameter_errors(said: Sequence[Said]) -> dict[str, dict[str, Any]]:
     return table
 
 
-def coverage(said: Iterable[Said], level: float | None = None) -> Measured:
+def coverage(said: Iterable[ReportedParameter], level: float | None = None) -> IntervalEstimate:
     """Share of the intervals at this level, or as stated, that hold the truth."""
     held = [one.covers(level) for one in said]
     return rate(sum(one is True for one in held), sum(one is not None for one in held))
 
 
-def distances(results: Iterable[Result], effect: str, names: Sequence[str]) -> list[float]:
+def distances(results: Iterable[CaseResult], effect: str, names: Sequence[str]) -> list[float]:
     """Length of the error vector of these parameters of one effect, in each case where it is
     rightly named.
     """
     found: dict[str, list[float]] = {}
-    for one in said_of(results):
+    for one in reported_parameters(results):
         if one.effect == effect and one.name in names:
             found.setdefault(one.case, []).append(one.error)
     return [math.hypot(*errors) for errors in found.values()]
 
 
-def words_right(results: Iterable[Result]) -> dict[str, Measured]:
+def words_right(results: Iterable[CaseResult]) -> dict[str, IntervalEstimate]:
     """By `effect.parameter`: how often a word (an edge) is that of the truth, where the effect is
     rightly named.
     """

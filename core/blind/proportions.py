@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 from scipy.stats import binomtest, quantile_test
 
-__all__ = ["CONFIDENCE", "Measured", "median_of", "rate", "share_of"]
+__all__ = ["CONFIDENCE", "IntervalEstimate", "median_of", "rate", "share_of"]
 
 T = TypeVar("T")
 CONFIDENCE = 0.95
@@ -17,7 +17,7 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
-class Measured:
+class IntervalEstimate:
     """A figure from n cases with its interval, which is None where there are too few; `hits` of a
     share.
     """
@@ -40,31 +40,31 @@ class Measured:
         }
 
 
-def rate(hits: int, n: int) -> Measured:
+def rate(hits: int, n: int) -> IntervalEstimate:
     """A share [1] with the interval of Clopper and Pearson (1934)."""
     if n == 0:
-        return Measured(None, None, None, 0, 0)
+        return IntervalEstimate(None, None, None, 0, 0)
     ends = binomtest(hits, n).proportion_ci(CONFIDENCE, method="exact")
-    return Measured(hits / n, float(ends.low), float(ends.high), n, hits)
+    return IntervalEstimate(hits / n, float(ends.low), float(ends.high), n, hits)
 
 
-def share_of(results: Iterable[T], holds: Callable[[T], bool]) -> Measured:
+def share_of(results: Iterable[T], holds: Callable[[T], bool]) -> IntervalEstimate:
     """In how many of the results it holds."""
     answers = [holds(result) for result in results]
     return rate(sum(answers), len(answers))
 
 
-def median_of(values: Sequence[float]) -> Measured:
+def median_of(values: Sequence[float]) -> IntervalEstimate:
     """A median with the interval between two order statistics (binomial, no assumption on the
     distribution).
     """
     if not values:
-        return Measured(None, None, None, 0)
+        return IntervalEstimate(None, None, None, 0)
     middle = float(np.median(values))
     ends: Any = quantile_test(values, p=0.5, q=middle).confidence_interval(
         CONFIDENCE
     )  # the stubs call it a float
-    return Measured(middle, _finite(ends.low), _finite(ends.high), len(values))
+    return IntervalEstimate(middle, _finite(ends.low), _finite(ends.high), len(values))
 
 
 def _finite(value: float) -> float | None:

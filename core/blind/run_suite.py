@@ -14,7 +14,7 @@ from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
-from palpate.blind.case_results import RESULTS_FILE, Result, add_result, read_results
+from palpate.blind.case_results import RESULTS_FILE, CaseResult, add_result, read_results
 from palpate.blind.cases import Case, scenario_of
 from palpate.foundation.errors import RunError
 from palpate.foundation.processes import ProcessPool
@@ -23,7 +23,7 @@ from palpate.foundation.source_digest import source_digest
 
 __all__ = ["known_results", "run_case", "run_suite", "source_digest"]
 
-Run = Callable[[Case, Path], Result]
+Run = Callable[[Case, Path], CaseResult]
 _PATIENCE = 5.0
 """A process that was told to end gets this long [s] before it is killed."""
 
@@ -37,7 +37,7 @@ def run_suite(
     any_version: bool = False,
     again: bool = False,
     run: Run | None = None,
-) -> list[Result]:
+) -> list[CaseResult]:
     """The results of all cases, in their order; those in `folder`/results.jsonl are taken from
     there, new ones are added to it.
 
@@ -73,13 +73,15 @@ def run_suite(
     return [known[case.name] for case in cases]
 
 
-def known_results(folder: Path, cases: Sequence[Case], any_version: bool = False) -> list[Result]:
+def known_results(
+    folder: Path, cases: Sequence[Case], any_version: bool = False
+) -> list[CaseResult]:
     """Those of these cases that are done, in their order; of two of one name the later. RunError as
     from `run_suite`.
     """
     file = folder / RESULTS_FILE
     wanted, digest = {case.name: case for case in cases}, source_digest()
-    known: dict[str, Result] = {}
+    known: dict[str, CaseResult] = {}
     for result in read_results(file):
         case = wanted.get(result.name)
         if case is None:
@@ -97,7 +99,7 @@ def known_results(folder: Path, cases: Sequence[Case], any_version: bool = False
     return [known[case.name] for case in cases if case.name in known]
 
 
-def run_case(case: Case, folder: Path, kept: Path | None = None) -> Result:
+def run_case(case: Case, folder: Path, kept: Path | None = None) -> CaseResult:
     """Make the dataset, diagnose it without a look at the truth, and compare; nothing but the
     result is kept.
 
@@ -133,7 +135,7 @@ def run_case(case: Case, folder: Path, kept: Path | None = None) -> Result:
         said = diagnose(open_dataset(dataset), run, workers=1, replays=whole, assurance=whole)
         seconds = round(time.monotonic() - began, 1)
     except Exception as error:  # any one: 200 cases must not end with it
-        return Result(
+        return CaseResult(
             case,
             hidden,
             outside=outside,
@@ -149,7 +151,7 @@ def run_case(case: Case, folder: Path, kept: Path | None = None) -> Result:
     told = said.pop("ambiguity_map", [])
     size = size_over_limit(made.effects, told, scenario, made.camera_shift)
     said["ambiguity_map"] = [row for row in told if row["effect"] in case.hidden]
-    return Result(case, hidden, said, outside, size, seconds, source_digest())
+    return CaseResult(case, hidden, said, outside, size, seconds, source_digest())
 
 
 def _truth(made: Any, size: Sequence[float]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
@@ -167,12 +169,12 @@ def _truth(made: Any, size: Sequence[float]) -> tuple[list[dict[str, Any]], list
     return described["effects"], described.get("disturbances", [])
 
 
-def _outcomes(cases: Sequence[Case], place: Path, workers: int, run: Run) -> Iterator[Result]:
+def _outcomes(cases: Sequence[Case], place: Path, workers: int, run: Run) -> Iterator[CaseResult]:
     """Results as they come. Each case has a process of its own, so that one that dies takes no
     other along.
     """
     waiting = deque(cases)
-    running: dict[Future[Result], tuple[Case, ProcessPool]] = {}
+    running: dict[Future[CaseResult], tuple[Case, ProcessPool]] = {}
     try:
         while waiting or running:
             while waiting and len(running) < workers:
@@ -191,11 +193,11 @@ def _outcomes(cases: Sequence[Case], place: Path, workers: int, run: Run) -> Ite
             pool.terminate(_PATIENCE)
 
 
-def _result(future: Future[Result], case: Case) -> Result:
+def _result(future: Future[CaseResult], case: Case) -> CaseResult:
     try:
         return future.result()
     except BrokenProcessPool:
         error = "its process was ended from outside, or by running out of memory"
     except Exception as problem:
         error = f"{type(problem).__name__}: {problem}"
-    return Result(case, code=source_digest(), error=error)
+    return CaseResult(case, code=source_digest(), error=error)

@@ -15,24 +15,24 @@ from palpate.blind.calibration import (
     first_effect,
     reliability,
 )
-from palpate.blind.case_results import Result
+from palpate.blind.case_results import CaseResult
 from palpate.blind.cases import KINDS
 from palpate.blind.parameter_errors import (
     SCORED_LEVEL,
     coverage,
     parameter_errors,
-    said_of,
+    reported_parameters,
     words_right,
 )
 from palpate.blind.proportions import CONFIDENCE, median_of, share_of
-from palpate.blind.targets import grade, judged
+from palpate.blind.targets import grade, judge_targets
 
 __all__ = ["confusion", "summary_of"]
 
 NOTHING, SEVERAL = "nothing", "several"
 
 
-def summary_of(results: Sequence[Result], seed: int, missing: int = 0) -> dict[str, Any]:
+def summary_of(results: Sequence[CaseResult], seed: int, missing: int = 0) -> dict[str, Any]:
     """Everything that is scored, as plain values.
 
     Args:
@@ -46,7 +46,7 @@ def summary_of(results: Sequence[Result], seed: int, missing: int = 0) -> dict[s
         "missing": missing,
         "confidence": CONFIDENCE,
         "code": dict(Counter(result.code for result in results)),
-        "targets": judged(results),
+        "targets": judge_targets(results),
         "kinds": {
             kind: _kind(own)
             for kind in KINDS
@@ -55,7 +55,7 @@ def summary_of(results: Sequence[Result], seed: int, missing: int = 0) -> dict[s
         "sizes": dict(
             Counter(grade(result) or "not given" for result in results if len(result.truth) == 1)
         ),
-        "parameters": parameter_errors(said_of(results)),
+        "parameters": parameter_errors(reported_parameters(results)),
         "words": {key: found.to_json() for key, found in words_right(results).items()},
         "coverage": _coverage(results),
         "calibration": {
@@ -70,8 +70,8 @@ def summary_of(results: Sequence[Result], seed: int, missing: int = 0) -> dict[s
     }
 
 
-def _coverage(results: Sequence[Result]) -> dict[str, Any]:
-    said = said_of(results)
+def _coverage(results: Sequence[CaseResult]) -> dict[str, Any]:
+    said = reported_parameters(results)
     return {
         "level_stated": sorted({result.level for result in results if result.report}),
         "at_stated_level": coverage(said).to_json(),
@@ -80,12 +80,12 @@ def _coverage(results: Sequence[Result]) -> dict[str, Any]:
     }
 
 
-def _seconds(results: Sequence[Result]) -> dict[str, Any]:
+def _seconds(results: Sequence[CaseResult]) -> dict[str, Any]:
     spent = [result.seconds for result in results if result.seconds]
     return {"median": median_of(spent).to_json(), "sum": round(sum(spent), 1)}
 
 
-def _kind(results: Sequence[Result]) -> dict[str, Any]:
+def _kind(results: Sequence[CaseResult]) -> dict[str, Any]:
     """What holds in how many cases of a kind; of those with something hidden also whether it is
     first and among what is named.
     """
@@ -117,7 +117,7 @@ def _calibration(stated: Any, true: Any) -> dict[str, Any]:
     }
 
 
-def confusion(results: Sequence[Result]) -> dict[str, dict[str, int]]:
+def confusion(results: Sequence[CaseResult]) -> dict[str, dict[str, int]]:
     """What is hidden (rows) by what is named (columns), of all cases but pairs.
 
     Columns beside the effects: `several` for a found set of more than one, and the verdicts that
@@ -131,13 +131,13 @@ def confusion(results: Sequence[Result]) -> dict[str, dict[str, int]]:
     return {row: dict(counts) for row, counts in table.items()}
 
 
-def _named(result: Result) -> str:
+def _named(result: CaseResult) -> str:
     if result.verdict != "found":
         return result.verdict
     return result.named[0] if len(result.named) == 1 else SEVERAL
 
 
-def _pairs(results: Sequence[Result]) -> dict[str, int]:
+def _pairs(results: Sequence[CaseResult]) -> dict[str, int]:
     """Of two hidden effects: how many are named, and whether anything else is."""
     found: Counter[str] = Counter()
     for result in results:
@@ -148,7 +148,7 @@ def _pairs(results: Sequence[Result]) -> dict[str, int]:
     return dict(found)
 
 
-def _gain(results: Sequence[Result]) -> dict[str, Any]:
+def _gain(results: Sequence[CaseResult]) -> dict[str, Any]:
     """Share of the reducible error removed, and the error that is left over the noise floor, by
     kind (medians).
     """

@@ -8,19 +8,25 @@ from dataclasses import dataclass
 from typing import Any
 
 from palpate.blind.calibration import calibration_error, first_effect
-from palpate.blind.case_results import Result
-from palpate.blind.parameter_errors import SCORED_LEVEL, coverage, distances, said_of, words_right
-from palpate.blind.proportions import Measured, median_of, share_of
+from palpate.blind.case_results import CaseResult
+from palpate.blind.parameter_errors import (
+    SCORED_LEVEL,
+    coverage,
+    distances,
+    reported_parameters,
+    words_right,
+)
+from palpate.blind.proportions import IntervalEstimate, median_of, share_of
 
-__all__ = ["TARGETS", "Target", "grade", "judged"]
+__all__ = ["TARGETS", "Target", "grade", "judge_targets"]
 
 CLEAR, SUBTLE = 5.0, 2.0
 """Sizes over the detection limit from which a cause counts as clear, and as subtle [1]."""
 
-Measure = Callable[[Sequence[Result]], Measured]
+Measure = Callable[[Sequence[CaseResult]], IntervalEstimate]
 
 
-def grade(result: Result) -> str:
+def grade(result: CaseResult) -> str:
     """`clear`, `subtle` or `faint` by the size over the detection limit where it is given, of two
     the fainter's; else ``.
     """
@@ -48,7 +54,7 @@ class Target:
     high: float | None = None
     unit: str = "1"
 
-    def judge(self, results: Sequence[Result]) -> dict[str, Any]:
+    def judge(self, results: Sequence[CaseResult]) -> dict[str, Any]:
         """Plain values: bounds, figure, `met`, and `sure` where the whole interval lies on one
         side; None without cases.
         """
@@ -84,23 +90,23 @@ class Target:
         )
 
 
-def judged(results: Sequence[Result]) -> list[dict[str, Any]]:
+def judge_targets(results: Sequence[CaseResult]) -> list[dict[str, Any]]:
     """Every target against these results."""
     return [target.judge(results) for target in TARGETS]
 
 
-def _of(kind: str) -> Callable[[Sequence[Result]], list[Result]]:
+def _of(kind: str) -> Callable[[Sequence[CaseResult]], list[CaseResult]]:
     return lambda results: [result for result in results if result.case.kind == kind]
 
 
-def _graded(wanted: str) -> Callable[[Sequence[Result]], list[Result]]:
+def _graded(wanted: str) -> Callable[[Sequence[CaseResult]], list[CaseResult]]:
     """Single effects of this size over their limit, however they were drawn."""
     return lambda results: [
         result for result in results if len(result.truth) == 1 and grade(result) == wanted
     ]
 
 
-def _told_pairs(results: Sequence[Result]) -> list[Result]:
+def _told_pairs(results: Sequence[CaseResult]) -> list[CaseResult]:
     """Two effects that each by itself the experiment could tell."""
     return [
         result
@@ -110,7 +116,7 @@ def _told_pairs(results: Sequence[Result]) -> list[Result]:
 
 
 def _share(
-    chosen: Callable[[Sequence[Result]], list[Result]], holds: Callable[[Result], bool]
+    chosen: Callable[[Sequence[CaseResult]], list[CaseResult]], holds: Callable[[CaseResult], bool]
 ) -> Measure:
     return lambda results: share_of(chosen(results), holds)
 
@@ -125,11 +131,11 @@ def _word(effect: str, name: str) -> Measure:
     )
 
 
-def _covered(results: Sequence[Result]) -> Measured:
-    return coverage(said_of(results), SCORED_LEVEL)
+def _covered(results: Sequence[CaseResult]) -> IntervalEstimate:
+    return coverage(reported_parameters(results), SCORED_LEVEL)
 
 
-def _removed(chosen: Callable[[Sequence[Result]], list[Result]]) -> Measure:
+def _removed(chosen: Callable[[Sequence[CaseResult]], list[CaseResult]]) -> Measure:
     return lambda results: median_of([result.removed or 0.0 for result in chosen(results)])
 
 

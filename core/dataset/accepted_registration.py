@@ -14,11 +14,11 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
 
-__all__ = ["Accepted", "rest_digest"]
+__all__ = ["AcceptedRegistration", "rest_digest"]
 
 
 @dataclass(frozen=True, eq=False)
-class Accepted:
+class AcceptedRegistration:
     """Camera to phantom as it was accepted under a name.
 
     Attributes:
@@ -43,7 +43,7 @@ class Accepted:
     rest: str = ""
 
     @classmethod
-    def from_json(cls, stored: Mapping[str, Any]) -> Accepted:
+    def from_json(cls, stored: Mapping[str, Any]) -> AcceptedRegistration:
         """From what `to_json` gives, or a file of accepted registrations; RegistrationError where
         that is not whole.
         """

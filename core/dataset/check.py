@@ -10,9 +10,9 @@ from typing import Any, Literal
 import numpy as np
 
 from palpate.dataset.folder import Dataset
-from palpate.dataset.motion_coverage import Lack, lacks
+from palpate.dataset.motion_coverage import CoverageGap, coverage_gaps
 from palpate.dataset.sequence import Sequence
-from palpate.dataset.tool_motion import Motion, motion_of
+from palpate.dataset.tool_motion import ToolMotion, describe_motion
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.foundation.progress import Report, part, silent
@@ -63,7 +63,7 @@ class SequenceSummary:
     clouds_outside: int
     points: tuple[int, int, int] | None
     forces: ClockSummary | None
-    motion: Motion | None
+    motion: ToolMotion | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +79,7 @@ class DatasetSummary:
     touches: tuple[str, ...]
     rest_points: int | None
     sequences: tuple[SequenceSummary, ...]
-    lacks: tuple[Lack, ...]
+    lacks: tuple[CoverageGap, ...]
     warnings: tuple[str, ...]
 
     def as_dict(self) -> dict[str, Any]:
@@ -108,7 +108,7 @@ def check_dataset(
         touches=dataset.touches.names,
         rest_points=len(dataset.rest_cloud()) if dataset.has_rest else None,
         sequences=tuple(summaries),
-        lacks=lacks(motions, observed, forces),
+        lacks=coverage_gaps(motions, observed, forces),
         warnings=(
             *_doubts(dataset),
             *(
@@ -134,7 +134,9 @@ def _summary(
         clouds_outside=int(((times < clock[0]) | (times > clock[-1])).sum()),
         points=(min(counts), int(np.median(counts)), max(counts)) if counts else None,
         forces=_clock(sequence.forces.time, HARMLESS_GAP) if sequence.forces else None,
-        motion=motion_of(dataset, sequence, phantom_from_robot) if phantom_from_robot else None,
+        motion=describe_motion(dataset, sequence, phantom_from_robot)
+        if phantom_from_robot
+        else None,
     )
 
 
@@ -223,7 +225,7 @@ def _clock_doubts(summary: SequenceSummary) -> list[str]:
     return doubts
 
 
-def _motion_doubts(dataset: Dataset, motion: Motion | None) -> list[str]:
+def _motion_doubts(dataset: Dataset, motion: ToolMotion | None) -> list[str]:
     if motion is None:
         return []
     if not motion.contacts:

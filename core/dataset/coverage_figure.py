@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.dataset.folder import Dataset
-from palpate.dataset.tool_motion import box_gap, motion_of, smooth_path
+from palpate.dataset.tool_motion import box_gap, describe_motion, smooth_path
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 
@@ -50,7 +50,8 @@ def coverage_picture(dataset: Dataset, phantom_from_robot: Transform, path: Path
         for name, points in paths.items():
             _draw_path(axes[view], 1e3 * points[:, _VIEWS[view]], depths[name], colours, norm)
     motions = [
-        motion_of(dataset, dataset.sequence(name), phantom_from_robot) for name in dataset.sequences
+        describe_motion(dataset, dataset.sequence(name), phantom_from_robot)
+        for name in dataset.sequences
     ]
     _number_places(
         axes["top"],

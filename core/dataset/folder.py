@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.dataset.accepted_registration import Accepted
+from palpate.dataset.accepted_registration import AcceptedRegistration
 from palpate.dataset.cloud import read_cloud, read_header
 from palpate.dataset.csv_table import FIRST_ROW, check_coordinates, read_labelled
 from palpate.dataset.files import problem
@@ -62,7 +62,7 @@ class Dataset:
     has_rest: bool
     loaded: tuple[Sequence, ...]
     geometry: Box | Shape
-    accepted: Accepted | None = None
+    accepted: AcceptedRegistration | None = None
 
     @property
     def name(self) -> str:
@@ -90,7 +90,7 @@ class Dataset:
             value=name,
         )
 
-    def registered(self, accepted: Accepted | None) -> Dataset:
+    def registered(self, accepted: AcceptedRegistration | None) -> Dataset:
         """The same with an accepted registration of the camera; RegistrationError where it is of
         another rest cloud.
         """

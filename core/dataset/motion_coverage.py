@@ -10,9 +10,9 @@ from itertools import combinations
 
 import numpy as np
 
-from palpate.dataset.tool_motion import ContactKind, Motion
+from palpate.dataset.tool_motion import ContactKind, ToolMotion
 
-__all__ = ["Lack", "lacks"]
+__all__ = ["CoverageGap", "coverage_gaps"]
 
 FEW_UNTOUCHED = 3  # clouds; fewer say nothing about the noise
 LONG_REST = 2.0  # s; several time constants of the quicker soft materials
@@ -24,7 +24,7 @@ SHALLOW = 0.002  # m; half of what a hand presses
 
 
 @dataclass(frozen=True)
-class Lack:
+class CoverageGap:
     """A motion or measurement that is not there, the effects it would tell, and the sentence for a
     person.
     """
@@ -33,7 +33,9 @@ class Lack:
     sentence: str
 
 
-def lacks(motions: dict[str, Motion], observed: bool, forces: bool) -> tuple[Lack, ...]:
+def coverage_gaps(
+    motions: dict[str, ToolMotion], observed: bool, forces: bool
+) -> tuple[CoverageGap, ...]:
     """What these motions (by sequence), with or without any cloud and force, do not show."""
     found = [*_of_measurements(observed, forces)]
     if motions and observed:
@@ -47,20 +49,20 @@ def lacks(motions: dict[str, Motion], observed: bool, forces: bool) -> tuple[Lac
     return tuple(found)
 
 
-def _of_measurements(observed: bool, forces: bool) -> Iterable[Lack]:
+def _of_measurements(observed: bool, forces: bool) -> Iterable[CoverageGap]:
     if not observed:
-        yield Lack(
+        yield CoverageGap(
             ("base_slip", "camera_registration", "time_offset"),
             "no clouds: the surface is not seen, only forces are compared; what the camera alone would show is not weighed",
         )
     if not forces:
-        yield Lack(
+        yield CoverageGap(
             ("young_modulus",),
             "no forces: the stiffness of a homogeneous block does not show; add forces.csv",
         )
 
 
-def _of_kinds(motions: list[Motion]) -> Iterable[Lack]:
+def _of_kinds(motions: list[ToolMotion]) -> Iterable[CoverageGap]:
     needed: dict[ContactKind, tuple[str, tuple[str, ...]]] = {
         "top": ("poke from above", ("stiff_inclusion", "tool_radius", "poisson_ratio")),
         "side": ("push from the side", ("base_slip", "base_detachment")),
@@ -69,27 +71,27 @@ def _of_kinds(motions: list[Motion]) -> Iterable[Lack]:
     for kind, (name, effects) in needed.items():
         count = sum(motion.has(kind) for motion in motions)
         if count == 0:
-            yield Lack(effects, f"no {name}: add two, elsewhere each")
+            yield CoverageGap(effects, f"no {name}: add two, elsewhere each")
         elif count == 1:
-            yield Lack(
+            yield CoverageGap(
                 effects,
                 f"only one sequence with a {name}: repeat it elsewhere, so that one can be kept for the test",
             )
 
 
-def _of_palpation(motions: list[Motion]) -> Iterable[Lack]:
+def _of_palpation(motions: list[ToolMotion]) -> Iterable[CoverageGap]:
     """Of pushes that are felt and not seen."""
     pushes = [contact for motion in motions for contact in motion.contacts]
     if len(pushes) < FEW_PUSHES:
         text = f"{len(pushes)} pushes in all: a lump between them is not felt, add more, none over {1e3 * OTHER_PLACE:.0f} mm away"
-        yield Lack(("stiff_inclusion",), text)
+        yield CoverageGap(("stiff_inclusion",), text)
     shallow = [contact for contact in pushes if contact.depth < SHALLOW]
     if pushes and len(shallow) > len(pushes) / 2:
         text = f"{len(shallow)} of {len(pushes)} pushes are less than {1e3 * SHALLOW:.0f} mm deep: deeper ones reach farther"
-        yield Lack(("stiff_inclusion", "young_modulus"), text)
+        yield CoverageGap(("stiff_inclusion", "young_modulus"), text)
 
 
-def _of_variety(motions: list[Motion]) -> Iterable[Lack]:
+def _of_variety(motions: list[ToolMotion]) -> Iterable[CoverageGap]:
     pushes = [
         contact for motion in motions for contact in motion.contacts if contact.kind != "drag"
     ]
@@ -98,27 +100,29 @@ def _of_variety(motions: list[Motion]) -> Iterable[Lack]:
     depths, speeds = ([getattr(motion, name) for motion in pushes] for name in ("depth", "speed"))
     if max(depths) < OTHER_DEPTH * max(min(depths), 1e-6):
         text = f"all pushes are about {1e3 * max(depths):.1f} mm deep: add a clearly shallower and a deeper one"
-        yield Lack(("tool_radius", "tool_offset", "surface_layer", "strain_stiffening"), text)
+        yield CoverageGap(
+            ("tool_radius", "tool_offset", "surface_layer", "strain_stiffening"), text
+        )
     if max(speeds) < OTHER_SPEED * max(min(speeds), 1e-6):
         text = f"all pushes go at about {1e3 * max(speeds):.1f} mm/s: add a slow and a fast one"
-        yield Lack(("time_offset", "viscoelasticity"), text)
+        yield CoverageGap(("time_offset", "viscoelasticity"), text)
     apart = max(
         float(np.linalg.norm(np.subtract(one.place, other.place)))
         for one, other in combinations(pushes, 2)
     )
     if apart < OTHER_PLACE:
         text = f"all pushes lie within {1e3 * apart:.1f} mm: add one more than {1e3 * OTHER_PLACE:.0f} mm away"
-        yield Lack(("stiff_inclusion", "stiffness_gradient", "anisotropy"), text)
+        yield CoverageGap(("stiff_inclusion", "stiffness_gradient", "anisotropy"), text)
 
 
-def _of_rests(motions: dict[str, Motion]) -> Iterable[Lack]:
+def _of_rests(motions: dict[str, ToolMotion]) -> Iterable[CoverageGap]:
     touching = {name: motion for name, motion in motions.items() if motion.contacts}
     if early := [
         name for name, motion in touching.items() if motion.untouched_before < FEW_UNTOUCHED
     ]:
         text = f"fewer than {FEW_UNTOUCHED} untouched clouds before the first contact in {', '.join(early)}: start recording earlier"
-        yield Lack(("camera_registration", "time_offset"), text)
+        yield CoverageGap(("camera_registration", "time_offset"), text)
     longest = max((motion.rest_after for motion in touching.values()), default=LONG_REST)
     if longest < LONG_REST:
         text = f"after release the longest rest is {longest:.1f} s: record a few time constants, at least {LONG_REST:.0f} s"
-        yield Lack(("viscoelasticity", "permanent_set"), text)
+        yield CoverageGap(("viscoelasticity", "permanent_set"), text)

@@ -16,7 +16,7 @@ from palpate.dataset.sequence import Sequence
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 
-__all__ = ["Contact", "ContactKind", "Motion", "box_gap", "motion_of", "smooth_path"]
+__all__ = ["Contact", "ContactKind", "ToolMotion", "box_gap", "describe_motion", "smooth_path"]
 
 ContactKind = Literal["top", "side", "drag"]
 
@@ -49,7 +49,7 @@ class Contact:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Motion:
+class ToolMotion:
     """One sequence in the phantom frame.
 
     Attributes:
@@ -80,7 +80,9 @@ def box_gap(points: FloatArray, size: tuple[float, float, float], radius: float)
     )
 
 
-def motion_of(dataset: Dataset, sequence: Sequence, phantom_from_robot: Transform) -> Motion:
+def describe_motion(
+    dataset: Dataset, sequence: Sequence, phantom_from_robot: Transform
+) -> ToolMotion:
     """What this sequence does, by the stated size, radius and registration."""
     time, path = smooth_path(sequence, phantom_from_robot)
     distance, normals = dataset.geometry.facing(path)
@@ -89,7 +91,7 @@ def motion_of(dataset: Dataset, sequence: Sequence, phantom_from_robot: Transfor
         _contact(time[part], path[part], gap[part], normals[part.start]) for part in _episodes(gap)
     )
     last_seen = float(sequence.cloud_times[-1] if len(sequence) else time[-1])
-    return Motion(
+    return ToolMotion(
         contacts=contacts,
         nearest=float(gap.min()),
         untouched_before=int((sequence.cloud_times < contacts[0].start).sum())

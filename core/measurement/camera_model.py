@@ -23,7 +23,7 @@ from palpate.registration.faces import NORMALS, camera_planes
 from palpate.registration.pose import motion_jacobian, small_motion
 from palpate.setup.setup import Setup
 
-__all__ = ["Sight", "sight_of"]
+__all__ = ["CameraModel", "camera_model_for"]
 
 _TOP, _TABLE = 0, 5
 _POINTS = 6
@@ -35,7 +35,7 @@ _ROUNDS, _HELD = 12, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class CameraModel:
     """One camera's readings (m, 3) [m], camera frame, and places in the phantom frame.
 
     Attributes:
@@ -63,17 +63,17 @@ class Sight:
         """Whether depth is read as it is."""
         return self.offset == 0.0 and self.scale == 1.0
 
-    def same(self, other: Sight) -> bool:
+    def same(self, other: CameraModel) -> bool:
         """Whether both place all readings alike."""
         depth = (self.offset, self.scale) == (other.offset, other.scale)
         return depth and np.array_equal(self.pose.matrix, other.pose.matrix)
 
 
-def sight_of(setup: Setup, *, reference: bool = False) -> Sight:
+def camera_model_for(setup: Setup, *, reference: bool = False) -> CameraModel:
     """Under this setup; the `reference`, the rest cloud, was seen before the camera could move."""
     sensor = setup.sensor
     pose = _registration_error(setup) @ setup.phantom_from_camera
-    return Sight(
+    return CameraModel(
         pose if reference else sensor.camera_shift @ pose, sensor.depth_offset, sensor.depth_scale
     )
 
@@ -91,7 +91,7 @@ def _registration_error(setup: Setup) -> Transform:
     normals, distances = NORMALS[face], np.einsum("mi,mi->m", NORMALS[face], places)
     pivot, laid = np.array([0.0, 0.0, stated[2]]), Transform()
     for _ in range(_ROUNDS):
-        true = Sight(
+        true = CameraModel(
             laid.inverse() @ setup.phantom_from_camera, sensor.depth_offset, sensor.depth_scale
         )
         found = setup.phantom_from_camera.apply(true.read(true_places))

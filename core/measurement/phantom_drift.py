@@ -26,7 +26,7 @@ from palpate.replay.equilibrium import Equilibrium
 from palpate.replay.replay import rest
 from palpate.setup.setup import Setup, Shape
 
-__all__ = ["Standing", "as_it_stood", "camera_of", "displaced", "standing"]
+__all__ = ["PhantomDrift", "align_sequences", "measure_drift", "recorded_camera", "shift_sequences"]
 
 LEAST, SURE = 1.5e-4, 5.0
 """Less than this [m], or than so many standard deviations, is no displacement."""
@@ -49,7 +49,7 @@ best where it lies, for the error is along the ray."""
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class PhantomDrift:
     """How far the block lies from where the rest cloud shows it as a sequence begins.
 
     Attributes:
@@ -63,11 +63,11 @@ class Standing:
     explained: float
 
 
-def as_it_stood(dataset: Dataset, registration: Registration) -> tuple[Dataset, Registration]:
+def align_sequences(dataset: Dataset, registration: Registration) -> tuple[Dataset, Registration]:
     """The dataset with each sequence as seen from the block where it stood; its registration warns
     where that is elsewhere.
     """
-    found = standing(dataset, registration)
+    found = measure_drift(dataset, registration)
     if not found:
         return dataset, registration
     rows = ", ".join(f"{name} by {1e3 * np.linalg.norm(way):.1f} mm" for name, way in found.items())
@@ -75,12 +75,12 @@ def as_it_stood(dataset: Dataset, registration: Registration) -> tuple[Dataset, 
         f"The block does not lie where rest.ply shows it as these begin: {rows}. It slid before, or was moved; each is compared "
         "from where it lay."
     )
-    return displaced(dataset, registration, found), replace(
+    return shift_sequences(dataset, registration, found), replace(
         registration, warnings=(*registration.warnings, told)
     )
 
 
-def displaced(
+def shift_sequences(
     dataset: Dataset, registration: Registration, ways: Mapping[str, FloatArray]
 ) -> Dataset:
     """The dataset with these sequences as seen from a block that lies `ways` (2,) [m] along x and y
@@ -88,30 +88,34 @@ def displaced(
     """
     return replace(
         dataset,
-        loaded=tuple(_seen_from(one, registration, ways.get(one.name)) for one in dataset.loaded),
+        loaded=tuple(
+            _shift_sequence(one, registration, ways.get(one.name)) for one in dataset.loaded
+        ),
     )
 
 
-def camera_of(sequence: Sequence, pose: Transform) -> Transform:
+def recorded_camera(sequence: Sequence, pose: Transform) -> Transform:
     """The camera's pose that puts clouds as they were recorded beside the block as the sequence is
     seen from it.
     """
     return pose if sequence.shift is None else pose @ Transform(translation=sequence.shift)
 
 
-def _seen_from(sequence: Sequence, registration: Registration, way: FloatArray | None) -> Sequence:
+def _shift_sequence(
+    sequence: Sequence, registration: Registration, way: FloatArray | None
+) -> Sequence:
     if way is None:
         return sequence
     back = -np.append(way, 0.0)
     # Where touches were of other landmarks, which way the robot's axes point is what the mended
     # ones say.
-    robot = registration.mended.phantom_from_robot
+    robot = registration.repaired.phantom_from_robot
     return sequence.moved(
         registration.phantom_from_camera.inverse().rotate(back), robot.inverse().rotate(back)
     )
 
 
-def standing(dataset: Dataset, registration: Registration) -> dict[str, FloatArray]:
+def measure_drift(dataset: Dataset, registration: Registration) -> dict[str, FloatArray]:
     """How far (2,) along x and y [m] the block lies from where the rest cloud shows it, of each
     sequence where it surely does.
 
@@ -120,25 +124,25 @@ def standing(dataset: Dataset, registration: Registration) -> dict[str, FloatArr
     """
     if isinstance(dataset.geometry, Shape) or not dataset.has_rest:
         return {}
-    mended = registration.mended
-    setup = setup_from(dataset, mended)
-    cleaner, shaft = cleaner_for(dataset, mended), find_shaft_axis(dataset, mended)
+    repaired = registration.repaired
+    setup = setup_from(dataset, repaired)
+    cleaner, shaft = cleaner_for(dataset, repaired), find_shaft_axis(dataset, repaired)
     bare, surface = (
         rest(setup, SCREEN_GRID.for_tool(setup.tool.radius)),
         replace(Surface.of(setup), patch=_PATCH),
     )
     cloud = dataset.rest_cloud()
     before = _means(setup, cloud[cleaner.clean(cloud).indices], np.zeros(3), bare, surface)
-    found: dict[str, Standing] = {}
+    found: dict[str, PhantomDrift] = {}
     for name in dataset.sequences:
-        points = _untouched(dataset.sequence(name), setup, cleaner, shaft)
-        one = _compared(setup, points, before, bare, surface) if len(points) else None
+        points = _untouched_points(dataset.sequence(name), setup, cleaner, shaft)
+        one = _fit_drift(setup, points, before, bare, surface) if len(points) else None
         if one is not None:
             found[name] = one
-    return _surely(found)
+    return _significant(found)
 
 
-def _surely(found: Mapping[str, Standing]) -> dict[str, FloatArray]:
+def _significant(found: Mapping[str, PhantomDrift]) -> dict[str, FloatArray]:
     if len(found) < 2:
         return {}
     nearest = min(found.values(), key=lambda one: float(np.linalg.norm(one.way)))
@@ -152,7 +156,7 @@ def _surely(found: Mapping[str, Standing]) -> dict[str, FloatArray]:
     return sure
 
 
-def _untouched(
+def _untouched_points(
     sequence: Sequence, setup: Setup, cleaner: Cleaner, shaft: FloatArray | None
 ) -> FloatArray:
     """Cleaned points (n, 3) [m], camera frame, of frames before the tool first comes near the
@@ -186,9 +190,9 @@ def _means(
     return patch_means(seen.gap, seen.patch, surface.patches)
 
 
-def _compared(
+def _fit_drift(
     setup: Setup, points: FloatArray, before: PatchMeans, bare: Equilibrium, surface: Surface
-) -> Standing | None:
+) -> PhantomDrift | None:
     """By least squares: a side that moved by d along its normal n has its points n d farther
     out."""
     way, first = np.zeros(3), 1.0
@@ -208,4 +212,6 @@ def _compared(
         if number < _ROUNDS - 1:  # the last round says what the way along the table has left
             way[:2] += step[:2]
     explained = 1.0 - max(left - 1.0, 0.0) / max(first - 1.0, 1e-9)
-    return Standing(np.append(way[:2], step[2]), np.sqrt(np.diag(np.linalg.inv(matrix))), explained)
+    return PhantomDrift(
+        np.append(way[:2], step[2]), np.sqrt(np.diag(np.linalg.inv(matrix))), explained
+    )

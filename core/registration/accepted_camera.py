@@ -6,19 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from palpate.dataset.accepted_registration import Accepted
+from palpate.dataset.accepted_registration import AcceptedRegistration
 from palpate.foundation.arrays import FloatArray
 from palpate.registration.camera_fit import CameraFit, refine_camera
 
-__all__ = ["camera_as_accepted"]
+__all__ = ["accepted_camera_fit"]
 
 APART = 3.0e-3
 """An accepted pose further than this [m] from where the cloud itself would draw it is told of: its
 directions may be open."""
 
 
-def camera_as_accepted(
-    cloud: FloatArray, size: tuple[float, float, float], depth_sigma: float, accepted: Accepted
+def accepted_camera_fit(
+    cloud: FloatArray,
+    size: tuple[float, float, float],
+    depth_sigma: float,
+    accepted: AcceptedRegistration,
 ) -> CameraFit:
     """The accepted pose and its covariance, with the statistics of the rest cloud (n, 3) [m],
     camera frame, about it.

@@ -21,7 +21,7 @@ from palpate.registration.faces import box_distance
 from palpate.registration.robot_fit import rigid_fits
 from palpate.registration.uncertainty import NAMES
 
-__all__ = ["ManualRegistration", "PairFit", "fit_pairs", "register_pairs"]
+__all__ = ["PairRegistration", "PairFit", "fit_pairs", "register_pairs"]
 
 REPEATED = 1.0e-3
 """Points of two pairs nearer than this [m] are the same point clicked twice."""
@@ -73,7 +73,7 @@ class PairFit:
 
 
 @dataclass(frozen=True, eq=False)
-class ManualRegistration:
+class PairRegistration:
     """What pairs and the ICP from there give.
 
     Attributes:
@@ -165,7 +165,7 @@ def register_pairs(
     cloud: FloatArray,
     mesh: FloatArray,
     depth_sigma: float = 0.002,
-) -> ManualRegistration:
+) -> PairRegistration:
     """Fit the pairs (see fit_pairs), then lay the rest cloud (m, 3) [m], camera frame, against the
     block from there.
     """
@@ -174,7 +174,7 @@ def register_pairs(
     left = _distance(camera.phantom_from_camera.apply(rest), size)
     counted = left < COUNTED
     before = _distance(pairs.phantom_from_camera.apply(rest[counted]), size)
-    return ManualRegistration(pairs, camera, _rms(before), _rms(left[counted]), int(counted.sum()))
+    return PairRegistration(pairs, camera, _rms(before), _rms(left[counted]), int(counted.sum()))
 
 
 def directions(covariance: FloatArray, lever: float) -> list[dict[str, Any]]:

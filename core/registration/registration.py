@@ -13,7 +13,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
 from palpate.foundation.progress import Report, silent
-from palpate.registration.accepted_camera import camera_as_accepted
+from palpate.registration.accepted_camera import accepted_camera_fit
 from palpate.registration.camera_fit import CameraFit, fit_camera
 from palpate.registration.heading import tool_misfit, turned_fit
 from palpate.registration.landmark_pairing import TouchProposal, propose
@@ -80,7 +80,7 @@ class Registration:
     repair: Repair | None = None
 
     @property
-    def mended(self) -> Registration:
+    def repaired(self) -> Registration:
         """With the robot where the repaired touches put it: for whoever has to find the tool in the
         clouds.
         """
@@ -116,7 +116,7 @@ def register(dataset: Dataset, report: Report = silent) -> Registration:
                 "dataset out, so that its forces are compared"
             )
         if dataset.accepted is not None:
-            camera = camera_as_accepted(
+            camera = accepted_camera_fit(
                 dataset.rest_cloud(), config.size, config.depth_sigma, dataset.accepted
             )
         else:

@@ -9,7 +9,7 @@ import pytest
 from blind_results import result
 
 from benchmarks.calibrating import first_at, loss, warmest
-from palpate.blind.case_results import Result
+from palpate.blind.case_results import CaseResult
 from palpate.diagnosis.search.model_probabilities import probabilities
 
 NAMES = ("tool_radius", "gravity", "poisson_ratio", "stiff_inclusion")
@@ -24,7 +24,7 @@ def _model(gain: float, *names: str) -> dict[str, object]:
     }
 
 
-def _drawn(seed: int) -> Result:
+def _drawn(seed: int) -> CaseResult:
     """Of gains that are over-sure by a factor of six: the truth is drawn from their softmax at that
     temperature.
     """

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from blind_results import cause, result
 
-from palpate.blind import Result, read_results
+from palpate.blind import CaseResult, read_results
 from palpate.blind.case_results import add_result
 from palpate.foundation.errors import RunError
 
 
-def said(kind: str, hidden: str, verdict: str, named: str, untold: bool = True) -> Result:
+def said(kind: str, hidden: str, verdict: str, named: str, untold: bool = True) -> CaseResult:
     return result(kind, hidden, verdict, [cause(one) for one in named.split()], untold=untold)
 
 

@@ -9,17 +9,23 @@ import numpy as np
 import pytest
 from blind_results import cause, result
 
-from palpate.blind import Result, summary_of
+from palpate.blind import CaseResult, summary_of
 from palpate.blind.calibration import brier, calibration_error, first_effect, reliability
-from palpate.blind.parameter_errors import Said, coverage, distances, parameter_errors, said_of
+from palpate.blind.parameter_errors import (
+    ReportedParameter,
+    coverage,
+    distances,
+    parameter_errors,
+    reported_parameters,
+)
 from palpate.blind.proportions import median_of, rate
-from palpate.blind.targets import TARGETS, grade, judged
+from palpate.blind.targets import TARGETS, grade, judge_targets
 from palpate.effects import DIAGNOSED, Parameter, effect_named
 from palpate.synthetic import HIDDEN
 
 
-def target(key: str, results: list[Result]) -> dict[str, object]:
-    return next(row for row in judged(results) if row["key"] == key)
+def target(key: str, results: list[CaseResult]) -> dict[str, object]:
+    return next(row for row in judge_targets(results) if row["key"] == key)
 
 
 def test_share_has_the_interval_of_clopper_and_pearson() -> None:
@@ -51,8 +57,8 @@ def said(
     low: float,
     high: float,
     item: Parameter | None = None,
-) -> Said:
-    return Said("case", "clear", effect, name, "1", true, value, low, high, 0.95, item)
+) -> ReportedParameter:
+    return ReportedParameter("case", "clear", effect, name, "1", true, value, low, high, 0.95, item)
 
 
 def test_interval_is_narrowed_as_a_normal_distribution_has_it() -> None:
@@ -95,7 +101,9 @@ def test_direction_comes_round_at_half_a_turn() -> None:
     )
 
 
-def inclusion(x: float, y: float, z: float, at: tuple[float, float, float], name: str) -> Result:
+def inclusion(
+    x: float, y: float, z: float, at: tuple[float, float, float], name: str
+) -> CaseResult:
     said = {
         key: (value, value - 1e-3, value + 1e-3)
         for key, value in zip("xyz", (x, y, z), strict=True)
@@ -110,7 +118,7 @@ def test_errors_are_of_what_is_named_and_hidden_alone() -> None:
         "clear", "stiff_inclusion", "found", [cause("gravity", x=(1.0, 0.9, 1.1))], truth={"x": 0.0}
     )
     found = inclusion(3e-3, 4e-3, 0.02, (0.0, 0.0, 0.022), "a")
-    table = parameter_errors(said_of([found, missed]))
+    table = parameter_errors(reported_parameters([found, missed]))
     assert list(table) == ["stiff_inclusion.x", "stiff_inclusion.y", "stiff_inclusion.z"]
     assert table["stiff_inclusion.z"]["median"]["value"] == pytest.approx(2e-3)
     assert table["stiff_inclusion.z"]["mean_signed"] == pytest.approx(-2e-3)
@@ -138,7 +146,10 @@ def test_word_is_right_or_wrong() -> None:
 
 def test_coverage_counts_intervals_and_not_cases() -> None:
     held = inclusion(0.0, 0.0, 0.02, (0.0, 0.0, 0.0215), "a")
-    assert (coverage(said_of([held])).hits, coverage(said_of([held])).n) == (2, 3)
+    assert (
+        coverage(reported_parameters([held])).hits,
+        coverage(reported_parameters([held])).n,
+    ) == (2, 3)
 
 
 def test_numbers_that_were_never_written_cover_as_those_of_a_file_do() -> None:
@@ -150,13 +161,16 @@ def test_numbers_that_were_never_written_cover_as_those_of_a_file_do() -> None:
         for name, entry in numbers
     }
     said = replace(one, report=one.report | {"causes": [cause | {"parameters": fresh}]})
-    assert (coverage(said_of([said])).hits, coverage(said_of([one])).hits) == (3, 3)
+    assert (
+        coverage(reported_parameters([said])).hits,
+        coverage(reported_parameters([one])).hits,
+    ) == (3, 3)
 
 
 def test_stated_level_of_a_report_is_taken() -> None:
     one = inclusion(0.0, 0.0, 0.02, (0.95e-3, 0.0, 0.02), "a")
     stated = replace(one, report=one.report | {"interval_level": 0.9})
-    assert [coverage(said_of([each]), 0.9).hits for each in (one, stated)] == [2, 3]
+    assert [coverage(reported_parameters([each]), 0.9).hits for each in (one, stated)] == [2, 3]
 
 
 def test_calibrated_probabilities_have_no_error_and_overconfident_ones_have_it() -> None:

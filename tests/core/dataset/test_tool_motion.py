@@ -9,7 +9,7 @@ import pytest
 from small_dataset import SIZE, write_valid_dataset
 
 from palpate.dataset import Dataset, Kinematics, Sequence, open_dataset
-from palpate.dataset.tool_motion import box_gap, motion_of
+from palpate.dataset.tool_motion import box_gap, describe_motion
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 
@@ -58,7 +58,7 @@ def test_two_pushes_from_above_are_two_contacts_with_their_depths(dataset: Datas
     above = TOP + RADIUS + 0.01
     down = [(0.01, 0.0, above), (0.01, 0.0, TOP + RADIUS - 0.004), (0.01, 0.0, above)]
     again = [(-0.01, 0.0, above), (-0.01, 0.0, TOP + RADIUS - 0.007), (-0.01, 0.0, above)]
-    motion = motion_of(dataset, moving(*down, *again), Transform())
+    motion = describe_motion(dataset, moving(*down, *again), Transform())
     assert [contact.kind for contact in motion.contacts] == ["top", "top"]
     np.testing.assert_allclose(
         [contact.depth for contact in motion.contacts], [0.004, 0.007], atol=4e-4
@@ -75,7 +75,7 @@ def test_a_push_from_the_side_and_a_drag_are_told_apart(dataset: Dataset) -> Non
         (SIZE[0] / 2 + RADIUS + 0.01, 0.0, 0.02),
         (SIZE[0] / 2 + RADIUS - 0.005, 0.0, 0.02),
     )
-    side = motion_of(dataset, moving(beside, into, beside), Transform())
+    side = describe_motion(dataset, moving(beside, into, beside), Transform())
     low = TOP + RADIUS - 0.004
     corners = [
         (-0.015, 0.0, TOP + 0.02),
@@ -83,14 +83,14 @@ def test_a_push_from_the_side_and_a_drag_are_told_apart(dataset: Dataset) -> Non
         (0.015, 0.0, low),
         (0.015, 0.0, TOP + 0.02),
     ]
-    drag = motion_of(dataset, moving(*corners), Transform())
+    drag = describe_motion(dataset, moving(*corners), Transform())
     assert [contact.kind for contact in side.contacts] == ["side"]
     assert [contact.kind for contact in drag.contacts] == ["drag"]
     np.testing.assert_allclose(drag.contacts[0].travel, 0.03, atol=3e-4)
 
 
 def test_a_tool_that_stays_away_has_no_contact_and_says_how_near_it_came(dataset: Dataset) -> None:
-    motion = motion_of(
+    motion = describe_motion(
         dataset, moving((0, 0, TOP + 0.03), (0, 0, TOP + 0.011), (0, 0, TOP + 0.03)), Transform()
     )
     assert motion.contacts == ()
@@ -108,13 +108,13 @@ def test_the_registration_carries_the_path_into_the_phantom(dataset: Dataset) ->
         here.kinematics.quaternion,
     )
     there = Sequence(Path(), "made", turned, here.cloud_times, here.cloud_files, None)
-    one, other = motion_of(dataset, here, Transform()), motion_of(dataset, there, pose)
+    one, other = describe_motion(dataset, here, Transform()), describe_motion(dataset, there, pose)
     np.testing.assert_allclose(one.contacts[0].place, other.contacts[0].place, atol=1e-9)
     assert one.contacts[0].kind == other.contacts[0].kind == "top"
 
 
 def test_the_rest_after_release_is_counted_to_the_last_cloud(dataset: Dataset) -> None:
     above, low = (0.0, 0.0, TOP + RADIUS + 0.01), (0.0, 0.0, TOP + RADIUS - 0.005)
-    motion = motion_of(dataset, moving(above, low, above, above, above), Transform())
+    motion = describe_motion(dataset, moving(above, low, above, above, above), Transform())
     np.testing.assert_allclose(motion.rest_after, 4.0 + 2.0 * 9.5 / 15, atol=0.15)
     assert motion.untouched_after == pytest.approx(10 * motion.rest_after, abs=1)

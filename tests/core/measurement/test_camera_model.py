@@ -15,7 +15,7 @@ from palpate.effects.geometry import GeometryScale
 from palpate.effects.sensor import CameraRegistration, DepthBias
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
-from palpate.measurement.camera_model import Sight, sight_of
+from palpate.measurement.camera_model import CameraModel, camera_model_for
 from palpate.registration.registration import fit_camera
 from palpate.setup.setup import Setup
 
@@ -39,33 +39,35 @@ def _as_stated(setup: Setup, name: str) -> FloatArray:
     them.
     """
     axis, end = SIDES[name]
-    placed = POSE.apply(sight_of(setup, reference=True).read(_side(name) * setup.scale))
+    placed = POSE.apply(camera_model_for(setup, reference=True).read(_side(name) * setup.scale))
     return (placed[:, axis] - end) * (1.0 if name == "top" else -1.0)
 
 
 def test_place_is_the_inverse_of_read():
-    sight, places = Sight(POSE, 3e-3, 0.96), _side("top")
+    sight, places = CameraModel(POSE, 3e-3, 0.96), _side("top")
     assert np.allclose(sight.place(sight.read(places)), places, atol=1e-12)
-    assert not np.allclose(Sight(POSE).read(places), sight.read(places), atol=1e-3)
+    assert not np.allclose(CameraModel(POSE).read(places), sight.read(places), atol=1e-3)
 
 
 def test_a_depth_is_read_as_scale_times_it_and_offset_along_the_ray():
     true = np.array([[0.02, -0.03, 0.4]])
-    read = Sight(POSE, 5e-3, 1.1).read(POSE.apply(true))
+    read = CameraModel(POSE, 5e-3, 1.1).read(POSE.apply(true))
     assert read[0, 2] == pytest.approx(1.1 * 0.4 + 5e-3)
     assert np.allclose(read[0] / read[0, 2], true[0] / true[0, 2])
 
 
 def test_what_nothing_is_wrong_with_is_seen_as_stated():
-    assert np.array_equal(sight_of(SETUP).pose.matrix, POSE.matrix)
+    assert np.array_equal(camera_model_for(SETUP).pose.matrix, POSE.matrix)
     moved = CameraRegistration(tx=1e-3, ty=0.0, tz=0.0, rx=0.0, ry=0.0, rz=0.02).apply(SETUP)
-    assert np.array_equal(sight_of(moved, reference=True).pose.matrix, POSE.matrix)
-    assert np.allclose(sight_of(moved).pose.matrix, (moved.sensor.camera_shift @ POSE).matrix)
+    assert np.array_equal(camera_model_for(moved, reference=True).pose.matrix, POSE.matrix)
+    assert np.allclose(
+        camera_model_for(moved).pose.matrix, (moved.sensor.camera_shift @ POSE).matrix
+    )
 
 
 def test_sides_that_were_laid_on_the_stated_ones_stay_there_and_the_top_shows_the_height():
     setup = SMALLER.apply(SETUP)
-    moved = sight_of(setup).pose @ POSE.inverse()
+    moved = camera_model_for(setup).pose @ POSE.inverse()
     assert np.allclose(moved.translation, [-0.02 * SIZE[0], 0.015 * SIZE[1], 0.0], atol=1e-9)
     assert np.allclose(moved.rotation, np.eye(3), atol=1e-9)
     for side, off in (("-x", 0.0), ("-y", 0.0), ("top", 0.03 * TOP)):
@@ -88,7 +90,7 @@ def test_offset_is_a_motion_of_the_camera_but_for_its_share_of_the_distance():
         assert np.std(_as_stated(setup, side)) < 1.2e-4
 
 
-def _rest_cloud(setup: Setup, true: Sight) -> FloatArray:
+def _rest_cloud(setup: Setup, true: CameraModel) -> FloatArray:
     """Raw cloud (n, 3) [m] of the true block on its table, without noise."""
     table = np.random.default_rng(9).uniform(-0.09, 0.09, (9000, 3)) * [1.0, 1.0, 0.0]
     half = np.array(setup.box.size[:2]) / 2
@@ -104,9 +106,11 @@ def test_registration_of_what_is_truly_seen_is_undone(effect: Effect, tolerance:
     motion of the camera again.
     """
     setup = effect.apply(SETUP)
-    cloud = _rest_cloud(setup, Sight(POSE, setup.sensor.depth_offset, setup.sensor.depth_scale))
+    cloud = _rest_cloud(
+        setup, CameraModel(POSE, setup.sensor.depth_offset, setup.sensor.depth_scale)
+    )
     stated = fit_camera(cloud, SIZE, 0.002, POSE).phantom_from_camera
-    found = sight_of(replace(setup, phantom_from_camera=stated)).pose
+    found = camera_model_for(replace(setup, phantom_from_camera=stated)).pose
     block = np.concatenate([_side(name) for name in SIDES])
 
     def off(pose: Transform) -> float:

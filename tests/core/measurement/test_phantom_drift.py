@@ -13,7 +13,12 @@ import pytest
 
 from palpate.dataset import Dataset, open_dataset
 from palpate.foundation.frames import Transform
-from palpate.measurement.phantom_drift import as_it_stood, camera_of, displaced, standing
+from palpate.measurement.phantom_drift import (
+    align_sequences,
+    measure_drift,
+    recorded_camera,
+    shift_sequences,
+)
 from palpate.measurement.segmentation import cleaner_for
 from palpate.registration.registration import Repair, RobotFit, register, setup_from
 from palpate.synthetic import HiddenEffect, Scenario, Truth, make_dataset
@@ -51,7 +56,7 @@ def test_a_block_that_slid_is_found_where_it_lies(slid: tuple[Dataset, Truth]) -
     dataset, truth = slid
     assert "poke-side-01" not in truth.begun
     assert {"poke-side-02", "poke-top-01"} == set(truth.begun)
-    found = standing(dataset, register(dataset))
+    found = measure_drift(dataset, register(dataset))
     assert set(found) == {name for name, way in truth.begun.items() if np.hypot(*way) > 2e-4}
     for name, way in found.items():
         assert way == pytest.approx(truth.begun[name], abs=1.2e-4)
@@ -60,16 +65,16 @@ def test_a_block_that_slid_is_found_where_it_lies(slid: tuple[Dataset, Truth]) -
 def test_what_is_displaced_is_told_and_then_stands_at_home(slid: tuple[Dataset, Truth]) -> None:
     dataset, _ = slid
     registration = register(dataset)
-    moved, told = as_it_stood(dataset, registration)
+    moved, told = align_sequences(dataset, registration)
     assert len(told.warnings) == len(registration.warnings) + 1
     assert "rest.ply" in told.warnings[-1]
     assert "poke-side-02" in told.warnings[-1]
     assert (
-        f"{1e3 * np.hypot(*standing(dataset, registration)['poke-side-02']):.1f} mm"
+        f"{1e3 * np.hypot(*measure_drift(dataset, registration)['poke-side-02']):.1f} mm"
         in told.warnings[-1]
     )
-    assert standing(moved, told) == {}
-    assert as_it_stood(moved, told) == (moved, told)
+    assert measure_drift(moved, told) == {}
+    assert align_sequences(moved, told) == (moved, told)
 
 
 def test_clouds_and_tool_move_together_and_a_raw_cloud_can_be_put_beside_them(
@@ -78,16 +83,16 @@ def test_clouds_and_tool_move_together_and_a_raw_cloud_can_be_put_beside_them(
     dataset, _ = slid
     registration = register(dataset)
     way = np.array([1e-3, -2e-3])
-    moved = displaced(dataset, registration, {"poke-side-02": way}).sequence("poke-side-02")
+    moved = shift_sequences(dataset, registration, {"poke-side-02": way}).sequence("poke-side-02")
     raw, setup = dataset.sequence("poke-side-02"), setup_from(dataset, registration)
     pose = setup.phantom_from_camera
     assert pose.apply(moved.cloud(3)) == pytest.approx(
         pose.apply(raw.cloud(3)) - [1e-3, -2e-3, 0.0], abs=1e-9
     )
-    assert camera_of(moved, pose).apply(raw.cloud(3)) == pytest.approx(
+    assert recorded_camera(moved, pose).apply(raw.cloud(3)) == pytest.approx(
         pose.apply(moved.cloud(3)), abs=1e-9
     )
-    assert camera_of(raw, pose) is pose
+    assert recorded_camera(raw, pose) is pose
     robot = setup.phantom_from_robot
     path = robot.apply(moved.kinematics.position)
     assert path == pytest.approx(
@@ -114,7 +119,7 @@ def test_the_tool_moves_with_the_block_where_its_touches_were_of_other_landmarks
     paired = replace(
         registration, phantom_from_robot=turned, repair=Repair("turn-1", 1.0, fit, 1e-2)
     )
-    moved = displaced(dataset, paired, {"poke-side-02": np.array([1e-3, -2e-3])}).sequence(
+    moved = shift_sequences(dataset, paired, {"poke-side-02": np.array([1e-3, -2e-3])}).sequence(
         "poke-side-02"
     )
     step = right.rotate(
@@ -125,8 +130,8 @@ def test_the_tool_moves_with_the_block_where_its_touches_were_of_other_landmarks
 
 def test_a_camera_that_was_moved_is_no_block_that_slid(bumped: Dataset) -> None:
     registration = register(bumped)
-    assert standing(bumped, registration) == {}
-    assert as_it_stood(bumped, registration) == (bumped, registration)
+    assert measure_drift(bumped, registration) == {}
+    assert align_sequences(bumped, registration) == (bumped, registration)
 
 
 def test_of_blocks_of_another_solver_only_one_that_slid_lies_elsewhere(
@@ -140,4 +145,4 @@ def test_of_blocks_of_another_solver_only_one_that_slid_lies_elsewhere(
             ]
         }
         dataset = open_dataset(path)
-        assert not standing(dataset, register(dataset)) or "base_slip" in hidden
+        assert not measure_drift(dataset, register(dataset)) or "base_slip" in hidden

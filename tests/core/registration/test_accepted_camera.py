@@ -8,7 +8,7 @@ import pytest
 from small_dataset import write_valid_dataset
 
 from palpate.dataset import open_dataset
-from palpate.dataset.accepted_registration import Accepted, rest_digest
+from palpate.dataset.accepted_registration import AcceptedRegistration, rest_digest
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
 from palpate.registration.pose import small_motion
@@ -27,7 +27,7 @@ def accepted(dataset, shift=0.001):
         small_motion(np.array([shift, 0, 0, 0, 0, 0.0]), found.camera_pivot)
         @ found.phantom_from_camera
     )
-    return Accepted(
+    return AcceptedRegistration(
         "by-hand",
         moved,
         found.camera_covariance / 2,
@@ -74,7 +74,7 @@ def test_one_of_another_rest_cloud_is_refused(dataset):
 
 def test_it_survives_json_and_what_is_not_whole_is_refused(dataset):
     given = accepted(dataset)
-    again = Accepted.from_json(json.loads(json.dumps(given.to_json())))
+    again = AcceptedRegistration.from_json(json.loads(json.dumps(given.to_json())))
     assert np.allclose(
         again.phantom_from_camera.matrix, given.phantom_from_camera.matrix, atol=1e-12
     )
@@ -87,4 +87,4 @@ def test_it_survives_json_and_what_is_not_whole_is_refused(dataset):
         {**given.to_json(), "pivot": [0, 0, float("nan")]},
     ):
         with pytest.raises(RegistrationError, match="no accepted registration"):
-            Accepted.from_json(broken)
+            AcceptedRegistration.from_json(broken)
