@@ -18,8 +18,8 @@ from rich.console import Console
 from rich.table import Table
 
 from palpate.blind.calibration import brier, calibration_error
-from palpate.blind.case_results import Result, read_results
-from palpate.blind.proportions import Measured
+from palpate.blind.case_results import CaseResult, read_results
+from palpate.blind.proportions import IntervalEstimate
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.search.model_probabilities import probabilities
 from palpate.effects.elastic_material import YoungModulus
@@ -34,7 +34,7 @@ LEAST = 1e-12
 """Probability of a set that was not tried, or was refused."""
 
 
-def _chances(result: Result, temperature: float) -> dict[frozenset[str], float]:
+def _chances(result: CaseResult, temperature: float) -> dict[frozenset[str], float]:
     """Of each set of causes, whatever the order they were found in."""
     surplus: dict[tuple[str, ...], float] = {}
     for model in result.report["models"]:
@@ -50,19 +50,19 @@ def _chances(result: Result, temperature: float) -> dict[frozenset[str], float]:
     return found
 
 
-def loss(results: Sequence[Result], temperature: float) -> float:
+def loss(results: Sequence[CaseResult], temperature: float) -> float:
     """Mean of minus the logarithm of the probability that the hidden set has [nats]."""
     chances = [_chances(one, temperature).get(one.truth - {MODULUS}, 0.0) for one in results]
     return float(-np.log(np.maximum(chances, LEAST)).mean())
 
 
-def warmest(results: Sequence[Result]) -> float:
+def warmest(results: Sequence[CaseResult]) -> float:
     """The temperature of least loss; of several the highest, which claims least."""
     losses = np.array([loss(results, one) for one in TEMPERATURES])
     return TEMPERATURES[int(np.flatnonzero(losses <= losses.min() + 1e-6)[-1])]
 
 
-def first_at(results: Sequence[Result], temperature: float) -> tuple[FloatArray, FloatArray]:
+def first_at(results: Sequence[CaseResult], temperature: float) -> tuple[FloatArray, FloatArray]:
     """Probability (n,) of the most probable effect at this temperature, and whether it is hidden
     (n,).
     """
@@ -79,7 +79,7 @@ def first_at(results: Sequence[Result], temperature: float) -> tuple[FloatArray,
     return np.array(stated), np.array(true)
 
 
-def _in_words(measured: Measured) -> str:
+def _in_words(measured: IntervalEstimate) -> str:
     ends = (measured.value, measured.low, measured.high)
     return (
         "–"
@@ -88,7 +88,7 @@ def _in_words(measured: Measured) -> str:
     )
 
 
-def _weighed(result: Result) -> bool:
+def _weighed(result: CaseResult) -> bool:
     """Whether its report says what was asked of each set; before November 2026 none did."""
     return all("asked_nats" in model for model in result.report["models"])
 

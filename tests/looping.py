@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from palpate.blind import Case, Result, run_case
+from palpate.blind import Case, CaseResult, run_case
 
 __all__ = ["LATE_CLOCK", "Loop", "run_looked_at"]
 
@@ -15,7 +15,7 @@ LATE_CLOCK = 14
 searched again."""
 
 
-def run_looked_at(case: Case, folder: Path, kept: Path) -> Result:
+def run_looked_at(case: Case, folder: Path, kept: Path) -> CaseResult:
     """As `run_case`; only where something is hidden does the run stay, with all that the page
     shows.
     """
@@ -30,8 +30,8 @@ class Loop:
 
     seed: int
     suite: Path
-    found: Result
-    nothing: Result
+    found: CaseResult
+    nothing: CaseResult
     run: Path
 
     @property

@@ -10,12 +10,12 @@ import numpy as np
 
 from palpate.dataset import Kinematics
 from palpate.diagnosis.forward.prediction import Prediction
-from palpate.diagnosis.forward.ray_comparison import Sample
+from palpate.diagnosis.forward.ray_comparison import PointSample
 from palpate.diagnosis.observation.frame_groups import Group, Observations
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
-from palpate.measurement.camera_model import sight_of
+from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.box_mesh import GridSpec
 from palpate.registration.registration import Registration
@@ -61,7 +61,7 @@ def seen_points(
         sample = random.uniform(low, high, (count // 3, 3))
         sample[:, axis] = end[axis]
         sides.append(frame.move(sample * truth.scale))
-    points = sight_of(truth).read(np.concatenate(sides))
+    points = camera_model_for(truth).read(np.concatenate(sides))
     away = points / np.linalg.norm(points, axis=1)[:, None]
     return points + away * (noise * random.standard_normal(len(points)))[:, None]
 
@@ -120,7 +120,7 @@ def prediction(
     ]
     none = np.zeros((*gap.shape, 0)) if columns is None else columns
     whole, real = np.zeros(0, np.int32), np.zeros(0)
-    nothing = Sample(whole, whole, real, real, np.zeros((0, 3)), whole)
+    nothing = PointSample(whole, whole, real, real, np.zeros((0, 3)), whole)
     full = np.where(np.isfinite(gap), count, 0.0)
     return Prediction(
         name,

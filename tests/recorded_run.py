@@ -46,7 +46,7 @@ def write_recorded_run(datasets: Path, runs: Path) -> Path:
     (run / "replays").mkdir(parents=True)
     cleaner, shaft = (
         cleaner_for(dataset, registration),
-        find_shaft_axis(dataset, registration.mended),
+        find_shaft_axis(dataset, registration.repaired),
     )
     grid = PAGE_GRID.for_tool(stated.tool.radius)
     record(

@@ -23,7 +23,7 @@ from palpate.app.reporting.blind_tables import (
 )
 from palpate.blind import (
     RESULTS_FILE,
-    Result,
+    CaseResult,
     all_cases,
     draw_cases,
     known_results,
@@ -146,7 +146,7 @@ def _parted(text: str | None) -> list[str] | None:
     return None if text is None else [part.strip() for part in text.split(",") if part.strip()]
 
 
-def _write(folder: Path, summary: dict[str, Any], results: Sequence[Result]) -> None:
+def _write(folder: Path, summary: dict[str, Any], results: Sequence[CaseResult]) -> None:
     from palpate.app.reporting.blind_page import blind_page
 
     write_json(folder / "summary.json", summary)
@@ -155,7 +155,7 @@ def _write(folder: Path, summary: dict[str, Any], results: Sequence[Result]) -> 
     os.replace(aside, folder / "report.html")
 
 
-def _cases(results: Sequence[Result]) -> Table:
+def _cases(results: Sequence[CaseResult]) -> Table:
     """A line for each case, and below it what was hidden and what was named: parameters need the
     whole width.
     """

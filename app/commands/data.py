@@ -91,7 +91,7 @@ def replay(
     ] = "graded",
     registration: Registered = None,
     runs: Annotated[
-        Path, typer.Option(help="Accepted registrations are looked for below this folder.")
+        Path, typer.Option(help="AcceptedRegistration registrations are looked for below this folder.")
     ] = Path("runs"),
 ) -> None:
     """Simulate one sequence as the setup states it: one equilibrium per cloud, written to an .npz
@@ -168,7 +168,7 @@ def replay(
 def _check_one(path: Path, picture: Path | None) -> None:
     from palpate.dataset import open_dataset
     from palpate.dataset.check import check_dataset
-    from palpate.measurement.phantom_drift import as_it_stood
+    from palpate.measurement.phantom_drift import align_sequences
     from palpate.registration.registration import register as relate
 
     dataset = open_dataset(path)
@@ -177,7 +177,7 @@ def _check_one(path: Path, picture: Path | None) -> None:
         dataset.validate(part(report, 0.0, 0.4))
         try:
             found = relate(dataset, part(report, 0.4, 0.6))
-            warnings = as_it_stood(dataset, found)[1].warnings
+            warnings = align_sequences(dataset, found)[1].warnings
         except RegistrationError as error:
             warnings = (error.message,)
         summary = check_dataset(

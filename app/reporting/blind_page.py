@@ -19,18 +19,18 @@ from palpate.app.reporting.blind_tables import (
     target_table,
 )
 from palpate.app.reporting.html_document import one_file, section
-from palpate.blind import Result
-from palpate.blind.parameter_errors import Said, said_of
+from palpate.blind import CaseResult
+from palpate.blind.parameter_errors import ReportedParameter, reported_parameters
 
 __all__ = ["blind_page"]
 
 
-def blind_page(summary: dict[str, Any], results: Sequence[Result]) -> str:
+def blind_page(summary: dict[str, Any], results: Sequence[CaseResult]) -> str:
     """The whole page: targets, kinds, reliability, gain, what was named for what, parameters, and
     every case.
     """
-    said = said_of(results)
-    groups: dict[str, list[Said]] = {}
+    said = reported_parameters(results)
+    groups: dict[str, list[ReportedParameter]] = {}
     for one in said:
         if not POSE.match(one.key):
             groups.setdefault(one.key, []).append(one)
@@ -79,7 +79,7 @@ _TARGETS_NOTE = "Parameter errors are medians over clear cases. A verdict in bra
 _PARAMETERS_NOTE = "Of rightly named causes. Amber: the interval as reported leaves out the truth."
 
 
-def _head(summary: dict[str, Any], results: Sequence[Result]) -> str:
+def _head(summary: dict[str, Any], results: Sequence[CaseResult]) -> str:
     right, hours = sum(one.right for one in results), summary["seconds"]["sum"] / 3600
     count = f"{right} of {len(results)} cases right · seed {summary['seed']} · {hours:.1f} hours of diagnosis"
     lines = [f"<h1>Blind suite</h1><p>{count}</p>"]

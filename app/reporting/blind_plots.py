@@ -10,7 +10,7 @@ from typing import Any
 
 from palpate.app.reporting.html_document import INK, figure, themed
 from palpate.app.reporting.quantities import SHOWN
-from palpate.blind.parameter_errors import Said
+from palpate.blind.parameter_errors import ReportedParameter
 
 __all__ = ["gain_plot", "parameter_plot", "reliability_plot"]
 
@@ -85,7 +85,7 @@ def gain_plot(removed: Sequence[float]) -> str:
     return themed(drawn)
 
 
-def parameter_plot(groups: dict[str, list[Said]]) -> str:
+def parameter_plot(groups: dict[str, list[ReportedParameter]]) -> str:
     """One panel for each `effect.parameter`: what is said against what is true, with the report's
     interval; no plot of none.
     """
@@ -110,7 +110,7 @@ def parameter_plot(groups: dict[str, list[Said]]) -> str:
     return themed(drawn)
 
 
-def _panel(axes: Any, said: Sequence[Said], factor: float) -> None:
+def _panel(axes: Any, said: Sequence[ReportedParameter], factor: float) -> None:
     ends = [factor * end for one in said for end in (one.nearest, one.value)]
     low, high = min(ends), max(ends)
     room = 0.12 * (high - low) or 0.1 * abs(high) or 1.0

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from palpate.dataset import Dataset
-from palpate.dataset.tool_motion import ContactKind, motion_of
+from palpate.dataset.tool_motion import ContactKind, describe_motion
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.setup.setup import Setup
 
@@ -17,7 +17,7 @@ __all__ = ["kinds_in", "kinds_of_pushes"]
 def kinds_in(dataset: Dataset, names: Iterable[str], setup: Setup) -> set[ContactKind]:
     """Return the kinds of motion in these sequences."""
     motions = (
-        motion_of(dataset, dataset.sequence(name), setup.phantom_from_robot) for name in names
+        describe_motion(dataset, dataset.sequence(name), setup.phantom_from_robot) for name in names
     )
     return {contact.kind for motion in motions for contact in motion.contacts}
 
@@ -31,7 +31,7 @@ def kinds_of_pushes(
     """
     kinds: dict[str, ContactKind] = {}
     for item in data:
-        contacts = motion_of(
+        contacts = describe_motion(
             dataset, dataset.sequence(item.name), setup.phantom_from_robot
         ).contacts
         if not contacts:

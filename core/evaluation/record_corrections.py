@@ -17,8 +17,8 @@ from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.evaluation.loaded_network import LoadedNetwork
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.progress import Report, silent
-from palpate.measurement.camera_model import sight_of
-from palpate.measurement.phantom_drift import as_it_stood, camera_of
+from palpate.measurement.camera_model import camera_model_for
+from palpate.measurement.phantom_drift import align_sequences, recorded_camera
 from palpate.measurement.segmentation import Cleaner, cleaner_for, find_shaft_axis, tool_poses
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import PAGE_GRID
@@ -57,7 +57,7 @@ def record_corrections(
         out: folder of the result.
         report: receives the progress.
     """
-    dataset, registration = as_it_stood(dataset, register(dataset))
+    dataset, registration = align_sequences(dataset, register(dataset))
     stated = setup_from(dataset, registration)
     corrected = _CorrectedModel(
         setup=setup_of_model(stated, model),
@@ -65,7 +65,7 @@ def record_corrections(
         network=network,
         stated=stated,
         cleaner=cleaner_for(dataset, registration),
-        shaft=find_shaft_axis(dataset, registration.mended),
+        shaft=find_shaft_axis(dataset, registration.repaired),
     )
     out.parent.mkdir(parents=True, exist_ok=True)
     aside = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
@@ -113,7 +113,7 @@ class _CorrectedModel:
             "error_corrected": side.error.astype(np.float32),
             "distance_corrected": side.distance,
             "paper_corrected": side.paper,
-            "camera_corrected": camera_of(sequence, sight_of(self.setup).pose).matrix,
+            "camera_corrected": recorded_camera(sequence, camera_model_for(self.setup).pose).matrix,
             **side.inside.arrays("corrected"),
         }
 

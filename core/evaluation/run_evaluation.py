@@ -26,7 +26,7 @@ from palpate.evaluation.motion_kinds import kinds_in, kinds_of_pushes
 from palpate.evaluation.summary_sentence import summary_sentence
 from palpate.foundation.errors import DiagnosisError, RunError
 from palpate.foundation.progress import Report, part, silent
-from palpate.measurement.phantom_drift import as_it_stood
+from palpate.measurement.phantom_drift import align_sequences
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.mesh.protocol import Meshing
 from palpate.recording.saved_model import effects_from, setup_of_model
@@ -100,12 +100,12 @@ class EvaluationData:
                 key="splits",
             )
         report(0.0, "registering robot, camera and phantom")
-        dataset, registration = as_it_stood(dataset, register(dataset))
-        stated, mended = setup_from(dataset, registration), registration.mended
+        dataset, registration = align_sequences(dataset, register(dataset))
+        stated, repaired = setup_from(dataset, registration), registration.repaired
         *_, believed = _setups(stated, spec or EvaluationSpec()).values()
-        seen_from = replace(setup_from(dataset, mended), sensor=believed.sensor)
+        seen_from = replace(setup_from(dataset, repaired), sensor=believed.sensor)
         data = observe_each(
-            dataset, tested, seen_from, mended, (TEST_GROUPS, TEST_FELT), part(report, 0.1, 1.0)
+            dataset, tested, seen_from, repaired, (TEST_GROUPS, TEST_FELT), part(report, 0.1, 1.0)
         )
         trained = kinds_in(dataset, (*dataset.config.train, *dataset.config.validation), stated)
         kinds = kinds_of_pushes(dataset, data, stated)

@@ -16,7 +16,7 @@ from typing import Self
 import numpy as np
 
 from palpate.dataset import Dataset, Sequence, open_dataset
-from palpate.dataset.accepted_registration import Accepted
+from palpate.dataset.accepted_registration import AcceptedRegistration
 from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.effects import Effect
 from palpate.effects.base import with_effects
@@ -25,7 +25,7 @@ from palpate.experiment.replayed_sequence import ReplayedSequence
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
-from palpate.measurement.phantom_drift import as_it_stood
+from palpate.measurement.phantom_drift import align_sequences
 from palpate.measurement.segmentation import Cleaner, cleaner_for, find_shaft_axis
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import REPLAY_GRID
@@ -63,7 +63,7 @@ class Experiment:
         cls,
         dataset: Dataset | Path | str,
         *,
-        accepted: Accepted | None = None,
+        accepted: AcceptedRegistration | None = None,
         report: Report = silent,
     ) -> Self:
         """Relate robot, camera and phantom of a dataset.
@@ -84,7 +84,7 @@ class Experiment:
     @classmethod
     def registered(cls, dataset: Dataset, registration: Registration) -> Self:
         """The experiment of a dataset whose registration is known already."""
-        aligned, registration = as_it_stood(dataset, registration)
+        aligned, registration = align_sequences(dataset, registration)
         return cls(aligned, registration, setup_from(aligned, registration))
 
     @property
@@ -110,7 +110,7 @@ class Experiment:
     @cached_property
     def shaft(self) -> FloatArray | None:
         """Direction (3,) of the tool's shaft in the tool's frame; None where no cloud shows one."""
-        return find_shaft_axis(self.dataset, self.registration.mended)
+        return find_shaft_axis(self.dataset, self.registration.repaired)
 
     def with_effects(self, *effects: Effect) -> Self:
         """The same experiment with these effects added to its model.
@@ -213,7 +213,7 @@ def _thinned(times: FloatArray) -> FloatArray:
 
 
 def register(
-    dataset: Dataset | Path | str, *, accepted: Accepted | None = None, report: Report = silent
+    dataset: Dataset | Path | str, *, accepted: AcceptedRegistration | None = None, report: Report = silent
 ) -> Experiment:
     """Relate robot, camera and phantom of a dataset; see `Experiment.of`."""
     return Experiment.of(dataset, accepted=accepted, report=report)

@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
-from palpate.measurement.camera_model import sight_of
+from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.surface_gaps import Surface
 from palpate.mesh.protocol import Meshing
 from palpate.recording.interior_fields import InteriorFields
@@ -71,7 +71,7 @@ class InteractiveReplay:
         self._replay = Replay(setup, grid, _TOLERANCE)
         self._surface, self._camera = (
             Surface.of(setup, VERTEX_SPACING),
-            np.asarray(sight_of(setup).pose.matrix),
+            np.asarray(camera_model_for(setup).pose.matrix),
         )
         self._last: Equilibrium = self._replay.free
         self._begun = time.monotonic()

@@ -14,9 +14,9 @@ from palpate.dataset import Sequence as Recording
 from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
-from palpate.measurement.camera_model import sight_of
+from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.metrics import paper_distance
-from palpate.measurement.phantom_drift import camera_of
+from palpate.measurement.phantom_drift import recorded_camera
 from palpate.measurement.segmentation import Cleaner, tool_poses
 from palpate.measurement.surface_gaps import Gaps, Surface, gaps
 from palpate.measurement.touch_correction import touch_correction
@@ -87,7 +87,7 @@ def compare_with_clouds(
     Frames at rest, which are half of them, need not be looked at again where the `other` setup has
     looked at the same block from the same place.
     """
-    surface, sight = Surface.of(setup, VERTEX_SPACING), sight_of(setup)
+    surface, sight = Surface.of(setup, VERTEX_SPACING), camera_model_for(setup)
     known = other[1] if other is not None and _looks_alike(other[0], setup) else None
     moved, errors, distance, paper = [], [], [], []
     for number, (frame, cloud) in enumerate(zip(frames, clouds, strict=True)):
@@ -119,7 +119,7 @@ def compare_with_clouds(
 
 def _looks_alike(one: Setup, other: Setup) -> bool:
     """Whether an untouched block and a cloud look the same in both setups."""
-    return sight_of(one).same(sight_of(other)) and (one.box, one.registered) == (
+    return camera_model_for(one).same(camera_model_for(other)) and (one.box, one.registered) == (
         other.box,
         other.registered,
     )
@@ -186,8 +186,8 @@ def record(
         paper_raw=before.paper,
         paper_extended=after.paper,
         noise_floor=np.array(float(np.nanmean(floor))),
-        camera_raw=camera_of(sequence, sight_of(stated).pose).matrix,
-        camera_extended=camera_of(sequence, sight_of(found).pose).matrix,
+        camera_raw=recorded_camera(sequence, camera_model_for(stated).pose).matrix,
+        camera_extended=recorded_camera(sequence, camera_model_for(found).pose).matrix,
         outcome=np.maximum(before.outcome, after.outcome),
         **{
             f"{key}_{model}": getattr(side, key)

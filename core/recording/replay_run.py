@@ -18,7 +18,7 @@ from palpate.effects.base import with_effects
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.processes import ProcessPool
 from palpate.foundation.progress import Report, silent
-from palpate.measurement.phantom_drift import as_it_stood
+from palpate.measurement.phantom_drift import align_sequences
 from palpate.measurement.segmentation import cleaner_for, find_shaft_axis
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.recording.record_sequence import record
@@ -57,12 +57,12 @@ def replay_into(
             key="sequences",
         )
     report(0.0, "relating robot, camera and phantom")
-    dataset, registration = as_it_stood(dataset, register(dataset))
+    dataset, registration = align_sequences(dataset, register(dataset))
     stated = setup_from(dataset, registration)
     found = with_effects(stated, effects) if effects else stated
     cleaner, shaft = (
         cleaner_for(dataset, registration),
-        find_shaft_axis(dataset, registration.mended),
+        find_shaft_axis(dataset, registration.repaired),
     )
     grid = PAGE_GRID.for_tool(stated.tool.radius)
     (out / "replays").mkdir(parents=True)

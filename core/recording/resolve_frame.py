@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 
 from palpate.dataset import open_dataset
-from palpate.dataset.accepted_registration import Accepted
+from palpate.dataset.accepted_registration import AcceptedRegistration
 from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.effects import DIAGNOSED, Effect
 from palpate.effects.base import with_effects
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RunError
-from palpate.measurement.camera_model import sight_of
-from palpate.measurement.phantom_drift import as_it_stood
+from palpate.measurement.camera_model import camera_model_for
+from palpate.measurement.phantom_drift import align_sequences
 from palpate.measurement.segmentation import cleaner_for, find_shaft_axis, tool_poses
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import PAGE_GRID
@@ -82,14 +82,14 @@ class FrameResolver:
     ) -> None:
         registered = extended.get("registration")
         dataset = open_dataset(folder).registered(
-            Accepted.from_json(registered) if registered else None
+            AcceptedRegistration.from_json(registered) if registered else None
         )
         if isinstance(dataset.geometry, Shape) or not len(dataset.sequence(sequence)):
             raise RunError(
                 f"{sequence} has no clouds of a block, so that there is nothing to compare with",
                 sequence=sequence,
             )
-        dataset, registration = as_it_stood(dataset, register(dataset))
+        dataset, registration = align_sequences(dataset, register(dataset))
         self.stated = setup_from(dataset, registration)
         self.tuned = with_fitted_values(self.stated, extended)
         self._sequence = dataset.sequence(sequence)
@@ -97,7 +97,7 @@ class FrameResolver:
         self._times = np.asarray(self._sequence.cloud_times)[self._clouds]
         self._cleaner, self._shaft = (
             cleaner_for(dataset, registration),
-            find_shaft_axis(dataset, registration.mended),
+            find_shaft_axis(dataset, registration.repaired),
         )
         self._grid = PAGE_GRID.for_tool(self.stated.tool.radius)
         self._cleaned: dict[int, FloatArray] = {}
@@ -150,7 +150,7 @@ class FrameResolver:
             setup.tool.radius,
             solved.outcome.value,
             not side.outcome[0],
-            np.asarray(sight_of(setup).pose.matrix),
+            np.asarray(camera_model_for(setup).pose.matrix),
             side.inside,
         )
 

@@ -13,7 +13,7 @@ from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
-from palpate.measurement.phantom_drift import as_it_stood
+from palpate.measurement.phantom_drift import align_sequences
 from palpate.measurement.segmentation import cleaner_for, find_shaft_axis, tool_poses
 from palpate.registration.registration import register, setup_from
 from palpate.setup.box import CLEARANCE, distance_to_block
@@ -86,7 +86,7 @@ def read_sweep_data(
                 key="sequences",
             )
     report(0.0, "registering robot, camera and phantom")
-    dataset, registration = as_it_stood(dataset, register(dataset))
+    dataset, registration = align_sequences(dataset, register(dataset))
     setup = setup_from(dataset, registration)
     cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration)
     sequences = []

@@ -14,7 +14,7 @@ from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import PalpateError, SolveError
-from palpate.measurement.camera_model import sight_of
+from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.metrics import paper_distance
 from palpate.measurement.patch_averages import patch_means
 from palpate.measurement.surface_gaps import Surface, gaps
@@ -94,7 +94,7 @@ def _sums(
         times=times,
         tolerance=TOLERANCE,
     )
-    surface, sight = Surface.of(setup), sight_of(setup)
+    surface, sight = Surface.of(setup), camera_model_for(setup)
     rows = np.zeros((len(frames), 4))
     for number, (frame, cloud) in enumerate(zip(frames, sequence.clouds, strict=True)):
         if frame.outcome is not Outcome.CONVERGED:

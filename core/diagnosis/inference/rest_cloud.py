@@ -17,7 +17,7 @@ from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.camera_error_model import CameraErrors, camera_errors
 from palpate.diagnosis.inference.evidence import Block
 from palpate.foundation.arrays import FloatArray
-from palpate.measurement.camera_model import sight_of
+from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.patch_averages import patch_means
 from palpate.measurement.segmentation import Cleaner
 from palpate.measurement.surface_gaps import Surface, gaps
@@ -54,7 +54,7 @@ class StaticChannel:
         """From the raw rest cloud (n, 3) [m], camera frame, under the stated setup."""
         clean = cleaner.clean(cloud)
         table, height, scatter = _table_cells(clean.table_points)
-        surface, sight = Surface.of(setup), sight_of(setup, reference=True)
+        surface, sight = Surface.of(setup), camera_model_for(setup, reference=True)
         points = sight.place(cloud[clean.indices])
         seen = gaps(
             points, sight.pose.translation, rest(setup, grid), surface, lowest=cleaner.lowest
@@ -114,8 +114,8 @@ class StaticChannel:
 
         What was measured lies, under the stated setup, about where its block and the table are.
         """
-        rays = sight_of(stated, reference=True).read(np.concatenate([self.centres, self.table]))
-        gap = sight_of(setup, reference=True).place(rays)
+        rays = camera_model_for(stated, reference=True).read(np.concatenate([self.centres, self.table]))
+        gap = camera_model_for(setup, reference=True).place(rays)
         gap[: len(self.centres)] -= rest(setup, grid).move(Surface.of(setup).own(self.centres))
         return np.concatenate(
             [

@@ -63,7 +63,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (run / "replays").mkdir(parents=True)
     cleaner, shaft = (
         cleaner_for(dataset, registration),
-        find_shaft_axis(dataset, registration.mended),
+        find_shaft_axis(dataset, registration.repaired),
     )
     grid = PAGE_GRID.for_tool(stated.tool.radius)
     record(

@@ -17,13 +17,13 @@ from blind_results import cause, result
 from palpate.app.cli import main
 from palpate.app.reporting.blind_page import blind_page
 from palpate.app.reporting.blind_tables import figure_text, hidden_text, named_text, target_text
-from palpate.blind import Result, all_cases, draw_cases, summary_of
+from palpate.blind import CaseResult, all_cases, draw_cases, summary_of
 from palpate.blind.case_results import add_result
 from palpate.blind.proportions import median_of, rate
 from palpate.foundation.source_digest import source_digest
 
 
-def lump(name: str, off: float) -> Result:
+def lump(name: str, off: float) -> CaseResult:
     named = cause("stiff_inclusion", 0.97, x=(0.01 + off, 0.009 + off, 0.011 + off))
     return result(
         "clear",

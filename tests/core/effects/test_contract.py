@@ -16,7 +16,7 @@ from palpate.effects.heterogeneity import Anisotropy
 from palpate.effects.sensor import CameraRegistration, TimeOffset
 from palpate.effects.tool import ToolOffset
 from palpate.foundation.errors import EffectError
-from palpate.measurement.camera_model import sight_of
+from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.box_mesh import GridSpec
 from palpate.replay.replay import Equilibrium, replay
@@ -181,7 +181,7 @@ def test_neutral_changes_nothing_in_a_replay(effect, baseline):
             frame.force, wanted.force, rtol=1e-6, atol=1e-9
         )
     assert setup.sensor.time_offset == SETUP.sensor.time_offset
-    assert sight_of(setup).same(sight_of(SETUP)) and np.array_equal(
+    assert camera_model_for(setup).same(camera_model_for(SETUP)) and np.array_equal(
         touch_correction(setup, GRID).matrix, np.eye(4)
     )
 
@@ -193,7 +193,7 @@ def test_example_changes_replay_or_sensor(effect):
     if effect.enters is Slot.SENSOR:
         assert _setup_as_text(replace(setup, sensor=SETUP.sensor)) == _setup_as_text(SETUP)
         assert _setup_as_text(setup) != _setup_as_text(SETUP)
-        assert effect is TimeOffset or not sight_of(setup).same(sight_of(SETUP))
+        assert effect is TimeOffset or not camera_model_for(setup).same(camera_model_for(SETUP))
         return
     way = side if effect.enters is Slot.SUPPORT else RELEASE if setup.material.has_history else POKE
     found, without = (

@@ -11,7 +11,7 @@ from palpate.dataset import Kinematics, Sequence
 from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.foundation.errors import Cancelled, CorrectionError, RunError
 from palpate.foundation.frames import Transform
-from palpate.measurement.camera_model import sight_of
+from palpate.measurement.camera_model import camera_model_for
 from palpate.mesh.box_mesh import GridSpec
 from palpate.replay.replay import replay
 
@@ -29,7 +29,7 @@ def test_samples_hold_what_the_replay_and_the_camera_say(bench):
         assert np.allclose(batch.tool[0, :3], centres[number], atol=1e-6)
         assert np.allclose(batch.tool[0, 10:], frames[number].force, atol=1e-5)
         count = int(batch.count[0, 1])
-        cloud = sight_of(recorder.setup).place(sequence.cloud(number)).astype(np.float32)
+        cloud = camera_model_for(recorder.setup).place(sequence.cloud(number)).astype(np.float32)
         kept = {tuple(point) for point in batch.points[0, :count].numpy().round(6)}
         assert kept <= {tuple(point) for point in cloud.round(6)}
         assert batch.points[0, count:].isnan().all()

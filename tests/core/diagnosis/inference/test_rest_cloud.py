@@ -13,7 +13,7 @@ from palpate.effects.geometry import GeometryScale
 from palpate.effects.sensor import DepthBias
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
-from palpate.measurement.camera_model import sight_of
+from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.segmentation import Cleaner
 from palpate.registration.registration import small_motion
 from palpate.replay.replay import rest
@@ -32,7 +32,7 @@ def _cloud(truth: Setup, seed: int) -> FloatArray:
     random = np.random.default_rng(seed)
     table = random.uniform(-0.09, 0.09, (12000, 3)) * [1.0, 1.0, 0.0]
     table = table[(np.abs(table[:, :2]) > np.array(SIZE[:2]) / 2 + 0.008).any(axis=1)]
-    table = sight_of(truth).read(table)
+    table = camera_model_for(truth).read(table)
     away = table / np.linalg.norm(table, axis=1)[:, None]
     table = table + away * (NOISE * random.standard_normal(len(table)))[:, None]
     return np.concatenate([seen_points(rest(truth, GRID), 24000, NOISE, seed, truth), table])

@@ -19,7 +19,7 @@ from palpate.diagnosis.report.report import verdict_of
 from palpate.diagnosis.search import candidates
 from palpate.diagnosis.search.forward_selection import search as find_causes
 from palpate.effects.tool import LandmarkMismatch
-from palpate.measurement.camera_model import sight_of
+from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.segmentation import Cleaner
 from palpate.measurement.touch_correction import touched_places
 from palpate.mesh.box_mesh import GridSpec
@@ -67,7 +67,7 @@ def _still(setup: Setup) -> Still:
         side = random.uniform(low, high, (6000, 3))
         side[:, axis] = end[axis]
         places.append(side)
-    cloud = sight_of(STATED).read(np.concatenate(places))
+    cloud = camera_model_for(STATED).read(np.concatenate(places))
     cloud += (
         NOISE
         * random.standard_normal((len(cloud), 1))
