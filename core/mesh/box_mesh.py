@@ -1,4 +1,4 @@
-"""A block filled with hexahedra on a structured grid, even or graded towards a focus.
+"""Structured meshes of a block: hexahedra on an even grid, or graded towards a focus.
 
 Grading matters more than the number of nodes: the contact zone of a 5 mm ball is a few millimetres
 wide, and on an even 13x5x5 grid it lies within one element.
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
 __all__ = ["BoxMesh", "GridSpec", "box_mesh", "focus_of", "meshing_for", "with_midpoints"]
 
 _FOCUS_STEP = 2e-4
+"""Step to which the focus is rounded [m], so that neighbouring frames share a mesh."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class GridSpec:
-    """How a block is meshed.
+    """Mesh of a block by the number of nodes.
 
     Attributes:
         nodes: number of nodes along x, y, z.
-        spacing: None for an even grid, else the distance of the nodes [m] at the focus of a graded
-            one.
-        order: of the shape functions, 1 (8 nodes an element) or 2 (27 nodes, which takes an odd
+        spacing: distance of the nodes [m] at the focus of a graded grid; None for an even grid.
+        order: of the shape functions: 1 (8 nodes an element) or 2 (27 nodes, which needs an odd
             number of nodes along each axis).
     """
 
@@ -56,7 +56,8 @@ class GridSpec:
 
         if self.order not in (1, 2) or any((count - 1) % self.order for count in self.nodes):
             raise MeshError(
-                f"a grid is of order 1, or of order 2 with odd numbers of nodes; got order {self.order} and {self.nodes}",
+                "a grid is of order 1, or of order 2 with odd numbers of nodes; got order "
+                f"{self.order} and {self.nodes}",
                 nodes=list(self.nodes),
                 order=self.order,
             )
@@ -73,7 +74,7 @@ class GridSpec:
 
     @classmethod
     def parse(cls, text: str) -> GridSpec:
-        """From `13x5x5`."""
+        """Parse `13x5x5`."""
         try:
             nx, ny, nz = (int(part) for part in text.lower().split("x"))
         except ValueError:
@@ -83,7 +84,7 @@ class GridSpec:
         return cls(nodes=(nx, ny, nz))
 
     def mesh(self, setup: Setup, centre: FloatArray) -> BoxMesh:
-        """The grid refined towards the surface point next to the tool."""
+        """The grid refined towards the surface point nearest to the tool."""
         size = setup.box.size
         if self.spacing is None:
             return _mesh(size, self, (0.0, 0.0, size[2]))
@@ -92,15 +93,15 @@ class GridSpec:
 
 
 def focus_of(size: tuple[float, float, float], centre: FloatArray) -> FloatArray:
-    """The surface point (3,) [m] next to a tool's centre, in small steps so that neighbouring
-    frames share it.
+    """The surface point (3,) [m] nearest to a tool's centre.
+
+    It moves in small steps, so that neighbouring frames share it.
     """
     half = np.array([size[0] / 2, size[1] / 2])
     low, high = np.append(-half, 0.0), np.append(half, size[2])
     focus = np.clip(np.round(centre / _FOCUS_STEP) * _FOCUS_STEP, low, high)
-    if np.all(
-        (focus > low) & (focus < high)
-    ):  # a centre pushed below the surface: the nearest side, the top if in doubt
+    # A centre pushed below the surface has its focus on the nearest side, the top if in doubt.
+    if np.all((focus > low) & (focus < high)):
         gaps = np.concatenate([focus - low, high - focus])
         gaps[2] = np.inf
         side = int(np.argmin(gaps))
@@ -109,12 +110,12 @@ def focus_of(size: tuple[float, float, float], centre: FloatArray) -> FloatArray
 
 
 def _quadratic(local: FloatArray) -> list[FloatArray]:
-    """The three quadratic Lagrange polynomials on [0, 1] at these places."""
+    """Values of the three quadratic Lagrange polynomials on [0, 1]."""
     return [(1 - local) * (1 - 2 * local), 4 * local * (1 - local), local * (2 * local - 1)]
 
 
 def with_midpoints(ends: FloatArray) -> FloatArray:
-    """Coordinates with the middle of each interval between them."""
+    """Insert the midpoint of each interval between coordinates."""
     return np.insert(ends, np.arange(1, len(ends)), (ends[1:] + ends[:-1]) / 2)
 
 
@@ -124,9 +125,9 @@ class BoxMesh:
 
     Attributes:
         axes: node coordinates along x, y, z [m], phantom frame.
-        focus: where they are closest (3,) [m], on a node or, where an axis has too few, between
-            two; the same place for all even grids of one block.
-        order: of the shape functions, 1 or 2; with 2 every second node lies midway between its
+        focus: the point of the finest mesh (3,) [m]; on a node, or between two if an axis has too
+            few; the same point for all even grids of one block.
+        order: of the shape functions, 1 or 2; with 2 every second node is the midpoint of its
             neighbours.
     """
 
@@ -135,14 +136,12 @@ class BoxMesh:
     order: int = 1
 
     def scaled(self, factors: FloatArray) -> BoxMesh:
-        """The same hexahedra in a block whose lengths are these times as long (3,) [1]."""
+        """The same hexahedra in a block whose edges are multiplied by these factors (3,) [1]."""
         x, y, z = (axis * factor for axis, factor in zip(self.axes, factors, strict=True))
         return BoxMesh((x, y, z), self.focus * factors, self.order)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Only what it was made of travels between processes; the rest is made again when asked
-        for.
-        """
+        """Pickle only the defining fields; everything else is computed again on demand."""
         return {"axes": self.axes, "focus": self.focus, "order": self.order}
 
     @cached_property
@@ -164,7 +163,7 @@ class BoxMesh:
 
     @cached_property
     def _steps(self) -> list[slice]:
-        """Along one axis, the first, second, ... node of every element."""
+        """Slices that select the first, second, ... node of every element along one axis."""
         return [
             slice(shift, shift - self.order or None, self.order) for shift in range(self.order + 1)
         ]
@@ -179,8 +178,9 @@ class BoxMesh:
 
     @cached_property
     def _sides(self) -> dict[str, tuple[IntArray, bool]]:
-        """Node numbers of each side in rows and columns, and whether rows run against the outward
-        turn.
+        """Node numbers of each side in rows and columns, and whether its rows must be reversed.
+
+        With reversed rows, the product of rows and columns points outwards.
         """
         n = self._numbers
         return {
@@ -194,8 +194,9 @@ class BoxMesh:
 
     @cached_property
     def element_sides(self) -> dict[str, IntArray]:
-        """Nodes (f, 4) or (f, 9) of the elements' sides, row by row; along the rows times across
-        them points outwards.
+        """Nodes (f, 4) or (f, 9) of the elements' sides, row by row.
+
+        The cross product of the directions along and across the rows points outwards.
         """
 
         def patches(grid: IntArray, flip: bool) -> IntArray:
@@ -208,8 +209,8 @@ class BoxMesh:
 
     @cached_property
     def faces(self) -> dict[str, IntArray]:
-        """Quadrilaterals (f, 4) of neighbouring nodes on each side, turning counter-clockwise seen
-        from outside.
+        """Quadrilaterals (f, 4) of neighbouring nodes on each side, counter-clockwise from
+        outside.
         """
 
         def quads(grid: IntArray, flip: bool) -> IntArray:
@@ -221,7 +222,7 @@ class BoxMesh:
 
     @cached_property
     def free_surface(self) -> IntArray:
-        """(f, 4) quadrilaterals of the top and the four sides."""
+        """Quadrilaterals (f, 4) of the top and the four sides."""
         return np.concatenate([self.faces[side] for side in ("+z", "-y", "+y", "-x", "+x")])
 
     @cached_property
@@ -231,8 +232,9 @@ class BoxMesh:
 
     @cached_property
     def near_focus(self) -> IntArray:
-        """Nodes (k,) of the free surface at most two elements from the focus; none of an even grid,
-        which follows no tool.
+        """Nodes (k,) of the free surface at most two elements from the focus.
+
+        An even grid has none, because it does not follow the tool.
         """
         if all(np.allclose(np.diff(axis), axis[1] - axis[0]) for axis in self.axes):
             return np.empty(0, dtype=np.int64)
@@ -248,12 +250,13 @@ class BoxMesh:
 
     @property
     def connectivity(self) -> Connectivity:
-        """Shared by all grids of this shape and order."""
+        """Connectivity, shared by all grids of this shape and order."""
         return _connectivity(self.shape, self.order)
 
     def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Elements' nodes and shape functions (m, a) at rest positions (m, 3) [m]; outside is moved
-        to the block.
+        """Find elements' nodes and shape functions (m, a) at rest positions (m, 3) [m].
+
+        Points outside are moved to the surface of the block.
         """
         first, along = (
             np.empty((3, len(points)), dtype=np.int64),
@@ -275,13 +278,13 @@ class BoxMesh:
         ends = self.axes[axis][:: self.order]
         index = np.clip(np.searchsorted(ends, at, side="right") - 1, 0, len(ends) - 2)
         local = (at - ends[index]) / (ends[index + 1] - ends[index])
-        found = np.zeros((len(at), len(self.axes[axis])))
+        shapes = np.zeros((len(at), len(self.axes[axis])))
         for step, values in enumerate([1 - local, local] if self.order == 1 else _quadratic(local)):
-            found[np.arange(len(at)), index * self.order + step] = values
-        return found
+            shapes[np.arange(len(at)), index * self.order + step] = values
+        return shapes
 
     def interpolate(self, field: FloatArray, points: FloatArray) -> FloatArray:
-        """A nodal field (n, c) at rest positions (m, 3) [m]."""
+        """Interpolate a nodal field (n, c) at rest positions (m, 3) [m]."""
         nodes, weights = self.locate(points)
         return weighted_nodes(nodes, weights, field)
 
@@ -294,8 +297,8 @@ def box_mesh(
     Args:
         size: edge lengths [m].
         grid: nodes along the axes, and the grading.
-        focus: (3,) point [m] towards which a graded grid is refined; the middle of the top when
-            left out.
+        focus: (3,) point [m] towards which a graded grid is refined; the middle of the top by
+            default.
     """
     lows, highs = (-size[0] / 2, -size[1] / 2, 0.0), (size[0] / 2, size[1] / 2, size[2])
     ends = [(count - 1) // grid.order + 1 for count in grid.nodes]
@@ -315,8 +318,9 @@ def box_mesh(
 
 
 def meshing_for(setup: Setup, grid: Meshing) -> Meshing:
-    """What a replay is meshed with: this, or the even grid of trilinear hexahedra that the setup
-    asks for in its place.
+    """The mesh specification of a replay: the given one, unless the setup has an element size.
+
+    An element size stands for an even grid of trilinear hexahedra.
     """
     if setup.element_size is None:
         return grid

@@ -1,15 +1,13 @@
-"""Reference elements: shape functions, quadrature, and the pressures that keep each of them free of
-volumetric locking.
+"""Reference elements: shape functions, quadrature, and pressures that avoid volumetric locking.
 
-The volumetric energy sees the volume change J only through its projection on a few polynomials per
-element: a constant for trilinear hexahedra (mean dilatation: Nagtegaal, Parks and Rice 1974), and
-for quadratic elements as many as the pair stays stable with (Q2/P1 and P2/P0: Sussman and Bathe
-1987; Boffi, Brezzi and Fortin 2013, ch. 8). For tetrahedra the test of Chapelle and Bathe (1993) on
-a cube clamped all round, 191 to 805 of Gmsh's elements, bears that out: the inf-sup constant of
-P2/P0 stays at 0.04 to
-0.08, whereas of P2/P1's pressures, four per element, 40 to 50 % are spurious. The price: a pressure
-that changes within an element is not resisted, so that a beam two elements high bends 4 to 6 % too
-far, and one of four elements 1 %.
+The volumetric energy depends on the volume change J only through its projection on a few
+polynomials per element: a constant for trilinear hexahedra (mean dilatation: Nagtegaal, Parks and
+Rice 1974), and for quadratic elements as many as keep the pair stable (Q2/P1 and P2/P0: Sussman and
+Bathe 1987; Boffi, Brezzi and Fortin 2013, ch. 8). Measured for tetrahedra by the test of Chapelle
+and Bathe (1993) on a cube clamped all round, 191 to 805 of Gmsh's elements: the inf-sup constant of
+P2/P0 stays at 0.04 to 0.08, whereas 40 to 50 % of P2/P1's pressures, four per element, are
+spurious. The cost: a pressure that changes within an element is not resisted, so that a beam two
+elements high bends 4 to 6 % too far, and one of four elements 1 %.
 """
 
 from __future__ import annotations
@@ -25,9 +23,10 @@ from numba import njit
 from palpate.foundation.arrays import FloatArray
 
 LANES = 4
-"""Numbers of double precision in a vector of the processor."""
+"""Double-precision numbers in a vector register of the processor."""
 _DENSE = 8
-"""Points along each edge of a hexahedron's dense side: none further apart than a fifth of it."""
+"""Quadrature points along each edge of a hexahedron's dense side: no two neighbours are further
+apart than a fifth of the edge."""
 
 __all__ = [
     "EDGES",
@@ -45,14 +44,18 @@ __all__ = [
 ]
 
 EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
-"""Corners of a tetrahedron between which its nodes 4 to 9 lie; the first three are those of a
+"""Corner pairs of a tetrahedron between which its nodes 4 to 9 lie; the first three are those of a
 triangle, for its nodes 3 to 5."""
 
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """A side of an element: shape functions (p, b) and their gradients (p, b, 2) at quadrature
-    points with these weights (p,).
+    """A side of an element.
+
+    Attributes:
+        shapes: (p, b) shape functions at the quadrature points.
+        gradients: (p, b, 2) their gradients.
+        weights: (p,).
     """
 
     shapes: FloatArray
@@ -64,14 +67,17 @@ class Face:
 class Element:
     """A reference element.
 
+    A hexahedron's local node numbers grow along x, then y, then z; a tetrahedron's corners come
+    before the midpoints of its EDGES.
+
     Attributes:
-        shapes, gradients: (q, a) and (q, a, 3), of the shape functions at the quadrature points; a
-            hexahedron's local node numbers grow along x, then y, then z, a tetrahedron's corners
-            come before the middles of its EDGES.
+        shapes: (q, a) shape functions at the quadrature points.
+        gradients: (q, a, 3) their gradients.
         weights: (q,).
         pressures: (q, m) polynomials.
         face: its side.
-        dense_face: the same with points so close that no tool worth the name fits between them.
+        dense_face: its side with quadrature points so close that no realistic tool fits between
+            them.
     """
 
     shapes: FloatArray
@@ -88,12 +94,12 @@ class Quadrature:
 
     Attributes:
         slopes: (e, q, 3, w) gradients of the nodes' shape functions [1/m], one row for each axis,
-            with zeros at its end: whole vectors of LANES numbers fill it, so that a loop over the
-            nodes is twice as fast.
+            padded with zeros to whole vectors of LANES numbers; a loop over the nodes is twice as
+            fast so.
         weights: (e, q) [m^3].
         pressures: (e, q, m), orthonormal.
         places: (e, q, 3) [m].
-        nodes: of an element.
+        nodes: number of nodes of an element.
     """
 
     slopes: FloatArray
@@ -104,18 +110,19 @@ class Quadrature:
 
     @cached_property
     def gradients(self) -> FloatArray:
-        """The same (e, q, a, 3) [1/m]."""
+        """Gradients of the shape functions (e, q, a, 3) [1/m], without the padding."""
         return np.ascontiguousarray(self.slopes[..., : self.nodes].swapaxes(2, 3))
 
     @cached_property
     def edges(self) -> FloatArray:
-        """Of the volume that each point stands for (e, q) [m]."""
+        """Edge length of the volume that each point represents (e, q) [m]."""
         return np.asarray(np.cbrt(self.weights))
 
 
 def _lagrange(order: int, at: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Values and slopes (p, order + 1) of the Lagrange polynomials on [-1, 1] at these places
-    (p,)."""
+    """Values and derivatives (p, order + 1) of the Lagrange polynomials on [-1, 1] at
+    points (p,).
+    """
     if order == 1:
         return np.stack([(1 - at) / 2, (1 + at) / 2], axis=1), np.tile([-0.5, 0.5], (len(at), 1))
     values = np.stack([at * (at - 1) / 2, 1 - at**2, at * (at + 1) / 2], axis=1)
@@ -123,7 +130,7 @@ def _lagrange(order: int, at: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _square(order: int, count: int) -> Face:
-    """Tensor-product side; node numbers grow along its rows, then across them."""
+    """Make a tensor-product side; node numbers grow along its rows, then across them."""
     places, weights = np.polynomial.legendre.leggauss(count)
     s, t = (part.ravel() for part in np.meshgrid(places, places, indexing="ij"))
     (along, d_along), (across, d_across) = _lagrange(order, s), _lagrange(order, t)
@@ -143,8 +150,9 @@ def _square(order: int, count: int) -> Face:
 
 
 def _hexahedron(order: int, count: int, linear_pressure: bool, faces: tuple[Face, Face]) -> Element:
-    """Tensor-product hexahedron with count^3 Gauss points; node and point numbers grow along x,
-    then y, then z.
+    """Make a tensor-product hexahedron with count^3 Gauss points.
+
+    Node and point numbers grow along x, then y, then z.
     """
     places, weights = np.polynomial.legendre.leggauss(count)
     z, y, x = (part.ravel() for part in np.meshgrid(places, places, places, indexing="ij"))
@@ -164,12 +172,14 @@ def _hexahedron(order: int, count: int, linear_pressure: bool, faces: tuple[Face
 HEX8 = _hexahedron(1, 2, False, (_square(1, 3), _square(1, _DENSE)))
 HEX27 = _hexahedron(2, 3, True, (_square(2, 4), _square(2, _DENSE)))
 HEXAHEDRA = {1: HEX8, 2: HEX27}
-"""By the order of the shape functions."""
+"""Hexahedra by the order of the shape functions."""
 
 
 def shapes_of(shares: FloatArray) -> FloatArray:
-    """Shape functions (p, 6) of a triangle or (p, 10) of a tetrahedron at barycentric coordinates
-    (p, 3) or (p, 4).
+    """Shape functions (p, 6) of a triangle or (p, 10) of a tetrahedron.
+
+    Args:
+        shares: (p, 3) or (p, 4) barycentric coordinates.
     """
     edges = EDGES[: 3 if shares.shape[1] == 3 else 6]
     return np.concatenate(
@@ -179,8 +189,9 @@ def shapes_of(shares: FloatArray) -> FloatArray:
 
 
 def _quadratic_gradients(shares: FloatArray) -> FloatArray:
-    """Their gradients (p, a, d) by the barycentric coordinates after the first, on which the
-    reference element is drawn.
+    """Gradients (p, a, d) of the same by the barycentric coordinates after the first.
+
+    These coordinates span the reference element.
     """
     count = shares.shape[1]
     slopes = np.concatenate([-np.ones((1, count - 1)), np.eye(count - 1)])
@@ -193,8 +204,9 @@ def _quadratic_gradients(shares: FloatArray) -> FloatArray:
 
 
 def _triangle(parts: int = 1) -> Face:
-    """Side of a quadratic tetrahedron: Dunavant's (1985) twelve points, exact to degree six, in
-    each of parts^2 triangles.
+    """Make the side of a quadratic tetrahedron.
+
+    It has Dunavant's (1985) twelve points, exact to degree six, in each of parts^2 triangles.
     """
     orbits = {
         (0.501426509658179, 0.249286745170910, 0.249286745170910): 0.116786275726379,
@@ -217,8 +229,8 @@ def _triangle(parts: int = 1) -> Face:
 
 
 def _split(parts: int) -> list[FloatArray]:
-    """Barycentric coordinates (3, 3) of the corners of the equal triangles that parts per edge make
-    of one.
+    """Barycentric coordinates (3, 3) of the corners of each of parts^2 equal triangles that fill
+    one.
     """
     found = []
     for i in range(parts):
@@ -230,8 +242,10 @@ def _split(parts: int) -> list[FloatArray]:
 
 
 def _tetrahedron(face: Face, dense_face: Face) -> Element:
-    """Four points, exact to degree two: all that elements with straight edges need at small
-    strain."""
+    """Make a quadratic tetrahedron with four points, exact to degree two.
+
+    That is enough for elements with straight edges at small strain.
+    """
     far = (5 + 3 * np.sqrt(5)) / 20
     shares = np.full((4, 4), (1 - far) / 3) + (far - (1 - far) / 3) * np.eye(4)
     return Element(
@@ -248,16 +262,21 @@ TET10 = _tetrahedron(_triangle(), _triangle(3))
 
 
 def quadrature(element: Element, corners: FloatArray) -> Quadrature:
-    """Gradients, weights and pressures at the quadrature points of elements with these nodes (e, a,
-    3) [m].
+    """Compute the quadrature of elements with these nodes.
+
+    Args:
+        element: reference element.
+        corners: (e, a, 3) nodes [m].
     """
     points, nodes = element.shapes.shape
-    # By products of matrices: 3.5 times as fast as einsum, in every frame whose mesh is another.
+    # Matrix products are 3.5 times as fast as einsum; this runs in every frame with a new mesh.
     flat = element.gradients.transpose(0, 2, 1).reshape(-1, nodes) @ corners.transpose(
         1, 0, 2
     ).reshape(nodes, -1)
     jacobian = np.ascontiguousarray(flat.reshape(points, 3, len(corners), 3).transpose(2, 0, 1, 3))
-    slopes, volumes = _on_bodies(element.gradients, jacobian, (nodes + LANES - 1) // LANES * LANES)
+    slopes, volumes = _mapped_gradients(
+        element.gradients, jacobian, (nodes + LANES - 1) // LANES * LANES
+    )
     weights = volumes * element.weights
     roots = np.sqrt(weights)[:, :, None]
     pressures = np.linalg.qr(roots * element.pressures)[0] / roots
@@ -268,12 +287,18 @@ def quadrature(element: Element, corners: FloatArray) -> Quadrature:
 
 
 @njit(cache=True)
-def _on_bodies(gradients: Any, jacobians: Any, wide: int) -> tuple[Any, Any]:
-    """Slopes (e, q, 3, wide) [1/m] of elements whose reference has gradients (q, a, 3), and their
-    Jacobians' determinants (e, q).
+def _mapped_gradients(gradients: Any, jacobians: Any, wide: int) -> tuple[Any, Any]:
+    """Gradients of the shape functions of elements, and the determinants of their Jacobians.
 
-    The `jacobians` (e, q, 3, 3) have the reference's axes as rows. LAPACK's inverses and
-    determinants of 3 x 3, one by one, take five times as long.
+    LAPACK's inverses and determinants of 3 x 3 matrices, one by one, take five times as long.
+
+    Args:
+        gradients: (q, a, 3) of the reference element.
+        jacobians: (e, q, 3, 3) with the reference's axes as rows.
+        wide: number of columns, the nodes and zeros after them.
+
+    Returns:
+        (e, q, 3, wide) [1/m], and (e, q) determinants.
     """
     elements, points, nodes = jacobians.shape[0], gradients.shape[0], gradients.shape[1]
     found, volumes = np.zeros((elements, points, 3, wide)), np.empty((elements, points))

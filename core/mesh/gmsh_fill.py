@@ -1,9 +1,9 @@
-"""Gmsh fills a closed surface with tetrahedra, small where the tool goes.
+"""Tetrahedral meshes of closed surfaces by Gmsh, fine near the tool.
 
 Gmsh (Geuzaine and Remacle 2009) is under the GPL and stays optional: `pip install
-"palpate[shapes]"`. The surface's triangles are only its geometry: they are joined to patches,
-between sharp edges and the border of what is held, and each patch is triangulated anew (Remacle et
-al. 2010).
+"palpate[shapes]"`. The surface's triangles only define the geometry: they are joined to patches,
+between sharp edges and the border of the held region, and each patch is triangulated anew (Remacle
+et al. 2010).
 """
 
 from __future__ import annotations
@@ -30,21 +30,25 @@ if TYPE_CHECKING:
 __all__ = ["TetSpec", "check_spacing", "fill"]
 
 _SHARP = np.radians(40.0)
-"""Triangles that meet at a sharper angle than this keep an edge between them."""
+"""Triangles that meet at a larger angle than this keep an edge between them [rad]."""
 _TETRAHEDRA, _TRIANGLES, _LINES = 4, 2, 1
 """Gmsh's numbers of element types."""
 _FRONTAL, _DELAUNAY = 6, 1
-"""Gmsh's numbers of algorithms in the plane and in space."""
+"""Gmsh's numbers of meshing algorithms in the plane and in space."""
 _alone = threading.Lock()
 
 
 def check_spacing(spacing: float, coarsest: float) -> None:
-    """MeshError unless spacings [m] at the tool and far from it are in this order and below a
-    metre.
+    """Raise MeshError unless 0 < spacing <= coarsest < 1 m.
+
+    Args:
+        spacing: of the nodes near the tool [m].
+        coarsest: of the nodes far from it [m].
     """
     if not 0 < spacing <= coarsest < 1:
         raise MeshError(
-            f"spacing {spacing:g} m and coarsest {coarsest:g} m are not in this order between 0 and 1 m",
+            f"spacing {spacing:g} m and coarsest {coarsest:g} m are not in this order "
+            "between 0 and 1 m",
             spacing=spacing,
             coarsest=coarsest,
         )
@@ -52,13 +56,13 @@ def check_spacing(spacing: float, coarsest: float) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class TetSpec:
-    """How a shape is meshed: one mesh for a whole motion, small wherever the tool goes.
+    """Mesh of a shape: one mesh for a whole motion, fine wherever the tool goes.
 
     Attributes:
-        path: places of the tool's centre [m], phantom frame.
-        radius: within which of where they touch the mesh is finest [m].
+        path: positions of the tool's centre [m], phantom frame.
+        radius: distance from the touched_places places within which the mesh is finest [m].
         spacing: of the nodes there [m], half an edge.
-        growth: of an edge's length with the distance from there [1].
+        growth: increase of an edge's length per distance from there [1].
         coarsest: spacing far away [m].
     """
 
@@ -75,8 +79,9 @@ class TetSpec:
 
     @classmethod
     def along(cls, centres: FloatArray, radius: float, **spacings: float) -> TetSpec:
-        """For a motion (f, 3) [m] of a tool of this radius [m]; places closer together than the
-        nodes are taken once.
+        """Make the specification for a motion (f, 3) [m] of a tool of this radius [m].
+
+        Positions closer together than the nodes are taken once.
         """
         spec = cls(path=(), radius=radius, **spacings)
         places = np.unique(np.round(centres / spec.spacing), axis=0) * spec.spacing
@@ -87,17 +92,16 @@ class TetSpec:
         )
 
     def mesh(self, setup: Setup, centre: FloatArray) -> TetMesh:
-        """The same mesh for all places of the tool's centre."""
+        """The mesh, the same for all positions of the tool's centre."""
         return fill(setup.shape, self)
 
     def finer(self) -> TetSpec:
-        """With nodes FINER times closer."""
+        """The same with nodes FINER times closer."""
         return replace(self, spacing=self.spacing / FINER, coarsest=self.coarsest / FINER)
 
 
-def touched(shape: Shape, spec: TetSpec) -> FloatArray:
-    """Places of the surface (k, 3) [m] next to where the tool goes, at least a spacing apart or
-    so."""
+def touched_places(shape: Shape, spec: TetSpec) -> FloatArray:
+    """Points of the surface (k, 3) [m] that the tool comes near, about a spacing or more apart."""
     path = np.array(spec.path).reshape(-1, 3)
     if not len(path):
         return path
@@ -114,29 +118,33 @@ def fill(shape: Shape, spec: TetSpec) -> TetMesh:
     with _gmsh() as gmsh:
         try:
             _build(gmsh, shape)
-            _size(gmsh, touched(shape, spec), spec)
+            _size(gmsh, touched_places(shape, spec), spec)
             gmsh.model.mesh.generate(3)
-            corners, tetrahedra = _taken(gmsh)
+            corners, tetrahedra = _read_mesh(gmsh)
         except Exception as error:  # Gmsh raises plain exceptions
             raise MeshError(
-                f"{shape.name}: Gmsh found no tetrahedra within the surface ({error}); repair or smooth it, or use a spacing "
+                f"{shape.name}: Gmsh found no tetrahedra within the surface ({error}); repair or "
+                "smooth it, or use a spacing "
                 f"smaller than {spec.spacing:g} m",
                 file=shape.name,
             ) from error
-    return _checked(shape, spec, corners, tetrahedra)
+    return _checked_mesh(shape, spec, corners, tetrahedra)
 
 
 @contextmanager
 def _gmsh() -> Iterator[Any]:
-    """Gmsh with an empty model, for one thread at a time; its signal handlers stay out, and it
-    reads no files of the user's.
+    """Gmsh with an empty model, for one thread at a time.
+
+    It installs no signal handlers and reads none of the user's files.
     """
     try:
         import gmsh
     except (ImportError, OSError) as error:
         raise SetupError(
-            f'shapes other than a block are meshed by Gmsh, which is not there ({error}): pip install "palpate[shapes]"; on Debian '
-            "and Ubuntu also apt-get install libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1",
+            f"shapes other than a block are meshed by Gmsh, which is not there ({error}): "
+            'pip install "palpate[shapes]"; on Debian '
+            "and Ubuntu also apt-get install libglu1-mesa libxrender1 libxcursor1 libxft2 "
+            "libxinerama1",
             key="geometry",
         ) from error
     with _alone:
@@ -155,7 +163,7 @@ def _gmsh() -> Iterator[Any]:
 
 
 def _build(gmsh: Any, shape: Shape) -> None:
-    """Hand over the surface as one volume's boundary."""
+    """Pass the surface to Gmsh as one volume's boundary."""
     gmsh.model.addDiscreteEntity(2, 1)
     gmsh.model.mesh.addNodes(2, 1, np.arange(1, len(shape.vertices) + 1), shape.vertices.ravel())
     gmsh.model.mesh.addElementsByType(1, _TRIANGLES, [], (shape.triangles + 1).ravel())
@@ -169,8 +177,8 @@ def _build(gmsh: Any, shape: Shape) -> None:
 
 
 def _border(shape: Shape) -> IntArray:
-    """Edges (k, 2) between what is held and what is not; Gmsh keeps lines that are there before it
-    makes patches.
+    """Edges (k, 2) between held and free triangles; Gmsh keeps lines that exist before it makes
+    patches.
     """
     edges = np.sort(
         np.concatenate(
@@ -183,7 +191,7 @@ def _border(shape: Shape) -> IntArray:
 
 
 def _size(gmsh: Any, places: FloatArray, spec: TetSpec) -> None:
-    """Edges of twice the spacing around these places (k, 3) [m], growing with the distance from
+    """Set edges of twice the spacing around these points (k, 3) [m], growing with the distance from
     them.
     """
     field, finest, coarsest = gmsh.model.mesh.field, 2 * spec.spacing, 2 * spec.coarsest
@@ -213,8 +221,8 @@ def _size(gmsh: Any, places: FloatArray, spec: TetSpec) -> None:
     gmsh.option.setNumber("Mesh.Algorithm3D", _DELAUNAY)
 
 
-def _taken(gmsh: Any) -> tuple[FloatArray, IntArray]:
-    """Corners (c, 3) [m] and tetrahedra (e, 4), numbered in Gmsh's order."""
+def _read_mesh(gmsh: Any) -> tuple[FloatArray, IntArray]:
+    """Read corners (c, 3) [m] and tetrahedra (e, 4) from Gmsh, in its order."""
     tags, places, _ = gmsh.model.mesh.getNodes()
     _, corners = gmsh.model.mesh.getElementsByType(_TETRAHEDRA)
     used, tetrahedra = np.unique(corners, return_inverse=True)
@@ -224,14 +232,18 @@ def _taken(gmsh: Any) -> tuple[FloatArray, IntArray]:
     ], tetrahedra.reshape(-1, 4).astype(np.int64)
 
 
-def _checked(shape: Shape, spec: TetSpec, corners: FloatArray, tetrahedra: IntArray) -> TetMesh:
-    """The mesh, if it fills the surface; a side is held where the surface next to it is."""
+def _checked_mesh(
+    shape: Shape, spec: TetSpec, corners: FloatArray, tetrahedra: IntArray
+) -> TetMesh:
+    """Make the mesh if it fills the surface; a side is held if the surface next to it is."""
     edges = corners[tetrahedra[:, 1:]] - corners[tetrahedra[:, :1]]
     volumes = np.linalg.det(edges) / 6
     if not len(volumes) or volumes.min() <= 0 or abs(volumes.sum() / shape.volume - 1) > 0.05:
         raise MeshError(
-            f"{shape.name}: the {len(volumes)} tetrahedra hold {1e6 * volumes.sum():.4g} cm3 of the surface's "
-            f"{1e6 * shape.volume:.4g} cm3; use a smaller coarsest spacing than {spec.coarsest:g} m",
+            f"{shape.name}: the {len(volumes)} tetrahedra hold {1e6 * volumes.sum():.4g} cm3 of "
+            "the surface's "
+            f"{1e6 * shape.volume:.4g} cm3; use a smaller coarsest spacing than {spec.coarsest:g} "
+            "m",
             file=shape.name,
             volume=float(volumes.sum()),
             expected=shape.volume,
@@ -240,7 +252,8 @@ def _checked(shape: Shape, spec: TetSpec, corners: FloatArray, tetrahedra: IntAr
     held = shape.held[nearest(middles, shape.corners)[0]]
     if not held.any() or held.all():
         raise MeshError(
-            f"{shape.name}: {held.sum()} of the mesh's {len(held)} sides are held; use a smaller coarsest spacing than "
+            f"{shape.name}: {held.sum()} of the mesh's {len(held)} sides are held; use a smaller "
+            "coarsest spacing than "
             f"{spec.coarsest:g} m, so that the fixed region has some of its own",
             file=shape.name,
             held=int(held.sum()),

@@ -1,13 +1,13 @@
-"""Hexahedra as large as the place asks for: a block's mesh by sizes and not by numbers.
+"""Graded hexahedral meshes of a block, by element sizes instead of node counts.
 
-A fixed number of nodes along an axis is spread thinly where the tool stands amid a long face, and
-wasted where it stands near an edge. Seven pushes all over the block are 3.5 % off with 1700 to 2200
-nodes graded so, the worst 5.4 %; with 13x9x9 quadratic nodes 7 to 9 % and 16 %, although a poke in
-the very middle of the top, alone, is 8 % off there (`python -m benchmarks gradings`).
+A fixed number of nodes along an axis is too sparse for a tool amid a long face, and wasteful for
+one near an edge. Measured over seven pushes all over the block: 3.5 % error on average and 5.4 % at
+worst with 1700 to 2200 nodes graded by size; 7 to 9 % and 16 % with 13x9x9 quadratic nodes, and 8 %
+for a single poke in the middle of the top (`python -m benchmarks gradings`).
 
-Far from the tool the edges stop growing, at a third of the shortest side. Where they do not, the
-sag of a heavy block is off by a tenth and changes as much with the place of the focus, so that a
-push into a side speaks against a weight that is there.
+Far from the tool the edges stop growing, at a third of the shortest side. Without that limit, the
+sag of a heavy block is off by a tenth and changes as much with the position of the focus, so that a
+push into a side contradicts a weight that is present.
 """
 
 from __future__ import annotations
@@ -30,24 +30,26 @@ if TYPE_CHECKING:
 __all__ = ["FINE_GRID", "PAGE_GRID", "REPLAY_GRID", "SCREEN_GRID", "Grading"]
 
 _USUAL_RADIUS = 5e-3
+"""Radius of the tool for which the gradings below are made [m]."""
 _LOOSE, _LOOSE_GROWTH, _LOOSE_STEP = 3.2, 0.6, 1e-3
-"""Longest edge where a base begins to be held, over the spacing at the focus [1]; its growth [1];
-and the steps in which the mesh follows that line [m], for each new mesh costs a factor's analysis.
-Elements of 12 mm there, half of each held, made a strip of 16 mm out to be 18 mm and hardly told it
-from one of 20."""
+"""Longest edge near the line at which a base begins to be held, over the spacing at the focus [1];
+growth of the edges from there [1]; and the step to which that line is rounded [m], because each new
+mesh costs an analysis of its factor. Measured: with elements of 12 mm there, half of each held, a
+strip of 16 mm was estimated as 18 mm and hardly distinguished from one of 20 mm."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Grading:
-    """How large a block's hexahedra are: the edge's length grows with the distance from the focus,
-    on the surface below the tool.
+    """Element sizes of a block: the edge's length grows with the distance from the focus.
+
+    The focus is on the surface below the tool.
 
     Attributes:
-        spacing: distance of the nodes [m] at the focus.
-        along, inward: growth of the edge's length over the distance [1], across the face that is
-            pushed and into the body.
-        longest: edge, as a share of the block's shortest side [1]: what a body does as a whole, its
-            sag above all, wants a few elements everywhere, wherever the tool is.
+        spacing: distance of the nodes at the focus [m].
+        along: growth of the edge's length per distance across the face that is pushed [1].
+        inward: growth of the edge's length per distance into the body [1].
+        longest: longest edge over the block's shortest side [1]; deformation of the whole body,
+            above all its sag, needs a few elements everywhere.
         order: of the shape functions, 1 (8 nodes an element) or 2 (27 nodes).
     """
 
@@ -69,36 +71,39 @@ class Grading:
                 )
         if not 0 < self.longest <= 1:
             raise MeshError(
-                f"a mesh's longest edge is 0 to 1 of the block's shortest side, got {self.longest:g}",
+                "a mesh's longest edge is 0 to 1 of the block's shortest side, "
+                f"got {self.longest:g}",
                 longest=self.longest,
             )
         if self.order not in (1, 2):
             raise MeshError(f"elements are of order 1 or 2, got {self.order}", order=self.order)
 
     def mesh(self, setup: Setup, centre: FloatArray) -> BoxMesh:
-        """The mesh for a tool's centre (3,) [m]; the same object for places next to each other."""
+        """The mesh for a tool's centre (3,) [m]; the same object for positions next to each
+        other.
+        """
         size = setup.box.size
         x, y, z = focus_of(size, centre).tolist()
         return _mesh(size, self, (x, y, z), _loose_edges(setup))
 
     def finer(self) -> Grading:
-        """With nodes FINER times closer everywhere."""
+        """The same with nodes FINER times closer everywhere."""
         names = ("spacing", "along", "inward", "longest")
         return replace(self, **{name: getattr(self, name) / FINER for name in names})
 
     def for_tool(self, radius: float) -> Grading:
-        """What this grading is for a ball of 5 mm, for one of another radius [m]."""
+        """Scale this grading, made for a ball of 5 mm, to another radius [m]."""
         return replace(self, spacing=self.spacing * radius / _USUAL_RADIUS)
 
 
 def _loose_edges(setup: Setup) -> tuple[tuple[int, float], ...]:
-    """Axis and place [m] of each line where a base begins to be held."""
-    found = []
+    """Axis and coordinate [m] of each line at which a base begins to be held."""
+    lines = []
     for strip in setup.support.detached:
         axis, sign = "xy".index(strip.edge[1]), -1 if strip.edge[0] == "-" else 1
         place = sign * (setup.box.size[axis] / 2 - strip.extent)
-        found.append((axis, round(place / _LOOSE_STEP) * _LOOSE_STEP))
-    return tuple(found)
+        lines.append((axis, round(place / _LOOSE_STEP) * _LOOSE_STEP))
+    return tuple(lines)
 
 
 @lru_cache(maxsize=64)
@@ -126,6 +131,6 @@ REPLAY_GRID = Grading(spacing=1.25e-3, along=0.6, inward=1.2, longest=0.35)
 FINE_GRID = Grading(spacing=1e-3, along=0.7, inward=0.7, longest=0.25)
 SCREEN_GRID = Grading(spacing=2.1e-3, along=0.6, inward=1.2, longest=0.5)
 PAGE_GRID = Grading(spacing=1.5e-3, along=0.7, inward=1.2)
-"""For a ball of 5 mm; `for_tool` has those of others. A diagnosis takes the first, the fine one to
-say how far that is off, and the coarse one for what an effect would do: 1000 nodes, and a pattern
-with a correlation of 0.99 with the first one's."""
+"""Gradings for a ball of 5 mm; `for_tool` scales them. A diagnosis replays with REPLAY_GRID,
+estimates the mesh error with FINE_GRID, and screens effects with SCREEN_GRID: 1000 nodes, and error
+patterns that correlate to 0.99 with those of REPLAY_GRID."""

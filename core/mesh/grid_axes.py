@@ -11,17 +11,16 @@ __all__ = ["even_axis", "graded_axis", "sized_axis", "split_near"]
 
 
 def even_axis(low: float, high: float, nodes: int) -> FloatArray:
-    """Evenly spaced node coordinates [m]."""
+    """Compute evenly spaced node coordinates [m]."""
     return np.linspace(low, high, nodes)
 
 
 def graded_axis(low: float, high: float, nodes: int, focus: float, spacing: float) -> FloatArray:
-    """Node coordinates [m] whose spacing is `spacing` at the focus and grows away from it at one
-    constant rate.
+    """Compute node coordinates [m] with a given spacing at the focus, growing away from it.
 
-    The spacing at s is spacing + g |s - focus|, so node numbers are the logarithm of the distance;
-    g is chosen such that the given number of nodes fills the axis, and the whole is stretched a
-    little so that the count on each side is whole.
+    The spacing at s is spacing + g |s - focus|, so node numbers are the logarithm of the distance.
+    The rate g is chosen such that the given number of nodes fills the axis, and each side is
+    stretched slightly to hold a whole number of elements.
     """
     left, right = max(focus - low, 0.0), max(high - focus, 0.0)
     elements = nodes - 1
@@ -50,11 +49,18 @@ def graded_axis(low: float, high: float, nodes: int, focus: float, spacing: floa
 def sized_axis(
     low: float, high: float, focus: float, edge: float, growth: float, longest: float = np.inf
 ) -> FloatArray:
-    """Element ends [m] for edges that are `edge` long at the focus and grow by `growth` [1] over
-    the distance, up to `longest` [m].
+    """Compute element ends [m] from edge lengths.
 
-    On each side growth and longest edge are changed by one factor, so that a whole number of
+    On each side, growth and longest edge are scaled by one factor, so that a whole number of
     elements fills it.
+
+    Args:
+        low: end of the axis [m].
+        high: other end [m].
+        focus: point of the finest mesh [m].
+        edge: length there [m].
+        growth: of the edges per distance [1].
+        longest: edge [m].
     """
     below, above = (
         _side(focus - low, edge, growth, longest),
@@ -64,8 +70,13 @@ def sized_axis(
 
 
 def split_near(ends: FloatArray, place: float, edge: float, growth: float) -> FloatArray:
-    """Element ends [m], each element cut in equal parts up to `edge` long at a place [m] and
-    `growth` [1] over the way to it.
+    """Split elements near a point into equal parts.
+
+    Args:
+        ends: of the elements [m].
+        place: the point [m].
+        edge: longest edge there [m].
+        growth: of the longest edge per distance from there [1].
     """
     apart = np.maximum(np.maximum(ends[:-1] - place, place - ends[1:]), 0.0)
     parts = np.ceil(np.diff(ends) / (edge + growth * apart) - 1e-9).astype(int)
@@ -82,7 +93,7 @@ def _side(length: float, edge: float, growth: float, longest: float) -> FloatArr
         return np.zeros(1)
 
     def reach(factor: float) -> float:
-        """Where the edges stop to grow [m]."""
+        """Distance at which the edges stop growing [m]."""
         return min(max((longest - edge / factor) / growth, 0.0), length)
 
     def count(factor: float) -> float:

@@ -1,5 +1,6 @@
-"""Nodal fields between the nodes: loops that NumPy would pay for with arrays of every node of every
-point.
+"""Interpolation of nodal fields, in compiled loops.
+
+NumPy would need arrays of every node of every point.
 """
 
 from __future__ import annotations
@@ -16,8 +17,12 @@ __all__ = ["grid_shapes", "neighbourhood_means", "patch_rows", "weighted_nodes"]
 
 @njit(cache=True)
 def weighted_nodes(nodes: Any, weights: Any, field: Any) -> FloatArray:
-    """Sums (m, c) over each point's nodes (m, a) of a nodal field (n, c), with these weights (m,
-    a).
+    """Weighted sums (m, c) of a nodal field over each point's nodes.
+
+    Args:
+        nodes: (m, a).
+        weights: (m, a).
+        field: (n, c).
     """
     found = np.zeros((nodes.shape[0], field.shape[1]))
     for m in range(nodes.shape[0]):
@@ -29,11 +34,13 @@ def weighted_nodes(nodes: Any, weights: Any, field: Any) -> FloatArray:
 
 @njit(cache=True)
 def grid_shapes(first: Any, along: Any, nx: int, ny: int) -> tuple[Any, Any]:
-    """Nodes and weights (m, s^3) of points in the hexahedra of a grid with nx times ny nodes in
-    each layer.
+    """Nodes and weights (m, s^3) of points in the hexahedra of a structured grid.
 
-    `first` (3, m) is each one's first node along x, y, z, and `along` (3, s, m) are the shape
-    functions there.
+    Args:
+        first: (3, m) first node of each point's element along x, y, z.
+        along: (3, s, m) shape functions along the axes.
+        nx: nodes along x.
+        ny: nodes along y.
     """
     steps, count = along.shape[1], first.shape[1]
     nodes, weights = np.empty((count, steps**3), dtype=np.int64), np.empty((count, steps**3))
@@ -53,11 +60,17 @@ def grid_shapes(first: Any, along: Any, nx: int, ny: int) -> tuple[Any, Any]:
 def patch_rows(
     nodes: Any, weights: Any, normals: Any, ends: Any, count: int
 ) -> tuple[FloatArray, Any, Any]:
-    """Entries, columns and row ends of a sparse matrix (p, 3 count): sums over each patch's points
-    of weight times normal.
+    """Sparse matrix (p, 3 count) of the sums over each patch's points of weight times normal.
 
-    The points' nodes (m, a), weights (m, a) and normals (m, 3) stand patch by patch, those of patch
-    i from ends[i] to ends[i + 1].
+    Args:
+        nodes: (m, a) of the points, patch by patch.
+        weights: (m, a).
+        normals: (m, 3).
+        ends: the points of patch i are ends[i] to ends[i + 1].
+        count: number of nodes.
+
+    Returns:
+        entries, columns and row ends of the matrix in CSR form.
     """
     room = nodes.size
     entries, columns, rows = (
@@ -85,8 +98,14 @@ def patch_rows(
 def neighbourhood_means(
     places: FloatArray, points: FloatArray, values: FloatArray, reach: float, least: int
 ) -> FloatArray:
-    """Mean (m,) of the values (n,) of points (n, 3) nearer than `reach` to each place (m, 3); NaN
-    where fewer than `least` are.
+    """Mean (m,) of the values of all points near each place; NaN if there are too few.
+
+    Args:
+        places: (m, 3).
+        points: (n, 3).
+        values: (n,) at the points.
+        reach: distance up to which a point counts.
+        least: smallest number of points.
     """
     if not len(points):
         return np.full(len(places), np.nan)
@@ -112,7 +131,9 @@ def _means(
     reach: float,
     least: int,
 ) -> Any:
-    """The points are sorted by cubic cells as wide as the reach, those of cell i from begins[i] to
+    """Kernel of `neighbourhood_means`.
+
+    The points are sorted by cubic cells as wide as the reach, those of cell i from begins[i] to
     begins[i + 1].
     """
     found, first, last = (

@@ -1,4 +1,4 @@
-"""What the engine asks of a mesh, whatever its elements, and of the ways to make one."""
+"""Interfaces of meshes and of mesh specifications that the engine uses."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ if TYPE_CHECKING:
 __all__ = ["FINER", "Connectivity", "Mesh", "Meshing"]
 
 FINER = 1.5
-"""How many times closer the nodes of the finer mesh are, by which errors are estimated."""
+"""Ratio of node spacings of a mesh and the finer mesh by which its error is estimated [1]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Connectivity:
-    """Which nodes form what, wherever they lie.
+    """Connectivity of a mesh, without coordinates.
 
     Attributes:
-        element: the elements' kind.
+        element: kind of the elements.
         count: number of nodes.
         elements: (e, a) nodes.
-        surface, base: (f, b) nodes of the elements' sides on the free surface and on what is held,
-            outwards by the right-hand rule.
+        surface: (f, b) nodes of the elements' sides on the free surface, outwards by the right-hand
+            rule.
+        base: (f, b) nodes of the elements' sides that are held, likewise.
         hull: (h, 3) or (h, 4) flat polygons of neighbouring nodes over the whole surface,
             counter-clockwise from outside.
         base_nodes: (k,) nodes of the base.
@@ -42,45 +43,45 @@ class Connectivity:
 
 
 class Mesh(Protocol):
-    """A body at rest, filled with elements; two are the same only if they are one object."""
+    """A body at rest, filled with elements; two meshes are equal only if they are one object."""
 
     def __hash__(self) -> int: ...
 
     @property
     def nodes(self) -> FloatArray:
-        """(n, 3) rest positions [m], phantom frame."""
+        """Rest positions (n, 3) [m], phantom frame."""
 
     @property
     def connectivity(self) -> Connectivity:
-        """Shared by meshes that differ only in where their nodes lie."""
+        """Connectivity, shared by meshes that differ only in node positions."""
 
     @property
     def focus(self) -> FloatArray:
-        """Where a mesh that follows the tool is finest (3,) [m]; the same place for all meshes that
-        do not.
+        """The finest point (3,) [m] of a mesh that follows the tool; a constant for other
+        meshes.
         """
 
     @property
     def near_focus(self) -> IntArray:
-        """Nodes (k,) of the free surface around the focus, on which a tool there presses; none
-        where no tool is followed.
+        """Nodes (k,) of the free surface around the focus, where the tool presses; none without a
+        focus.
         """
 
     def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Elements' nodes and shape functions (m, a) at rest positions (m, 3) [m]; outside is moved
-        into the body.
+        """Find elements' nodes and shape functions (m, a) at rest positions (m, 3) [m].
+
+        Points outside are moved into the body.
         """
 
     def interpolate(self, field: FloatArray, points: FloatArray) -> FloatArray:
-        """A nodal field (n, c) at rest positions (m, 3) [m], with the shape functions of
-        `locate`."""
+        """Interpolate a nodal field (n, c) at rest positions (m, 3) [m], as `locate` does."""
 
 
 class Meshing(Protocol):
-    """How a body is meshed."""
+    """A mesh specification of a body."""
 
     def mesh(self, setup: Setup, centre: FloatArray) -> Mesh:
-        """The mesh for a tool's centre (3,) [m]; the same object where the same mesh will do."""
+        """The mesh for a tool's centre (3,) [m]; the same object wherever the same mesh serves."""
 
     def finer(self) -> Self:
-        """With nodes FINER times closer, or as nearly so as whole elements allow."""
+        """The same with nodes FINER times closer, or as nearly so as whole elements allow."""

@@ -1,9 +1,7 @@
-"""Meshes for many short pushes all over a body: one for each place that is pushed, small there and
-nowhere else.
+"""Meshes for many short pushes all over a body: one for each pushed place, fine only there.
 
-One mesh that is small wherever the tool goes would be small all over. The pushes are short and the
-body rests between them, so that each may have a mesh of its own; a replay goes from one to the next
-while the tool is clear.
+One mesh for all pushes would be fine everywhere. The pushes are short and the body rests between
+them, so each may have its own mesh; a replay changes the mesh while the tool is clear.
 """
 
 from __future__ import annotations
@@ -28,21 +26,21 @@ if TYPE_CHECKING:
 __all__ = ["FINE_PUSHES", "REPLAY_PUSHES", "SCREEN_PUSHES", "PushMeshSpec"]
 
 _SLENDER = 0.2
-"""Of the body's shortest extent, half of the longest edge anywhere: fewer elements would cut its
-roundings off [1]."""
-_KEPT = 256
-"""Meshes that a process keeps: three for each of some eighty pushes."""
+"""Half of the longest edge anywhere, over the body's shortest extent [1]: fewer elements would cut
+off its roundings."""
+_CACHED = 256
+"""Meshes that a process caches: three for each of some eighty pushes."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PushMeshSpec:
-    """How a shape is meshed under pushes.
+    """Mesh of a shape under pushes.
 
     Attributes:
-        places: of the surface that are pushed [m], phantom frame.
-        reach: within which of a place its mesh is finest [m].
+        places: points of the surface that are pushed [m], phantom frame.
+        reach: distance from such a point within which its mesh is finest [m].
         spacing: of the nodes there [m], half an edge.
-        growth: of an edge's length with the distance from there [1].
+        growth: increase of an edge's length per distance from there [1].
         coarsest: spacing far away [m].
     """
 
@@ -56,11 +54,11 @@ class PushMeshSpec:
         check_spacing(self.spacing, self.coarsest)
 
     def at(self, places: FloatArray) -> PushMeshSpec:
-        """The same for pushes at these places (k, 3) [m]."""
+        """The same for pushes at these points (k, 3) [m]."""
         return replace(self, places=tuple((float(x), float(y), float(z)) for x, y, z in places))
 
     def for_tool(self, radius: float) -> PushMeshSpec:
-        """What this is for a ball of 5 mm, for one of another radius [m]."""
+        """Scale this specification, made for a ball of 5 mm, to another radius [m]."""
         factor = radius / 5e-3
         spacing = self.spacing * factor
         return replace(
@@ -68,7 +66,7 @@ class PushMeshSpec:
         )
 
     def mesh(self, setup: Setup, centre: FloatArray) -> TetMesh:
-        """That of the push nearest to a tool's centre (3,) [m]."""
+        """The mesh of the push nearest to a tool's centre (3,) [m]."""
         if not self.places:
             raise MeshError(
                 f"{setup.shape.name}: no place that is pushed was named; name one at least",
@@ -78,11 +76,11 @@ class PushMeshSpec:
         return _filled(setup.shape, self.places[number], replace(self, places=()))
 
     def finer(self) -> Self:
-        """With nodes FINER times closer."""
+        """The same with nodes FINER times closer."""
         return replace(self, spacing=self.spacing / FINER, coarsest=self.coarsest / FINER)
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHED)
 def _filled(shape: Shape, place: tuple[float, float, float], spec: PushMeshSpec) -> TetMesh:
     _, (centre,) = nearest(np.array([place]), shape.corners)
     size = TetSpec(
@@ -98,5 +96,5 @@ def _filled(shape: Shape, place: tuple[float, float, float], spec: PushMeshSpec)
 REPLAY_PUSHES = PushMeshSpec()
 FINE_PUSHES = PushMeshSpec(spacing=1.25e-3, growth=0.55, coarsest=3.5e-3)
 SCREEN_PUSHES = PushMeshSpec(spacing=2.2e-3, growth=0.8, coarsest=5e-3)
-"""For a ball of 5 mm; `for_tool` has those of others. A diagnosis takes the first, the fine one to
-say how far that is off, and the coarse one for what an effect would do."""
+"""Specifications for a ball of 5 mm; `for_tool` scales them. A diagnosis replays with
+REPLAY_PUSHES, estimates the mesh error with FINE_PUSHES, and screens effects with SCREEN_PUSHES."""

@@ -1,4 +1,4 @@
-"""A body filled with quadratic tetrahedra whose edges are straight."""
+"""Meshes of quadratic tetrahedra with straight edges."""
 
 from __future__ import annotations
 
@@ -19,15 +19,16 @@ __all__ = ["TetMesh", "sides_of"]
 _SIDES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
 """Corners of a tetrahedron's sides, counter-clockwise from outside."""
 _QUARTERS = ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))
-"""The triangles between the six nodes of a side."""
+"""The four triangles between the six nodes of a side."""
 _ON_THE_EDGE = 1e-9
-"""How far outside a tetrahedron a point of its surface may lie by rounding, in barycentric
-coordinates."""
+"""A point of the surface may lie so far outside a tetrahedron by rounding, in barycentric
+coordinates [1]."""
 
 
 def sides_of(tetrahedra: IntArray) -> IntArray:
-    """Corners (f, 3) of the sides of tetrahedra (e, 4) that belong to one of them only,
-    counter-clockwise from outside.
+    """Corners (f, 3) of the boundary sides of tetrahedra (e, 4), counter-clockwise from outside.
+
+    A boundary side belongs to one tetrahedron only.
     """
     sides = tetrahedra[:, np.array(_SIDES)].reshape(-1, 3)
     _, first, uses = np.unique(
@@ -38,12 +39,12 @@ def sides_of(tetrahedra: IntArray) -> IntArray:
 
 @dataclass(frozen=True, eq=False)
 class TetMesh:
-    """Corners and tetrahedra of a body, to which the nodes in the middle of the edges are added.
+    """Corners and tetrahedra of a body; nodes at the midpoints of the edges are added.
 
     Attributes:
         corners: (c, 3) rest positions [m], phantom frame.
         tetrahedra: (e, 4) corners, of positive volume.
-        held: (f,) which of `sides_of(tetrahedra)` are held.
+        held: (f,) True for sides of `sides_of(tetrahedra)` that are held.
     """
 
     corners: FloatArray
@@ -51,24 +52,24 @@ class TetMesh:
     held: BoolArray
 
     def __getstate__(self) -> dict[str, Any]:
-        """Only what cannot be made again travels between processes."""
+        """Pickle only the defining fields; everything else is computed again on demand."""
         return {"corners": self.corners, "tetrahedra": self.tetrahedra, "held": self.held}
 
     @cached_property
     def _edges(self) -> tuple[IntArray, IntArray]:
-        """Ends (k, 2) of all edges, and the number of each tetrahedron's (e, 6)."""
+        """Ends (k, 2) of all edges, and the edge numbers of each tetrahedron (e, 6)."""
         ends = np.sort(self.tetrahedra[:, np.array(EDGES)].reshape(-1, 2), axis=1)
         unique, inverse = np.unique(ends, axis=0, return_inverse=True)
         return unique, inverse.reshape(-1, len(EDGES))
 
     @cached_property
     def nodes(self) -> FloatArray:
-        """(n, 3) rest positions [m]: the corners, then the middles of the edges."""
+        """Rest positions (n, 3) [m]: the corners, then the midpoints of the edges."""
         return np.concatenate([self.corners, self.corners[self._edges[0]].mean(axis=1)])
 
     @cached_property
     def connectivity(self) -> Connectivity:
-        """Which nodes form what."""
+        """Connectivity of the quadratic mesh."""
         ends, numbers = self._edges
         count = len(self.corners)
         sides = sides_of(self.tetrahedra)
@@ -90,18 +91,21 @@ class TetMesh:
 
     @property
     def focus(self) -> FloatArray:
-        """Nowhere else in another frame."""
+        """A constant (3,) [m]: the mesh does not follow the tool."""
         return np.zeros(3)
 
     @property
     def near_focus(self) -> IntArray:
-        """None: it follows no tool."""
+        """No nodes: the mesh does not follow the tool."""
         return np.empty(0, dtype=np.int64)
 
     @cached_property
     def _frames(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Bounds (e, 3) twice [m], first corners (e, 3) [m] and the inverses (e, 3, 3) [1/m] that
-        give barycentric coordinates.
+        """Bounding boxes and barycentric frames of the tetrahedra.
+
+        Returns:
+            lower and upper bounds (e, 3) [m], first corners (e, 3) [m], and the matrices (e, 3, 3)
+                [1/m] that give barycentric coordinates.
         """
         corners = self.corners[self.tetrahedra]
         inverses = np.linalg.inv((corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1))
@@ -110,8 +114,9 @@ class TetMesh:
         return low, high, np.ascontiguousarray(corners[:, 0]), np.ascontiguousarray(inverses)
 
     def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Elements' nodes and shape functions (m, 10) at rest positions (m, 3) [m]; outside is
-        moved to the surface.
+        """Find elements' nodes and shape functions (m, 10) at rest positions (m, 3) [m].
+
+        Points outside are moved to the surface.
         """
         places = np.array(points, dtype=float)
         element = containing(places, *self._frames, _ON_THE_EDGE)
@@ -130,12 +135,12 @@ class TetMesh:
 
     @cached_property
     def _owners(self) -> IntArray:
-        """The tetrahedron that each side on the surface belongs to (f,)."""
+        """The tetrahedron (f,) that each boundary side belongs to."""
         sides = np.sort(self.tetrahedra[:, np.array(_SIDES)].reshape(-1, 3), axis=1)
         _, first, uses = np.unique(sides, axis=0, return_index=True, return_counts=True)
         return np.asarray(np.sort(first[uses == 1]) // len(_SIDES))
 
     def interpolate(self, field: FloatArray, points: FloatArray) -> FloatArray:
-        """A nodal field (n, c) at rest positions (m, 3) [m]."""
+        """Interpolate a nodal field (n, c) at rest positions (m, 3) [m]."""
         nodes, weights = self.locate(points)
         return weighted_nodes(nodes, weights, field)
