@@ -15,14 +15,14 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from palpate.blind.case_results import Result, read_results
+from palpate.blind.case_results import CaseResult, read_results
 from palpate.diagnosis.inference.residual_structure import Structure
-from palpate.diagnosis.validation.rejection import leaves_most
+from palpate.diagnosis.validation.rejection import leaves_structure
 
 __all__ = ["run", "structures"]
 
 
-def structures(result: Result) -> tuple[Structure, Structure]:
+def structures(result: CaseResult) -> tuple[Structure, Structure]:
     """Structure over what chance gives, of the stated setup and of what is named."""
     stated, left = result.report["evidence"], result.report["unexplained"]
     before, after = (
@@ -50,7 +50,7 @@ def run(console: Console, files: Sequence[Path]) -> None:
                 f"{before.ratio:.2f}",
                 f"{left.ratio:.2f}",
                 "–" if one.removed is None else f"{100 * one.removed:.0f} %",
-                "yes" if leaves_most(before, left, one.removed) else "no",
+                "yes" if leaves_structure(before, left, one.removed) else "no",
             )
     console.print(table)
 

@@ -16,25 +16,25 @@ from typing import Any
 from palpate.dataset import Dataset
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.worker_pool import Workers
-from palpate.diagnosis.gain.test_gain import tuned, worth
+from palpate.diagnosis.gain.test_gain import held_out_gain, tuned_setup
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.rest_cloud import StaticChannel
 from palpate.diagnosis.inference.rest_evidence import Still
 from palpate.diagnosis.observation.force_only import observe_each, pushed_places
 from palpate.diagnosis.observation.frame_groups import Observations
-from palpate.diagnosis.report.error_patterns import draw_patterns, patterns
-from palpate.diagnosis.report.force_report import palpated
+from palpate.diagnosis.report.error_patterns import draw_patterns, error_patterns
+from palpate.diagnosis.report.force_report import with_palpation
 from palpate.diagnosis.report.palpation_figure import draw_palpation
 from palpate.diagnosis.report.report import report_of, verdict_of
-from palpate.diagnosis.report.supplements import assured
+from palpate.diagnosis.report.supplements import with_supplements
 from palpate.diagnosis.search.findings import Findings
 from palpate.diagnosis.search.forward_selection import search
-from palpate.diagnosis.validation.held_out_test import held_out
-from palpate.diagnosis.validation.rejection import objection
-from palpate.diagnosis.validation.stiffness_error_test import most_asked
+from palpate.diagnosis.validation.held_out_test import check_held_out
+from palpate.diagnosis.validation.rejection import rejection_reason
+from palpate.diagnosis.validation.stiffness_error_test import largest_stiffness_error
 from palpate.foundation.errors import DiagnosisError, RunError
 from palpate.foundation.progress import Report, part, rising, silent
-from palpate.measurement.phantom_drift import as_it_stood
+from palpate.measurement.phantom_drift import align_sequences
 from palpate.measurement.segmentation import cleaner_for, find_shaft_axis
 from palpate.mesh.graded_mesh import FINE_GRID, PAGE_GRID, REPLAY_GRID, SCREEN_GRID
 from palpate.mesh.protocol import Meshing
@@ -85,9 +85,9 @@ def diagnose(
     with Workers([], workers) as pool:
         pool.start()
         dataset.validate(part(report, 0.0, 0.02))
-        dataset, registration = as_it_stood(dataset, register(dataset))
+        dataset, registration = align_sequences(dataset, register(dataset))
         setup = setup_from(dataset, registration)
-        data = _observed(dataset, registration.mended, setup.sensor, pool, part(report, 0.02, 0.05))
+        data = _observed(dataset, registration.repaired, setup.sensor, pool, part(report, 0.02, 0.05))
         out.parent.mkdir(parents=True, exist_ok=True)
         making = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
         try:
@@ -164,9 +164,9 @@ def _bench(
     report: Report,
 ) -> Bench:
     """All that a search needs."""
-    fitted, unseen = data
-    grid, fine, rough = _meshings(setup, [*fitted, *unseen])
-    seen = any(not item.unseen for item in fitted)
+    fitted, held_out = data
+    grid, fine, rough = _meshings(setup, [*fitted, *held_out])
+    seen = any(not item.force_only for item in fitted)
     static = (
         Still(
             StaticChannel.of(dataset.rest_cloud(), cleaner_for(dataset, registration), setup, grid)
@@ -202,10 +202,10 @@ def _searched(
         findings.best.model.setup.sensor.time_offset if findings.best else setup.sensor.time_offset
     )
     clock = replace(setup, sensor=replace(setup.sensor, time_offset=late))
-    if late == setup.sensor.time_offset or all(item.holds_together(clock) for item in data[0]):
+    if late == setup.sensor.time_offset or all(item.grouping_holds(clock) for item in data[0]):
         return data, bench, findings
     del bench, findings
-    data = _observed(dataset, registration.mended, clock.sensor, pool, silent)
+    data = _observed(dataset, registration.repaired, clock.sensor, pool, silent)
     bench = _bench(dataset, registration, setup, data, pool, report)
     bench.tell("searching again, with the frames grouped by the clock that was found")
     return data, bench, search(bench, seed)
@@ -239,24 +239,26 @@ def _run(
     wanted: tuple[bool, bool],
 ) -> dict[str, Any]:
     replays, assurance = wanted
-    (fitted, unseen), bench, findings = _searched(
+    (fitted, held_out), bench, findings = _searched(
         dataset, registration, setup, data, pool, part(report, 0.05, 0.75), seed
     )
     fine, seen, names = bench.fine, bench.seen, list(bench.names)
     model = findings.best.model if findings.best else findings.baseline
     report(0.75, "measuring the gain on test sequences")
-    gain = worth(bench, findings, unseen, pool, fine, seed, assurance) if unseen else None
-    if why := objection(findings, gain):
+    gain = (
+        held_out_gain(bench, findings, held_out, pool, fine, seed, assurance) if held_out else None
+    )
+    if why := rejection_reason(findings, gain):
         findings.withdraw(why)
         model, gain = (
             findings.baseline,
-            worth(bench, findings, unseen, pool, fine, seed) if unseen else None,
+            held_out_gain(bench, findings, held_out, pool, fine, seed) if held_out else None,
         )
     if verdict_of(findings) == "none":
         report(0.77, "looking whether every sequence, also of the test, is as clear")
-        findings.asked = most_asked(bench, findings.baseline)
-        findings.beyond = held_out(bench, unseen, seed)
-    found = tuned(bench, model) if findings.best else setup
+        findings.asked = largest_stiffness_error(bench, findings.baseline)
+        findings.beyond = check_held_out(bench, held_out, seed)
+    found = tuned_setup(bench, model) if findings.best else setup
     (making / "replays").mkdir()
     (making / "pictures").mkdir()
     # Begun before what is worked out meanwhile: that leaves a process idle now and then.
@@ -269,13 +271,13 @@ def _run(
     if dataset.accepted is not None:
         result["registration"] = dataset.accepted.to_json()
     if assurance:
-        result = assured(result, bench, fitted, findings)
+        result = with_supplements(result, bench, fitted, findings)
     if seen:
-        pictured = patterns(bench, fitted, findings.baseline, model)
+        pictured = error_patterns(bench, fitted, findings.baseline, model)
         pictured.save(making / "patterns.npz")
         draw_patterns(pictured, bench.surface, making / "pictures" / "patterns.png")
     else:
-        result, pushes, shown = palpated(result, bench, fitted, findings)
+        result, pushes, shown = with_palpation(result, bench, fitted, findings)
         lump = next((cause for cause in result["causes"] if "cover" in cause), None)
         draw_palpation(making / "pictures" / "palpation.png", setup.geometry, pushes, shown, lump)
     for number, task in enumerate(recordings):
@@ -299,7 +301,7 @@ def _recordings(
     stated, found = setups
     cleaner, shaft = (
         cleaner_for(dataset, registration),
-        find_shaft_axis(dataset, registration.mended),
+        find_shaft_axis(dataset, registration.repaired),
     )
     page = PAGE_GRID.for_tool(stated.tool.radius)
     return [

@@ -27,7 +27,7 @@ from palpate.diagnosis.search.candidates import lump_places
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.identifiability import Told
 from palpate.effects import Effect
-from palpate.measurement.camera_model import sight_of
+from palpate.measurement.camera_model import camera_model_for
 
 __all__ = ["Advice", "Pair", "next_probe", "pairs_of"]
 
@@ -137,7 +137,7 @@ def next_probe(
 def _scene(bench: Bench, findings: Findings) -> Scene:
     """What the camera sees, as it has seen it so far."""
     predictions, surface = (
-        [item for item in findings.baseline.predictions if not item.unseen],
+        [item for item in findings.baseline.predictions if not item.force_only],
         bench.surface,
     )
     counts = [item.count[[frame.in_contact for frame in item.equilibria]] for item in predictions]
@@ -148,7 +148,7 @@ def _scene(bench: Bench, findings: Findings) -> Scene:
         normals=surface.patch_normals,
         count=np.concatenate(counts).mean(axis=0),
         variance=patch_variance(predictions),
-        eye=sight_of(bench.setup).pose.translation,
+        eye=camera_model_for(bench.setup).pose.translation,
         pivot=bench.registration.robot_pivot,
         grid=bench.rough,
         temperature=bench.temperature,

@@ -122,7 +122,7 @@ def _evidence(bench: Bench, model: Model, nuisances: FloatArray) -> Callable[[Fl
             return bench.objective(model, nuisances)
         replayed = [future.result() for future in bench.predict(effects, None, model.predictions)]
         moved = [
-            there.with_rows(rows_of(here)[1])
+            there.replace_columns(rows_of(here)[1])
             for here, there in zip(model.predictions, replayed, strict=True)
         ]
         return bench.objective(

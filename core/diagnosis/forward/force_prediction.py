@@ -11,8 +11,8 @@ import numpy as np
 from palpate.diagnosis.forward.history_replay import forgetful
 from palpate.diagnosis.forward.jacobian import Columns, Wanted
 from palpate.diagnosis.forward.prediction import Prediction
-from palpate.diagnosis.forward.tool_path import led
-from palpate.diagnosis.observation.force_record import Felt
+from palpate.diagnosis.forward.tool_path import tool_path_of
+from palpate.diagnosis.observation.force_record import ForceComparison
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
@@ -43,10 +43,10 @@ def predict_forces(
         wanted: changes to state; none without it.
     """
     setup = forgetful(setup)
-    block, way = Replay(setup, grid, tolerance), led(data, setup, grid, wanted)
+    block, way = Replay(setup, grid, tolerance), tool_path_of(data, setup, grid, wanted)
     if way.measured is None:
         raise DiagnosisError(f"{data.name}: has neither clouds nor forces")
-    columns = None if wanted is None else Columns(block, wanted, felt=True)
+    columns = None if wanted is None else Columns(block, wanted, forces=True)
     frames: list[Equilibrium] = []
     changes: list[FloatArray] = []
     for number, (group, centre) in enumerate(zip(data.groups, way.centres, strict=True)):
@@ -63,7 +63,9 @@ def predict_forces(
             )
     rows, count = len(frames), columns.count if columns is not None else 0
     nothing = np.zeros((rows, 0))
-    felt = Felt.of(way.measured, frames, changes, np.array([group.probe for group in data.groups]))
+    forces = ForceComparison.of(
+        way.measured, frames, changes, np.array([group.probe for group in data.groups])
+    )
     return Prediction(
-        data.name, nothing, nothing, nothing, np.zeros((rows, 0, count)), tuple(frames), (), felt
+        data.name, nothing, nothing, nothing, np.zeros((rows, 0, count)), tuple(frames), (), forces
     )

@@ -57,7 +57,7 @@ class Past:
         self._block, self._last, self._left = block, -np.inf, -np.inf
         self._travel = travel(block.setup)
         self._frame: Equilibrium | None = None
-        self._times, way = data.way(block.setup)
+        self._times, way = data.path(block.setup)
         self._way = moved.apply(way)
         self._near = (
             distance_to_block(block.setup.box.size, self._way) < block.setup.tool.radius + CLEARANCE

@@ -22,11 +22,11 @@ from palpate.foundation.frames import Transform
 from palpate.replay.replay import Equilibrium
 from palpate.setup.setup import Setup
 
-__all__ = ["Timeline", "timeline_of"]
+__all__ = ["LoadingHistory", "loading_history_of"]
 
 
 @dataclass(frozen=True, eq=False)
-class Timeline:
+class LoadingHistory:
     """One sequence.
 
     Attributes:
@@ -77,11 +77,11 @@ class Timeline:
         return sorted(found, key=lambda one: one[0])
 
 
-def timeline_of(
+def loading_history_of(
     data: Observations, setup: Setup, moved: Transform, frames: tuple[Equilibrium, ...]
-) -> Timeline:
+) -> LoadingHistory:
     """Of a sequence and its plain replay; `moved` leads from stated to true places of the tool."""
-    times, way = data.way(setup)
+    times, way = data.path(setup)
     places = moved.apply(way) + np.array(setup.tool.offset)
     instants = [data.instant(group, setup) for group in data.groups]
     seen = np.array([np.nan if instant is None else instant for instant in instants])
@@ -115,7 +115,7 @@ def timeline_of(
                 shares[rows, inside[number]] = np.minimum(
                     scale * late, CRITERIA.history.most_interpolated
                 )
-    return Timeline(times, depths, places, seen, touched, shares)
+    return LoadingHistory(times, depths, places, seen, touched, shares)
 
 
 def _pushes(depths: FloatArray) -> list[tuple[int, int]]:

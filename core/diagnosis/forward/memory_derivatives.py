@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from palpate.diagnosis.forward.loading_history import Timeline
+from palpate.diagnosis.forward.loading_history import LoadingHistory
 from palpate.effects import Effect
 from palpate.effects.time_dependence import PermanentSet, Viscoelasticity
 from palpate.fem.constitutive.elastic import Law
@@ -47,7 +47,7 @@ class Recollection:
         order: numbers of the groups by time.
     """
 
-    def __init__(self, block: Replay, frames: Sequence[Equilibrium], time: Timeline) -> None:
+    def __init__(self, block: Replay, frames: Sequence[Equilibrium], time: LoadingHistory) -> None:
         self._law, self._time = Law.of(block.setup.material), time
         self.order: list[int] = np.argsort(time.instants, kind="stable").tolist()
         self._points = material_points(block.setup, block.grid, block.free.mesh)

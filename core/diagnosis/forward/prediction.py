@@ -11,9 +11,9 @@ import numpy as np
 
 from palpate.diagnosis.forward.history_replay import Past, forgetful, travel
 from palpate.diagnosis.forward.jacobian import Columns, Wanted
-from palpate.diagnosis.forward.ray_comparison import Sample, choose, compare
-from palpate.diagnosis.forward.tool_path import led
-from palpate.diagnosis.observation.force_record import Felt
+from palpate.diagnosis.forward.ray_comparison import PointSample, choose_points, compare
+from palpate.diagnosis.forward.tool_path import tool_path_of
+from palpate.diagnosis.observation.force_record import ForceComparison
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
@@ -22,7 +22,7 @@ from palpate.mesh.protocol import Meshing
 from palpate.replay.replay import Equilibrium, Replay
 from palpate.setup.setup import Setup
 
-__all__ = ["Prediction", "Sample", "predict"]
+__all__ = ["PointSample", "Prediction", "predict"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,12 +48,12 @@ class Prediction:
     spread: FloatArray
     columns: FloatArray
     equilibria: tuple[Equilibrium, ...]
-    samples: tuple[Sample, ...]
-    felt: Felt | None = None
-    elsewhere: FloatArray | None = None
+    samples: tuple[PointSample, ...]
+    forces: ForceComparison | None = None
+    other_side: FloatArray | None = None
 
     @property
-    def unseen(self) -> bool:
+    def force_only(self) -> bool:
         """Whether there are forces alone."""
         return not self.gap.shape[1]
 
@@ -69,68 +69,68 @@ class Prediction:
         own = list(index)
         frames = tuple(self.equilibria[row] for row in own)
         points = tuple(self.samples[row] for row in own) if self.samples else ()
-        felt = None if self.felt is None else self.felt.of_groups(own)
+        forces = None if self.forces is None else self.forces.of_groups(own)
         seen = (self.gap[own], self.count[own], self.spread[own], self.columns[own])
         return Prediction(
             self.name,
             *seen,
             frames,
             points,
-            felt,
-            None if self.elsewhere is None else self.elsewhere[own],
+            forces,
+            None if self.other_side is None else self.other_side[own],
         )
 
-    def with_rows(self, columns: FloatArray) -> Prediction:
+    def replace_columns(self, columns: FloatArray) -> Prediction:
         """With other columns (g, p, k), or (g, p + 3, k) where the last rows are the force's."""
         patches = self.gap.shape[1]
-        felt = None if self.felt is None else replace(self.felt, columns=columns[:, patches:])
-        return replace(self, columns=columns[:, :patches], felt=felt)
+        forces = None if self.forces is None else replace(self.forces, columns=columns[:, patches:])
+        return replace(self, columns=columns[:, :patches], forces=forces)
 
     def beside(self, surface: FloatArray, force: FloatArray | None = None) -> Prediction:
         """With further columns last: of the surface's gap (g, p, m), and of the force's (g, 3, m),
         which are else zero.
         """
         columns = np.concatenate([self.columns, surface], axis=2)
-        if self.felt is None:
+        if self.forces is None:
             return replace(self, columns=columns)
         none = np.zeros((len(surface), 3, surface.shape[2]))
         return replace(
-            self, columns=columns, felt=self.felt.beside(none if force is None else force)
+            self, columns=columns, forces=self.forces.beside(none if force is None else force)
         )
 
-    def with_column(self, other: Prediction, column: int, step: float) -> Prediction:
+    def replace_column(self, other: Prediction, column: int, step: float) -> Prediction:
         """With what another setup changes over its step in place of a column."""
-        surface, force = other.less(self)
-        columns = [self.columns] if self.felt is None else [self.columns, self.felt.columns]
+        surface, force = other.change_from(self)
+        columns = [self.columns] if self.forces is None else [self.columns, self.forces.columns]
         changed = np.concatenate(columns, axis=1)
         changed[..., column] = (
             surface if force is None else np.concatenate([surface, force], axis=1)
         ) / step
-        return self.with_rows(changed)
+        return self.replace_columns(changed)
 
-    def upon(self, base: Prediction, origin: Prediction) -> Prediction:
+    def transferred(self, base: Prediction, origin: Prediction) -> Prediction:
         """With gaps as if what this model changes over `origin`, both on another mesh, had been
         done to `base`.
         """
-        felt = self.felt
-        if felt is not None and base.felt is not None and origin.felt is not None:
-            felt = replace(felt, gap=base.felt.gap + felt.gap - origin.felt.gap)
-        return replace(self, gap=base.gap + self.gap - origin.gap, felt=felt)
+        forces = self.forces
+        if forces is not None and base.forces is not None and origin.forces is not None:
+            forces = replace(forces, gap=base.forces.gap + forces.gap - origin.forces.gap)
+        return replace(self, gap=base.gap + self.gap - origin.gap, forces=forces)
 
-    def alone(self) -> Prediction:
+    def without_details(self) -> Prediction:
         """The gaps without what takes most of the memory: for what is only compared."""
         return replace(self, columns=self.columns[..., :0], equilibria=(), samples=())
 
-    def less(self, origin: Prediction) -> tuple[FloatArray, FloatArray | None]:
+    def change_from(self, origin: Prediction) -> tuple[FloatArray, FloatArray | None]:
         """What this model's gaps have over another's, of the surface (g, p) [m] and of the force
         (g, 3) [N]; zero where unseen.
         """
-        felt = (
+        forces = (
             None
-            if self.felt is None or origin.felt is None
-            else np.nan_to_num(self.felt.gap - origin.felt.gap)
+            if self.forces is None or origin.forces is None
+            else np.nan_to_num(self.forces.gap - origin.forces.gap)
         )
-        return np.nan_to_num(self.gap - origin.gap), felt
+        return np.nan_to_num(self.gap - origin.gap), forces
 
 
 def predict(
@@ -140,7 +140,7 @@ def predict(
     wanted: Wanted | None = None,
     starts: Sequence[Equilibrium] | None = None,
     tolerance: float = 3e-4,
-    samples: Sequence[Sample] | None = None,
+    samples: Sequence[PointSample] | None = None,
 ) -> Prediction:
     """Replay a sequence's groups and compare each with its points.
 
@@ -150,7 +150,7 @@ def predict(
         samples: which points to average; chosen anew without them.
     """
     surface, block = Surface.of(setup), Replay(setup, grid, tolerance, travel(setup))
-    way = led(data, setup, grid, wanted)
+    way = tool_path_of(data, setup, grid, wanted)
     true_from_stated, centres, moves, turned, measured = (
         way.correction,
         way.centres,
@@ -161,7 +161,16 @@ def predict(
     columns = (
         Columns(block, wanted, measured is not None) if wanted and not setup.has_history else None
     )
-    gap, count, spread, changes, pressed, frames, chosen, elsewhere = [], [], [], [], [], [], [], []
+    gap, count, spread, changes, pressed, frames, chosen, other_side = (
+        [],
+        [],
+        [],
+        [],
+        [],
+        [],
+        [],
+        [],
+    )
     past = Past(data, block, true_from_stated) if setup.has_history else None
     previous: Equilibrium | None = None
     for number, (group, centre, turn) in enumerate(
@@ -177,13 +186,15 @@ def predict(
             start = starts[number] if starts is not None and starts[number].in_contact else previous
             frame = block.solve_from_any(centre, (start, previous))
         previous = frame if frame.outcome is Outcome.CONVERGED else None
-        sample = samples[number] if samples is not None else choose(group, setup, frame, surface)
+        sample = (
+            samples[number] if samples is not None else choose_points(group, setup, frame, surface)
+        )
         compared = compare(group, setup, frame, surface, sample)
         chosen.append(sample)
         gap.append(compared.means.mean)
         count.append(compared.means.count)
         spread.append(compared.means.spread)
-        elsewhere.append(compared.elsewhere(sample))
+        other_side.append(compared.other_side(sample))
         frames.append(replace(frame, way=()))  # what was on the way to it is for this replay alone
         if columns is not None:
             moved = columns.of_group(frame, moves[:, number])
@@ -204,7 +215,7 @@ def predict(
         forgotten = predict(data, forgetful(setup), grid, plain, starts, tolerance, chosen)
         stacked, pressed = (
             forgotten.columns,
-            [] if forgotten.felt is None else list(forgotten.felt.columns),
+            [] if forgotten.forces is None else list(forgotten.forces.columns),
         )
     return Prediction(
         data.name,
@@ -214,6 +225,6 @@ def predict(
         stacked,
         tuple(frames),
         tuple(chosen),
-        None if measured is None else Felt.of(measured, frames, pressed),
-        np.array(elsewhere),
+        None if measured is None else ForceComparison.of(measured, frames, pressed),
+        np.array(other_side),
     )

@@ -11,20 +11,20 @@ import scipy.sparse as sp
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.frame_groups import Group
-from palpate.diagnosis.observation.stray_points import among_neighbours
+from palpate.diagnosis.observation.stray_points import agrees_with_neighbours
 from palpate.foundation.arrays import FloatArray, IntArray
-from palpate.measurement.camera_model import sight_of
+from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.patch_averages import PatchMeans, plain_means, within_spread
 from palpate.measurement.surface_gaps import Gaps, Surface, gaps, gaps_beside
 from palpate.mesh.interpolation import patch_rows
 from palpate.replay.replay import Equilibrium
 from palpate.setup.setup import Setup
 
-__all__ = ["Compared", "Sample", "choose", "compare", "observe"]
+__all__ = ["PointComparison", "PointSample", "averaging_matrix", "choose_points", "compare"]
 
 
 @dataclass(frozen=True, eq=False)
-class Sample:
+class PointSample:
     """Which of a group's points are averaged where: settled by the baseline and kept for every
     other model.
 
@@ -53,7 +53,7 @@ class Sample:
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
+class PointComparison:
     """A group's sample under one model.
 
     Gaps are lengths as the camera reads them: a model that says it reads them too long would
@@ -88,7 +88,7 @@ class Compared:
         np.add.at(total, patch, values)
         return np.asarray(total / np.maximum(self.means.count, 1)[:, None])
 
-    def elsewhere(self, sample: Sample) -> FloatArray:
+    def other_side(self, sample: PointSample) -> FloatArray:
         """Share (p,) of each patch's points that meet another side of this model than of the one
         that chose them [1].
         """
@@ -117,7 +117,7 @@ class Compared:
         return np.asarray(self.average(values[:, None], patch)[:, 0])
 
 
-def observe(frame: Equilibrium, compared: Compared) -> sp.csr_matrix:
+def averaging_matrix(frame: Equilibrium, compared: PointComparison) -> sp.csr_matrix:
     """Patch averages of the displacement along the normal as a linear function of the nodes'
     displacement (p, 3n).
     """
@@ -133,18 +133,18 @@ def observe(frame: Equilibrium, compared: Compared) -> sp.csr_matrix:
     return sp.csr_matrix((entries, columns, rows), shape=(patches, 3 * count))
 
 
-def choose(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) -> Sample:
+def choose_points(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) -> PointSample:
     """The points to average, by the model at hand: those on clear parts of the surface, without
     stray ones.
     """
-    sight = sight_of(setup, reference=group.reference)
+    sight = camera_model_for(setup, reference=group.reference)
     seen = gaps(
         sight.place(group.points), sight.pose.translation, frame, surface, lowest=group.lowest
     )
     kept = within_spread(seen.gap, seen.patch, surface.patches)
-    kept[kept] = among_neighbours(seen.gap[kept], seen.patch[kept], surface)
+    kept[kept] = agrees_with_neighbours(seen.gap[kept], seen.patch[kept], surface)
     index, patch = seen.index[kept].astype(np.int32), seen.patch[kept].astype(np.int32)
-    return Sample(
+    return PointSample(
         index,
         patch,
         (sight.scale * seen.gap[kept]).astype(np.float32),
@@ -154,7 +154,7 @@ def choose(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) -> 
     )
 
 
-def _along_rays(seen: Gaps, sample: Sample, scale: float) -> Gaps:
+def _along_rays(seen: Gaps, sample: PointSample, scale: float) -> Gaps:
     """Gaps, and the normals that say how they change, as long as the baseline's surface would have
     made them of these rays, and as a camera reads them whose lengths are `scale` times what they
     are [1].
@@ -165,7 +165,7 @@ def _along_rays(seen: Gaps, sample: Sample, scale: float) -> Gaps:
     return replace(seen, gap=seen.gap * factor, normal=seen.normal * factor[:, None])
 
 
-def _places(points: FloatArray, camera: FloatArray, seen: Gaps, sample: Sample) -> FloatArray:
+def _places(points: FloatArray, camera: FloatArray, seen: Gaps, sample: PointSample) -> FloatArray:
     """Where the rays of points (m, 3) [m] meet the model; the points themselves where they meet
     nothing.
     """
@@ -182,7 +182,11 @@ def _taken(part: Gaps, rows: IntArray) -> Gaps:
 
 
 def _met_or_beside(
-    points: FloatArray, camera: FloatArray, frame: Equilibrium, surface: Surface, sample: Sample
+    points: FloatArray,
+    camera: FloatArray,
+    frame: Equilibrium,
+    surface: Surface,
+    sample: PointSample,
 ) -> Gaps:
     """Gaps of the sample's points to the model: where their rays meet it, or beside it where they
     miss.
@@ -196,18 +200,18 @@ def _met_or_beside(
     away = np.linalg.norm(met.foot - usual[met.index], axis=1) > CRITERIA.rays.jump
     missed = np.ones(len(points), dtype=bool)
     missed[met.index] = False
-    elsewhere = np.concatenate([np.flatnonzero(missed), met.index[away]])
-    if not len(elsewhere):
+    other_side = np.concatenate([np.flatnonzero(missed), met.index[away]])
+    if not len(other_side):
         return met
-    foot, side = usual[elsewhere], sample.side[elsewhere].astype(np.int64)
+    foot, side = usual[other_side], sample.side[other_side].astype(np.int64)
     beside = replace(
-        gaps_beside(points[elsewhere], camera, frame, surface, foot, side), index=elsewhere
+        gaps_beside(points[other_side], camera, frame, surface, foot, side), index=other_side
     )
     by_ray = np.full(len(points), np.inf)
     by_ray[met.index] = np.abs(met.gap)
-    nearer = np.abs(beside.gap) < by_ray[elsewhere] - CRITERIA.rays.jump_gain
+    nearer = np.abs(beside.gap) < by_ray[other_side] - CRITERIA.rays.jump_gain
     given_up = np.zeros(len(points), dtype=bool)
-    given_up[elsewhere[nearer]] = True
+    given_up[other_side[nearer]] = True
     kept = ~given_up[met.index]
     parts = (_taken(met, np.flatnonzero(kept)), _taken(beside, np.flatnonzero(nearer)))
     return Gaps(
@@ -216,12 +220,12 @@ def _met_or_beside(
 
 
 def compare(
-    group: Group, setup: Setup, frame: Equilibrium, surface: Surface, sample: Sample
-) -> Compared:
+    group: Group, setup: Setup, frame: Equilibrium, surface: Surface, sample: PointSample
+) -> PointComparison:
     """The sample's points, where they meet the surface, and their averages; points of the model's
     tool lie off the tool.
     """
-    sight = sight_of(setup, reference=group.reference)
+    sight = camera_model_for(setup, reference=group.reference)
     points, camera = sight.place(group.points[sample.index]), sight.pose.translation
     met = _met_or_beside(points, camera, frame, surface, sample)
     seen = _along_rays(met, sample, sight.scale)
@@ -249,7 +253,7 @@ def compare(
     means = plain_means(values, sample.patch, surface.patches)
     places = _places(points, camera, met, sample)
     places[tool] = points[tool]
-    return Compared(
+    return PointComparison(
         places,
         seen,
         means,

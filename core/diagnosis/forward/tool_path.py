@@ -18,11 +18,11 @@ from palpate.setup.setup import Setup
 if TYPE_CHECKING:
     from palpate.diagnosis.forward.jacobian import Wanted
 
-__all__ = ["Led", "led"]
+__all__ = ["ToolPath", "tool_path_of"]
 
 
 @dataclass(frozen=True, eq=False)
-class Led:
+class ToolPath:
     """A sequence's groups under one setup.
 
     Attributes:
@@ -44,7 +44,9 @@ class Led:
     measured: tuple[FloatArray, FloatArray] | None
 
 
-def led(data: Observations, setup: Setup, grid: Meshing, wanted: Wanted | None) -> Led:
+def tool_path_of(
+    data: Observations, setup: Setup, grid: Meshing, wanted: Wanted | None
+) -> ToolPath:
     """Under this setup, and the wanted ones; the grid is for the sag of the landmarks."""
     correction = touch_correction(setup, grid)
     centres = correction.apply(data.centres(setup))
@@ -56,22 +58,27 @@ def led(data: Observations, setup: Setup, grid: Meshing, wanted: Wanted | None) 
         moves[number] = there.apply(data.centres(other)) - centres
         turned[number] = (there @ other.phantom_from_robot @ robot.inverse()).rotation
     turns = _turns(data, setup, grid, wanted)
-    return Led(
-        correction, centres, moves, turns, turned, data.felt(robot, setup.sensor.time_offset)
+    return ToolPath(
+        correction,
+        centres,
+        moves,
+        turns,
+        turned,
+        data.force_in_groups(robot, setup.sensor.time_offset),
     )
 
 
 def _turns(
     data: Observations, setup: Setup, grid: Meshing, wanted: Wanted | None
 ) -> list[tuple[FloatArray, FloatArray] | None]:
-    """As `Led.turns`; another clock says when a cloud was taken, not where the tool turned."""
+    """As `ToolPath.turns`; another clock says when a cloud was taken, not where the tool turned."""
     if setup.support.friction_coefficient is None or setup.has_history:
         return [None] * len(data.groups)
-    chosen, clock = data.turns(setup), setup.sensor.time_offset
+    chosen, clock = data.deepest_places(setup), setup.sensor.time_offset
     setups = (setup, *(wanted.setups if wanted else ()))
     timed = [replace(one, sensor=replace(one.sensor, time_offset=clock)) for one in setups]
     ways = [
-        touch_correction(one, grid).apply(data.way(same)[1])
+        touch_correction(one, grid).apply(data.path(same)[1])
         for one, same in zip(setups, timed, strict=True)
     ]
     places = [

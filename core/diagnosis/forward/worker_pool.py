@@ -19,7 +19,7 @@ from palpate.diagnosis.forward.force_prediction import predict_forces
 from palpate.diagnosis.forward.history_columns import Trace, traces_of
 from palpate.diagnosis.forward.jacobian import Wanted
 from palpate.diagnosis.forward.prediction import Prediction, predict
-from palpate.diagnosis.forward.ray_comparison import Sample
+from palpate.diagnosis.forward.ray_comparison import PointSample
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.effects import Effect
 from palpate.foundation.processes import ProcessPool, giving_memory_back
@@ -76,11 +76,11 @@ def _task(
     grid: Meshing,
     wanted: Wanted | None,
     starts: Sequence[Equilibrium] | None,
-    samples: Sequence[Sample] | None,
+    samples: Sequence[PointSample] | None,
     tolerance: float,
 ) -> Prediction:
     data = _measured(file)
-    if data.unseen:
+    if data.force_only:
         return predict_forces(data, setup, grid, wanted, starts, tolerance)
     found = predict(data, setup, grid, wanted, starts, tolerance, samples)
     return found if samples is None else replace(found, samples=())
@@ -93,7 +93,7 @@ class Pending:
     """
 
     future: Future[Prediction]
-    samples: tuple[Sample, ...] | None
+    samples: tuple[PointSample, ...] | None
 
     def result(self) -> Prediction:
         """Wait for it."""
@@ -106,7 +106,7 @@ def _trace(
     setup: Setup,
     grid: Meshing,
     frames: Sequence[Equilibrium],
-    samples: Sequence[Sample],
+    samples: Sequence[PointSample],
     effects: Sequence[Effect],
 ) -> list[Trace]:
     return traces_of(_measured(file), setup, grid, frames, samples, effects)

@@ -19,11 +19,11 @@ from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DiagnosisError
 
-__all__ = ["FeltLadder", "felt_ladder"]
+__all__ = ["ForceGain", "force_gain"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class FeltLadder:
+class ForceGain:
     """RMS length of measured minus simulated force [N] while the tool presses, and the share of the
     reducible error removed.
 
@@ -59,13 +59,13 @@ class FeltLadder:
         }
 
 
-def felt_ladder(
+def force_gain(
     data: Sequence[Observations],
     baseline: Sequence[Prediction],
     extended: Sequence[Prediction],
     seed: int,
     stiffer: tuple[float, float] = (1.0, 1.0),
-) -> FeltLadder:
+) -> ForceGain:
     """Compare two models on the pushes of test sequences, which are resampled whole.
 
     Args:
@@ -73,26 +73,26 @@ def felt_ladder(
     """
     rows: list[tuple[str, float, float, float]] = []
     for item, before, after in zip(data, baseline, extended, strict=True):
-        if before.felt is None or after.felt is None:
+        if before.forces is None or after.forces is None:
             continue
         for number, group in enumerate(item.groups):
             if (
                 number in before.failed
                 or number in after.failed
-                or not np.isfinite(before.felt.gap[number]).all()
+                or not np.isfinite(before.forces.gap[number]).all()
             ):
                 continue
-            felt = [
-                side.stiffer(factor)
-                for side, factor in zip((before.felt, after.felt), stiffer, strict=True)
+            forces = [
+                side.scaled(factor)
+                for side, factor in zip((before.forces, after.forces), stiffer, strict=True)
             ]
-            one, other = (float((side.gap[number] ** 2).sum()) for side in felt)
+            one, other = (float((side.gap[number] ** 2).sum()) for side in forces)
             rows.append(
                 (
                     f"{item.name}/{group.probe}",
                     one,
                     other,
-                    3 * float(before.felt.noise[number]) ** 2,
+                    3 * float(before.forces.noise[number]) ** 2,
                 )
             )
     if not rows:
@@ -106,7 +106,7 @@ def felt_ladder(
     )
     drawn, whole = _rms(pushes[chosen].sum(axis=1)), _rms(pushes.sum(axis=0)[None])
     low, high = np.quantile(_share(drawn), [0.025, 0.975])
-    return FeltLadder(
+    return ForceGain(
         baseline=float(whole[0, 0]),
         extended=float(whole[0, 1]),
         noise_floor=float(whole[0, 2]),

@@ -17,11 +17,11 @@ from palpate.diagnosis.observation.force_record import rms_force
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.setup.setup import Setup
 
-__all__ = ["Ladder", "ladder"]
+__all__ = ["SurfaceGain", "surface_gain"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Ladder:
+class SurfaceGain:
     """RMS of patch averages of signed distance [m] in touched frames, and the share of the
     reducible error that is removed.
 
@@ -48,14 +48,14 @@ class Ladder:
     tuned: tuple[float, float, float] | None = None
 
 
-def ladder(
+def surface_gain(
     data: Sequence[Observations],
     baseline: Sequence[Prediction],
     extended: Sequence[Prediction],
     stated: Setup,
     found: Setup,
     seed: int,
-) -> Ladder:
+) -> SurfaceGain:
     """Compare two models on test sequences; probes are resampled whole.
 
     Groups in touch count, and where a push leaves something (a dent, a block that slid) also those
@@ -64,7 +64,7 @@ def ladder(
     sums = probe_sums(data, (baseline, extended), found.pushes_leave_traces)
     drawn, whole = sums.rms(sums.draws(seed)), sums.rms()[0]
     low, high = np.quantile(removed_share(*drawn.T), [0.025, 0.975])
-    return Ladder(
+    return SurfaceGain(
         baseline=float(whole[0]),
         extended=float(whole[1]),
         noise_floor=float(whole[2]),
@@ -93,13 +93,13 @@ def _force(
     """
     before, after = [], []
     for one, other in zip(baseline, extended, strict=True):
-        if one.felt is not None and other.felt is not None:
+        if one.forces is not None and other.forces is not None:
             touched = [
                 a.in_contact or b.in_contact
                 for a, b in zip(one.equilibria, other.equilibria, strict=True)
             ]
-            before.append((one.felt, np.array(touched)))
-            after.append((other.felt, np.array(touched)))
+            before.append((one.forces, np.array(touched)))
+            after.append((other.forces, np.array(touched)))
     if not before:
         return None
     raw, floor = rms_force(before)

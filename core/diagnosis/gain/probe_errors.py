@@ -22,7 +22,7 @@ from palpate.diagnosis.inference.noise_model import patch_variance
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import DiagnosisError
-from palpate.measurement.camera_model import sight_of
+from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.metrics import paper_distance
 from palpate.measurement.surface_gaps import Surface
 from palpate.setup.setup import Setup
@@ -128,7 +128,7 @@ def probe_sums(
 
     Raises DiagnosisError where a sequence has no untouched frame, or none of them a touched one.
     """
-    seen = [row for row in zip(data, *models, strict=True) if not row[0].unseen]
+    seen = [row for row in zip(data, *models, strict=True) if not row[0].force_only]
     variance = patch_variance([row[1:][end] for row in seen for end in ends])
     found: list[tuple[str, FloatArray]] = []
     for item, *own in seen:
@@ -193,11 +193,11 @@ def paper_sums(
     """Sum of the paper's metric over touched groups [m], and their number, by push
     ("sequence/number").
     """
-    surface, sight = Surface.of(setup), sight_of(setup)
+    surface, sight = Surface.of(setup), camera_model_for(setup)
     found: dict[str, tuple[float, int]] = {}
     for item, prediction in zip(data, predictions, strict=True):
         for number, group in enumerate(item.groups):
-            if not item.unseen and not group.free and number not in prediction.failed:
+            if not item.force_only and not group.free and number not in prediction.failed:
                 name = f"{item.name}/{group.probe}"
                 distance = paper_distance(
                     sight.place(group.points[: CRITERIA.gain.paper_points]),

@@ -17,8 +17,8 @@ import numpy as np
 from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.forward.worker_pool import Pending, Workers
-from palpate.diagnosis.gain.force_gain import FeltLadder, felt_ladder
-from palpate.diagnosis.gain.gain_ladder import Ladder, ladder
+from palpate.diagnosis.gain.force_gain import ForceGain, force_gain
+from palpate.diagnosis.gain.gain_ladder import SurfaceGain, surface_gain
 from palpate.diagnosis.inference.credible_intervals import modulus_interval
 from palpate.diagnosis.inference.evidence import fit
 from palpate.diagnosis.inference.hypothesis import Model
@@ -31,10 +31,10 @@ from palpate.mesh.protocol import Meshing
 from palpate.registration.pose import small_motion
 from palpate.setup.setup import Setup
 
-__all__ = ["tuned", "worth"]
+__all__ = ["held_out_gain", "tuned_setup"]
 
 
-def tuned(bench: Bench, model: Model) -> Setup:
+def tuned_setup(bench: Bench, model: Model) -> Setup:
     """The model's setup with the robot's pose, the tool's radius and Poisson's ratio as the fit
     left them.
 
@@ -62,15 +62,15 @@ def tuned(bench: Bench, model: Model) -> Setup:
     )
 
 
-def worth(
+def held_out_gain(
     bench: Bench,
     findings: Findings,
-    unseen: list[Observations],
+    held_out: list[Observations],
     pool: Workers,
     grid: Meshing,
     seed: int,
     alone: bool = False,
-) -> Ladder | FeltLadder | None:
+) -> SurfaceGain | ForceGain | None:
     """Of the stated and the found model on test sequences; `alone` adds what tuning without a cause
     would give.
 
@@ -78,13 +78,13 @@ def worth(
     says which points count. None where the stated setup then finds an equilibrium in no frame in
     which the tool touches.
     """
-    names, stated = [item.name for item in unseen], bench.setup
-    found = tuned(bench, findings.best.model) if findings.best else stated
+    names, stated = [item.name for item in held_out], bench.setup
+    found = tuned_setup(bench, findings.best.model) if findings.best else stated
     first, second = (found, stated) if findings.known else (stated, found)
-    felt = all(item.unseen for item in unseen)
+    forces = all(item.force_only for item in held_out)
     without = (
-        tuned(bench, findings.baseline)
-        if alone and findings.best and not findings.known and not felt
+        tuned_setup(bench, findings.baseline)
+        if alone and findings.best and not findings.known and not forces
         else None
     )
     further = [
@@ -93,18 +93,19 @@ def worth(
     one, rest = _begun(pool, names, [first, *further], grid)
     other = one if first is second else _found(rest[0])
     baseline, extended = (other, one) if findings.known else (one, other)
-    touched = [{n for n, group in enumerate(item.groups) if not group.free} for item in unseen]
+    touched = [{n for n, group in enumerate(item.groups) if not group.free} for item in held_out]
     rows = zip(touched, baseline, extended, strict=True)
     if findings.known and all(
         own <= {*before.failed, *after.failed} for own, before, after in rows
     ):
         return None
-    if felt:
-        return felt_ladder(unseen, baseline, extended, seed, _stiffer(bench, findings))
-    gain = ladder(unseen, baseline, extended, stated, found, seed)
+    if forces:
+        return force_gain(held_out, baseline, extended, seed, _stiffer(bench, findings))
+    gain = surface_gain(held_out, baseline, extended, stated, found, seed)
     if without is not None:
         gain = replace(
-            gain, tuned=ladder(unseen, baseline, _found(rest[-1]), stated, without, seed).removed
+            gain,
+            tuned=surface_gain(held_out, baseline, _found(rest[-1]), stated, without, seed).removed,
         )
     return gain
 

@@ -62,7 +62,8 @@ def led(
                 )
             ]
             found = [
-                here.with_column(one, column, step) for here, one in zip(found, there, strict=True)
+                here.replace_column(one, column, step)
+                for here, one in zip(found, there, strict=True)
             ]
         column += len(effect.numbers())
     return found

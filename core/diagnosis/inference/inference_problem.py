@@ -68,7 +68,7 @@ class Bench:
         )
         self.names, self._report, self._done = tuple(names), report, 0.0
         self.grid, self.fine, self.rough = grid, fine, grid
-        self.nuisances = Nuisances.of(registration.mended, forces)
+        self.nuisances = Nuisances.of(registration.repaired, forces)
         self._first = TOOL_COLUMNS + 8 + forces
         self.weighed: tuple[type[Effect], ...] = weighed(setup, seen=seen, forces=forces)
         self.seen = seen
@@ -249,7 +249,7 @@ class Bench:
         for number, noise in enumerate(self.noises):
             here, zero = model.predictions[number], origin.predictions[number]
             for _, other in signatures:
-                surface, force = other[number].less(zero)
+                surface, force = other[number].change_from(zero)
                 here = here.beside(surface[..., None], None if force is None else force[..., None])
             blocks.append(noise.block(here))
         places = tuple(range(count, count + len(signatures)))

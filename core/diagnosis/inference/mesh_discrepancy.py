@@ -45,7 +45,8 @@ def with_columns(
 ) -> tuple[Prediction, ...]:
     """Replays on another grid with the columns of those on the stated one."""
     return tuple(
-        here.with_rows(rows_of(there)[1]) for here, there in zip(replayed, stated, strict=True)
+        here.replace_columns(rows_of(there)[1])
+        for here, there in zip(replayed, stated, strict=True)
     )
 
 

@@ -66,10 +66,10 @@ def rows_of(item: Prediction) -> tuple[FloatArray, FloatArray]:
     """Gaps (g, r) of the surface's patches [m] and, where there is one, of the force's three
     components [N]; columns (g, r, k).
     """
-    if item.felt is None:
+    if item.forces is None:
         return item.gap, item.columns
-    return np.concatenate([item.gap, item.felt.gap], axis=1), np.concatenate(
-        [item.columns, item.felt.columns], axis=1
+    return np.concatenate([item.gap, item.forces.gap], axis=1), np.concatenate(
+        [item.columns, item.forces.columns], axis=1
     )
 
 
@@ -115,8 +115,8 @@ class Noise:
         seen[list(set(baseline.failed) | set(fine.failed))] = False
         mesh = np.where(seen, finer - gap, 0.0)
         scatter = variance / np.maximum(baseline.count, 1) + CRITERIA.noise.white_floor**2
-        if baseline.felt is not None:
-            scatter = np.concatenate([scatter, force_scatter(baseline.felt)], axis=1)
+        if baseline.forces is not None:
+            scatter = np.concatenate([scatter, force_scatter(baseline.forces)], axis=1)
         scatter = scatter + (0.5 * mesh) ** 2
         centres = surface.patch_centres
         size = np.array(
@@ -132,9 +132,9 @@ class Noise:
             * size[..., None]
             * smooth_basis(centres, CRITERIA.noise.field_length)
         )
-        if baseline.felt is not None:
+        if baseline.forces is not None:
             displacement = _aside(
-                displacement, force_discrepancy(baseline.felt, baseline.equilibria)
+                displacement, force_discrepancy(baseline.forces, baseline.equilibria)
             )
         stiffness = CRITERIA.noise.stiffness_error * columns[..., lumps].astype(float)
         weights = np.where(seen, 1 / scatter, 0.0)
@@ -142,19 +142,19 @@ class Noise:
         return cls(weights, np.where(seen, gap, 0.0), mesh, discrepancy, spots=stiffness.shape[2])
 
     @classmethod
-    def felt(cls, baseline: Prediction, fine: Prediction, lumps: slice) -> Noise:
+    def of_forces(cls, baseline: Prediction, fine: Prediction, lumps: slice) -> Noise:
         """The same of a sequence without clouds: the force's rows alone, with how deep each push
         went as one more thing that is known only so well.
         """
         (gap, columns), finer = rows_of(baseline), rows_of(fine)[0]
-        assert baseline.felt is not None
+        assert baseline.forces is not None
         seen = np.isfinite(gap) & np.isfinite(finer)
         seen[list(set(baseline.failed) | set(fine.failed))] = False
         mesh = np.where(seen, finer - gap, 0.0)
-        scatter = force_scatter(baseline.felt) + (0.5 * mesh) ** 2
+        scatter = force_scatter(baseline.forces) + (0.5 * mesh) ** 2
         parts = [
-            force_discrepancy(baseline.felt, baseline.equilibria),
-            depth_discrepancy(baseline.felt, baseline.equilibria),
+            force_discrepancy(baseline.forces, baseline.equilibria),
+            depth_discrepancy(baseline.forces, baseline.equilibria),
             CRITERIA.noise.stiffness_error * columns[..., lumps].astype(float),
         ]
         weights = np.where(seen, 1 / scatter, 0.0)
@@ -173,9 +173,9 @@ class Noise:
         seen = np.isfinite(gap) & np.isfinite(finer) & (self.weights > 0)
         seen[list(set(model.failed) | set(fine.failed))] = False
         weights = self.weights.copy()
-        if model.elsewhere is not None:
-            weights[:, : model.elsewhere.shape[1]][
-                model.elsewhere > CRITERIA.noise.other_side_share
+        if model.other_side is not None:
+            weights[:, : model.other_side.shape[1]][
+                model.other_side > CRITERIA.noise.other_side_share
             ] = 0.0
         return replace(self, weights=weights, mesh=np.where(seen, finer - gap, self.mesh))
 
@@ -231,11 +231,11 @@ def noises(
     lumps: slice,
 ) -> list[Noise]:
     """The noise of every sequence; only those without clouds need no surface."""
-    seen = [item for item in baseline if not item.unseen]
+    seen = [item for item in baseline if not item.force_only]
     variance = patch_variance(seen) if seen else np.empty(0)
     return [
-        Noise.felt(b, f, lumps)
-        if b.unseen or surface is None
+        Noise.of_forces(b, f, lumps)
+        if b.force_only or surface is None
         else Noise.of(b, f, surface, variance, lumps)
         for b, f in zip(baseline, fine, strict=True)
     ]

@@ -71,20 +71,20 @@ def _with_modes(model: Model, bench: Bench) -> list[Block]:
         if bench.seen
         else np.zeros((0, 0))
     )
-    felt = (
+    forces = (
         smooth_basis(bench.pushed[0], CRITERIA.structure.force_mode_length)
         if len(bench.pushed[0])
         else np.zeros((0, 0))
     )
     blocks, at = [], 0
     for noise, item in zip(bench.noises, model.predictions, strict=True):
-        modes = max(seen.shape[1], felt.shape[1])
-        if item.felt is not None and item.unseen:
-            push = np.asarray(item.felt.push)
+        modes = max(seen.shape[1], forces.shape[1])
+        if item.forces is not None and item.force_only:
+            push = np.asarray(item.forces.push)
             names = np.unique(push)
-            own = felt[at + np.searchsorted(names, push)]
+            own = forces[at + np.searchsorted(names, push)]
             at += len(names)
-            force = _wide(item.felt.force[:, :, None] * own[:, None, :], modes)
+            force = _wide(item.forces.force[:, :, None] * own[:, None, :], modes)
             blocks.append(noise.block(item.beside(np.zeros((len(own), 0, modes)), force)))
         else:
             blocks.append(

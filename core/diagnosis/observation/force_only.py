@@ -64,7 +64,7 @@ def observe_forces(sequence: Sequence, setup: Setup, most: int) -> Observations:
             file=home,
         )
     instants, groups = _instants(times, depth, _kept(pushes, most))
-    return Observations(sequence.name, instants, clock, groups, record, unseen=True)
+    return Observations(sequence.name, instants, clock, groups, record, force_only=True)
 
 
 def _gap(setup: Setup, centres: FloatArray) -> FloatArray:
@@ -141,7 +141,7 @@ def pushed_places(data: Ordered[Observations], setup: Setup) -> tuple[FloatArray
     """
     places, normals = [], []
     for item in data:
-        if not item.unseen:
+        if not item.force_only:
             continue
         centres = item.centres(setup)
         for probe in sorted({group.probe for group in item.groups}):

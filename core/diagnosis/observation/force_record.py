@@ -22,7 +22,7 @@ from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.replay.replay import Equilibrium
 
 __all__ = [
-    "Felt",
+    "ForceComparison",
     "ForceRecord",
     "depth_discrepancy",
     "force_discrepancy",
@@ -139,7 +139,7 @@ def _white(time: FloatArray, force: FloatArray, untouched: BoolArray, sample: fl
 
 
 @dataclass(frozen=True, eq=False)
-class Felt:
+class ForceComparison:
     """The forces of a sequence's groups under one setup, phantom frame.
 
     Attributes:
@@ -164,7 +164,7 @@ class Felt:
         frames: Sequence[Equilibrium],
         columns: Sequence[Any],
         push: IntArray | None = None,
-    ) -> Felt:
+    ) -> ForceComparison:
         """From forces and their deviations, a model's frames, and the changes (3, k) of each, if
         any.
         """
@@ -172,14 +172,14 @@ class Felt:
         stacked: FloatArray = np.stack(columns) if columns else np.zeros((len(frames), 3, 0))
         return cls(measured[0] - force, measured[1], force, stacked, push)
 
-    def of_groups(self, index: list[int]) -> Felt:
+    def of_groups(self, index: list[int]) -> ForceComparison:
         """These groups alone."""
         push = None if self.push is None else self.push[index]
-        return Felt(
+        return ForceComparison(
             self.gap[index], self.noise[index], self.force[index], self.columns[index], push
         )
 
-    def stiffer(self, factor: float) -> Felt:
+    def scaled(self, factor: float) -> ForceComparison:
         """Of a body so many times as stiff: a simulated force goes with the modulus."""
         return replace(
             self,
@@ -188,50 +188,56 @@ class Felt:
             columns=factor * self.columns,
         )
 
-    def beside(self, added: FloatArray) -> Felt:
+    def beside(self, added: FloatArray) -> ForceComparison:
         """With further columns (g, 3, m) last."""
         return replace(self, columns=np.concatenate([self.columns, added], axis=2))
 
 
-def force_scatter(felt: Felt) -> FloatArray:
+def force_scatter(forces: ForceComparison) -> FloatArray:
     """Variance (g, 3) [N^2] of each measured force: the sensor's, and the engine's own."""
-    engine = CRITERIA.force_error.group_error * np.linalg.norm(felt.force, axis=1)
-    return np.repeat((felt.noise**2 + engine**2)[:, None], 3, axis=1)
+    engine = CRITERIA.force_error.group_error * np.linalg.norm(forces.force, axis=1)
+    return np.repeat((forces.noise**2 + engine**2)[:, None], 3, axis=1)
 
 
-def force_discrepancy(felt: Felt, frames: Sequence[Equilibrium]) -> FloatArray:
+def force_discrepancy(forces: ForceComparison, frames: Sequence[Equilibrium]) -> FloatArray:
     """Columns (g, 3, pushes) [N] of the engine's own error, one for each push, of unit variance."""
     return np.asarray(
-        CRITERIA.force_error.push_error * felt.force[:, :, None] * _pushes(felt, frames)[:, None, :]
+        CRITERIA.force_error.push_error
+        * forces.force[:, :, None]
+        * _pushes(forces, frames)[:, None, :]
     )
 
 
-def depth_discrepancy(felt: Felt, frames: Sequence[Equilibrium]) -> FloatArray:
+def depth_discrepancy(forces: ForceComparison, frames: Sequence[Equilibrium]) -> FloatArray:
     """Columns (g, 3, pushes) [N] of how deep each push really went, along its force, of unit
     variance.
     """
-    along = felt.force / np.maximum(np.linalg.norm(felt.force, axis=1, keepdims=True), 1e-12)
-    deeper = np.einsum("gik,gk->gi", felt.columns[..., :3], along)
+    along = forces.force / np.maximum(np.linalg.norm(forces.force, axis=1, keepdims=True), 1e-12)
+    deeper = np.einsum("gik,gk->gi", forces.columns[..., :3], along)
     return np.asarray(
-        CRITERIA.force_error.contact_depth * deeper[:, :, None] * _pushes(felt, frames)[:, None, :]
+        CRITERIA.force_error.contact_depth
+        * deeper[:, :, None]
+        * _pushes(forces, frames)[:, None, :]
     )
 
 
-def _pushes(felt: Felt, frames: Sequence[Equilibrium]) -> BoolArray:
+def _pushes(forces: ForceComparison, frames: Sequence[Equilibrium]) -> BoolArray:
     """Which groups belong to which push (g, pushes)."""
     touched = np.array([frame.in_contact for frame in frames])
     push = (
-        np.cumsum(np.diff(touched.astype(int), prepend=0) == 1) if felt.push is None else felt.push
+        np.cumsum(np.diff(touched.astype(int), prepend=0) == 1)
+        if forces.push is None
+        else forces.push
     )
     return np.asarray(touched[:, None] & (push[:, None] == np.arange(1, push.max(initial=0) + 1)))
 
 
-def rms_force(felt: Sequence[tuple[Felt, BoolArray]]) -> tuple[float, float]:
+def rms_force(forces: Sequence[tuple[ForceComparison, BoolArray]]) -> tuple[float, float]:
     """RMS length of measured minus simulated force [N] over groups chosen by masks (g,), and that
     of the sensor's noise.
     """
-    gaps = np.concatenate([one.gap[chosen] for one, chosen in felt])
-    noise = np.concatenate([one.noise[chosen] for one, chosen in felt])
+    gaps = np.concatenate([one.gap[chosen] for one, chosen in forces])
+    noise = np.concatenate([one.noise[chosen] for one, chosen in forces])
     known = np.isfinite(gaps).all(axis=1)
     if not known.any():
         return 0.0, 0.0

@@ -70,7 +70,7 @@ class Observations:
         kinematics: the robot's stream.
         groups: in the order of time.
         forces: on the tool, if they were measured.
-        unseen: whether there are no clouds, so that groups hold instants of the pushes and no
+        force_only: whether there are no clouds, so that groups hold instants of the pushes and no
             points.
     """
 
@@ -79,7 +79,7 @@ class Observations:
     kinematics: Kinematics
     groups: tuple[Group, ...]
     forces: ForceRecord | None = None
-    unseen: bool = False
+    force_only: bool = False
 
     def centres(self, setup: Setup) -> FloatArray:
         """Stated tool centre (g, 3) [m] of each group, phantom frame, under the setup's clock and
@@ -104,13 +104,13 @@ class Observations:
             else None
         )
 
-    def holds_together(self, setup: Setup) -> bool:
+    def grouping_holds(self, setup: Setup) -> bool:
         """Whether under this setup's clock every frame was taken about where its group is replayed.
 
         That is within TRAVEL of the group's place, or with the tool out of touch where it is said
         to be clear of the block.
         """
-        if self.unseen:
+        if self.force_only:
             return True
         places = self._places(setup)
         for group, centre in zip(self.groups, self.centres(setup), strict=True):
@@ -124,7 +124,7 @@ class Observations:
                 return False
         return True
 
-    def way(self, setup: Setup) -> tuple[FloatArray, FloatArray]:
+    def path(self, setup: Setup) -> tuple[FloatArray, FloatArray]:
         """Times (t,) [s] of the recording, on the robot's clock, and stated tool centres (t, 3)
         [m], phantom frame.
         """
@@ -134,7 +134,7 @@ class Observations:
         )
         return times, setup.phantom_from_robot.apply(smooth_centres(self.kinematics, times))
 
-    def felt(
+    def force_in_groups(
         self, phantom_from_robot: Transform, late: float
     ) -> tuple[FloatArray, FloatArray] | None:
         """Force on the tool (g, 3) [N] in each group, phantom frame, and its standard deviation
@@ -156,14 +156,14 @@ class Observations:
         ]
         return force @ phantom_from_robot.rotation.T, np.sqrt(variance)
 
-    def turns(self, setup: Setup) -> list[int | None]:
-        """For each group at which place of the `way` the tool was deepest since the group before;
+    def deepest_places(self, setup: Setup) -> list[int | None]:
+        """For each group at which place of the `path` the tool was deepest since the group before;
         None where that is its own place.
 
         A base that slides has gone as far as the deepest push took it, whether a cloud was taken
         there or not.
         """
-        times, way = self.way(setup)
+        times, way = self.path(setup)
         depths = _depth(setup.box.size, way)
         found: list[int | None] = []
         last = np.inf

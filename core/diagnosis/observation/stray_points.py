@@ -15,10 +15,10 @@ from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.measurement.patch_averages import MaskArray, patch_medians
 from palpate.measurement.surface_gaps import Surface
 
-__all__ = ["among_neighbours"]
+__all__ = ["agrees_with_neighbours"]
 
 
-def among_neighbours(gap: FloatArray, patch: IntArray, surface: Surface) -> MaskArray:
+def agrees_with_neighbours(gap: FloatArray, patch: IntArray, surface: Surface) -> MaskArray:
     """Which points (m,) with these gaps (m,) [m] to keep: not those of patches (m,) far off all
     around.
 

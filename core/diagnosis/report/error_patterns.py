@@ -21,11 +21,11 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DiagnosisError
 from palpate.measurement.surface_gaps import SIDES, Surface
 
-__all__ = ["Patterns", "draw_patterns", "patterns"]
+__all__ = ["ErrorPatterns", "draw_patterns", "error_patterns"]
 
 
 @dataclass(frozen=True, eq=False)
-class Patterns:
+class ErrorPatterns:
     """Error by patch (p,) [m], NaN where unseen: measured minus stated model, and extended minus
     stated model.
     """
@@ -46,7 +46,9 @@ class Patterns:
         )
 
 
-def patterns(bench: Bench, data: Sequence[Observations], baseline: Model, found: Model) -> Patterns:
+def error_patterns(
+    bench: Bench, data: Sequence[Observations], baseline: Model, found: Model
+) -> ErrorPatterns:
     """The error of the one push in which the cause matters most, and what the cause predicts of it,
     smoothed alike.
 
@@ -57,7 +59,7 @@ def patterns(bench: Bench, data: Sequence[Observations], baseline: Model, found:
     pairs = [
         row
         for row in zip(data, baseline.predictions, found.predictions, strict=True)
-        if not row[0].unseen
+        if not row[0].force_only
     ]
     lasting = found.setup.pushes_leave_traces
     compared = [
@@ -87,7 +89,9 @@ def patterns(bench: Bench, data: Sequence[Observations], baseline: Model, found:
     measured, predicted = (
         near @ (points * values).sum(axis=0) / shown for values in (error, change)
     )
-    return Patterns(bench.surface.patch_centres, bench.surface.patch_normals, measured, predicted)
+    return ErrorPatterns(
+        bench.surface.patch_centres, bench.surface.patch_normals, measured, predicted
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +142,7 @@ def _kernel(surface: Surface) -> FloatArray:
     )
 
 
-def draw_patterns(found: Patterns, surface: Surface, path: Path) -> None:
+def draw_patterns(found: ErrorPatterns, surface: Surface, path: Path) -> None:
     """Both patterns, or the error alone where no cause is named, on the unfolded block, one colour
     scale in mm, as PNG.
     """
@@ -167,7 +171,9 @@ def draw_patterns(found: Patterns, surface: Surface, path: Path) -> None:
     figure.savefig(path, dpi=130)
 
 
-def _unfold(axes: Any, found: Patterns, values: FloatArray, surface: Surface, limit: float) -> Any:
+def _unfold(
+    axes: Any, found: ErrorPatterns, values: FloatArray, surface: Surface, limit: float
+) -> Any:
     """Scatter the patches of the top and, folded out around it, of the four sides."""
     x, y, z = surface.geometry.size
     centres, normals = found.centres, found.normals

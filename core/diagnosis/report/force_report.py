@@ -20,11 +20,11 @@ from palpate.effects.base import with_effects
 from palpate.effects.elastic_material import StiffInclusion
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["Pushes", "palpated", "pushes_of"]
+__all__ = ["PushForces", "push_forces", "with_palpation"]
 
 
 @dataclass(frozen=True, eq=False)
-class Pushes:
+class PushForces:
     """The pushes that were fitted on, each at its full depth.
 
     Attributes:
@@ -58,12 +58,14 @@ class Pushes:
         ]
 
 
-def pushes_of(bench: Bench, data: Sequence[Observations], baseline: Model, found: Model) -> Pushes:
+def push_forces(
+    bench: Bench, data: Sequence[Observations], baseline: Model, found: Model
+) -> PushForces:
     """Of all sequences without clouds, in their order."""
     rows: list[tuple[float, ...]] = []
     place, normal = bench.pushed
     for item, before, after in zip(data, baseline.predictions, found.predictions, strict=True):
-        if not item.unseen or before.felt is None or after.felt is None:
+        if not item.force_only or before.forces is None or after.forces is None:
             continue
         centres = item.centres(bench.setup)
         for row in deepest_rows(item):
@@ -72,27 +74,27 @@ def pushes_of(bench: Bench, data: Sequence[Observations], baseline: Model, found
                 bench.setup.geometry.facing(centres[row][None])[0][0]
             )
             stated, extended = (
-                side.felt.force[row] @ out for side in (before, after) if side.felt is not None
+                side.forces.force[row] @ out for side in (before, after) if side.forces is not None
             )
             lost = [number for number, side in enumerate((before, after)) if row in side.failed]
             forces = [float(value) for value in (stated, extended)]
             for number in lost:
                 forces[number] = float("nan")
             rows.append(
-                (depth, float((before.felt.gap[row] + before.felt.force[row]) @ out), *forces)
+                (depth, float((before.forces.gap[row] + before.forces.force[row]) @ out), *forces)
             )
     depths, measured, stated_all, extended_all = np.array(rows).reshape(-1, 4).T
-    return Pushes(place, normal, depths, measured, stated_all, extended_all)
+    return PushForces(place, normal, depths, measured, stated_all, extended_all)
 
 
-def palpated(
+def with_palpation(
     report: dict[str, Any], bench: Bench, data: Sequence[Observations], findings: Findings
-) -> tuple[dict[str, Any], Pushes, Footprint | None]:
+) -> tuple[dict[str, Any], PushForces, Footprint | None]:
     """The report with `palpation`, and with `footprint`, `depth` and `cover` of a lump among its
     causes; and what is drawn.
     """
     model = findings.best.model if findings.best else findings.baseline
-    pushes = pushes_of(bench, data, findings.baseline, model)
+    pushes = push_forces(bench, data, findings.baseline, model)
     causes, shown = list(report["causes"]), None
     for index, effect in enumerate(model.effects):
         if not isinstance(effect, StiffInclusion):

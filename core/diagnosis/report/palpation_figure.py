@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.report.force_report import Pushes
+from palpate.diagnosis.report.force_report import PushForces
 from palpate.diagnosis.report.inclusion_footprint import Footprint
 from palpate.foundation.arrays import FloatArray
 from palpate.setup.setup import Box, Shape
@@ -27,7 +27,7 @@ INK, FAINT, FOUND = "#2b2f36", "#c9cdd3", "#0f766e"
 def draw_palpation(
     path: Path,
     body: Box | Shape,
-    pushes: Pushes,
+    pushes: PushForces,
     shown: Footprint | None,
     cause: dict[str, Any] | None,
 ) -> None:
@@ -52,7 +52,7 @@ def draw_palpation(
 def _from_above(
     axes: Axes,
     body: Box | Shape,
-    pushes: Pushes,
+    pushes: PushForces,
     shown: Footprint | None,
     cause: dict[str, Any] | None,
 ) -> Any:

@@ -10,14 +10,14 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.gain.force_gain import FeltLadder
-from palpate.diagnosis.gain.gain_ladder import Ladder
+from palpate.diagnosis.gain.force_gain import ForceGain
+from palpate.diagnosis.gain.gain_ladder import SurfaceGain
 from palpate.diagnosis.inference.credible_intervals import intervals, modulus_interval
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.mesh_discrepancy import too_coarse
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.model_probabilities import probabilities
-from palpate.diagnosis.validation.worst_location import worst_patch, worst_push
+from palpate.diagnosis.validation.worst_location import worst_patch_location, worst_push_location
 from palpate.effects.elastic_material import YoungModulus
 from palpate.effects.geometry import MeshResolution
 
@@ -138,9 +138,9 @@ def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
         when, fraction, place = one.sequence, one.share, one.place
     else:
         place = (
-            worst_patch(model.predictions, bench)
+            worst_patch_location(model.predictions, bench)
             if bench.seen
-            else worst_push(model.predictions, bench)
+            else worst_push_location(model.predictions, bench)
         )
     where = str(place)
     when = f"most in {when}{note}"
@@ -173,7 +173,11 @@ def _all_clear(findings: Findings) -> dict[str, Any]:
 
 
 def report_of(
-    dataset: Dataset, bench: Bench, findings: Findings, gain: Ladder | FeltLadder | None, split: str
+    dataset: Dataset,
+    bench: Bench,
+    findings: Findings,
+    gain: SurfaceGain | ForceGain | None,
+    split: str,
 ) -> dict[str, Any]:
     """The report contract."""
     verdict = verdict_of(findings)
@@ -218,7 +222,7 @@ def report_of(
         },
         "warnings": [*bench.registration.warnings, *(text for text in told if text)],
     }
-    if isinstance(gain, FeltLadder):
+    if isinstance(gain, ForceGain):
         report["gain"] = gain.to_json(split)
     elif gain is not None:
         value, low, high = gain.removed

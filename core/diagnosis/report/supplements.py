@@ -12,11 +12,11 @@ from palpate.diagnosis.design.profile_likelihood import profiles
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.search.findings import Findings
-from palpate.diagnosis.validation.force_controls import felt_controls
+from palpate.diagnosis.validation.force_controls import force_controls
 from palpate.diagnosis.validation.negative_controls import Control, controls, warnings_of
 from palpate.effects.tool import LandmarkMismatch
 
-__all__ = ["assured"]
+__all__ = ["with_supplements"]
 
 _AGAIN = {
     "kind": "measurement",
@@ -25,7 +25,7 @@ _AGAIN = {
 }
 
 
-def assured(
+def with_supplements(
     report: dict[str, Any], bench: Bench, data: Sequence[Observations], findings: Findings
 ) -> dict[str, Any]:
     """The report with `controls` and `next_probe`, and `identifiability` of each parameter of the
@@ -42,7 +42,7 @@ def assured(
             checked = (
                 controls(bench, data, model, findings.baseline)
                 if bench.seen
-                else felt_controls(bench, model, findings.baseline)
+                else force_controls(bench, model, findings.baseline)
             )
         told, open_rows = profiles(bench, findings.best.model)
         names = dict(zip(findings.best.model.names, told, strict=True))

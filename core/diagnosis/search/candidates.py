@@ -123,7 +123,9 @@ def signatures(bench: Bench, baseline: Model) -> list[Signature]:
         effect for kind in FINITE if kind in bench.weighed for effect in kind.starts(bench.setup)
     ]
     found: list[Signature] = (
-        [(OWN_GRID, [one.alone() for one in bench.on_own_grid])] if bench.on_own_grid else []
+        [(OWN_GRID, [one.without_details() for one in bench.on_own_grid])]
+        if bench.on_own_grid
+        else []
     )
     return [*found, *_replayed(bench, baseline, starts, baseline), *_traced(bench, baseline)]
 
@@ -174,7 +176,12 @@ def _replayed(
         bench.tell(f"what {effect.name} would do", 0.15 + 0.25 * number / len(pending))
         changed = [future.result() for future in futures]
         rows = zip(origin.predictions, changed, without, strict=True)
-        found.append((effect, [other.upon(here, zero).alone() for here, other, zero in rows]))
+        found.append(
+            (
+                effect,
+                [other.transferred(here, zero).without_details() for here, other, zero in rows],
+            )
+        )
     return found
 
 
@@ -182,7 +189,7 @@ def _traced(bench: Bench, baseline: Model) -> list[Signature]:
     """What hangs on the past would do, to first order, for the cost of a few solves a group (see
     `palpate.diagnosis.forward.history_columns`).
     """
-    if any(item.unseen for item in baseline.predictions):
+    if any(item.force_only for item in baseline.predictions):
         return []  # short pushes that are felt alone leave nothing behind to be seen
     starts = [
         effect for kind in TRACED if kind in bench.weighed for effect in kind.starts(bench.setup)
@@ -196,7 +203,7 @@ def _traced(bench: Bench, baseline: Model) -> list[Signature]:
     traces = [future.result() for future in pending]
     rows = list(zip(traces, baseline.predictions, strict=True))
     return [
-        (effect, [own[number].on(plain).alone() for own, plain in rows])
+        (effect, [own[number].on(plain).without_details() for own, plain in rows])
         for number, effect in enumerate(starts)
     ]
 
@@ -244,7 +251,7 @@ def candidates_of(model: Model, bench: Bench, finite: Sequence[Signature]) -> li
         )
     for place, (effect, predictions) in zip(model.extra.get("signatures", ()), finite, strict=True):
         if any(
-            np.isfinite(p.gap).any() or (p.felt is not None and np.isfinite(p.felt.gap).any())
+            np.isfinite(p.gap).any() or (p.forces is not None and np.isfinite(p.forces.gap).any())
             for p in predictions
         ):
             found.append(Candidate(start=effect, columns=(place,), spread=(1.0,)))

@@ -11,8 +11,8 @@ from palpate.diagnosis.inference.camera_error_model import CALM, Ripple
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.residual_structure import NOTHING, Structure
 from palpate.diagnosis.search.identifiability import Told
-from palpate.diagnosis.validation.held_out_test import HeldOut
-from palpate.diagnosis.validation.stiffness_error_test import Asked
+from palpate.diagnosis.validation.held_out_test import HeldOutCheck
+from palpate.diagnosis.validation.stiffness_error_test import StiffnessErrorTest
 from palpate.effects import Effect
 
 __all__ = ["Findings", "Trial"]
@@ -72,8 +72,8 @@ class Findings:
     left: Structure = NOTHING
     told: tuple[Told, ...] = ()
     ripple: Ripple = CALM
-    asked: Asked | None = None
-    beyond: HeldOut | None = None
+    asked: StiffnessErrorTest | None = None
+    beyond: HeldOutCheck | None = None
     withdrawn: str = ""
     known: tuple[Effect, ...] = ()
 
@@ -101,7 +101,7 @@ class Findings:
         return self.beyond is not None and self.beyond.structure.significant
 
     @property
-    def looked_at(self) -> tuple[Asked, ...]:
+    def looked_at(self) -> tuple[StiffnessErrorTest, ...]:
         """What sequences ask for, of those fitted first; nothing where no all-clear was in
         question.
         """
@@ -109,7 +109,7 @@ class Findings:
         return tuple(one for one in both if one is not None)
 
     @property
-    def unusual(self) -> Asked | None:
+    def unusual(self) -> StiffnessErrorTest | None:
         """The first that the engine's own error does not explain."""
         return next((one for one in self.looked_at if one.significant), None)
 

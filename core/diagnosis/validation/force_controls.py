@@ -21,12 +21,12 @@ from palpate.diagnosis.inference.noise_model import rows_of
 from palpate.diagnosis.validation.negative_controls import Control, judge
 from palpate.foundation.arrays import FloatArray, IntArray
 
-__all__ = ["EXCHANGED", "exchanged", "felt_controls"]
+__all__ = ["EXCHANGED", "exchanged", "force_controls"]
 
 EXCHANGED = "pushes exchanged"
 
 
-def felt_controls(bench: Bench, model: Model, baseline: Model) -> tuple[Control, ...]:
+def force_controls(bench: Bench, model: Model, baseline: Model) -> tuple[Control, ...]:
     """Every cause of an accepted model, on sequences without clouds."""
     found = []
     first = len(bench.nuisances.precision) - 1
@@ -39,11 +39,11 @@ def felt_controls(bench: Bench, model: Model, baseline: Model) -> tuple[Control,
         for noise, before, after in zip(bench.noises, origin, model.predictions, strict=True):
             pattern = np.nan_to_num(rows_of(after)[0] - rows_of(before)[0])
             pattern[list({*before.failed, *after.failed})] = 0.0
-            assert after.felt is not None and after.felt.push is not None
-            other = exchanged(pattern, after.felt.force, after.felt.push)
+            assert after.forces is not None and after.forces.push is not None
+            other = exchanged(pattern, after.forces.force, after.forces.push)
             nuisances = rows_of(after)[1][..., :first]
             block = noise.block(
-                before.with_rows(
+                before.replace_columns(
                     np.concatenate([nuisances, np.stack([pattern, other], axis=2)], axis=2)
                 )
             )

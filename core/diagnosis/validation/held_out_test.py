@@ -15,28 +15,35 @@ from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.residual_structure import Structure, structure_of
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.search.candidates import lump_places
-from palpate.diagnosis.validation.stiffness_error_test import Asked, most_asked
+from palpate.diagnosis.validation.stiffness_error_test import (
+    StiffnessErrorTest,
+    largest_stiffness_error,
+)
 
-__all__ = ["HeldOut", "held_out"]
+__all__ = ["HeldOutCheck", "check_held_out"]
 
 
 @dataclass(frozen=True, eq=False)
-class HeldOut:
+class HeldOutCheck:
     """The stated setup on sequences that nothing was fitted on, the structured error it leaves
     there, and what they ask for.
     """
 
     model: Model
     structure: Structure
-    asked: Asked | None = None
+    asked: StiffnessErrorTest | None = None
 
 
-def held_out(bench: Bench, unseen: Sequence[Observations], seed: int) -> HeldOut | None:
+def check_held_out(
+    bench: Bench, held_out: Sequence[Observations], seed: int
+) -> HeldOutCheck | None:
     """Of those with clouds; None where there are none. The workers of the bench must have them."""
-    names = [item.name for item in unseen if not item.unseen]
+    names = [item.name for item in held_out if not item.force_only]
     if not names:
         return None
     stated, forces = (bench.setup, bench.registration, bench.workers), bench.nuisances.forces
     other = Bench(*stated, names, bench.static, bench.grid, bench.fine, forces=forces)
     model = other.baseline((), lump_places(other))
-    return HeldOut(model, structure_of(other, model, seed), most_asked(other, model))
+    return HeldOutCheck(
+        model, structure_of(other, model, seed), largest_stiffness_error(other, model)
+    )

@@ -19,7 +19,7 @@ import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction, predict
-from palpate.diagnosis.forward.ray_comparison import Sample
+from palpate.diagnosis.forward.ray_comparison import PointSample
 from palpate.diagnosis.inference.evidence import Block, fit
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import Bench
@@ -144,7 +144,7 @@ def _chosen(
     order = [
         number
         for number in np.argsort([-size.sum() for size in shown]).tolist()
-        if not data[number].unseen
+        if not data[number].force_only
     ]
     for number in sorted(order[: CRITERIA.controls.most_sequences]):
         groups = data[number].groups
@@ -164,7 +164,7 @@ def _origin(
 
 
 def _false_patterns(
-    item: Observations, setups: Sequence[Setup], grid: Meshing, samples: Sequence[Sample]
+    item: Observations, setups: Sequence[Setup], grid: Meshing, samples: Sequence[PointSample]
 ) -> list[FloatArray]:
     """What tells the first setup from each of the others (g, r) along falsified motions, at points
     that are settled.
@@ -206,7 +206,7 @@ def _blocks(
         here = origin[number]
         nuisances = rows_of(model.predictions[number])[1][index][..., :first]
         own = np.stack([pattern[place] for pattern in patterns], axis=2)
-        there = here.of_groups(index).with_rows(np.concatenate([nuisances, own], axis=2))
+        there = here.of_groups(index).replace_columns(np.concatenate([nuisances, own], axis=2))
         block = _of_groups(bench.noises[number], index).block(there)
         blocks.append(Block(block.name, block.gram / bench.temperature, block.values))
     if bench.static:

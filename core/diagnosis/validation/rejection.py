@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.gain.force_gain import FeltLadder
-from palpate.diagnosis.gain.gain_ladder import Ladder
+from palpate.diagnosis.gain.force_gain import ForceGain
+from palpate.diagnosis.gain.gain_ladder import SurfaceGain
 from palpate.diagnosis.inference.residual_structure import Structure
 from palpate.diagnosis.search.findings import Findings
 
-__all__ = ["leaves_most", "objection"]
+__all__ = ["leaves_structure", "rejection_reason"]
 
 
-def objection(findings: Findings, gain: Ladder | FeltLadder | None) -> str:
+def rejection_reason(findings: Findings, gain: SurfaceGain | ForceGain | None) -> str:
     """Why the causes found are not named; empty where nothing speaks against them."""
     if findings.best is None:
         return ""
@@ -19,7 +19,7 @@ def objection(findings: Findings, gain: Ladder | FeltLadder | None) -> str:
     return _harm(names, gain) or _no_explanation(names, findings, gain)
 
 
-def _harm(names: str, gain: Ladder | FeltLadder | None) -> str:
+def _harm(names: str, gain: SurfaceGain | ForceGain | None) -> str:
     """They do not carry over: the test sequences get worse."""
     if gain is None or gain.removed[2] > -CRITERIA.rejection.added_error:
         return ""
@@ -30,12 +30,12 @@ def _harm(names: str, gain: Ladder | FeltLadder | None) -> str:
     )
 
 
-def _no_explanation(names: str, findings: Findings, gain: Ladder | FeltLadder | None) -> str:
+def _no_explanation(names: str, findings: Findings, gain: SurfaceGain | ForceGain | None) -> str:
     """They remove something, but what is wrong stays: the larger part of the smooth error that
     grows with the push, and of what could be removed on test sequences.
     """
     before, left = findings.structure, findings.left
-    if not leaves_most(before, left, None if gain is None else gain.removed[0]):
+    if not leaves_structure(before, left, None if gain is None else gain.removed[0]):
         return ""
     tested = (
         ""
@@ -49,7 +49,7 @@ def _no_explanation(names: str, findings: Findings, gain: Ladder | FeltLadder | 
     )
 
 
-def leaves_most(before: Structure, left: Structure, removed: float | None) -> bool:
+def leaves_structure(before: Structure, left: Structure, removed: float | None) -> bool:
     """Whether a cause leaves what is wrong: significant structure, the larger part of that without
     it, and of the reducible error on test sequences no more than the smaller part is `removed` [1];
     None without such sequences.
@@ -60,6 +60,6 @@ def leaves_most(before: Structure, left: Structure, removed: float | None) -> bo
     return stays and (removed is None or removed <= 1.0 - CRITERIA.rejection.left_share)
 
 
-def _share(gain: Ladder | FeltLadder) -> str:
+def _share(gain: SurfaceGain | ForceGain) -> str:
     value, low, high = gain.removed
     return f"{100 * value:.0f} % ({100 * low:.0f} to {100 * high:.0f} %)"

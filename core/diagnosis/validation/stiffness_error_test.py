@@ -24,14 +24,14 @@ from palpate.diagnosis.inference.evidence import Block, fit, less_constants, log
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.noise_model import Noise
-from palpate.diagnosis.validation.worst_location import Worst, gathered
+from palpate.diagnosis.validation.worst_location import ErrorLocation, location_of
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["Asked", "asked_of", "bound_for", "most_asked"]
+__all__ = ["StiffnessErrorTest", "chance_bound", "largest_stiffness_error", "stiffness_error_of"]
 
 
 @dataclass(frozen=True)
-class Asked:
+class StiffnessErrorTest:
     """Of the sequence that asks for most.
 
     Attributes:
@@ -46,7 +46,7 @@ class Asked:
     factor: float
     gain: float
     bound: float
-    place: Worst
+    place: ErrorLocation
 
     @property
     def significant(self) -> bool:
@@ -81,22 +81,24 @@ class Asked:
         }
 
 
-def most_asked(bench: Bench, model: Model) -> Asked | None:
+def largest_stiffness_error(bench: Bench, model: Model) -> StiffnessErrorTest | None:
     """Of the sequences with clouds; None where there is none."""
     precision = bench.held(model)
     found = []
     for noise, item in zip(bench.noises, model.predictions, strict=True):
-        if not item.unseen:
+        if not item.force_only:
             whole, own = Block(item.name, *noise.whole(item)), noise.discrepancy.shape[2]
-            wanted = asked_of(whole, [*model.nuisance, *model.columns], precision, own, noise.spots)
+            wanted = stiffness_error_of(
+                whole, [*model.nuisance, *model.columns], precision, own, noise.spots
+            )
             found.append((item.name, wanted, noise))
     if not found:
         return None
     name, wanted, noise = max(found, key=lambda row: row[1].gain)
-    place = gathered(
+    place = location_of(
         bench.surface.patch_centres, _seen(noise, wanted.errors)[: bench.surface.patches]
     )
-    return Asked(name, wanted.factor, wanted.gain, bound_for(len(found)), place)
+    return StiffnessErrorTest(name, wanted.factor, wanted.gain, chance_bound(len(found)), place)
 
 
 def _seen(noise: Noise, errors: FloatArray) -> FloatArray:
@@ -108,7 +110,7 @@ def _seen(noise: Noise, errors: FloatArray) -> FloatArray:
     return np.asarray((noise.weights * away**2).sum(axis=0))
 
 
-def bound_for(sequences: int) -> float:
+def chance_bound(sequences: int) -> float:
     """What one of so many sequences gains by chance once in 1 / FALSE datasets, where the usual
     deviation is true [nats].
 
@@ -119,8 +121,8 @@ def bound_for(sequences: int) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Wanted:
-    """Of one sequence: `factor` and `gain` as of `Asked`, and the most probable `errors` (s,) of
+class StiffnessError:
+    """Of one sequence: `factor` and `gain` as of `StiffnessErrorTest`, and the most probable `errors` (s,) of
     local stiffness there, over the deviation that is allowed.
     """
 
@@ -129,9 +131,9 @@ class Wanted:
     errors: FloatArray
 
 
-def asked_of(
+def stiffness_error_of(
     block: Block, fitted: list[int], precision: FloatArray, own: int, spots: int
-) -> Wanted:
+) -> StiffnessError:
     """Of a block whose last `own` columns are the engine's error, the last `spots` of them of local
     stiffness.
     """
@@ -161,4 +163,4 @@ def asked_of(
         )
     )
     errors = fit([block], columns, prior(move, spot)).change[-spots:]
-    return Wanted(spot / CRITERIA.stiffness_error.usual, max(more - usual, 0.0), errors)
+    return StiffnessError(spot / CRITERIA.stiffness_error.usual, max(more - usual, 0.0), errors)

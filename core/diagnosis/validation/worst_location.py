@@ -12,11 +12,11 @@ from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["Worst", "gathered", "worst_patch", "worst_push"]
+__all__ = ["ErrorLocation", "location_of", "worst_patch_location", "worst_push_location"]
 
 
 @dataclass(frozen=True)
-class Worst:
+class ErrorLocation:
     """A place [m] and the share [1] of an error that is around it."""
 
     place: tuple[float, float, float]
@@ -27,39 +27,39 @@ class Worst:
         return f"{100 * self.share:.0f} % of it within {1e3 * CRITERIA.verdict.location_radius:.0f} mm of ({x:.0f}, {y:.0f}, {z:.0f}) mm"
 
 
-def gathered(centres: FloatArray, total: FloatArray) -> Worst:
+def location_of(centres: FloatArray, total: FloatArray) -> ErrorLocation:
     """Of places (p, 3) [m] that with the most of a total (p,) around it."""
     around = (
         np.linalg.norm(centres[:, None] - centres, axis=2) < CRITERIA.verdict.location_radius
     ) @ total
     worst = int(around.argmax())
     x, y, z = (float(part) for part in centres[worst])
-    return Worst((x, y, z), float(around[worst] / max(total.sum(), 1e-300)))
+    return ErrorLocation((x, y, z), float(around[worst] / max(total.sum(), 1e-300)))
 
 
-def worst_push(predictions: Sequence[Prediction], bench: Bench) -> Worst:
+def worst_push_location(predictions: Sequence[Prediction], bench: Bench) -> ErrorLocation:
     """Of the pushes that with the largest squared error of the force around it."""
     total: list[float] = []
     for item in predictions:
-        assert item.felt is not None and item.felt.push is not None
-        squares = np.nan_to_num(item.felt.gap**2).sum(axis=1)
+        assert item.forces is not None and item.forces.push is not None
+        squares = np.nan_to_num(item.forces.gap**2).sum(axis=1)
         total += [
-            float(squares[item.felt.push == name].sum()) for name in np.unique(item.felt.push)
+            float(squares[item.forces.push == name].sum()) for name in np.unique(item.forces.push)
         ]
-    return gathered(bench.pushed[0], np.array(total))
+    return location_of(bench.pushed[0], np.array(total))
 
 
-def worst_patch(predictions: Sequence[Prediction], bench: Bench) -> Worst:
+def worst_patch_location(predictions: Sequence[Prediction], bench: Bench) -> ErrorLocation:
     """Of the patches that with the largest squared residual around it while something is touched,
     less what is there at rest.
     """
     total = np.zeros(bench.surface.patches)
     for item in predictions:
-        if item.unseen:
+        if item.force_only:
             continue
         touched = np.array([frame.in_contact for frame in item.equilibria])
         still = np.isfinite(item.gap) & ~touched[:, None]
         zero = np.where(still, item.gap, 0.0).sum(axis=0) / np.maximum(still.sum(axis=0), 1)
         away = np.where(still.any(axis=0), np.nan_to_num(item.gap - zero), 0.0)
         total += (away**2 * item.count * touched[:, None]).sum(axis=0)
-    return gathered(bench.surface.patch_centres, total)
+    return location_of(bench.surface.patch_centres, total)

@@ -6,7 +6,7 @@ from dragged_block import dragged
 from pushed_block import GRID, SETUP
 
 from palpate.diagnosis.forward.history_columns import traces_of
-from palpate.diagnosis.forward.loading_history import timeline_of
+from palpate.diagnosis.forward.loading_history import loading_history_of
 from palpate.diagnosis.forward.prediction import Prediction, predict
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.effects import Effect
@@ -79,7 +79,7 @@ def test_force_of_a_trace_is_that_of_the_replay(data, plain):
 
 
 def test_what_was_between_two_looks_goes_with_the_depth(data, plain):
-    time = timeline_of(data, SETUP, Transform(), plain.equilibria)
+    time = loading_history_of(data, SETUP, Transform(), plain.equilibria)
     assert time.touched == (2, 3, 4, 5, 6)
     inside = (time.times > 1.2) & (time.times < 2.0)
     assert time.shares[inside].sum(axis=1) == pytest.approx(1.0, abs=0.02)
@@ -89,7 +89,7 @@ def test_what_was_between_two_looks_goes_with_the_depth(data, plain):
 
 
 def test_memory_follows_what_is_held_and_fades_when_it_is_gone(data, plain):
-    time = timeline_of(data, SETUP, Transform(), plain.equilibria)
+    time = loading_history_of(data, SETUP, Transform(), plain.equilibria)
     left = time.faded(np.full(len(time.times), 1 / 0.5)).sum(axis=1)
     assert left[:2] == pytest.approx(0.0) and left[6] > 0.85 > left[4]
     assert left[9] / left[8] == pytest.approx(np.exp(-1.5 / 0.5), rel=0.05)

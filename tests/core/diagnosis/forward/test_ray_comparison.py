@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from pushed_block import GRID, POSE, SETUP, SIZE
 
-from palpate.diagnosis.forward.ray_comparison import Compared, choose, compare
+from palpate.diagnosis.forward.ray_comparison import PointComparison, choose_points, compare
 from palpate.diagnosis.observation.frame_groups import Group
 from palpate.effects.sensor import CameraRegistration, DepthBias
-from palpate.measurement.camera_model import sight_of
+from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.surface_gaps import Surface
 from palpate.replay.replay import rest
 from palpate.setup.setup import Setup
@@ -18,7 +18,7 @@ SHIFT = np.array([5e-3, 1e-3, 0.0])
 MOVED = CameraRegistration(tx=5e-3, ty=1e-3, tz=0.0, rx=0.0, ry=0.0, rz=0.0).apply(SETUP)
 
 
-def _compared(beyond: float, setup: Setup) -> Compared:
+def _compared(beyond: float, setup: Setup) -> PointComparison:
     """Points of a side next to its far edge, `beyond` it [m], by a camera that is off by SHIFT;
     sampled by the stated setup.
     """
@@ -31,7 +31,7 @@ def _compared(beyond: float, setup: Setup) -> Compared:
         ]
     )
     group = Group((0,), POSE.inverse().apply(points - SHIFT), False)
-    return compare(group, setup, BLOCK, SURFACE, choose(group, SETUP, BLOCK, SURFACE))
+    return compare(group, setup, BLOCK, SURFACE, choose_points(group, SETUP, BLOCK, SURFACE))
 
 
 def test_points_lie_off_the_stated_block_by_the_cameras_shift():
@@ -50,7 +50,7 @@ def test_ray_that_misses_the_true_block_does_not_count_against_it():
 def test_ray_that_misses_feels_how_the_surface_moves():
     found = _compared(5e-5, MOVED)
     side = CameraRegistration(tx=5e-3, ty=1.1e-3, tz=0.0, rx=0.0, ry=0.0, rz=0.0).apply(SETUP)
-    moved = sight_of(side).place(sight_of(MOVED).read(found.places))
+    moved = camera_model_for(side).place(camera_model_for(MOVED).read(found.places))
     change = found.along_sight(moved)[found.means.count > 0]
     assert np.allclose(change, -1e-4, atol=1e-6)
 
@@ -68,7 +68,7 @@ def test_gap_does_not_jump_where_a_rim_passes_the_ray():
         ]
     )
     group = Group((0,), POSE.inverse().apply(places), False)
-    sample = choose(group, SETUP, BLOCK, SURFACE)
+    sample = choose_points(group, SETUP, BLOCK, SURFACE)
     for lift in (0.5e-3, 1e-3, 2e-3, 4e-3):
         lifted = CameraRegistration(tx=0.0, ty=0.0, tz=lift, rx=0.0, ry=0.0, rz=0.0).apply(SETUP)
         found = compare(group, lifted, BLOCK, SURFACE, sample).means
@@ -81,8 +81,8 @@ def test_points_of_a_side_that_lie_too_low_are_not_chosen():
     heights = np.linspace(2e-3, 12e-3, 200)
     points = np.column_stack([np.linspace(-0.02, 0.02, 200), np.full(200, -SIZE[1] / 2), heights])
     group = Group((0,), POSE.inverse().apply(points), False)
-    assert len(choose(group, SETUP, BLOCK, SURFACE).index) == 200
-    low = choose(replace(group, lowest=5e-3), SETUP, BLOCK, SURFACE)
+    assert len(choose_points(group, SETUP, BLOCK, SURFACE).index) == 200
+    low = choose_points(replace(group, lowest=5e-3), SETUP, BLOCK, SURFACE)
     assert np.array_equal(low.index, np.flatnonzero(heights >= 5e-3))
 
 
@@ -105,7 +105,7 @@ def _top(noise: float) -> Group:
 
 def test_model_that_shrinks_the_cloud_does_not_shrink_its_noise():
     group = _top(8e-4)
-    sample = choose(group, SETUP, BLOCK, SURFACE)
+    sample = choose_points(group, SETUP, BLOCK, SURFACE)
     spreads = []
     for scale in (1.0, 1.1):
         setup = DepthBias(offset=0.0, scale=scale).apply(SETUP)
@@ -120,10 +120,10 @@ def test_column_of_a_stretch_is_the_difference_of_two_models_and_free_of_noise()
     columns, means = [], []
     for noise in (8e-4, 0.0):
         group = _top(noise)
-        sample = choose(group, SETUP, BLOCK, SURFACE)
+        sample = choose_points(group, SETUP, BLOCK, SURFACE)
         here, there = (compare(group, setup, BLOCK, SURFACE, sample) for setup in (SETUP, near))
-        moved = sight_of(near).place(sight_of(SETUP).read(here.places))
-        columns.append(here.along_sight(moved, sight_of(near).scale) / step)
+        moved = camera_model_for(near).place(camera_model_for(SETUP).read(here.places))
+        columns.append(here.along_sight(moved, camera_model_for(near).scale) / step)
         means.append(np.nan_to_num(here.means.mean))
         difference = np.nan_to_num(there.means.mean - here.means.mean) / step
         assert np.allclose(columns[-1], difference, atol=2e-3)
@@ -140,9 +140,9 @@ def test_column_of_a_turn_does_not_turn_the_noise():
     """
     turn = CameraRegistration(tx=0.0, ty=0.0, tz=0.0, rx=2e-3, ry=0.0, rz=0.0).apply(SETUP)
     group = _top(8e-4)
-    sample = choose(group, SETUP, BLOCK, SURFACE)
+    sample = choose_points(group, SETUP, BLOCK, SURFACE)
     here, there = (compare(group, setup, BLOCK, SURFACE, sample) for setup in (SETUP, turn))
-    column = here.along_sight(sight_of(turn).place(sight_of(SETUP).read(here.places)))
+    column = here.along_sight(camera_model_for(turn).place(camera_model_for(SETUP).read(here.places)))
     seen = here.means.count > 20
     change = (there.means.mean - here.means.mean)[seen]
     # Each patch's share of its own residual that a change of two milliradians makes: to first order

@@ -131,9 +131,9 @@ def test_patch_that_slid_from_under_its_points_is_told(data):
     """The far edge of the top has gone, and what lay on it is seen on the side, or on nothing."""
     stated = predict(data, _free(SLIDING), GRID)
     found = predict(data, SLIDING, GRID, None, None, 3e-4, stated.samples)
-    assert found.elsewhere is not None and stated.elsewhere is not None
-    assert not stated.elsewhere.any()
-    assert not (found.elsewhere[1] > 0.2).any() and (found.elsewhere[-1] > 0.2).any()
+    assert found.other_side is not None and stated.other_side is not None
+    assert not stated.other_side.any()
+    assert not (found.other_side[1] > 0.2).any() and (found.other_side[-1] > 0.2).any()
 
 
 def test_base_that_finds_no_rest_is_told_and_stays_where_it_was(monkeypatch):

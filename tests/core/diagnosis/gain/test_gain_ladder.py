@@ -7,7 +7,7 @@ import pytest
 from pushed_block import POSE, SETUP, dwelling, poke, prediction, seen_points
 
 from palpate.diagnosis.forward.prediction import Prediction
-from palpate.diagnosis.gain.gain_ladder import Ladder, ladder
+from palpate.diagnosis.gain.gain_ladder import SurfaceGain, surface_gain
 from palpate.diagnosis.gain.probe_errors import fixed_pattern
 from palpate.diagnosis.observation.frame_groups import Group, Observations
 from palpate.effects.support import BaseSlip
@@ -43,7 +43,7 @@ def _model(
 
 def _ladder(
     probes: list[int], before: list[float], after: list[float], failed: tuple[int, ...] = ()
-) -> Ladder:
+) -> SurfaceGain:
     """The ladder of these errors, with single points scattered such that the noise floor is
     FLOOR."""
     known = POINTS * sum(probe == 0 for probe in probes)
@@ -53,7 +53,7 @@ def _ladder(
         replace(_model(list(np.array(sizes) * still), failed=which), spread=scatter)
         for sizes, which in ((before, ()), (after, failed))
     ]
-    return ladder([_observations(probes)], models[:1], models[1:], SETUP, SETUP, seed=0)
+    return surface_gain([_observations(probes)], models[:1], models[1:], SETUP, SETUP, seed=0)
 
 
 def test_share_of_the_reducible_error_is_known():
@@ -67,24 +67,24 @@ def test_share_of_the_reducible_error_is_known():
 def test_fixed_pattern_of_the_camera_is_no_error():
     item = _observations([0, 1])
     pattern = _model([2e-3, 2e-3])
-    found = ladder([item], [pattern], [pattern], SETUP, SETUP, seed=0)
+    found = surface_gain([item], [pattern], [pattern], SETUP, SETUP, seed=0)
     assert found.baseline == pytest.approx(0.0, abs=1e-12)
 
 
 def test_pattern_that_only_one_model_has_is_its_error():
     item, touched = _observations([0, 1]), [0.0, 3e-3]
     still = replace(_model([2e-3, 0.0]), gap=_model([2e-3, 2e-3]).gap + _model(touched).gap)
-    found = ladder([item], [still], [_model([0.0, 3e-3])], SETUP, SETUP, seed=0)
+    found = surface_gain([item], [still], [_model([0.0, 3e-3])], SETUP, SETUP, seed=0)
     assert found.baseline == pytest.approx(np.hypot(3e-3, 2e-3))
     assert found.extended == pytest.approx(3e-3)
-    back = ladder([item], [_model([0.0, 3e-3])], [still], SETUP, SETUP, seed=0)
+    back = surface_gain([item], [_model([0.0, 3e-3])], [still], SETUP, SETUP, seed=0)
     assert (back.baseline, back.extended) == pytest.approx((found.extended, found.baseline))
 
 
 def test_pattern_as_large_in_both_models_gains_nothing():
     item = _observations([0, 1])
     models = [_model([size, size]) for size in (2e-3, -2e-3)]
-    found = ladder([item], models[:1], models[1:], SETUP, SETUP, seed=0)
+    found = surface_gain([item], models[:1], models[1:], SETUP, SETUP, seed=0)
     assert found.baseline == pytest.approx(2e-3) and found.extended == pytest.approx(2e-3)
     assert found.removed == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
 
@@ -92,7 +92,7 @@ def test_pattern_as_large_in_both_models_gains_nothing():
 def test_part_of_a_sag_that_was_not_named_stays_an_error():
     item = _observations([0, 1])
     stated, named = _model([3e-3, 3e-3]), _model([1e-3, 1e-3])  # two thirds of it
-    found = ladder([item], [stated], [named], SETUP, SETUP, seed=0)
+    found = surface_gain([item], [stated], [named], SETUP, SETUP, seed=0)
     assert found.baseline == pytest.approx(3e-3) and found.extended == pytest.approx(1e-3)
     assert found.removed[0] == pytest.approx(2 / 3)
 
@@ -100,7 +100,7 @@ def test_part_of_a_sag_that_was_not_named_stays_an_error():
 def test_scatter_of_single_points_makes_the_noise_floor():
     item, spread = _observations([0, 1]), 2e-3
     before = replace(_model([0.0, 1e-3]), spread=np.full((2, PATCHES), spread))
-    found = ladder([item], [before], [before], SETUP, SETUP, seed=0)
+    found = surface_gain([item], [before], [before], SETUP, SETUP, seed=0)
     assert found.baseline == pytest.approx(1e-3)
     assert found.noise_floor == pytest.approx(spread * np.sqrt(2 / POINTS))
 
@@ -110,11 +110,11 @@ def test_groups_are_weighed_by_their_points():
     before, after = (
         replace(_model(sizes), count=counts) for sizes in ([0.0, 1e-3, 3e-3], [0.0, 1e-3, 1e-3])
     )
-    found = ladder([item], [before], [after], SETUP, SETUP, seed=0)
+    found = surface_gain([item], [before], [after], SETUP, SETUP, seed=0)
     assert found.baseline == pytest.approx(np.sqrt((30 * 1e-6 + 10 * 9e-6) / 40))
 
 
-def _many(seed: int, probes: int) -> Ladder:
+def _many(seed: int, probes: int) -> SurfaceGain:
     """Probes whose errors vary by chance; half of the reducible error is removed in the long
     run."""
     before, after = _varied(seed, probes)
@@ -156,7 +156,7 @@ def test_probes_are_resampled_whole():
 def test_pushes_of_different_sequences_are_different_probes():
     items = [_observations([0, 1], name) for name in ("a", "b")]
     models = [_model([FLOOR, size], name) for name, size in (("a", 3e-3), ("b", 4e-3))]
-    assert ladder(items, models, models, SETUP, SETUP, seed=0).probes == 2
+    assert surface_gain(items, models, models, SETUP, SETUP, seed=0).probes == 2
 
 
 def test_nothing_is_removed_where_nothing_is_reducible():
@@ -178,13 +178,13 @@ def test_group_that_one_model_fails_in_counts_for_neither():
 def test_sequence_without_untouched_frames_is_refused():
     item, model = _observations([1, 2]), _model([1e-3, 1e-3])
     with pytest.raises(DiagnosisError, match="no untouched frame"):
-        ladder([item], [model], [model], SETUP, SETUP, seed=0)
+        surface_gain([item], [model], [model], SETUP, SETUP, seed=0)
 
 
 def test_sequences_without_any_touch_are_refused():
     item, model = _observations([0, 0]), _model([1e-3, 1e-3])
     with pytest.raises(DiagnosisError, match="no frame in which the tool touches"):
-        ladder([item], [model], [model], SETUP, SETUP, seed=0)
+        surface_gain([item], [model], [model], SETUP, SETUP, seed=0)
 
 
 def test_papers_metric_is_the_mean_over_touched_groups():
@@ -203,7 +203,7 @@ def test_what_a_push_leaves_counts_where_the_material_remembers_or_the_base_slid
     )
     stated, named = _model([0.0, 1e-3, 4e-3, 1e-3]), _model([0.0, 1e-3, 1e-3, 1e-3])
     kept = effect.apply(SETUP)
-    found = ladder([item], [stated], [named], SETUP, kept, seed=0)
+    found = surface_gain([item], [stated], [named], SETUP, kept, seed=0)
     assert found.baseline == pytest.approx(np.sqrt((1 + 16 + 1) / 3) * 1e-3)
     assert found.extended == pytest.approx(1e-3) and found.probes == 2
     # The dent is no pattern of the camera's, and without a memory no push is asked for it.

@@ -11,7 +11,7 @@ from pushed_block import GRID, SETUP, observed, poke, registration
 
 from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS
 from palpate.diagnosis.forward.worker_pool import Workers
-from palpate.diagnosis.gain.test_gain import _begun, tuned
+from palpate.diagnosis.gain.test_gain import _begun, tuned_setup
 from palpate.diagnosis.inference.evidence import Block, gram
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import Bench
@@ -43,7 +43,7 @@ def _shown(bench: Bench, *true: float) -> Model:
 
 
 def test_robot_radius_and_nu_are_where_the_data_have_them(bench: Bench) -> None:
-    found = tuned(bench, _shown(bench, *OFF, RADIUS, NU))
+    found = tuned_setup(bench, _shown(bench, *OFF, RADIUS, NU))
     true = small_motion(OFF, bench.registration.robot_pivot) @ SETUP.phantom_from_robot
     assert found.phantom_from_robot.matrix == pytest.approx(true.matrix, abs=1e-6)
     assert found.tool.radius == pytest.approx(SETUP.tool.radius + RADIUS, abs=1e-7)
@@ -54,13 +54,13 @@ def test_robot_radius_and_nu_are_where_the_data_have_them(bench: Bench) -> None:
 
 
 def test_what_no_material_has_is_not_taken_along(bench: Bench) -> None:
-    found = tuned(bench, _shown(bench, *np.zeros(6), 0.0, 0.2))
+    found = tuned_setup(bench, _shown(bench, *np.zeros(6), 0.0, 0.2))
     assert found.material.poisson_ratio == 0.495
     assert found.material.young_modulus == YoungModulus.neutral(SETUP).E
 
 
 def test_data_that_show_nothing_leave_the_setup_as_it_is(bench: Bench) -> None:
-    found = tuned(bench, _shown(bench, 0.0))
+    found = tuned_setup(bench, _shown(bench, 0.0))
     assert found.phantom_from_robot.matrix == pytest.approx(
         SETUP.phantom_from_robot.matrix, abs=1e-12
     )

@@ -52,14 +52,14 @@ def _sequence(places: list[tuple[float, float]], depths: list[float]) -> Sequenc
 
 def test_each_push_is_looked_at_on_its_way_in_and_while_it_is_held() -> None:
     item = observe_forces(_sequence([(0.0, 0.0), (0.01, 0.0)], [4e-3, 3e-3]), SETUP, most=20)
-    assert item.unseen and [group.probe for group in item.groups] == [1, 1, 2, 2]
+    assert item.force_only and [group.probe for group in item.groups] == [1, 1, 2, 2]
     depth = SIZE[2] + 5e-3 - item.centres(SETUP)[:, 2]
     assert depth == pytest.approx([0.55 * 4e-3, 4e-3, 0.55 * 3e-3, 3e-3], abs=4e-4)
     assert deepest_rows(item) == [1, 3]
     held = item.times[list(item.groups[1].frames)]
     assert len(held) == 8 and np.ptp(held) > 0.6
-    felt = item.felt(SETUP.phantom_from_robot, 0.0)
-    assert felt is not None and felt[0][[1, 3], 2] == pytest.approx(0.2, abs=2e-3)
+    forces = item.force_in_groups(SETUP.phantom_from_robot, 0.0)
+    assert forces is not None and forces[0][[1, 3], 2] == pytest.approx(0.2, abs=2e-3)
 
 
 def test_no_more_pushes_are_kept_than_asked_for_and_those_evenly() -> None:
@@ -111,11 +111,11 @@ def test_lumps_are_looked_for_below_the_pushes_and_within_the_body() -> None:
 
 
 def test_forces_alone_weigh_what_they_can_tell_and_clouds_all() -> None:
-    felt = weighed(SETUP, seen=False, forces=True)
-    assert {StiffInclusion, YoungModulus, SurfaceLayer} <= set(felt) and not {
+    forces = weighed(SETUP, seen=False, forces=True)
+    assert {StiffInclusion, YoungModulus, SurfaceLayer} <= set(forces) and not {
         CameraRegistration,
         TimeOffset,
-    } & set(felt)
+    } & set(forces)
     organ = Setup(geometry=Shape(*organ_surface(4e-3)), tool=SETUP.tool)
     assert set(weighed(organ, seen=False, forces=True)) == {*FELT, YoungModulus}
     assert weighed(SETUP, seen=True, forces=False) == DIAGNOSED

@@ -164,8 +164,8 @@ def test_time_offset_moves_the_centres_back_along_the_path(sequence):
 def test_frames_near_one_another_by_one_clock_are_not_by_another(sequence):
     late = replace(SETUP, sensor=Sensor(time_offset=0.12))
     stated, found = _observed(sequence), observe(sequence, late, CLEANER, None, 100)
-    assert stated.holds_together(SETUP) and not stated.holds_together(late)
-    assert found.holds_together(late) and not found.holds_together(SETUP)
+    assert stated.grouping_holds(SETUP) and not stated.grouping_holds(late)
+    assert found.grouping_holds(late) and not found.grouping_holds(SETUP)
     moved = _two_pushes(np.arange(FRAMES) / RATE - 0.12)
     for group in found.groups:
         here = moved[list(group.frames)]
@@ -182,8 +182,8 @@ def test_centres_follow_the_robots_registration(sequence):
 
 def test_turns_are_the_deepest_places_that_no_group_has(sequence):
     observed = _observed(sequence, most=4)
-    way, centres = observed.way(SETUP)[1], observed.centres(SETUP)
-    turns = [None if number is None else way[number] for number in observed.turns(SETUP)]
+    way, centres = observed.path(SETUP)[1], observed.centres(SETUP)
+    turns = [None if number is None else way[number] for number in observed.deepest_places(SETUP)]
     bottom = TOP + 5e-3 - 4e-3
     deep = [(turn, centre) for turn, centre in zip(turns, centres, strict=True) if turn is not None]
     assert len(deep) >= 2  # both pushes turn between groups

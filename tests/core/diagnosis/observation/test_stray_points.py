@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.diagnosis.observation.stray_points import among_neighbours
+from palpate.diagnosis.observation.stray_points import agrees_with_neighbours
 from palpate.measurement.surface_gaps import Surface
 from palpate.setup.setup import Box
 
@@ -28,19 +28,19 @@ def _cloud(stray: float, points: int, slope: float = 0.0):
 @pytest.mark.parametrize("stray", [4e-3, -2e-3])
 def test_lone_points_far_from_all_around_are_set_aside(stray):
     gap, patch, hidden = _cloud(stray, 2)
-    kept = among_neighbours(gap, patch, SURFACE)
+    kept = agrees_with_neighbours(gap, patch, SURFACE)
     assert not kept[patch == hidden].any()
     assert kept[patch != hidden].all()
 
 
 def test_a_patch_with_its_usual_points_speaks_for_itself():
     gap, patch, _ = _cloud(4e-3, 20)
-    assert among_neighbours(gap, patch, SURFACE).all()
+    assert agrees_with_neighbours(gap, patch, SURFACE).all()
 
 
 def test_a_patch_that_floats_where_no_dent_could_bring_it_is_set_aside_however_well_it_is_seen():
     gap, patch, hidden = _cloud(1.1e-2, 20)
-    kept = among_neighbours(gap, patch, SURFACE)
+    kept = agrees_with_neighbours(gap, patch, SURFACE)
     assert not kept[patch == hidden].any()
     assert kept[patch != hidden].all()
 
@@ -48,8 +48,8 @@ def test_a_patch_that_floats_where_no_dent_could_bring_it_is_set_aside_however_w
 def test_what_lies_where_its_neighbours_lie_is_kept_however_wrong_the_model():
     gap, patch, _ = _cloud(0.0, 2, slope=0.1)
     assert np.abs(gap).max() > 2e-3
-    assert among_neighbours(gap, patch, SURFACE).all()
+    assert agrees_with_neighbours(gap, patch, SURFACE).all()
 
 
 def test_no_point_at_all():
-    assert len(among_neighbours(np.zeros(0), np.zeros(0, dtype=int), SURFACE)) == 0
+    assert len(agrees_with_neighbours(np.zeros(0), np.zeros(0, dtype=int), SURFACE)) == 0

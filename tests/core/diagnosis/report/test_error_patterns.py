@@ -1,4 +1,4 @@
-"""Patterns of what is measured and of what a model says, seen from where they were made."""
+"""ErrorPatterns of what is measured and of what a model says, seen from where they were made."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.observation.frame_groups import Group, Observations
-from palpate.diagnosis.report.error_patterns import draw_patterns, patterns
+from palpate.diagnosis.report.error_patterns import draw_patterns, error_patterns
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.box_mesh import GridSpec
 
@@ -49,7 +49,9 @@ def test_patterns_show_the_push_in_which_the_cause_matters_most(bench, tmp_path)
     gap, count = camera + size * 3e-4, np.full((4, patches), 10.0)
     after = gap - size * 2e-4
     data = _watched([None, None, 0, 1])
-    found = patterns(bench, data, _pictured(bench, gap, count), _pictured(bench, after, count))
+    found = error_patterns(
+        bench, data, _pictured(bench, gap, count), _pictured(bench, after, count)
+    )
     # A uniform error stays what it is when smoothed; the camera's pattern is taken off.
     assert np.allclose(found.measured, 6e-4)
     assert np.allclose(found.predicted, 4e-4)
@@ -64,7 +66,7 @@ def test_patches_never_seen_are_left_open(bench):
     gap[0:2] = 0.0
     gap[:, 4] = np.nan
     count = np.full(gap.shape, 10.0)
-    found = patterns(
+    found = error_patterns(
         bench,
         _watched([None, None, 0]),
         _pictured(bench, gap, count),
@@ -76,7 +78,7 @@ def test_patches_never_seen_are_left_open(bench):
 def test_patterns_are_drawn_as_png(bench, tmp_path: Path):
     gap = 1e-3 * np.random.default_rng(2).standard_normal((4, bench.surface.patches))
     count = np.full(gap.shape, 10.0)
-    found = patterns(
+    found = error_patterns(
         bench,
         _watched([None, None, 0, 0]),
         _pictured(bench, gap, count),
@@ -94,9 +96,11 @@ def test_without_a_cause_the_largest_error_is_shown_and_alone(bench, tmp_path):
         np.full((4, bench.surface.patches), 10.0),
     )
     model = _pictured(bench, gap, count)
-    unnamed = patterns(bench, _watched([None, None, 0, 1]), model, model)
+    unnamed = error_patterns(bench, _watched([None, None, 0, 1]), model, model)
     assert np.allclose(unnamed.measured, 6e-4) and not unnamed.predicted.any()
-    named = patterns(bench, _watched([None, None, 0, 1]), model, _pictured(bench, 0.2 * gap, count))
+    named = error_patterns(
+        bench, _watched([None, None, 0, 1]), model, _pictured(bench, 0.2 * gap, count)
+    )
     widths = []
     for number, one in enumerate((unnamed, named)):
         draw_patterns(one, bench.surface, tmp_path / f"{number}.png")

@@ -14,8 +14,8 @@ from palpated import write_palpation
 from palpate.dataset import open_dataset
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
-from palpate.diagnosis.gain.force_gain import felt_ladder
-from palpate.diagnosis.observation.force_record import Felt
+from palpate.diagnosis.gain.force_gain import force_gain
+from palpate.diagnosis.observation.force_record import ForceComparison
 from palpate.diagnosis.observation.frame_groups import Group, Observations
 from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.report.inclusion_footprint import outline
@@ -128,7 +128,7 @@ def _prediction(gap: FloatArray) -> Prediction:
     block = Replay(
         Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3)), Grading(spacing=8e-3), 1e-3
     )
-    felt = Felt(
+    forces = ForceComparison(
         gap,
         np.full(len(gap), 1e-3),
         np.ones((len(gap), 3)),
@@ -144,16 +144,16 @@ def _prediction(gap: FloatArray) -> Prediction:
         np.zeros((len(gap), 0, 0)),
         (block.free,) * len(gap),
         (),
-        felt,
+        forces,
     )
 
 
 def test_gain_is_the_share_of_what_stands_above_the_sensors_noise() -> None:
     groups = tuple(Group((n,), np.empty((0, 3)), False, probe=1 + n // 2) for n in range(4))
-    item = Observations("felt", np.arange(4.0), None, groups, unseen=True)  # type: ignore[arg-type]
+    item = Observations("felt", np.arange(4.0), None, groups, force_only=True)  # type: ignore[arg-type]
     before = _prediction(np.tile([0.0, 0.0, 10e-3], (4, 1)))
     after = _prediction(np.tile([0.0, 0.0, 4e-3], (4, 1)))
-    found = felt_ladder([item], [before], [after], 0)
+    found = force_gain([item], [before], [after], 0)
     floor = np.sqrt(3) * 1e-3
     assert (found.baseline, found.extended, found.noise_floor) == pytest.approx(
         (10e-3, 4e-3, floor)
@@ -161,7 +161,7 @@ def test_gain_is_the_share_of_what_stands_above_the_sensors_noise() -> None:
     assert found.removed == pytest.approx([6e-3 / (10e-3 - floor)] * 3) and found.probes == 2
     assert found.to_json("test")["unit"] == "mN" and found.to_json("test")["baseline"] == 10.0
     with pytest.raises(DiagnosisError, match="no push whose force is known"):
-        felt_ladder([item], [_prediction(np.full((4, 3), np.nan))], [after], 0)
+        force_gain([item], [_prediction(np.full((4, 3), np.nan))], [after], 0)
 
 
 def test_test_sequences_without_clouds_beside_fitted_ones_with_are_refused(

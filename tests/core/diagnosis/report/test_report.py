@@ -11,22 +11,22 @@ from small_dataset import write_valid_dataset
 
 from palpate.dataset import Dataset, open_dataset
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.gain.gain_ladder import Ladder
+from palpate.diagnosis.gain.gain_ladder import SurfaceGain
 from palpate.diagnosis.inference.camera_error_model import Ripple
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.residual_structure import Structure
 from palpate.diagnosis.report.report import report_of, verdict_of
 from palpate.diagnosis.search.findings import Findings, Trial
-from palpate.diagnosis.validation.held_out_test import HeldOut
-from palpate.diagnosis.validation.rejection import objection
-from palpate.diagnosis.validation.stiffness_error_test import Asked
-from palpate.diagnosis.validation.worst_location import Worst
+from palpate.diagnosis.validation.held_out_test import HeldOutCheck
+from palpate.diagnosis.validation.rejection import rejection_reason
+from palpate.diagnosis.validation.stiffness_error_test import StiffnessErrorTest
+from palpate.diagnosis.validation.worst_location import ErrorLocation
 from palpate.effects import DIAGNOSED, Effect
 from palpate.effects.elastic_material import PoissonRatio
 
 NU = PoissonRatio(nu=0.40)
-RIM = Worst((0.03, 0.0, 0.039), 0.4)
-LADDER = Ladder(
+RIM = ErrorLocation((0.03, 0.0, 0.039), 0.4)
+LADDER = SurfaceGain(
     baseline=1.92e-3,
     extended=0.61e-3,
     noise_floor=0.55e-3,
@@ -130,14 +130,14 @@ def test_depth_that_waves_is_told_and_is_no_noise(bench, dataset):
 
 def test_error_that_only_the_test_sequences_show_is_no_all_clear(bench, dataset):
     findings = _findings(bench, misfit=1.0)
-    findings.beyond = HeldOut(noisy_model(bench), Structure(20.0, 20.0, 30.0))
+    findings.beyond = HeldOutCheck(noisy_model(bench), Structure(20.0, 20.0, 30.0))
     clear = report_of(dataset, bench, findings, LADDER, "test")
     assert (clear["verdict"], clear["unexplained"]["fraction"]) == ("none", 0.0)
     assert (
         clear["evidence"]["held_out_structure"],
         clear["evidence"]["held_out_structure_bound"],
     ) == (1.0, 1.5)
-    findings.beyond = HeldOut(noisy_model(bench), Structure(50.0, 20.0, 30.0))
+    findings.beyond = HeldOutCheck(noisy_model(bench), Structure(50.0, 20.0, 30.0))
     report = report_of(dataset, bench, findings, LADDER, "test")
     assert (report["verdict"], report["causes"], report["unexplained"]["fraction"]) == (
         "unexplained",
@@ -150,13 +150,13 @@ def test_error_that_only_the_test_sequences_show_is_no_all_clear(bench, dataset)
 def test_sequence_that_asks_for_more_than_a_replay_errs_is_no_all_clear(bench, dataset):
     findings = _findings(bench, misfit=1.0)
     name = findings.baseline.predictions[-1].name
-    findings.asked = Asked(name, 1.2, 0.5, 6.0, RIM)
+    findings.asked = StiffnessErrorTest(name, 1.2, 0.5, 6.0, RIM)
     clear = report_of(dataset, bench, findings, LADDER, "test")
     assert (
         clear["verdict"] == "none"
         and clear["evidence"]["local_stiffness_error"][0]["sequence"] == name
     )
-    findings.asked = Asked(name, 4.0, 13.2, 6.0, RIM)
+    findings.asked = StiffnessErrorTest(name, 4.0, 13.2, 6.0, RIM)
     report = report_of(dataset, bench, findings, LADDER, "test")
     assert (report["verdict"], report["causes"], report["unexplained"]["fraction"]) == (
         "unexplained",
@@ -173,9 +173,11 @@ def test_sequence_that_asks_for_more_than_a_replay_errs_is_no_all_clear(bench, d
 def test_test_sequence_that_asks_for_more_is_no_all_clear_either(bench, dataset):
     findings = _findings(bench, misfit=1.0)
     other = noisy_model(bench)
-    findings.asked = Asked("poke-01", 1.0, 0.0, 6.0, RIM)
-    findings.beyond = HeldOut(
-        other, Structure(20.0, 20.0, 30.0), Asked(other.predictions[-1].name, 4.0, 13.2, 6.0, RIM)
+    findings.asked = StiffnessErrorTest("poke-01", 1.0, 0.0, 6.0, RIM)
+    findings.beyond = HeldOutCheck(
+        other,
+        Structure(20.0, 20.0, 30.0),
+        StiffnessErrorTest(other.predictions[-1].name, 4.0, 13.2, 6.0, RIM),
     )
     report = report_of(dataset, bench, findings, LADDER, "test")
     assert report["verdict"] == "unexplained"
@@ -248,7 +250,7 @@ def test_report_without_a_cause_names_none(bench, dataset):
 def test_cause_that_makes_the_test_sequences_worse_is_withdrawn(bench, dataset):
     findings = _findings(bench, ((RADIUS,), 106.0, 1.02), ((LUMP,), 8.0, 1.03), misfit=1.03)
     worse = replace(LADDER, removed=(-0.75, -1.4, -0.31))
-    why = objection(findings, worse)
+    why = rejection_reason(findings, worse)
     findings.withdraw(why)
     report = report_of(dataset, bench, findings, LADDER, "test")
     assert report["verdict"] == "none" and report["causes"] == []

@@ -47,10 +47,10 @@ def test_weight_and_what_hangs_on_it_are_weighed_anew_on_top_of_each_other(
     finite = _replayed(bench, origin, [there, added], origin)
     model = bench.evaluate([there], origin.predictions)
     both = bench.evaluate([there, added], model.predictions)
-    true = both.predictions[0].less(model.predictions[0])[0]
+    true = both.predictions[0].change_from(model.predictions[0])[0]
     (kept, same), (effect, anew) = renewed(bench, model, finite, origin)
     assert (kept, effect) == (there, added) and same is finite[0][1]
-    stale, fresh = (one[0].less(origin.predictions[0])[0] for one in (finite[1][1], anew))
+    stale, fresh = (one[0].change_from(origin.predictions[0])[0] for one in (finite[1][1], anew))
     assert np.linalg.norm(fresh - true) < 0.05 * np.linalg.norm(true)
     assert np.linalg.norm(stale - true) > 0.15 * np.linalg.norm(true)
 

@@ -65,7 +65,7 @@ def _noise(item: Prediction, shape: tuple[int, ...]) -> Noise:
 
 def _change(there: list[Prediction], here: list[Prediction]) -> FloatArray:
     return np.concatenate(
-        [one.less(other)[0].ravel() for one, other in zip(there, here, strict=True)]
+        [one.change_from(other)[0].ravel() for one, other in zip(there, here, strict=True)]
     )
 
 

@@ -12,7 +12,7 @@ from pushed_block import CORNERS, SETUP, observed, poke, registration
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.observation.frame_groups import Observations
-from palpate.diagnosis.validation.held_out_test import held_out
+from palpate.diagnosis.validation.held_out_test import check_held_out
 from palpate.mesh.box_mesh import GridSpec
 from palpate.setup.setup import Material, Setup
 
@@ -45,16 +45,16 @@ def bench() -> Iterator[Bench]:
 
 
 def test_what_holds_for_them_too_is_clear(bench: Bench) -> None:
-    found = held_out(bench, [DATA["alike"]], seed=0)
+    found = check_held_out(bench, [DATA["alike"]], seed=0)
     assert found is not None and [item.name for item in found.model.predictions] == ["alike"]
     assert not found.structure.significant
 
 
 def test_error_that_only_they_show_is_seen(bench: Bench) -> None:
-    found = held_out(bench, [DATA["alike"], DATA["other"]], seed=0)
+    found = check_held_out(bench, [DATA["alike"], DATA["other"]], seed=0)
     assert found is not None and found.structure.significant
     assert bench.noises == [] and bench.names == ("fitted",)  # nothing of it reaches what is fitted
 
 
 def test_without_test_sequences_there_is_nothing_to_look_at(bench: Bench) -> None:
-    assert held_out(bench, [], seed=0) is None
+    assert check_held_out(bench, [], seed=0) is None

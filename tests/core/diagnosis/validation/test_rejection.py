@@ -5,14 +5,14 @@ from dataclasses import replace
 import pytest
 from pushed_block import SETUP
 
-from palpate.diagnosis.gain.gain_ladder import Ladder
+from palpate.diagnosis.gain.gain_ladder import SurfaceGain
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.residual_structure import Structure
 from palpate.diagnosis.search.findings import Findings, Trial
-from palpate.diagnosis.validation.rejection import objection
+from palpate.diagnosis.validation.rejection import rejection_reason
 from palpate.effects.tool import ToolCompliance
 
-LADDER = Ladder(
+LADDER = SurfaceGain(
     baseline=1.92e-3,
     extended=0.61e-3,
     noise_floor=0.55e-3,
@@ -43,11 +43,11 @@ def _found(before: float, left: float) -> Findings:
     "removed", [(0.9, 0.8, 0.95), (0.0, 0.0, 0.0), (-0.3, -0.9, 0.1), (-0.05, -0.08, -0.02)]
 )
 def test_cause_that_leaves_no_structure_and_may_carry_over_is_kept(removed):
-    assert objection(_found(3.0, 1.2), replace(LADDER, removed=removed)) == ""
+    assert rejection_reason(_found(3.0, 1.2), replace(LADDER, removed=removed)) == ""
 
 
 def test_cause_that_leaves_the_structure_and_helps_no_test_sequence_is_not_named():
-    why = objection(_found(5.0, 5.4), IDLE)
+    why = rejection_reason(_found(5.0, 5.4), IDLE)
     assert why.startswith("tool_compliance would explain part")
     assert (
         "5.4 times what chance gives, 5.0 times without it" in why
@@ -56,16 +56,16 @@ def test_cause_that_leaves_the_structure_and_helps_no_test_sequence_is_not_named
 
 
 def test_cause_that_leaves_the_structure_where_nothing_was_tested_is_not_named():
-    assert "stays" in objection(_found(5.0, 5.4), None)
+    assert "stays" in rejection_reason(_found(5.0, 5.4), None)
 
 
 def test_cause_that_removes_most_of_the_structure_or_of_what_test_sequences_show_is_kept():
-    assert objection(_found(20.0, 3.0), IDLE) == ""
-    assert objection(_found(5.0, 4.6), replace(LADDER, removed=(0.6, 0.5, 0.7))) == ""
+    assert rejection_reason(_found(20.0, 3.0), IDLE) == ""
+    assert rejection_reason(_found(5.0, 4.6), replace(LADDER, removed=(0.6, 0.5, 0.7))) == ""
 
 
 def test_cause_that_leaves_the_larger_part_of_either_is_not_named_though_it_surely_removes_some():
-    why = objection(_found(2.2, 1.9), replace(LADDER, removed=(0.29, 0.23, 0.47)))
+    why = rejection_reason(_found(2.2, 1.9), replace(LADDER, removed=(0.29, 0.23, 0.47)))
     assert (
         "1.9 times what chance gives, 2.2 times without it" in why
         and "29 % (23 to 47 %) is removed" in why
@@ -73,4 +73,4 @@ def test_cause_that_leaves_the_larger_part_of_either_is_not_named_though_it_sure
 
 
 def test_nothing_found_needs_no_objection():
-    assert objection(Findings(_found(1.0, 1.0).baseline), LADDER) == ""
+    assert rejection_reason(Findings(_found(1.0, 1.0).baseline), LADDER) == ""

@@ -16,13 +16,13 @@ from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.search.candidates import lump_places
 from palpate.diagnosis.validation.stiffness_error_test import (
-    Asked,
-    Wanted,
-    asked_of,
-    bound_for,
-    most_asked,
+    StiffnessError,
+    StiffnessErrorTest,
+    chance_bound,
+    largest_stiffness_error,
+    stiffness_error_of,
 )
-from palpate.diagnosis.validation.worst_location import Worst
+from palpate.diagnosis.validation.worst_location import ErrorLocation
 from palpate.effects.base import with_effects
 from palpate.effects.elastic_material import StiffInclusion
 from palpate.mesh.box_mesh import GridSpec
@@ -54,9 +54,9 @@ def workers() -> Iterator[Workers]:
         yield found
 
 
-def _looked_at(workers: Workers, *names: str) -> Asked:
+def _looked_at(workers: Workers, *names: str) -> StiffnessErrorTest:
     bench = Bench(STATED, registration(), workers, names, None, GRID, FINE)
-    found = most_asked(bench, bench.baseline((), lump_places(bench)))
+    found = largest_stiffness_error(bench, bench.baseline((), lump_places(bench)))
     assert found is not None
     return found
 
@@ -82,7 +82,7 @@ GROUPS, PATCHES, NUISANCES, MOVED, SPOTS = 8, 60, 2, 6, 20
 FITTED, OWN = [0, 1], MOVED + SPOTS
 
 
-def _asked(deviation: float, seed: int) -> Wanted:
+def _asked(deviation: float, seed: int) -> StiffnessError:
     """Of white noise, nuisances, and errors of local stiffness of this deviation over the allowed
     one.
     """
@@ -93,27 +93,27 @@ def _asked(deviation: float, seed: int) -> Wanted:
     )
     residual = columns @ factors + random.standard_normal((GROUPS, PATCHES))
     block = Block("poke", *gram(residual, columns, np.ones((GROUPS, PATCHES))))
-    return asked_of(block, FITTED, np.eye(NUISANCES), OWN, SPOTS)
+    return stiffness_error_of(block, FITTED, np.eye(NUISANCES), OWN, SPOTS)
 
 
 @pytest.mark.parametrize("deviation", [0.05, CRITERIA.stiffness_error.usual])
 def test_what_is_usual_is_rarely_too_much(deviation: float) -> None:
     gains = np.array([_asked(deviation, seed).gain for seed in range(200)])
-    assert (gains > bound_for(1)).sum() <= 2 and np.median(gains) < 0.5
+    assert (gains > chance_bound(1)).sum() <= 2 and np.median(gains) < 0.5
 
 
 def test_more_than_usual_is_measured() -> None:
     found = [_asked(4 * CRITERIA.stiffness_error.usual, seed) for seed in range(20)]
-    assert all(one.gain > bound_for(4) for one in found)
+    assert all(one.gain > chance_bound(4) for one in found)
     assert np.median([one.factor for one in found]) == pytest.approx(4.0, rel=0.5)
 
 
 def test_more_sequences_ask_for_more_by_chance() -> None:
-    assert 4.5 < bound_for(1) < bound_for(4) < bound_for(20) < 8.0
+    assert 4.5 < chance_bound(1) < chance_bound(4) < chance_bound(20) < 8.0
 
 
 def test_factor_is_said_in_percent_of_stiffness() -> None:
-    found = Asked("poke-side-01", 4.0, 13.2, 6.1, Worst((0.0, 0.0, 0.0), 1.0))
+    found = StiffnessErrorTest("poke-side-01", 4.0, 13.2, 6.1, ErrorLocation((0.0, 0.0, 0.0), 1.0))
     assert (
         f"off by {100 * 4 * CRITERIA.stiffness_error.usual * CRITERIA.noise.stiffness_error:.0f} %"
         in found.warning
