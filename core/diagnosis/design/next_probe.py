@@ -119,7 +119,7 @@ def next_probe(
         depth_reached(data, bench.setup),
         drags=drags,
         speed=speed,
-        holds=(0.0, 10.0) if memory else (0.0,),
+        holds=(0.0, CRITERIA.design.hold) if memory else (0.0,),
     )
     scene = _scene(bench, findings)
     pending = [

@@ -75,7 +75,11 @@ def profile(
 
 def vague(covariance: FloatArray, items: Sequence[Parameter]) -> list[int]:
     """Which coordinates the linearised fit knows to no step that matters, the worst first."""
-    widths = 1.96 * np.sqrt(np.diag(covariance)) / np.array([item.scale for item in items])
+    widths = (
+        CRITERIA.intervals.normal_quantile
+        * np.sqrt(np.diag(covariance))
+        / np.array([item.scale for item in items])
+    )
     return [int(index) for index in np.argsort(-widths) if widths[index] > CRITERIA.verdict.vague]
 
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.history_replay import forgetful
 from palpate.diagnosis.forward.jacobian import Columns, Wanted
 from palpate.diagnosis.forward.prediction import Prediction
@@ -30,7 +31,7 @@ def predict_forces(
     grid: Meshing,
     wanted: Wanted | None = None,
     starts: Sequence[Equilibrium] | None = None,
-    tolerance: float = 3e-4,
+    tolerance: float = CRITERIA.replay.tolerance,
 ) -> Prediction:
     """Replay a sequence's pushes and compare the forces; of the surface nothing is predicted, as
     nothing of it was seen.

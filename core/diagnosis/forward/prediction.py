@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.history_replay import Past, forgetful, travel
 from palpate.diagnosis.forward.jacobian import Columns, Wanted
 from palpate.diagnosis.forward.ray_comparison import PointSample, choose_points, compare
@@ -139,7 +140,7 @@ def predict(
     grid: Meshing,
     wanted: Wanted | None = None,
     starts: Sequence[Equilibrium] | None = None,
-    tolerance: float = 3e-4,
+    tolerance: float = CRITERIA.replay.tolerance,
     samples: Sequence[PointSample] | None = None,
 ) -> Prediction:
     """Replay a sequence's groups and compare each with its points.

@@ -91,8 +91,9 @@ def removed_share(baseline: FloatArray, model: FloatArray, floor: FloatArray) ->
     baseline already lies at the floor.
     """
     reducible = baseline - floor
-    share = (baseline - model) / np.where(reducible > 1e-6, reducible, 1.0)
-    return np.where(reducible > 1e-6, np.minimum(share, 1.0), 0.0)
+    some = reducible > CRITERIA.gain.least_reducible
+    share = (baseline - model) / np.where(some, reducible, 1.0)
+    return np.where(some, np.minimum(share, 1.0), 0.0)
 
 
 def fixed_pattern(

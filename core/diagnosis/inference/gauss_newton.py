@@ -58,7 +58,7 @@ def _descended(
         if lost or promised < worth:
             break
         step = _step(bench, model, nuisances, radius)
-        if np.abs(step / model.scales).max() < 0.05:
+        if np.abs(step / model.scales).max() < CRITERIA.fits.least_step:
             break
         trial = bench.evaluate(_shifted(model, step), model.predictions)
         value = bench.objective(trial, nuisances)
@@ -67,8 +67,8 @@ def _descended(
             if gained < 2 * worth:
                 break
         else:
-            radius = 0.3 * np.abs(step / model.scales).max()
-            if radius < 0.1:
+            radius = CRITERIA.fits.shrinking * np.abs(step / model.scales).max()
+            if radius < CRITERIA.fits.least_trust:
                 break
     return model
 

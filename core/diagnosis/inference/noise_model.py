@@ -37,7 +37,7 @@ def patch_variance(predictions: Sequence[Prediction]) -> FloatArray:
         [np.nansum(item.spread**2 * np.maximum(item.count - 1, 0), axis=0) for item in predictions],
         axis=0,
     )
-    enough = freedom > 50
+    enough = freedom > CRITERIA.noise.least_freedom
     variance = np.where(enough, squares / np.maximum(freedom, 1), np.nan)
     typical = (
         float(np.nanmedian(variance))
@@ -117,7 +117,7 @@ class Noise:
         scatter = variance / np.maximum(baseline.count, 1) + CRITERIA.noise.white_floor**2
         if baseline.forces is not None:
             scatter = np.concatenate([scatter, force_scatter(baseline.forces)], axis=1)
-        scatter = scatter + (0.5 * mesh) ** 2
+        scatter = scatter + (CRITERIA.noise.mesh_share * mesh) ** 2
         centres = surface.patch_centres
         size = np.array(
             [
@@ -151,7 +151,7 @@ class Noise:
         seen = np.isfinite(gap) & np.isfinite(finer)
         seen[list(set(baseline.failed) | set(fine.failed))] = False
         mesh = np.where(seen, finer - gap, 0.0)
-        scatter = force_scatter(baseline.forces) + (0.5 * mesh) ** 2
+        scatter = force_scatter(baseline.forces) + (CRITERIA.noise.mesh_share * mesh) ** 2
         parts = [
             force_discrepancy(baseline.forces, baseline.equilibria),
             depth_discrepancy(baseline.forces, baseline.equilibria),

@@ -114,7 +114,9 @@ class StaticChannel:
 
         What was measured lies, under the stated setup, about where its block and the table are.
         """
-        rays = camera_model_for(stated, reference=True).read(np.concatenate([self.centres, self.table]))
+        rays = camera_model_for(stated, reference=True).read(
+            np.concatenate([self.centres, self.table])
+        )
         gap = camera_model_for(setup, reference=True).place(rays)
         gap[: len(self.centres)] -= rest(setup, grid).move(Surface.of(setup).own(self.centres))
         return np.concatenate(
@@ -136,7 +138,7 @@ def _table_cells(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
     count = np.bincount(index)
     means = np.stack([np.bincount(index, table[:, axis]) / count for axis in range(3)], axis=1)
     spread = float(np.median(np.abs(table[:, 2] - means[index, 2]))) * 1.48 if len(table) else 0.0
-    good = count >= 4
+    good = count >= CRITERIA.rest.least_table_points
     return means[good] * np.array([1.0, 1.0, 0.0]), means[good, 2], spread**2 / count[good]
 
 

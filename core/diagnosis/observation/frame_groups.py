@@ -253,8 +253,13 @@ def observe(
     for number, run in enumerate(runs):
         picked = (
             run
-            if len(run) <= 12
-            else [run[i] for i in np.linspace(0, len(run) - 1, 12).round().astype(int)]
+            if len(run) <= CRITERIA.grouping.most_clouds
+            else [
+                run[i]
+                for i in np.linspace(0, len(run) - 1, CRITERIA.grouping.most_clouds)
+                .round()
+                .astype(int)
+            ]
         )
         clouds = [sequence.cloud(frame) for frame in picked]
         points = np.concatenate(

@@ -36,7 +36,7 @@ def agrees_with_neighbours(gap: FloatArray, patch: IntArray, surface: Surface) -
     centres, normals = surface.patch_centres[seen], surface.patch_normals[seen]
     near = (
         (np.linalg.norm(centres[:, None] - centres, axis=2) < CRITERIA.outliers.neighbour_distance)
-        & (normals @ normals.T > 0.5)
+        & (normals @ normals.T > CRITERIA.outliers.same_side_cosine)
         & well
     )
     np.fill_diagonal(near, False)

@@ -165,7 +165,7 @@ def _resisting(
     """
     found = []
     for setup in setups:
-        block = Replay(setup, grid, 1e-3)
+        block = Replay(setup, grid, CRITERIA.replay.footprint_tolerance)
         frame = block.solve_from_any(place + (setup.tool.radius - depth) * normal, (None,))
         found.append(
             float(frame.force @ normal) if frame.outcome.name == "CONVERGED" else float("nan")

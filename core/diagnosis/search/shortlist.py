@@ -61,7 +61,10 @@ def shortlist(
     for number in np.argsort(-gains):
         candidate = candidates[number]
         taken = [c for c in chosen if c.start.name == candidate.start.name]
-        apart = all(_distance(candidate.start, other.start) > 0.015 for other in taken)
+        apart = all(
+            _distance(candidate.start, other.start) > CRITERIA.screening.inclusions_apart
+            for other in taken
+        )
         nothing_finer = isinstance(candidate.start, MeshResolution) and candidate.widened
         room = not (taken or nothing_finer) or (
             isinstance(candidate.start, StiffInclusion) and len(taken) < 2 and apart

@@ -53,7 +53,7 @@ def fitted(setup: Setup, grid: Meshing, pairing: str) -> tuple[LandmarkMismatch,
         )
         change = -np.linalg.lstsq(slopes, here, rcond=None)[0]
         effect = effect.moved([effect.scale + change[0], effect.inset + change[1]])
-        if (np.abs(change) < 1e-3 * _SPREADS).all():
+        if (np.abs(change) < CRITERIA.touch_pairing.settled * _SPREADS).all():
             break
     return effect, 0.5 * float(misses(effect) @ misses(effect))
 
