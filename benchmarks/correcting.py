@@ -34,7 +34,7 @@ from palpate.correction import (
     train,
 )
 from palpate.correction.corrected_replay import FEEDBACKS, CorrectedFrame
-from palpate.correction.samples.record_samples import tool_columns
+from palpate.correction.samples.tool_columns import tool_columns
 from palpate.dataset import open_dataset
 from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.measurement.metrics import paper_distance

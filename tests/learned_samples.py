@@ -1,6 +1,4 @@
-"""Small samples written by hand: a block that is lower than the simulation says, most of all around
-the tool.
-"""
+"""Small synthetic samples: a block that is lower than simulated, most of all around the tool."""
 
 from __future__ import annotations
 
@@ -21,8 +19,9 @@ SIZE, NODES = (0.06, 0.04, 0.03), (5, 4, 3)
 def write_samples(
     folder: Path, rows: int = 24, names: tuple[str, ...] = ("one", "two", "three"), seed: int = 0
 ) -> Samples:
-    """`rows` frames of each sequence, the first names trained on, the last two for validation and
-    test.
+    """Write `rows` frames of each sequence.
+
+    The last two sequences are for validation and test, the others for training.
     """
     rng, body = np.random.default_rng(seed), Body.block(SIZE, NODES)
     folder.mkdir(parents=True)

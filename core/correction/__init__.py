@@ -1,7 +1,7 @@
-"""The correction network: what physics does not explain, learned from the clouds, on top of any model.
+"""Correction networks: they learn the error that a model leaves, from the clouds.
 
-recorder = recorder_for(open_dataset(folder))            # or with setup=..., the extended model
-samples = make_samples(target, recorder)                 # replayed once, streamed from disk ever after
+recorder = recorder_for(open_dataset(folder))  # the stated model; setup=... takes another one
+samples = make_samples(target, recorder)  # the model is replayed once; samples are read from disk
 trained = train(samples, Split.of(samples), TrainingSpec(network=NetworkSpec(kind="unet2d")), run)
 """
 
@@ -9,12 +9,15 @@ from palpate.correction.corrected_replay import CorrectedFrame, Corrector, repla
 from palpate.correction.networks.architectures import CorrectionNetwork, NetworkSpec, build
 from palpate.correction.networks.chamfer import SurfaceLoss
 from palpate.correction.online import Learner, OnlineSpec, learn_online
+from palpate.correction.sample_errors import sample_errors
 from palpate.correction.samples.corrected_points import Body
-from palpate.correction.samples.record_samples import Recorder, make_samples, recorder_for
+from palpate.correction.samples.record_samples import make_samples
+from palpate.correction.samples.sample_recorder import Recorder, recorder_for
 from palpate.correction.samples.sample_splits import Split
 from palpate.correction.samples.sample_store import Batch, Samples, open_samples
-from palpate.correction.train import body_for, sample_errors, train
+from palpate.correction.train import train
 from palpate.correction.trained_network import TrainedNetwork
+from palpate.correction.training_run import body_for
 from palpate.correction.training_spec import TrainingSpec
 
 __all__ = [
@@ -34,11 +37,11 @@ __all__ = [
     "TrainingSpec",
     "body_for",
     "build",
-    "sample_errors",
     "learn_online",
     "make_samples",
     "open_samples",
     "recorder_for",
     "replay_corrected",
+    "sample_errors",
     "train",
 ]

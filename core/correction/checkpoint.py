@@ -1,6 +1,4 @@
-"""A training on disk: everything it needs to go on as if it had never been stopped, written aside
-and renamed into place.
-"""
+"""Checkpoint files, written atomically, and the random state that they hold."""
 
 from __future__ import annotations
 
@@ -14,11 +12,11 @@ import torch
 
 from palpate.foundation.errors import RunError
 
-__all__ = ["load", "save_json", "random_state", "restore_random_state", "save"]
+__all__ = ["load", "random_state", "restore_random_state", "save", "save_json"]
 
 
 def save(path: Path, content: dict[str, Any]) -> None:
-    """Write tensors and plain values: the old file or the new one is there at any moment, whole."""
+    """Write tensors and plain values atomically."""
     aside = path.with_name(f".{path.name}-{uuid4().hex}")
     try:
         with aside.open("wb") as file:
@@ -31,21 +29,22 @@ def save(path: Path, content: dict[str, Any]) -> None:
 
 
 def save_json(path: Path, value: Any) -> None:
-    """Write plain values for readers without torch, whole at any moment."""
+    """Write plain values as JSON atomically, for readers without torch."""
     aside = path.with_name(f".{path.name}-{uuid4().hex}")
     aside.write_text(json.dumps(value))
     os.replace(aside, path)
 
 
 def load(path: Path, device: torch.device | str = "cpu") -> dict[str, Any]:
-    """What `save` wrote; only tensors and plain values are read, no code. RunError where it is
-    missing or damaged.
+    """Return what `save` wrote; code in the file is not executed.
+
+    Raises RunError where the file is missing or damaged.
     """
     try:
         content = torch.load(path, map_location=device, weights_only=True)
     except FileNotFoundError:
         raise RunError(f"{path} is not there; train first", path=str(path)) from None
-    except Exception as error:  # torch raises whatever its unpickler does
+    except Exception as error:  # the unpickler raises many kinds
         raise RunError(
             f"{path} cannot be read ({type(error).__name__}: {error}); train again", path=str(path)
         ) from None
@@ -57,7 +56,7 @@ def load(path: Path, device: torch.device | str = "cpu") -> dict[str, Any]:
 
 
 def random_state() -> dict[str, Any]:
-    """Of torch, on the processor and all CUDA devices."""
+    """Return torch's random state, of the CPU and of all CUDA devices."""
     return {
         "cpu": torch.get_rng_state(),
         "cuda": torch.cuda.get_rng_state_all() if torch.cuda.is_available() else [],
@@ -65,7 +64,7 @@ def random_state() -> dict[str, Any]:
 
 
 def restore_random_state(state: dict[str, Any]) -> None:
-    """The inverse."""
+    """Set the random state that `random_state` returned."""
     torch.set_rng_state(state["cpu"].cpu())
     if state["cuda"] and torch.cuda.is_available():
         torch.cuda.set_rng_state_all([part.cpu() for part in state["cuda"]])

@@ -1,14 +1,14 @@
-"""Correction inside a replay: each frame's shape, corrected, as a frame like any other.
+"""Replays whose frames a network corrects.
 
-What the network says of its grid is interpolated linearly to the nodes that were solved on, so that the dent keeps its detail.
-Three ways to feed it back:
+The network's correction of its grid is interpolated linearly to the nodes of the solved mesh, which
+keeps the detail of the dent. It is fed back in one of three ways:
 
     none    only the points that the network corrects are moved
-    follow  the simulation answers for all others, see `palpate.correction.elastic_extension`
-    start   as follow, and the next frame is solved from there
+    follow  the simulation moves all other points, see `palpate.correction.elastic_extension`
+    start   as follow, and the next frame is solved from the corrected shape
 
-An elastic block in equilibrium has no memory: from wherever a frame is solved, it ends in the same place, and `start` can only
-change how many iterations that takes.
+The equilibrium of an elastic block does not depend on where its solution starts, so `start` changes
+only the number of iterations.
 """
 
 from __future__ import annotations
@@ -41,13 +41,14 @@ FEEDBACKS: tuple[str, ...] = get_args(Feedback)
 
 
 class Corrector:
-    """A trained network on the frames of one setup's replay.
+    """Applies a trained network to the frames of one setup.
 
     Args:
         trained: the network.
-        setup: of the frames.
-        feedback: see the module.
-        half: bfloat16 inside, see `palpate.correction.networks.unet_inference`.
+        setup: the setup of the frames.
+        feedback: how the correction is fed back, see the module.
+        half: whether the network computes in bfloat16; None chooses, see
+            `palpate.correction.networks.unet_inference`.
     """
 
     def __init__(
@@ -73,7 +74,7 @@ class Corrector:
             self._following = ElasticExtension(setup, self._lattice, self._driven(trained))
 
     def _mesh(self, setup: Setup) -> BoxMesh | None:
-        """The grid of all the samples' points; None for a body that is no grid."""
+        """Return the grid of all sample points; None for a body that is not a grid."""
         grid = self.body.grid
         if grid is None:
             return None
@@ -83,15 +84,19 @@ class Corrector:
         return box_mesh(setup.box.size, GridSpec(nodes=(grid[0], grid[1], grid[2])))
 
     def _driven(self, trained: TrainedNetwork) -> IntArray:
-        """What the network is believed of: the top, or all points that the camera sees."""
+        """Return the points whose correction is used: the top, or all points the camera sees."""
         if self.body.flat:
             return self.body.index
         seen = np.asarray(trained.about["seen"], dtype=float)
         return np.flatnonzero(hold_weights(seen) < 0.5)
 
     def correction(self, frame: Equilibrium, tool: FloatArray) -> FloatArray:
-        """How far the body's points are moved (v, 3) [m]; tool (13,) as in the samples, a simulated
-        force is the frame's.
+        """Return the correction of the body's points (v, 3) [m].
+
+        Args:
+            frame: the simulated frame.
+            tool: (13,) as in the samples. Its force is replaced by the frame's, unless the network
+                was trained with measured forces.
         """
         known = torch.as_tensor(tool, dtype=torch.float32)
         if not self.measured_force:
@@ -100,14 +105,15 @@ class Corrector:
         return np.asarray((self._network(simulated, known) - simulated).numpy(), dtype=float)
 
     def correct(self, frame: Equilibrium, tool: FloatArray) -> Equilibrium:
-        """The frame with its shape corrected; all else is the simulation's."""
+        """Return the frame with its shape corrected; everything else stays simulated."""
         moved = self.correction(frame, tool)
         if self._lattice is None:
             if len(frame.mesh.nodes) != len(moved) or not np.allclose(
                 frame.mesh.nodes, self.body.rest, atol=1e-9
             ):
                 raise CorrectionError(
-                    "the frame is of another mesh than the network was trained on; replay on that one",
+                    "the frame is of another mesh than the network was trained on; "
+                    "replay on that one",
                     key="mesh",
                 )
             return replace(frame, displacement=frame.displacement + moved)
@@ -125,22 +131,27 @@ class Corrector:
 def _single(
     network: CorrectionNetwork, half: bool | None
 ) -> Callable[[torch.Tensor, torch.Tensor], torch.Tensor]:
-    """The network for one frame (v, 3) and tool (13,)."""
+    """Return the network as a function of vertices (v, 3) [m] and tool (13,) of one frame."""
     if network.spec.kind != "graph":
         return UNetInference(network, half)
     plain = network.cpu().eval()
 
     def single(vertices: torch.Tensor, tool: torch.Tensor) -> torch.Tensor:
         with torch.inference_mode():
-            found: torch.Tensor = plain(vertices[None], tool[None])[0]
-            return found
+            corrected: torch.Tensor = plain(vertices[None], tool[None])[0]
+            return corrected
 
     return single
 
 
 @dataclass(frozen=True, eq=False)
 class CorrectedFrame:
-    """A frame as simulated and as corrected."""
+    """A frame as simulated and as corrected.
+
+    Attributes:
+        raw: the simulated frame.
+        corrected: the corrected frame.
+    """
 
     raw: Equilibrium
     corrected: Equilibrium
@@ -156,16 +167,18 @@ def replay_corrected(
     times: FloatArray | None = None,
     tolerance: float = 1e-3,
 ) -> Iterator[CorrectedFrame]:
-    """Each frame of a replay, corrected; one at a time.
+    """Yield the corrected frames of a replay one by one.
+
+    A frame without equilibrium is yielded uncorrected.
 
     Args:
+        corrector: corrects the frames.
+        setup: the setup of the replay.
         centres: (f, 3) stated tool centres [m], phantom frame.
         tools: (f, 13) as in the samples.
-        grid: the mesh.
-        times: (f,) [s], for a material with memory.
-        tolerance: residual at which a frame counts as converged, over the push.
-
-    A frame without equilibrium is returned as it is: there is nothing to correct.
+        grid: the mesh protocol.
+        times: (f,) times of the frames [s], for a material with history.
+        tolerance: residual over the push force at which a frame counts as converged [1].
     """
     block, previous, start = Replay(setup, grid, tolerance), None, None
     for number, centre in enumerate(centres):

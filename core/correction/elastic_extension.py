@@ -1,13 +1,12 @@
-"""How a body follows where some of its points are moved: the elastic answer, linearised at rest.
+"""Elastic extension of a correction from some points of a body to all others, linearised at rest.
 
-A network that corrects the top says nothing of what lies below. Fed back, its correction is a
-displacement prescribed to the simulation, and all other points take the places in which no force is
-left on them:
+A network over the top layer does not correct the points below. Its correction is prescribed as a
+displacement d_t, and all other points move to where no force acts on them:
 
     K_ff d_f + K_ft d_t = 0
 
-with K the tangent of the block at rest on the corrected grid. Solved once, it is one product of a
-matrix with each correction.
+with K the tangent stiffness of the block at rest on the corrected grid. It is solved once; each
+correction then costs one matrix product.
 """
 
 from __future__ import annotations
@@ -27,12 +26,12 @@ __all__ = ["ElasticExtension"]
 
 
 class ElasticExtension:
-    """Displacements of all nodes of a grid from those of some.
+    """Computes the displacements of all nodes of a grid from those of some.
 
     Args:
-        setup: material and support.
-        mesh: the grid of order 1.
-        driven: (k,) nodes that are moved; base nodes stay held.
+        setup: gives material and support.
+        mesh: the grid, of order 1.
+        driven: (k,) numbers of the nodes with a prescribed displacement; base nodes stay fixed.
     """
 
     def __init__(self, setup: Setup, mesh: BoxMesh, driven: IntArray) -> None:
@@ -42,21 +41,21 @@ class ElasticExtension:
         rest = np.setdiff1d(np.flatnonzero(free.all(axis=1)), moved)
         if not len(moved):
             raise CorrectionError(
-                "no point that is corrected can move: all are held by the base", key="driven"
+                "no corrected point can move: all are fixed at the base", key="driven"
             )
         self.driven, self._rest = moved, rest
-        self._answer = _answer(_tangent(model), unknown[rest].ravel(), unknown[moved].ravel())
+        self._response = _response(_tangent(model), unknown[rest].ravel(), unknown[moved].ravel())
 
     def __call__(self, displacement: FloatArray) -> FloatArray:
-        """(n, 3) [m] of all nodes from (n, 3) [m], of which only the driven count."""
-        found = np.zeros_like(displacement, dtype=float)
-        found[self.driven] = displacement[self.driven]
-        found[self._rest] = (self._answer @ found[self.driven].ravel()).reshape(-1, 3)
-        return found
+        """Return displacements (n, 3) [m] of all nodes; only those of driven nodes are read."""
+        extended = np.zeros_like(displacement, dtype=float)
+        extended[self.driven] = displacement[self.driven]
+        extended[self._rest] = (self._response @ extended[self.driven].ravel()).reshape(-1, 3)
+        return extended
 
 
 def _tangent(model: BlockModel) -> sp.csc_matrix:
-    """At rest, over E (u, u) [m]."""
+    """Return the tangent stiffness at rest over Young's modulus (u, u) [m]."""
     pattern = model.topology.pattern
     upper = sp.csr_matrix(
         (model.assemble(model.mesh.nodes, None).data, pattern.indices, pattern.indptr),
@@ -66,7 +65,7 @@ def _tangent(model: BlockModel) -> sp.csc_matrix:
 
 
 @on_one_thread
-def _answer(tangent: sp.csc_matrix, follows: IntArray, moved: IntArray) -> FloatArray:
+def _response(tangent: sp.csc_matrix, follows: IntArray, moved: IntArray) -> FloatArray:
     if not len(follows):
         return np.zeros((0, len(moved)))
     columns = tangent[:, moved]

@@ -1,9 +1,8 @@
-"""A network that keeps learning as frames arrive: each is predicted first, then learned from, so
-that its error is an honest one.
+"""Online learning: a network that keeps learning as frames arrive.
 
-Steps are small and mix the newest frame with some of those before it, or the network would forget
-what it knew of other places. Of these the last `memory` are kept: when the material changes, what
-was true of the old one leaves with them.
+Each frame is predicted before it is learned from, so that its error is out of sample. A step mixes
+the newest frame with earlier ones, which keeps what the network learned elsewhere. Only the last
+`memory` frames are kept, so that the network adapts when the material changes.
 """
 
 from __future__ import annotations
@@ -24,21 +23,22 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import CorrectionError
 from palpate.foundation.progress import Report, silent
 
-__all__ = ["Learner", "OnlineSpec", "OnlineErrors", "learn_online"]
+__all__ = ["Learner", "OnlineErrors", "OnlineSpec", "learn_online"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class OnlineSpec:
-    """How a network learns on the way.
+    """The settings of online learning.
 
     Attributes:
-        rate: of Adam.
-        batch: frames in a step, the newest among them.
-        steps: after each frame.
-        memory: frames that are kept.
-        distance, hold: as in a training.
-        device: of torch, or "auto".
-        seed: of which frames are drawn.
+        rate: learning rate of Adam.
+        batch: frames per step, including the newest.
+        steps: steps after each frame.
+        memory: number of frames that are kept.
+        distance: distance of the loss, as in a training.
+        hold: weight of the hidden points' correction [1/mm], as in a training.
+        device: torch device, or "auto".
+        seed: seed of the draw of earlier frames.
     """
 
     rate: float = 1e-3
@@ -70,11 +70,11 @@ class OnlineSpec:
 
 
 class Learner:
-    """A copy of a trained network that learns; the one it was made from stays as it is.
+    """A copy of a trained network that learns online; the original does not change.
 
     Args:
         trained: the network.
-        spec: how it learns.
+        spec: the settings.
     """
 
     def __init__(self, trained: TrainedNetwork, spec: OnlineSpec) -> None:
@@ -86,51 +86,56 @@ class Learner:
         )
         self._optimizer = torch.optim.Adam(self.network.parameters(), lr=spec.rate, fused=True)
         self._random = np.random.default_rng(spec.seed)
-        self._kept: list[Batch] = []
+        self._stored: list[Batch] = []
         self._next = 0
 
     @torch.no_grad()
     def predict(self, batch: Batch) -> Tensor:
-        """Corrected points (b, v, 3) [m] of the body."""
+        """Return the corrected points (b, v, 3) [m] of the body."""
         here = batch.to(self._device)
         corrected: Tensor = self.network.eval()(here.positions[:, self.body.index], here.tool)
         return corrected
 
     @torch.no_grad()
     def error(self, vertices: Tensor, batch: Batch) -> float:
-        """Mean distance [mm] of one frame's measured points to the surface of vertices (1, v, 3)
-        [m]; NaN where there are none.
+        """Return the mean distance [mm] of one frame's measured points to a surface.
+
+        NaN where there are no points. The surface is given by vertices (1, v, 3) [m].
         """
         apart, valid = self._loss.distances(vertices, batch.to(self._device))
         return float((apart[valid].sum() / valid.sum()).cpu()) * 1e3
 
     def learn(self, frame: Batch) -> None:
-        """A few steps on this frame (a batch of one) and some that are remembered."""
+        """Take the steps after a frame (a batch of one), mixed with stored frames."""
         newest = frame.to(self._device)
         self.network.train()
         for _ in range(self.spec.steps):
-            others = min(self.spec.batch - 1, len(self._kept))
+            others = min(self.spec.batch - 1, len(self._stored))
             batch = newest
             for number in (
-                self._random.choice(len(self._kept), others, replace=False) if others else ()
+                self._random.choice(len(self._stored), others, replace=False) if others else ()
             ):
-                batch = batch.joined(self._kept[int(number)])
+                batch = batch.joined(self._stored[int(number)])
             raw = batch.positions[:, self.body.index]
             loss = self._loss(self.network(raw, batch.tool), batch, raw)
             self._optimizer.zero_grad(set_to_none=True)
             loss.total.backward()
             self._optimizer.step()
-        if len(self._kept) < self.spec.memory:
-            self._kept.append(newest)
+        if len(self._stored) < self.spec.memory:
+            self._stored.append(newest)
         else:
-            self._kept[self._next] = newest
+            self._stored[self._next] = newest
             self._next = (self._next + 1) % self.spec.memory
 
 
 @dataclass(frozen=True, eq=False)
 class OnlineErrors:
-    """Errors [mm] of frames in the order in which they came (f,): learning, of the network as it
-    was, and without one.
+    """Errors of frames in the order in which they came.
+
+    Attributes:
+        online: (f,) errors of the network that learns [mm].
+        frozen: (f,) errors of the network as it was trained [mm].
+        raw: (f,) errors without a network [mm].
     """
 
     online: FloatArray
@@ -144,12 +149,14 @@ def learn_online(
     spec: OnlineSpec,
     report: Report = silent,
 ) -> OnlineErrors:
-    """Predict each frame, then learn from it.
+    """Predict each frame, then learn from it; return the errors.
 
     Args:
         trained: the network at the beginning.
-        streams: samples and names of their sequences, in the order in which they come; a second set
-            of samples is how a change of the material half way is told.
+        streams: samples and names of their sequences, in the order in which they come. A second
+            set of samples stands for a change of the material.
+        spec: the settings.
+        report: receives the progress.
     """
     learner, frozen = Learner(trained, spec), Learner(trained, spec)
     total, done, rows = sum(len(samples.rows(names)) for samples, names in streams), 0, []

@@ -1,4 +1,4 @@
-"""A network that was trained, with the body it corrects and where both come from; one file."""
+"""A trained network, with the body that it corrects and a description, in one file."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ class TrainedNetwork:
     """A network in evaluation mode.
 
     Attributes:
-        network: takes vertices and tool.
-        body: what it corrects.
+        network: the network.
+        body: the points that it corrects.
         about: plain values: dataset, setup, split, training, history, and validation errors [mm]
-            before and after.
+            with and without the network.
     """
 
     network: CorrectionNetwork
@@ -35,7 +35,7 @@ class TrainedNetwork:
     about: dict[str, Any]
 
     def save(self, folder: Path) -> Path:
-        """Write it to `folder`, whole or not at all."""
+        """Write the network to `folder` atomically; return the file."""
         arrays = {
             name: torch.as_tensor(value) if hasattr(value, "dtype") else value
             for name, value in self.body.to_arrays().items()
@@ -53,7 +53,7 @@ class TrainedNetwork:
 
     @classmethod
     def load(cls, folder: Path, device: torch.device | str = "cpu") -> Self:
-        """From a folder or its file; RunError where there is none, or one of another format."""
+        """Load a network from its folder or file; RunError for none or another format."""
         path = folder if folder.suffix == ".pt" else folder / FILE
         content = load(path, device)
         if content.get("format") != _FORMAT:

@@ -1,4 +1,4 @@
-"""What is asked of a training, as plain values that REST, terminal and checkpoints share."""
+"""The specification of a training, as plain values for REST, command line and checkpoints."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ _BOUNDS: Mapping[str, tuple[float, float]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingSpec:
-    """One training.
+    """The specification of one training.
 
     Attributes:
-        network: what is trained.
-        distance: see `palpate.correction.networks.chamfer`.
+        network: the network that is trained.
+        distance: distance of the loss, see `palpate.correction.networks.chamfer`.
         hold: weight of the hidden points' correction [1/mm].
-        rate: of Adam, halved when `patience` / 2 epochs brought nothing.
-        batch: samples in a step.
-        epochs: at most.
-        patience: epochs without a better validation error after which it ends.
+        rate: learning rate of Adam, halved after `patience` / 2 epochs without improvement.
+        batch: samples per step.
+        epochs: most epochs.
+        patience: epochs without a lower validation error after which the training ends.
         keep_every: steps between checkpoints.
-        mixed: half precision in the convolutions, on CUDA only.
-        device: of torch, or "auto".
-        threads: of a processor; torch's own number when left out.
-        seed: of first weights and of the order of the samples.
+        mixed: whether convolutions use half precision, on CUDA only.
+        device: torch device, or "auto".
+        threads: number of CPU threads; torch's own choice if None.
+        seed: seed of the first weights and of the order of the samples.
     """
 
     network: NetworkSpec = field(default_factory=NetworkSpec)
@@ -76,11 +76,11 @@ class TrainingSpec:
             )
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """Return plain values for JSON."""
         return {**asdict(self), "network": self.network.to_json()}
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Self:
-        """The inverse; what is left out has its default."""
+        """Return the specification that `to_json` wrote; missing keys have their defaults."""
         network = NetworkSpec.from_json(data["network"]) if "network" in data else NetworkSpec()
         return cls(**{**data, "network": network})

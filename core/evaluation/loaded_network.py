@@ -75,7 +75,7 @@ class LoadedNetwork:
         self, sequence: Recording, times: FloatArray, setup: Setup, grid: Meshing
     ) -> FloatArray:
         """Return the tool inputs (n, 13) at cloud stamps (n,) [s] under a setup."""
-        from palpate.correction.samples.record_samples import tool_columns
+        from palpate.correction.samples.tool_columns import tool_columns
 
         robot = touch_correction(setup, grid) @ setup.phantom_from_robot
         return tool_columns(

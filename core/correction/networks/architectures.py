@@ -1,14 +1,15 @@
-"""The networks: a U-Net over the top layer or the volume (Wu, Kazanzides and Unberath 2020), and a
-graph network on any mesh.
+"""Network architectures: U-Nets over the top layer or the volume, and a graph network on any mesh.
 
-All take vertices (b, v, 3) [m] and what is known of the tool (b, t), and return corrected vertices.
-What a network says is squashed by tanh and bounded to `trust` voxels along each axis, so that it
-can only correct the simulation and never replace it. The last layer begins at zero: an untrained
-network leaves the simulation as it is.
+The U-Nets are those of Wu, Kazanzides and Unberath (2020).
 
-The graph network is in plain torch. It needs one gather and one sum over neighbours (`index_add_`),
-which torch has on all devices and, where asked for, deterministically; torch-geometric would bring
-four packages for these two lines.
+All take vertices (b, v, 3) [m] and tool inputs (b, t), and return corrected vertices. The output
+passes through tanh and is bounded to `trust` voxels along each axis, so that a network can correct
+the simulation but not replace it. The last layer starts at zero: an untrained network does not
+change the simulation.
+
+The graph network is in plain torch. It needs one gather and one sum over neighbours (`index_add`),
+which torch has on all devices, also in a deterministic form; torch-geometric would add four
+packages for these two lines.
 """
 
 from __future__ import annotations
@@ -32,21 +33,21 @@ TOOL_INPUTS: dict[str, tuple[int, ...]] = {
     "velocity": (7, 8, 9),
     "force": (10, 11, 12),
 }
-"""Columns of what samples hold of the tool: position [m] and quaternion, velocity [m/s], contact
-force [N]; phantom frame."""
+"""Columns of the samples' tool array: position [m] and quaternion, velocity [m/s], contact force
+[N]; phantom frame."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NetworkSpec:
-    """A network by its numbers.
+    """The specification of a network.
 
     Attributes:
-        kind: unet2d over the top layer, unet3d over the volume, graph over the neighbours of any
-            mesh.
-        features: of the blocks from fine to coarse; a graph network has the last one, in as many
-            rounds of messages as there are blocks.
-        trust: how far the simulation may be corrected along each axis, in voxels.
-        inputs: of TOOL_INPUTS.
+        kind: "unet2d" over the top layer, "unet3d" over the volume, or "graph" over the edges of
+            any mesh.
+        features: features of the blocks from fine to coarse. A graph network has the last number of
+            features and as many message rounds as there are blocks.
+        trust: bound of the correction along each axis [voxels].
+        inputs: the tool inputs, names of TOOL_INPUTS.
     """
 
     kind: Kind = "unet2d"
@@ -79,16 +80,16 @@ class NetworkSpec:
 
     @property
     def columns(self) -> list[int]:
-        """Of the tool's description, those that are seen."""
+        """Columns of the tool array that the network reads."""
         return [column for name in self.inputs for column in TOOL_INPUTS[name]]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """Return plain values for JSON."""
         return {**asdict(self), "features": list(self.features), "inputs": list(self.inputs)}
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> Self:
-        """The inverse; what is left out has its default."""
+        """Return the specification that `to_json` wrote; missing keys have their defaults."""
         plain: dict[str, Any] = {
             **data,
             **{key: tuple(data[key]) for key in ("features", "inputs") if key in data},
@@ -97,16 +98,17 @@ class NetworkSpec:
 
 
 class GraphNet(nn.Module):
-    """Rounds of messages along edges (Battaglia et al. 2018).
+    """Message passing along edges (Battaglia et al. 2018).
 
-    A message is what both ends and the edge add up to, rectified; what a vertex hears is their mean
-    through one more layer. All products of matrices are so on the vertices, of which there are a
-    fifth as many as edges.
+    A message is the rectified sum of linear maps of both ends and of the edge. A vertex is updated
+    from the mean of its messages. All matrix products are over vertices, of which there are a fifth
+    as many as edges.
 
     Args:
-        vertex, edge: numbers that describe each at the beginning.
-        features: of a state.
-        rounds: of messages.
+        vertex: number of input features of a vertex.
+        edge: number of input features of an edge.
+        features: number of features of a vertex's state.
+        rounds: number of message rounds.
     """
 
     def __init__(self, vertex: int, edge: int, features: int, rounds: int) -> None:
@@ -116,8 +118,13 @@ class GraphNet(nn.Module):
         self.last = nn.Linear(features, 3)
 
     def forward(self, vertices: Tensor, along: Tensor, edges: Tensor, share: Tensor) -> Tensor:
-        """(b, v, 3) from vertices (b, v, n), edges' own numbers (b, e, m), their ends (2, e) and 1
-        / neighbours (v, 1).
+        """Return the output (b, v, 3).
+
+        Args:
+            vertices: (b, v, n) features of the vertices.
+            along: (b, e, m) features of the edges.
+            edges: (2, e) ends of the edges.
+            share: (v, 1) one over the number of neighbours.
         """
         state = self.first(vertices)
         for step in self.rounds:
@@ -143,17 +150,20 @@ class _Round(nn.Module):
             for part, end in zip((self.source, self.target), edges, strict=True)
         )
         sent = torch.relu(source + target + self.edge(along))
-        heard = torch.zeros_like(state).index_add(1, edges[1], sent.to(state.dtype)) * share
-        return torch.as_tensor(self.update(torch.cat([state, heard], dim=2)))
+        received = torch.zeros_like(state).index_add(1, edges[1], sent.to(state.dtype)) * share
+        return torch.as_tensor(self.update(torch.cat([state, received], dim=2)))
 
 
 class CorrectionNetwork(nn.Module):
-    """Vertices and tool in, corrected vertices out, for one body.
+    """A network that corrects the vertices of one body, given the tool.
 
-    The tool's place is seen as a share of the body's extent, and displacements, velocity and force
-    by what is usual in the samples (`set_input_scales`), which is kept with the weights. The place is
-    not: pushes in one spot have next to no spread, and any other spot would lie a hundred
-    deviations away.
+    The tool's position is normalised by the body's extent. Displacement, velocity and force are
+    normalised by their RMS in the samples (`set_input_scales`), which is saved with the weights.
+    The position is not, because pushes at one place have almost no spread.
+
+    Args:
+        spec: the architecture.
+        body: the points that are corrected.
     """
 
     rest: Tensor
@@ -172,38 +182,42 @@ class CorrectionNetwork(nn.Module):
         self.spec, self.grid, self._columns = spec, body.grid, spec.columns
         count = len(spec.columns)
         middle, half = body.rest.mean(axis=0), np.maximum(np.ptp(body.rest, axis=0) / 2, body.voxel)
-        self._keep("rest", body.rest)
-        self._keep("bound", spec.trust * body.voxel)
-        self._keep("place", (body.rest - middle) / half)
-        self._keep("extent", half)
-        self._keep("tool_middle", np.concatenate([middle, np.zeros(10)])[spec.columns])
-        self._keep(
+        self._add_buffer("rest", body.rest)
+        self._add_buffer("bound", spec.trust * body.voxel)
+        self._add_buffer("place", (body.rest - middle) / half)
+        self._add_buffer("extent", half)
+        self._add_buffer("tool_middle", np.concatenate([middle, np.zeros(10)])[spec.columns])
+        self._add_buffer(
             "tool_scale",
             np.concatenate([half, np.ones(4), np.full(3, 0.01), np.ones(3)])[spec.columns],
         )
-        self._keep("spread", np.array(float(body.voxel.mean()) / 4))
+        self._add_buffer("spread", np.array(float(body.voxel.mean()) / 4))
         self.inside: UNet | GraphNet
         if spec.kind == "graph":
             neighbours = np.bincount(body.edges[1], minlength=len(body.rest))
             self.register_buffer(
                 "edges", torch.as_tensor(body.edges.astype(np.int64)), persistent=False
             )
-            self._keep("share", 1.0 / np.maximum(neighbours, 1)[:, None])
+            self._add_buffer("share", 1.0 / np.maximum(neighbours, 1)[:, None])
             lengths = np.linalg.norm(body.rest[body.edges[0]] - body.rest[body.edges[1]], axis=1)
-            self._keep("along", lengths[:, None] / half.mean())
-            # Displacement, place at rest, the way to the tool, and the tool itself.
+            self._add_buffer("along", lengths[:, None] / half.mean())
+            # Displacement, position at rest, vector to the tool, and tool inputs.
             self.inside = GraphNet(3 + 3 + 3 + count, 4, spec.features[-1], len(spec.features))
         else:
             self.inside = UNet(body.grid or (), 3, count, spec.features)
         for parameter in self.inside.last.parameters():
             nn.init.zeros_(parameter)
 
-    def _keep(self, name: str, values: Any) -> None:
+    def _add_buffer(self, name: str, values: Any) -> None:
         self.register_buffer(name, torch.as_tensor(np.asarray(values, dtype=np.float32)))
 
     def set_input_scales(self, velocity: float, force: float, displacement: float) -> None:
-        """What is usual, RMS along an axis: the tool's velocity [m/s], its force [N], displacements
-        of the points [m].
+        """Set the normalisation of the inputs.
+
+        Args:
+            velocity: RMS of the tool's velocity along an axis [m/s].
+            force: RMS of its force along an axis [N].
+            displacement: RMS of the points' displacement along an axis [m].
         """
         scale = self.tool_scale.new_ones(13)
         scale[self._columns] = self.tool_scale
@@ -212,25 +226,28 @@ class CorrectionNetwork(nn.Module):
         self.spread.fill_(max(displacement, 1e-5))
 
     def forward(self, vertices: Tensor, tool: Tensor) -> Tensor:
-        """Corrected vertices (b, v, 3) [m] of simulated ones (b, v, 3) [m], and the tool (b, 13) of
-        TOOL_INPUTS.
+        """Return the corrected vertices (b, v, 3) [m] of simulated ones.
+
+        Args:
+            vertices: (b, v, 3) simulated vertices [m].
+            tool: (b, 13) tool array, see TOOL_INPUTS.
         """
         moved = (vertices - self.rest) / self.spread
         known = (tool[:, self._columns] - self.tool_middle) / self.tool_scale
-        said = (
+        output = (
             self._graph(vertices, moved, tool, known)
             if self.grid is None or self.spec.kind == "graph"
             else self._grid(moved, known)
         )
-        return vertices + torch.tanh(said.to(vertices.dtype)) * self.bound
+        return vertices + torch.tanh(output.to(vertices.dtype)) * self.bound
 
     def _grid(self, moved: Tensor, known: Tensor) -> Tensor:
         axes = len(self.grid or ())
         volume = moved.reshape(len(moved), *reversed(self.grid or ()), 3)
         order = (0, axes + 1, *range(axes, 0, -1))
         back = (0, *range(axes + 1, 1, -1), 1)
-        said: Tensor = self.inside(volume.permute(order), known)
-        return said.permute(back).reshape(moved.shape)
+        output: Tensor = self.inside(volume.permute(order), known)
+        return output.permute(back).reshape(moved.shape)
 
     def _graph(self, vertices: Tensor, moved: Tensor, tool: Tensor, known: Tensor) -> Tensor:
         to_tool = (tool[:, None, :3] - vertices) / self.extent
@@ -238,15 +255,16 @@ class CorrectionNetwork(nn.Module):
         place = self.place.expand(len(vertices), -1, -1)
         strain = moved.index_select(1, self.edges[0]) - moved.index_select(1, self.edges[1])
         along = torch.cat([strain, self.along.expand(len(vertices), -1, -1)], dim=2)
-        said: Tensor = self.inside(
+        output: Tensor = self.inside(
             torch.cat([moved, place, to_tool, everywhere], dim=2), along, self.edges, self.share
         )
-        return said
+        return output
 
 
 def build(spec: NetworkSpec, body: Body, seed: int = 0) -> CorrectionNetwork:
-    """A network, its first weights by this seed whatever was drawn before; CorrectionError where
-    the kind does not fit the body.
+    """Return a network with first weights that depend on the seed only.
+
+    Raises CorrectionError where the kind does not fit the body.
     """
     axes = {"unet2d": 2, "unet3d": 3}.get(spec.kind)
     if axes is not None and (body.grid is None or len(body.grid) != axes):

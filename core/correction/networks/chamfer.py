@@ -1,10 +1,10 @@
-"""How far a corrected surface is from what was measured, as a loss with gradients.
+"""Distance of a corrected surface to the measured points, as a differentiable loss.
 
-The Chamfer distance of Wu, Kazanzides and Unberath (2020) runs one way, from each measured point to
-the nearest vertex of the surface super-sampled three-fold, because of what the camera does not see
-there are no points. Nearest neighbours are exact: a k-d tree of SciPy on a processor, all distances
-on a CUDA device. They are constants of a step, so that the gradient is that of the distance to the
-vertex found.
+The Chamfer distance of Wu, Kazanzides and Unberath (2020) is one-directional, from each measured
+point to the nearest vertex of the surface super-sampled three-fold: where the camera does not see
+the surface there are no points. Nearest neighbours are exact, by SciPy's k-d tree on a CPU and by
+all distances on a CUDA device. They are constant within a step, so the gradient is that of the
+distance to the nearest vertex.
 """
 
 from __future__ import annotations
@@ -28,21 +28,24 @@ from palpate.foundation.errors import CorrectionError
 __all__ = ["Distance", "Loss", "SurfaceLoss", "hold_weights", "nearest"]
 
 Distance = Literal["chamfer", "symmetric", "hausdorff"]
-_LEAST = 1e-8
-"""Added to distances in square [m], whose root has no gradient at zero."""
-_ROOM = 2**26
-"""Distances that are held at a time on a CUDA device."""
+_SMOOTHING = 1e-8
+"""Added to a distance in quadrature [m]: the gradient of the root is infinite at zero."""
+_MOST_DISTANCES = 2**26
+"""Most distances in memory at a time on a CUDA device."""
 _DENSE = 2**20
-"""Weights of a surface up to which a product with all of them is faster than picking its
-corners."""
-_SCARCE = 0.1
-"""Share of the best seen material point's number of measured points, at which one is held half."""
+"""Number of surface weights up to which a dense matrix product is faster than a gather."""
+_HALF_SEEN = 0.1
+"""Measured points near a material point, as a share of the largest number, at weight 1/2 [1]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Loss:
-    """Of a batch: what is minimised [mm], and its parts: distance [mm], and correction of what is
-    hidden [mm^2].
+    """The loss of a batch.
+
+    Attributes:
+        total: the value that is minimised [mm].
+        distance: distance of surface and points [mm].
+        hidden: mean squared correction of hidden points [mm^2].
     """
 
     total: Tensor
@@ -51,28 +54,28 @@ class Loss:
 
 
 def hold_weights(seen: FloatArray) -> FloatArray:
-    """How much each material point (v,) is to stay where the simulation has it [0..1], by the
-    measured points near it (v,).
+    """Return the weight (v,) [0..1] that holds each material point at its simulated position.
+
+    `seen` (v,) is the number of measured points near it.
     """
     best = float(seen.max(initial=0.0))
     return (
         np.ones_like(seen)
         if best == 0.0
-        else np.asarray(1.0 / (1.0 + (seen / (_SCARCE * best)) ** 4))
+        else np.asarray(1.0 / (1.0 + (seen / (_HALF_SEEN * best)) ** 4))
     )
 
 
 class SurfaceLoss:
-    """The distance of clouds to the surface of a body, and what holds its hidden points near the
-    simulation.
+    """The distance of clouds to the surface of a body, plus a penalty on hidden points' correction.
 
     Args:
-        body: whose surface.
+        body: the body.
         seen: (v,) measured points near each of its material points, see `Samples.seen`.
-        distance: one-directional Chamfer (points to surface), symmetric (and what is seen of the
-            surface to the points), or Hausdorff's (the largest of both).
+        distance: "chamfer" (points to surface), "symmetric" (also the visible surface to the
+            points), or "hausdorff" (the largest of both).
         hold: weight of the hidden points' squared correction [1/mm].
-        device: of batches.
+        device: device of the batches.
     """
 
     def __init__(
@@ -93,40 +96,41 @@ class SurfaceLoss:
             raise CorrectionError(f"hold = {hold:g}; expected 0 to 1e6", key="hold", value=hold)
         self.distance, self.hold, self._flat = distance, hold, body.flat
         weights = hold_weights(seen)
-        self._held = torch.as_tensor(weights, dtype=torch.float32, device=device)
+        self._hidden_weights = torch.as_tensor(weights, dtype=torch.float32, device=device)
         self._visible = torch.as_tensor(
             (weights[body.corners] * body.shares).sum(axis=1) < 0.5, device=device
         )
         self.surface = _surface_of(body, device)
 
     def distances(self, vertices: Tensor, batch: Batch) -> tuple[Tensor, Tensor]:
-        """From each measured point (b, p) [m] to the surface of vertices (b, v, 3) [m], and which
-        of them count (b, p).
+        """Return the distance of each measured point (b, p) [m], and which points count (b, p).
+
+        The surface is given by vertices (b, v, 3) [m].
         """
         dense, valid = self.surface(vertices), self.valid(batch)
         points = torch.where(valid[:, :, None], batch.points, 0.0)
-        return _apart(points, dense, nearest(points, dense, valid)), valid
+        return _distances(points, dense, nearest(points, dense, valid)), valid
 
     def valid(self, batch: Batch) -> Tensor:
-        """Which points (b, p) are there and of the part of the surface that is corrected."""
+        """Return which points (b, p) exist and lie on the part of the surface that is corrected."""
         count = batch.count[:, 0 if self._flat else 1]
         return torch.arange(batch.points.shape[1], device=count.device) < count[:, None]
 
     def __call__(self, corrected: Tensor, batch: Batch, raw: Tensor) -> Loss:
-        """Of corrected and simulated vertices (b, v, 3) [m]."""
+        """Return the loss of corrected and simulated vertices (b, v, 3) [m]."""
         distance = self._distance(corrected, batch) * 1e3
         moved = ((corrected - raw) * 1e3).square().sum(dim=2)
-        hidden = (moved @ self._held).mean() / len(self._held)
+        hidden = (moved @ self._hidden_weights).mean() / len(self._hidden_weights)
         return Loss(distance + self.hold * hidden, distance, hidden)
 
     def _distance(self, vertices: Tensor, batch: Batch) -> Tensor:
-        apart, valid = self.distances(vertices, batch)
+        distances, valid = self.distances(vertices, batch)
         if self.distance == "chamfer":
-            return _means(apart, valid).mean()
+            return _means(distances, valid).mean()
         dense = self.surface(vertices)[:, self._visible]
         counted = valid.any(dim=1)
         points = torch.where(valid[:, :, None], batch.points, torch.inf)[counted]
-        back = _apart(
+        back = _distances(
             dense[counted],
             points,
             nearest(
@@ -134,13 +138,13 @@ class SurfaceLoss:
             ),
         )
         if self.distance == "symmetric":
-            return _means(apart, valid).mean() + back.mean(dim=1).sum() / len(valid)
-        there = torch.where(valid, apart, 0.0).amax(dim=1)
+            return _means(distances, valid).mean() + back.mean(dim=1).sum() / len(valid)
+        there = torch.where(valid, distances, 0.0).amax(dim=1)
         return torch.maximum(there[counted], back.amax(dim=1)).sum() / len(valid)
 
 
 def _surface_of(body: Body, device: torch.device | str) -> Callable[[Tensor], Tensor]:
-    """Vertices (b, v, 3) to the super-sampled surface (b, s, 3)."""
+    """Return the map of vertices (b, v, 3) to the super-sampled surface (b, s, 3)."""
     count = len(body.corners)
     if count * len(body.rest) <= _DENSE:
         weights = np.zeros((count, len(body.rest)), dtype=np.float32)
@@ -155,27 +159,25 @@ def _surface_of(body: Body, device: torch.device | str) -> Callable[[Tensor], Te
     ).sum(dim=2)
 
 
-def _apart(points: Tensor, others: Tensor, index: Tensor) -> Tensor:
-    """Distance (b, p) [m] of points (b, p, 3) to those of others (b, s, 3) with this number (b,
-    p)."""
-    # By one flat index: its gradient is added up in one order on CUDA, too, if that is asked for.
+def _distances(points: Tensor, others: Tensor, index: Tensor) -> Tensor:
+    """Return the distances (b, p) [m] of points (b, p, 3) to others (b, s, 3) at index (b, p)."""
+    # One flat index has a gradient that is deterministic on CUDA as well.
     flat = index + others.shape[1] * torch.arange(len(others), device=index.device)[:, None]
     found = others.reshape(-1, 3).index_select(0, flat.flatten()).reshape(points.shape)
-    return ((found - points).square().sum(dim=2) + _LEAST**2).sqrt()
+    return ((found - points).square().sum(dim=2) + _SMOOTHING**2).sqrt()
 
 
 def _means(values: Tensor, valid: Tensor) -> Tensor:
-    """Mean (b,) over the valid of values (b, p); zero where there are none."""
+    """Return the mean (b,) over the valid values (b, p); zero where there are none."""
     return torch.where(valid, values, 0.0).sum(dim=1) / valid.sum(dim=1).clamp_min(1)
 
 
 @torch.no_grad()
 def nearest(points: Tensor, others: Tensor, valid: Tensor) -> Tensor:
-    """Number (b, p) of the nearest of others (b, s, 3) to each of points (b, p, 3); zero where not
-    valid (b, p).
+    """Return the index (b, p) of the nearest of others (b, s, 3) to each of points (b, p, 3).
 
-    Exact on every device; of two that are equally near the tree and the list of all distances may
-    choose differently.
+    Zero where not valid (b, p). Exact on every device; between two equally near vertices CPU and
+    CUDA may choose differently.
     """
     if points.device.type == "cpu":
         return _by_tree(points, others, valid)
@@ -184,11 +186,11 @@ def nearest(points: Tensor, others: Tensor, valid: Tensor) -> Tensor:
 
 def _by_all(points: Tensor, others: Tensor) -> Tensor:
     index = torch.zeros(points.shape[:2], dtype=torch.long, device=points.device)
-    step = max(1, _ROOM // (points.shape[1] * others.shape[1]))
+    step = max(1, _MOST_DISTANCES // (points.shape[1] * others.shape[1]))
     for start in range(0, len(points), step):
         part = slice(start, start + step)
-        # Through a matrix product distances below a tenth of a millimetre would be lost, and
-        # torch.cdist without one was 88 to 98 % of a training step on an H200.
+        # A matrix product would lose distances below 0.1 mm. Measured: torch.cdist without one
+        # takes 88 to 98 % of a training step on an H200.
         here, there = points[part, :, None], others[part, None]
         apart = (here[..., 0] - there[..., 0]).square_()
         for axis in (1, 2):

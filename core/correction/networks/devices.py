@@ -1,4 +1,4 @@
-"""Where a network runs, and that it gives the same numbers each time."""
+"""Torch devices, and reproducible computation on them."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ __all__ = ["device_of", "reproducible"]
 
 
 def device_of(name: str) -> torch.device:
-    """The device of this name ("cpu", "cuda:1"); "auto" is CUDA where there is one. CorrectionError
-    where it is not here.
+    """Return the device of a name ("cpu", "cuda:1"); "auto" is CUDA where it is available.
+
+    Raises CorrectionError for a device that is not available.
     """
     here = ["cpu", *(f"cuda:{index}" for index in range(torch.cuda.device_count()))]
     if name == "auto":
         return torch.device(here[-1] if len(here) == 1 else "cuda:0")
-    wanted = "cuda:0" if name == "cuda" else name
-    if wanted not in here:
+    device = "cuda:0" if name == "cuda" else name
+    if device not in here:
         raise CorrectionError(
             f"there is no device {name!r} here; there is {', '.join(here)}",
             key="device",
             value=name,
         )
-    return torch.device(wanted)
+    return torch.device(device)
 
 
 @contextmanager
 def reproducible(device: torch.device, seed: int, threads: int | None = None) -> Iterator[None]:
-    """Draw by this seed, add up in one order and on so many threads; afterwards all is as it
-    was."""
-    was, strict, cudnn = (
+    """Seed torch and make it deterministic, on this many threads; restore its state afterwards."""
+    count, strict, cudnn = (
         torch.get_num_threads(),
         torch.are_deterministic_algorithms_enabled(),
         torch.backends.cudnn.benchmark,
@@ -43,8 +43,7 @@ def reproducible(device: torch.device, seed: int, threads: int | None = None) ->
     with torch.random.fork_rng(devices=on):
         try:
             if device.type == "cuda":
-                # cuBLAS adds up in one order only with a workspace of its own, which is read when
-                # it starts.
+                # cuBLAS is deterministic only with this workspace, which it reads when it starts.
                 os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
                 torch.backends.cudnn.benchmark = False
                 torch.use_deterministic_algorithms(True)
@@ -55,4 +54,4 @@ def reproducible(device: torch.device, seed: int, threads: int | None = None) ->
         finally:
             torch.use_deterministic_algorithms(strict)
             torch.backends.cudnn.benchmark = cudnn
-            torch.set_num_threads(was)
+            torch.set_num_threads(count)

@@ -1,14 +1,14 @@
-"""The U-Net of Wu, Kazanzides and Unberath (2020), for two or three axes by one implementation.
+"""The U-Net of Wu, Kazanzides and Unberath (2020), over two or three axes.
 
-Blocks of two convolutions and a max-pool each; at the bottom the tool is concatenated to every
-voxel and four more convolutions bring the features back to those of the last block; then up again
-with skip connections. Pools keep what an odd size leaves over (`ceil_mode`), and what was doubled
-is cut to the size of its skip connection: the output has the input's size whatever it is.
+Each block has two convolutions and a max-pool. At the bottom the tool inputs are concatenated to
+every voxel, and four convolutions reduce the features to those of the last block; transposed
+convolutions with skip connections follow. Pools keep the last voxel of an odd length (`ceil_mode`),
+and upsampled values are cropped to their skip connection: the output has the size of the input.
 
-At the bottom of a grid as small as 13x5x5 most of a convolution's kernel lies in the padding: along
-an axis of one voxel two thirds of it. `PaddedConvolution` leaves the taps out that never meet a voxel, which
-changes no result and saves most of the work there. Channels-last memory was tried: on a processor
-training is 5 % slower with it (`python -m benchmarks correction`).
+On a grid as small as 13x5x5 most of a convolution's kernel lies in the padding at the bottom: two
+thirds of it along an axis of one voxel. `PaddedConvolution` leaves out the taps that never meet a
+voxel, which changes no result and saves most of the work there. Measured: channels-last memory
+makes training 5 % slower on a CPU.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-__all__ = ["PaddedConvolution", "UNet", "max_pool_by_halves", "max_pool"]
+__all__ = ["PaddedConvolution", "UNet", "max_pool", "max_pool_by_halves"]
 
 KERNEL, BOTTOM = 3, 4
 _TOOL = 0.1
-"""Size of the first weights on what is known of the tool, over that of all others [1]."""
+"""Scale of the first weights of tool inputs, over that of all others [1]."""
 
 
 class PaddedConvolution(nn.Module):
@@ -38,7 +38,7 @@ class PaddedConvolution(nn.Module):
         self.bias = nn.Parameter(torch.zeros(outputs))
 
     def forward(self, values: Tensor) -> Tensor:
-        """(b, outputs, ...) of (b, inputs, ...)."""
+        """Return (b, outputs, ...) of (b, inputs, ...)."""
         weight, padding = self.weight, [1] * self._axes
         for axis in range(self._axes):
             if values.shape[2 + axis] == 1:
@@ -48,7 +48,10 @@ class PaddedConvolution(nn.Module):
 
 
 def max_pool(values: Tensor) -> Tensor:
-    """The largest of each two along every axis (b, c, ...), and what an odd length leaves over."""
+    """Return the maximum of each two voxels along every axis of (b, c, ...).
+
+    The last voxel of an odd length is kept.
+    """
     if values.device.type == "cpu":
         pool = functional.max_pool2d if values.dim() == 4 else functional.max_pool3d
         return torch.as_tensor(pool(values, 2, ceil_mode=True))
@@ -56,8 +59,9 @@ def max_pool(values: Tensor) -> Tensor:
 
 
 def max_pool_by_halves(values: Tensor) -> Tensor:
-    """The same by steps whose gradients CUDA adds up in one order, as it does not those of its own
-    pools; 3 times slower on CPU.
+    """Return the same as `max_pool`, with a gradient that is deterministic on CUDA.
+
+    Three times slower on a CPU.
     """
     for axis in range(2, values.dim()):
         length = values.shape[axis]
@@ -82,14 +86,14 @@ def _two(axes: int, inputs: int, outputs: int) -> nn.Sequential:
 
 
 class UNet(nn.Module):
-    """Values on a grid, and numbers that hold for all of it, to values on the same grid.
+    """A U-Net that maps values on a grid, and global inputs, to values on the same grid.
 
     Args:
-        grid: points along two or three axes that its first weights are made for; it takes any
-            other, too.
-        channels: in and out.
-        known: numbers concatenated at the bottom.
-        features: of the blocks, from fine to coarse.
+        grid: points along two or three axes, for which the first weights are scaled; other grids
+            are accepted as well.
+        channels: number of channels of input and output.
+        known: number of global inputs, which are concatenated at the bottom.
+        features: features of the blocks from fine to coarse.
     """
 
     def __init__(
@@ -123,24 +127,24 @@ class UNet(nn.Module):
 
     @torch.no_grad()
     def _draw(self, grid: Sequence[int]) -> None:
-        """First weights that keep the size of what goes through (He et al. 2015), counting only the
-        taps that meet a voxel.
+        """Initialise weights so that the variance is preserved (He et al. 2015).
 
-        With torch's own, what the tool says at the bottom arrives at the output as 1e-8 of what it
-        was.
+        Only the taps that meet a voxel are counted. With torch's own initialisation the tool inputs
+        at the bottom reach the output attenuated by 1e-8.
         """
         lengths = [list(grid)]
         for _ in self.down:
             lengths.append([-(-length // 2) for length in lengths[-1]])
         parts = [*self.down, self.bottom, *self.up]
-        for part, shape in zip(parts, [*lengths[:-1], lengths[-1], *lengths[-2::-1]], strict=True):
+        shapes = [*lengths[:-1], lengths[-1], *lengths[-2::-1]]
+        for part, shape in zip(parts, shapes, strict=True):
             met = math.prod((3 * length - 2) / length for length in shape)
             for layer in part.modules():
                 if isinstance(layer, PaddedConvolution):
                     layer.weight.normal_(0.0, math.sqrt(2.0 / (met * layer.weight.shape[1])))
                     layer.bias.zero_()
-        # TrainedNetwork on few places, a network that heeds the tool from the start says anything of all
-        # others.
+        # After training on few tool positions a network that depends strongly on the tool inputs
+        # extrapolates badly; their first weights are therefore small.
         first = self.bottom[0].get_parameter("weight")
         first[:, first.shape[1] - self._known :] *= _TOOL
         for layer in self.doubled:
@@ -149,7 +153,7 @@ class UNet(nn.Module):
             layer.get_parameter("bias").zero_()
 
     def forward(self, values: Tensor, known: Tensor) -> Tensor:
-        """(b, channels, nx, ny[, nz]) of the same shape and what is known (b, k)."""
+        """Return (b, channels, nx, ny[, nz]) of values of this shape and global inputs (b, k)."""
         values = values.contiguous()
         skips = []
         for block in self.down:

@@ -1,11 +1,11 @@
-"""A trained U-Net for one frame at a time on a processor: every convolution one product of
-matrices.
+"""Fast inference of a trained U-Net for single frames on a CPU.
 
-For a single frame of 13x5x5 points torch's convolutions spend most of their time on re-ordering
-weights and padding. Here activations are rows (points, features), what a kernel meets is one gather
-of rows, and the weights lie as the product wants them. Taps that never meet a point are left out.
-Where the processor multiplies bfloat16, weights and activations are of that type: half as much
-memory is read, and a correction changes by some thousandths of a millimetre.
+Every convolution is one matrix product. For a single frame of 13x5x5 points torch's convolutions
+spend most of their time on re-ordering weights and padding. Here activations are rows (points,
+features), the inputs of a kernel are gathered once, and the weights are stored in the order of the
+product. Taps that never meet a point are left out. Where the CPU multiplies bfloat16, weights and
+activations have that type: half as much memory is read, and a correction changes by some
+micrometres.
 """
 
 from __future__ import annotations
@@ -29,26 +29,27 @@ Shape = tuple[int, ...]
 
 
 def supports_bfloat16() -> bool:
-    """Whether this processor multiplies bfloat16 itself; elsewhere it is slower than single
-    precision.
+    """Return whether this CPU multiplies bfloat16 in hardware.
+
+    On other CPUs bfloat16 is slower than single precision.
     """
     supported = getattr(torch.cpu, "_is_avx512_bf16_supported", None)
     return bool(supported is not None and supported())
 
 
 class UNetInference:
-    """Vertices (v, 3) [m] and tool (13,) to corrected vertices, as `CorrectionNetwork` of a U-Net
-    does with a batch of one.
+    """Corrects single frames, as a `CorrectionNetwork` with a U-Net does with a batch of one.
 
     Args:
-        network: trained, over a grid.
-        half: bfloat16 inside, or the network's own type; where the processor has it, when left out.
+        network: a trained network over a grid.
+        half: whether to compute in bfloat16 instead of the network's own type; None chooses it
+            where the CPU supports it.
     """
 
     def __init__(self, network: CorrectionNetwork, half: bool | None = None) -> None:
         inside, grid = network.inside, network.grid
         if not isinstance(inside, UNet) or grid is None:
-            raise TypeError(f"only a U-Net can be made compact, this is a {type(inside).__name__}")
+            raise TypeError(f"expected a U-Net, got a {type(inside).__name__}")
         self._type = (
             torch.bfloat16
             if (supports_bfloat16() if half is None else half)
@@ -73,7 +74,7 @@ class UNetInference:
 
     @torch.inference_mode()
     def __call__(self, vertices: Tensor, tool: Tensor) -> Tensor:
-        """Corrected vertices (v, 3) [m]."""
+        """Return corrected vertices (v, 3) [m] of simulated ones and the tool (13,)."""
         net = self._network
         known = ((tool[self._columns] - net.tool_middle) / net.tool_scale).to(self._type)
         values, skips = ((vertices - net.rest) / net.spread).to(self._type), []
@@ -106,7 +107,7 @@ class UNetInference:
         return block
 
     def _convolution(self, part: PaddedConvolution, shape: Shape) -> Step:
-        rows, taps = _met(shape)
+        rows, taps = _tap_rows(shape)
         axes = len(shape)
         # Kernels are stored along x, y, z; rows run with x fastest.
         weight = part.weight.permute(0, *range(axes + 1, 1, -1), 1).flatten(1, axes)[:, taps]
@@ -120,7 +121,7 @@ class UNetInference:
         return convolve
 
     def _double(self, part: torch.nn.Module, coarse: Shape, fine: Shape) -> Step:
-        """A transposed convolution with kernel and stride 2, cut to the finer grid."""
+        """Return a transposed convolution with kernel and stride 2, cropped to the finer grid."""
         weight, bias = part.get_parameter("weight"), part.get_parameter("bias")
         axes, outputs = len(coarse), weight.shape[1]
         ordered = weight.permute(*range(axes + 1, 1, -1), 1, 0).reshape(-1, weight.shape[0])
@@ -133,13 +134,15 @@ class UNetInference:
 
 
 def _places(shape: Shape) -> IntArray:
-    """Grid coordinates (p, axes) of all points, in the order of the rows."""
+    """Return the grid coordinates (p, axes) of all points, in the order of the rows."""
     return np.stack(np.unravel_index(np.arange(int(np.prod(shape))), shape), axis=1)
 
 
-def _met(shape: Shape) -> tuple[IntArray, Sequence[int]]:
-    """Rows (p, t) that each tap of a kernel of 3 meets at each point, the one after the last where
-    there is none; the taps met.
+def _tap_rows(shape: Shape) -> tuple[IntArray, Sequence[int]]:
+    """Return the rows (p, t) that each tap of a kernel of 3 meets at each point, and the taps.
+
+    The row is the one after the last where a tap meets no point. Taps that never meet a point are
+    left out.
     """
     places, count = _places(shape), int(np.prod(shape))
     columns, taps = [], []
@@ -154,9 +157,7 @@ def _met(shape: Shape) -> tuple[IntArray, Sequence[int]]:
 
 
 def _pool(shape: Shape) -> Step:
-    """The largest of each two points along every axis; of what is left over at the end the one that
-    is there.
-    """
+    """Return a max-pool of each two points along every axis; an odd last point is kept."""
     coarse = tuple(-(-length // 2) for length in shape)
     columns = [
         np.ravel_multi_index(

@@ -1,8 +1,6 @@
-"""What a network corrects: material points of a body, which of them are neighbours, and the surface
-that a camera sees of them.
+"""The material points that a network corrects, their edges, and their visible surface.
 
-The grid that is learned on is a sampling of the mesh that is solved on, as in
-`palpate.measurement.metrics`.
+The points sample the solved mesh, as in `palpate.measurement.metrics`.
 """
 
 from __future__ import annotations
@@ -20,26 +18,22 @@ from palpate.mesh.protocol import Mesh
 __all__ = ["FOLD", "Body"]
 
 FOLD = 3
-"""How many times closer the super-sampled vertices of the surface are, by linear interpolation (Wu
-et al. 2020)."""
+"""Super-sampling of the surface along each axis, by linear interpolation (Wu et al. 2020)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """Material points and what connects them.
+    """Material points, their edges and their surface.
 
     Attributes:
         rest: (v, 3) rest positions [m], phantom frame.
-        edges: (2, e) neighbours, each pair in both directions.
-        voxel: (3,) distance of neighbours along x, y, z [m], by which the bound of a correction is
-            measured.
-        corners, shares: (s, k) points, and their linear weights [1], between which each vertex of
-            the super-sampled surface lies.
-        grid: number of points along x, y (and z) where they form a grid, x fastest; None for any
-            other mesh.
-        index: (v,) which points of the samples these are.
-        flat: whether only the top belongs to it, and only what is measured of the top is compared
-            with it.
+        edges: (2, e) pairs of neighbours, each in both directions.
+        voxel: (3,) distance of neighbours along x, y, z [m]; the unit of a correction's bound.
+        corners: (s, k) points between which each vertex of the super-sampled surface lies.
+        shares: (s, k) linear weights of these points [1].
+        grid: number of points along x, y (and z) of a grid, x fastest; None for any other mesh.
+        index: (v,) numbers of these points among those of the samples.
+        flat: whether the body is the top layer, which is compared with points of the top only.
     """
 
     rest: FloatArray
@@ -53,8 +47,13 @@ class Body:
 
     @classmethod
     def block(cls, size: tuple[float, float, float], nodes: tuple[int, int, int]) -> Self:
-        """All points of an even grid through a block (lengths [m]); its surface is the top and the
-        four sides.
+        """Return the points of a regular grid through a block.
+
+        The surface is the top and the four sides.
+
+        Args:
+            size: (x, y, z) edge lengths of the block [m].
+            nodes: number of points along x, y, z.
         """
         mesh, dense = _grids(size, nodes)
         places = dense.nodes[np.unique(dense.free_surface)]
@@ -70,7 +69,7 @@ class Body:
 
     @classmethod
     def top(cls, size: tuple[float, float, float], nodes: tuple[int, int, int]) -> Self:
-        """The top layer of the same grid."""
+        """Return the top layer of the same grid."""
         mesh, dense = _grids(size, nodes)
         flat = (nodes[0], nodes[1])
         index = np.arange(len(mesh.nodes))[-nodes[0] * nodes[1] :]
@@ -100,30 +99,28 @@ class Body:
 
     @classmethod
     def of_mesh(cls, mesh: Mesh) -> Self:
-        """The nodes of a mesh, whatever its shape; neighbours share an edge of an element, or of
-        the surface.
-        """
+        """Return the nodes of any mesh; edges are those of its elements and of its surface."""
         hull = mesh.connectivity.hull
         free = hull[~np.isin(hull, mesh.connectivity.base_nodes).all(axis=1)]
         edges, nodes = _mesh_edges(mesh), np.array(mesh.nodes)
-        # Equal in all directions: elements of an unstructured mesh have none of their own.
+        # The same along all axes: the elements of an unstructured mesh have no axes.
         voxel = np.full(3, float(np.linalg.norm(nodes[edges[0]] - nodes[edges[1]], axis=1).mean()))
         return cls(nodes, edges, voxel, *_subdivided(free), None, np.arange(len(nodes)))
 
     def surface(self, vertices: FloatArray) -> FloatArray:
-        """The super-sampled surface (..., s, 3) [m] of vertices (..., v, 3) [m]."""
+        """Return the super-sampled surface (..., s, 3) [m] of vertices (..., v, 3) [m]."""
         return np.asarray(
             np.einsum("sk,...skc->...sc", self.shares, vertices[..., self.corners, :])
         )
 
     def to_arrays(self) -> dict[str, Any]:
-        """SampleWriter and plain values for a file."""
+        """Return arrays and plain values for a file."""
         plain = {item.name: getattr(self, item.name) for item in fields(self)}
         return {**plain, "grid": None if self.grid is None else list(self.grid)}
 
     @classmethod
     def from_arrays(cls, data: dict[str, Any]) -> Self:
-        """The inverse; arrays may be any that NumPy reads."""
+        """Return the body that `to_arrays` wrote; arrays may be any that NumPy reads."""
         plain = {
             name: np.asarray(value) for name, value in data.items() if name not in ("grid", "flat")
         }
@@ -134,7 +131,7 @@ class Body:
 def _grids(
     size: tuple[float, float, float], nodes: tuple[int, int, int]
 ) -> tuple[BoxMesh, BoxMesh]:
-    """The grid, and the super-sampled one."""
+    """Return the grid and the super-sampled one."""
     if len(nodes) != 3 or min(nodes) < 2:
         raise CorrectionError(
             f"a grid has two points or more along each of three axes, got {nodes}", key="nodes"
@@ -148,8 +145,9 @@ def _voxel(size: tuple[float, float, float], nodes: tuple[int, int, int]) -> Flo
 
 
 def _between(mesh: BoxMesh, places: FloatArray, index: IntArray) -> tuple[IntArray, FloatArray]:
-    """Corners and shares (s, 4) at places (s, 3) [m] on the surface, by their number among the
-    nodes `index` (v,).
+    """Return corners and shares (s, 4) of places (s, 3) [m] on the surface.
+
+    Corners are numbers within `index` (v,), the nodes that are used.
     """
     nodes, shares = mesh.locate(places)
     heaviest = np.argsort(-shares, axis=1, kind="stable")[:, :4]
@@ -157,12 +155,12 @@ def _between(mesh: BoxMesh, places: FloatArray, index: IntArray) -> tuple[IntArr
     number = np.full(len(mesh.nodes), -1)
     number[index] = np.arange(len(index))
     own = number[nodes]
-    # A corner without weight may lie outside; any other will do in its place.
+    # A corner outside `index` has no weight, so that any other corner can replace it.
     return np.where(own < 0, own.max(axis=1, keepdims=True), own), np.where(own < 0, 0.0, shares)
 
 
 def _grid_edges(nodes: tuple[int, int, int]) -> IntArray:
-    """Neighbours along the axes (2, e)."""
+    """Return the neighbours along the axes (2, e)."""
     numbers = np.arange(np.prod(nodes)).reshape(nodes[::-1])
     pairs = [
         np.stack([numbers[1:].ravel(), numbers[:-1].ravel()]),
@@ -174,8 +172,9 @@ def _grid_edges(nodes: tuple[int, int, int]) -> IntArray:
 
 
 def _mesh_edges(mesh: Mesh) -> IntArray:
-    """Pairs of nodes of one element to both of which no third is nearer (2, e): its edges, not its
-    diagonals; and the hull's.
+    """Return the edges of elements and of the hull (2, e).
+
+    Two nodes of an element form an edge, and not a diagonal, where no third node is nearer to both.
     """
     elements, hull = mesh.connectivity.elements, mesh.connectivity.hull
     corners = np.asarray(mesh.nodes[elements])
@@ -191,15 +190,16 @@ def _mesh_edges(mesh: Mesh) -> IntArray:
 
 
 def _subdivided(polygons: IntArray) -> tuple[IntArray, FloatArray]:
-    """Corners and shares (s, 3) of the places on triangles or quadrilaterals (f, 3 or 4) in FOLD
-    steps, each place once.
+    """Return corners and shares (s, 3) of points on triangles or quadrilaterals (f, 3 or 4).
+
+    Each side is divided into FOLD steps; each point occurs once.
     """
     if polygons.shape[1] == 4:
         polygons = np.concatenate([polygons[:, [0, 1, 2]], polygons[:, [0, 2, 3]]])
     parts = np.array([(i, j, FOLD - i - j) for i in range(FOLD + 1) for j in range(FOLD + 1 - i)])
     corners = np.broadcast_to(polygons[:, None], (len(polygons), len(parts), 3)).reshape(-1, 3)
     steps = np.broadcast_to(parts, (len(polygons), *parts.shape)).reshape(-1, 3)
-    # A place on an edge belongs to two triangles; what it is made of says that it is the same.
+    # A point on an edge belongs to two triangles, with the same corners and weights in both.
     key = np.sort(np.where(steps > 0, corners * (FOLD + 1) + steps, -1), axis=1)
     _, once = np.unique(key, axis=0, return_index=True)
     return corners[once], steps[once] / FOLD

@@ -1,4 +1,4 @@
-"""The arrays of one sequence's samples while they are written: row by row, none held whole."""
+"""Writer of the arrays of one sequence's samples, row by row through memory maps."""
 
 from __future__ import annotations
 
@@ -20,13 +20,20 @@ ARRAYS: dict[str, Any] = {
     "frame": np.int64,
     "probe": np.int64,
 }
-"""By name, with the type of their numbers; what they hold says
+"""Names of the arrays and the types of their numbers; see
 `palpate.correction.samples.sample_store`."""
 _CHUNK = 256
 
 
 class SampleWriter:
-    """Of one sequence in a folder that is there: `rows` at most, cut to their number at the end."""
+    """Writes the arrays of one sequence.
+
+    Args:
+        folder: an existing folder.
+        rows: most rows; the arrays are cut to their number at the end.
+        vertices: number of material points.
+        points: most measured points of a frame.
+    """
 
     def __init__(self, folder: Path, rows: int, vertices: int, points: int) -> None:
         shapes: dict[str, tuple[int, ...]] = {
@@ -43,7 +50,7 @@ class SampleWriter:
             )
 
     def put(self, row: int, points: FloatArray, **values: Any) -> None:
-        """Fill a row; what there are no points for is NaN."""
+        """Write a row: measured points (n, 3) [m], padded with NaN, and other arrays by name."""
         self._arrays["points"][row, : len(points)], self._arrays["points"][row, len(points) :] = (
             points,
             np.nan,
@@ -52,7 +59,7 @@ class SampleWriter:
             self._arrays[name][row] = value
 
     def close(self, rows: int) -> None:
-        """Keep the first rows, under the arrays' own names."""
+        """Write the first `rows` rows to the arrays' final files."""
         for name, array in self._arrays.items():
             whole = np.lib.format.open_memmap(
                 self._folder / f"{name}.npy", "w+", array.dtype, (rows, *array.shape[1:])

@@ -1,6 +1,4 @@
-"""Which samples are trained on, which stop the training, and which are only predicted: whole
-sequences, never single frames.
-"""
+"""Split of samples into training, validation and test, by whole sequences."""
 
 from __future__ import annotations
 
@@ -16,7 +14,15 @@ __all__ = ["Split"]
 
 @dataclass(frozen=True, kw_only=True)
 class Split:
-    """Names of sequences; frames of one sequence are alike, so that none may be on two sides."""
+    """Names of the sequences of each side.
+
+    Frames of one sequence are similar, so no sequence may be on two sides (CorrectionError).
+
+    Attributes:
+        train: sequences that are trained on.
+        validation: sequences that stop the training.
+        test: sequences that are only predicted.
+    """
 
     train: tuple[str, ...]
     validation: tuple[str, ...]
@@ -24,13 +30,13 @@ class Split:
 
     def __post_init__(self) -> None:
         if not self.train or not self.validation:
-            lacking = "validation" if self.train else "train"
-            raise CorrectionError(f"no sequence for {lacking}: name at least one", key=lacking)
+            missing = "validation" if self.train else "train"
+            raise CorrectionError(f"no sequence for {missing}: name at least one", key=missing)
         everywhere = (*self.train, *self.validation, *self.test)
         for name in everywhere:
             if everywhere.count(name) > 1:
                 raise CorrectionError(
-                    f"{name} is on two sides of the split; frames of one sequence are alike",
+                    f"{name} is on two sides of the split; frames of one sequence are similar",
                     key="split",
                     value=name,
                 )
@@ -44,9 +50,9 @@ class Split:
         validation: Sequence[str] = (),
         test: Sequence[str] = (),
     ) -> Self:
-        """The sides that are named, and of the others those stated by the dataset.
+        """Return the named sides, and the dataset's own for those that are not named.
 
-        Where the dataset states no validation, the last of several training sequences is it.
+        Without validation sequences, the last of several training sequences becomes one.
         """
         stated = samples.about["splits"]
         names = {

@@ -1,15 +1,18 @@
-"""Training samples on disk: what was simulated, where the tool was and what was measured, frame by frame, never loaded whole.
+"""Training samples on disk, read frame by frame: simulated shape, tool, and measured points.
 
 samples/
-  samples.json              where they come from, splits, and what is in each column
-  body.npz                  the material points, see `palpate.correction.samples.corrected_points`
-  <sequence>/positions.npy  (n, v, 3) simulated places of the points [m]
-             tool.npy       (n, 13) tool: position [m], quaternion, velocity [m/s], force [N]; all in the phantom frame
-             points.npy     (n, p, 3) measured points [m], those of the top first; NaN beyond their number
-             count.npy      (n, 2) points of the top, and all
-             time.npy       (n,) cloud stamp [s]
-             frame.npy      (n,) number of the cloud
-             probe.npy      (n,) which push, counted from 1; 0 where the tool is clear of the block
+  samples.json       origin of the samples, splits, and numbers of samples
+  body.npz           the material points, see `palpate.correction.samples.corrected_points`
+  <sequence>/
+    positions.npy    (n, v, 3) simulated positions of the points [m]
+    tool.npy         (n, 13) tool: position [m], quaternion, velocity [m/s], force [N]
+    points.npy       (n, p, 3) measured points [m], those of the top first; NaN beyond their number
+    count.npy        (n, 2) number of points of the top, and of all points
+    time.npy         (n,) cloud stamp [s]
+    frame.npy        (n,) number of the cloud
+    probe.npy        (n,) number of the push, from 1; 0 where the tool is clear of the block
+
+All coordinates are in the phantom frame.
 """
 
 from __future__ import annotations
@@ -37,8 +40,13 @@ FORMAT = 1
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Samples that are worked on together: positions (b, v, 3), tool (b, 13), points (b, p, 3),
-    count (b, 2); see the module.
+    """A batch of samples, see the module.
+
+    Attributes:
+        positions: (b, v, 3) simulated positions [m].
+        tool: (b, 13) tool.
+        points: (b, p, 3) measured points [m].
+        count: (b, 2) numbers of points.
     """
 
     positions: Tensor
@@ -50,24 +58,23 @@ class Batch:
         return len(self.positions)
 
     def to(self, device: torch.device) -> Batch:
-        """On this device."""
+        """Return the batch on a device."""
         parts = (self.positions, self.tool, self.points, self.count)
         return Batch(*(part.to(device, non_blocking=True) for part in parts))
 
     def joined(self, other: Batch) -> Batch:
-        """Both, this one first."""
+        """Return both batches as one, this one first."""
         pairs = zip(vars(self).values(), vars(other).values(), strict=True)
         return Batch(*(torch.cat(pair) for pair in pairs))
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """A folder of samples; a row is (sequence, frame), counted over all sequences in the order of
-    `sequences`.
+    """A folder of samples; rows are numbered over all sequences, in the order of `sequences`.
 
     Attributes:
-        folder: where they are.
-        about: what samples.json says.
+        folder: the folder.
+        about: content of samples.json.
         body: the material points.
     """
 
@@ -77,7 +84,7 @@ class Samples:
 
     @property
     def sequences(self) -> tuple[str, ...]:
-        """Names."""
+        """Names of the sequences."""
         return tuple(self.about["sequences"])
 
     @cached_property
@@ -91,13 +98,14 @@ class Samples:
 
     @cached_property
     def seen(self) -> FloatArray:
-        """(v,) measured points per frame near each material point; zero where the camera never
-        looks.
+        """Mean number of measured points per frame near each material point (v,).
+
+        Zero where the camera never sees the surface.
         """
         return np.asarray(self.about["seen"], dtype=float)
 
     def array(self, sequence: str, name: str) -> Any:
-        """One of ARRAYS of one sequence, mapped from disk."""
+        """Return one of ARRAYS of a sequence, memory-mapped; RunError where it cannot be read."""
         path = self.folder / sequence / f"{name}.npy"
         try:
             return np.load(path, mmap_mode="r")
@@ -113,10 +121,11 @@ class Samples:
         }
 
     def rows(self, sequences: Sequence[str]) -> IntArray:
-        """Rows (n,) of these sequences, in their order; CorrectionError that names one that is not
-        here.
+        """Return the rows (n,) of sequences, in their order.
+
+        Raises CorrectionError for a sequence without samples.
         """
-        found = [np.empty(0, dtype=np.int64)]
+        rows = [np.empty(0, dtype=np.int64)]
         for name in sequences:
             if name not in self.sequences:
                 raise CorrectionError(
@@ -125,21 +134,21 @@ class Samples:
                     value=name,
                 )
             number = self.sequences.index(name)
-            found.append(np.arange(self._starts[number], self._starts[number + 1]))
-        return np.concatenate(found)
+            rows.append(np.arange(self._starts[number], self._starts[number + 1]))
+        return np.concatenate(rows)
 
     def column(self, name: str, rows: IntArray) -> Any:
-        """Of these rows one of ARRAYS (n, ...), read from disk."""
+        """Read one of ARRAYS for these rows (n, ...)."""
         arrays = self._mapped[name]
         which = np.searchsorted(self._starts, rows, side="right") - 1
-        found = np.empty((len(rows), *arrays[0].shape[1:]), dtype=arrays[0].dtype)
+        values = np.empty((len(rows), *arrays[0].shape[1:]), dtype=arrays[0].dtype)
         for number in np.unique(which):
             here = which == number
-            found[here] = arrays[number][rows[here] - self._starts[number]]
-        return found
+            values[here] = arrays[number][rows[here] - self._starts[number]]
+        return values
 
     def batch(self, rows: IntArray) -> Batch:
-        """These rows, read from disk."""
+        """Read these rows."""
         return Batch(
             *(
                 torch.from_numpy(self.column(name, rows))
@@ -148,13 +157,13 @@ class Samples:
         )
 
     def batches(self, rows: IntArray, size: int) -> Iterator[Batch]:
-        """The rows in their order, `size` at a time."""
+        """Yield batches of `size` rows, in order."""
         for start in range(0, len(rows), size):
             yield self.batch(rows[start : start + size])
 
 
 def open_samples(folder: Path) -> Samples:
-    """Samples that were made whole; RunError for anything else."""
+    """Open complete samples; RunError for anything else."""
     try:
         about = json.loads((folder / "samples.json").read_text())
         with np.load(folder / "body.npz") as arrays:
@@ -165,7 +174,8 @@ def open_samples(folder: Path) -> Samples:
         ) from None
     if about.get("format") != FORMAT:
         raise RunError(
-            f"{folder} has samples of format {about.get('format')}; expected {FORMAT}: make them again",
+            f"{folder} has samples of format {about.get('format')}; expected {FORMAT}: "
+            "make them again",
             path=str(folder),
         )
     return Samples(folder, about, body)

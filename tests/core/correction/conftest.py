@@ -1,6 +1,4 @@
-"""A virtual block that sags under its weight, which nobody states; pushed from above in three
-places. One that sags less.
-"""
+"""A virtual block with a hidden weight, pushed from above in three sequences, and a stiffer one."""
 
 from __future__ import annotations
 
@@ -19,7 +17,7 @@ PUSHES = ("poke-top-01", "poke-top-02", "poke-top-03")
 
 @dataclass(frozen=True)
 class Bench:
-    """A dataset, and the samples of the stated model along it."""
+    """A dataset with the recorder and the samples of its stated model."""
 
     dataset: Dataset
     recorder: Recorder
@@ -44,5 +42,5 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
 
 @pytest.fixture(scope="session")
 def stiffer(tmp_path_factory: pytest.TempPathFactory) -> Bench:
-    """The same block of another material: four times as stiff, it sags a quarter as much."""
+    """The same block of a material four times as stiff, which sags a quarter as much."""
     return _bench(tmp_path_factory.mktemp("stiffer"), 0.6, PUSHES[:1])

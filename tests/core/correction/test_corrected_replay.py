@@ -9,7 +9,7 @@ import torch
 from palpate.correction import Body, Corrector, NetworkSpec, TrainedNetwork, build, replay_corrected
 from palpate.correction.corrected_replay import FEEDBACKS
 from palpate.correction.elastic_extension import ElasticExtension, _tangent
-from palpate.correction.samples.record_samples import tool_columns
+from palpate.correction.samples.tool_columns import tool_columns
 from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.fem.model import BlockModel
 from palpate.foundation.errors import CorrectionError
@@ -25,7 +25,7 @@ TOOLS = np.concatenate([WAY, np.tile([1.0, *[0.0] * 9], (3, 1))], axis=1)
 
 
 def _trained(kind, body=None, **about):
-    """A network that was never trained, with something to say."""
+    """Return an untrained network whose last layer is not zero."""
     body = body or (Body.top(SIZE, NODES) if kind == "unet2d" else Body.block(SIZE, NODES))
     network = build(NetworkSpec(kind=kind, features=(4, 6)), body)
     torch.manual_seed(0)
@@ -43,24 +43,24 @@ def frames():
 
 
 @pytest.mark.parametrize("kind", ["unet2d", "unet3d", "graph"])
-def test_frame_is_moved_by_what_the_network_says_of_it(kind, frames):
+def test_frame_is_moved_by_the_networks_correction(kind, frames):
     trained = _trained(kind)
     corrector = Corrector(trained, SETUP, half=False)
     tool = torch.as_tensor(TOOLS[-1], dtype=torch.float32)
     tool[10:] = torch.as_tensor(frames[-1].force)
     simulated = torch.as_tensor(frames[-1].move(trained.body.rest), dtype=torch.float32)
     with torch.no_grad():
-        wanted = (trained.network(simulated[None], tool[None])[0] - simulated).numpy()
-    assert np.allclose(corrector.correction(frames[-1], TOOLS[-1]), wanted, atol=1e-8)
+        expected = (trained.network(simulated[None], tool[None])[0] - simulated).numpy()
+    assert np.allclose(corrector.correction(frames[-1], TOOLS[-1]), expected, atol=1e-8)
     corrected = corrector.correct(frames[-1], TOOLS[-1])
-    # Between the nodes that were solved on both are interpolated.
+    # Both are interpolated between the solved nodes.
     moved = corrected.move(trained.body.rest) - frames[-1].move(trained.body.rest)
-    assert np.abs(moved - wanted).max() < 0.5 * np.abs(wanted).max()
-    assert np.sqrt(np.mean((moved - wanted) ** 2)) < 0.25 * np.sqrt(np.mean(wanted**2))
+    assert np.abs(moved - expected).max() < 0.5 * np.abs(expected).max()
+    assert np.sqrt(np.mean((moved - expected) ** 2)) < 0.25 * np.sqrt(np.mean(expected**2))
     assert (corrected.force == frames[-1].force).all()
 
 
-def test_below_a_corrected_top_the_body_stays_or_follows(frames):
+def test_points_below_a_corrected_top_stay_or_follow(frames):
     still, follows = (
         Corrector(_trained("unet2d"), SETUP, feedback=kind).correct(frames[-1], TOOLS[-1])
         for kind in ("none", "follow")
@@ -72,7 +72,7 @@ def test_below_a_corrected_top_the_body_stays_or_follows(frames):
     assert np.allclose(still.move(top), follows.move(top), atol=1e-9)
 
 
-def test_body_that_follows_is_in_equilibrium_and_held_at_its_base():
+def test_elastic_extension_is_in_equilibrium_and_fixed_at_the_base():
     mesh = box_mesh(SIZE, GridSpec(nodes=(5, 4, 4)))
     top = np.flatnonzero(np.isclose(mesh.nodes[:, 2], SIZE[2]))
     given = np.zeros_like(mesh.nodes)
@@ -87,7 +87,7 @@ def test_body_that_follows_is_in_equilibrium_and_held_at_its_base():
     assert np.abs(force[between]).max() < 1e-12 * np.abs(force[top]).max() * len(found)
 
 
-def test_small_motion_of_the_top_is_followed_as_the_solver_would():
+def test_small_elastic_extension_agrees_with_the_solver():
     mesh = box_mesh(SIZE, GridSpec(nodes=(5, 4, 4)))
     top = np.flatnonzero(np.isclose(mesh.nodes[:, 2], SIZE[2]))
     given = np.zeros_like(mesh.nodes)
@@ -114,7 +114,7 @@ def test_equilibrium_does_not_depend_on_the_feedback(kind):
     )
 
 
-def test_replay_on_the_bench_is_corrected_as_the_samples_were(bench):
+def test_replay_of_a_dataset_is_corrected_as_its_samples(bench):
     recorder = bench.recorder
     body = bench.samples.body
     trained = _trained("unet3d", body, seen=bench.samples.seen.tolist())
@@ -128,12 +128,12 @@ def test_replay_on_the_bench_is_corrected_as_the_samples_were(bench):
     frames = list(replay_corrected(corrector, recorder.setup, centres, tools, recorder.grid))
     batch = bench.samples.batch(bench.samples.rows(["poke-top-01"])[:12])
     with torch.no_grad():
-        wanted = trained.network(batch.positions, batch.tool)
+        expected = trained.network(batch.positions, batch.tool)
     for number, frame in enumerate(frames):
-        assert np.allclose(frame.corrected.move(body.rest), wanted[number], atol=2e-6)
+        assert np.allclose(frame.corrected.move(body.rest), expected[number], atol=2e-6)
 
 
-def test_measured_force_is_heeded_and_a_simulated_one_is_the_frames_own(frames):
+def test_measured_force_is_used_and_a_simulated_one_is_the_frames(frames):
     pushed = TOOLS[-1] + np.append(np.zeros(10), [0.0, 0.0, 3.0])
     for measured in (True, False):
         trained = _trained("graph", force="measured" if measured else "simulated")

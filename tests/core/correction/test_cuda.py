@@ -1,4 +1,4 @@
-"""What a CUDA card computes is what a processor does; skipped where there is none."""
+"""CUDA gives the same results as the CPU; skipped where there is no CUDA device."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from palpate.correction import (
 )
 from palpate.correction.networks.chamfer import nearest
 from palpate.correction.networks.devices import reproducible
-from palpate.correction.train import body_for
+from palpate.correction.training_run import body_for
 from palpate.foundation.errors import Cancelled
 
 pytestmark = pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA here")
@@ -40,7 +40,7 @@ SPEC = TrainingSpec(
 
 @pytest.fixture(scope="module")
 def samples(tmp_path_factory: pytest.TempPathFactory) -> Samples:
-    return write_samples(tmp_path_factory.mktemp("card") / "samples")
+    return write_samples(tmp_path_factory.mktemp("cuda") / "samples")
 
 
 def _same(one: TrainedNetwork, other: TrainedNetwork) -> bool:
@@ -63,11 +63,11 @@ def test_nearest_is_exact():
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("distance", ["chamfer", "symmetric", "hausdorff"])
-def test_gradient_is_the_processors(samples, kind, distance):
+def test_gradient_equals_the_cpus(samples, kind, distance):
     body, gradients = body_for(samples, kind), []
     for place in ("cpu", "cuda"):
-        # Of shortened products a card is allowed for convolutions Hausdorff's distance may take
-        # another, almost as distant point.
+        # With TF32 products in convolutions Hausdorff's distance may choose another, almost
+        # equally distant point.
         with reproducible(torch.device(place), 0), torch.backends.cudnn.flags(allow_tf32=False):
             network = build(NetworkSpec(kind=kind, features=(8, 16)), body, 3).to(place)
             for number, weight in enumerate(network.parameters()):
@@ -102,7 +102,7 @@ def test_same_seed_gives_the_same_weights_bit_for_bit(samples, kind, tmp_path):
 
 
 @pytest.mark.parametrize("step", [1, 5])
-def test_cancelled_training_goes_on_as_if_nothing_had_been(samples, tmp_path, step):
+def test_cancelled_training_resumes_exactly(samples, tmp_path, step):
     calls = iter(range(10**9))
 
     def stop(fraction: float, text: str) -> None:
@@ -116,7 +116,7 @@ def test_cancelled_training_goes_on_as_if_nothing_had_been(samples, tmp_path, st
 
 
 @pytest.mark.parametrize("mixed", [False, True])
-def test_training_ends_where_a_processors_ends(samples, tmp_path, mixed):
+def test_training_reaches_the_error_of_the_cpu(samples, tmp_path, mixed):
     spec = replace(SPEC, epochs=30, patience=30)
     here, there = (
         train(
@@ -128,7 +128,7 @@ def test_training_ends_where_a_processors_ends(samples, tmp_path, mixed):
     assert there.about["error"] == pytest.approx(here.about["error"], rel=0.05)
 
 
-def test_what_was_trained_on_a_card_corrects_alike_on_a_processor(samples, tmp_path):
+def test_network_trained_on_cuda_corrects_alike_on_the_cpu(samples, tmp_path):
     trained = train(samples, Split.of(samples), SPEC, tmp_path)
     rows, errors = samples.rows(["three"]), []
     for place in ("cpu", "cuda"):

@@ -19,7 +19,7 @@ from palpate.correction import (
 from palpate.foundation.errors import Cancelled, CorrectionError
 
 
-def test_learning_on_the_way_follows_a_material_that_changes_half_way(bench, stiffer, tmp_path):
+def test_online_learning_adapts_to_a_change_of_the_material(bench, stiffer, tmp_path):
     network = NetworkSpec(kind="graph", features=(8, 16, 24))
     spec = TrainingSpec(network=network, rate=2e-3, batch=8, epochs=8, device="cpu")
     trained = train(bench.samples, Split.of(bench.samples), spec, tmp_path)
@@ -31,8 +31,8 @@ def test_learning_on_the_way_follows_a_material_that_changes_half_way(bench, sti
     )
     assert len(stream.online) == len(before) + len(after)
     first, second = slice(None, len(before)), slice(len(before), None)
-    # What it was trained for it still does; of the other material the frozen network is worse than
-    # none.
+    # On the trained material it is as good as before; on the other material the frozen network is
+    # worse than none.
     assert (
         np.mean(stream.online[first])
         < 1.02 * np.mean(stream.frozen[first])
@@ -59,14 +59,14 @@ def test_each_frame_is_predicted_before_it_is_learned_from(known):
     frame = samples.batch(samples.rows(["three"])[:1])
     learner = Learner(trained, OnlineSpec())
     with torch.no_grad():
-        wanted = trained.network(frame.positions, frame.tool)
-    assert torch.equal(learner.predict(frame), wanted)
+        expected = trained.network(frame.positions, frame.tool)
+    assert torch.equal(learner.predict(frame), expected)
     stream = learn_online(trained, [(samples, ["three"])], OnlineSpec())
     assert stream.online[0] == stream.frozen[0]
-    assert stream.online[0] == pytest.approx(learner.error(wanted, frame))
+    assert stream.online[0] == pytest.approx(learner.error(expected, frame))
 
 
-def test_network_it_was_made_from_stays_as_it_is(known):
+def test_original_network_does_not_change(known):
     samples, trained = known
     before = [value.clone() for value in trained.network.state_dict().values()]
     learn_online(trained, [(samples, ["two"])], OnlineSpec())
@@ -106,6 +106,6 @@ def test_stream_can_be_cancelled(known):
 @pytest.mark.parametrize(
     ("key", "value"), [("rate", 2.0), ("batch", 0), ("steps", -1), ("memory", 0)]
 )
-def test_impossible_learning_is_refused(key, value):
+def test_invalid_settings_are_refused(key, value):
     with pytest.raises(CorrectionError, match=key):
         replace(OnlineSpec(), **{key: value})

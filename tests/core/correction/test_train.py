@@ -23,7 +23,7 @@ from palpate.correction import (
     sample_errors,
     train,
 )
-from palpate.correction.train import CHECKPOINT, _Run
+from palpate.correction.training_run import CHECKPOINT, TrainingRun
 from palpate.foundation.errors import Cancelled, CorrectionError, RunError
 from palpate.foundation.progress import silent
 
@@ -64,7 +64,7 @@ def _stop_at(step: int):
 
 
 @pytest.mark.parametrize("kind", ["unet2d", "unet3d", "graph"])
-def test_network_beats_no_network_on_a_held_out_sequence_of_the_bench(kind, bench, tmp_path):
+def test_network_reduces_the_error_of_a_held_out_sequence(kind, bench, tmp_path):
     spec = TrainingSpec(
         network=NetworkSpec(kind=kind, features=(8, 16, 32)),
         rate=2e-3,
@@ -85,7 +85,7 @@ def test_network_beats_no_network_on_a_held_out_sequence_of_the_bench(kind, benc
     assert trained.about["error"] < trained.about["raw_error"]
 
 
-def test_hidden_points_stay_where_the_simulation_has_them(bench, tmp_path):
+def test_hidden_points_stay_at_their_simulated_positions(bench, tmp_path):
     moved = []
     for hold in (0.0, 1.0):
         spec = TrainingSpec(
@@ -109,7 +109,7 @@ def test_hidden_points_stay_where_the_simulation_has_them(bench, tmp_path):
     assert moved[1] < 0.5 * moved[0]
 
 
-def test_same_seed_gives_the_same_weights_bit_for_bit_and_another_others(samples, tmp_path):
+def test_weights_are_reproducible_by_the_seed(samples, tmp_path):
     first, second = (
         train(samples, Split.of(samples), TINY, tmp_path / name) for name in ("first", "second")
     )
@@ -119,7 +119,7 @@ def test_same_seed_gives_the_same_weights_bit_for_bit_and_another_others(samples
 
 
 @pytest.mark.parametrize("step", [1, 4, 5, 9])
-def test_cancelled_training_goes_on_as_if_nothing_had_been(samples, tmp_path, step):
+def test_cancelled_training_resumes_exactly(samples, tmp_path, step):
     whole = train(samples, Split.of(samples), TINY, tmp_path / "whole")
     with pytest.raises(Cancelled):
         train(samples, Split.of(samples), TINY, tmp_path / "stopped", _stop_at(step))
@@ -136,7 +136,8 @@ def test_training_killed_at_a_random_moment_ends_with_the_same_weights(samples, 
         "import sys, json; from pathlib import Path\n"
         "from palpate.correction import *\n"
         "samples = open_samples(Path(sys.argv[1]))\n"
-        "train(samples, Split.of(samples), TrainingSpec.from_json(json.loads(sys.argv[3])), Path(sys.argv[2]))\n"
+        "spec = TrainingSpec.from_json(json.loads(sys.argv[3]))\n"
+        "train(samples, Split.of(samples), spec, Path(sys.argv[2]))\n"
     )
     killed = tmp_path / "killed"
     process = subprocess.Popen(
@@ -162,7 +163,7 @@ def test_finished_training_is_returned_as_it_is(samples, tmp_path):
     assert (tmp_path / "network.pt").stat().st_mtime_ns == before
 
 
-def test_training_stops_when_validation_gets_no_better_and_keeps_the_best(samples, tmp_path):
+def test_training_stops_without_improvement_and_keeps_the_best_weights(samples, tmp_path):
     trained = train(
         samples, Split.of(samples), replace(TINY, rate=0.3, epochs=50, patience=3), tmp_path
     )
@@ -170,7 +171,7 @@ def test_training_stops_when_validation_gets_no_better_and_keeps_the_best(sample
     assert len(errors) < 50
     assert trained.about["error"] == min([*errors, trained.about["raw_error"]])
     loss = SurfaceLoss(trained.body, samples.seen)
-    kept = (
+    error = (
         sample_errors(
             trained.network,
             loss,
@@ -181,7 +182,7 @@ def test_training_stops_when_validation_gets_no_better_and_keeps_the_best(sample
         .mean()
         .item()
     )
-    assert kept == pytest.approx(trained.about["error"], rel=1e-5)
+    assert error == pytest.approx(trained.about["error"], rel=1e-5)
     rates = [row[2] for row in trained.about["history"]]
     assert rates[-1] < rates[0]
 
@@ -199,7 +200,7 @@ def test_training_on_another_model_is_another_training(samples, tmp_path):
         train(extended, Split.of(extended), replace(TINY, epochs=1), tmp_path)
 
 
-def test_more_epochs_can_be_asked_of_a_finished_training(samples, tmp_path):
+def test_finished_training_can_be_continued_for_more_epochs(samples, tmp_path):
     train(samples, Split.of(samples), replace(TINY, epochs=2), tmp_path / "more")
     more = train(samples, Split.of(samples), TINY, tmp_path / "more")
     assert _same(more, train(samples, Split.of(samples), TINY, tmp_path / "at-once"))
@@ -212,7 +213,7 @@ def test_damaged_checkpoint_is_named(samples, tmp_path):
 
 
 def test_diverging_training_says_what_to_do(samples, tmp_path):
-    run = _Run(samples, Split.of(samples), TINY, tmp_path, torch.device("cpu"))
+    run = TrainingRun(samples, Split.of(samples), TINY, tmp_path, torch.device("cpu"))
     with torch.no_grad():
         next(run.network.parameters()).fill_(float("nan"))
     with pytest.raises(CorrectionError, match="smaller rate"):
@@ -228,12 +229,12 @@ def test_log_for_tensorboard_has_every_epoch(samples, tmp_path):
     )
 
 
-def test_torch_is_left_as_it_was(samples, tmp_path):
+def test_torchs_random_state_and_threads_are_restored(samples, tmp_path):
     torch.manual_seed(3)
-    wanted, threads = torch.rand(1), torch.get_num_threads()
+    expected, threads = torch.rand(1), torch.get_num_threads()
     torch.manual_seed(3)
     train(samples, Split.of(samples), replace(TINY, epochs=1, threads=2), tmp_path)
-    assert torch.equal(torch.rand(1), wanted)
+    assert torch.equal(torch.rand(1), expected)
     assert torch.get_num_threads() == threads
 
 
@@ -267,7 +268,7 @@ _WRONG = [
 
 
 @pytest.mark.parametrize(("key", "value"), _WRONG)
-def test_impossible_training_is_refused(key, value):
+def test_invalid_specification_is_refused(key, value):
     with pytest.raises(CorrectionError, match=key):
         TrainingSpec(**{key: value})
 
@@ -277,7 +278,7 @@ def test_missing_device_is_named(samples, tmp_path):
         train(samples, Split.of(samples), replace(TINY, device="tpu"), tmp_path)
 
 
-def test_request_survives_json():
+def test_specification_survives_json():
     assert TrainingSpec.from_json(TINY.to_json()) == TINY
     assert TrainingSpec.from_json({"epochs": 3}) == TrainingSpec(epochs=3)
 

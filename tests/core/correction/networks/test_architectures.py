@@ -20,8 +20,8 @@ def _body(kind, nodes):
     return Body.top(SIZE, nodes) if kind == "unet2d" else Body.block(SIZE, nodes)
 
 
-def _awake(spec, body):
-    """A network whose last layer says something."""
+def _with_output(spec, body):
+    """Return a network whose last layer is not zero."""
     network = build(spec, body)
     torch.manual_seed(1)
     for parameter in network.inside.last.parameters():
@@ -40,11 +40,12 @@ def _inputs(body, frames=2, seed=0):
 
 @pytest.mark.parametrize("nodes", GRIDS)
 @pytest.mark.parametrize("kind", KINDS)
-def test_output_has_the_shape_of_the_input_and_keeps_the_bound(kind, nodes):
+def test_output_has_the_shape_of_the_input_and_is_bounded(kind, nodes):
     body = _body(kind, nodes)
     vertices, tool = _inputs(body)
     moved = (
-        _awake(NetworkSpec(kind=kind, features=SMALL, trust=0.5), body)(vertices, tool) - vertices
+        _with_output(NetworkSpec(kind=kind, features=SMALL, trust=0.5), body)(vertices, tool)
+        - vertices
     )
     assert moved.shape == vertices.shape
     share = moved.abs().amax(dim=(0, 1)) / torch.as_tensor(body.voxel)
@@ -53,7 +54,7 @@ def test_output_has_the_shape_of_the_input_and_keeps_the_bound(kind, nodes):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_untrained_network_leaves_the_simulation_as_it_is(kind):
+def test_untrained_network_does_not_change_the_simulation(kind):
     body = _body(kind, (13, 5, 5))
     vertices, tool = _inputs(body)
     assert torch.equal(
@@ -86,7 +87,7 @@ def test_unet_of_the_paper_has_its_layers():
 
 
 @pytest.mark.parametrize("shape", [(2, 1), (13, 5), (1, 1), (4, 2, 2), (2, 1, 1), (3, 1, 4)])
-def test_taps_left_out_change_nothing(shape):
+def test_omitted_taps_do_not_change_the_convolution(shape):
     torch.manual_seed(0)
     part = PaddedConvolution(len(shape), 3, 5)
     values = torch.randn(2, 3, *shape)
@@ -97,7 +98,7 @@ def test_taps_left_out_change_nothing(shape):
 
 
 @pytest.mark.parametrize("shape", [(13, 5), (13, 5, 5), (2, 1, 3)])
-def test_pool_for_cuda_is_that_of_torch_and_so_is_its_gradient(shape):
+def test_deterministic_pool_equals_torchs_in_value_and_gradient(shape):
     torch.manual_seed(0)
     one, other = (
         torch.rand(2, 3, *shape, generator=torch.Generator().manual_seed(1)).requires_grad_()
@@ -111,7 +112,7 @@ def test_pool_for_cuda_is_that_of_torch_and_so_is_its_gradient(shape):
     assert torch.equal(one.grad, other.grad)
 
 
-def test_every_voxel_feels_the_tool_and_every_other_voxel():
+def test_every_output_voxel_depends_on_the_tool_and_on_all_voxels():
     torch.manual_seed(0)
     network = UNet((13, 5), 3, 7, SMALL)
     values, known = torch.randn(1, 3, 13, 5), torch.randn(1, 7)
@@ -123,13 +124,13 @@ def test_every_voxel_feels_the_tool_and_every_other_voxel():
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_only_the_inputs_that_are_asked_for_are_seen(kind):
+def test_network_depends_on_its_specified_inputs_only(kind):
     body = _body(kind, (4, 3, 2))
     vertices, tool = _inputs(body)
     other = tool.clone()
     other[:, 7:] += 5.0
-    blind = _awake(NetworkSpec(kind=kind, features=SMALL), body)
-    sensing = _awake(
+    blind = _with_output(NetworkSpec(kind=kind, features=SMALL), body)
+    sensing = _with_output(
         NetworkSpec(kind=kind, features=SMALL, inputs=("pose", "velocity", "force")), body
     )
     assert torch.equal(blind(vertices, tool), blind(vertices, other))
@@ -139,12 +140,12 @@ def test_only_the_inputs_that_are_asked_for_are_seen(kind):
 def test_graph_network_works_on_tetrahedra():
     body = Body.of_mesh(filled_box(SIZE, 0.014))
     vertices, tool = _inputs(body)
-    corrected = _awake(NetworkSpec(kind="graph", features=SMALL), body)(vertices, tool)
+    corrected = _with_output(NetworkSpec(kind="graph", features=SMALL), body)(vertices, tool)
     assert corrected.shape == vertices.shape
     assert not torch.equal(corrected, vertices)
 
 
-def test_graph_network_does_not_know_how_nodes_are_numbered():
+def test_graph_network_does_not_depend_on_the_numbering_of_nodes():
     body = Body.block(SIZE, (4, 3, 2))
     order = torch.randperm(len(body.rest), generator=torch.Generator().manual_seed(3))
     place = torch.argsort(order)
@@ -159,7 +160,7 @@ def test_graph_network_does_not_know_how_nodes_are_numbered():
     )
     vertices, tool = _inputs(body)
     spec = NetworkSpec(kind="graph", features=SMALL)
-    here, there = _awake(spec, body), _awake(spec, turned)
+    here, there = _with_output(spec, body), _with_output(spec, turned)
     assert torch.allclose(
         here(vertices, tool)[:, order], there(vertices[:, order], tool), atol=1e-7
     )
@@ -167,12 +168,14 @@ def test_graph_network_does_not_know_how_nodes_are_numbered():
 
 @pytest.mark.parametrize("nodes", GRIDS)
 @pytest.mark.parametrize("kind", ["unet2d", "unet3d"])
-def test_compact_network_says_the_same(kind, nodes):
+def test_fast_inference_gives_the_same_correction(kind, nodes):
     body = _body(kind, nodes)
-    network = _awake(NetworkSpec(kind=kind, features=SMALL, inputs=("pose", "force")), body).eval()
+    network = _with_output(
+        NetworkSpec(kind=kind, features=SMALL, inputs=("pose", "force")), body
+    ).eval()
     vertices, tool = _inputs(body, 1)
     with torch.no_grad():
-        wanted, single = (
+        expected, single = (
             network(vertices, tool)[0],
             UNetInference(network, half=False)(vertices[0], tool[0]),
         )
@@ -181,13 +184,12 @@ def test_compact_network_says_the_same(kind, nodes):
     assert (
         UNetInference(network, half=False)(vertices[0].double(), tool[0].double()) - exact
     ).abs().max() < 1e-12
-    assert (single - exact).abs().max() < 3 * (
-        wanted - exact
-    ).abs().max()  # rounded in another order, but no worse
-    assert (rough - wanted).square().mean() < 0.05**2 * (wanted - vertices[0]).square().mean()
+    # Rounding differs in its order, but is not larger.
+    assert (single - exact).abs().max() < 3 * (expected - exact).abs().max()
+    assert (rough - expected).square().mean() < 0.05**2 * (expected - vertices[0]).square().mean()
 
 
-def test_same_seed_gives_the_same_weights_whatever_was_drawn_before():
+def test_weights_depend_on_the_seed_only():
     body = Body.top(SIZE, (4, 3, 2))
     first = build(NetworkSpec(features=SMALL), body, seed=4)
     torch.rand(7)
@@ -204,7 +206,7 @@ def test_same_seed_gives_the_same_weights_whatever_was_drawn_before():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "message"),
     [
         ({"kind": "mlp"}, "unet2d"),
         ({"trust": 0.0}, "trust"),
@@ -212,8 +214,8 @@ def test_same_seed_gives_the_same_weights_whatever_was_drawn_before():
         ({"features": ()}, "features"),
     ],
 )
-def test_impossible_network_is_refused(wrong, said):
-    with pytest.raises(CorrectionError, match=said):
+def test_invalid_specification_is_refused(wrong, message):
+    with pytest.raises(CorrectionError, match=message):
         NetworkSpec(**wrong)
 
 

@@ -20,7 +20,7 @@ NODES = (13, 5, 5)
 
 
 def _cloud(body, frames=3, points=40, seed=0):
-    """Points near the body's surface; of each frame some are missing."""
+    """Return points near the body's surface; some are missing in each frame."""
     rng = np.random.default_rng(seed)
     surface = body.surface(body.rest)
     cloud = surface[rng.integers(len(surface), size=(frames, points))] + rng.normal(
@@ -40,7 +40,7 @@ def _seen(body):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_both_ways_to_the_nearest_are_exact(seed):
+def test_both_nearest_neighbour_searches_are_exact(seed):
     generator = torch.Generator().manual_seed(seed)
     points, others = (
         torch.randn(3, 50, 3, generator=generator),
@@ -58,11 +58,11 @@ def test_chamfer_is_the_papers_metric():
     apart, valid = SurfaceLoss(body, _seen(body)).distances(batch.positions, batch)
     frame = rest(setup, GridSpec(nodes=(5, 4, 3)))
     for row in range(len(batch)):
-        wanted = paper_distance(batch.points[row][valid[row]].numpy(), frame, Surface(setup.box))
-        assert apart[row][valid[row]].mean() == pytest.approx(wanted, rel=1e-5)
+        expected = paper_distance(batch.points[row][valid[row]].numpy(), frame, Surface(setup.box))
+        assert apart[row][valid[row]].mean() == pytest.approx(expected, rel=1e-5)
 
 
-def test_flat_body_is_compared_with_the_points_of_the_top_alone():
+def test_top_layer_is_compared_with_points_of_the_top_only():
     body = Body.top(SIZE, NODES)
     batch = _cloud(body)
     batch.count[:, 0] = 5
@@ -89,13 +89,13 @@ def test_hausdorff_is_scipys():
     loss = SurfaceLoss(body, np.ones(len(body.rest)), distance="hausdorff", hold=0.0)
     surface = body.surface(body.rest)
     cloud = batch.points[0][: int(batch.count[0, 1])].numpy()
-    wanted = max(directed_hausdorff(surface, cloud)[0], directed_hausdorff(cloud, surface)[0])
+    expected = max(directed_hausdorff(surface, cloud)[0], directed_hausdorff(cloud, surface)[0])
     assert loss(batch.positions, batch, batch.positions).distance.item() == pytest.approx(
-        wanted * 1e3, rel=1e-5
+        expected * 1e3, rel=1e-5
     )
 
 
-def test_symmetric_adds_the_way_back_from_what_is_seen():
+def test_symmetric_distance_adds_visible_surface_to_points():
     body = Body.block(SIZE, (4, 3, 2))
     batch = _cloud(body)
     one, both = (
@@ -105,14 +105,14 @@ def test_symmetric_adds_the_way_back_from_what_is_seen():
         for kind in ("chamfer", "symmetric")
     )
     surface = body.surface(body.rest)
-    # Of what the camera sees, the top, a vertex on the side belongs to it by more than half.
+    # The camera sees the top; vertices of the sides count as visible above half the height.
     seen = surface[surface[:, 2] > SIZE[2] / 2 + 1e-9]
     clouds = [batch.points[row][: int(batch.count[row, 1])].numpy() for row in range(len(batch))]
     back = np.mean([np.mean(cKDTree(cloud).query(seen)[0]) for cloud in clouds]) * 1e3
     assert both - one == pytest.approx(back, rel=1e-4)
 
 
-def test_hidden_points_are_held_and_seen_ones_are_free():
+def test_hidden_points_are_held_and_visible_ones_are_free():
     body = Body.block(SIZE, NODES)
     batch, seen = _cloud(body), _seen(body)
     loss = SurfaceLoss(body, seen, hold=1.0)
@@ -126,12 +126,12 @@ def test_hidden_points_are_held_and_seen_ones_are_free():
     assert loss(shown, batch, batch.positions).hidden.item() < 1e-3
 
 
-def test_nothing_is_believed_where_nothing_was_seen():
+def test_points_without_measurements_have_full_weight():
     assert hold_weights(np.zeros(4)).tolist() == [1.0] * 4
     assert hold_weights(np.array([0.0, 100.0])).round(3).tolist() == [1.0, 0.0]
 
 
-def test_frame_without_points_counts_nothing_and_breaks_nothing():
+def test_frame_without_points_has_a_finite_loss_and_gradient():
     body = Body.block(SIZE, (4, 3, 2))
     batch = _cloud(body)
     batch.count[1] = 0

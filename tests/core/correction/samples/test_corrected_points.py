@@ -34,7 +34,7 @@ def test_top_is_the_upper_layer_of_the_block():
     assert np.allclose(top.voxel, body.voxel)
 
 
-def test_neighbours_of_a_hexahedral_mesh_are_those_along_its_axes():
+def test_edges_of_a_hexahedral_mesh_are_along_its_axes():
     grid = Body.block(SIZE, NODES)
     mesh = Body.of_mesh(box_mesh(SIZE, GridSpec(nodes=NODES)))
     assert {tuple(pair) for pair in mesh.edges.T} == {tuple(pair) for pair in grid.edges.T}
@@ -59,7 +59,7 @@ def test_body_without_a_grid_has_no_top_layer():
         _ = Body.of_mesh(box_mesh(SIZE, GridSpec(nodes=(4, 3, 2)))).upper
 
 
-def test_surface_of_tetrahedra_leaves_out_what_is_held():
+def test_surface_of_tetrahedra_excludes_the_base():
     mesh = filled_box(SIZE, 0.012)
     body = Body.of_mesh(mesh)
     places, hull = body.surface(body.rest), mesh.connectivity.hull

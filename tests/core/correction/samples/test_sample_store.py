@@ -6,7 +6,7 @@ from learned_samples import write_samples
 from scipy.spatial.transform import Rotation
 
 from palpate.correction import Body, make_samples, open_samples, recorder_for
-from palpate.correction.samples.record_samples import canonical_quaternions, tool_columns
+from palpate.correction.samples.tool_columns import canonical_quaternions, tool_columns
 from palpate.dataset import Kinematics, Sequence
 from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.foundation.errors import Cancelled, CorrectionError, RunError
@@ -16,7 +16,7 @@ from palpate.mesh.box_mesh import GridSpec
 from palpate.replay.replay import replay
 
 
-def test_samples_hold_what_the_replay_and_the_camera_say(bench):
+def test_samples_hold_the_replay_and_the_clouds(bench):
     samples, recorder = bench.samples, bench.recorder
     sequence = bench.dataset.sequence("poke-top-02")
     rows, times = samples.rows(["poke-top-02"]), np.asarray(sequence.cloud_times)
@@ -30,8 +30,8 @@ def test_samples_hold_what_the_replay_and_the_camera_say(bench):
         assert np.allclose(batch.tool[0, 10:], frames[number].force, atol=1e-5)
         count = int(batch.count[0, 1])
         cloud = camera_model_for(recorder.setup).place(sequence.cloud(number)).astype(np.float32)
-        kept = {tuple(point) for point in batch.points[0, :count].numpy().round(6)}
-        assert kept <= {tuple(point) for point in cloud.round(6)}
+        stored = {tuple(point) for point in batch.points[0, :count].numpy().round(6)}
+        assert stored <= {tuple(point) for point in cloud.round(6)}
         assert batch.points[0, count:].isnan().all()
 
 
@@ -44,7 +44,7 @@ def test_points_of_the_top_come_first(bench):
         assert heights[:upper].median() > heights[upper:].max() - 4e-3
 
 
-def test_what_the_camera_never_sees_is_known(bench):
+def test_points_inside_the_block_are_never_seen(bench):
     seen, rest = bench.samples.seen, bench.samples.body.rest
     assert (seen[np.isclose(rest[:, 2], rest[:, 2].max())] > 0).all()
     inside = np.all(
@@ -57,7 +57,7 @@ def test_what_the_camera_never_sees_is_known(bench):
     )
 
 
-def test_probes_are_counted_and_frames_clear_of_the_block_have_none(bench):
+def test_pushes_are_numbered_and_frames_clear_of_the_block_have_zero(bench):
     samples = bench.samples
     rows = samples.rows(["poke-top-01"])
     probe, tool = samples.column("probe", rows), samples.column("tool", rows)
@@ -75,7 +75,7 @@ def test_splits_are_those_of_the_dataset(bench):
     }
 
 
-def test_every_second_frame_by_two_processes_is_the_same_as_by_one(bench, tmp_path):
+def test_two_processes_make_the_same_samples_as_one(bench, tmp_path):
     names = bench.samples.sequences[:2]
     alone = make_samples(tmp_path / "alone", bench.recorder, sequences=names, every=8)
     shared = make_samples(tmp_path / "shared", bench.recorder, sequences=names, every=8, workers=2)
@@ -98,7 +98,7 @@ def test_cancelled_samples_leave_nothing_behind(bench, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_of_two_who_make_the_same_samples_one_is_told_that_they_are_there(bench, tmp_path):
+def test_samples_made_by_another_process_meanwhile_are_kept(bench, tmp_path):
     folder = tmp_path / "samples"
 
     def other(done, text):
@@ -121,7 +121,7 @@ def test_samples_of_an_arbitrary_mesh_are_its_nodes(bench, tmp_path):
         _ = samples.body.upper
 
 
-def test_batches_come_from_disk_in_the_order_asked_for(tmp_path):
+def test_batches_are_read_in_the_requested_order(tmp_path):
     samples = write_samples(tmp_path / "samples", rows=5)
     rows = np.array([14, 0, 7])
     batch = samples.batch(rows)
@@ -131,7 +131,7 @@ def test_batches_come_from_disk_in_the_order_asked_for(tmp_path):
     assert [len(part) for part in samples.batches(np.arange(15), 6)] == [6, 6, 3]
 
 
-def test_samples_that_are_not_there_or_not_whole_are_named(tmp_path):
+def test_missing_and_incomplete_samples_are_named(tmp_path):
     with pytest.raises(RunError, match="no samples"):
         open_samples(tmp_path)
     samples = write_samples(tmp_path / "samples", rows=2)
@@ -140,14 +140,14 @@ def test_samples_that_are_not_there_or_not_whole_are_named(tmp_path):
         samples.batch(np.arange(4))
 
 
-def test_samples_are_not_written_over(bench, tmp_path):
+def test_existing_samples_are_not_overwritten(bench, tmp_path):
     with pytest.raises(RunError, match="exists already"):
         make_samples(tmp_path, bench.recorder)
     with pytest.raises(CorrectionError, match="every"):
         make_samples(tmp_path / "new", bench.recorder, every=0)
 
 
-def test_rotation_and_its_opposite_quaternion_are_one():
+def test_opposite_quaternions_have_one_canonical_form():
     turned = Rotation.random(20, rng=np.random.default_rng(0)).as_quat()
     assert np.allclose(canonical_quaternions(turned), canonical_quaternions(-turned))
     assert np.allclose(
@@ -156,7 +156,7 @@ def test_rotation_and_its_opposite_quaternion_are_one():
     )
 
 
-def test_tool_is_told_in_the_phantom_frame(tmp_path):
+def test_tool_columns_are_in_the_phantom_frame(tmp_path):
     time = np.arange(0.0, 1.0, 0.01)
     path = np.array([0.1, 0.0, 0.0]) * time[:, None]
     sequence = Sequence(
