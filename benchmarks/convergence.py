@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from benchmarks.picture import picture
-from benchmarks.reference import compared, poke_frames, reference
-from benchmarks.stopwatch import timed
+from benchmarks.cpu_time import timed
+from benchmarks.plot_file import picture
+from benchmarks.reference_pokes import compared, poke_frames, reference
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.box_mesh import GridSpec
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from rich.table import Table
 
-from benchmarks.reference import SETUP
-from benchmarks.stopwatch import timed
+from benchmarks.cpu_time import timed
+from benchmarks.reference_pokes import SETUP
 from palpate.measurement.patch_averages import patch_means
 from palpate.measurement.surface_gaps import Surface, gaps
 from palpate.mesh.box_mesh import GridSpec

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from rich.table import Table
 
-from benchmarks.reference import SETUP, compared, poke_frames, reference
-from benchmarks.stopwatch import timed
+from benchmarks.cpu_time import timed
+from benchmarks.reference_pokes import SETUP, compared, poke_frames, reference
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.box_mesh import GridSpec
 from palpate.mesh.graded_mesh import PAGE_GRID, REPLAY_GRID

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from blind_results import result
 
-from benchmarks.calibrating import first_at, loss, warmest
+from benchmarks.temperature_choice import first_at, loss, warmest
 from palpate.blind.case_results import CaseResult
 from palpate.diagnosis.search.model_probabilities import probabilities
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from benchmarks.withheld import run
+from benchmarks.rejected_causes import run
 
 KEPT = Path(__file__).parents[3] / "benchmarks" / "blind"
 

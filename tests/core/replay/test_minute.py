@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.reference import SETUP
+from benchmarks.reference_pokes import SETUP
 from benchmarks.replay import RATE, motion
 from palpate.mesh.box_mesh import GridSpec
 from palpate.replay.replay import replay, require_converged

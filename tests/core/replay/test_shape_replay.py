@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from shapes import box_surface, dome
 
-from benchmarks.reference import SETUP, compared, reference
+from benchmarks.reference_pokes import SETUP, compared, reference
 from palpate.fem.model import BlockModel, ToolSphere
 from palpate.foundation.arrays import FloatArray
 from palpate.gradients.displacement_changes import displacement_changes

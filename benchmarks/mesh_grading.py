@@ -1,7 +1,7 @@
 """What a mesh's grading is worth where the tool may be, not only amid the top: seven pushes, each
 on every way to spend the nodes.
 
-`python -m benchmarks.gradings` solves them once more on a grid of 10 353 nodes, far finer than
+`python -m benchmarks.mesh_grading` solves them once more on a grid of 10 353 nodes, far finer than
 those compared, and stores that.
 """
 
@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from benchmarks.reference import SETUP
-from benchmarks.stopwatch import timed
+from benchmarks.cpu_time import timed
+from benchmarks.reference_pokes import SETUP
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.box_mesh import GridSpec
 from palpate.mesh.graded_mesh import FINE_GRID, PAGE_GRID, REPLAY_GRID
@@ -32,7 +32,7 @@ counted [1]."""
 HEAVY = replace(SETUP, load=Load(specific_weight_over_stiffness=1.8))
 SMOOTH, MOST_SAG = GridSpec(nodes=(33, 21, 19), spacing=1.5e-3, order=2), 30e-6
 """A mesh that knows the sag to a few um, and by how much that of a replay may be off [m]."""
-_FILE = Path(__file__).with_name("gradings.npz")
+_FILE = Path(__file__).with_name("mesh_grading.npz")
 GRIDS: dict[str, Meshing] = {
     "graded by size": REPLAY_GRID,
     "graded by size, fine": FINE_GRID,

@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from rich.table import Table
 
-from benchmarks.stopwatch import timed
+from benchmarks.cpu_time import timed
 from palpate.correction import (
     Corrector,
     NetworkSpec,

@@ -23,7 +23,7 @@ import numpy as np
 import websockets
 from rich.table import Table
 
-from benchmarks.recorded import CAMERA, RUN, SEQUENCE, cloud, write_place
+from benchmarks.made_up_run import CAMERA, RUN, SEQUENCE, cloud, write_place
 
 __all__ = ["run"]
 

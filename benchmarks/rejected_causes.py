@@ -1,7 +1,7 @@
 """Which causes of kept blind suites are withheld because they leave most of what is wrong, by the
 figures in their rows.
 
-`python -m benchmarks.withheld FILE ...`: of every row whose report names a cause that leaves
+`python -m benchmarks.rejected_causes FILE ...`: of every row whose report names a cause that leaves
 significant structure, how much of it, what share of the reducible error it removes on test
 sequences, and whether `palpate.diagnosis.validation.rejection` withholds it today.
 """

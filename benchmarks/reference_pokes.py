@@ -1,4 +1,4 @@
-"""The converged pokes that grids are judged by: `python -m benchmarks.reference` solves them once
+"""The converged pokes that grids are judged by: `python -m benchmarks.reference_pokes` solves them once
 more and writes them anew.
 
 Straight down in the middle of the top by 4 and 8 mm, on quadratic hexahedra with 0.6 mm between
@@ -35,7 +35,7 @@ SETUP = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3
 DEPTHS = (4e-3, 8e-3)
 _WAY = np.arange(1, 9) * 1e-3
 FINEST = GridSpec(nodes=(33, 25, 17), spacing=0.6e-3, order=2)
-_FILE = Path(__file__).with_name("reference.npz")
+_FILE = Path(__file__).with_name("reference_pokes.npz")
 
 
 @dataclass(frozen=True, eq=False)

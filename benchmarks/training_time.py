@@ -1,4 +1,4 @@
-"""`python -m benchmarks.learning FOLDER` trains the 2D network on 15 872 samples, as many as the
+"""`python -m benchmarks.training_time FOLDER` trains the 2D network on 15 872 samples, as many as the
 paper's, and times it.
 
 Twelve sequences at 30 frames a second: eight to learn from, two that stop the training, two to test

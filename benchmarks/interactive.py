@@ -7,7 +7,7 @@ import time
 import numpy as np
 from rich.table import Table
 
-from benchmarks.reference import SETUP
+from benchmarks.reference_pokes import SETUP
 from palpate.effects import effect_named
 from palpate.fem.newton import MAX_PENETRATION
 from palpate.foundation.arrays import FloatArray

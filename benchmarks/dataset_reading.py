@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from benchmarks.stopwatch import timed
+from benchmarks.cpu_time import timed
 from palpate.dataset import open_dataset
 
 __all__ = ["run", "write_recording"]

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from rich.table import Table
 
-from benchmarks.reference import SETUP
-from benchmarks.stopwatch import timed
+from benchmarks.cpu_time import timed
+from benchmarks.reference_pokes import SETUP
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
-from palpate.measurement.segmentation import Cleaner, ToolPose
+from palpate.measurement.segmentation import Cleaner
+from palpate.measurement.tool_pose import ToolPose
 
 __all__ = ["run"]
 

@@ -12,8 +12,8 @@ import numpy as np
 import scipy.sparse as sp
 from rich.table import Table
 
-from benchmarks.reference import SETUP
-from benchmarks.stopwatch import timed
+from benchmarks.cpu_time import timed
+from benchmarks.reference_pokes import SETUP
 from palpate.fem.linalg.direct_solver import Factor
 from palpate.fem.linalg.sparsity import SOLVERS, factor_of
 from palpate.fem.model import BlockModel

@@ -18,7 +18,7 @@ import torch
 from rich.table import Table
 from torch import Tensor, nn
 
-from benchmarks.stopwatch import timed
+from benchmarks.cpu_time import timed
 from palpate.correction import Batch, Body, CorrectionNetwork, NetworkSpec, SurfaceLoss, build
 from palpate.correction.networks.chamfer import Loss
 from palpate.correction.networks.unet import PaddedConvolution

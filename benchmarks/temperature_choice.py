@@ -1,7 +1,7 @@
 """The temperature of a diagnosis' probabilities, chosen on one half of a blind suite and judged on
 the other.
 
-`python -m benchmarks.calibrating results.jsonl`: cases by turns into either half; on each half the
+`python -m benchmarks.temperature_choice results.jsonl`: cases by turns into either half; on each half the
 temperature under which the sets of causes that were hidden are most probable, and on the other half
 the calibration error and the Brier score with it, beside those with the temperature that is in use.
 Cases outside the catalogue have no set that is right, and are left out.

@@ -7,24 +7,25 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
+from palpate.foundation.figure import new_figure, save_figure
 
 __all__ = ["picture"]
 
 
 @contextmanager
 def picture(file: Path, plots: int, size: tuple[float, float]) -> Iterator[list[Any]]:
-    """Axes side by side to draw into; at the end they get grid and legend, and are written to
-    `file`. Size in inches.
-    """
-    mpl.use("Agg")
-    from matplotlib import pyplot
+    """Yield axes side by side to draw into; then add grid and legend and write them to `file`.
 
-    figure, rows = pyplot.subplots(1, plots, figsize=size, layout="constrained", squeeze=False)
-    yield list(rows[0])
-    for axes in rows[0]:
+    Args:
+        file: PNG; its folder is made.
+        plots: number of axes.
+        size: width and height [inch].
+    """
+    figure = new_figure(*size)
+    row = figure.subplots(1, plots, squeeze=False)[0]
+    yield list(row)
+    for axes in row:
         axes.grid(visible=True, which="both", alpha=0.3)
         axes.legend(frameon=False)
     file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, dpi=120)
-    pyplot.close(figure)
+    save_figure(figure, file, dots_per_inch=120)

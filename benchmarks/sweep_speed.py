@@ -1,7 +1,7 @@
 """Points of a sweep: two processes against a plain loop in one; how many a minute, and whether both
 say the same.
 
-python -m benchmarks.sweeps [POINTS]
+python -m benchmarks.sweep_speed [POINTS]
 """
 
 from __future__ import annotations

@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 from rich.table import Table
 
-from benchmarks.reference import SETUP, compared, poke_centres, poke_frames, reference
+from benchmarks.cpu_time import timed
+from benchmarks.reference_pokes import SETUP, compared, poke_centres, poke_frames, reference
 from benchmarks.replay import RATE, motion
-from benchmarks.stopwatch import timed
 from palpate.mesh.box_mesh import GridSpec
 from palpate.mesh.gmsh_fill import TetSpec
 from palpate.mesh.protocol import Meshing

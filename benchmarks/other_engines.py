@@ -17,8 +17,8 @@ import numpy as np
 from rich.table import Table
 from scipy.interpolate import RegularGridInterpolator
 
-from benchmarks.reference import DEPTHS, SETUP, compared, reference, top_points
-from benchmarks.stopwatch import timed
+from benchmarks.cpu_time import timed
+from benchmarks.reference_pokes import DEPTHS, SETUP, compared, reference, top_points
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.box_mesh import GridSpec
 from palpate.mesh.graded_mesh import REPLAY_GRID, Grading

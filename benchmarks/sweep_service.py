@@ -1,7 +1,7 @@
 """Points of a sweep over REST, by two processes and by a dask cluster of two workers, against a
 plain loop in one process.
 
-python -m benchmarks.service [POINTS]
+python -m benchmarks.sweep_service [POINTS]
 """
 
 from __future__ import annotations

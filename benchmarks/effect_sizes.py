@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from rich.table import Table
 from scipy.interpolate import LinearNDInterpolator
 
-from benchmarks.reference import SETUP
-from benchmarks.stopwatch import timed
+from benchmarks.cpu_time import timed
+from benchmarks.reference_pokes import SETUP
 from palpate.effects.base import Effect
 from palpate.effects.elastic_material import PoissonRatio, StiffInclusion
 from palpate.effects.load import Gravity
