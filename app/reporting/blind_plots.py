@@ -8,9 +8,10 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from palpate.app.reporting.html_document import INK, figure, themed
+from palpate.app.reporting.html_document import INK, themed
 from palpate.app.reporting.quantities import SHOWN
 from palpate.blind.parameter_errors import ReportedParameter
+from palpate.foundation.figure import new_figure
 
 __all__ = ["gain_plot", "parameter_plot", "reliability_plot"]
 
@@ -21,7 +22,7 @@ def reliability_plot(curve: Sequence[dict[str, Any]]) -> str:
     """Stated probability against the share that is true, with binomial intervals; the area of a
     point grows with its cases.
     """
-    drawn = figure(4.6, 3.8)
+    drawn = new_figure(4.6, 3.8)
     axes = drawn.subplots()
     axes.plot([0, 1], [0, 1], color=INK["text-3"], linewidth=1, linestyle=(0, (4, 3)))
     for row in curve:
@@ -64,7 +65,7 @@ def gain_plot(removed: Sequence[float]) -> str:
     """How many cases by the share of the reducible error that is removed; below zero counts as
     zero.
     """
-    drawn = figure(4.6, 3.8)
+    drawn = new_figure(4.6, 3.8)
     axes = drawn.subplots()
     shares = [100 * min(max(share, 0.0), 1.0) for share in removed]
     axes.hist(shares, bins=list(range(0, 101, 5)), color=INK["extended"], rwidth=0.86)
@@ -92,7 +93,7 @@ def parameter_plot(groups: dict[str, list[ReportedParameter]]) -> str:
     if not groups:
         return ""
     rows = math.ceil(len(groups) / _COLUMNS)
-    drawn = figure(2.5 * _COLUMNS, 2.5 * rows)
+    drawn = new_figure(2.5 * _COLUMNS, 2.5 * rows)
     panels = drawn.subplots(rows, _COLUMNS, squeeze=False).ravel()
     for axes, (key, said) in zip(panels, groups.items(), strict=False):
         factor, unit = SHOWN.get(said[0].unit, (1.0, said[0].unit))

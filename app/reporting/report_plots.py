@@ -8,26 +8,27 @@ from typing import Any
 
 import numpy as np
 
-from palpate.app.reporting.html_document import INK, figure, themed
-from palpate.app.storage.run_store import Replay
+from palpate.app.reporting.html_document import INK, themed
+from palpate.app.storage.run_store import RecordedReplay
+from palpate.foundation.figure import new_figure
 
 __all__ = ["drawn_errors", "error_plots"]
 
 _COLUMNS, _HEADROOM = 3, 1.06
 
 
-def error_plots(replays: Sequence[Replay], splits: dict[str, str]) -> str:
+def error_plots(replays: Sequence[RecordedReplay], splits: dict[str, str]) -> str:
     """RMS distance [mm] over time [s], one panel for each sequence on a common scale: stated and
     extended model, noise floor.
     """
     return themed(drawn_errors(replays, splits)) if replays else ""
 
 
-def drawn_errors(replays: Sequence[Replay], splits: dict[str, str]) -> Any:
+def drawn_errors(replays: Sequence[RecordedReplay], splits: dict[str, str]) -> Any:
     """The same as a figure; at least one replay."""
     columns = min(_COLUMNS, len(replays))
     rows = math.ceil(len(replays) / columns)
-    drawn = figure(3.0 * columns, 1.9 * rows)
+    drawn = new_figure(3.0 * columns, 1.9 * rows)
     panels = drawn.subplots(rows, columns, squeeze=False, sharey=True).ravel()
     for axes, replay in zip(panels, replays, strict=False):
         time = np.asarray(replay["time"]) - replay["time"][0]
@@ -53,7 +54,7 @@ def drawn_errors(replays: Sequence[Replay], splits: dict[str, str]) -> Any:
     return drawn
 
 
-def _largest(replay: Replay) -> float:
+def _largest(replay: RecordedReplay) -> float:
     """Of errors and floor [m]; NaN is a frame without a comparison."""
     curves = [np.asarray(replay[f"distance_{model}"]) for model in ("raw", "extended")]
     return float(np.nanmax(np.concatenate([*curves, [float(replay["noise_floor"]), 1e-6]])))

@@ -4,7 +4,6 @@ paths coloured by depth.
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +12,7 @@ import numpy as np
 from palpate.dataset.folder import Dataset
 from palpate.dataset.tool_motion import box_gap, describe_motion, smooth_path
 from palpate.foundation.arrays import FloatArray
+from palpate.foundation.figure import new_figure, save_figure
 from palpate.foundation.frames import Transform
 
 if TYPE_CHECKING:
@@ -62,18 +62,13 @@ def coverage_picture(dataset: Dataset, phantom_from_robot: Transform, path: Path
         },
     )
     _draw_legend(axes["legend"], dataset, colours, norm)
-    aside = path.with_name(f".{path.name}.part")
-    figure.savefig(aside, dpi=130, format="png")
-    os.replace(aside, path)
+    save_figure(figure, path)
 
 
 def _figure(dataset: Dataset) -> tuple[Figure, dict[str, Axes]]:
     """Axes placed by hand, so that all views have one scale and the upper one stands straight above
     the lower one.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     x, y, z = (1e3 * length for length in dataset.config.size)
     left, right, upper, lower = (
         x + 2 * _MARGIN,
@@ -83,8 +78,7 @@ def _figure(dataset: Dataset) -> tuple[Figure, dict[str, Axes]]:
     )
     scale = 8.4 / (left + right)  # inches per mm
     width, height = scale * (left + right) + 2.0, scale * (upper + lower) + 2.3
-    figure = Figure(figsize=(width, height), facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = new_figure(width, height, layout=None, facecolor="white")
 
     def axes(across: float, up: float, wide: float, high: float) -> Axes:
         return figure.add_axes(

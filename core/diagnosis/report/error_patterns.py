@@ -19,6 +19,7 @@ from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DiagnosisError
+from palpate.foundation.figure import new_figure, save_figure
 from palpate.measurement.surface_gaps import SIDES, Surface
 
 __all__ = ["ErrorPatterns", "draw_patterns", "error_patterns"]
@@ -146,13 +147,9 @@ def draw_patterns(found: ErrorPatterns, surface: Surface, path: Path) -> None:
     """Both patterns, or the error alone where no cause is named, on the unfolded block, one colour
     scale in mm, as PNG.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     shown = [("measured error", found.measured), ("predicted by the cause", found.predicted)]
     shown = shown if np.nan_to_num(found.predicted).any() else shown[:1]
-    figure = Figure(figsize=(1.4 + 4.3 * len(shown), 4.6), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(1.4 + 4.3 * len(shown), 4.6)
     sizes = np.abs(np.concatenate([found.measured, found.predicted]))
     seen = sizes[np.isfinite(sizes)]
     limit = max(1e3 * float(np.quantile(seen, 0.98)), 0.05) if len(seen) else 1.0
@@ -168,7 +165,7 @@ def draw_patterns(found: ErrorPatterns, surface: Surface, path: Path) -> None:
         shrink=0.7,
         label="surface higher (+) or lower (-) than the simulation [mm]",
     )
-    figure.savefig(path, dpi=130)
+    save_figure(figure, path)
 
 
 def _unfold(

@@ -14,6 +14,7 @@ from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.report.force_report import PushForces
 from palpate.diagnosis.report.inclusion_footprint import Footprint
 from palpate.foundation.arrays import FloatArray
+from palpate.foundation.figure import new_figure, save_figure
 from palpate.setup.setup import Box, Shape
 
 if TYPE_CHECKING:
@@ -32,12 +33,8 @@ def draw_palpation(
     cause: dict[str, Any] | None,
 ) -> None:
     """As PNG; `cause` is the lump's row of the report, with its place, depth and cover."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     wide = cause is not None
-    figure = Figure(figsize=(12.0 if wide else 6.2, 5.2), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(12.0 if wide else 6.2, 5.2)
     axes = figure.subplots(1, 2 if wide else 1, squeeze=False)[0]
     drawn = _from_above(axes[0], body, pushes, shown, cause)
     bar = figure.colorbar(drawn, ax=axes[0], location="bottom", shrink=0.7, aspect=32, pad=0.02)
@@ -46,7 +43,7 @@ def draw_palpation(
     if cause is not None:
         _cut(axes[1], body, cause)
         figure.legend(loc="outside lower right", ncols=2, frameon=False, fontsize=9)
-    figure.savefig(path, dpi=130)
+    save_figure(figure, path)
 
 
 def _from_above(
