@@ -36,9 +36,9 @@ from palpate.app.schemas import PROBLEMS
 from palpate.app.server import viser_proxy as relay
 from palpate.app.server.login import Login
 from palpate.app.server.login import router as login_router
-from palpate.app.server.request_guard import Guard
+from palpate.app.server.request_guard import RequestGuard
 from palpate.app.server.tokens import Token
-from palpate.app.services import Desk
+from palpate.app.services import Services
 from palpate.app.settings import Settings
 from palpate.foundation.errors import PalpateError
 
@@ -77,9 +77,9 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        app.state.desk = Desk.open(settings, dict(targets))
+        app.state.services = Services.open(settings, dict(targets))
         yield
-        app.state.desk.close()
+        app.state.services.close()
 
     app = FastAPI(
         title="Palpate",
@@ -91,7 +91,7 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
     )
     app.state.ending = threading.Event()
     app.state.settings, app.state.login = settings, login
-    app.add_middleware(Guard, settings=settings, login=login)
+    app.add_middleware(RequestGuard, settings=settings, login=login)
     for module in MODULES:
         app.include_router(module.router, prefix="/api", responses=PROBLEMS)
     app.include_router(relay.router)

@@ -6,8 +6,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-from palpate.app.jobs.job_records import Job
-
 __all__ = [
     "PROBLEMS",
     "DiagnosisRequest",
@@ -198,16 +196,6 @@ class JobOut(BaseModel):
     attempt: int
     remaining: float | None
     can_retry: bool
-
-    @classmethod
-    def of(cls, job: Job) -> JobOut:
-        """The public part of a record."""
-        shown = {
-            name: getattr(job, name)
-            for name in cls.model_fields
-            if name not in ("dataset", "can_retry")
-        }
-        return cls(dataset=job.request.get("name"), can_retry=job.state.can_be_retried, **shown)
 
 
 class NoteOut(BaseModel):

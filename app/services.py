@@ -3,54 +3,59 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import Depends, Header
 from starlette.requests import HTTPConnection
 
-from palpate.app.jobs.job_queue import Jobs
+from palpate.app.jobs.job_queue import JobQueue
 from palpate.app.jobs.job_records import Job
-from palpate.app.jobs.whatif_process import Lives, WhatIfs
-from palpate.app.scene.manual_registration import Clickings
+from palpate.app.jobs.whatif_process import FrameSolver, InteractiveSolver
+from palpate.app.scene.manual_registration import ManualRegistrations
 from palpate.app.scene.page_session import Sessions
-from palpate.app.scene.viser_server import Audience, Stage
+from palpate.app.scene.phantom import open_phantom
+from palpate.app.scene.viser_server import SceneListener, ViewerServer
 from palpate.app.settings import Settings
 from palpate.app.storage.dataset_import import STAGING
 from palpate.app.storage.dataset_library import Library
 from palpate.app.storage.disk_usage import Disk
-from palpate.app.storage.registration_store import Registrations
-from palpate.app.storage.run_store import Runs
+from palpate.app.storage.registration_store import RegistrationStore
+from palpate.app.storage.run_store import RunStore
 
-__all__ = ["Desk", "DeskOf", "KeyOf"]
+__all__ = ["Services", "CurrentServices", "IdempotencyKey"]
 
 
 @dataclass(frozen=True)
-class Desk:
+class Services:
     """The parts of a running server."""
 
     settings: Settings
     library: Library
-    runs: Runs
-    jobs: Jobs
+    runs: RunStore
+    jobs: JobQueue
     disk: Disk
     sessions: Sessions
-    stage: Stage
-    clickings: Clickings
-    whatifs: WhatIfs
-    lives: Lives
+    viewer: ViewerServer
+    manual_registrations: ManualRegistrations
+    frame_solver: FrameSolver
+    interactive_solver: InteractiveSolver
 
     @classmethod
-    def open(cls, settings: Settings, targets: dict[str, str]) -> Desk:
+    def open(cls, settings: Settings, targets: dict[str, str]) -> Services:
         """Start the job queue and the inner viewer."""
-        runs = Runs(settings.runs)
+        runs = RunStore(settings.runs)
         sessions, library = Sessions(runs), Library(settings.datasets)
-        clickings, disk = Clickings(library.phantom), Disk(settings.runs, settings.disk_limit)
+        manual_registrations, disk = (
+            ManualRegistrations(partial(open_phantom, library)),
+            Disk(settings.runs, settings.disk_limit),
+        )
         return cls(
             settings=settings,
             library=library,
             runs=runs,
-            jobs=Jobs(
+            jobs=JobQueue(
                 settings.runs,
                 targets,
                 settings.preload,
@@ -59,14 +64,14 @@ class Desk:
             ),
             disk=disk,
             sessions=sessions,
-            stage=Stage(
-                Audience(sessions.join, sessions.leave),
-                Audience(clickings.join, clickings.leave),
-                clickings.click,
+            viewer=ViewerServer(
+                SceneListener(sessions.join, sessions.leave),
+                SceneListener(manual_registrations.join, manual_registrations.leave),
+                manual_registrations.click,
             ),
-            clickings=clickings,
-            whatifs=WhatIfs(),
-            lives=Lives(),
+            manual_registrations=manual_registrations,
+            frame_solver=FrameSolver(),
+            interactive_solver=InteractiveSolver(),
         )
 
     def diagnose(
@@ -96,7 +101,7 @@ class Desk:
         """
         if registration is None:
             return {}
-        accepted = Registrations(self.settings.runs).accepted(dataset, registration)
+        accepted = RegistrationStore(self.settings.runs, dataset).accepted(registration)
         accepted.check(self.library.path(dataset))
         return {"registration": accepted.to_json()}
 
@@ -112,9 +117,9 @@ class Desk:
     def close(self) -> None:
         """Cancel what runs and stop the inner viewer."""
         self.jobs.close()
-        self.stage.close()
-        self.whatifs.close()
-        self.lives.close()
+        self.viewer.close()
+        self.frame_solver.close()
+        self.interactive_solver.close()
 
 
 def _tidied(disk: Disk) -> str:
@@ -125,14 +130,14 @@ def _tidied(disk: Disk) -> str:
     return f"dropped {now.dropped / 2**20:.0f} MiB of the oldest caches" if now.dropped else ""
 
 
-def _desk(connection: HTTPConnection) -> Desk:
-    desk: Desk = connection.app.state.desk
-    return desk
+def _services(connection: HTTPConnection) -> Services:
+    services: Services = connection.app.state.services
+    return services
 
 
-DeskOf = Annotated[Desk, Depends(_desk)]
+CurrentServices = Annotated[Services, Depends(_services)]
 
-KeyOf = Annotated[
+IdempotencyKey = Annotated[
     str | None,
     Header(
         alias="Idempotency-Key",

@@ -9,6 +9,8 @@ from pathlib import Path
 
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from palpate.app.static_files import STATIC_FOLDER
+
 __all__ = ["Settings"]
 
 
@@ -42,7 +44,7 @@ class Settings(BaseSettings):
     datasets: Path = Path("datasets")
     workers: int = 2
     scheduler: str | None = None
-    static: Path = Path(__file__).resolve().parent.parent / "static"
+    static: Path = STATIC_FOLDER
     preload: tuple[str, ...] = (
         "palpate.app.jobs.tasks",
         "palpate.dataset",

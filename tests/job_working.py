@@ -14,7 +14,7 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
-from palpate.app.jobs.job_queue import Jobs
+from palpate.app.jobs.job_queue import JobQueue
 from palpate.app.jobs.job_records import Job
 from palpate.foundation.errors import Cancelled, DatasetError
 from palpate.foundation.progress import Report
@@ -101,12 +101,12 @@ TARGETS = {
 }
 
 
-def ended(jobs: Jobs, job: Job) -> Job:
+def ended(jobs: JobQueue, job: Job) -> Job:
     """The job once it has ended."""
     return reached(jobs, job, lambda now: now.state.is_finished)
 
 
-def reached(jobs: Jobs, job: Job, true: Callable[[Job], bool]) -> Job:
+def reached(jobs: JobQueue, job: Job, true: Callable[[Job], bool]) -> Job:
     """The job once something holds of it."""
     end = time.monotonic() + 120
     while not true(now := jobs.get(job.id)):

@@ -6,11 +6,12 @@ from typing import Any
 
 from fastapi import APIRouter, Response
 
+from palpate.app.api.job_results import job_out
 from palpate.app.http_errors import Conflict
 from palpate.app.jobs.job_records import JobState
 from palpate.app.schemas import DiagnosisRequest, JobOut
-from palpate.app.server.pagination import PageOf, part_of
-from palpate.app.services import DeskOf, KeyOf
+from palpate.app.server.pagination import RequestedPage, paginate
+from palpate.app.services import CurrentServices, IdempotencyKey
 
 __all__ = ["router"]
 
@@ -18,36 +19,38 @@ router = APIRouter(prefix="/diagnoses", tags=["diagnoses"])
 
 
 @router.post("", status_code=202)
-def start(request: DiagnosisRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
+def start(
+    request: DiagnosisRequest, services: CurrentServices, key: IdempotencyKey = None
+) -> JobOut:
     """Check the dataset completely, then queue its diagnosis; the answer's id names the job now and
     the run later.
     """
-    dataset = desk.library.open(request.dataset)
+    dataset = services.library.open(request.dataset)
     dataset.validate()
-    return JobOut.of(
-        desk.diagnose(dataset.path, request.dataset, request.seed, key, request.registration)
+    return job_out(
+        services.diagnose(dataset.path, request.dataset, request.seed, key, request.registration)
     )
 
 
 @router.get("")
-def listed(desk: DeskOf, response: Response, page: PageOf) -> list[JobOut]:
+def listed(services: CurrentServices, response: Response, page: RequestedPage) -> list[JobOut]:
     """Diagnoses that were asked for here, the newest first; the header X-Total-Count says how many
     there are.
     """
-    found = [job for job in desk.jobs.all() if job.kind == "diagnosis"]
-    return [JobOut.of(job) for job in part_of(found, page, response)]
+    found = [job for job in services.jobs.all() if job.kind == "diagnosis"]
+    return [job_out(job) for job in paginate(found, page, response)]
 
 
 @router.get("/{identity}")
-def one(identity: str, desk: DeskOf) -> JobOut:
+def one(identity: str, services: CurrentServices) -> JobOut:
     """One diagnosis."""
-    return JobOut.of(desk.jobs.get(identity))
+    return job_out(services.jobs.get(identity))
 
 
 @router.get("/{identity}/report")
-def report(identity: str, desk: DeskOf) -> dict[str, Any]:
+def report(identity: str, services: CurrentServices) -> dict[str, Any]:
     """The report of a finished diagnosis; 409 while there is none."""
-    job = desk.jobs.get(identity)
+    job = services.jobs.get(identity)
     if job.state is not JobState.DONE:
         reason = f": {job.error['message']}" if job.error else ""
         raise Conflict(
@@ -55,4 +58,4 @@ def report(identity: str, desk: DeskOf) -> dict[str, Any]:
             job=identity,
             state=job.state.value,
         )
-    return desk.runs.get(identity).report
+    return services.runs.get(identity).report

@@ -7,7 +7,7 @@ from typing import Any
 
 from fastapi import APIRouter
 
-from palpate.app.services import DeskOf
+from palpate.app.services import CurrentServices
 
 __all__ = ["router"]
 
@@ -15,16 +15,16 @@ router = APIRouter(prefix="/disk", tags=["disk"])
 
 
 @router.get("")
-def usage(desk: DeskOf) -> dict[str, Any]:
+def usage(services: CurrentServices) -> dict[str, Any]:
     """Bytes below the runs folder: all, what of it are caches, and the limit beyond which the
     oldest caches are dropped.
     """
-    return asdict(desk.disk.usage())
+    return asdict(services.disk.usage())
 
 
 @router.post("/empty")
-def empty(desk: DeskOf) -> dict[str, Any]:
+def empty(services: CurrentServices) -> dict[str, Any]:
     """Drop all caches: what is lost can be worked out once more. Results, and archives that wait
     for their import, stay.
     """
-    return asdict(desk.disk.trim(0, desk.awaited()))
+    return asdict(services.disk.trim(0, services.awaited()))

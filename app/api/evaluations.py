@@ -1,4 +1,4 @@
-"""Evaluations: the ladder of a dataset's test sequences."""
+"""Evaluations: errors of the models and networks on the test sequences of a dataset."""
 
 from __future__ import annotations
 
@@ -8,11 +8,19 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.config import JsonDict
 
+from palpate.app.api.job_results import (
+    cancel_job,
+    job_of,
+    job_out,
+    listed_result,
+    names_and_jobs,
+    result_and_job,
+)
 from palpate.app.schemas import JobOut
-from palpate.app.server.pagination import PageOf, part_of
-from palpate.app.services import DeskOf, KeyOf
-from palpate.app.storage.evaluation_store import Evaluations, networks_for
-from palpate.app.storage.training_store import Trainings
+from palpate.app.server.pagination import RequestedPage, paginate
+from palpate.app.services import CurrentServices, IdempotencyKey
+from palpate.app.storage.evaluation_store import EvaluationStore, networks_for
+from palpate.app.storage.training_store import TrainingStore
 
 __all__ = ["EvaluationRequest", "router"]
 
@@ -21,10 +29,10 @@ EXAMPLE: JsonDict = {"dataset": "block-01"}
 
 
 class EvaluationRequest(BaseModel):
-    """Which dataset, beside which run's extended model, with which trainings; the newest ones where
-    none is named.
+    """A dataset, a run whose extended model is evaluated too, and trainings.
 
-    With the feedback `follow` the simulation answers for the points that a network does not see.
+    Without named trainings the newest suitable ones are used. With the feedback `follow` the
+    simulation moves the points that a network does not see.
     """
 
     model_config = ConfigDict(
@@ -39,37 +47,46 @@ class EvaluationRequest(BaseModel):
 
 
 @router.post("", status_code=202)
-def start(request: EvaluationRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
-    """Check what is asked, then queue it; the answer's id names job and evaluation."""
-    dataset, settings = desk.library.open(request.dataset), desk.settings
+def start(
+    request: EvaluationRequest, services: CurrentServices, key: IdempotencyKey = None
+) -> JobOut:
+    """Check the request, then queue it; the id of the answer names job and evaluation."""
+    dataset, settings = services.library.open(request.dataset), services.settings
     if request.run is not None:
-        desk.runs.get(request.run)
-    networks_for(Trainings(settings.runs), dataset.path, request.run, request.trainings)
-    said = {
+        services.runs.get(request.run)
+    networks_for(TrainingStore(settings.runs), dataset.path, request.run, request.trainings)
+    job_request = {
         "dataset": str(dataset.path),
         "name": request.dataset,
         "runs": str(settings.runs),
         "workers": settings.workers,
         **request.model_dump(include={"run", "trainings", "feedback", "seed"}),
     }
-    return JobOut.of(desk.jobs.submit("evaluation", said, f"evaluation-{request.dataset}", key))
+    label = f"evaluation-{request.dataset}"
+    return job_out(services.jobs.submit("evaluation", job_request, label, key))
 
 
 @router.get("")
-def listed(desk: DeskOf, response: Response, page: PageOf) -> list[dict[str, Any]]:
-    """Evaluations, the newest first, each with its job where that is still known; X-Total-Count
-    says how many there are.
+def listed(
+    services: CurrentServices, response: Response, page: RequestedPage
+) -> list[dict[str, Any]]:
+    """Evaluations, the newest first, each with its job where that is still recorded.
+
+    The header X-Total-Count has their number.
     """
-    return list(part_of(Evaluations(desk.settings.runs).listed(desk), page, response))
+    store = EvaluationStore(services.settings.runs)
+    rows = paginate(names_and_jobs(store, services), page, response)
+    return [listed_result(store, name, job) for name, job in rows]
 
 
 @router.get("/{identity}")
-def one(identity: str, desk: DeskOf) -> dict[str, Any]:
-    """One evaluation: its job, and the ladder once it has ended."""
-    return Evaluations(desk.settings.runs).one(identity, desk)
+def one(identity: str, services: CurrentServices) -> dict[str, Any]:
+    """One evaluation: its job, and the errors once it has ended."""
+    store = EvaluationStore(services.settings.runs)
+    return result_and_job(store, identity, job_of(store, identity, services))
 
 
 @router.post("/{identity}/cancel")
-def cancel(identity: str, desk: DeskOf) -> JobOut:
+def cancel(identity: str, services: CurrentServices) -> JobOut:
     """Stop it. 409 if it has ended already."""
-    return Evaluations(desk.settings.runs).cancel(identity, desk)
+    return cancel_job(EvaluationStore(services.settings.runs), identity, services)

@@ -14,10 +14,11 @@ from uuid import uuid4
 from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
 
+from palpate.app.api.job_results import job_out
 from palpate.app.http_errors import Conflict
 from palpate.app.jobs.job_records import Job
 from palpate.app.schemas import JobOut
-from palpate.app.services import Desk, DeskOf, KeyOf
+from palpate.app.services import CurrentServices, IdempotencyKey, Services
 from palpate.app.storage.archive import is_archive
 from palpate.app.storage.dataset_import import UPLOADS, check_name
 from palpate.foundation.errors import DatasetError
@@ -50,26 +51,26 @@ class FolderRequest(BaseModel):
 @router.post("", status_code=202, openapi_extra=_BODY)
 async def upload(
     request: Request,
-    desk: DeskOf,
+    services: CurrentServices,
     name: Annotated[str, Query(min_length=1, max_length=64)],
-    key: KeyOf = None,
+    key: IdempotencyKey = None,
 ) -> JobOut:
     """Take the body as an archive and queue its import: checked whole, then a dataset of this name,
     or nothing.
     """
-    _free(name, desk)
-    archive = await _received(request, desk)
-    return JobOut.of(_queue(desk, name, {"archive": str(archive)}, key))
+    _free(name, services)
+    archive = await _received(request, services)
+    return job_out(_queue(services, name, {"archive": str(archive)}, key))
 
 
 @router.post("/folder", status_code=202)
-def folder(request: FolderRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
+def folder(request: FolderRequest, services: CurrentServices, key: IdempotencyKey = None) -> JobOut:
     """Queue the import of a folder on the server's disk, from where that is allowed; it is copied,
     never changed.
     """
-    _free(request.name, desk)
+    _free(request.name, services)
     path = Path(request.folder).resolve()
-    allowed = desk.settings.import_roots
+    allowed = services.settings.import_roots
     if allowed is not None and not any(path.is_relative_to(root.resolve()) for root in allowed):
         raise DatasetError(
             f"{request.folder} may not be imported from: start the server with --import-from FOLDER for one that may",
@@ -77,34 +78,34 @@ def folder(request: FolderRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
         )
     if not path.is_dir():
         raise DatasetError(f"{request.folder} is no folder that the server can read", key="folder")
-    return JobOut.of(_queue(desk, request.name, {"folder": str(path)}, key))
+    return job_out(_queue(services, request.name, {"folder": str(path)}, key))
 
 
-def _free(name: str, desk: Desk) -> None:
+def _free(name: str, services: Services) -> None:
     try:
-        check_name(name, desk.settings.datasets)
+        check_name(name, services.settings.datasets)
     except DatasetError as error:
         if "already" in error.message:
             raise Conflict(error.message, **error.where) from error
         raise
 
 
-def _queue(desk: Desk, name: str, source: dict[str, str], key: str | None) -> Job:
-    settings = desk.settings
+def _queue(services: Services, name: str, source: dict[str, str], key: str | None) -> Job:
+    settings = services.settings
     said = {
         **source,
         "name": name,
         "datasets": str(settings.datasets),
         "most": settings.largest_dataset,
     }
-    return desk.jobs.submit("import", said, f"import-{name}", key)
+    return services.jobs.submit("import", said, f"import-{name}", key)
 
 
-async def _received(request: Request, desk: Desk) -> Path:
+async def _received(request: Request, services: Services) -> Path:
     """The body as a file below the uploads, named by its digest: the same archive sent twice is one
     file.
     """
-    folder = desk.settings.runs / UPLOADS
+    folder = services.settings.runs / UPLOADS
     folder.mkdir(parents=True, exist_ok=True)
     coming, digest = folder / f".{uuid4().hex}.part", hashlib.sha256()
     try:

@@ -10,9 +10,10 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
+from palpate.app.api.job_results import job_out
 from palpate.app.schemas import JobOut, NoteOut, Notes
-from palpate.app.server.pagination import TOTAL, PageOf
-from palpate.app.services import Desk, DeskOf
+from palpate.app.server.pagination import TOTAL, RequestedPage
+from palpate.app.services import CurrentServices, Services
 
 __all__ = ["router"]
 
@@ -23,60 +24,62 @@ SHOWN = 50
 
 
 @router.get("")
-def listed(desk: DeskOf, response: Response, page: PageOf) -> list[JobOut]:
+def listed(services: CurrentServices, response: Response, page: RequestedPage) -> list[JobOut]:
     """Jobs, the newest first; the header X-Total-Count says how many there are."""
-    response.headers[TOTAL] = str(desk.jobs.count())
-    return [JobOut.of(job) for job in desk.jobs.all(page.most, page.after)]
+    response.headers[TOTAL] = str(services.jobs.count())
+    return [job_out(job) for job in services.jobs.all(page.most, page.after)]
 
 
 @router.get("/events")
-def events(request: Request, desk: DeskOf) -> StreamingResponse:
+def events(request: Request, services: CurrentServices) -> StreamingResponse:
     """The newest jobs, at most 50, as server-sent events: at once, and after each change."""
     return StreamingResponse(
-        _changes(request, desk),
+        _changes(request, services),
         media_type="text/event-stream",
         headers={"cache-control": "no-cache"},
     )
 
 
 @router.get("/{identity}")
-def one(identity: str, desk: DeskOf) -> JobOut:
+def one(identity: str, services: CurrentServices) -> JobOut:
     """One job: how far it is, or how it ended."""
-    return JobOut.of(desk.jobs.get(identity))
+    return job_out(services.jobs.get(identity))
 
 
 @router.post("/{identity}/cancel")
-def cancel(identity: str, desk: DeskOf) -> JobOut:
+def cancel(identity: str, services: CurrentServices) -> JobOut:
     """Stop a job; 409 if it has ended already."""
-    return JobOut.of(desk.jobs.cancel(identity))
+    return job_out(services.jobs.cancel(identity))
 
 
 @router.post("/{identity}/retry", status_code=202)
-def retry(identity: str, desk: DeskOf) -> JobOut:
+def retry(identity: str, services: CurrentServices) -> JobOut:
     """Have a job that failed, was cancelled or interrupted done once more, under its name; 409 if
     it runs, waits or is done.
     """
-    return JobOut.of(desk.jobs.retry(identity))
+    return job_out(services.jobs.retry(identity))
 
 
 @router.get("/{identity}/log")
-def notes(identity: str, desk: DeskOf, after: Annotated[int, Query(ge=0, le=10**9)] = 0) -> Notes:
+def notes(
+    identity: str, services: CurrentServices, after: Annotated[int, Query(ge=0, le=10**9)] = 0
+) -> Notes:
     """What a job did, and of what it was warned, from the `after`-th line on: at most 1000
     lines."""
     found = [
         NoteOut(at=note.at, level=note.level, text=note.text)
-        for note in desk.jobs.notes(identity, after)
+        for note in services.jobs.notes(identity, after)
     ]
     return Notes(notes=found, next=after + len(found))
 
 
-async def _changes(request: Request, desk: Desk) -> AsyncIterator[str]:
+async def _changes(request: Request, services: Services) -> AsyncIterator[str]:
     seen, quiet = -1, 0.0
     while not request.app.state.ending.is_set() and not await request.is_disconnected():
-        version = desk.jobs.version
+        version = services.jobs.version
         if version != seen:
-            jobs = await asyncio.to_thread(desk.jobs.all, SHOWN)
-            yield f"data: {json.dumps([JobOut.of(job).model_dump() for job in jobs])}\n\n"
+            jobs = await asyncio.to_thread(services.jobs.all, SHOWN)
+            yield f"data: {json.dumps([job_out(job).model_dump() for job in jobs])}\n\n"
             seen, quiet = version, 0.0
         elif quiet >= KEEP_ALIVE:
             yield ": still here\n\n"

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 from palpate.app.scene.registration_scene import Ray
 from palpate.app.schemas import Point, Shown
 from palpate.app.server.viser_proxy import PageId
-from palpate.app.services import DeskOf
+from palpate.app.services import CurrentServices
 
 __all__ = ["router"]
 
@@ -59,41 +59,43 @@ class Aim(BaseModel):
 
 
 @router.post("")
-def show(page: PageId, shown: Shown, desk: DeskOf) -> dict[str, Any]:
+def show(page: PageId, shown: Shown, services: CurrentServices) -> dict[str, Any]:
     """Show rest cloud and phantom with these pairs; says how many points and ends are drawn, and by
     which pose the cloud is [m].
     """
-    return desk.clickings.open(page).show(shown)
+    return services.manual_registrations.open(page).show(shown)
 
 
 @router.post("/look", status_code=204)
-def look(page: PageId, desk: DeskOf) -> None:
+def look(page: PageId, services: CurrentServices) -> None:
     """Turn the camera to cloud and phantom."""
-    desk.clickings.open(page).look()
+    services.manual_registrations.open(page).look()
 
 
 @router.post("/nudge")
-def nudge(page: PageId, asked: Nudge, desk: DeskOf) -> dict[str, Any]:
+def nudge(page: PageId, asked: Nudge, services: CurrentServices) -> dict[str, Any]:
     """A point moved a little on its surface, as an arrow key asks for it; 404 while no scene is
     open.
     """
     return {
-        "point": desk.clickings.open(page).nudge(asked.side, asked.point, asked.right, asked.up)
+        "point": services.manual_registrations.open(page).nudge(
+            asked.side, asked.point, asked.right, asked.up
+        )
     }
 
 
 @router.post("/pick")
-def pick(page: PageId, aim: Aim, desk: DeskOf) -> dict[str, Any]:
+def pick(page: PageId, aim: Aim, services: CurrentServices) -> dict[str, Any]:
     """The point that a ray means on the side that is picked on: what a click in the scene would
     give.
     """
-    return desk.clickings.open(page).pick(
+    return services.manual_registrations.open(page).pick(
         Ray(np.array(aim.origin), np.array(aim.direction), aim.pixel)
     )
 
 
 @router.websocket("/clicks")
-async def clicks(websocket: WebSocket, page: PageId, desk: DeskOf) -> None:
+async def clicks(websocket: WebSocket, page: PageId, services: CurrentServices) -> None:
     """Each click of a person in the scene, as the point that it means."""
     await websocket.accept()
     loop, waiting = asyncio.get_running_loop(), asyncio.Queue[dict[str, Any]]()
@@ -101,7 +103,7 @@ async def clicks(websocket: WebSocket, page: PageId, desk: DeskOf) -> None:
     def told(said: dict[str, Any]) -> None:
         loop.call_soon_threadsafe(waiting.put_nowait, said)
 
-    stop = desk.clickings.open(page).listen(told)
+    stop = services.manual_registrations.open(page).listen(told)
 
     async def send() -> None:
         while True:

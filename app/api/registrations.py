@@ -10,9 +10,10 @@ from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.config import JsonValue
 
+from palpate.app.api.job_results import job_out
 from palpate.app.schemas import JobOut, Point
-from palpate.app.services import DeskOf, KeyOf
-from palpate.app.storage.registration_store import Registrations, register
+from palpate.app.services import CurrentServices, IdempotencyKey
+from palpate.app.storage.registration_store import RegistrationStore, register
 from palpate.registration.point_pairs import fit_pairs
 
 __all__ = ["router"]
@@ -27,7 +28,7 @@ PAIRS: list[JsonValue] = [
 ]
 
 
-class Pair(BaseModel):
+class PointPair(BaseModel):
     """One point [m] on the cloud, camera frame, and the same on the mesh, phantom frame."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -43,7 +44,7 @@ class FitRequest(BaseModel):
         frozen=True, extra="forbid", json_schema_extra={"examples": [{"pairs": PAIRS}]}
     )
 
-    pairs: list[Pair] = Field(max_length=100)
+    pairs: list[PointPair] = Field(max_length=100)
 
 
 class RegistrationRequest(FitRequest):
@@ -59,25 +60,25 @@ class RegistrationRequest(FitRequest):
 
 
 @router.get("")
-def listed(name: str, desk: DeskOf) -> dict[str, Any]:
+def listed(name: str, services: CurrentServices) -> dict[str, Any]:
     """The names of the registrations kept for a dataset."""
-    desk.library.path(name)
-    return {"registrations": Registrations(desk.settings.runs).names(name)}
+    services.library.path(name)
+    return {"registrations": RegistrationStore(services.settings.runs, name).names()}
 
 
 @router.get("/{registration}")
-def one(name: str, registration: str, desk: DeskOf) -> dict[str, Any]:
+def one(name: str, registration: str, services: CurrentServices) -> dict[str, Any]:
     """One registration as it was accepted."""
-    desk.library.path(name)
-    return Registrations(desk.settings.runs).get(name, registration)
+    services.library.path(name)
+    return RegistrationStore(services.settings.runs, name).request(registration)
 
 
 @router.post("/fit")
-def fitted(name: str, request: FitRequest, desk: DeskOf) -> dict[str, Any]:
+def fitted(name: str, request: FitRequest, services: CurrentServices) -> dict[str, Any]:
     """The rigid fit of the pairs alone, with each pair's residual, at once: what to look at while
     clicking.
     """
-    desk.library.path(name)
+    services.library.path(name)
     pairs = request.pairs
     return fit_pairs(
         np.array([pair.cloud for pair in pairs]), np.array([pair.mesh for pair in pairs])
@@ -95,31 +96,33 @@ class AutomaticRequest(BaseModel):
 
 
 @router.post("/automatic", status_code=202)
-def automatic(name: str, request: AutomaticRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
+def automatic(
+    name: str, request: AutomaticRequest, services: CurrentServices, key: IdempotencyKey = None
+) -> JobOut:
     """Queue the automatic registration of a dataset; what it finds is kept under a name like one
     made by hand.
     """
-    folder, kept = desk.library.path(name), Registrations(desk.settings.runs)
+    folder, store = services.library.path(name), RegistrationStore(services.settings.runs, name)
     if request.accept is not None:
-        kept.check_name(name, request.accept)
+        store.check_name(request.accept)
     said = {
         "dataset": str(folder),
         "name": name,
-        "runs": str(desk.settings.runs),
+        "runs": str(services.settings.runs),
         "accept": request.accept,
     }
-    return JobOut.of(desk.jobs.submit("registration", said, f"register-{name}", key))
+    return job_out(services.jobs.submit("registration", said, f"register-{name}", key))
 
 
 @router.post("")
-def made(name: str, request: RegistrationRequest, desk: DeskOf) -> dict[str, Any]:
+def made(name: str, request: RegistrationRequest, services: CurrentServices) -> dict[str, Any]:
     """Fit the pairs, lay the rest cloud against the block from there, and keep it if a name is
     given; a taken name is refused.
     """
-    folder, kept = desk.library.path(name), Registrations(desk.settings.runs)
+    folder, store = services.library.path(name), RegistrationStore(services.settings.runs, name)
     if request.accept is not None:
-        kept.check_name(name, request.accept)
+        store.check_name(request.accept)
     found = register(
         folder, [pair.cloud for pair in request.pairs], [pair.mesh for pair in request.pairs]
     )
-    return found if request.accept is None else kept.save(name, request.accept, found)
+    return found if request.accept is None else store.save(request.accept, found)

@@ -10,12 +10,13 @@ from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.config import JsonDict
 
+from palpate.app.api.job_results import job_out
 from palpate.app.http_errors import Missing
 from palpate.app.jobs.short_tasks import EXPORTS
 from palpate.app.schemas import EffectIn, JobOut
-from palpate.app.services import DeskOf, KeyOf
-from palpate.app.storage.registration_store import Registrations
-from palpate.app.storage.run_store import NAME
+from palpate.app.services import CurrentServices, IdempotencyKey
+from palpate.app.storage.registration_store import RegistrationStore
+from palpate.app.storage.result_store import NAME
 
 __all__ = ["router"]
 
@@ -70,7 +71,7 @@ class ExportRequest(BaseModel):
 
 
 @router.post("/replays", status_code=202)
-def replay(request: ReplayRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
+def replay(request: ReplayRequest, services: CurrentServices, key: IdempotencyKey = None) -> JobOut:
     """Check what is asked, then queue the replay; its result is a run of the job's id, with the
     effects as its extended model.
     """
@@ -78,7 +79,7 @@ def replay(request: ReplayRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
 
     effects = [one.model_dump() for one in request.effects]
     effects_from(effects)
-    dataset, settings = desk.library.open(request.dataset), desk.settings
+    dataset, settings = services.library.open(request.dataset), services.settings
     for name in request.sequences:
         dataset.sequence(name)
     said = {
@@ -88,39 +89,40 @@ def replay(request: ReplayRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
         "workers": settings.workers,
         "sequences": list(request.sequences),
         "effects": effects,
-        **desk.registered(request.dataset, request.registration),
+        **services.registered(request.dataset, request.registration),
     }
-    return JobOut.of(desk.jobs.submit("replay", said, f"replay-{request.dataset}", key))
+    return job_out(services.jobs.submit("replay", said, f"replay-{request.dataset}", key))
 
 
 @router.post("/exports", status_code=202)
-def export(request: ExportRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
+def export(request: ExportRequest, services: CurrentServices, key: IdempotencyKey = None) -> JobOut:
     """Queue the writing of files; the job's result names them for GET
     /api/exports/{identity}/{file}.
     """
     if request.run is not None:
-        desk.runs.get(request.run)
+        services.runs.get(request.run)
     else:
-        Registrations(desk.settings.runs).get(request.dataset or "", request.registration or "")
+        store = RegistrationStore(services.settings.runs, request.dataset or "")
+        store.request(request.registration or "")
     said = {
-        "runs": str(desk.settings.runs),
+        "runs": str(services.settings.runs),
         "run": request.run,
         "what": list(request.what),
         "name": request.dataset or request.run,
         "registration": request.registration,
     }
-    return JobOut.of(
-        desk.jobs.submit("export", said, f"export-{request.run or request.dataset}", key)
+    return job_out(
+        services.jobs.submit("export", said, f"export-{request.run or request.dataset}", key)
     )
 
 
 @router.get("/exports/{identity}")
-def exported(identity: str, desk: DeskOf) -> dict[str, Any]:
+def exported(identity: str, services: CurrentServices) -> dict[str, Any]:
     """The files of a finished export, with their sizes in bytes."""
     return {
         "files": {
             path.name: path.stat().st_size
-            for path in sorted(_folder(identity, desk.settings.runs).iterdir())
+            for path in sorted(_folder(identity, services.settings.runs).iterdir())
         }
     }
 
@@ -136,9 +138,9 @@ def exported(identity: str, desk: DeskOf) -> dict[str, Any]:
         }
     },
 )
-def exported_file(identity: str, file: str, desk: DeskOf) -> FileResponse:
+def exported_file(identity: str, file: str, services: CurrentServices) -> FileResponse:
     """One file of a finished export."""
-    path = _folder(identity, desk.settings.runs) / file
+    path = _folder(identity, services.settings.runs) / file
     if not NAME.fullmatch(file) or not path.is_file():
         raise Missing(f"export {identity} has no file {file}", export=identity, file=file)
     return FileResponse(path, media_type="application/octet-stream", filename=file)

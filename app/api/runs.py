@@ -12,13 +12,13 @@ from fastapi.responses import FileResponse, HTMLResponse
 from palpate.app.reporting.json_values import finite
 from palpate.app.reporting.model_comparison import compared
 from palpate.app.reporting.sentences import registration_sentences, verdict_sentence
-from palpate.app.reporting.timeline_series import course
+from palpate.app.reporting.timeline_series import timeline_series
 from palpate.app.scene.colours import nice_limit
 from palpate.app.scene.model_layer import NO_INSIDE
 from palpate.app.scene.view import Quantity
-from palpate.app.server.pagination import PageOf, part_of
-from palpate.app.services import DeskOf
-from palpate.app.storage.run_store import Replay, Run
+from palpate.app.server.pagination import RequestedPage, paginate
+from palpate.app.services import CurrentServices
+from palpate.app.storage.run_store import RecordedReplay, Run
 from palpate.foundation.errors import RunError
 
 __all__ = ["router"]
@@ -27,19 +27,21 @@ router = APIRouter(prefix="/runs", tags=["runs"])
 
 
 @router.get("")
-def listed(desk: DeskOf, response: Response, page: PageOf) -> list[dict[str, Any]]:
+def listed(
+    services: CurrentServices, response: Response, page: RequestedPage
+) -> list[dict[str, Any]]:
     """Runs, the newest first, each with its verdict; one whose report cannot be read says so.
     X-Total-Count: how many there are.
     """
-    return [_listed(run) for run in part_of(desk.runs.all(), page, response)]
+    return [_listed(run) for run in paginate(services.runs.all(), page, response)]
 
 
 @router.get("/{name}")
-def one(name: str, desk: DeskOf) -> dict[str, Any]:
+def one(name: str, services: CurrentServices) -> dict[str, Any]:
     """One run: verdict sentence, phantom and, per sequence, its split and both models' errors where
     the stated one is worst [m].
     """
-    run = desk.runs.get(name)
+    run = services.runs.get(name)
     replays = [run.replay(sequence) for sequence in run.sequences]
     size = [round(float(edge), 6) for edge in replays[0].size] if replays else None
     return {
@@ -64,9 +66,9 @@ def one(name: str, desk: DeskOf) -> dict[str, Any]:
 
 
 @router.get("/{name}/report")
-def report(name: str, desk: DeskOf) -> dict[str, Any]:
+def report(name: str, services: CurrentServices) -> dict[str, Any]:
     """The report, as written."""
-    return desk.runs.get(name).report
+    return services.runs.get(name).report
 
 
 @router.get(
@@ -74,11 +76,11 @@ def report(name: str, desk: DeskOf) -> dict[str, Any]:
     response_class=Response,
     responses={200: {"content": {"text/html": {"schema": {"type": "string"}}}}},
 )
-def page(name: str, desk: DeskOf) -> HTMLResponse:
+def page(name: str, services: CurrentServices) -> HTMLResponse:
     """The report as one HTML file that needs nothing but itself, to keep, print or send."""
     from palpate.app.reporting.report_page import report_page
 
-    text = report_page(desk.runs.get(name))
+    text = report_page(services.runs.get(name))
     return HTMLResponse(
         text, headers={"content-disposition": f'attachment; filename="{name}.html"'}
     )
@@ -86,26 +88,26 @@ def page(name: str, desk: DeskOf) -> HTMLResponse:
 
 @router.get("/{name}/comparison")
 def comparison(
-    name: str, desk: DeskOf, beside: Annotated[tuple[str, ...], Query()] = ()
+    name: str, services: CurrentServices, beside: Annotated[tuple[str, ...], Query()] = ()
 ) -> dict[str, Any]:
     """By sequence the errors [m] of this run's models, and of those `beside` it, which must be of
     the same dataset.
     """
-    return compared([desk.runs.get(one) for one in dict.fromkeys([name, *beside])])
+    return compared([services.runs.get(one) for one in dict.fromkeys([name, *beside])])
 
 
 @router.get("/{name}/model")
-def model(name: str, desk: DeskOf) -> dict[str, Any]:
+def model(name: str, services: CurrentServices) -> dict[str, Any]:
     """The extended model with its lineage."""
-    return desk.runs.get(name).model
+    return services.runs.get(name).model
 
 
 @router.get("/{name}/patterns")
-def patterns(name: str, desk: DeskOf) -> dict[str, Any]:
+def patterns(name: str, services: CurrentServices) -> dict[str, Any]:
     """Patches with the measured and predicted error pattern, all [m], null where unseen; `limit`
     ends their common scale.
     """
-    arrays = desk.runs.get(name).patterns()
+    arrays = services.runs.get(name).patterns()
     values = {
         key: finite(arrays[key], digits=7)
         for key in ("centres", "normals", "measured", "predicted")
@@ -121,22 +123,22 @@ def patterns(name: str, desk: DeskOf) -> dict[str, Any]:
     response_class=Response,
     responses={200: {"content": {"image/png": {}}}},
 )
-def picture(name: str, picture: str, desk: DeskOf) -> FileResponse:
+def picture(name: str, picture: str, services: CurrentServices) -> FileResponse:
     """A picture of the run."""
-    return FileResponse(desk.runs.get(name).picture(picture))
+    return FileResponse(services.runs.get(name).picture(picture))
 
 
 @router.get("/{name}/sequences/{sequence}")
-def sequence(name: str, sequence: str, desk: DeskOf) -> dict[str, Any]:
+def sequence(name: str, sequence: str, services: CurrentServices) -> dict[str, Any]:
     """Times [s] and errors [m] of each frame, push depth [m], force [N], spells of touch, and what
     the scene can show.
 
     `limits` are the robust ends of the scales, null where the run does not hold a quantity;
     `inside` says why it has no inside.
     """
-    reel = desk.sessions.reel(name, sequence)
-    replay = reel.replay
-    told = course(desk.runs.get(name), replay)
+    renderer = services.sessions.renderer(name, sequence)
+    replay = renderer.replay
+    told = timeline_series(services.runs.get(name), replay)
     series = [
         f"{key}_{model}"
         for key in ("distance", "paper")
@@ -149,16 +151,16 @@ def sequence(name: str, sequence: str, desk: DeskOf) -> dict[str, Any]:
         **{key: finite(replay[key], digits=8) for key in series},
         "noise_floor": finite(replay["noise_floor"]),
         "outcome": [int(code) for code in replay["outcome"]],
-        "limits": {quantity: reel.end(quantity) for quantity in get_args(Quantity)},
-        "inside": NO_INSIDE if reel.end("energy") is None else None,
-        "lumps": reel.lumps,
-        "landmarks": reel.landmarks,
-        "box": [[round(float(x), 6) for x in corner] for corner in reel.corners],
+        "limits": {quantity: renderer.end(quantity) for quantity in get_args(Quantity)},
+        "inside": NO_INSIDE if renderer.end("energy") is None else None,
+        "lumps": renderer.lumps,
+        "landmarks": renderer.landmarks,
+        "box": [[round(float(x), 6) for x in corner] for corner in renderer.corners],
         **told,
     }
 
 
-def _worst(replay: Replay) -> dict[str, Any]:
+def _worst(replay: RecordedReplay) -> dict[str, Any]:
     """Errors [m] of both models in the frame in which the stated one is furthest off."""
     keys = ("distance_raw", "distance_extended")
     seen = np.flatnonzero(np.isfinite(replay[keys[0]]))
@@ -171,7 +173,7 @@ def _worst(replay: Replay) -> dict[str, Any]:
 def _listed(run: Run) -> dict[str, Any]:
     try:
         return _heading(run)
-    except RunError:
+    except (RunError, AttributeError, KeyError, TypeError):  # damaged, or of another program
         return {
             "id": run.name,
             "dataset": "?",

@@ -14,10 +14,10 @@ from pydantic import ValidationError
 from palpate.app.http_errors import as_dict
 from palpate.app.scene.colours import palette
 from palpate.app.scene.view import Camera, View
-from palpate.app.scene.viewpoint import Lookout, Standpoint
+from palpate.app.scene.viewpoint import Direction, Viewpoint
 from palpate.app.server.newest_wins import newest_wins
 from palpate.app.server.viser_proxy import PageId
-from palpate.app.services import DeskOf
+from palpate.app.services import CurrentServices
 from palpate.foundation.errors import PalpateError
 
 __all__ = ["router"]
@@ -33,24 +33,26 @@ def colours() -> dict[str, Any]:
 
 
 @router.post("/sessions/{page}/view")
-def show(page: PageId, view: View, desk: DeskOf) -> dict[str, Any]:
+def show(page: PageId, view: View, services: CurrentServices) -> dict[str, Any]:
     """Show this view."""
-    return desk.sessions.open(page).show(view)
+    return services.sessions.open(page).show(view)
 
 
 @router.post("/sessions/{page}/look", status_code=204)
-def look(page: PageId, desk: DeskOf, where: Standpoint = "reset") -> None:
+def look(page: PageId, services: CurrentServices, where: Direction = "reset") -> None:
     """Turn the camera to the phantom: the depth camera's view, or from the top, the front (along
     +y), the side (along -x).
     """
-    desk.sessions.get(page).look(where)
+    services.sessions.get(page).look(where)
 
 
 @router.put("/sessions/{page}/camera", status_code=204)
-def stand(page: PageId, camera: Camera, desk: DeskOf) -> None:
+def stand(page: PageId, camera: Camera, services: CurrentServices) -> None:
     """Look at a run from a place of one's own, also in scenes of the page that open later."""
     place, target = np.array(camera.position), np.array(camera.target)
-    desk.sessions.open(page).stand(camera.run, Lookout(place, target, np.array([0.0, 0.0, 1.0])))
+    services.sessions.open(page).stand(
+        camera.run, Viewpoint(place, target, np.array([0.0, 0.0, 1.0]))
+    )
 
 
 @router.get(
@@ -58,14 +60,16 @@ def stand(page: PageId, camera: Camera, desk: DeskOf) -> None:
     response_class=Response,
     responses={200: {"content": {"image/png": {}}}},
 )
-def still(page: PageId, desk: DeskOf, width: Pixels = 1280, height: Pixels = 720) -> Response:
+def still(
+    page: PageId, services: CurrentServices, width: Pixels = 1280, height: Pixels = 720
+) -> Response:
     """What the page's scene shows now, as its browser renders it; the background is transparent.
     404 where no browser shows it.
     """
     from PIL import Image
 
     stream = BytesIO()
-    Image.fromarray(desk.sessions.get(page).still(width, height)).save(
+    Image.fromarray(services.sessions.get(page).still(width, height)).save(
         stream, "PNG", compress_level=1
     )
     return Response(
@@ -74,22 +78,22 @@ def still(page: PageId, desk: DeskOf, width: Pixels = 1280, height: Pixels = 720
 
 
 @router.get("/sessions/{page}/state")
-def state(page: PageId, desk: DeskOf) -> dict[str, Any]:
+def state(page: PageId, services: CurrentServices) -> dict[str, Any]:
     """The view held for a page and counts and a digest of the arrays drawn."""
-    return desk.sessions.get(page).state()
+    return services.sessions.get(page).state()
 
 
 @router.websocket("/sessions/{page}/socket")
-async def socket(websocket: WebSocket, page: PageId, desk: DeskOf) -> None:
+async def socket(websocket: WebSocket, page: PageId, services: CurrentServices) -> None:
     """Views in, states out; views that come while one is being drawn replace each other, so the
     newest wins.
     """
-    await newest_wins(websocket, lambda text: _answer(desk, page, text))
+    await newest_wins(websocket, lambda text: _answer(services, page, text))
 
 
-def _answer(desk: DeskOf, page: str, text: str) -> dict[str, Any]:
+def _answer(services: CurrentServices, page: str, text: str) -> dict[str, Any]:
     try:
-        return desk.sessions.open(page).show(View.model_validate_json(text))
+        return services.sessions.open(page).show(View.model_validate_json(text))
     except ValidationError as error:
         return {
             "problem": {"kind": "RequestError", "message": error.errors()[0]["msg"], "where": {}}

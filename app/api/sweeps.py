@@ -8,11 +8,11 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 from pydantic.config import JsonDict
 
-from palpate.app.http_errors import Missing
+from palpate.app.api.job_results import cancel_job, job_of, job_out, names_and_jobs, result_and_job
 from palpate.app.schemas import JobOut
-from palpate.app.server.pagination import PageOf, part_of
-from palpate.app.services import Desk, DeskOf, KeyOf
-from palpate.app.storage.sweep_store import Sweeps
+from palpate.app.server.pagination import RequestedPage, paginate
+from palpate.app.services import CurrentServices, IdempotencyKey
+from palpate.app.storage.sweep_store import SweepStore
 from palpate.sweep.sweep_spec import MOST_POINTS, Measure, Method, SweepSpec
 
 __all__ = ["router"]
@@ -59,13 +59,13 @@ class SweepRequest(BaseModel):
 
 
 @router.post("", status_code=202)
-def start(request: SweepRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
+def start(request: SweepRequest, services: CurrentServices, key: IdempotencyKey = None) -> JobOut:
     """Check what is asked, then queue it; the answer's id names job and sweep."""
     asked = SweepSpec.from_json(request.model_dump(exclude={"dataset", "registration"}))
-    dataset = desk.library.open(request.dataset)
+    dataset = services.library.open(request.dataset)
     for name in asked.sequences:
         dataset.sequence(name)
-    settings = desk.settings
+    settings = services.settings
     said = {
         "dataset": str(dataset.path),
         "name": request.dataset,
@@ -73,72 +73,52 @@ def start(request: SweepRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
         "workers": settings.workers,
         "scheduler": settings.scheduler,
         "sweep": asked.to_json(),
-        **desk.registered(request.dataset, request.registration),
+        **services.registered(request.dataset, request.registration),
     }
-    return JobOut.of(desk.jobs.submit("sweep", said, f"sweep-{request.dataset}", key))
+    return job_out(services.jobs.submit("sweep", said, f"sweep-{request.dataset}", key))
 
 
 @router.get("")
-def listed(desk: DeskOf, response: Response, page: PageOf) -> list[dict[str, Any]]:
-    """Sweeps, the newest first, each with its job where that is still known; X-Total-Count says how
-    many there are.
+def listed(
+    services: CurrentServices, response: Response, page: RequestedPage
+) -> list[dict[str, Any]]:
+    """Sweeps, the newest first, each with its job where that is still recorded.
+
+    The header X-Total-Count has their number.
     """
-    kept = Sweeps(desk.settings.runs)
-    jobs = {job.id: JobOut.of(job).model_dump() for job in desk.jobs.all() if job.kind == "sweep"}
-    names = [*(name for name in jobs if not kept.begun(name)), *kept.names()]
-    return [
-        {"id": name, "job": jobs.get(name), "begun": kept.begun(name)}
-        for name in part_of(names, page, response)
-    ]
+    store = SweepStore(services.settings.runs)
+    rows = paginate(names_and_jobs(store, services), page, response)
+    return [{"id": name, "job": job, "begun": store.has_begun(name)} for name, job in rows]
 
 
 @router.get("/{identity}")
-def one(identity: str, desk: DeskOf) -> dict[str, Any]:
-    """One sweep: its job, what was asked, and what it found once it has ended."""
-    kept, job = Sweeps(desk.settings.runs), _job(identity, desk)
-    if job is None and not kept.begun(identity):
-        raise Missing(
-            f"there is no sweep {identity}; GET /api/sweeps lists those there are", sweep=identity
-        )
-    begun = kept.begun(identity)
-    asked = kept.request(identity) if begun else None
-    return {
-        "id": identity,
-        "job": job,
-        "request": asked,
-        "summary": kept.summary(identity) if begun else None,
-    }
+def one(identity: str, services: CurrentServices) -> dict[str, Any]:
+    """One sweep: its job, the request, and the summary once it has ended."""
+    store = SweepStore(services.settings.runs)
+    return result_and_job(store, identity, job_of(store, identity, services))
 
 
 @router.get("/{identity}/points")
 def points(
     identity: str,
-    desk: DeskOf,
+    services: CurrentServices,
     after: Annotated[int, Query(ge=0, le=10**9)] = 0,
     most: Annotated[int, Query(ge=1, le=1000)] = 1000,
 ) -> dict[str, Any]:
-    """Points in the order in which they ended, from the `after`-th on; `next` is what to ask for
-    next time.
+    """Finished points in the order of their ends, from number `after` on.
+
+    `next` is the value of `after` for the next request.
     """
-    kept, job = Sweeps(desk.settings.runs), _job(identity, desk)
-    if job is None:
-        kept.request(identity)
-    found = kept.points(identity)[after : after + most] if kept.begun(identity) else []
-    return {"points": found, "next": after + len(found), "job": job}
+    store = SweepStore(services.settings.runs)
+    job = job_of(store, identity, services)
+    if job is None and not store.has_begun(identity):
+        raise store.missing(identity)
+    begun = store.has_begun(identity)
+    rows = store.points(identity)[after : after + most] if begun else []
+    return {"points": rows, "next": after + len(rows), "job": job}
 
 
 @router.post("/{identity}/cancel")
-def cancel(identity: str, desk: DeskOf) -> JobOut:
-    """Stop it; the points that have ended stay. 409 if it has ended already."""
-    if _job(identity, desk) is None:
-        raise Missing(f"there is no sweep {identity} that could be stopped", sweep=identity)
-    return JobOut.of(desk.jobs.cancel(identity))
-
-
-def _job(identity: str, desk: Desk) -> dict[str, Any] | None:
-    """The job of a sweep, if its record is there."""
-    try:
-        job = desk.jobs.get(identity)
-    except Missing:
-        return None
-    return JobOut.of(job).model_dump() if job.kind == "sweep" else None
+def cancel(identity: str, services: CurrentServices) -> JobOut:
+    """Stop it; its finished points stay. 409 if it has ended already."""
+    return cancel_job(SweepStore(services.settings.runs), identity, services)

@@ -8,10 +8,18 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.config import JsonDict
 
+from palpate.app.api.job_results import (
+    cancel_job,
+    job_of,
+    job_out,
+    listed_result,
+    names_and_jobs,
+    result_and_job,
+)
 from palpate.app.schemas import JobOut
-from palpate.app.server.pagination import PageOf, part_of
-from palpate.app.services import DeskOf, KeyOf
-from palpate.app.storage.training_store import Trainings
+from palpate.app.server.pagination import RequestedPage, paginate
+from palpate.app.services import CurrentServices, IdempotencyKey
+from palpate.app.storage.training_store import TrainingStore
 from palpate.foundation.errors import CorrectionError
 
 __all__ = ["TrainingRequest", "router"]
@@ -66,13 +74,15 @@ class TrainingRequest(BaseModel):
 
 
 @router.post("", status_code=202)
-def start(request: TrainingRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
+def start(
+    request: TrainingRequest, services: CurrentServices, key: IdempotencyKey = None
+) -> JobOut:
     """Check what is asked, then queue it; the answer's id names job and training. Retried, it goes
     on where it was.
     """
-    dataset, settings = desk.library.open(request.dataset), desk.settings
+    dataset, settings = services.library.open(request.dataset), services.settings
     if request.run is not None:
-        desk.runs.get(request.run)
+        services.runs.get(request.run)
     said = {
         "dataset": str(dataset.path),
         "name": request.dataset,
@@ -81,27 +91,34 @@ def start(request: TrainingRequest, desk: DeskOf, key: KeyOf = None) -> JobOut:
         "run": request.run,
         "training": request.asked(),
     }
-    return JobOut.of(desk.jobs.submit("training", said, f"training-{request.dataset}", key))
+    return job_out(services.jobs.submit("training", said, f"training-{request.dataset}", key))
 
 
 @router.get("")
-def listed(desk: DeskOf, response: Response, page: PageOf) -> list[dict[str, Any]]:
-    """Trainings, the newest first, each with its job where that is still known; X-Total-Count says
-    how many there are.
+def listed(
+    services: CurrentServices, response: Response, page: RequestedPage
+) -> list[dict[str, Any]]:
+    """Trainings, the newest first, each with its job where that is still recorded.
+
+    The header X-Total-Count has their number.
     """
-    return list(part_of(Trainings(desk.settings.runs).listed(desk), page, response))
+    store = TrainingStore(services.settings.runs)
+    rows = paginate(names_and_jobs(store, services), page, response)
+    return [listed_result(store, name, job) for name, job in rows]
 
 
 @router.get("/{identity}")
-def one(identity: str, desk: DeskOf) -> dict[str, Any]:
-    """One training: its job, what was asked, loss, validation error [mm] and rate of each epoch so
-    far, and what came of it.
+def one(identity: str, services: CurrentServices) -> dict[str, Any]:
+    """One training: its job, the request, the summary once it has ended, and the history.
+
+    The history has loss, validation error [mm] and learning rate of each finished epoch.
     """
-    trainings = Trainings(desk.settings.runs)
-    return {**trainings.one(identity, desk), "history": trainings.history(identity)}
+    store = TrainingStore(services.settings.runs)
+    result = result_and_job(store, identity, job_of(store, identity, services))
+    return {**result, "history": store.history(identity)}
 
 
 @router.post("/{identity}/cancel")
-def cancel(identity: str, desk: DeskOf) -> JobOut:
-    """Stop it; retried, it goes on where it was. 409 if it has ended already."""
-    return Trainings(desk.settings.runs).cancel(identity, desk)
+def cancel(identity: str, services: CurrentServices) -> JobOut:
+    """Stop it; a retry resumes it. 409 if it has ended already."""
+    return cancel_job(TrainingStore(services.settings.runs), identity, services)

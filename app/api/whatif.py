@@ -10,13 +10,13 @@ from fastapi import APIRouter, WebSocket
 from pydantic import ValidationError
 
 from palpate.app.http_errors import Missing, as_dict
-from palpate.app.jobs.whatif_process import Hand
+from palpate.app.jobs.whatif_process import InteractiveSession
 from palpate.app.reporting.json_values import finite
-from palpate.app.scene.page_session import Touch, Trial
+from palpate.app.scene.page_session import FrameOverride, InteractiveOverride
 from palpate.app.schemas import LiveRequest, WhatIfRequest
 from palpate.app.server.newest_wins import newest_wins
 from palpate.app.server.viser_proxy import PageId
-from palpate.app.services import Desk, DeskOf
+from palpate.app.services import CurrentServices, Services
 from palpate.foundation.errors import PalpateError
 
 if TYPE_CHECKING:
@@ -28,35 +28,37 @@ router = APIRouter(tags=["what if"])
 
 
 @router.get("/runs/{name}/sequences/{sequence}/whatif")
-def beginnings(name: str, sequence: str, desk: DeskOf) -> dict[str, Any]:
+def beginnings(name: str, sequence: str, services: CurrentServices) -> dict[str, Any]:
     """The model's effects, and a finite size of every effect of the catalogue, from which to go on
     by hand.
     """
-    run = desk.runs.get(name)
+    run = services.runs.get(name)
     run.replay(sequence)
     return {
         "model": run.model.get("effects", []),
-        "beginnings": desk.whatifs.beginnings(run, sequence),
+        "beginnings": services.frame_solver.beginnings(run, sequence),
     }
 
 
 @router.post("/runs/{name}/sequences/{sequence}/whatif")
-def solve(name: str, sequence: str, request: WhatIfRequest, desk: DeskOf) -> dict[str, Any]:
+def solve(
+    name: str, sequence: str, request: WhatIfRequest, services: CurrentServices
+) -> dict[str, Any]:
     """Solve one frame with these effects; errors [m] of it beside those of the run's models; drawn
     in `page` where one is given.
     """
-    run = desk.runs.get(name)
+    run = services.runs.get(name)
     replay = run.replay(sequence)
     if request.frame >= len(replay):
         raise Missing(
             f"{sequence} has the frames 0 to {len(replay) - 1}, not {request.frame}",
             sequence=sequence,
         )
-    session = desk.sessions.get(request.page) if request.page else None
+    session = services.sessions.get(request.page) if request.page else None
     effects = [one.model_dump() for one in request.effects]
-    moment = desk.whatifs.solve(run, sequence, request.frame, effects, request.tuned)
+    moment = services.frame_solver.solve(run, sequence, request.frame, effects, request.tuned)
     if session is not None:
-        session.try_out(Trial(name, sequence, request.frame, moment))
+        session.override_frame(FrameOverride(name, sequence, request.frame, moment))
     return {
         "frame": request.frame,
         "distance": finite(moment.distance),
@@ -69,38 +71,44 @@ def solve(name: str, sequence: str, request: WhatIfRequest, desk: DeskOf) -> dic
 
 
 @router.post("/runs/{name}/sequences/{sequence}/live")
-def lead(name: str, sequence: str, request: LiveRequest, desk: DeskOf) -> dict[str, Any]:
+def lead(
+    name: str, sequence: str, request: LiveRequest, services: CurrentServices
+) -> dict[str, Any]:
     """Lead the tool somewhere: push depth [m] and force [N] that it feels there, from wherever it
     was; drawn in `page` if given.
     """
-    session = desk.sessions.get(request.page) if request.page else None
+    session = services.sessions.get(request.page) if request.page else None
     effects = [one.model_dump() for one in request.effects]
-    hand = Hand.of(request.page or "nobody", desk.runs.get(name), sequence, effects, request.tuned)
-    felt = desk.lives.at(hand, request.at, session is not None and session.wants_inside())
+    hand = InteractiveSession.of(
+        request.page or "nobody", services.runs.get(name), sequence, effects, request.tuned
+    )
+    felt = services.interactive_solver.at(
+        hand, request.at, session is not None and session.wants_inside()
+    )
     if session is not None:
-        session.touch(Touch(name, sequence, request.shown, felt))
+        session.touch(InteractiveOverride(name, sequence, request.shown, felt))
     return told(felt)
 
 
 @router.delete("/sessions/{page}/live", status_code=204)
-def let_go(page: PageId, desk: DeskOf) -> None:
+def let_go(page: PageId, services: CurrentServices) -> None:
     """Show the recording again."""
-    desk.sessions.get(page).touch(None)
+    services.sessions.get(page).touch(None)
 
 
 @router.websocket("/sessions/{page}/live")
-async def led(websocket: WebSocket, page: PageId, desk: DeskOf) -> None:
+async def led(websocket: WebSocket, page: PageId, services: CurrentServices) -> None:
     """Places in, answers out, drawn in the page: each message is a `LiveRequest` with `run` and
     `sequence`.
 
     While one is being solved only the newest is kept. The recording is shown again when the
     connection ends.
     """
-    hands: dict[str, Hand] = {}
+    hands: dict[str, InteractiveSession] = {}
 
     def answer(text: str) -> dict[str, Any]:
         try:
-            return _led(desk, page, hands, LedRequest.model_validate_json(text))
+            return _led(services, page, hands, LiveMessage.model_validate_json(text))
         except ValidationError as error:
             return {
                 "problem": {
@@ -116,17 +124,19 @@ async def led(websocket: WebSocket, page: PageId, desk: DeskOf) -> None:
         await newest_wins(websocket, answer)
     finally:
         with contextlib.suppress(Missing):
-            await asyncio.to_thread(desk.sessions.get(page).touch, None)
+            await asyncio.to_thread(services.sessions.get(page).touch, None)
 
 
-class LedRequest(LiveRequest):
+class LiveMessage(LiveRequest):
     """A `LiveRequest` that says of what."""
 
     run: str
     sequence: str
 
 
-def _led(desk: Desk, page: str, hands: dict[str, Hand], request: LedRequest) -> dict[str, Any]:
+def _led(
+    services: Services, page: str, hands: dict[str, InteractiveSession], request: LiveMessage
+) -> dict[str, Any]:
     """Solve, draw and tell; `hands` keeps what was looked up for the connection's last request of
     the same kind.
     """
@@ -134,12 +144,12 @@ def _led(desk: Desk, page: str, hands: dict[str, Hand], request: LedRequest) -> 
     if key not in hands:
         hands.clear()
         effects = [one.model_dump() for one in request.effects]
-        hands[key] = Hand.of(
-            page, desk.runs.get(request.run), request.sequence, effects, request.tuned
+        hands[key] = InteractiveSession.of(
+            page, services.runs.get(request.run), request.sequence, effects, request.tuned
         )
-    session = desk.sessions.open(page)
-    felt = desk.lives.at(hands[key], request.at, session.wants_inside())
-    session.touch(Touch(request.run, request.sequence, request.shown, felt))
+    session = services.sessions.open(page)
+    felt = services.interactive_solver.at(hands[key], request.at, session.wants_inside())
+    session.touch(InteractiveOverride(request.run, request.sequence, request.shown, felt))
     return {
         **told(felt),
         "at": list(request.at),
@@ -160,6 +170,6 @@ def told(felt: InteractiveFrame) -> dict[str, Any]:
 
 
 @router.delete("/sessions/{page}/whatif", status_code=204)
-def back(page: PageId, desk: DeskOf) -> None:
+def back(page: PageId, services: CurrentServices) -> None:
     """Show the run's own extended model again."""
-    desk.sessions.get(page).try_out(None)
+    services.sessions.get(page).override_frame(None)

@@ -21,7 +21,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rich.table import Table
 
 from palpate.app.jobs.signals import stop
-from palpate.app.reporting.quantities import between
+from palpate.app.reporting.quantities import parameter_texts
 from palpate.foundation.errors import Cancelled, PalpateError
 from palpate.foundation.progress import Report
 
@@ -30,7 +30,6 @@ __all__ = [
     "errors",
     "look_at",
     "out",
-    "parameters_text",
     "print_problem",
     "print_warnings",
     "progress",
@@ -183,11 +182,6 @@ def print_problem(error: PalpateError, place: str = "") -> None:
     )
 
 
-def parameters_text(cause: dict[str, Any]) -> str:
-    """`radius 4.2 mm (4.1 to 4.3), ...` of a cause or of a hidden effect."""
-    return ", ".join(_parameters(cause))
-
-
 def write_json(path: Path, value: Any) -> None:
     """Write aside and rename, so that a reader never sees half of it."""
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -197,11 +191,9 @@ def write_json(path: Path, value: Any) -> None:
 
 
 def _causes(causes: list[dict[str, Any]]) -> str:
-    return "\n".join(line for cause in causes for line in (cause["effect"], *_parameters(cause)))
-
-
-def _parameters(cause: dict[str, Any]) -> list[str]:
-    return [f"{name} {between(entry)}" for name, entry in cause.get("parameters", {}).items()]
+    return "\n".join(
+        line for cause in causes for line in (cause["effect"], *parameter_texts(cause))
+    )
 
 
 def _removed(report: dict[str, Any]) -> str:

@@ -56,12 +56,18 @@ def demo(
     table.add_row(*verdict_cells(dataset.name, report, seconds, truth, True))
     out.print(table)
     if show:
+        from palpate.app.main import create_app
         from palpate.app.server.serve import serve
 
         settings = Settings(
             port=port, runs=folder / "runs", datasets=folder / "datasets", workers=workers
         )
-        serve(settings, lambda address: announce(address, f"/?run={run.name}"))
+        serve(
+            create_app(settings),
+            settings.host,
+            settings.port,
+            lambda address: announce(address, f"/?run={run.name}"),
+        )
     else:
         look_at(folder)
 

@@ -26,7 +26,7 @@ from palpate.app.commands.console import (
     verdict_table,
     write_json,
 )
-from palpate.app.reporting.quantities import between
+from palpate.app.reporting.quantities import with_interval
 from palpate.app.reporting.sentences import (
     control_sentences,
     determined_sentences,
@@ -40,7 +40,7 @@ from palpate.app.reporting.sentences import (
 from palpate.foundation.errors import DatasetError, RunError
 
 if TYPE_CHECKING:
-    from palpate.dataset.accepted_registration import Accepted
+    from palpate.dataset.accepted_registration import AcceptedRegistration
 
 __all__ = ["diagnose", "print_report", "run_diagnosis", "true_effects", "truth_beside"]
 
@@ -63,7 +63,7 @@ def diagnose(
     seed: Annotated[int, typer.Option(min=0, help="Seed of all random draws.")] = 0,
     registration: Registration = None,
     runs: Annotated[
-        Path, typer.Option(help="Accepted registrations are looked for below this folder.")
+        Path, typer.Option(help="AcceptedRegistration registrations are looked for below this folder.")
     ] = Path("runs"),
 ) -> None:
     """Name what the simulation of each dataset misses, and what naming it gains on sequences
@@ -93,7 +93,7 @@ def diagnose(
 
 
 def run_diagnosis(
-    dataset: Path, run: Path, workers: int, seed: int, accepted: Accepted | None = None
+    dataset: Path, run: Path, workers: int, seed: int, accepted: AcceptedRegistration | None = None
 ) -> tuple[dict[str, Any], float]:
     """Diagnose with a progress bar; the run folder is whole at `run`, or not there at all. Returns
     report and seconds.
@@ -155,7 +155,9 @@ def print_report(report: dict[str, Any]) -> None:
     if shown:
         lines.append(Text(f"error on the {gain.get('split', 'test')} sequences: {shown}"))
     for one in report.get("identified", []):
-        shown = ", ".join(f"{name} {between(entry)}" for name, entry in one["parameters"].items())
+        shown = ", ".join(
+            f"{name} {with_interval(entry)}" for name, entry in one["parameters"].items()
+        )
         lines.append(
             Text(f"identified: {one['effect']}: {shown}; {one.get('why', '')}", style="dim")
         )

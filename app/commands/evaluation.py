@@ -99,7 +99,7 @@ def _ladder(
     dataset: Path, asked: dict[str, Any], truth: bool, workers: int, runs: Path
 ) -> dict[str, Any]:
     from palpate.app.jobs.tasks import evaluate as climb
-    from palpate.app.storage.evaluation_store import Evaluations
+    from palpate.app.storage.evaluation_store import EvaluationStore
 
     name = f"{dataset.resolve().name}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(2)}"
     hidden = true_effects(dataset) if truth else None
@@ -113,13 +113,13 @@ def _ladder(
     }
     with progress(f"evaluate {dataset.name}") as report:
         climb(request, report)
-    kept = Evaluations(runs)
-    found = kept.found(name) or {}
+    evaluations = EvaluationStore(runs)
+    found = evaluations.result(name) or {}
     out.print(f"[bold]{found['sentence']}[/]", highlight=False)
     for one in found["parts"]:
         if one["part"] != "kind":
             out.print(_rungs(found["rungs"], one))
-    out.print(f"{kept.folder / name}", highlight=False, soft_wrap=True)
+    out.print(f"{evaluations.folder / name}", highlight=False, soft_wrap=True)
     return found
 
 
@@ -168,8 +168,8 @@ def _make(dataset: Path, size: str, workers: int) -> None:
 def _paper(
     dataset: Path, features: list[int], epochs: int, every: int, seed: int, workers: int, runs: Path
 ) -> dict[str, Any]:
-    from palpate.app.storage.sweep_store import Sweeps
-    from palpate.app.storage.training_store import Trainings
+    from palpate.app.storage.sweep_store import SweepStore
+    from palpate.app.storage.training_store import TrainingStore
     from palpate.dataset import open_dataset
     from palpate.evaluation.paper_tables import PaperRequest, run_paper
     from palpate.evaluation.train_network import TrainingPlan
@@ -182,8 +182,8 @@ def _paper(
         found = run_paper(
             open_dataset(dataset),
             folder,
-            store=Sweeps(runs).store,
-            samples=Trainings(runs).store,
+            store=SweepStore(runs).replay_cache,
+            samples=TrainingStore(runs).sample_cache,
             request=PaperRequest(training=training),
             workers=workers,
             seed=seed,

@@ -45,6 +45,7 @@ def serve(
     ] = False,
 ) -> None:
     """Serve the page and the REST service on one port."""
+    from palpate.app.main import create_app
     from palpate.app.server.serve import serve as run
 
     settings = Settings(
@@ -63,7 +64,7 @@ def serve(
             highlight=False,
             soft_wrap=True,
         )
-    run(settings, announce)
+    run(create_app(settings), settings.host, settings.port, announce)
 
 
 def announce(address: str, path: str = "/") -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -58,7 +56,8 @@ def sweep(
     Can be stopped at any time: the same command goes on where it was.
     """
     from palpate.app.storage.registration_store import accepted_for
-    from palpate.app.storage.sweep_store import Sweeps
+    from palpate.app.storage.result_store import request_name
+    from palpate.app.storage.sweep_store import SweepStore
     from palpate.dataset import open_dataset
     from palpate.sweep.run_sweep import run_sweep
     from palpate.sweep.sweep_spec import SweepSpec
@@ -77,16 +76,15 @@ def sweep(
     }
     request = SweepSpec.from_json(asked)
     accepted = accepted_for(dataset, registration, runs)
-    opened, sweeps = open_dataset(dataset).registered(accepted), Sweeps(runs)
+    opened, sweeps = open_dataset(dataset).registered(accepted), SweepStore(runs)
     said = [str(dataset.resolve()), request.to_json(), *([accepted.to_json()] if accepted else [])]
-    digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()[:8]
-    folder = sweeps.folder / f"{dataset.resolve().name}-{digest}"
+    folder = sweeps.folder / request_name(dataset.resolve().name, said)
     with progress(f"sweep {dataset.name}") as report:
         found = run_sweep(
             opened,
             request,
             folder,
-            store=sweeps.store,
+            store=sweeps.replay_cache,
             workers=workers,
             scheduler=scheduler,
             report=report,

@@ -4,8 +4,6 @@ of a run.
 
 from __future__ import annotations
 
-import hashlib
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -66,6 +64,7 @@ def train(
     Can be stopped at any time: the same command goes on where it was.
     """
     from palpate.app.jobs.tasks import train as learn
+    from palpate.app.storage.result_store import request_name
 
     network = {
         "kind": kind,
@@ -86,8 +85,8 @@ def train(
     }
     asked = {"spec": spec, "every": every}
     hidden = true_effects(dataset) if truth else None
-    said = json.dumps([str(dataset.resolve()), run, hidden, asked], sort_keys=True)
-    digest = hashlib.sha256(said.encode()).hexdigest()[:8]
+    name = dataset.resolve().name
+    folder = request_name(f"{name}-{kind}", [str(dataset.resolve()), run, hidden, asked])
     request = {
         "dataset": str(dataset),
         "runs": str(runs),
@@ -95,7 +94,7 @@ def train(
         "run": run,
         "truth": hidden,
         "training": asked,
-        "folder": f"{dataset.resolve().name}-{kind}-{digest}",
+        "folder": folder,
     }
     with progress(f"train {dataset.name}") as report:
         found = learn(request, report)

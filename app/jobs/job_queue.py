@@ -24,10 +24,10 @@ from typing import Any
 
 from palpate.app.http_errors import Conflict, Missing
 from palpate.app.jobs.job_process import context, stop_group, work
-from palpate.app.jobs.job_records import Job, JobState, Note, Records
+from palpate.app.jobs.job_records import Job, JobRecords, JobState, Note
 from palpate.foundation.errors import SetupError
 
-__all__ = ["Jobs"]
+__all__ = ["JobQueue"]
 
 log = logging.getLogger(__name__)
 PAUSE = 0.1
@@ -38,7 +38,7 @@ _ENDING = 10.0
 _NUMBERS = re.compile(r"\d+(\.\d+)?")
 
 
-class Jobs:
+class JobQueue:
     """Runs jobs one after another and keeps their records.
 
     Each job has a scratch folder, named in its request, that is gone when the job has ended,
@@ -60,7 +60,7 @@ class Jobs:
         self._alone = _take(folder)
         for place in (self._scratch, *self._beside):
             shutil.rmtree(place, ignore_errors=True)
-        self._records = Records(folder / "jobs.sqlite")
+        self._records = JobRecords(folder / "jobs.sqlite")
         self._records.interrupt_running("the server ended while this job ran; retry it")
         self._waiting: queue.Queue[str | None] = queue.Queue()
         for job in self._records.waiting():

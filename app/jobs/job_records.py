@@ -13,7 +13,7 @@ from typing import Any
 
 from palpate.app.http_errors import Missing
 
-__all__ = ["Job", "JobState", "Note", "Records"]
+__all__ = ["Job", "JobState", "Note", "JobRecords"]
 
 SCHEMA = """
 create table if not exists jobs (
@@ -97,7 +97,7 @@ COLUMNS = tuple(Job.__dataclass_fields__)
 JSON_COLUMNS = ("request", "error", "result")
 
 
-class Records:
+class JobRecords:
     """The table of jobs; every method may be called from any thread."""
 
     def __init__(self, path: Path) -> None:

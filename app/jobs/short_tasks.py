@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate.app.http_errors import Conflict
-from palpate.app.storage.registration_store import Registrations
-from palpate.app.storage.run_store import Run, Runs
+from palpate.app.storage.registration_store import RegistrationStore
+from palpate.app.storage.run_store import Run, RunStore
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.progress import Report, part
 
@@ -50,12 +50,13 @@ def register(request: dict[str, Any], report: Report) -> dict[str, Any]:
         "touch_rms": found.touch_rms,
     }
     stored = {"points": [], "registration": pose, "rest": rest_digest(dataset.path)}
-    kept, name = Registrations(Path(request["runs"])), str(request["name"])
+    name = str(request["name"])
+    registrations = RegistrationStore(Path(request["runs"]), name)
     if request.get("accept"):
         accepted = str(request["accept"])
-        kept.save(name, accepted, stored)
+        registrations.save(accepted, stored)
     else:
-        accepted = _first_free(kept, name, stored)
+        accepted = _save_under_free_name(registrations, stored)
     return {
         "dataset": name,
         "registration": accepted,
@@ -63,15 +64,16 @@ def register(request: dict[str, Any], report: Report) -> dict[str, Any]:
     }
 
 
-def _first_free(kept: Registrations, dataset: str, stored: dict[str, Any]) -> str:
+def _save_under_free_name(registrations: RegistrationStore, stored: dict[str, Any]) -> str:
     for number in range(1, 10_000):
         try:
-            kept.save(dataset, f"automatic-{number}", stored)
+            registrations.save(f"automatic-{number}", stored)
         except Conflict:
             continue
         return f"automatic-{number}"
     raise Conflict(
-        f"{dataset} has too many registrations called automatic-...: name this one", dataset=dataset
+        f"{registrations.dataset} has too many registrations called automatic-...: name this one",
+        dataset=registrations.dataset,
     )
 
 
@@ -80,13 +82,13 @@ def replay(request: dict[str, Any], report: Report) -> dict[str, Any]:
     run, for the page.
     """
     from palpate.dataset import open_dataset
-    from palpate.dataset.accepted_registration import Accepted
+    from palpate.dataset.accepted_registration import AcceptedRegistration
     from palpate.recording.replay_run import replay_into
     from palpate.recording.saved_model import effects_from
 
     registered, scratch = request.get("registration"), Path(request["scratch"])
     dataset = open_dataset(Path(request["dataset"])).registered(
-        Accepted.from_json(registered) if registered else None
+        AcceptedRegistration.from_json(registered) if registered else None
     )
     began, run = time.time(), Path(request["runs"]) / scratch.name
     made = scratch / run.name
@@ -120,12 +122,14 @@ def export(request: dict[str, Any], report: Report) -> dict[str, Any]:
     made = scratch / "files"
     made.mkdir(parents=True)
     if request.get("registration"):
-        stored = Registrations(runs).get(request["name"], request["registration"])
+        stored = RegistrationStore(runs, request["name"]).request(request["registration"])
         (made / f"{request['name']}-{request['registration']}.json").write_text(
             json.dumps(stored, indent=1)
         )
     if request.get("run"):
-        _export_run(Runs(runs).get(request["run"]), request["what"], made, part(report, 0.1, 0.9))
+        _export_run(
+            RunStore(runs).get(request["run"]), request["what"], made, part(report, 0.1, 0.9)
+        )
     folder = runs / EXPORTS / scratch.name
     folder.parent.mkdir(parents=True, exist_ok=True)
     files = sorted(path.name for path in made.iterdir())

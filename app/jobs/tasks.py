@@ -11,23 +11,23 @@ from typing import TYPE_CHECKING, Any
 
 from palpate.app.storage.archive import copy_folder, dataset_root, unpack
 from palpate.app.storage.dataset_import import STAGING, check_name
-from palpate.app.storage.evaluation_store import Evaluations, networks_for
-from palpate.app.storage.run_store import CORRECTIONS, Run, Runs
-from palpate.app.storage.sweep_store import Sweeps
-from palpate.app.storage.training_store import Trainings
+from palpate.app.storage.evaluation_store import EvaluationStore, networks_for
+from palpate.app.storage.run_store import CORRECTIONS, Run, RunStore
+from palpate.app.storage.sweep_store import SweepStore
+from palpate.app.storage.training_store import TrainingStore
 from palpate.foundation.errors import DatasetError, RunError
 from palpate.foundation.progress import Report, part
 
 if TYPE_CHECKING:
-    from palpate.dataset.accepted_registration import Accepted
+    from palpate.dataset.accepted_registration import AcceptedRegistration
 
-__all__ = ["TARGETS", "bring", "diagnose", "diagnose_into", "evaluate", "sweep", "train"]
+__all__ = ["TARGETS", "import_dataset", "diagnose", "diagnose_into", "evaluate", "sweep", "train"]
 
 TARGETS = {
     "diagnosis": "palpate.app.jobs.tasks:diagnose",
     "sweep": "palpate.app.jobs.tasks:sweep",
     "training": "palpate.app.jobs.tasks:train",
-    "import": "palpate.app.jobs.tasks:bring",
+    "import": "palpate.app.jobs.tasks:import_dataset",
     "registration": "palpate.app.jobs.short_tasks:register",
     "replay": "palpate.app.jobs.short_tasks:replay",
     "export": "palpate.app.jobs.short_tasks:export",
@@ -39,7 +39,7 @@ def diagnose(request: dict[str, Any], report: Report) -> dict[str, Any]:
     """Diagnose `request["dataset"]`; the run folder gets the name of the scratch folder, below
     `request["runs"]`.
     """
-    from palpate.dataset.accepted_registration import Accepted
+    from palpate.dataset.accepted_registration import AcceptedRegistration
 
     registered = request.get("registration")
     scratch = Path(request["scratch"])
@@ -51,7 +51,7 @@ def diagnose(request: dict[str, Any], report: Report) -> dict[str, Any]:
         workers=int(request["workers"]),
         seed=int(request["seed"]),
         report=report,
-        accepted=Accepted.from_json(registered) if registered else None,
+        accepted=AcceptedRegistration.from_json(registered) if registered else None,
     )
     return {"run": run.name, "verdict": result["verdict"]}
 
@@ -64,7 +64,7 @@ def diagnose_into(
     workers: int,
     seed: int,
     report: Report,
-    accepted: Accepted | None = None,
+    accepted: AcceptedRegistration | None = None,
 ) -> dict[str, Any]:
     """Diagnose into `scratch`, note the origin, and rename the whole to `run`; returns the report.
 
@@ -102,20 +102,20 @@ def sweep(request: dict[str, Any], report: Report) -> dict[str, Any]:
     the job.
     """
     from palpate.dataset import open_dataset
-    from palpate.dataset.accepted_registration import Accepted
+    from palpate.dataset.accepted_registration import AcceptedRegistration
     from palpate.sweep.run_sweep import run_sweep
     from palpate.sweep.sweep_spec import SweepSpec
 
     registered = request.get("registration")
     dataset = open_dataset(Path(request["dataset"])).registered(
-        Accepted.from_json(registered) if registered else None
+        AcceptedRegistration.from_json(registered) if registered else None
     )
-    sweeps, name = Sweeps(Path(request["runs"])), Path(request["scratch"]).name
+    sweeps, name = SweepStore(Path(request["runs"])), Path(request["scratch"]).name
     found = run_sweep(
         dataset,
         SweepSpec.from_json(request["sweep"]),
         sweeps.folder / name,
-        store=sweeps.store,
+        store=sweeps.replay_cache,
         workers=int(request["workers"]),
         scheduler=request["scheduler"],
         report=report,
@@ -133,13 +133,13 @@ def train(request: dict[str, Any], report: Report) -> dict[str, Any]:
     from palpate.evaluation.train_network import TrainingPlan, train_network
 
     runs, name = Path(request["runs"]), str(request.get("folder") or Path(request["scratch"]).name)
-    trainings, dataset = Trainings(runs), open_dataset(Path(request["dataset"]))
-    run = Runs(runs).get(request["run"]) if request.get("run") else None
+    trainings, dataset = TrainingStore(runs), open_dataset(Path(request["dataset"]))
+    run = RunStore(runs).get(request["run"]) if request.get("run") else None
     summary = train_network(
         dataset,
         TrainingPlan.from_json(request["training"]),
         trainings.folder / name,
-        store=trainings.store,
+        store=trainings.sample_cache,
         model=None if run is None else run.model,
         run=None if run is None else run.name,
         truth=request.get("truth"),
@@ -164,7 +164,12 @@ def _show(run: Run, dataset: Any, training: Path, runs: Path, report: Report) ->
     if frames:
         model = json.loads((run.path / "model.json").read_text())
         record_corrections(
-            dataset, model, LoadedNetwork.load(training), frames, runs / CORRECTIONS / run.name, report
+            dataset,
+            model,
+            LoadedNetwork.load(training),
+            frames,
+            runs / CORRECTIONS / run.name,
+            report,
         )
 
 
@@ -179,9 +184,9 @@ def evaluate(request: Mapping[str, Any], report: Report) -> dict[str, Any]:
         str(request.get("folder") or Path(request["scratch"]).name),
         Path(request["dataset"]),
     )
-    run = Runs(runs).get(request["run"]) if request.get("run") else None
+    run = RunStore(runs).get(request["run"]) if request.get("run") else None
     networks = networks_for(
-        Trainings(runs),
+        TrainingStore(runs),
         dataset,
         request.get("run"),
         list(request.get("trainings", ())),
@@ -193,7 +198,7 @@ def evaluate(request: Mapping[str, Any], report: Report) -> dict[str, Any]:
         networks=networks,
         feedback=request.get("feedback", "none"),
     )
-    out = Evaluations(runs).folder / name
+    out = EvaluationStore(runs).folder / name
     found = climb(
         open_dataset(dataset),
         asked,
@@ -205,7 +210,7 @@ def evaluate(request: Mapping[str, Any], report: Report) -> dict[str, Any]:
     return {"evaluation": name, "sentence": found["sentence"]}
 
 
-def bring(request: dict[str, Any], report: Report) -> dict[str, Any]:
+def import_dataset(request: dict[str, Any], report: Report) -> dict[str, Any]:
     """The job: unpack `request["archive"]`, or copy `request["folder"]`, check every file, and make
     it the dataset `name`.
 

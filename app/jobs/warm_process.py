@@ -11,14 +11,14 @@ from typing import Any, TypeVar
 from palpate.foundation.errors import RunError
 from palpate.foundation.processes import ProcessPool
 
-__all__ = ["Solver"]
+__all__ = ["WarmProcess"]
 
 T = TypeVar("T")
 _PATIENCE = 60.0
 """A frame that finds no equilibrium, or a long past, may take so long [s] before it is given up."""
 
 
-class Solver:
+class WarmProcess:
     """Answers one question at a time in a process of its own: the newest answer is what a page
     waits for.
     """

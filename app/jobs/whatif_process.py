@@ -7,7 +7,7 @@ from collections import OrderedDict
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
-from palpate.app.jobs.warm_process import Solver
+from palpate.app.jobs.warm_process import WarmProcess
 from palpate.app.storage.run_store import Run
 from palpate.foundation.errors import RunError
 
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from palpate.recording.interactive import InteractiveFrame, InteractiveReplay
     from palpate.recording.resolve_frame import ResolvedFrame
 
-__all__ = ["Hand", "Lives", "WhatIfs"]
+__all__ = ["InteractiveSession", "InteractiveSolver", "FrameSolver"]
 
 MOST_HANDS = 8
 """Blocks under hands that a process keeps; the one longest untouched goes first, and begins anew
 when touched again."""
 
 
-class WhatIfs(Solver):
+class FrameSolver(WarmProcess):
     """Solves frames of runs again, one at a time, in a process of its own."""
 
     def beginnings(self, run: Run, sequence: str) -> list[dict[str, Any]]:
@@ -39,7 +39,7 @@ class WhatIfs(Solver):
 
 
 @dataclass(frozen=True)
-class Hand:
+class InteractiveSession:
     """One who leads the tool: `name` tells hands apart, whose blocks each remember their own way;
     `key` says of which sequence.
     """
@@ -57,10 +57,12 @@ class Hand:
         return cls(name, _key(run, sequence), effects, tuned)
 
 
-class Lives(Solver):
+class InteractiveSolver(WarmProcess):
     """Blocks under tools that hands lead, all in one process of their own."""
 
-    def at(self, hand: Hand, centre: tuple[float, float, float], within: bool = False) -> InteractiveFrame:
+    def at(
+        self, hand: InteractiveSession, centre: tuple[float, float, float], within: bool = False
+    ) -> InteractiveFrame:
         """What the block answers with the tool there [m]; RunError where it takes too long or the
         process ends.
         """
@@ -109,7 +111,9 @@ def _solve(
 _hands: OrderedDict[str, InteractiveReplay] = OrderedDict()
 
 
-def _felt(hand: Hand, centre: tuple[float, float, float], within: bool) -> InteractiveFrame:
+def _felt(
+    hand: InteractiveSession, centre: tuple[float, float, float], within: bool
+) -> InteractiveFrame:
     import numpy as np
 
     from palpate.recording.resolve_frame import open_resolver

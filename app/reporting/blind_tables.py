@@ -7,10 +7,9 @@ from collections.abc import Collection, Iterable, Sequence
 from html import escape
 from typing import Any
 
-from palpate.app.commands.console import parameters_text
 from palpate.app.reporting.html_document import table
-from palpate.app.reporting.quantities import NARROW, quantity
-from palpate.blind import Result
+from palpate.app.reporting.quantities import NARROW, parameters_text, quantity
+from palpate.blind import CaseResult
 
 __all__ = [
     "POSE",
@@ -43,7 +42,7 @@ POSE = re.compile(r"camera_registration\.[tr][xyz]$")
 """Parameters that a person reads as two magnitudes."""
 
 
-def hidden_text(result: Result) -> str:
+def hidden_text(result: CaseResult) -> str:
     """What is hidden, with its parameters."""
     effects = _listed(result.hidden)
     return (
@@ -54,7 +53,7 @@ def hidden_text(result: Result) -> str:
     )
 
 
-def named_text(result: Result) -> str:
+def named_text(result: CaseResult) -> str:
     """What is named, with its parameters; of a case that ended in an error that."""
     return result.error or _listed(result.causes) or "–"
 
@@ -293,7 +292,7 @@ def parameter_table(summary: dict[str, Any]) -> str:
     return note + shown if stated else shown
 
 
-def case_table(results: Sequence[Result]) -> str:
+def case_table(results: Sequence[CaseResult]) -> str:
     """What was hidden and said in each case; wrong ones stand out."""
     rows = []
     for one in results:

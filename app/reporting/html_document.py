@@ -8,12 +8,12 @@ import io
 import re
 from collections.abc import Iterable, Sequence
 from html import escape
-from pathlib import Path
 from typing import Any
 
+from palpate.app.static_files import STATIC_FOLDER
 from palpate.foundation.errors import RunError
 
-__all__ = ["INK", "figure", "one_file", "section", "table", "themed"]
+__all__ = ["INK", "one_file", "section", "table", "themed"]
 
 INK = {
     "text": "#010101",
@@ -25,7 +25,7 @@ INK = {
     "floor": "#070707",
 }
 """Variables of the page, and the stand-ins that a plot is drawn with."""
-_STYLES = Path(__file__).parent.parent / "static" / "css"
+_STYLES = STATIC_FOLDER / "css"
 
 
 def one_file(title: str, body: str, *styles: str) -> str:
@@ -73,16 +73,6 @@ def table(
             f"<tr class='wrong'>{cells}</tr>" if wrong and wrong[number] else f"<tr>{cells}</tr>"
         )
     return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
-
-
-def figure(width: float, height: float) -> Any:
-    """An empty figure of so many inches that no window is opened for."""
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-    from matplotlib.figure import Figure
-
-    made = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasSVG(made)
-    return made
 
 
 def themed(drawn: Any) -> str:

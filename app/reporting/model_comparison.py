@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.app.storage.run_store import Replay, Run
+from palpate.app.storage.run_store import RecordedReplay, Run
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RunError
 
@@ -111,7 +111,7 @@ def _causes(run: Run) -> list[str]:
     return [cause["effect"] for cause in run.report.get("causes", [])]
 
 
-def _row(replay: Replay, split: str | None) -> SequenceErrors:
+def _row(replay: RecordedReplay, split: str | None) -> SequenceErrors:
     raw, extended = (
         np.asarray(replay[f"distance_{model}"], float) for model in ("raw", "extended")
     )

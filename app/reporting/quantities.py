@@ -5,7 +5,15 @@ from __future__ import annotations
 import math
 from typing import Any
 
-__all__ = ["NARROW", "SHOWN", "between", "measured", "quantity"]
+__all__ = [
+    "NARROW",
+    "SHOWN",
+    "with_interval",
+    "measured",
+    "parameter_texts",
+    "parameters_text",
+    "quantity",
+]
 
 NARROW = "\N{NO-BREAK SPACE}"
 SHOWN = {
@@ -68,9 +76,21 @@ def measured(entry: dict[str, Any]) -> tuple[str, str, str]:
     return told(value), told(low), told(high)
 
 
-def between(entry: dict[str, Any]) -> str:
+def with_interval(entry: dict[str, Any]) -> str:
     """A parameter of a report with its interval: 5.1 kPa (4.8 to 5.4); with the value alone where
     there is none.
     """
     value, low, high = measured(entry)
     return f"{value} ({low.split(NARROW)[0]} to {high.split(NARROW)[0]})" if low and high else value
+
+
+def parameter_texts(cause: dict[str, Any]) -> list[str]:
+    """Each parameter of a cause or of a hidden effect with its interval: `radius 4.2 mm (4.1 to
+    4.3)`.
+    """
+    return [f"{name} {with_interval(entry)}" for name, entry in cause.get("parameters", {}).items()]
+
+
+def parameters_text(cause: dict[str, Any]) -> str:
+    """All parameters of a cause or of a hidden effect, separated by commas."""
+    return ", ".join(parameter_texts(cause))

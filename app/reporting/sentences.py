@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from palpate.app.reporting.quantities import NARROW, between, quantity
+from palpate.app.reporting.quantities import NARROW, quantity, with_interval
 
 __all__ = [
     "cause_phrase",
@@ -204,7 +204,7 @@ def _lump(values: Values, size: Sequence[float] | None) -> str:
 def _felt_lump(cause: dict[str, Any], values: Values) -> str:
     """A lump that was felt and not seen: how deep it lies below the skin next to it."""
     kind = "stiff" if values["stiffness_ratio"] >= 1.0 else "soft"
-    return f"a {kind} lump, {quantity(2 * values['radius'], 'm')} across, its centre {between(cause['depth'])} under the surface"
+    return f"a {kind} lump, {quantity(2 * values['radius'], 'm')} across, its centre {with_interval(cause['depth'])} under the surface"
 
 
 def palpation_sentences(report: dict[str, Any]) -> list[str]:
@@ -224,7 +224,7 @@ def palpation_sentences(report: dict[str, Any]) -> list[str]:
             area = f"{1e4 * footprint['area']:.1f}{NARROW}cm²"
             said.append(f"it is felt over {area} of the surface around ({x}, {y}, {z})")
         if cover := cause.get("cover"):
-            said.append(f"{between(cover)} of tissue lie above it")
+            said.append(f"{with_interval(cover)} of tissue lie above it")
     return said
 
 

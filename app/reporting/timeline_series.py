@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from palpate.app.reporting.json_values import finite
-from palpate.app.storage.run_store import Replay, Run
+from palpate.app.storage.run_store import RecordedReplay, Run
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import PalpateError
 
 __all__ = [
     "by_model",
     "contact_force",
-    "course",
+    "timeline_series",
     "models_of",
     "push_depth",
     "touching",
@@ -32,7 +32,7 @@ FLAT = 2.0e-4
 """How far a vertex of a box may lie from its faces [m]."""
 
 
-def course(run: Run, replay: Replay) -> dict[str, Any]:
+def timeline_series(run: Run, replay: RecordedReplay) -> dict[str, Any]:
     """All series of a sequence for the timeline; null where the data or the run do not hold them.
 
     `depth` [m], `force` as measured [N], and by model `forces` [N] and `iterations` have one number
@@ -59,14 +59,14 @@ def course(run: Run, replay: Replay) -> dict[str, Any]:
     }
 
 
-def by_model(replay: Replay, key: str) -> dict[str, Any]:
+def by_model(replay: RecordedReplay, key: str) -> dict[str, Any]:
     """A series (f,) of each model that has it in the run."""
     return {
         name: replay.arrays[f"{key}_{name}"] for name in MODELS if f"{key}_{name}" in replay.arrays
     }
 
 
-def models_of(replay: Replay) -> tuple[str, ...]:
+def models_of(replay: RecordedReplay) -> tuple[str, ...]:
     """The models whose surface and errors the run holds: `corrected` is in few of them."""
     return tuple(
         name
@@ -75,7 +75,7 @@ def models_of(replay: Replay) -> tuple[str, ...]:
     )
 
 
-def push_depth(replay: Replay) -> FloatArray | None:
+def push_depth(replay: RecordedReplay) -> FloatArray | None:
     """How far the tool as the stated model has it reaches into the block at rest (f,) [m], 0 apart
     from it; None if it is no box.
 
@@ -103,7 +103,7 @@ def touching(depth: FloatArray) -> list[list[int]]:
     ]
 
 
-def contact_force(run: Run, replay: Replay) -> FloatArray | None:
+def contact_force(run: Run, replay: RecordedReplay) -> FloatArray | None:
     """Size of the measured force on the tool (f,) [N] at the frames, NaN where none was recorded;
     None without any.
     """

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 
 from palpate.app.scene import colours
-from palpate.app.scene.figures import Figure, Lines, Mesh
-from palpate.app.scene.model_layer import Side
+from palpate.app.scene.figures import Figure, LinesFigure, SurfaceFigure
+from palpate.app.scene.model_layer import ModelLayer
 from palpate.app.scene.surface_bands import IntArray, lattice
 from palpate.app.storage.run_store import Run
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RunError
 
-__all__ = ["Furniture", "Lump", "furniture_of", "path_lines"]
+__all__ = ["Annotations", "Lump", "annotations_of", "path_lines"]
 
 CROSS, TOUCH = 2.5e-3, 7e-4
 TICK, TICKS_APART = 2.6e-3, 3.2e-3
@@ -36,7 +36,7 @@ class Lump:
 
 
 @dataclass(frozen=True, eq=False)
-class Furniture:
+class Annotations:
     """Of one run, phantom frame.
 
     Attributes:
@@ -64,9 +64,9 @@ class Furniture:
         beads = (self.touches[:, None] + TOUCH * ball).reshape(-1, 3)
         turns = (faces + len(ball) * np.arange(len(self.touches))[:, None, None]).reshape(-1, 3)
         return {
-            "landmarks-crosses": Lines(_single(crosses), colours.LANDMARK, 1.8),
-            "landmarks-misses": Lines(_single(misses), colours.TOOL, 1.0),
-            "landmarks-touches": Mesh(_single(beads), turns, colours.TOOL),
+            "landmarks-crosses": LinesFigure(_single(crosses), colours.LANDMARK, 1.8),
+            "landmarks-misses": LinesFigure(_single(misses), colours.TOOL, 1.0),
+            "landmarks-touches": SurfaceFigure(_single(beads), turns, colours.TOOL),
         }
 
     def base(self, low: FloatArray, high: FloatArray, extended: bool) -> dict[str, Figure]:
@@ -87,7 +87,7 @@ class Furniture:
         outline = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
         flat = np.concatenate([outline, np.array(ticks).reshape(-1, 2, 2)])
         return {
-            "base": Lines(
+            "base": LinesFigure(
                 _single(np.dstack([flat, np.full(flat.shape[:2], 2e-4)])), colours.SUPPORT, 1.6
             )
         }
@@ -100,7 +100,7 @@ class Furniture:
                 return True
         return False
 
-    def found(self, side: Side, frame: int, opacity: float) -> dict[str, Figure]:
+    def found(self, layer: ModelLayer, frame: int, opacity: float) -> dict[str, Figure]:
         """Each lump as a ball, and around it the ellipsoid that holds it wherever it may lie within
         its intervals.
         """
@@ -108,20 +108,20 @@ class Furniture:
         ball, faces = sphere(28, 18)
         for number, lump in enumerate(self.lumps):
             centre = np.array([value for _, value, _ in lump.centre])
-            moved = side.moved(frame, centre[None])
+            moved = layer.moved(frame, centre[None])
             at = centre if moved is None else moved[0]
-            figures[f"lump-{number}"] = Mesh(
+            figures[f"lump-{number}"] = SurfaceFigure(
                 _single(at + lump.radius[1] * ball), faces, colours.EXTENDED, 0.55 * opacity
             )
             middle = at - centre + np.array([(low + high) / 2 for low, _, high in lump.centre])
             reach = lump.radius[2] + np.array([(high - low) / 2 for low, _, high in lump.centre])
-            figures[f"lump-{number}-interval"] = Mesh(
+            figures[f"lump-{number}-interval"] = SurfaceFigure(
                 _single(middle + reach * ball), faces, colours.EXTENDED, 0.2 * opacity
             )
         return figures
 
 
-def furniture_of(run: Run) -> Furniture:
+def annotations_of(run: Run) -> Annotations:
     """From what the run says of its model and causes; what it does not say is not there."""
     try:
         setup = run.model.get("setup", {})
@@ -139,7 +139,7 @@ def furniture_of(run: Run) -> Furniture:
     )
     strips = (setup.get("support") or {}).get("detached") or []
     loose = tuple((str(strip["edge"]), float(strip["extent"])) for strip in strips)
-    return Furniture(landmarks, touches, loose, tuple(_lumps(run.report.get("causes", []))))
+    return Annotations(landmarks, touches, loose, tuple(_lumps(run.report.get("causes", []))))
 
 
 def _lumps(causes: Sequence[dict[str, Any]]) -> list[Lump]:
@@ -163,16 +163,16 @@ def _span(parameter: dict[str, Any]) -> tuple[float, float, float]:
     return low, value, high
 
 
-def path_lines(side: Side, frame: int) -> dict[str, Figure]:
+def path_lines(layer: ModelLayer, frame: int) -> dict[str, Figure]:
     """The way of the tool's centre through the sequence: dark until this frame, light from
     there."""
-    places = side.path
+    places = layer.path
     if len(places) < 2:
         return {}
     segments = np.stack([places[:-1], places[1:]], axis=1)
     shades = np.where((np.arange(len(segments)) < frame)[:, None, None], colours.TOOL, AHEAD)
     return {
-        "path": Lines(
+        "path": LinesFigure(
             _single(segments), np.broadcast_to(shades, segments.shape).astype(np.uint8), 1.8
         )
     }

@@ -8,13 +8,13 @@ from palpate.app.scene.surface_bands import FineSurface, IntArray, lattice
 from palpate.app.scene.view import Section
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["clipped", "cut_face", "kept"]
+__all__ = ["clipped", "cut_face", "depth_inside"]
 
 CAP_SPACING = 1.2e-3
 """Of the points on a cut face, about [m]."""
 
 
-def kept(section: Section, places: FloatArray) -> FloatArray:
+def depth_inside(section: Section, places: FloatArray) -> FloatArray:
     """How far inside what is left these places (..., 3) [m] at rest lie [m]; negative where they
     are cut away.
     """
@@ -28,7 +28,7 @@ def clipped(surface: FineSurface, rest: FloatArray, section: Section) -> FineSur
     New points are weighted means of the same coarse vertices (v, 3) [m], so that they move with the
     material.
     """
-    inside = kept(section, surface.spread(rest))
+    inside = depth_inside(section, surface.spread(rest))
     good = inside >= 0
     count = good[surface.faces].sum(axis=1)
     whole = surface.faces[count == 3]

@@ -14,7 +14,17 @@ import numpy as np
 from palpate.app.scene.surface_bands import IntArray
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["Cloud", "Figure", "Label", "Lines", "Mesh", "PointArray", "Rgb", "Tool", "checksum"]
+__all__ = [
+    "CloudFigure",
+    "Figure",
+    "LabelFigure",
+    "LinesFigure",
+    "SurfaceFigure",
+    "PointArray",
+    "Rgb",
+    "ToolFigure",
+    "checksum",
+]
 
 PointArray = np.ndarray[Any, np.dtype[np.float32]]
 Rgb = tuple[int, int, int]
@@ -23,7 +33,7 @@ HERE: Place = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class SurfaceFigure:
     """A surface of one colour: vertices (n, 3) [m], faces (m, 3); `at` is how far it is shifted
     [m], as of all figures.
     """
@@ -36,7 +46,7 @@ class Mesh:
 
 
 @dataclass(frozen=True, eq=False)
-class Cloud:
+class CloudFigure:
     """Points (n, 3) [m]."""
 
     points: PointArray
@@ -45,7 +55,7 @@ class Cloud:
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class LinesFigure:
     """Segments (k, 2, 3) [m] of one colour, or with a colour (k, 2, 3) at each end; `width` in
     pixels.
     """
@@ -57,7 +67,7 @@ class Lines:
 
 
 @dataclass(frozen=True, eq=False)
-class Tool:
+class ToolFigure:
     """A sphere with a short shaft upwards; centre (3,) and radius [m]."""
 
     centre: FloatArray
@@ -67,7 +77,7 @@ class Tool:
 
 
 @dataclass(frozen=True, eq=False)
-class Label:
+class LabelFigure:
     """Words at a place (3,) [m]."""
 
     text: str
@@ -75,7 +85,7 @@ class Label:
     at: Place = HERE
 
 
-Figure = Mesh | Cloud | Lines | Tool | Label
+Figure = SurfaceFigure | CloudFigure | LinesFigure | ToolFigure | LabelFigure
 
 
 def checksum(frame: int, figures: Mapping[str, Figure]) -> str:

@@ -11,25 +11,23 @@ import logging
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from palpate.app.http_errors import Missing
+from palpate.app.scene.phantom import Phantom
 from palpate.app.scene.registration_picture import Arrow, Mark, PairPicture, middle_of
 from palpate.app.scene.registration_scene import PairScene, Ray
 from palpate.app.schemas import Shown, WeakDirection
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import PalpateError
 from palpate.foundation.frames import Transform
-from palpate.registration.faces import IndexArray
-from palpate.registration.levelling import as_seen, levelled
 from palpate.registration.picking import pick_cloud, pick_mesh, slide_on_cloud
 
-__all__ = ["Clicking", "Clickings", "Phantom"]
+__all__ = ["ManualRegistration", "ManualRegistrations"]
 
-SESSIONS = 32
+MOST_SESSIONS = 32
 APART = 0.03
 """Gap [m] between phantom and cloud side by side."""
 SNAP = 14.0
@@ -38,44 +36,7 @@ ARROW = 0.022
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, eq=False)
-class Phantom:
-    """What is to be registered: the rest cloud (n, 3) [m], camera frame, and the phantom as stated,
-    phantom frame.
-
-    `stated` is the first guess of phantom_from_camera in dataset.toml, None where there is none.
-    """
-
-    cloud: FloatArray
-    size: tuple[float, float, float]
-    landmarks: dict[str, tuple[float, float, float]]
-    stated: Transform | None
-
-    @property
-    def vertices(self) -> FloatArray:
-        """(8, 3) corners of the block [m]."""
-        x, y, z = self.size
-        return np.array(
-            [[i * x / 2, j * y / 2, k * z] for i in (-1, 1) for j in (-1, 1) for k in (0, 1)]
-        )
-
-    @property
-    def faces(self) -> IndexArray:
-        """(12, 3) triangles of the block, turned outwards."""
-        quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-        return np.array(
-            [[a, b, c] for q in quads for a, b, c in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))],
-            dtype=np.int64,
-        )
-
-    def start(self, kind: str) -> Transform:
-        """phantom_from_camera by which the cloud is shown before any pair is clicked."""
-        if kind == "stated" and self.stated is not None:
-            return self.stated
-        return as_seen(self.cloud) if kind == "camera" else levelled(self.cloud)
-
-
-class Clicking:
+class ManualRegistration:
     """One page: what it shows, and the browsers' scenes that show it."""
 
     def __init__(self, phantom_of: Callable[[str], Phantom]) -> None:
@@ -315,20 +276,20 @@ def _arrow(weak: WeakDirection, pivot: FloatArray) -> Arrow:
     return Arrow(pivot - ARROW * axis, pivot + ARROW * axis, turns, weak.text)
 
 
-class Clickings:
+class ManualRegistrations:
     """The registrations that pages are clicking, the oldest forgotten beyond a few dozen."""
 
     def __init__(self, phantom_of: Callable[[str], Phantom]) -> None:
         self._phantom_of = phantom_of
-        self._sessions: OrderedDict[str, Clicking] = OrderedDict()
+        self._sessions: OrderedDict[str, ManualRegistration] = OrderedDict()
         self._lock = threading.Lock()
 
-    def open(self, page: str) -> Clicking:
+    def open(self, page: str) -> ManualRegistration:
         """That of a page, made if need be."""
         with self._lock:
-            found = self._sessions.pop(page, None) or Clicking(self._phantom_of)
+            found = self._sessions.pop(page, None) or ManualRegistration(self._phantom_of)
             self._sessions[page] = found
-            while len(self._sessions) > SESSIONS:
+            while len(self._sessions) > MOST_SESSIONS:
                 self._sessions.popitem(last=False)
             return found
 

@@ -11,12 +11,12 @@ import numpy as np
 
 from palpate.app.scene.colours import nice_end, nice_limit
 from palpate.app.scene.view import MODELS, Model, Quantity
-from palpate.app.storage.run_store import Replay
+from palpate.app.storage.run_store import RecordedReplay
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.recording.interior_fields import InteriorFields
 
-__all__ = ["NO_INSIDE", "Found", "Side", "end_of_scale", "sides_of"]
+__all__ = ["NO_INSIDE", "FrameSolution", "ModelLayer", "end_of_scale", "model_layers"]
 
 NO_INSIDE = "this diagnosis was made before the inside was recorded: make it again to see it"
 MOST_OF_ALL = {"error": 0.95, "displacement": 0.998, "energy": 0.9}
@@ -24,7 +24,7 @@ MOST_OF_ALL = {"error": 0.95, "displacement": 0.998, "energy": 0.9}
 to nothing."""
 
 
-class Found(Protocol):
+class FrameSolution(Protocol):
     """A frame solved again, in place of a recorded one: arrays as in
     `palpate.recording.resolve_frame.ResolvedFrame`.
     """
@@ -49,27 +49,29 @@ class Found(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
+class ModelLayer:
     """A model in a sequence; `found` stands in the place of the recorded frame `instead`."""
 
-    replay: Replay
+    replay: RecordedReplay
     model: Model
     inside: InteriorFields | None
     instead: int | None = None
-    found: Found | None = None
+    solution: FrameSolution | None = None
 
     def surface(self, frame: int) -> FloatArray:
         """(v, 3) moved vertices [m]."""
         return np.asarray(
-            self._found(frame).surface if frame == self.instead else self.replay[self.model][frame],
+            self._solution(frame).surface
+            if frame == self.instead
+            else self.replay[self.model][frame],
             dtype=float,
         )
 
     def tool(self, frame: int) -> tuple[FloatArray, float]:
         """Centre (3,) and radius [m]."""
         if frame == self.instead:
-            return np.asarray(self._found(frame).tool, dtype=float), float(
-                self._found(frame).radius
+            return np.asarray(self._solution(frame).tool, dtype=float), float(
+                self._solution(frame).radius
             )
         return np.asarray(self._own("tool")[frame], dtype=float), float(self._own("tool_radius"))
 
@@ -81,7 +83,9 @@ class Side:
     def camera(self, frame: int) -> Transform:
         """phantom_from_camera."""
         return Transform.from_matrix(
-            np.asarray(self._found(frame).camera if frame == self.instead else self._own("camera"))
+            np.asarray(
+                self._solution(frame).camera if frame == self.instead else self._own("camera")
+            )
         )
 
     def values(self, quantity: Quantity, frame: int) -> FloatArray | None:
@@ -90,7 +94,7 @@ class Side:
         """
         if quantity == "error":
             return np.asarray(
-                self._found(frame).error
+                self._solution(frame).error
                 if frame == self.instead
                 else self.replay[f"error_{self.model}"][frame]
             )
@@ -116,12 +120,12 @@ class Side:
         return None if inside is None else places + inside.displacement(at, places)
 
     def _inside(self, frame: int) -> tuple[InteriorFields | None, int]:
-        return (self._found(frame).inside, 0) if frame == self.instead else (self.inside, frame)
+        return (self._solution(frame).inside, 0) if frame == self.instead else (self.inside, frame)
 
-    def _found(self, frame: int) -> Found:
-        if self.found is None:
+    def _solution(self, frame: int) -> FrameSolution:
+        if self.solution is None:
             raise ValueError(f"nothing was found for frame {frame}")
-        return self.found
+        return self.solution
 
     def _own(self, key: str) -> Any:
         """What is this model's own, or, where a correction stands on another model, that one's."""
@@ -129,15 +133,18 @@ class Side:
         return next(self.replay[name] for name in names if name in self.replay.arrays)
 
 
-def sides_of(replay: Replay) -> dict[Model, Side]:
+def model_layers(replay: RecordedReplay) -> dict[Model, ModelLayer]:
     """The models that a run holds."""
     held = [
         model for model in MODELS if model in replay.arrays and f"error_{model}" in replay.arrays
     ]
-    return {model: Side(replay, model, InteriorFields.read(replay.arrays, model)) for model in held}
+    return {
+        model: ModelLayer(replay, model, InteriorFields.read(replay.arrays, model))
+        for model in held
+    }
 
 
-def end_of_scale(replay: Replay, quantity: Quantity) -> float | None:
+def end_of_scale(replay: RecordedReplay, quantity: Quantity) -> float | None:
     """A round end of the scale for a whole sequence, of the stated model; None where the run does
     not hold the quantity.
     """

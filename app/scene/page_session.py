@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.app.http_errors import Missing
-from palpate.app.scene.annotations import furniture_of
+from palpate.app.scene.annotations import annotations_of
 from palpate.app.scene.model_layer import end_of_scale
-from palpate.app.scene.picture import Picture, Reel
+from palpate.app.scene.picture import Picture, SequenceRenderer
 from palpate.app.scene.view import MODELS, Model, Quantity, View
-from palpate.app.scene.viewer_scene import Scene
-from palpate.app.scene.viewpoint import Lookout, Standpoint, lookout
-from palpate.app.storage.run_store import Run, Runs
+from palpate.app.scene.viewer_scene import PageScene
+from palpate.app.scene.viewpoint import Direction, Viewpoint, lookout
+from palpate.app.storage.run_store import Run, RunStore
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import PalpateError
 
@@ -28,15 +28,15 @@ if TYPE_CHECKING:
     from palpate.recording.interactive import InteractiveFrame
     from palpate.recording.resolve_frame import ResolvedFrame
 
-__all__ = ["Session", "Sessions", "Touch", "Trial"]
+__all__ = ["Session", "Sessions", "InteractiveOverride", "FrameOverride"]
 
 log = logging.getLogger(__name__)
-REELS = 6
-SESSIONS = 32
+MOST_RENDERERS = 6
+MOST_SESSIONS = 32
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class FrameOverride:
     """A frame solved again that a page shows in place of the extended model's."""
 
     run: str
@@ -50,7 +50,7 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class Touch:
+class InteractiveOverride:
     """What a page shows while a hand leads the tool: the model's answer, in place of one of the
     run's models.
     """
@@ -89,16 +89,16 @@ class Session:
     def __init__(
         self,
         identity: str,
-        reel_of: Callable[[str, str], Reel],
+        renderer_of: Callable[[str, str], SequenceRenderer],
         end_of: Callable[[str, Quantity], float | None],
     ) -> None:
         self.identity = identity
         self._shown: tuple[View, Picture] | None = None
-        self._trial: Trial | None = None
-        self._touch: Touch | None = None
-        self._stand: tuple[str, Lookout] | None = None
-        self._reel_of, self._end_of = reel_of, end_of
-        self._scenes: list[Scene] = []
+        self._override: FrameOverride | None = None
+        self._touch: InteractiveOverride | None = None
+        self._stand: tuple[str, Viewpoint] | None = None
+        self._renderer_of, self._end_of = renderer_of, end_of
+        self._scenes: list[PageScene] = []
         self._framed: tuple[str, tuple[tuple[float, float, float], ...]] | None = None
         self._lock = threading.Lock()
 
@@ -119,20 +119,20 @@ class Session:
 
     def _draw(self, view: View) -> None:
         with self._lock:
-            reel = self._reel_of(view.run, view.sequence)
-            frame = min(view.frame, len(reel.replay) - 1)
-            if self._trial is not None and self._trial.fits(view, frame):
-                reel = reel.instead(frame, self._trial.moment)
+            renderer = self._renderer_of(view.run, view.sequence)
+            frame = min(view.frame, len(renderer.replay) - 1)
+            if self._override is not None and self._override.fits(view, frame):
+                renderer = renderer.instead(frame, self._override.moment)
             shown = seen = view.model_copy(update={"frame": frame})
             if self._touch is not None and (self._touch.run, self._touch.sequence) == (
                 view.run,
                 view.sequence,
             ):
-                reel, seen = (
-                    reel.instead(frame, self._touch.felt, self._touch.model),
+                renderer, seen = (
+                    renderer.instead(frame, self._touch.felt, self._touch.model),
                     self._touch.seen(seen),
                 )
-            picture = reel.picture(
+            picture = renderer.picture(
                 seen, self._end_of(seen.run, seen.quantity) if seen.scale == "fixed" else None
             )
             self._shown = (
@@ -147,16 +147,16 @@ class Session:
                 self._look()
             self._framed = (view.run, picture.columns)
 
-    def try_out(self, trial: Trial | None) -> None:
+    def override_frame(self, override: FrameOverride | None) -> None:
         """Show this in place of the extended model, wherever the page shows that frame; None shows
         the model again.
         """
         with self._lock:
-            self._trial, view = trial, self.view
+            self._override, view = override, self.view
         if view is not None:
             self._draw(view)
 
-    def touch(self, touch: Touch | None) -> None:
+    def touch(self, touch: InteractiveOverride | None) -> None:
         """Show what a hand feels, until None lets go."""
         with self._lock:
             self._touch, view = touch, self.view
@@ -168,16 +168,16 @@ class Session:
         view = self.view
         if view is None:
             return False
-        lumps = "lump" in view.layers and self._reel_of(view.run, view.sequence).lumps
+        lumps = "lump" in view.layers and self._renderer_of(view.run, view.sequence).lumps
         return view.section is not None or view.quantity == "energy" or bool(lumps)
 
-    def look(self, where: Standpoint = "reset") -> None:
+    def look(self, where: Direction = "reset") -> None:
         """Turn the cameras of all scenes to the phantom."""
         with self._lock:
             self._stand = None
             self._look(where)
 
-    def stand(self, run: str, lookout: Lookout) -> None:
+    def stand(self, run: str, lookout: Viewpoint) -> None:
         """Look from there while this run is shown, as often as a scene opens, until told
         otherwise."""
         with self._lock:
@@ -185,10 +185,10 @@ class Session:
             if self.view is not None and self.view.run == run:
                 self._look()
 
-    def _look(self, where: Standpoint = "reset") -> None:
+    def _look(self, where: Direction = "reset") -> None:
         if self.view is None or self.picture is None:
             return
-        replay = self._reel_of(self.view.run, self.view.sequence).replay
+        replay = self._renderer_of(self.view.run, self.view.sequence).replay
         found = lookout(replay.size, replay.camera("raw").translation, self.picture.columns, where)
         if self._stand is not None and self._stand[0] == self.view.run:
             found = self._stand[1]
@@ -208,7 +208,7 @@ class Session:
             session=self.identity,
         )
 
-    def join(self, scene: Scene) -> None:
+    def join(self, scene: PageScene) -> None:
         """A browser's scene was opened: show it what the page shows."""
         with self._lock:
             self._scenes.append(scene)
@@ -218,7 +218,7 @@ class Session:
             self._look()
             scene.draw(self.picture)
 
-    def leave(self, scene: Scene) -> None:
+    def leave(self, scene: PageScene) -> None:
         """A browser's scene was closed."""
         with self._lock:
             self._scenes = [other for other in self._scenes if other is not scene]
@@ -242,13 +242,15 @@ class Sessions:
 
     def __init__(
         self,
-        runs: Runs,
+        runs: RunStore,
         clouds_of: Callable[[Run, str], Callable[[int], FloatArray] | None] | None = None,
     ) -> None:
         self._runs = runs
         self._clouds_of = clouds_of or measured_clouds
         self._sessions: OrderedDict[str, Session] = OrderedDict()
-        self._reels: OrderedDict[tuple[str, str, tuple[int, ...]], Reel] = OrderedDict()
+        self._renderers: OrderedDict[tuple[str, str, tuple[int, ...]], SequenceRenderer] = (
+            OrderedDict()
+        )
         self._ends: dict[tuple[str, Quantity], float | None] = {}
         self._lock = threading.Lock()
 
@@ -262,34 +264,36 @@ class Sessions:
     def open(self, identity: str) -> Session:
         """The session of a page, made if need be."""
         with self._lock:
-            session = self._sessions.pop(identity, None) or Session(identity, self.reel, self.end)
+            session = self._sessions.pop(identity, None) or Session(
+                identity, self.renderer, self.end
+            )
             self._sessions[identity] = session
-            while len(self._sessions) > SESSIONS:
+            while len(self._sessions) > MOST_SESSIONS:
                 self._sessions.popitem(last=False)
             return session
 
-    def join(self, identity: str, scene: Scene) -> None:
+    def join(self, identity: str, scene: PageScene) -> None:
         """A browser's scene belongs to this page."""
         self.open(identity).join(scene)
 
-    def leave(self, identity: str, scene: Scene) -> None:
+    def leave(self, identity: str, scene: PageScene) -> None:
         """A browser's scene is gone."""
         self.open(identity).leave(scene)
 
-    def reel(self, run: str, sequence: str) -> Reel:
+    def renderer(self, run: str, sequence: str) -> SequenceRenderer:
         """The sequence of a run, ready to be drawn."""
         with self._lock:
             found = self._runs.get(run)
             key = (run, sequence, found.stamp(sequence))
-            reel = self._reels.pop(key, None)
-            if reel is None:
-                reel = Reel(
-                    found.replay(sequence), self._clouds_of(found, sequence), furniture_of(found)
+            renderer = self._renderers.pop(key, None)
+            if renderer is None:
+                renderer = SequenceRenderer(
+                    found.replay(sequence), self._clouds_of(found, sequence), annotations_of(found)
                 )
-            self._reels[key] = reel
-            while len(self._reels) > REELS:
-                self._reels.popitem(last=False)
-            return reel
+            self._renderers[key] = renderer
+            while len(self._renderers) > MOST_RENDERERS:
+                self._renderers.popitem(last=False)
+            return renderer
 
     def end(self, run: str, quantity: Quantity) -> float | None:
         """The end of a scale that serves all sequences of a run: the largest of their own; None

@@ -13,16 +13,25 @@ from typing import Any
 import numpy as np
 
 from palpate.app.scene import colours
-from palpate.app.scene.annotations import Furniture, path_lines
-from palpate.app.scene.cut_section import clipped, cut_face, kept
-from palpate.app.scene.figures import Cloud, Figure, Label, Lines, Mesh, PointArray, Tool, checksum
-from palpate.app.scene.model_layer import Found, Side, end_of_scale, sides_of
+from palpate.app.scene.annotations import Annotations, path_lines
+from palpate.app.scene.cut_section import clipped, cut_face, depth_inside
+from palpate.app.scene.figures import (
+    CloudFigure,
+    Figure,
+    LabelFigure,
+    LinesFigure,
+    PointArray,
+    SurfaceFigure,
+    ToolFigure,
+    checksum,
+)
+from palpate.app.scene.model_layer import FrameSolution, ModelLayer, end_of_scale, model_layers
 from palpate.app.scene.surface_bands import FineSurface, IntArray, grid_edges, refine
 from palpate.app.scene.view import Model, Quantity, Section, View
-from palpate.app.storage.run_store import Replay
+from palpate.app.storage.run_store import RecordedReplay
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["Picture", "Reel"]
+__all__ = ["Picture", "SequenceRenderer"]
 
 NAMES = {"raw": "Raw model", "extended": "Extended model", "corrected": "Corrected model"}
 MARGIN, APART = 0.008, 0.016
@@ -66,13 +75,13 @@ class Picture:
 
     def summary(self) -> dict[str, Any]:
         """Counts of what is drawn."""
-        tool = next(iter(self.of(Tool).values()), None)
+        tool = next(iter(self.of(ToolFigure).values()), None)
         return {
             "points": self.points,
-            "triangles": {name: len(mesh.faces) for name, mesh in self.of(Mesh).items()},
+            "triangles": {name: len(mesh.faces) for name, mesh in self.of(SurfaceFigure).items()},
             "lines": sum(
                 len(lines.segments)
-                for name, lines in self.of(Lines).items()
+                for name, lines in self.of(LinesFigure).items()
                 if name.endswith("-lines")
             ),
             "figures": sorted(self.figures),
@@ -82,20 +91,20 @@ class Picture:
         }
 
 
-class Reel:
+class SequenceRenderer:
     """One replayed sequence ready to be drawn; `clouds(i)` gives the raw cloud i in the camera
     frame, or is None.
     """
 
     def __init__(
         self,
-        replay: Replay,
+        replay: RecordedReplay,
         clouds: Callable[[int], FloatArray] | None,
-        furniture: Furniture | None = None,
+        annotations: Annotations | None = None,
     ) -> None:
         self.replay, self._clouds = replay, clouds
-        self.sides = sides_of(replay)
-        self._furniture = furniture or Furniture(np.zeros((0, 3)), np.zeros((0, 3)))
+        self.layers = model_layers(replay)
+        self._annotations = annotations or Annotations(np.zeros((0, 3)), np.zeros((0, 3)))
         self._rest = np.asarray(replay["rest"], dtype=float)
         self._surfaces = {
             parts: refine(self._rest, replay["faces"], parts)
@@ -120,12 +129,12 @@ class Reel:
     @property
     def lumps(self) -> int:
         """How many lumps can be shown."""
-        return len(self._furniture.lumps)
+        return len(self._annotations.lumps)
 
     @property
     def landmarks(self) -> int:
         """How many touched landmarks can be shown."""
-        return len(self._furniture.landmarks)
+        return len(self._annotations.landmarks)
 
     def end(self, quantity: Quantity) -> float | None:
         """The robust end of a scale; None where the run does not hold the quantity."""
@@ -133,17 +142,22 @@ class Reel:
             self._ends[quantity] = end_of_scale(self.replay, quantity)
         return self._ends[quantity]
 
-    def instead(self, frame: int, found: Found, model: Model = "extended") -> Reel:
+    def instead(
+        self, frame: int, found: FrameSolution, model: Model = "extended"
+    ) -> SequenceRenderer:
         """The same reel with another solution of one frame in place of a model's."""
         other = copy(self)
-        other.sides = {**self.sides, model: replace(self.sides[model], instead=frame, found=found)}
+        other.layers = {
+            **self.layers,
+            model: replace(self.layers[model], instead=frame, found=found),
+        }
         return other
 
     def picture(self, view: View, end: float | None = None) -> Picture:
         """The moment that a view asks for; `end` of the scale where the view names none and it is
         not the robust one.
         """
-        models = tuple(model for model in view.models() if model in self.sides)
+        models = tuple(model for model in view.models() if model in self.layers)
         front = view.front(models)
         limit = view.limit or end or self.end(view.quantity)
         figures: dict[str, Figure] = {}
@@ -154,15 +168,17 @@ class Reel:
             coloured = coloured or shown
             alone = view.side_by_side and len(models) > 1
             if alone or model == front:
-                around, points = self._around(view, self.sides[model], f"-{model}" if alone else "")
+                around, points = self._around(
+                    view, self.layers[model], f"-{model}" if alone else ""
+                )
                 drawn = {**drawn, **around}
             if alone:
-                drawn[f"name-{model}"] = Label(
+                drawn[f"name-{model}"] = LabelFigure(
                     NAMES[model], np.array([0.0, 0.0, self.corners[1][2] + 0.03])
                 )
             figures.update({name: replace(figure, at=at) for name, figure in drawn.items()})
         if not models:
-            figures, points = self._around(view, self.sides["raw"], "")
+            figures, points = self._around(view, self.layers["raw"], "")
         quantity, limit = (view.quantity, limit) if coloured else (None, None)
         return Picture(view.frame, figures, points, quantity, limit, columns)
 
@@ -174,7 +190,7 @@ class Reel:
         """
         if not view.side_by_side or len(models) < 2:
             return ((0.0, 0.0, 0.0),) * max(1, len(models))
-        eye = self.sides["raw"].camera(-1).translation
+        eye = self.layers["raw"].camera(-1).translation
         around = np.arctan2(eye[1], eye[0])
         right = np.array([-np.sin(around), np.cos(around)])
         size = self.corners[1] - self.corners[0]
@@ -186,25 +202,25 @@ class Reel:
         self, view: View, model: Model, models: tuple[Model, ...], limit: float | None
     ) -> tuple[dict[str, Figure], bool]:
         """The figures of one model, and whether it shows the quantity."""
-        side, opacity, colour = (
-            self.sides[model],
+        layer, opacity, colour = (
+            self.layers[model],
             view.opacity(model),
             getattr(colours, model.upper()),
         )
         if view.lines(model, models):
-            lines = side.surface(view.frame)[self._edges_left(view.section)]
-            return {f"{model}-lines": Lines(_single(lines), colour, WIRE)}, False
+            lines = layer.surface(view.frame)[self._edges_left(view.section)]
+            return {f"{model}-lines": LinesFigure(_single(lines), colour, WIRE)}, False
         values = (
-            side.values(view.quantity, view.frame)
+            layer.values(view.quantity, view.frame)
             if view.coloured(model, models) and limit
             else None
         )
         surface = self._surface(view.section, fine=values is not None)
-        vertices = surface.spread(side.surface(view.frame))
-        cap = self._cap(view, side)
+        vertices = surface.spread(layer.surface(view.frame))
+        cap = self._cap(view, layer)
         if values is None or limit is None:
             plain: dict[str, Figure] = {
-                model: Mesh(_single(vertices), surface.faces, colour, opacity)
+                model: SurfaceFigure(_single(vertices), surface.faces, colour, opacity)
             }
             if cap is not None:
                 plain[f"{model}-cut"] = _plain(cap[1], cap[2], colour, opacity)
@@ -215,7 +231,7 @@ class Reel:
         )
         if cap is not None:
             places, moved, faces = cap
-            inner = side.within(view.quantity, view.frame, places)
+            inner = layer.within(view.quantity, view.frame, places)
             if inner is None:
                 drawn[f"{model}-cut"] = _plain(moved, faces, colour, opacity)
             else:
@@ -224,24 +240,24 @@ class Reel:
                 )
         return drawn, True
 
-    def _around(self, view: View, side: Side, suffix: str) -> tuple[dict[str, Figure], int]:
+    def _around(self, view: View, layer: ModelLayer, suffix: str) -> tuple[dict[str, Figure], int]:
         """Cloud, tool, path, base, landmarks and lump beside a model."""
         figures: dict[str, Figure] = {}
         points = 0
         if "measured" in view.layers:
-            cloud, points = self._cloud(view, side)
+            cloud, points = self._cloud(view, layer)
             if cloud is not None:
-                figures["cloud"] = Cloud(cloud, colours.MEASURED)
+                figures["cloud"] = CloudFigure(cloud, colours.MEASURED)
         if "tool" in view.layers:
-            figures["tool"] = Tool(*side.tool(view.frame), view.opacity("tool"))
+            figures["tool"] = ToolFigure(*layer.tool(view.frame), view.opacity("tool"))
         if "path" in view.layers:
-            figures.update(path_lines(side, view.frame))
+            figures.update(path_lines(layer, view.frame))
         if "landmarks" in view.layers:
-            figures.update(self._furniture.touched())
+            figures.update(self._annotations.touched())
         if "base" in view.layers:
-            figures.update(self._furniture.base(*self.corners, extended=side.model != "raw"))
-        if "lump" in view.layers and not (suffix and side.model == "raw"):
-            figures.update(self._furniture.found(side, view.frame, view.opacity("lump")))
+            figures.update(self._annotations.base(*self.corners, extended=layer.model != "raw"))
+        if "lump" in view.layers and not (suffix and layer.model == "raw"):
+            figures.update(self._annotations.found(layer, view.frame, view.opacity("lump")))
         return {f"{name}{suffix}": figure for name, figure in figures.items()}, points
 
     def _surface(self, section: Section | None, *, fine: bool) -> FineSurface:
@@ -259,30 +275,32 @@ class Reel:
                 parts: clipped(surface, self._rest, section)
                 for parts, surface in self._surfaces.items()
             }
-            edges = self._edges[np.all(kept(section, self._rest)[self._edges] >= -1e-9, axis=1)]
+            edges = self._edges[
+                np.all(depth_inside(section, self._rest)[self._edges] >= -1e-9, axis=1)
+            ]
             self._cut = cut = (section, surfaces, edges)
         return cut
 
-    def _cap(self, view: View, side: Side) -> tuple[FloatArray, FloatArray, IntArray] | None:
+    def _cap(self, view: View, layer: ModelLayer) -> tuple[FloatArray, FloatArray, IntArray] | None:
         """The face that a section opens: places at rest and where they are (n, 3) [m], triangles;
         None where there is none.
         """
         if view.section is None:
             return None
         face = cut_face(*self.corners, view.section)
-        moved = None if face is None else side.moved(view.frame, face[0])
+        moved = None if face is None else layer.moved(view.frame, face[0])
         return None if face is None or moved is None else (face[0], moved, face[1])
 
-    def _cloud(self, view: View, side: Side) -> tuple[PointArray | None, int]:
+    def _cloud(self, view: View, layer: ModelLayer) -> tuple[PointArray | None, int]:
         if self._clouds is None:
             return None, 0
-        points = side.camera(view.frame).apply(
+        points = layer.camera(view.frame).apply(
             self._clouds(int(self.replay["cloud_index"][view.frame]))
         )
         if view.crop:
             points = points[_near_box(points, self.corners[1] - self.corners[0])]
         if view.section is not None:
-            points = points[kept(view.section, points) >= 0]
+            points = points[depth_inside(view.section, points) >= 0]
         count = min(MOST_POINTS, int(np.ceil(len(points) * view.opacity("measured"))))
         points = (
             points[np.linspace(0, len(points) - 1, count).astype(int)]
@@ -319,16 +337,18 @@ def banded(
         unseen = number == len(shades)
         label = f"{name}-unseen" if unseen else f"{name}-{number:02d}"
         shade = colours.UNSEEN if unseen else shades[number]
-        meshes[label] = Mesh(_single(vertices[used]), turned.reshape(-1, 3), shade, opacity)
+        meshes[label] = SurfaceFigure(
+            _single(vertices[used]), turned.reshape(-1, 3), shade, opacity
+        )
     return meshes
 
 
 def _plain(
     vertices: FloatArray, faces: IntArray, colour: tuple[int, int, int], opacity: float
-) -> Mesh:
+) -> SurfaceFigure:
     """A cut face in a model's colour, lighter, so that it is told from the outside."""
     light = tuple(round(0.45 * part + 0.55 * 255) for part in colour)
-    return Mesh(_single(vertices), faces, (light[0], light[1], light[2]), opacity)
+    return SurfaceFigure(_single(vertices), faces, (light[0], light[1], light[2]), opacity)
 
 
 def _single(values: Any) -> PointArray:

@@ -9,27 +9,40 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from palpate.app.scene import colours
-from palpate.app.scene.figures import Cloud, Figure, Label, Lines, Mesh, Tool
+from palpate.app.scene.figures import (
+    CloudFigure,
+    Figure,
+    LabelFigure,
+    LinesFigure,
+    SurfaceFigure,
+    ToolFigure,
+)
 from palpate.app.scene.picture import Picture
-from palpate.app.scene.viewpoint import FIELD_OF_VIEW, Lookout
+from palpate.app.scene.viewpoint import FIELD_OF_VIEW, Viewpoint
 
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-__all__ = ["NullScene", "Scene", "ViserScene"]
+__all__ = ["RecordingScene", "PageScene", "ViserScene"]
 
 POINT_SIZE = 0.00026
 SHAFT = 0.022
-PLACES = {Cloud: "/{}", Mesh: "/mesh/{}", Lines: "/lines/{}", Tool: "/{}", Label: "/names/{}"}
+PLACES = {
+    CloudFigure: "/{}",
+    SurfaceFigure: "/mesh/{}",
+    LinesFigure: "/lines/{}",
+    ToolFigure: "/{}",
+    LabelFigure: "/names/{}",
+}
 
 
-class Scene(Protocol):
+class PageScene(Protocol):
     """Draws pictures and looks at the phantom."""
 
     def draw(self, picture: Picture) -> None:
         """Show this picture and nothing else."""
 
-    def look(self, lookout: Lookout) -> None:
+    def look(self, lookout: Viewpoint) -> None:
         """Look from there."""
 
     def still(self, width: int, height: int) -> np.ndarray[Any, Any] | None:
@@ -38,18 +51,18 @@ class Scene(Protocol):
         """
 
 
-class NullScene:
+class RecordingScene:
     """Draws nothing and remembers all."""
 
     def __init__(self) -> None:
         self.pictures: list[Picture] = []
-        self.looked_from: list[Lookout] = []
+        self.looked_from: list[Viewpoint] = []
 
     def draw(self, picture: Picture) -> None:
         """Keep the picture."""
         self.pictures.append(picture)
 
-    def look(self, lookout: Lookout) -> None:
+    def look(self, lookout: Viewpoint) -> None:
         """Keep the place."""
         self.looked_from.append(lookout)
 
@@ -77,7 +90,7 @@ class ViserScene:
             for name, node in self._nodes.items():
                 node.visible = name in shown
 
-    def look(self, lookout: Lookout) -> None:
+    def look(self, lookout: Viewpoint) -> None:
         """Turn the camera."""
         camera = self._client.camera
         with self._client.atomic():
@@ -99,27 +112,27 @@ class ViserScene:
 
     def _put(self, name: str, figure: Figure) -> None:
         """Make the node, or give it what is new; another kind or size of arrays takes a new one."""
-        made = _mould(figure)
+        made = _node_key(figure)
         if self._made.get(name) != made:
             self._nodes[name] = self._make(name, figure)
             self._made[name] = made
         node = self._nodes[name]
-        if isinstance(figure, Tool):
+        if isinstance(figure, ToolFigure):
             node.position = figure.centre + figure.at
             return
-        node.position = figure.place + figure.at if isinstance(figure, Label) else figure.at
-        if isinstance(figure, Cloud):
+        node.position = figure.place + figure.at if isinstance(figure, LabelFigure) else figure.at
+        if isinstance(figure, CloudFigure):
             node.points = figure.points
-        elif isinstance(figure, Mesh):
+        elif isinstance(figure, SurfaceFigure):
             node.vertices, node.faces = figure.vertices, figure.faces.astype(np.uint32)
-        elif isinstance(figure, Lines):
+        elif isinstance(figure, LinesFigure):
             node.points = figure.segments
             if isinstance(figure.colour, np.ndarray):
                 node.colors = figure.colour
 
     def _make(self, name: str, figure: Figure) -> Any:
         scene = self._client.scene
-        if isinstance(figure, Cloud):
+        if isinstance(figure, CloudFigure):
             return scene.add_point_cloud(
                 name,
                 figure.points,
@@ -129,7 +142,7 @@ class ViserScene:
                 precision="float32",
                 point_shading="flat",
             )
-        if isinstance(figure, Mesh):
+        if isinstance(figure, SurfaceFigure):
             return scene.add_mesh_simple(
                 name,
                 figure.vertices,
@@ -140,7 +153,7 @@ class ViserScene:
                 receive_shadow=False,
                 opacity=None if figure.opacity >= 1 else figure.opacity,
             )
-        if isinstance(figure, Lines):
+        if isinstance(figure, LinesFigure):
             return scene.add_line_segments(
                 name,
                 figure.segments,
@@ -148,11 +161,11 @@ class ViserScene:
                 thickness=figure.width,
                 thickness_units="screen",
             )
-        if isinstance(figure, Label):
+        if isinstance(figure, LabelFigure):
             return scene.add_label(name, figure.text, anchor="bottom-center", font_screen_scale=0.9)
         return self._make_tool(name, figure)
 
-    def _make_tool(self, name: str, tool: Tool) -> Any:
+    def _make_tool(self, name: str, tool: ToolFigure) -> Any:
         scene, opacity = self._client.scene, None if tool.opacity >= 1 else tool.opacity
         root = scene.add_frame(name, show_axes=False)
         scene.add_icosphere(
@@ -176,19 +189,19 @@ class ViserScene:
         return root
 
 
-def _mould(figure: Figure) -> tuple[Any, ...]:
+def _node_key(figure: Figure) -> tuple[Any, ...]:
     """What cannot be changed in a node that is there: where it differs, the node is made anew."""
-    if isinstance(figure, Cloud):
-        return (Cloud, figure.points.shape, figure.colour)
-    if isinstance(figure, Mesh):
-        return (Mesh, figure.colour, figure.opacity)
-    if isinstance(figure, Lines):
+    if isinstance(figure, CloudFigure):
+        return (CloudFigure, figure.points.shape, figure.colour)
+    if isinstance(figure, SurfaceFigure):
+        return (SurfaceFigure, figure.colour, figure.opacity)
+    if isinstance(figure, LinesFigure):
         return (
-            Lines,
+            LinesFigure,
             figure.segments.shape,
             figure.width,
             figure.colour if isinstance(figure.colour, tuple) else None,
         )
-    if isinstance(figure, Label):
-        return (Label, figure.text)
-    return (Tool, figure.radius, figure.opacity)
+    if isinstance(figure, LabelFigure):
+        return (LabelFigure, figure.text)
+    return (ToolFigure, figure.radius, figure.opacity)

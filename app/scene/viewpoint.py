@@ -10,17 +10,17 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["FIELD_OF_VIEW", "LOOKS", "Lookout", "Standpoint", "lookout"]
+__all__ = ["FIELD_OF_VIEW", "LOOKS", "Viewpoint", "Direction", "lookout"]
 
-Standpoint = Literal["reset", "top", "front", "side"]
-LOOKS: tuple[Standpoint, ...] = get_args(Standpoint)
+Direction = Literal["reset", "top", "front", "side"]
+LOOKS: tuple[Direction, ...] = get_args(Direction)
 FIELD_OF_VIEW = 0.6
 RAISED = np.deg2rad(36.0)
 ROOM = 1.2
 
 
 @dataclass(frozen=True, eq=False)
-class Lookout:
+class Viewpoint:
     """Where the camera is, what it looks at (3,) [m], and its upright (3,)."""
 
     position: FloatArray
@@ -32,8 +32,8 @@ def lookout(
     size: FloatArray,
     eye: FloatArray,
     columns: Sequence[tuple[float, float, float]],
-    where: Standpoint,
-) -> Lookout:
+    where: Direction,
+) -> Viewpoint:
     """A camera that sees the whole phantom of edge lengths (3,) [m], and all its columns where it
     stands more than once.
 
@@ -52,4 +52,4 @@ def lookout(
     centre = shifts.mean(axis=0) + np.array([0.0, 0.0, 0.52 * size[2]])
     reach = float(np.linalg.norm(size) + np.ptp(shifts, axis=0).max()) / 2
     away = np.array(directions[where]) * reach / np.sin(FIELD_OF_VIEW / 2) * ROOM
-    return Lookout(centre + away, centre, np.array([0.0, 0.0, 1.0]))
+    return Viewpoint(centre + away, centre, np.array([0.0, 0.0, 1.0]))

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from palpate.app.scene.registration_scene import PairScene, Ray, ViserPairScene
-from palpate.app.scene.viewer_scene import Scene, ViserScene
+from palpate.app.scene.viewer_scene import PageScene, ViserScene
 from palpate.app.scene.viewpoint import FIELD_OF_VIEW
 
 if TYPE_CHECKING:
     from viser import ClientHandle, ViserServer
 
-__all__ = ["BY_HAND", "Audience", "Stage"]
+__all__ = ["BY_HAND", "SceneListener", "ViewerServer"]
 
 BY_HAND = "-register"
 """Ends the name under which a page's scene of manual registration connects."""
@@ -26,7 +26,7 @@ S = TypeVar("S")
 
 
 @dataclass(frozen=True)
-class Audience(Generic[S]):
+class SceneListener(Generic[S]):
     """Whom to tell of a scene of a page that opened, and that closed; from the viewer's threads."""
 
     joined: Callable[[str, S], None]
@@ -38,13 +38,16 @@ class Audience(Generic[S]):
         return lambda: self.gone(page, scene)
 
 
-class Stage:
+class ViewerServer:
     """Owns the viser server: tells `show` of scenes of a page's replays, and `pairs` of those in
     which it registers by hand.
     """
 
     def __init__(
-        self, show: Audience[Scene], pairs: Audience[PairScene], clicked: Callable[[str, Ray], None]
+        self,
+        show: SceneListener[PageScene],
+        pairs: SceneListener[PairScene],
+        clicked: Callable[[str, Ray], None],
     ) -> None:
         import viser
 

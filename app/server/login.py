@@ -36,7 +36,7 @@ class Login:
         self._key = secrets.token_bytes(32)
         self._known = b""  # keyed digest of the right token once it was shown, so that a bearer costs no scrypt each time
 
-    async def welcome(self, headers: Mapping[str, str], peer: str) -> bool:
+    async def is_logged_in(self, headers: Mapping[str, str], peer: str) -> bool:
         """Whether a request with these headers comes from somebody who is logged in."""
         if self._sessions.get(_digest(session_of(headers)), -1.0) > self._clock():
             return True

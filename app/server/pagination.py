@@ -10,7 +10,7 @@ from typing import Annotated, TypeVar
 
 from fastapi import Depends, Query, Response
 
-__all__ = ["TOTAL", "Page", "PageOf", "part_of"]
+__all__ = ["TOTAL", "Page", "RequestedPage", "paginate"]
 
 TOTAL = "X-Total-Count"
 T = TypeVar("T")
@@ -31,10 +31,10 @@ def _page(
     return Page(after, most)
 
 
-PageOf = Annotated[Page, Depends(_page)]
+RequestedPage = Annotated[Page, Depends(_page)]
 
 
-def part_of(rows: Sequence[T], page: Page, response: Response) -> Sequence[T]:
+def paginate(rows: Sequence[T], page: Page, response: Response) -> Sequence[T]:
     """The wanted part of a list, and in the answer's header of how many."""
     response.headers[TOTAL] = str(len(rows))
     return rows[page.after : page.after + page.most]

@@ -14,7 +14,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from palpate.app.server.login import Login
 from palpate.app.settings import Settings
 
-__all__ = ["Guard", "same_origin"]
+__all__ = ["RequestGuard", "same_origin"]
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
 PAGE_POLICY = (
@@ -36,7 +36,7 @@ WILD = frozenset({"0.0.0.0", "::"})
 TRICKS = (b"%2f", b"%5c", b"%2e", b"%00", b"//", b"\\")
 
 
-class Guard:
+class RequestGuard:
     """Refuses foreign Host names (DNS rebinding), foreign Origins (other sites' pages), whoever is
     not logged in, paths that read as two things, and bodies that are too large; for requests and
     websockets alike.
@@ -109,7 +109,7 @@ class Guard:
     ) -> JSONResponse | RedirectResponse | None:
         if self._login is None or scope["path"] in OPEN or scope["path"].startswith(OPEN_BELOW):
             return None
-        if await self._login.welcome(headers, (scope.get("client") or ("",))[0]):
+        if await self._login.is_logged_in(headers, (scope.get("client") or ("",))[0]):
             return None
         if scope["path"] == "/" and "authorization" not in headers:
             return RedirectResponse("/login", status_code=303)

@@ -1,4 +1,4 @@
-"""Running the service on one port."""
+"""Run the service on one port."""
 
 from __future__ import annotations
 
@@ -10,16 +10,14 @@ from types import FrameType
 import uvicorn
 from fastapi import FastAPI
 
-from palpate.app.main import create_app
-from palpate.app.settings import Settings
 from palpate.foundation.errors import SetupError
 
 __all__ = ["Server", "serve"]
 
 
 class Server(uvicorn.Server):
-    """Tells the app's open event streams that it is ending, so that they end first and do not hold
-    it up.
+    """Uvicorn server that ends the app's open event streams first, so that they do not delay its
+    shutdown.
     """
 
     def __init__(self, app: FastAPI) -> None:
@@ -35,30 +33,39 @@ class Server(uvicorn.Server):
         self._app = app
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """On a signal: end the streams, then everything."""
+        """End the event streams on a signal, then the server."""
         self._app.state.ending.set()
         super().handle_exit(sig, frame)
 
 
-def serve(settings: Settings, started: Callable[[str], None]) -> None:
-    """Serve until interrupted; `started(address)` is called once the port is taken. Port 0 takes a
-    free one.
+def serve(app: FastAPI, host: str, port: int, started: Callable[[str], None]) -> None:
+    """Serve `app` until interrupted.
+
+    Args:
+        app: the application of `create_app`.
+        host: address to listen on.
+        port: port to listen on; 0 takes a free one.
+        started: is called with the server's address as soon as the port is bound.
+
+    Raises:
+        SetupError: the port cannot be used.
     """
-    app = create_app(settings)
-    with socket.socket(
-        socket.AF_INET6 if ":" in settings.host else socket.AF_INET, socket.SOCK_STREAM
-    ) as listener:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            listener.bind((settings.host, settings.port))
+            listener.bind((host, port))
         except OSError as error:
             raise SetupError(
-                f"port {settings.port} on {settings.host} cannot be used ({error.strerror}); choose another with --port",
+                f"port {port} on {host} cannot be used ({error.strerror}); "
+                "choose another with --port",
                 key="port",
-                value=settings.port,
+                value=port,
             ) from error
-        listener.listen()  # so that whoever reads the address can connect at once and only has to wait
-        host = f"[{settings.host}]" if ":" in settings.host else settings.host
-        started(f"http://{host}:{listener.getsockname()[1]}")
-        with contextlib.suppress(KeyboardInterrupt):  # the ordinary way to end it
+        # Clients that read the address can connect at once: the kernel queues them until the
+        # server accepts.
+        listener.listen()
+        name = f"[{host}]" if ":" in host else host
+        started(f"http://{name}:{listener.getsockname()[1]}")
+        with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C ends the server
             Server(app).run(sockets=[listener])

@@ -50,7 +50,7 @@ def viewer(page: PageId) -> HTMLResponse:
 @router.websocket("/viser/{page}")
 async def relay(websocket: WebSocket, page: PageId) -> None:
     """Both directions until either side ends."""
-    port = websocket.app.state.desk.stage.port
+    port = websocket.app.state.services.viewer.port
     offered = [Subprotocol(name) for name in websocket.scope.get("subprotocols", [])]
     try:
         upstream = await websockets.connect(

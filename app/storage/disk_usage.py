@@ -1,5 +1,5 @@
-"""What the runs folder takes on the disk, and room where it is too much: caches only, the oldest
-first, never a result.
+"""Disk usage of the runs folder, kept below a limit by deleting the oldest caches, never a
+result.
 """
 
 from __future__ import annotations
@@ -10,21 +10,24 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from palpate.app.storage.dataset_import import UPLOADS
-from palpate.app.storage.sweep_store import FOLDER as SWEEPS
-from palpate.app.storage.sweep_store import STORE as REPLAYS
-from palpate.app.storage.training_store import FOLDER as TRAININGS
-from palpate.app.storage.training_store import STORE as SAMPLES
+from palpate.app.storage.sweep_store import REPLAY_CACHE, SWEEPS
+from palpate.app.storage.training_store import SAMPLE_CACHE, TRAININGS
 
 __all__ = ["CACHES", "Disk", "Usage"]
 
-CACHES = (f"{SWEEPS}/{REPLAYS}", f"{TRAININGS}/{SAMPLES}", UPLOADS)
-"""Folders below the runs of what can be worked out, or sent, once more."""
+CACHES = (f"{SWEEPS}/{REPLAY_CACHE}", f"{TRAININGS}/{SAMPLE_CACHE}", UPLOADS)
+"""Folders below the runs whose content can be computed, or uploaded, again."""
 
 
 @dataclass(frozen=True)
 class Usage:
-    """Bytes below the runs folder: all, those of caches, and how many may be; what was dropped just
-    now.
+    """Bytes below the runs folder.
+
+    Attributes:
+        used: of all files.
+        caches: of the files in caches.
+        limit: that `used` should stay below.
+        dropped: that were deleted by this call.
     """
 
     used: int
@@ -34,13 +37,13 @@ class Usage:
 
 
 class Disk:
-    """The runs folder, kept below a limit [bytes] as far as dropping caches goes."""
+    """Disk usage of the runs folder; `limit` [bytes] is kept by deleting caches only."""
 
     def __init__(self, runs: Path, limit: int) -> None:
         self._runs, self._limit = runs, limit
 
     def usage(self) -> Usage:
-        """As it is now."""
+        """Measure the current usage."""
         return Usage(
             sum(size for _, size, _ in _files(self._runs)),
             sum(size for _, size, _ in self._cached()),
@@ -48,8 +51,11 @@ class Disk:
         )
 
     def trim(self, limit: int | None = None, spared: frozenset[str] = frozenset()) -> Usage:
-        """Drop the files of caches that were used longest ago until all is below the limit;
-        `spared` paths are kept.
+        """Delete the least recently used files of caches until the usage is below the limit.
+
+        Args:
+            limit: [bytes]; the one of this object where it is None.
+            spared: paths that are not deleted.
         """
         now, dropped = self.usage(), 0
         excess = now.used - (self._limit if limit is None else limit)
@@ -68,7 +74,7 @@ class Disk:
 
 
 def _files(folder: Path) -> list[tuple[Path, int, float]]:
-    """Files below a folder with size [bytes] and when they were last used [s]."""
+    """Files below a folder with size [bytes] and time of the last use [s since 1970]."""
     found = []
     for place, _, names in os.walk(folder):
         for name in names:

@@ -1,6 +1,4 @@
-"""Registrations made by hand, by name: one file each below the runs folder, never in the dataset,
-never over an older one.
-"""
+"""AcceptedRegistration registrations by name, below the runs folder: never in the dataset, never overwritten."""
 
 from __future__ import annotations
 
@@ -8,112 +6,127 @@ import json
 import os
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 import numpy as np
 
 from palpate.app.http_errors import Conflict, Missing
-from palpate.app.storage.run_store import NAME
-from palpate.dataset.accepted_registration import Accepted, rest_digest
-from palpate.foundation.errors import RegistrationError, RunError
+from palpate.app.storage.result_store import NAME, ResultStore, read_object
+from palpate.dataset.accepted_registration import AcceptedRegistration, rest_digest
+from palpate.foundation.errors import RegistrationError
 from palpate.foundation.processes import ProcessPool
 
-__all__ = ["Registrations", "accepted_for", "register"]
+if TYPE_CHECKING:
+    from palpate.dataset import Dataset
 
-FOLDER = "registrations"
+__all__ = ["RegistrationStore", "accepted_for", "refuse_unregistrable", "register"]
 
 
-class Registrations:
-    """The registrations of all datasets, in `runs`/registrations/DATASET/NAME.json."""
+class RegistrationStore(ResultStore):
+    """The registrations of one dataset, in `runs`/registrations/DATASET/NAME.json."""
 
-    def __init__(self, runs: Path) -> None:
-        self._folder = runs / FOLDER
+    def __init__(self, runs: Path, dataset: str) -> None:
+        self.dataset = _checked(dataset)
+        super().__init__(runs / "registrations" / dataset, "registration", "", "")
 
-    def names(self, dataset: str) -> list[str]:
-        """The registrations of one dataset, sorted."""
-        return sorted(
-            path.stem
-            for path in (self._folder / dataset).glob("*.json")
-            if NAME.fullmatch(path.stem)
+    def names(self) -> list[str]:
+        """Names of the registrations, sorted."""
+        files = self.folder.glob("*.json")
+        return sorted(path.stem for path in files if NAME.fullmatch(path.stem))
+
+    def has_begun(self, name: str) -> bool:
+        """Whether there is a registration of this name."""
+        return self._path(name).is_file()
+
+    def missing(self, name: str) -> Missing:
+        """The error for a name that no registration has."""
+        return Missing(
+            f"{self.dataset} has no registration {name}", dataset=self.dataset, registration=name
         )
 
-    def get(self, dataset: str, name: str) -> dict[str, Any]:
-        """One registration, or Missing."""
-        path = self._path(dataset, name)
-        if not path.is_file():
-            raise Missing(
-                f"{dataset} has no registration {name}", dataset=dataset, registration=name
-            )
-        try:
-            stored: dict[str, Any] = json.loads(path.read_text())
-        except (OSError, ValueError) as error:
-            raise RunError(
-                f"registration {name} of {dataset} cannot be read ({error}); make it again",
-                file=path.name,
-            ) from error
-        return stored
+    def accepted(self, name: str) -> AcceptedRegistration:
+        """One registration, for use in place of the automatic one."""
+        return AcceptedRegistration.from_json(self.request(name))
 
-    def accepted(self, dataset: str, name: str) -> Accepted:
-        """One registration, to be used in place of the automatic one."""
-        return Accepted.from_json(self.get(dataset, name))
+    def check_name(self, name: str) -> None:
+        """Raise RegistrationError for an invalid name, Conflict for one that is taken."""
+        if self._path(name).exists():
+            raise self._taken(name)
 
-    def check_name(self, dataset: str, name: str) -> None:
-        """Refuse what is no name, and one that is taken."""
-        if self._path(dataset, name).exists():
-            raise Conflict(
-                f"{dataset} has a registration {name} already: choose another name",
-                registration=name,
-            )
-
-    def save(self, dataset: str, name: str, found: dict[str, Any]) -> dict[str, Any]:
-        """Keep a registration under a new name; Conflict where the name is taken."""
-        path = self._path(dataset, name)
+    def save(self, name: str, registration: dict[str, Any]) -> dict[str, Any]:
+        """Store a registration under a new name; raises Conflict where the name is taken."""
+        path = self._path(name)
         path.parent.mkdir(parents=True, exist_ok=True)
-        stored = {"format": 1, "name": name, "dataset": dataset, "created": time.time(), **found}
+        head = {"format": 1, "name": name, "dataset": self.dataset, "created": time.time()}
+        stored = {**head, **registration}
         whole = path.with_name(f".{uuid4().hex}")
         whole.write_text(json.dumps(stored, indent=1))
         try:
-            # A link, unlike a renaming, fails where the name is taken, even by a request at the
-            # same moment.
+            # Unlike a rename, a link fails where the name is taken, even by a request at the same
+            # moment.
             os.link(whole, path)
         except FileExistsError as error:
-            raise Conflict(
-                f"{dataset} has a registration {name} already: choose another name",
-                registration=name,
-            ) from error
+            raise self._taken(name) from error
         finally:
             whole.unlink()
         return stored
 
-    def _path(self, dataset: str, name: str) -> Path:
-        if not (NAME.fullmatch(dataset) and NAME.fullmatch(name)) or len(name) > 64:
-            raise RegistrationError(
-                f"{name!r} is no name: at most 64 letters, digits, dot, dash, underscore",
-                key="name",
-            )
-        return self._folder / dataset / f"{name}.json"
+    def _taken(self, name: str) -> Conflict:
+        return Conflict(
+            f"{self.dataset} has a registration {name} already: choose another name",
+            registration=name,
+        )
+
+    def _object(self, name: str, file: str) -> dict[str, Any]:
+        return read_object(self._path(name), self.kind, name)
+
+    def _path(self, name: str) -> Path:
+        return self.folder / f"{_checked(name, longest=64)}.json"
 
 
-def accepted_for(dataset: Path, said: str | None, runs: Path) -> Accepted | None:
-    """What the terminal calls a registration: a file of one, or the name of one that is kept below
-    `runs` for this dataset.
-    """
-    if said is None:
+def _checked(name: str, longest: int = 255) -> str:
+    if not NAME.fullmatch(name) or len(name) > longest:
+        raise RegistrationError(
+            f"{name!r} is no name: at most 64 letters, digits, dot, dash, underscore", key="name"
+        )
+    return name
+
+
+def accepted_for(dataset: Path, named: str | None, runs: Path) -> AcceptedRegistration | None:
+    """The registration that the command line names: a file, or a name stored below `runs`."""
+    if named is None:
         return None
-    if not Path(said).is_file():
-        return Registrations(runs).accepted(dataset.resolve().name, said)
+    if not Path(named).is_file():
+        return RegistrationStore(runs, dataset.resolve().name).accepted(named)
     try:
-        return Accepted.from_json(json.loads(Path(said).read_text()))
+        return AcceptedRegistration.from_json(json.loads(Path(named).read_text()))
     except (OSError, ValueError) as error:
         raise RegistrationError(
-            f"{said} cannot be read ({error}); name a registration that was accepted", file=said
+            f"{named} cannot be read ({error}); name a registration that was accepted", file=named
         ) from error
 
 
+def refuse_unregistrable(dataset: Dataset) -> None:
+    """Raise RegistrationError for a dataset whose cloud cannot be registered to its phantom."""
+    from palpate.setup.setup import Shape
+
+    if isinstance(dataset.geometry, Shape):
+        raise RegistrationError("clouds are registered to a block only, not to other shapes yet")
+    if not dataset.has_rest:
+        raise RegistrationError(
+            "the dataset has no rest.ply: record one cloud of the untouched phantom",
+            file="rest.ply",
+        )
+
+
 def register(dataset: Path, cloud: list[list[float]], mesh: list[list[float]]) -> dict[str, Any]:
-    """Fit pairs and run ICP from there in a process of its own, since the server itself loads no
-    Open3D.
+    """Fit pairs of points and refine by ICP, in another process: the server loads no Open3D.
+
+    Args:
+        dataset: the dataset's folder.
+        cloud: points on the rest cloud [m], camera frame.
+        mesh: the same points on the phantom [m], phantom frame.
     """
     with ProcessPool(1) as pool:
         return pool.submit(_register, dataset, cloud, mesh).result()
@@ -122,19 +135,12 @@ def register(dataset: Path, cloud: list[list[float]], mesh: list[list[float]]) -
 def _register(dataset: Path, cloud: list[list[float]], mesh: list[list[float]]) -> dict[str, Any]:
     from palpate.dataset import open_dataset
     from palpate.registration.point_pairs import register_pairs
-    from palpate.setup.setup import Shape
 
     opened = open_dataset(dataset)
-    if isinstance(opened.geometry, Shape):
-        raise RegistrationError("clouds are registered to a block only, not to other shapes yet")
-    if not opened.has_rest:
-        raise RegistrationError(
-            "the dataset has no rest.ply: record one cloud of the untouched phantom",
-            file="rest.ply",
-        )
+    refuse_unregistrable(opened)
     config = opened.config
-    found = register_pairs(
+    registration = register_pairs(
         opened.rest_cloud(), config.size, np.array(cloud), np.array(mesh), config.depth_sigma
     )
     points = [{"cloud": one, "mesh": other} for one, other in zip(cloud, mesh, strict=True)]
-    return {"points": points, "registration": found.to_json(), "rest": rest_digest(dataset)}
+    return {"points": points, "registration": registration.to_json(), "rest": rest_digest(dataset)}

@@ -1,10 +1,8 @@
-"""Results on disk: one folder per finished diagnosis, as the diagnosis wrote it."""
+"""Runs on disk: a folder for each finished diagnosis, as the diagnosis wrote it."""
 
 from __future__ import annotations
 
-import json
 import os
-import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,37 +12,37 @@ from zipfile import BadZipFile
 import numpy as np
 
 from palpate.app.http_errors import Missing
+from palpate.app.storage.result_store import NAME, ResultStore, read_object, unusable
 from palpate.foundation.arrays import FloatArray
-from palpate.foundation.errors import RunError
 from palpate.foundation.frames import Transform
 
-__all__ = ["NAME", "Replay", "Run", "Runs"]
+__all__ = ["CORRECTIONS", "RecordedReplay", "Run", "RunStore"]
 
-NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 FIELDS = (
-    *(
-        "time",
-        "cloud_index",
-        "faces",
-        "rest",
-        "raw",
-        "extended",
-        "tool_raw",
-        "tool_extended",
-        "tool_radius_raw",
-    ),
-    *(
-        "tool_radius_extended",
-        "error_raw",
-        "error_extended",
-        "distance_raw",
-        "distance_extended",
-        "paper_raw",
-    ),
-    *("paper_extended", "noise_floor", "camera_raw", "camera_extended", "outcome"),
+    "time",
+    "cloud_index",
+    "faces",
+    "rest",
+    "raw",
+    "extended",
+    "tool_raw",
+    "tool_extended",
+    "tool_radius_raw",
+    "tool_radius_extended",
+    "error_raw",
+    "error_extended",
+    "distance_raw",
+    "distance_extended",
+    "paper_raw",
+    "paper_extended",
+    "noise_floor",
+    "camera_raw",
+    "camera_extended",
+    "outcome",
 )
+"""Arrays that every file of a replay has."""
 CORRECTIONS = "corrections"
-"""Folder beside the runs: of each run its recorded frames under a trained network."""
+"""Folder beside the runs: the recorded frames of each run, corrected by a trained network."""
 CORRECTED = (
     "corrected",
     "error_corrected",
@@ -57,9 +55,12 @@ CORRECTED = (
 
 
 @dataclass(frozen=True, eq=False)
-class Replay:
-    """One sequence as measured and as both models replay it; `arrays` holds what the run folder's
-    contract names.
+class RecordedReplay:
+    """One sequence as recorded in a run: the measurement and the replays of the models.
+
+    Attributes:
+        name: of the sequence.
+        arrays: at least those of FIELDS.
     """
 
     name: str
@@ -78,7 +79,7 @@ class Replay:
         return np.asarray(rest.max(axis=0) - rest.min(axis=0), dtype=float)
 
     def camera(self, model: str) -> Transform:
-        """phantom_from_camera as the `raw` or the `extended` model holds it."""
+        """phantom_from_camera of the `raw` or the `extended` model."""
         return Transform.from_matrix(self.arrays[f"camera_{model}"])
 
 
@@ -90,31 +91,31 @@ class Run:
 
     @property
     def name(self) -> str:
-        """The folder's name, which is the id of the diagnosis."""
+        """Name of the folder, which is the id of the diagnosis."""
         return self.path.name
 
     @cached_property
     def report(self) -> dict[str, Any]:
-        """The report, as in the design's contract."""
+        """Content of report.json."""
         return self._json("report.json")
 
     @cached_property
     def model(self) -> dict[str, Any]:
-        """The extended model with its lineage."""
+        """Content of model.json: the extended model and how it was found."""
         return self._json("model.json")
 
     @cached_property
     def origin(self) -> dict[str, Any]:
-        """Where the data lie and when the run was made; empty for a folder that does not say."""
+        """Folder of the dataset, time and seed of the run; empty where the run does not state them."""
         return self._json("origin.json") if (self.path / "origin.json").is_file() else {}
 
     @property
     def sequences(self) -> tuple[str, ...]:
-        """The names of the replayed sequences, sorted."""
+        """Names of the replayed sequences, sorted."""
         return tuple(sorted(path.stem for path in (self.path / "replays").glob("*.npz")))
 
-    def replay(self, name: str) -> Replay:
-        """The replay of one sequence."""
+    def replay(self, name: str) -> RecordedReplay:
+        """The replay of one sequence; raises Missing for another name."""
         if name not in self.sequences:
             known = ", ".join(self.sequences)
             raise Missing(
@@ -122,10 +123,12 @@ class Run:
                 run=self.name,
                 sequence=name,
             )
-        return Replay(name, self._arrays(f"replays/{name}.npz", FIELDS) | self._corrected(name))
+        return RecordedReplay(
+            name, self._arrays(f"replays/{name}.npz", FIELDS) | self._corrected(name)
+        )
 
     def stamp(self, name: str) -> tuple[int, ...]:
-        """Of the files of a sequence's replay: changes when one of them is written anew."""
+        """Modification times of the files of a sequence's replay, for use as a cache key."""
         files = (self.path / "replays" / f"{name}.npz", self._correction(name))
         return tuple(file.stat().st_mtime_ns if file.is_file() else 0 for file in files)
 
@@ -133,33 +136,25 @@ class Run:
         return self.path.parent / CORRECTIONS / self.name / f"{name}.npz"
 
     def _corrected(self, name: str) -> dict[str, Any]:
-        """What a training on this run's model has left of a sequence; nothing where there was none,
-        or one of other frames.
-        """
+        """Arrays of the corrected model; empty where no training on this run's model was shown."""
         file = self._correction(name)
         return self._arrays(os.path.relpath(file, self.path), CORRECTED) if file.is_file() else {}
 
     def patterns(self) -> dict[str, Any]:
-        """Patch centres and normals (P, 3) and the measured and predicted error (P,) [m], phantom
-        frame.
+        """Patch centres [m] and normals, (P, 3) in the phantom frame, and the measured and
+        predicted error (P,) [m].
         """
         return self._arrays("patterns.npz", ("centres", "normals", "measured", "predicted"))
 
     def picture(self, name: str) -> Path:
-        """The file of a picture."""
+        """Path of a picture; raises Missing where there is none of this name."""
         path = self.path / "pictures" / name
         if not NAME.fullmatch(name) or not path.is_file():
             raise Missing(f"run {self.name} has no picture {name}", run=self.name, picture=name)
         return path
 
-    def _json(self, name: str) -> dict[str, Any]:
-        try:
-            value = json.loads((self.path / name).read_text())
-        except (OSError, ValueError) as error:
-            raise self._broken(name, f"cannot be read ({error})") from error
-        if not isinstance(value, dict):
-            raise self._broken(name, f"holds {type(value).__name__}, expected an object")
-        return value
+    def _json(self, file: str) -> dict[str, Any]:
+        return read_object(self.path / file, "run", self.name)
 
     def _arrays(self, name: str, fields: tuple[str, ...]) -> dict[str, Any]:
         try:
@@ -169,38 +164,25 @@ class Run:
             ):
                 arrays = {field: stored[field] for field in stored.files}
         except (OSError, ValueError, EOFError, BadZipFile) as error:
-            raise self._broken(name, f"cannot be read ({error})") from error
+            raise unusable(name, f"cannot be read ({error})", "run", self.name) from error
         missing = [field for field in fields if field not in arrays]
         if missing:
-            raise self._broken(name, f"lacks {', '.join(missing)}")
+            raise unusable(name, f"lacks {', '.join(missing)}", "run", self.name)
         return arrays
 
-    def _broken(self, file: str, what: str) -> RunError:
-        return RunError(
-            f"run {self.name}: {file} {what}; make the run again", run=self.name, file=file
-        )
 
-
-class Runs:
+class RunStore(ResultStore):
     """The folder of runs."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
+        super().__init__(folder, "run", "report.json", "report.json")
 
     def all(self) -> list[Run]:
-        """All whole runs, the newest first."""
-        found = [
-            path.parent
-            for path in self.folder.glob("*/report.json")
-            if NAME.fullmatch(path.parent.name)
-        ]
-        return [
-            Run(path) for path in sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
-        ]
+        """All complete runs, the newest first."""
+        return [Run(self.folder / name) for name in self.names()]
 
     def get(self, name: str) -> Run:
-        """One run, or Missing."""
-        path = self.folder / name
-        if not NAME.fullmatch(name) or not (path / "report.json").is_file():
-            raise Missing(f"there is no run {name}; GET /api/runs lists those there are", run=name)
-        return Run(path)
+        """One run; raises Missing where there is none of this name."""
+        if not self.has_begun(name):
+            raise self.missing(name)
+        return Run(self.folder / name)

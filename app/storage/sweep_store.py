@@ -1,76 +1,29 @@
-"""Sweeps on disk: a folder each, below the runs folder, written by the work and read by the page
-while it runs.
-"""
+"""Sweeps on disk, below the runs folder; a sweep's points are readable while it runs."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-from palpate.app.http_errors import Missing
-from palpate.app.storage.run_store import NAME
-from palpate.foundation.errors import RunError
+from palpate.app.storage.result_store import ResultStore
 from palpate.sweep.result_rows import ResultRows
 
-__all__ = ["Sweeps"]
+__all__ = ["REPLAY_CACHE", "SWEEPS", "SweepStore"]
 
-FOLDER, STORE = "sweeps", ".replays"
+SWEEPS, REPLAY_CACHE = "sweeps", ".replays"
 
 
-class Sweeps:
-    """The folder of sweeps; `store` keeps the replays that all of them share."""
+class SweepStore(ResultStore):
+    """The folder of sweeps."""
 
     def __init__(self, runs: Path) -> None:
-        self.folder = runs / FOLDER
+        super().__init__(runs / SWEEPS, "sweep", "request.json", "summary.json")
 
     @property
-    def store(self) -> Path:
-        """Of replays by their content."""
-        return self.folder / STORE
-
-    def names(self) -> list[str]:
-        """All sweeps that have begun, the newest first."""
-        found = [
-            path.parent
-            for path in self.folder.glob("*/request.json")
-            if NAME.fullmatch(path.parent.name)
-        ]
-        return [
-            path.name for path in sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
-        ]
-
-    def begun(self, name: str) -> bool:
-        """Whether anything of it is on disk."""
-        return bool(NAME.fullmatch(name)) and (self.folder / name / "request.json").is_file()
-
-    def request(self, name: str) -> dict[str, Any]:
-        """What was asked."""
-        if not self.begun(name):
-            raise Missing(
-                f"there is no sweep {name}; GET /api/sweeps lists those there are", sweep=name
-            )
-        return self._json(name, "request.json")
-
-    def summary(self, name: str) -> dict[str, Any] | None:
-        """What it found; None before its end."""
-        return (
-            self._json(name, "summary.json")
-            if (self.folder / name / "summary.json").is_file()
-            else None
-        )
+    def replay_cache(self) -> Path:
+        """Folder of replays by their content, shared by all sweeps."""
+        return self.folder / REPLAY_CACHE
 
     def points(self, name: str) -> list[dict[str, Any]]:
-        """The points that have ended, in that order; those that failed with their reason."""
+        """Finished points in the order of their ends; failed ones with their reason."""
         return ResultRows(self.folder / name / "points.jsonl").read()
-
-    def _json(self, name: str, file: str) -> dict[str, Any]:
-        try:
-            value: dict[str, Any] = json.loads((self.folder / name / file).read_text())
-        except (OSError, ValueError) as error:
-            raise RunError(
-                f"sweep {name}: {file} cannot be read ({error}); make the sweep again",
-                sweep=name,
-                file=file,
-            ) from error
-        return value

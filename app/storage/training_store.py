@@ -1,44 +1,49 @@
-"""Trainings on disk, below the runs folder, and the job that makes one; with a run the corrected
-model gets into its scene, too.
-"""
+"""Trainings of correction networks on disk, below the runs folder."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
-from palpate.app.storage.result_folder import Kept
+from palpate.app.storage.result_store import NAME, ResultStore, unusable
 
-__all__ = ["FOLDER", "STORE", "Trainings"]
+__all__ = ["SAMPLE_CACHE", "TRAININGS", "TrainingStore"]
 
-FOLDER, STORE = "trainings", ".samples"
+TRAININGS, SAMPLE_CACHE = "trainings", ".samples"
 
 
-class Trainings(Kept):
-    """The folder of trainings; `store` keeps the samples that all of them share."""
+class TrainingStore(ResultStore):
+    """The folder of trainings."""
 
     def __init__(self, runs: Path) -> None:
-        super().__init__(runs, "training", FOLDER, "request.json", "training.json")
+        super().__init__(runs / TRAININGS, "training", "request.json", "training.json")
 
     @property
-    def store(self) -> Path:
-        """Of samples by their content."""
-        return self.folder / STORE
+    def sample_cache(self) -> Path:
+        """Folder of training samples by their content, shared by all trainings."""
+        return self.folder / SAMPLE_CACHE
 
     def history(self, name: str) -> list[list[float]]:
-        """Of each epoch so far the loss, the validation error [mm] and the learning rate."""
-        found = self.read(name, "history.json")
-        return list(found) if found is not None else (self.found(name) or {}).get("history", [])
+        """Loss, validation error [mm] and learning rate of each finished epoch."""
+        path = self.folder / name / "history.json"
+        if not NAME.fullmatch(name) or not path.is_file():
+            return list((self.result(name) or {}).get("history", []))
+        try:
+            return list(json.loads(path.read_text()))
+        except (OSError, ValueError) as error:
+            raise unusable(path.name, f"cannot be read ({error})", self.kind, name) from error
 
     def newest(self, dataset: Path, model: str, run: str | None = None) -> Path | None:
-        """The folder of the newest finished training on a dataset's model: baseline, true, or
-        extended of a run.
+        """Folder of the newest finished training on one model of a dataset.
+
+        Args:
+            dataset: the dataset's folder.
+            model: baseline, true, or extended.
+            run: the run whose extended model was corrected.
         """
+        expected = (str(dataset.resolve()), model, run)
         for name in self.finished():
-            asked = self.asked(name)
-            if (asked.get("dataset"), asked.get("model"), asked.get("run")) == (
-                str(dataset.resolve()),
-                model,
-                run,
-            ):
+            request = self.request(name)
+            if (request.get("dataset"), request.get("model"), request.get("run")) == expected:
                 return self.folder / name
         return None

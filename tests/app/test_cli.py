@@ -19,16 +19,10 @@ from broken_datasets import BREAKAGES, write_valid_dataset
 
 from palpate.app.cli import main
 from palpate.app.commands import console
-from palpate.app.commands.console import (
-    agrees,
-    parameters_text,
-    progress,
-    verdict_cells,
-    verdict_table,
-    write_json,
-)
+from palpate.app.commands.console import agrees, progress, verdict_cells, verdict_table, write_json
 from palpate.app.commands.diagnosis import print_report
 from palpate.app.jobs.signals import Stop
+from palpate.app.reporting.quantities import parameters_text
 from palpate.foundation.errors import Cancelled
 
 Palpate = Callable[..., tuple[int, str, str]]

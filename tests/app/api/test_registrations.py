@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from small_dataset import SIZE
 
 from palpate.app.http_errors import Conflict
-from palpate.app.storage.registration_store import Registrations
+from palpate.app.storage.registration_store import RegistrationStore
 from palpate.foundation.frames import Transform
 
 X, Y, Z = SIZE[0] / 2, SIZE[1] / 2, SIZE[2]
@@ -79,11 +79,11 @@ def test_unknown_names_are_not_found_and_names_that_lead_elsewhere_refused(
 
 
 def test_a_name_taken_meanwhile_is_refused_and_the_older_one_stays(tmp_path: Path) -> None:
-    kept = Registrations(tmp_path)
-    first = kept.save("small", "a", {"registration": 1})
+    store = RegistrationStore(tmp_path, "small")
+    first = store.save("a", {"registration": 1})
     with pytest.raises(Conflict, match="already"):
-        kept.save("small", "a", {"registration": 2})
-    assert kept.get("small", "a") == first
+        store.save("a", {"registration": 2})
+    assert store.request("a") == first
     assert [path.name for path in (tmp_path / "registrations" / "small").iterdir()] == ["a.json"]
 
 

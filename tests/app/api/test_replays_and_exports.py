@@ -59,8 +59,8 @@ def test_a_replay_becomes_a_run_of_its_own(palpate: Client, client: httpx.Client
     assert [one["name"] for one in heading["sequences"]] == ["poke-01"] and "for-replay" in heading[
         "notes"
     ][0]
-    course = client.get(f"/api/runs/{run}/sequences/poke-01").json()
-    assert len(course["time"]) == 5
+    timeline_series = client.get(f"/api/runs/{run}/sequences/poke-01").json()
+    assert len(timeline_series["time"]) == 5
     assert client.get(f"/api/runs/{run}/model").json()["registration"]["name"] == "for-replay"
     assert client.get(f"/api/runs/{run}/report.html").status_code == 200
 

@@ -41,7 +41,7 @@ def test_the_help_leads_from_an_archive_to_a_registration_and_a_sweep(
         page = Page(context.new_page(), client)
         walk = Walk(page, theme)
         walk.help()
-        walk.bring(archive)
+        walk.import_dataset(archive)
         walk.register(
             Bench(
                 page,
@@ -74,7 +74,7 @@ class Walk:
         self.picture("help")
         self.page.page.keyboard.press("Escape")
 
-    def bring(self, archive: str) -> None:
+    def import_dataset(self, archive: str) -> None:
         page = self.page.page
         page.click("#import")
         page.set_input_files("input[name=file]", archive)

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from palpate.app.cli import app
 from palpate.app.jobs.short_tasks import register
-from palpate.app.storage.registration_store import Registrations, accepted_for
+from palpate.app.storage.registration_store import RegistrationStore, accepted_for
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.progress import silent
 
@@ -94,5 +94,5 @@ def test_a_diagnosis_in_the_terminal_is_given_it(
     )
     assert (
         given["accepted"].to_json()
-        == Registrations(home / "runs").accepted("small", "mine").to_json()
+        == RegistrationStore(home / "runs", "small").accepted("mine").to_json()
     )

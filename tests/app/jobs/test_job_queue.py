@@ -11,7 +11,7 @@ import pytest
 from job_working import TARGETS, alive, ended, reached, scratch_is_clean
 
 from palpate.app.http_errors import Conflict, Missing
-from palpate.app.jobs.job_queue import Jobs
+from palpate.app.jobs.job_queue import JobQueue
 from palpate.app.jobs.job_records import JobState
 
 
@@ -21,13 +21,13 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def jobs(folder: Path) -> Iterator[Jobs]:
-    with closing(Jobs(folder, TARGETS)) as jobs:
+def jobs(folder: Path) -> Iterator[JobQueue]:
+    with closing(JobQueue(folder, TARGETS)) as jobs:
         yield jobs
 
 
 def test_job_runs_in_another_process_and_leaves_its_result(
-    jobs: Jobs, tmp_path: Path, folder: Path
+    jobs: JobQueue, tmp_path: Path, folder: Path
 ) -> None:
     done = ended(
         jobs, jobs.submit("count", {"steps": 3, "result": str(tmp_path / "result")}, label="block")
@@ -40,7 +40,7 @@ def test_job_runs_in_another_process_and_leaves_its_result(
     assert done.created <= done.started <= done.finished
 
 
-def test_progress_is_seen_while_the_job_runs(jobs: Jobs, tmp_path: Path) -> None:
+def test_progress_is_seen_while_the_job_runs(jobs: JobQueue, tmp_path: Path) -> None:
     job = jobs.submit("count", {"steps": 50, "pause": 0.05, "result": str(tmp_path / "result")})
     now = reached(jobs, job, lambda now: now.fraction > 0.05)
     assert now.state is JobState.RUNNING
@@ -48,7 +48,7 @@ def test_progress_is_seen_while_the_job_runs(jobs: Jobs, tmp_path: Path) -> None
 
 
 def test_cancelled_job_ends_its_whole_family_and_leaves_nothing(
-    jobs: Jobs, tmp_path: Path, folder: Path
+    jobs: JobQueue, tmp_path: Path, folder: Path
 ) -> None:
     job = jobs.submit("sleep_with_child", {"result": str(tmp_path / "pids")})
     reached(jobs, job, lambda now: now.fraction == 0.5)
@@ -66,7 +66,7 @@ def test_cancelled_job_ends_its_whole_family_and_leaves_nothing(
         jobs.cancel(job.id)
 
 
-def test_waiting_job_can_be_cancelled_before_it_starts(jobs: Jobs, tmp_path: Path) -> None:
+def test_waiting_job_can_be_cancelled_before_it_starts(jobs: JobQueue, tmp_path: Path) -> None:
     first = jobs.submit("count", {"steps": 10, "pause": 0.05, "result": str(tmp_path / "first")})
     second = jobs.submit("count", {"steps": 1, "result": str(tmp_path / "second")})
     assert jobs.get(second.id).state is JobState.QUEUED
@@ -77,7 +77,7 @@ def test_waiting_job_can_be_cancelled_before_it_starts(jobs: Jobs, tmp_path: Pat
     assert not (tmp_path / "second").exists()
 
 
-def test_failed_job_keeps_its_error_with_its_place(jobs: Jobs, folder: Path) -> None:
+def test_failed_job_keeps_its_error_with_its_place(jobs: JobQueue, folder: Path) -> None:
     failed = ended(jobs, jobs.submit("refuse", {}))
     assert failed.state is JobState.FAILED
     assert failed.error == {
@@ -94,19 +94,19 @@ def test_failed_job_keeps_its_error_with_its_place(jobs: Jobs, folder: Path) -> 
         ("die", "WorkerDied: the worker process ended with code 7"),
     ],
 )
-def test_bug_and_sudden_death_are_told(jobs: Jobs, kind: str, error: str) -> None:
+def test_bug_and_sudden_death_are_told(jobs: JobQueue, kind: str, error: str) -> None:
     failed = ended(jobs, jobs.submit(kind, {}))
     assert failed.state is JobState.FAILED
     assert failed.error is not None
     assert f"{failed.error['kind']}: {failed.error['message']}" == error
 
 
-def test_work_that_gives_up_is_cancelled(jobs: Jobs) -> None:
+def test_work_that_gives_up_is_cancelled(jobs: JobQueue) -> None:
     assert ended(jobs, jobs.submit("give_up", {})).state is JobState.CANCELLED
 
 
 def test_closing_interrupts_what_runs(folder: Path, tmp_path: Path) -> None:
-    with closing(Jobs(folder, TARGETS)) as jobs:
+    with closing(JobQueue(folder, TARGETS)) as jobs:
         job = jobs.submit("sleep_with_child", {"result": str(tmp_path / "pids")})
         reached(jobs, job, lambda now: now.fraction == 0.5)
     family = [int(pid) for pid in (tmp_path / "pids").read_text().split()]
@@ -117,12 +117,12 @@ def test_closing_interrupts_what_runs(folder: Path, tmp_path: Path) -> None:
     assert os.getpid() not in family
 
 
-def test_unknown_job_is_missing(jobs: Jobs) -> None:
+def test_unknown_job_is_missing(jobs: JobQueue) -> None:
     with pytest.raises(Missing, match="there is no job x"):
         jobs.get("x")
 
 
-def test_every_change_is_noticed(jobs: Jobs, tmp_path: Path) -> None:
+def test_every_change_is_noticed(jobs: JobQueue, tmp_path: Path) -> None:
     seen: list[Any] = [jobs.version]
     job = jobs.submit("count", {"steps": 2, "result": str(tmp_path / "result")})
     seen.append(jobs.version)
@@ -137,7 +137,7 @@ def test_what_a_killed_job_made_beside_the_others_is_gone_and_it_is_done_once_mo
     beside = tmp_path / "datasets" / ".importing"
     (beside / "of-an-earlier-server").mkdir(parents=True)
     with closing(
-        Jobs(tmp_path / "runs", TARGETS, beside=[beside], tidy=lambda: "made room")
+        JobQueue(tmp_path / "runs", TARGETS, beside=[beside], tidy=lambda: "made room")
     ) as jobs:
         assert not beside.exists()
         job = ended(

@@ -20,7 +20,7 @@ import pytest
 from job_working import TARGETS, ended, gone, reached, scratch_is_clean
 
 from palpate.app.http_errors import Conflict
-from palpate.app.jobs.job_queue import Jobs
+from palpate.app.jobs.job_queue import JobQueue
 from palpate.app.jobs.job_records import JobState
 from palpate.foundation.errors import SetupError
 
@@ -65,7 +65,7 @@ def test_server_that_is_killed_leaves_no_process_and_loses_no_job(tmp_path: Path
         process.kill()
         process.wait()
         assert gone(family)
-    with closing(Jobs(tmp_path / "runs", TARGETS)) as jobs:
+    with closing(JobQueue(tmp_path / "runs", TARGETS)) as jobs:
         waited, ran, first = jobs.all()
         assert (first.state, first.result) == (JobState.DONE, {"steps": 1})
         assert (ran.state, (ran.error or {})["kind"]) == (JobState.INTERRUPTED, "Interrupted")
@@ -75,7 +75,7 @@ def test_server_that_is_killed_leaves_no_process_and_loses_no_job(tmp_path: Path
 
 
 def test_worker_that_is_killed_is_told_and_retried_under_the_same_name(tmp_path: Path) -> None:
-    with closing(Jobs(tmp_path / "runs", TARGETS)) as jobs:
+    with closing(JobQueue(tmp_path / "runs", TARGETS)) as jobs:
         job = jobs.submit("count", {"steps": 40, "pause": 0.05, "result": str(tmp_path / "result")})
         reached(jobs, job, lambda now: now.fraction > 0.1)
         os.kill(int(written(tmp_path / "result.pid")), signal.SIGKILL)
@@ -93,7 +93,7 @@ def test_worker_that_is_killed_is_told_and_retried_under_the_same_name(tmp_path:
 
 
 def test_a_job_that_was_just_cancelled_can_be_retried_at_once(tmp_path: Path) -> None:
-    with closing(Jobs(tmp_path / "runs", TARGETS)) as jobs:
+    with closing(JobQueue(tmp_path / "runs", TARGETS)) as jobs:
         job = jobs.submit("count", {"steps": 20, "pause": 0.05, "result": str(tmp_path / "result")})
         reached(jobs, job, lambda now: now.fraction > 0.1)
         jobs.cancel(job.id)
@@ -102,7 +102,7 @@ def test_a_job_that_was_just_cancelled_can_be_retried_at_once(tmp_path: Path) ->
 
 
 def test_log_has_each_stage_once_and_every_warning(tmp_path: Path) -> None:
-    with closing(Jobs(tmp_path / "runs", TARGETS)) as jobs:
+    with closing(JobQueue(tmp_path / "runs", TARGETS)) as jobs:
         job = ended(jobs, jobs.submit("warn", {}))
         told = [(note.level, note.text) for note in jobs.notes(job.id)]
         assert [text for level, text in told if level == "info"] == [
@@ -116,7 +116,7 @@ def test_log_has_each_stage_once_and_every_warning(tmp_path: Path) -> None:
 
 
 def test_the_same_request_under_the_same_key_is_one_job(tmp_path: Path) -> None:
-    with closing(Jobs(tmp_path / "runs", TARGETS)) as jobs:
+    with closing(JobQueue(tmp_path / "runs", TARGETS)) as jobs:
         job = jobs.submit("warn", {"of": 1}, key="mine")
         assert jobs.submit("warn", {"of": 1}, key="mine").id == job.id
         assert jobs.submit("warn", {"of": 1}).id != job.id
@@ -126,11 +126,11 @@ def test_the_same_request_under_the_same_key_is_one_job(tmp_path: Path) -> None:
 
 def test_two_servers_do_not_share_a_folder(tmp_path: Path) -> None:
     with (
-        closing(Jobs(tmp_path, TARGETS)),
+        closing(JobQueue(tmp_path, TARGETS)),
         pytest.raises(SetupError, match="another server works in"),
     ):
-        Jobs(tmp_path, TARGETS)
-    with closing(Jobs(tmp_path, TARGETS)):
+        JobQueue(tmp_path, TARGETS)
+    with closing(JobQueue(tmp_path, TARGETS)):
         pass
 
 
@@ -150,7 +150,7 @@ def test_records_of_an_earlier_version_are_read_and_what_ran_then_is_interrupted
                 row,
             )
     (tmp_path / ".making" / "old").mkdir(parents=True)
-    with closing(Jobs(tmp_path, TARGETS)) as jobs:
+    with closing(JobQueue(tmp_path, TARGETS)) as jobs:
         found: list[Any] = [jobs.get(name) for name in ("ran", "ended")]
         assert [(job.state.value, job.attempt) for job in found] == [
             ("interrupted", 1),

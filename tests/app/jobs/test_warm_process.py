@@ -4,11 +4,11 @@ import os
 import threading
 import time
 
-from palpate.app.jobs.warm_process import Solver
+from palpate.app.jobs.warm_process import WarmProcess
 
 
 def test_solver_outlives_the_thread_that_asked_first() -> None:
-    solver = Solver()
+    solver = WarmProcess()
     found: list[int] = []
     try:
         asking = threading.Thread(target=lambda: found.append(solver.ask(os.getpid)))

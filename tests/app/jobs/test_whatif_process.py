@@ -17,7 +17,7 @@ from browsing import Page
 from recorded_run import RADIUS, SEQUENCE, write_recorded_run
 from websockets.sync.client import connect
 
-from palpate.app.jobs.whatif_process import WhatIfs
+from palpate.app.jobs.whatif_process import FrameSolver
 from palpate.app.settings import Settings
 from palpate.app.storage.run_store import Run
 from palpate.foundation.errors import RunError
@@ -133,7 +133,7 @@ def test_it_is_drawn_in_the_page_that_asked_and_taken_back(there: httpx.Client, 
 
 
 def test_solver_that_dies_is_started_again(run: Path) -> None:
-    asked, found = WhatIfs(), Run(run)
+    asked, found = FrameSolver(), Run(run)
     try:
         asked.solve(found, SEQUENCE, 0, [], True)
         assert asked._pool is not None
@@ -151,7 +151,7 @@ def test_solver_that_dies_is_started_again(run: Path) -> None:
 
 
 def test_solve_that_takes_too_long_is_given_up(run: Path) -> None:
-    asked = WhatIfs(patience=0.01)
+    asked = FrameSolver(patience=0.01)
     with pytest.raises(RunError, match="given up"):
         asked.solve(Run(run), SEQUENCE, 0, [], True)
     asked.close()
@@ -161,7 +161,7 @@ def test_run_that_does_not_say_where_its_data_are_is_told(run: Path, tmp_path: P
     other = Path(shutil.copytree(run, tmp_path / "other"))
     (other / "origin.json").write_text(json.dumps({}))
     with pytest.raises(RunError, match="does not say where its dataset is"):
-        WhatIfs().solve(Run(other), SEQUENCE, 0, [], True)
+        FrameSolver().solve(Run(other), SEQUENCE, 0, [], True)
 
 
 LIVE = f"/api/runs/large-tool-1/sequences/{SEQUENCE}/live"

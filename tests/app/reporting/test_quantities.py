@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from palpate.app.reporting.quantities import NARROW, between, measured, quantity
+from palpate.app.reporting.quantities import NARROW, measured, quantity, with_interval
 
 
 def _plain(text: str) -> str:
@@ -43,12 +43,12 @@ def test_quantities_have_the_unit_people_read_and_two_digits(
 def test_interval_has_as_many_decimals_as_tell_its_ends_apart(
     value: float, low: float, high: float, unit: str, text: str
 ) -> None:
-    assert _plain(between({"value": value, "low": low, "high": high, "unit": unit})) == text
+    assert _plain(with_interval({"value": value, "low": low, "high": high, "unit": unit})) == text
 
 
 def test_value_without_an_interval_stands_alone() -> None:
-    assert _plain(between({"value": 0.0034, "unit": "m"})) == "3.40 mm"
-    assert between({"value": "-x", "unit": ""}) == "-x"
+    assert _plain(with_interval({"value": 0.0034, "unit": "m"})) == "3.40 mm"
+    assert with_interval({"value": "-x", "unit": ""}) == "-x"
 
 
 def test_value_without_bounds_is_said_and_no_error() -> None:

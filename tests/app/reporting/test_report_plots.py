@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from palpate.app.reporting.report_plots import drawn_errors, error_plots
-from palpate.app.storage.run_store import Replay
+from palpate.app.storage.run_store import RecordedReplay
 
 
-def _replay(name: str, worst: float) -> Replay:
+def _replay(name: str, worst: float) -> RecordedReplay:
     """Four frames, the third with the largest error [m], the last without a comparison."""
     raw = np.array([1e-4, 1e-4, worst, np.nan])
-    return Replay(
+    return RecordedReplay(
         name,
         {
             "time": np.arange(4.0),

@@ -7,13 +7,13 @@ import pytest
 
 from palpate.app.reporting.timeline_series import (
     contact_force,
-    course,
     models_of,
     push_depth,
+    timeline_series,
     touching,
     worst_frames,
 )
-from palpate.app.storage.run_store import Replay, Run
+from palpate.app.storage.run_store import RecordedReplay, Run
 from palpate.foundation.arrays import FloatArray
 
 
@@ -23,28 +23,28 @@ def run(place: Any, run_name: str) -> Run:
 
 
 @pytest.fixture
-def replay(run: Run) -> Replay:
+def replay(run: Run) -> RecordedReplay:
     return run.replay("poke-01")
 
 
-def moved(replay: Replay, **arrays: Any) -> Replay:
-    return Replay(replay.name, {**replay.arrays, **arrays})
+def moved(replay: RecordedReplay, **arrays: Any) -> RecordedReplay:
+    return RecordedReplay(replay.name, {**replay.arrays, **arrays})
 
 
-def depth_of(replay: Replay) -> FloatArray:
+def depth_of(replay: RecordedReplay) -> FloatArray:
     depth = push_depth(replay)
     assert depth is not None
     return depth
 
 
-def test_depth_from_above_is_how_far_the_ball_is_below_the_top(replay: Replay) -> None:
+def test_depth_from_above_is_how_far_the_ball_is_below_the_top(replay: RecordedReplay) -> None:
     np.testing.assert_allclose(
         depth_of(replay), 0.003 * np.sin(np.pi * np.linspace(0.1, 0.9, 5)), atol=1e-8
     )
 
 
 def test_depth_from_the_side_and_at_an_edge_is_measured_along_the_shortest_way(
-    replay: Replay,
+    replay: RecordedReplay,
 ) -> None:
     half = replay.size / 2
     centres = [
@@ -57,7 +57,7 @@ def test_depth_from_the_side_and_at_an_edge_is_measured_along_the_shortest_way(
     np.testing.assert_allclose(depth, [0.001, 0.0, 0.0, 0.005 + half[1]], atol=1e-7)
 
 
-def test_what_is_no_box_has_no_depth(replay: Replay) -> None:
+def test_what_is_no_box_has_no_depth(replay: RecordedReplay) -> None:
     rest = np.array(replay["rest"], dtype=float)
     dome = rest - np.array([0, 0, 1.0]) * (4.0 * rest[:, :1] ** 2)
     assert push_depth(moved(replay, rest=dome)) is None
@@ -68,12 +68,14 @@ def test_spells_of_touch_are_first_and_last_frames() -> None:
     assert touching(np.zeros(4)) == []
 
 
-def test_force_is_the_size_of_the_measured_one_at_the_frames(run: Run, replay: Replay) -> None:
+def test_force_is_the_size_of_the_measured_one_at_the_frames(
+    run: Run, replay: RecordedReplay
+) -> None:
     assert contact_force(run, replay) == pytest.approx([0.1, 0.3, 0.5, 0.7, 0.9])
     assert contact_force(run, run.replay("drag-01")) is None
 
 
-def test_force_outside_its_recording_is_not_made_up(run: Run, replay: Replay) -> None:
+def test_force_outside_its_recording_is_not_made_up(run: Run, replay: RecordedReplay) -> None:
     force = contact_force(run, moved(replay, time=np.array([99.0, 100.2, 101.5])))
     assert force is not None
     assert np.isnan(force).tolist() == [True, False, True]
@@ -92,9 +94,9 @@ def test_a_peak_beside_a_higher_one_is_not_told_twice() -> None:
 
 
 def test_forces_and_failures_of_each_model_are_told_where_recorded(
-    run: Run, replay: Replay
+    run: Run, replay: RecordedReplay
 ) -> None:
-    plain = course(run, replay)
+    plain = timeline_series(run, replay)
     assert (plain["forces"], plain["failed"]) == (None, {})
     kept = moved(
         replay,
@@ -102,17 +104,17 @@ def test_forces_and_failures_of_each_model_are_told_where_recorded(
         outcome_raw=np.array([0, 0, 1, 0, 2]),
         outcome_extended=np.zeros(5),
     )
-    assert course(run, kept)["forces"] == {"raw": [0.0, 0.1, 0.2, 0.3, 0.4]}
-    assert course(run, kept)["failed"] == {"raw": [2, 4], "extended": []}
+    assert timeline_series(run, kept)["forces"] == {"raw": [0.0, 0.1, 0.2, 0.3, 0.4]}
+    assert timeline_series(run, kept)["failed"] == {"raw": [2, 4], "extended": []}
 
 
 def test_series_of_a_third_model_and_iterations_are_told_where_recorded(
-    run: Run, replay: Replay
+    run: Run, replay: RecordedReplay
 ) -> None:
     assert models_of(replay) == ("raw", "extended")
-    assert course(run, replay)["iterations"] is None
+    assert timeline_series(run, replay)["iterations"] is None
     more = {f"{key}corrected": replay[f"{key}extended"] for key in ("", "error_", "distance_")}
-    told = course(run, moved(replay, **more, iterations_raw=np.arange(5)))
+    told = timeline_series(run, moved(replay, **more, iterations_raw=np.arange(5)))
     assert told["models"] == ["raw", "extended", "corrected"]
     assert told["iterations"] == {"raw": [0, 1, 2, 3, 4]}
     assert told["touching"] == [[0, 4]]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.app.scene.cut_section import clipped, cut_face, kept
+from palpate.app.scene.cut_section import clipped, cut_face, depth_inside
 from palpate.app.scene.surface_bands import FineSurface, refine
 from palpate.app.scene.view import Section
 from palpate.foundation.arrays import FloatArray
@@ -38,7 +38,7 @@ def test_both_parts_together_are_the_whole(axis, at):
     )
     for part, flip in zip(parts, (False, True), strict=True):
         used = part.spread(rest)[np.unique(part.faces)]
-        assert np.all(kept(Section(axis=axis, at=at, flip=flip), used) > -1e-12)
+        assert np.all(depth_inside(Section(axis=axis, at=at, flip=flip), used) > -1e-12)
 
 
 def test_new_points_move_with_the_material_and_keep_the_outward_turn():

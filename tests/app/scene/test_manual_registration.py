@@ -10,7 +10,7 @@ import pytest
 from small_dataset import SIZE
 from websockets.sync.client import connect
 
-from palpate.app.scene.manual_registration import Clicking, Phantom
+from palpate.app.scene.manual_registration import ManualRegistration, Phantom
 from palpate.app.scene.registration_picture import PairPicture
 from palpate.app.scene.registration_scene import Ray
 from palpate.app.schemas import Shown
@@ -47,8 +47,8 @@ def phantom() -> Phantom:
 
 
 @pytest.fixture
-def clicking() -> Clicking:
-    found = Clicking(lambda name: phantom())
+def clicking() -> ManualRegistration:
+    found = ManualRegistration(lambda name: phantom())
     found.scene = Noted()  # type: ignore[attr-defined]
     found.join(found.scene)  # type: ignore[attr-defined]
     return found
@@ -59,7 +59,7 @@ def above(point: Any, mark: tuple[int, str] | None = None) -> Ray:
 
 
 def test_before_any_fit_the_cloud_lies_beside_the_phantom_whatever_its_pose(
-    clicking: Clicking,
+    clicking: ManualRegistration,
 ) -> None:
     for start in ("levelled", "camera", "stated"):
         said = clicking.show(Shown(dataset="a", start=start))
@@ -69,7 +69,7 @@ def test_before_any_fit_the_cloud_lies_beside_the_phantom_whatever_its_pose(
 
 
 def test_a_click_is_the_cloud_point_in_the_camera_frame_wherever_the_cloud_is_shown(
-    clicking: Clicking,
+    clicking: ManualRegistration,
 ) -> None:
     moved = small_motion(np.array([0.02, 0, 0, 0, 0, 0.4]), np.zeros(3)) @ POSE
     clicking.show(Shown(dataset="a", pose=moved.matrix.tolist(), over=True))
@@ -84,7 +84,7 @@ def test_a_click_is_the_cloud_point_in_the_camera_frame_wherever_the_cloud_is_sh
 
 
 def test_a_click_on_the_phantom_meets_its_surface_and_near_a_landmark_the_landmark(
-    clicking: Clicking,
+    clicking: ManualRegistration,
 ) -> None:
     clicking.show(Shown(dataset="a", mode="mesh"))
     assert np.allclose(
@@ -96,7 +96,9 @@ def test_a_click_on_the_phantom_meets_its_surface_and_near_a_landmark_the_landma
     assert far["landmark"] is None
 
 
-def test_a_click_on_an_end_chooses_it_and_a_dragged_end_keeps_its_side(clicking: Clicking) -> None:
+def test_a_click_on_an_end_chooses_it_and_a_dragged_end_keeps_its_side(
+    clicking: ManualRegistration,
+) -> None:
     pairs = [{"cloud": None, "mesh": [0.01, 0.0, Z]}]
     clicking.show(
         Shown.model_validate(
@@ -113,7 +115,9 @@ def test_a_click_on_an_end_chooses_it_and_a_dragged_end_keeps_its_side(clicking:
     )
 
 
-def test_arrow_keys_move_a_point_on_its_surface_as_the_person_sees_it(clicking: Clicking) -> None:
+def test_arrow_keys_move_a_point_on_its_surface_as_the_person_sees_it(
+    clicking: ManualRegistration,
+) -> None:
     clicking.show(Shown(dataset="a", pose=POSE.matrix.tolist(), over=True))
     assert np.allclose(
         clicking.nudge("mesh", [0.01, 0.0, Z], 2e-4, -1e-4), [0.0102, -1e-4, Z], atol=1e-6
@@ -124,7 +128,7 @@ def test_arrow_keys_move_a_point_on_its_surface_as_the_person_sees_it(clicking: 
     assert clicking.nudge("mesh", [X, 0.0, Z], 0.01, 0.0) == [X, 0.0, Z]
 
 
-def test_pairs_lines_and_weak_directions_are_drawn(clicking: Clicking) -> None:
+def test_pairs_lines_and_weak_directions_are_drawn(clicking: ManualRegistration) -> None:
     cloud = phantom().cloud
     asked = {
         "dataset": "a",

@@ -8,14 +8,14 @@ import pytest
 from palpate.app.http_errors import Missing
 from palpate.app.scene.page_session import Sessions
 from palpate.app.scene.view import View
-from palpate.app.scene.viewer_scene import NullScene
-from palpate.app.scene.viewpoint import Lookout, lookout
-from palpate.app.storage.run_store import Runs
+from palpate.app.scene.viewer_scene import RecordingScene
+from palpate.app.scene.viewpoint import Viewpoint, lookout
+from palpate.app.storage.run_store import RunStore
 
 
 @pytest.fixture
 def sessions(place: Any) -> Sessions:
-    return Sessions(Runs(place.runs))
+    return Sessions(RunStore(place.runs))
 
 
 def view(run: str, **changes: Any) -> View:
@@ -23,7 +23,7 @@ def view(run: str, **changes: Any) -> View:
 
 
 def test_every_scene_of_a_page_gets_the_picture(sessions: Sessions, run_name: str) -> None:
-    scenes = [NullScene(), NullScene()]
+    scenes = [RecordingScene(), RecordingScene()]
     for scene in scenes:
         sessions.join("page-one", scene)
     state = sessions.open("page-one").show(view(run_name, frame=1))
@@ -35,7 +35,7 @@ def test_a_scene_that_joins_late_sees_what_the_page_shows(
     sessions: Sessions, run_name: str
 ) -> None:
     sessions.open("page-one").show(view(run_name, frame=3))
-    scene = NullScene()
+    scene = RecordingScene()
     sessions.join("page-one", scene)
     assert scene.pictures[0].frame == 3
     assert len(scene.looked_from) == 1
@@ -44,7 +44,7 @@ def test_a_scene_that_joins_late_sees_what_the_page_shows(
 def test_camera_is_turned_to_the_phantom_once_per_run_and_on_request(
     sessions: Sessions, run_name: str
 ) -> None:
-    scene = NullScene()
+    scene = RecordingScene()
     sessions.join("page-one", scene)
     session = sessions.open("page-one")
     for frame in range(3):
@@ -58,10 +58,12 @@ def test_a_place_of_ones_own_is_looked_from_in_scenes_that_open_later(
     sessions: Sessions, run_name: str
 ) -> None:
     session = sessions.open("page-one")
-    own = Lookout(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.0, 0.02]), np.array([0.0, 0.0, 1.0]))
+    own = Viewpoint(
+        np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.0, 0.02]), np.array([0.0, 0.0, 1.0])
+    )
     session.stand(run_name, own)
     session.show(view(run_name))
-    scene = NullScene()
+    scene = RecordingScene()
     sessions.join("page-one", scene)
     assert scene.looked_from == [own]
     session.look("top")
@@ -82,7 +84,7 @@ def test_standard_views_look_along_an_axis(where: Any, axis: int, sign: int) -> 
 
 
 def test_a_scene_that_left_gets_nothing_more(sessions: Sessions, run_name: str) -> None:
-    scene = NullScene()
+    scene = RecordingScene()
     sessions.join("page-one", scene)
     sessions.leave("page-one", scene)
     sessions.open("page-one").show(view(run_name))
@@ -114,7 +116,7 @@ def test_what_a_training_adds_to_a_run_is_shown_without_a_new_start(
 ) -> None:
     wish = view(run_name, layers=("raw", "corrected"), colour="corrected")
     assert "raw" in sessions.open("page-one").show(wish)["drawn"]["figures"]
-    arrays = Runs(place.runs).get(run_name).replay("poke-01").arrays
+    arrays = RunStore(place.runs).get(run_name).replay("poke-01").arrays
     made = {
         f"{key}corrected": arrays[f"{key}extended"]
         for key in ("", "error_", "distance_", "paper_", "tool_", "tool_radius_")

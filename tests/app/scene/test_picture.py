@@ -7,11 +7,17 @@ import numpy as np
 import pytest
 from small_dataset import SIZE, small_cloud
 
-from palpate.app.scene.annotations import furniture_of
+from palpate.app.scene.annotations import annotations_of
 from palpate.app.scene.colours import BANDS, EXTENDED, RAW, SEQUENTIAL, SIGNED, band_of
-from palpate.app.scene.figures import Cloud, Label, Lines, Mesh, Tool
+from palpate.app.scene.figures import (
+    CloudFigure,
+    LabelFigure,
+    LinesFigure,
+    SurfaceFigure,
+    ToolFigure,
+)
 from palpate.app.scene.page_session import Session
-from palpate.app.scene.picture import MOST_TRIANGLES, Picture, Reel
+from palpate.app.scene.picture import MOST_TRIANGLES, Picture, SequenceRenderer
 from palpate.app.scene.view import Layer, View
 from palpate.app.storage.run_store import Run
 
@@ -19,16 +25,16 @@ ALL: tuple[Layer, ...] = ("measured", "raw", "extended", "tool")
 
 
 @pytest.fixture
-def reel(place: object, tmp_path: Path, run_name: str) -> Reel:
+def renderer(place: object, tmp_path: Path, run_name: str) -> SequenceRenderer:
     run = Run(tmp_path / "runs" / run_name)
-    return Reel(
-        run.replay("poke-01"), lambda index: small_cloud() + 1e-6 * index, furniture_of(run)
+    return SequenceRenderer(
+        run.replay("poke-01"), lambda index: small_cloud() + 1e-6 * index, annotations_of(run)
     )
 
 
-def show(reel: Reel, **changes: Any) -> Picture:
+def show(renderer: SequenceRenderer, **changes: Any) -> Picture:
     wish = {"run": "r", "sequence": "poke-01", "frame": 2, "layers": ALL, "crop": False, **changes}
-    return reel.picture(View.model_validate(wish))
+    return renderer.picture(View.model_validate(wish))
 
 
 def names(picture: Picture, kind: type[Any]) -> list[str]:
@@ -36,20 +42,20 @@ def names(picture: Picture, kind: type[Any]) -> list[str]:
 
 
 def test_plain_picture_has_the_extended_model_as_surface_and_the_raw_one_as_lines(
-    reel: Reel,
+    renderer: SequenceRenderer,
 ) -> None:
-    picture = show(reel)
-    assert names(picture, Mesh) == ["extended"]
-    assert picture.of(Mesh)["extended"].colour == EXTENDED
-    assert picture.of(Lines)["raw-lines"].colour == RAW
+    picture = show(renderer)
+    assert names(picture, SurfaceFigure) == ["extended"]
+    assert picture.of(SurfaceFigure)["extended"].colour == EXTENDED
+    assert picture.of(LinesFigure)["raw-lines"].colour == RAW
     assert picture.limit is None and picture.quantity is None
 
 
-def test_coloured_picture_shares_all_triangles_among_the_bands(reel: Reel) -> None:
-    picture = show(reel, colour="raw", limit=2e-4)
-    meshes = picture.of(Mesh)
+def test_coloured_picture_shares_all_triangles_among_the_bands(renderer: SequenceRenderer) -> None:
+    picture = show(renderer, colour="raw", limit=2e-4)
+    meshes = picture.of(SurfaceFigure)
     total = sum(len(mesh.faces) for mesh in meshes.values())
-    assert total == 8**2 * len(reel.replay["faces"])
+    assert total == 8**2 * len(renderer.replay["faces"])
     assert total <= MOST_TRIANGLES
     assert "raw-error-unseen" in meshes
     assert (picture.quantity, picture.limit) == ("error", 2e-4)
@@ -59,145 +65,167 @@ def test_coloured_picture_shares_all_triangles_among_the_bands(reel: Reel) -> No
             assert mesh.colour == SIGNED[int(name.removeprefix("raw-error-"))]
 
 
-def test_colour_of_a_place_is_the_band_of_its_error(reel: Reel) -> None:
-    picture = show(reel, colour="raw", limit=5e-4, layers=("raw",))
-    raw, errors = reel.replay["raw"][2], reel.replay["error_raw"][2]
-    top = np.flatnonzero((reel.replay["rest"][:, 2] > SIZE[2] - 1e-9) & np.isfinite(errors))
-    for name, mesh in picture.of(Mesh).items():
+def test_colour_of_a_place_is_the_band_of_its_error(renderer: SequenceRenderer) -> None:
+    picture = show(renderer, colour="raw", limit=5e-4, layers=("raw",))
+    raw, errors = renderer.replay["raw"][2], renderer.replay["error_raw"][2]
+    top = np.flatnonzero((renderer.replay["rest"][:, 2] > SIZE[2] - 1e-9) & np.isfinite(errors))
+    for name, mesh in picture.of(SurfaceFigure).items():
         if name.endswith("unseen"):
             continue
         band = int(name.removeprefix("raw-error-"))
         gaps = np.linalg.norm(mesh.vertices[:, None] - raw[None, top], axis=-1)
         at = top[np.unique(np.nonzero(gaps < 1e-7)[1])]
         assert np.all(np.abs(band_of(errors[at].astype(float), 5e-4) - band) <= 2)
-    assert len(picture.of(Mesh)) > BANDS // 2
+    assert len(picture.of(SurfaceFigure)) > BANDS // 2
 
 
 def test_displacement_is_coloured_from_zero_and_energy_says_that_it_was_not_recorded(
-    reel: Reel,
+    renderer: SequenceRenderer,
 ) -> None:
-    picture = show(reel, colour="raw", quantity="displacement")
+    picture = show(renderer, colour="raw", quantity="displacement")
     assert picture.quantity == "displacement"
     assert picture.limit == pytest.approx(3e-3, rel=0.4)
-    deepest = max(name for name in picture.of(Mesh) if name.startswith("raw-displacement"))
-    assert picture.of(Mesh)[deepest].colour == SEQUENTIAL[int(deepest[-2:])]
-    assert picture.of(Mesh)["raw-displacement-00"].colour == SEQUENTIAL[0]
-    old = show(reel, colour="raw", quantity="energy")
-    assert names(old, Mesh) == ["raw"] and old.limit is None and reel.end("energy") is None
+    deepest = max(name for name in picture.of(SurfaceFigure) if name.startswith("raw-displacement"))
+    assert picture.of(SurfaceFigure)[deepest].colour == SEQUENTIAL[int(deepest[-2:])]
+    assert picture.of(SurfaceFigure)["raw-displacement-00"].colour == SEQUENTIAL[0]
+    old = show(renderer, colour="raw", quantity="energy")
+    assert (
+        names(old, SurfaceFigure) == ["raw"]
+        and old.limit is None
+        and renderer.end("energy") is None
+    )
 
 
-def test_hidden_layers_are_not_in_the_picture(reel: Reel) -> None:
-    picture = show(reel, layers=())
+def test_hidden_layers_are_not_in_the_picture(renderer: SequenceRenderer) -> None:
+    picture = show(renderer, layers=())
     assert picture.figures == {} and picture.points == 0
 
 
-def test_choosing_the_error_of_a_hidden_model_shows_the_other_one_plain(reel: Reel) -> None:
-    picture = show(reel, colour="raw", layers=("extended",))
-    assert names(picture, Mesh) == ["extended"]
+def test_choosing_the_error_of_a_hidden_model_shows_the_other_one_plain(
+    renderer: SequenceRenderer,
+) -> None:
+    picture = show(renderer, colour="raw", layers=("extended",))
+    assert names(picture, SurfaceFigure) == ["extended"]
     assert picture.limit is None
 
 
-def test_each_layer_has_a_look_of_its_own(reel: Reel) -> None:
+def test_each_layer_has_a_look_of_its_own(renderer: SequenceRenderer) -> None:
     looks = {
         "raw": {"lines": False, "opacity": 0.4},
         "extended": {"coloured": True},
         "tool": {"opacity": 0.5},
     }
-    picture = show(reel, looks=looks)
-    assert picture.of(Mesh)["raw"].opacity == 0.4
-    assert picture.of(Mesh)["extended-error-unseen"].opacity == 1.0
-    assert names(picture, Lines) == []
-    assert picture.of(Tool)["tool"].opacity == 0.5
-    assert show(reel, looks={"measured": {"opacity": 0.5}}).points == show(reel).points / 2
+    picture = show(renderer, looks=looks)
+    assert picture.of(SurfaceFigure)["raw"].opacity == 0.4
+    assert picture.of(SurfaceFigure)["extended-error-unseen"].opacity == 1.0
+    assert names(picture, LinesFigure) == []
+    assert picture.of(ToolFigure)["tool"].opacity == 0.5
+    assert show(renderer, looks={"measured": {"opacity": 0.5}}).points == show(renderer).points / 2
 
 
-def test_side_by_side_each_model_stands_apart_with_its_name_cloud_and_tool(reel: Reel) -> None:
-    picture = show(reel, side_by_side=True, colour="raw")
-    assert {label.text for label in picture.of(Label).values()} == {"Raw model", "Extended model"}
-    assert set(picture.of(Cloud)) == {"cloud-raw", "cloud-extended"}
-    tools = picture.of(Tool)
+def test_side_by_side_each_model_stands_apart_with_its_name_cloud_and_tool(
+    renderer: SequenceRenderer,
+) -> None:
+    picture = show(renderer, side_by_side=True, colour="raw")
+    assert {label.text for label in picture.of(LabelFigure).values()} == {
+        "Raw model",
+        "Extended model",
+    }
+    assert set(picture.of(CloudFigure)) == {"cloud-raw", "cloud-extended"}
+    tools = picture.of(ToolFigure)
     assert (tools["tool-raw"].radius, tools["tool-extended"].radius) == (0.005, 0.004)
     apart = np.array(tools["tool-extended"].at) - np.array(tools["tool-raw"].at)
     assert np.linalg.norm(apart) > 0.04
-    assert {name.split("-")[0] for name in picture.of(Mesh)} == {"raw", "extended"}
+    assert {name.split("-")[0] for name in picture.of(SurfaceFigure)} == {"raw", "extended"}
     assert all(
         np.allclose(mesh.at, tools[f"tool-{name.split('-')[0]}"].at)
-        for name, mesh in picture.of(Mesh).items()
+        for name, mesh in picture.of(SurfaceFigure).items()
     )
 
 
-def test_cloud_is_moved_into_the_phantom_frame_and_cut_to_the_block(reel: Reel) -> None:
-    whole, near = show(reel), show(reel, crop=True)
-    expected = reel.replay.camera("extended").apply(small_cloud() + 2e-6)
-    np.testing.assert_allclose(whole.of(Cloud)["cloud"].points[: whole.points], expected, atol=1e-7)
+def test_cloud_is_moved_into_the_phantom_frame_and_cut_to_the_block(
+    renderer: SequenceRenderer,
+) -> None:
+    whole, near = show(renderer), show(renderer, crop=True)
+    expected = renderer.replay.camera("extended").apply(small_cloud() + 2e-6)
+    np.testing.assert_allclose(
+        whole.of(CloudFigure)["cloud"].points[: whole.points], expected, atol=1e-7
+    )
     assert whole.points == 192
     assert near.points < whole.points
 
 
-def test_cloud_has_one_length_for_the_whole_sequence(reel: Reel) -> None:
-    assert {len(show(reel, frame=frame).of(Cloud)["cloud"].points) for frame in range(5)} == {1000}
+def test_cloud_has_one_length_for_the_whole_sequence(renderer: SequenceRenderer) -> None:
+    assert {
+        len(show(renderer, frame=frame).of(CloudFigure)["cloud"].points) for frame in range(5)
+    } == {1000}
 
 
-def test_tool_has_the_radius_that_the_surface_model_believes(reel: Reel) -> None:
+def test_tool_has_the_radius_that_the_surface_model_believes(renderer: SequenceRenderer) -> None:
     assert [
-        show(reel, colour=colour).of(Tool)["tool"].radius for colour in ("raw", "extended")
+        show(renderer, colour=colour).of(ToolFigure)["tool"].radius
+        for colour in ("raw", "extended")
     ] == [0.005, 0.004]
 
 
-def test_checksum_tells_frames_and_layers_apart(reel: Reel) -> None:
+def test_checksum_tells_frames_and_layers_apart(renderer: SequenceRenderer) -> None:
     pictures = [
-        show(reel),
-        show(reel, frame=3),
-        show(reel, layers=("raw",)),
-        show(reel, colour="raw"),
+        show(renderer),
+        show(renderer, frame=3),
+        show(renderer, layers=("raw",)),
+        show(renderer, colour="raw"),
     ]
     assert len({picture.checksum() for picture in pictures}) == 4
-    assert show(reel).checksum() == show(reel).checksum()
+    assert show(renderer).checksum() == show(renderer).checksum()
 
 
-def test_automatic_scale_is_one_for_the_whole_sequence(reel: Reel) -> None:
+def test_automatic_scale_is_one_for_the_whole_sequence(renderer: SequenceRenderer) -> None:
     limits = {
-        show(reel, frame=frame, colour=colour).limit
+        show(renderer, frame=frame, colour=colour).limit
         for frame in range(5)
         for colour in ("raw", "extended")
     }
-    assert limits == {reel.limit}
+    assert limits == {renderer.limit}
 
 
-def test_a_section_leaves_out_what_lies_beyond_and_the_cloud_there(reel: Reel) -> None:
+def test_a_section_leaves_out_what_lies_beyond_and_the_cloud_there(
+    renderer: SequenceRenderer,
+) -> None:
     cut = {"axis": "x", "at": 0.004}
     for flip in (False, True):
         picture = show(
-            reel, section={**cut, "flip": flip}, colour="raw", layers=("raw", "measured")
+            renderer, section={**cut, "flip": flip}, colour="raw", layers=("raw", "measured")
         )
-        places = np.concatenate([mesh.vertices for mesh in picture.of(Mesh).values()])[:, 0]
+        places = np.concatenate([mesh.vertices for mesh in picture.of(SurfaceFigure).values()])[
+            :, 0
+        ]
         assert (places.min() > 0.003) if flip else (places.max() < 0.005)
-        assert np.all((picture.of(Cloud)["cloud"].points[:, 0] > 0.004) == flip)
-    assert len(show(reel, section=cut).of(Lines)["raw-lines"].segments) < len(
-        show(reel).of(Lines)["raw-lines"].segments
+        assert np.all((picture.of(CloudFigure)["cloud"].points[:, 0] > 0.004) == flip)
+    assert len(show(renderer, section=cut).of(LinesFigure)["raw-lines"].segments) < len(
+        show(renderer).of(LinesFigure)["raw-lines"].segments
     )
 
 
-def test_lump_landmarks_base_and_path_are_layers(reel: Reel) -> None:
-    picture = show(reel, layers=("extended", "lump", "base", "path", "landmarks"))
-    ball, interval = (picture.of(Mesh)[name] for name in ("lump-0", "lump-0-interval"))
+def test_lump_landmarks_base_and_path_are_layers(renderer: SequenceRenderer) -> None:
+    picture = show(renderer, layers=("extended", "lump", "base", "path", "landmarks"))
+    ball, interval = (picture.of(SurfaceFigure)[name] for name in ("lump-0", "lump-0-interval"))
     assert np.ptp(ball.vertices, axis=0) == pytest.approx(2 * 0.0075, rel=0.02)
     assert np.ptp(interval.vertices, axis=0)[0] == pytest.approx(
         2 * 0.008 + 0.0115 - 0.0088, rel=0.02
     )
     assert interval.opacity < ball.opacity < 1
-    assert {"base", "path"} <= set(picture.of(Lines))
-    assert reel.lumps == 1 and reel.landmarks == 0
+    assert {"base", "path"} <= set(picture.of(LinesFigure))
+    assert renderer.lumps == 1 and renderer.landmarks == 0
 
 
 def test_who_asks_while_a_picture_is_drawn_is_told_the_last_view_with_its_own_picture(
-    reel: Reel, run_name: str
+    renderer: SequenceRenderer, run_name: str
 ) -> None:
     seen: list[dict[str, Any]] = []
 
-    def asked_for(run: str, sequence: str) -> Reel:
+    def asked_for(run: str, sequence: str) -> SequenceRenderer:
         seen.append(session.state())
-        return reel
+        return renderer
 
     def end_of(run: str, quantity: str) -> None:
         seen.append(session.state())

@@ -152,7 +152,7 @@ def test_sessions_end_by_themselves_and_throttling_does_too(tmp_path: Path) -> N
     text, now = Token.make(tmp_path), [0.0]
     login = Login(Token.load(tmp_path), lambda: now[0])
     cookie = {"cookie": f"palpate_session={login.begin()}"}
-    assert asyncio.run(login.welcome(cookie, "a"))
+    assert asyncio.run(login.is_logged_in(cookie, "a"))
     for _ in range(TRIES):
         assert not asyncio.run(login.right("guess", "a"))
     assert login.wait("a") == WINDOW and login.wait("b") == 0.0
@@ -160,7 +160,7 @@ def test_sessions_end_by_themselves_and_throttling_does_too(tmp_path: Path) -> N
     now[0] = WINDOW + 1.0
     assert asyncio.run(login.right(text, "a"))
     now[0] = LASTS + 1.0
-    assert not asyncio.run(login.welcome(cookie, "a"))
+    assert not asyncio.run(login.is_logged_in(cookie, "a"))
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,85 @@
+"""Results of one kind together with the jobs that make them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from palpate.app.http_errors import Missing
+from palpate.app.jobs.job_records import Job
+from palpate.app.schemas import JobOut
+from palpate.app.services import Services
+from palpate.app.storage.result_store import ResultStore
+from palpate.foundation.errors import RunError
+
+__all__ = [
+    "cancel_job",
+    "job_of",
+    "job_out",
+    "listed_result",
+    "names_and_jobs",
+    "result_and_job",
+]
+
+
+def job_out(job: Job) -> JobOut:
+    """The public part of a job record."""
+    names = [name for name in JobOut.model_fields if name not in ("dataset", "can_retry")]
+    return JobOut(
+        dataset=job.request.get("name"),
+        can_retry=job.state.can_be_retried,
+        **{name: getattr(job, name) for name in names},
+    )
+
+
+def names_and_jobs(
+    store: ResultStore, services: Services
+) -> list[tuple[str, dict[str, Any] | None]]:
+    """Names of all results, the newest first, with their jobs where these are still recorded.
+
+    Results whose jobs have not begun to write come first.
+    """
+    jobs = {job.id: job_out(job) for job in services.jobs.all() if job.kind == store.kind}
+    begun = store.names()
+    names = [*(name for name in jobs if name not in begun), *begun]
+    return [(name, jobs[name].model_dump() if name in jobs else None) for name in names]
+
+
+def result_and_job(store: ResultStore, name: str, job: dict[str, Any] | None) -> dict[str, Any]:
+    """One result as REST answers it: its job, the request, and the summary once it is finished.
+
+    Raises Missing where there is neither a job nor a folder.
+    """
+    begun = store.has_begun(name)
+    if job is None and not begun:
+        raise store.missing(name)
+    has_request = begun and store.first != store.last
+    return {
+        "id": name,
+        "job": job,
+        "request": store.request(name) if has_request else None,
+        "summary": store.result(name) if begun else None,
+    }
+
+
+def listed_result(store: ResultStore, name: str, job: dict[str, Any] | None) -> dict[str, Any]:
+    """One result in a list: a damaged file leaves its content out, so that the others are listed."""
+    try:
+        return result_and_job(store, name, job)
+    except RunError:
+        return {"id": name, "job": job, "request": None, "summary": None}
+
+
+def job_of(store: ResultStore, name: str, services: Services) -> dict[str, Any] | None:
+    """The job of a result; None where it is not recorded."""
+    try:
+        job = services.jobs.get(name)
+    except Missing:
+        return None
+    return job_out(job).model_dump() if job.kind == store.kind else None
+
+
+def cancel_job(store: ResultStore, name: str, services: Services) -> JobOut:
+    """Stop the job of a result."""
+    if job_of(store, name, services) is None:
+        raise Missing(f"there is no {store.kind} {name} to stop", **{store.kind: name})
+    return job_out(services.jobs.cancel(name))
