@@ -11,7 +11,8 @@ import numpy as np
 
 from palpate.dataset import open_dataset
 from palpate.effects import effect_named
-from palpate.measurement.segmentation import cleaner_for, find_shaft_axis
+from palpate.measurement.segmentation import cleaner_for
+from palpate.measurement.tool_pose import find_shaft_axis
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.recording.record_sequence import record
 from palpate.registration.registration import register, setup_from

@@ -189,7 +189,10 @@ def read_results(file: Path, mend: bool = False) -> list[CaseResult]:
                 if mend:
                     _rewrite(file, lines[:-1])
                 break
-            text = f"{file}, row {number} is not a result of this suite ({error}); remove the row to have it done again"
+            text = (
+                f"{file}, row {number} is not a result of this suite ({error}); remove the "
+                "row to have it done again"
+            )
             raise RunError(text, row=number) from error
     return results
 

@@ -238,7 +238,8 @@ def _choices(kind: str, effects: Sequence[str]) -> list[tuple[str, ...]]:
     found = choices.get(kind, [(effect,) for effect in effects])
     if not found:
         raise RunError(
-            f"{', '.join(effects) or 'no effect'} gives no case of the kind {kind}; name other effects, or leave it out",
+            f"{', '.join(effects) or 'no effect'} gives no case of the kind {kind}; name other "
+            "effects, or leave it out",
             kind=kind,
         )
     return found

@@ -87,11 +87,15 @@ def known_results(
         if case is None:
             continue
         if result.case != case:
-            text = f"{file}: {result.name} was {result.case}, now it is {case}; name another folder, or remove the row"
+            text = (
+                f"{file}: {result.name} was {result.case}, now it is {case}; name another "
+                "folder, or remove the row"
+            )
             raise RunError(text, case=result.name)
         if result.code != digest and not any_version:
             text = (
-                f"{file}: {result.name} was made by version {result.code or 'unknown'} of the code, this is {digest}; "
+                f"{file}: {result.name} was made by version {result.code or 'unknown'} of the "
+                f"code, this is {digest}; "
                 "name another folder, or allow any version: the summary then says which there are"
             )
             raise RunError(text, case=result.name)

@@ -63,7 +63,8 @@ class AcceptedRegistration:
             )
         except (KeyError, TypeError, ValueError) as error:
             raise RegistrationError(
-                f"this is no accepted registration ({type(error).__name__}: {error}); make one in the page's panel Register, or by "
+                f"this is no accepted registration ({type(error).__name__}: {error}); make one in "
+                "the page's panel Register, or by "
                 "POST /api/datasets/NAME/registrations",
                 key=str(error) if isinstance(error, KeyError) else None,
             ) from error
@@ -88,7 +89,8 @@ class AcceptedRegistration:
         """RegistrationError where the rest cloud is not the one that it was made from."""
         if self.rest and (found := rest_digest(folder)) != self.rest:
             raise RegistrationError(
-                f"registration {self.name} was made from another rest.ply (digest {self.rest}) than the one in {folder.name} "
+                f"registration {self.name} was made from another rest.ply (digest {self.rest}) "
+                f"than the one in {folder.name} "
                 f"({found}): register this dataset anew",
                 file="rest.ply",
                 value=found,

@@ -190,18 +190,21 @@ def _sequence_doubts(dataset: Dataset, summary: SequenceSummary) -> list[str]:
         )
     if summary.clouds_outside:
         doubts.append(
-            f"{summary.clouds_outside} of {summary.clouds.count} clouds are stamped outside the kinematics, where the tool's place "
+            f"{summary.clouds_outside} of {summary.clouds.count} clouds are stamped outside the "
+            "kinematics, where the tool's place "
             "is unknown: do both stamps come from the same clock?"
         )
     doubts += _clock_doubts(summary)
     if summary.points and summary.points[0] < 0.5 * summary.points[1]:
         doubts.append(
-            f"the smallest cloud has {summary.points[0]} points, the median one {summary.points[1]}: is the view blocked?"
+            f"the smallest cloud has {summary.points[0]} points, the median one "
+            f"{summary.points[1]}: is the view blocked?"
         )
     extent = float(np.ptp(dataset.sequence(summary.name).kinematics.position, axis=0).max())
     if extent < 1e-3:
         doubts.append(
-            f"the tool moves by {1e3 * extent:.3f} mm only: is the unit of kinematics.csv the metre?"
+            f"the tool moves by {1e3 * extent:.3f} mm only: is the unit of kinematics.csv the "
+            "metre?"
         )
     return doubts + _motion_doubts(dataset, summary.motion)
 
@@ -220,7 +223,8 @@ def _clock_doubts(summary: SequenceSummary) -> list[str]:
             )
     if summary.kinematics.rate < summary.clouds.rate:
         doubts.append(
-            f"kinematics at {summary.kinematics.rate:.1f} Hz are slower than the clouds at {summary.clouds.rate:.1f} Hz"
+            f"kinematics at {summary.kinematics.rate:.1f} Hz are slower than the clouds at "
+            f"{summary.clouds.rate:.1f} Hz"
         )
     return doubts
 
@@ -230,10 +234,12 @@ def _motion_doubts(dataset: Dataset, motion: ToolMotion | None) -> list[str]:
         return []
     if not motion.contacts:
         return [
-            f"the tool never touches the phantom, it stays {1e3 * motion.nearest:.1f} mm away: are touches and tool radius right?"
+            f"the tool never touches the phantom, it stays {1e3 * motion.nearest:.1f} mm away: "
+            "are touches and tool radius right?"
         ]
     if -motion.nearest > 0.6 * min(dataset.config.size):
         return [
-            f"the tool goes {-1e3 * motion.nearest:.1f} mm into the phantom as stated: are touches, size and radius right?"
+            f"the tool goes {-1e3 * motion.nearest:.1f} mm into the phantom as stated: are "
+            "touches, size and radius right?"
         ]
     return []

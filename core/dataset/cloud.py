@@ -129,7 +129,8 @@ def _header(file: str, data: bytes, size: int) -> PlyHeader:
         if element.has_list or (order == "=" and element.count):
             raise problem(
                 file,
-                f"element {element.name} comes before the points; expected vertex first: write it first",
+                f"element {element.name} comes before the points; expected vertex first: write it "
+                "first",
             )
         skipped += element.count * element.record
     raise problem(
@@ -144,7 +145,8 @@ def _header_text(file: str, data: bytes) -> tuple[list[str], int]:
         found = "is empty" if not data else f"starts with {data[:8]!r}"
         raise problem(
             file,
-            f"{found}; expected a PLY file ('ply' in its first line): export the cloud again as PLY",
+            f"{found}; expected a PLY file ('ply' in its first line): export the cloud again as "
+            "PLY",
             row=1,
         )
     newline = b"\r\n" if data.startswith(b"ply\r\n") else b"\n"
@@ -152,7 +154,8 @@ def _header_text(file: str, data: bytes) -> tuple[list[str], int]:
     if end < 0:
         raise problem(
             file,
-            "has no end_header line; expected a whole PLY header: the file is cut off or damaged, export it again",
+            "has no end_header line; expected a whole PLY header: the file is cut off or "
+            "damaged, export it again",
         )
     try:
         text = data[:end].decode("ascii")
@@ -187,7 +190,10 @@ def _elements(file: str, lines: list[str]) -> tuple[_Order, list[_Element]]:
                 case _:
                     raise KeyError(line)
         except KeyError:
-            text = f"'{line[:60]}' is no line of a PLY 1.0 header, or comes twice; export the cloud again"
+            text = (
+                f"'{line[:60]}' is no line of a PLY 1.0 header, or comes twice; export the "
+                "cloud again"
+            )
             raise problem(file, text, row=row, value=line[:60]) from None
     if order is None:
         raise problem(
@@ -236,7 +242,8 @@ def _check_size(file: str, header: PlyHeader, size: int, rest: list[_Element]) -
     present = size - header.start + (1 if header.order == "=" else 0)
     if present < header.count * record:
         text = (
-            f"element vertex announces {header.count} points ({header.count * record} bytes) but {max(present, 0)} bytes follow; "
+            f"element vertex announces {header.count} points ({header.count * record} bytes) but "
+            f"{max(present, 0)} bytes follow; "
             "expected all of them: the file is cut off, export or copy it again"
         )
         raise problem(file, text, key="vertex", value=header.count)
@@ -244,7 +251,10 @@ def _check_size(file: str, header: PlyHeader, size: int, rest: list[_Element]) -
         return
     expected = header.count * record + sum(element.count * element.record for element in rest)
     if present != expected:
-        text = f"element vertex and what follows take {expected} bytes by the header, {present} are there; export or copy it again"
+        text = (
+            f"element vertex and what follows take {expected} bytes by the header, {present} "
+            "are there; export or copy it again"
+        )
         raise problem(file, text, key="vertex", value=header.count)
 
 
@@ -274,7 +284,10 @@ def _ascii_points(file: str, header: PlyHeader, data: bytes) -> FloatArray:
         if not cells and row == len(lines) - 1:
             raise _short(file, header, row)
         if len(cells) != len(names):
-            text = f"{len(cells)} numbers; expected {len(names)} ({' '.join(names)}): export the cloud again"
+            text = (
+                f"{len(cells)} numbers; expected {len(names)} ({' '.join(names)}): export the "
+                "cloud again"
+            )
             raise problem(file, text, row=row + 1)
         try:
             points[row] = [float(cells[column]) for column in columns]
@@ -287,5 +300,8 @@ def _ascii_points(file: str, header: PlyHeader, data: bytes) -> FloatArray:
 
 
 def _short(file: str, header: PlyHeader, found: int) -> DatasetError:
-    text = f"element vertex announces {header.count} points, {found} follow; the file is cut off, export or copy it again"
+    text = (
+        f"element vertex announces {header.count} points, {found} follow; the file is cut "
+        "off, export or copy it again"
+    )
     return problem(file, text, row=found + 1, key="vertex", value=header.count)

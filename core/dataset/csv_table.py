@@ -102,13 +102,19 @@ def check_increasing(file: str, time: FloatArray) -> None:
     """Refuse a time column (n,) [s] that stands still or goes back, or is not in seconds."""
     if len(late := np.flatnonzero(np.abs(time) > LATEST)):
         value = f"{time[late[0]]:g}"
-        text = f"t = {value} s; expected seconds, since any start: did you write milliseconds or nanoseconds?"
+        text = (
+            f"t = {value} s; expected seconds, since any start: did you write milliseconds or "
+            "nanoseconds?"
+        )
         raise problem(file, text, row=int(late[0]) + FIRST_ROW, key="t", value=value)
     bad = np.flatnonzero(np.diff(time) <= 0)
     if len(bad):
         at = int(bad[0])
         before, after = repr(float(time[at])), repr(float(time[at + 1]))
-        text = f"t = {after} s does not increase (row {at + FIRST_ROW}: {before} s); sort the rows by time and keep each stamp once"
+        text = (
+            f"t = {after} s does not increase (row {at + FIRST_ROW}: {before} s); sort the "
+            "rows by time and keep each stamp once"
+        )
         raise problem(file, text, row=at + 1 + FIRST_ROW, key="t", value=after)
 
 
@@ -122,9 +128,15 @@ def check_coordinates(file: str, points: FloatArray, first_row: int = FIRST_ROW)
         value = float(points[at, axis])
         found = f"{'xyz'[axis]} = {value:g}"
         if math.isfinite(value):
-            advice = f" m; expected metres, at most {LARGEST_COORDINATE:g} m from the origin: did you write millimetres?"
+            advice = (
+                f" m; expected metres, at most {LARGEST_COORDINATE:g} m from the origin: did "
+                "you write millimetres?"
+            )
         else:
-            advice = "; expected a finite number of metres: leave out points and rows without a measurement"
+            advice = (
+                "; expected a finite number of metres: leave out points and rows without a "
+                "measurement"
+            )
         raise problem(file, found + advice, row=at + first_row, key="xyz"[axis], value=f"{value:g}")
 
 
@@ -132,7 +144,10 @@ def _body(root: Path, file: str, header: str) -> list[str]:
     lines = read_text(root, file, _LIMIT).rstrip("\n ").split("\n")
     found = ",".join(cell.strip() for cell in lines[0].split(","))
     if found != header:
-        text = f"the header is '{found[:80]}'; expected '{header}': name and order the columns like this"
+        text = (
+            f"the header is '{found[:80]}'; expected '{header}': name and order the columns "
+            "like this"
+        )
         raise problem(file, text, row=1, value=found[:80])
     if len(lines) == 1:
         raise problem(
@@ -186,7 +201,10 @@ def _cells(file: str, line: str, header: str, row: int) -> list[str]:
 
 def _number(file: str, cell: str, row: int, key: str) -> float:
     if not _NUMBER.fullmatch(cell):
-        text = f"{key} = '{cell[:40]}'; expected a finite number with a decimal point: correct or remove this row"
+        text = (
+            f"{key} = '{cell[:40]}'; expected a finite number with a decimal point: correct "
+            "or remove this row"
+        )
         raise problem(file, text, row=row, key=key, value=cell[:40])
     number = float(cell)
     if not math.isfinite(number):

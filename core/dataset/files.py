@@ -48,7 +48,8 @@ def open_inside(root: Path, file: str, within: str = "") -> BinaryIO:
     if os.path.commonpath([home, os.path.realpath(path)]) != home:
         raise problem(
             file,
-            "leads out of its folder through a link; expected a file inside: copy the file itself here",
+            "leads out of its folder through a link; expected a file inside: copy the file "
+            "itself here",
         )
     try:
         return path.open("rb")
@@ -72,7 +73,8 @@ def read_text(root: Path, file: str, limit: int) -> str:
     if len(data) > limit:
         raise problem(
             file,
-            f"is larger than {limit // 2**20} MiB; expected far less of such a file: check what was exported",
+            f"is larger than {limit // 2**20} MiB; expected far less of such a file: check what "
+            "was exported",
         )
     try:
         text = data.decode("utf-8-sig")

@@ -128,7 +128,10 @@ def check_span(file: str, points: FloatArray, size: tuple[float, float, float]) 
     # Axis by axis in a row each: seventeen times as fast as over rows of three.
     span, edge = float(np.ptp(np.ascontiguousarray(points.T), axis=1).max()), max(size)
     if len(points) > 1 and span < 0.01 * edge:
-        text = f"the cloud spans {span:.3g} m; expected about the phantom, {edge:g} m, or more: is its unit the metre?"
+        text = (
+            f"the cloud spans {span:.3g} m; expected about the phantom, {edge:g} m, or more: "
+            "is its unit the metre?"
+        )
         raise problem(file, text, value=f"{span:.3g}")
 
 
@@ -192,12 +195,16 @@ def read_touches(root: Path, config: DatasetConfig) -> Touches:
                 value=name,
             )
         if (first := names.index(name) + FIRST_ROW) != row:
-            text = f"landmark '{name}' was touched in row {first} already; expected each once: keep one of them"
+            text = (
+                f"landmark '{name}' was touched in row {first} already; expected each once: "
+                "keep one of them"
+            )
             raise problem(file, text, row=row, key="landmark", value=name)
     check_coordinates(file, positions)
     if len(names) < FEWEST_TOUCHES:
         text = (
-            f"{len(names)} touches; expected at least {FEWEST_TOUCHES}: three determine a pose without any residual "
+            f"{len(names)} touches; expected at least {FEWEST_TOUCHES}: three determine a pose "
+            "without any residual "
             "to judge it by, touch another landmark"
         )
         raise problem(file, text, row=FIRST_ROW + len(names), value=len(names))
@@ -217,7 +224,10 @@ def _check_touch_scale(file: str, positions: FloatArray, landmarks: FloatArray) 
             key="landmarks",
         )
     if not 0.1 < touched / stated < 10:
-        text = f"the touches reach {touched:.3g} m from their centre, the landmarks {stated:.3g} m; expected the same unit, metres"
+        text = (
+            f"the touches reach {touched:.3g} m from their centre, the landmarks {stated:.3g} "
+            "m; expected the same unit, metres"
+        )
         raise problem(file, text + ": convert one of them", row=FIRST_ROW, value=f"{touched:.3g}")
 
 
@@ -230,7 +240,10 @@ def sequence_names(root: Path) -> list[str]:
             if not entry.name.startswith(".")
         )
     except OSError as error:
-        text = f"is no folder that can be read ({error.strerror}); expected one folder per sequence in it: add it"
+        text = (
+            f"is no folder that can be read ({error.strerror}); expected one folder per "
+            "sequence in it: add it"
+        )
         raise problem("sequences", text) from None
     for name, _ in entries:
         if name.endswith(_BAGS):

@@ -53,7 +53,8 @@ def _of_measurements(observed: bool, forces: bool) -> Iterable[CoverageGap]:
     if not observed:
         yield CoverageGap(
             ("base_slip", "camera_registration", "time_offset"),
-            "no clouds: the surface is not seen, only forces are compared; what the camera alone would show is not weighed",
+            "no clouds: the surface is not seen, only forces are compared; what the camera alone "
+            "would show is not weighed",
         )
     if not forces:
         yield CoverageGap(
@@ -75,7 +76,8 @@ def _of_kinds(motions: list[ToolMotion]) -> Iterable[CoverageGap]:
         elif count == 1:
             yield CoverageGap(
                 effects,
-                f"only one sequence with a {name}: repeat it elsewhere, so that one can be kept for the test",
+                f"only one sequence with a {name}: repeat it elsewhere, so that one can be kept "
+                "for the test",
             )
 
 
@@ -83,11 +85,17 @@ def _of_palpation(motions: list[ToolMotion]) -> Iterable[CoverageGap]:
     """Of pushes that are felt and not seen."""
     pushes = [contact for motion in motions for contact in motion.contacts]
     if len(pushes) < FEW_PUSHES:
-        text = f"{len(pushes)} pushes in all: a lump between them is not felt, add more, none over {1e3 * OTHER_PLACE:.0f} mm away"
+        text = (
+            f"{len(pushes)} pushes in all: a lump between them is not felt, add more, none "
+            f"over {1e3 * OTHER_PLACE:.0f} mm away"
+        )
         yield CoverageGap(("stiff_inclusion",), text)
     shallow = [contact for contact in pushes if contact.depth < SHALLOW]
     if pushes and len(shallow) > len(pushes) / 2:
-        text = f"{len(shallow)} of {len(pushes)} pushes are less than {1e3 * SHALLOW:.0f} mm deep: deeper ones reach farther"
+        text = (
+            f"{len(shallow)} of {len(pushes)} pushes are less than {1e3 * SHALLOW:.0f} mm "
+            "deep: deeper ones reach farther"
+        )
         yield CoverageGap(("stiff_inclusion", "young_modulus"), text)
 
 
@@ -99,7 +107,10 @@ def _of_variety(motions: list[ToolMotion]) -> Iterable[CoverageGap]:
         return
     depths, speeds = ([getattr(motion, name) for motion in pushes] for name in ("depth", "speed"))
     if max(depths) < OTHER_DEPTH * max(min(depths), 1e-6):
-        text = f"all pushes are about {1e3 * max(depths):.1f} mm deep: add a clearly shallower and a deeper one"
+        text = (
+            f"all pushes are about {1e3 * max(depths):.1f} mm deep: add a clearly shallower "
+            "and a deeper one"
+        )
         yield CoverageGap(
             ("tool_radius", "tool_offset", "surface_layer", "strain_stiffening"), text
         )
@@ -111,7 +122,10 @@ def _of_variety(motions: list[ToolMotion]) -> Iterable[CoverageGap]:
         for one, other in combinations(pushes, 2)
     )
     if apart < OTHER_PLACE:
-        text = f"all pushes lie within {1e3 * apart:.1f} mm: add one more than {1e3 * OTHER_PLACE:.0f} mm away"
+        text = (
+            f"all pushes lie within {1e3 * apart:.1f} mm: add one more than "
+            f"{1e3 * OTHER_PLACE:.0f} mm away"
+        )
         yield CoverageGap(("stiff_inclusion", "stiffness_gradient", "anisotropy"), text)
 
 
@@ -120,9 +134,15 @@ def _of_rests(motions: dict[str, ToolMotion]) -> Iterable[CoverageGap]:
     if early := [
         name for name, motion in touching.items() if motion.untouched_before < FEW_UNTOUCHED
     ]:
-        text = f"fewer than {FEW_UNTOUCHED} untouched clouds before the first contact in {', '.join(early)}: start recording earlier"
+        text = (
+            f"fewer than {FEW_UNTOUCHED} untouched clouds before the first contact in "
+            f"{', '.join(early)}: start recording earlier"
+        )
         yield CoverageGap(("camera_registration", "time_offset"), text)
     longest = max((motion.rest_after for motion in touching.values()), default=LONG_REST)
     if longest < LONG_REST:
-        text = f"after release the longest rest is {longest:.1f} s: record a few time constants, at least {LONG_REST:.0f} s"
+        text = (
+            f"after release the longest rest is {longest:.1f} s: record a few time constants, "
+            f"at least {LONG_REST:.0f} s"
+        )
         yield CoverageGap(("viscoelasticity", "permanent_set"), text)

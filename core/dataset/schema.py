@@ -299,7 +299,10 @@ def _pose(keys: _Keys, key: str) -> Transform:
     try:
         return Transform.from_matrix(matrix)
     except SetupError:
-        expected = "a rotation in its upper left 3x3, right-handed and without scale: correct the signs and the unit"
+        expected = (
+            "a rotation in its upper left 3x3, right-handed and without scale: correct the "
+            "signs and the unit"
+        )
         raise keys.wrong(key, matrix, expected) from None
 
 

@@ -140,13 +140,19 @@ def read_kinematics(root: Path, file: str) -> Kinematics:
     check_increasing(file, time)
     check_coordinates(file, position)
     if (step := float(np.median(np.diff(time)))) > SLOWEST_STEP:
-        text = f"t steps by {step:g} s; expected a stream of at least {1 / SLOWEST_STEP:g} Hz in seconds: did you write milliseconds?"
+        text = (
+            f"t steps by {step:g} s; expected a stream of at least {1 / SLOWEST_STEP:g} Hz in "
+            "seconds: did you write milliseconds?"
+        )
         raise problem(file, text, row=FIRST_ROW + 1, key="t", value=f"{step:g}")
     with np.errstate(over="ignore"):
         norms = np.linalg.norm(quaternion, axis=1)
     if len(bad := np.flatnonzero(np.abs(norms - 1) > 1e-2)):
         at = int(bad[0])
-        text = f"the quaternion qx,qy,qz,qw has norm {norms[at]:.4g}; expected 1: are the columns in the order of the header?"
+        text = (
+            f"the quaternion qx,qy,qz,qw has norm {norms[at]:.4g}; expected 1: are the "
+            "columns in the order of the header?"
+        )
         raise problem(file, text, row=at + FIRST_ROW, key="qx,qy,qz,qw", value=f"{norms[at]:.4g}")
     return Kinematics(time, position, quaternion)
 
@@ -164,16 +170,23 @@ def read_cloud_list(
     for row, name in enumerate(names, FIRST_ROW):
         path = PurePosixPath(name)
         if path.is_absolute() or ".." in path.parts or "\\" in name or not name.isprintable():
-            text = f"file = '{name[:80]}' leads out of the sequence; expected a path inside such as clouds/000000.ply: move it there"
+            text = (
+                f"file = '{name[:80]}' leads out of the sequence; expected a path inside such "
+                "as clouds/000000.ply: move it there"
+            )
             raise problem(file, text, row=row, key="file", value=name[:80])
         if str(path) in seen:
-            text = f"file = '{name}' is in row {seen[str(path)]} already; expected one cloud per frame: remove one row"
+            text = (
+                f"file = '{name}' is in row {seen[str(path)]} already; expected one cloud per "
+                "frame: remove one row"
+            )
             raise problem(file, text, row=row, key="file", value=name)
         seen[str(path)] = row
         _check_cloud(root, home, file, row, name)
     if times[-1] < clock[0] or times[0] > clock[-1]:
         text = (
-            f"clouds from t = {times[0]:.3f} to {times[-1]:.3f} s, kinematics from {clock[0]:.3f} to {clock[-1]:.3f} s; "
+            f"clouds from t = {times[0]:.3f} to {times[-1]:.3f} s, kinematics from {clock[0]:.3f} "
+            f"to {clock[-1]:.3f} s; "
             "expected the same clock and an overlap: convert the stamps to one clock"
         )
         raise problem(file, text, row=FIRST_ROW, key="t", value=f"{times[0]:.3f}")
@@ -197,6 +210,9 @@ def read_forces(root: Path, file: str) -> Forces:
     if len(bad := np.argwhere(np.abs(force) > LARGEST_FORCE)):
         at, axis = (int(index) for index in bad[0])
         key = ("fx", "fy", "fz")[axis]
-        text = f"{key} = {force[at, axis]:g} N; expected at most {LARGEST_FORCE:g} N on soft tissue: did you write millinewtons?"
+        text = (
+            f"{key} = {force[at, axis]:g} N; expected at most {LARGEST_FORCE:g} N on soft "
+            "tissue: did you write millinewtons?"
+        )
         raise problem(file, text, row=at + FIRST_ROW, key=key, value=f"{force[at, axis]:g}")
     return Forces(time, force)

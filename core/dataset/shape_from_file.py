@@ -31,7 +31,8 @@ def read_shape(root: Path, file: str) -> Shape:
     if Path(file).suffix.lower() not in FORMATS:
         raise problem(
             file,
-            f"is no surface that can be read; expected one of {', '.join(FORMATS)}: export it as STL",
+            f"is no surface that can be read; expected one of {', '.join(FORMATS)}: export it as "
+            "STL",
         )
     try:
         vertices, triangles = read_surface(root / file)
@@ -52,7 +53,10 @@ def _check_units(file: str, vertices: FloatArray) -> None:
         raise problem(file, text, value=shown)
     low = float(vertices[:, 2].min())
     if abs(low) > _OFF_ORIGIN:
-        text = f"its lowest point lies at z = {low:.4g} m; expected the base at z = 0, where the phantom frame begins: move it there"
+        text = (
+            f"its lowest point lies at z = {low:.4g} m; expected the base at z = 0, where the "
+            "phantom frame begins: move it there"
+        )
         raise problem(file, text, value=f"{low:.4g}")
 
 

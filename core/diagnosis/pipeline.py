@@ -19,7 +19,7 @@ from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.gain.test_gain import held_out_gain, tuned_setup
 from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.rest_cloud import StaticChannel
-from palpate.diagnosis.inference.rest_evidence import Still
+from palpate.diagnosis.inference.rest_evidence import RestEvidence
 from palpate.diagnosis.observation.force_only import observe_each, pushed_places
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.report.error_patterns import draw_patterns, error_patterns
@@ -35,7 +35,8 @@ from palpate.diagnosis.validation.stiffness_error_test import largest_stiffness_
 from palpate.foundation.errors import DiagnosisError, RunError
 from palpate.foundation.progress import Report, part, rising, silent
 from palpate.measurement.phantom_drift import align_sequences
-from palpate.measurement.segmentation import cleaner_for, find_shaft_axis
+from palpate.measurement.segmentation import cleaner_for
+from palpate.measurement.tool_pose import find_shaft_axis
 from palpate.mesh.graded_mesh import FINE_GRID, PAGE_GRID, REPLAY_GRID, SCREEN_GRID
 from palpate.mesh.protocol import Meshing
 from palpate.mesh.push_meshes import FINE_PUSHES, REPLAY_PUSHES, SCREEN_PUSHES
@@ -168,7 +169,7 @@ def _bench(
     grid, fine, rough = _meshings(setup, [*fitted, *held_out])
     seen = any(not item.force_only for item in fitted)
     static = (
-        Still(
+        RestEvidence(
             StaticChannel.of(dataset.rest_cloud(), cleaner_for(dataset, registration), setup, grid)
         )
         if seen
@@ -333,6 +334,7 @@ def _model(dataset: Dataset, setup: Setup, findings: Findings, fitted: list[str]
         "effects": effects,
         "setup": setup.as_dict(),
         "grid": _described(setup),
+        "criteria": CRITERIA.to_json(),
         **registered,
     }
 

@@ -19,7 +19,8 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.phantom_drift import align_sequences, recorded_camera
-from palpate.measurement.segmentation import Cleaner, cleaner_for, find_shaft_axis, tool_poses
+from palpate.measurement.segmentation import Cleaner, cleaner_for
+from palpate.measurement.tool_pose import find_shaft_axis, tool_poses
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.mesh.protocol import Meshing

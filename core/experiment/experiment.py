@@ -26,7 +26,8 @@ from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.phantom_drift import align_sequences
-from palpate.measurement.segmentation import Cleaner, cleaner_for, find_shaft_axis
+from palpate.measurement.segmentation import Cleaner, cleaner_for
+from palpate.measurement.tool_pose import find_shaft_axis
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import REPLAY_GRID
 from palpate.mesh.protocol import Meshing

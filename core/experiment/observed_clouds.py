@@ -11,7 +11,8 @@ from palpate.dataset import Sequence
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.frames import Transform
 from palpate.foundation.progress import Report, silent
-from palpate.measurement.segmentation import Cleaner, tool_poses
+from palpate.measurement.segmentation import Cleaner
+from palpate.measurement.tool_pose import tool_poses
 
 __all__ = ["ObservedClouds", "segment_clouds"]
 

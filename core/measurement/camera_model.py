@@ -1,13 +1,12 @@
-"""How the camera's readings become places in the phantom frame, with all that is believed to be
-wrong about the camera.
+"""Camera model: readings to points in the phantom frame, with pose and depth errors of a setup.
 
-The stated pose was found by laying the rest cloud against the stated block on its table. If the
-camera misreads depth, or the block has another size, the same laying of what it then truly saw
-gives the stated pose from another true one. That is undone here without the cloud: the planes that
-the camera sees of the true block, read with the camera's error, are laid on the stated planes, and
-what that takes is taken back. The table and the sides hold the pose and the top may lie off as a
-whole, as in `palpate.registration.camera_fit`, to which the table is larger. Along an axis of which
-no side is seen the pose stays as stated.
+The stated pose comes from the registration of the rest cloud to the stated block on its table. If
+the camera misreads depth, or the block has another size, the same registration gives the stated
+pose from another true pose. The error is computed here without the cloud: the visible planes of the
+true block, read with the camera's error, are registered to the stated planes, and the motion found
+is inverted. Table and sides determine the pose, and the top may be offset as a whole, as in
+`palpate.registration.camera_fit`, where the table has most points. Along an axis without a visible
+side the pose stays as stated.
 """
 
 from __future__ import annotations
@@ -27,20 +26,21 @@ __all__ = ["CameraModel", "camera_model_for"]
 
 _TOP, _TABLE = 0, 5
 _POINTS = 6
-"""Along each edge of each side."""
+"""Number of points along each edge of each side."""
 _TABLE_WIDTH = 0.05
-"""How far around the block the table is seen [m]."""
+"""Width of the visible table around the block [m]."""
 _ROUNDS, _HELD = 12, 1e-6
-"""Of Gauss and Newton; weight at which the pose stays as stated where nothing is seen."""
+"""Number of Gauss-Newton steps, and weight of the stated pose in directions without a plane."""
 
 
 @dataclass(frozen=True, eq=False)
 class CameraModel:
-    """One camera's readings (m, 3) [m], camera frame, and places in the phantom frame.
+    """Relation between readings, camera frame, and points, phantom frame.
 
     Attributes:
         pose: phantom_from_camera.
-        offset, scale: a depth z is read as scale z + offset [m], [1].
+        offset: a depth z is read as scale z + offset [m].
+        scale: see `offset` [1].
     """
 
     pose: Transform
@@ -48,29 +48,31 @@ class CameraModel:
     scale: float = 1.0
 
     def place(self, readings: FloatArray) -> FloatArray:
-        """Where (m, 3) [m] in the phantom frame; the error is along the ray, whose depth is z."""
+        """Points (m, 3) [m], phantom frame, of readings (m, 3) [m]; depth errors are along the
+        ray.
+        """
         if self.exact:
             return self.pose.apply(readings)
         return self.pose.apply(readings * ((1.0 - self.offset / readings[:, 2:]) / self.scale))
 
     def read(self, places: FloatArray) -> FloatArray:
-        """The inverse of `place`."""
+        """Readings (m, 3) [m] of points (m, 3) [m], the inverse of `place`."""
         true = self.pose.inverse().apply(places)
         return true if self.exact else true * (self.scale + self.offset / true[:, 2:])
 
     @property
     def exact(self) -> bool:
-        """Whether depth is read as it is."""
+        """Whether depth is read without error."""
         return self.offset == 0.0 and self.scale == 1.0
 
     def same(self, other: CameraModel) -> bool:
-        """Whether both place all readings alike."""
+        """Whether both models are identical."""
         depth = (self.offset, self.scale) == (other.offset, other.scale)
         return depth and np.array_equal(self.pose.matrix, other.pose.matrix)
 
 
 def camera_model_for(setup: Setup, *, reference: bool = False) -> CameraModel:
-    """Under this setup; the `reference`, the rest cloud, was seen before the camera could move."""
+    """The camera model of a setup; with `reference` that of the rest cloud, before any shift."""
     sensor = setup.sensor
     pose = _registration_error(setup) @ setup.phantom_from_camera
     return CameraModel(
@@ -79,7 +81,7 @@ def camera_model_for(setup: Setup, *, reference: bool = False) -> CameraModel:
 
 
 def _registration_error(setup: Setup) -> Transform:
-    """Stated to true phantom_from_camera of the rest cloud."""
+    """Motion from the stated to the true phantom_from_camera of the rest cloud."""
     sensor = setup.sensor
     if setup.registered is None and sensor.depth_offset == 0.0 and sensor.depth_scale == 1.0:
         return Transform()
@@ -112,8 +114,10 @@ def _registration_error(setup: Setup) -> Transform:
 def _seen(
     size: tuple[float, float, float], camera: tuple[float, float, float]
 ) -> tuple[FloatArray, IntArray, FloatArray]:
-    """Places (m, 3) [m] on the planes that a camera at (3,) [m] sees, their number in `FACES` (m,),
-    and 1 on the top (m,).
+    """Sample the planes that a camera at (3,) [m] sees.
+
+    Returns:
+        points (m, 3) [m], their number in `FACES` (m,), and 1 on the top (m,).
     """
     planes = camera_planes(size, np.array(camera))
     x, y, z = size

@@ -1,6 +1,4 @@
-"""Errors, each with its unit: RMS of signed distance, and the paper's one-directional mean
-distance.
-"""
+"""The paper's error metric: one-directional mean distance to a super-sampled surface."""
 
 from __future__ import annotations
 
@@ -17,7 +15,9 @@ from palpate.replay.replay import Equilibrium
 __all__ = ["PAPER_GRID", "paper_distance", "supersampled"]
 
 PAPER_GRID = GridSpec(nodes=(13, 5, 5))
+"""The paper's grid (Wu, Kazanzides and Unberath 2020)."""
 _FOLD = 3
+"""Super-sampling along each axis."""
 
 
 @lru_cache(maxsize=8)
@@ -32,10 +32,10 @@ def _dense(size: tuple[float, float, float]) -> FloatArray:
 
 
 def supersampled(frame: Equilibrium, surface: Surface) -> FloatArray:
-    """Vertices of the 13x5x5 grid's free surface, super-sampled three-fold by linear interpolation
-    (v, 3) [m].
+    """Vertices (v, 3) [m] of the 13x5x5 grid's free surface, super-sampled three-fold by linear
+    interpolation.
 
-    The grid that the paper shows and learns on is a sampling of the mesh that is solved on.
+    The paper's grid is a sampling of the mesh that is solved.
     """
     size = surface.geometry.size
     coarse = box_mesh(size, PAPER_GRID)

@@ -1,4 +1,4 @@
-"""Averages of thousands of noisy values over patches of a surface."""
+"""Robust averages of noisy values over patches of a surface."""
 
 from __future__ import annotations
 
@@ -23,8 +23,12 @@ MaskArray = np.ndarray[Any, np.dtype[np.bool_]]
 
 @dataclass(frozen=True, eq=False)
 class PatchMeans:
-    """Robust averages over patches: mean (p,) [m], NaN where fewer than the least number of points;
-    count (p,); spread (p,) [m].
+    """Averages over patches.
+
+    Attributes:
+        mean: (p,) [m]; NaN with fewer than the least number of points.
+        count: (p,) number of points.
+        spread: (p,) standard deviation of the points [m].
     """
 
     mean: FloatArray
@@ -33,7 +37,7 @@ class PatchMeans:
 
 
 def patch_medians(values: FloatArray, patch: IntArray, patches: int) -> FloatArray:
-    """Medians (p,) of values (m,) by patch (m,); NaN where there are none."""
+    """Medians (p,) of values (m,) by patch (m,); NaN for an empty patch."""
     order, count = np.lexsort((values, patch)), np.bincount(patch, minlength=patches)
     found, seen, first = np.full(patches, np.nan), count > 0, np.cumsum(count) - count
     lower, upper = (order[first[seen] + (count[seen] - less) // 2] for less in (1, 0))
@@ -42,12 +46,11 @@ def patch_medians(values: FloatArray, patch: IntArray, patches: int) -> FloatArr
 
 
 def within_spread(values: FloatArray, patch: IntArray, patches: int) -> MaskArray:
-    """Which values (m,) lie within four robust deviations of their patch's median; one deviation
-    for all patches.
+    """Mask (m,) of values within four robust deviations of their patch's median.
 
-    The deviation is that of differences within patches, which is right for patches of any size:
-    three points lie so near to their own median that a deviation from it would throw out good
-    points, and leave averages that scatter more than they seem to.
+    All patches share one deviation, that of differences within patches, which is unbiased for
+    patches of any size. A deviation from the median would be too small for patches of three points
+    and would reject good ones.
     """
     if not len(values):
         return np.zeros(0, dtype=bool)
@@ -58,8 +61,8 @@ def within_spread(values: FloatArray, patch: IntArray, patches: int) -> MaskArra
         (np.cumsum(count) - count)[patch[order]],
         values[order],
     )
-    # Each is compared with the one half a patch's points before it, in a ring; a lone point says
-    # nothing of noise.
+    # Each value is compared with the one half a patch before it, cyclically; a patch of one point
+    # has no difference.
     ring = first + (np.arange(len(order)) - first - size // 2) % size
     apart = np.abs(ordered - ordered[ring])[size > 1]
     scale = 1.4826 / np.sqrt(2) * float(np.median(apart)) if len(apart) else np.inf
@@ -81,8 +84,8 @@ def plain_means(values: FloatArray, patch: IntArray, patches: int, least: int = 
 
 
 def patch_means(values: FloatArray, patch: IntArray, patches: int, least: int = 2) -> PatchMeans:
-    """Average values (m,) [m] by patch (m,), leaving out what is more than four robust deviations
+    """Averages of values (m,) [m] by patch (m,), without values more than four robust deviations
     from the patch's median.
     """
-    kept = within_spread(values, patch, patches)
-    return plain_means(values[kept], patch[kept], patches, least)
+    inlier = within_spread(values, patch, patches)
+    return plain_means(values[inlier], patch[inlier], patches, least)

@@ -1,10 +1,9 @@
-"""Where the block stood when a sequence began: a base that slid stays where it is, and so does a
-block that somebody nudged.
+"""Displacement of the block on its table between the rest cloud and the begin of each sequence.
 
-The rest cloud is taken once, before anything is pushed. Each sequence's frames before its first
-touch show by how much the block lies elsewhere on the table by then. It is a measurement and no
-hypothesis: every model, the stated one as well, is compared with the sequence as seen from the
-block where it stood. What slides within a sequence is left to be explained.
+A base that slid, or a block that somebody moved, stays where it is. The rest cloud is taken once,
+before any push. The frames of a sequence before its first touch show the displacement since then.
+It is a measurement, not a hypothesis: all models, also the stated one, are compared with the
+sequence relative to the displaced block. Slip within a sequence is left to the models.
 """
 
 from __future__ import annotations
@@ -18,8 +17,9 @@ from palpate.dataset import Dataset, Sequence
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.patch_averages import PatchMeans, patch_means
-from palpate.measurement.segmentation import Cleaner, cleaner_for, find_shaft_axis, tool_poses
+from palpate.measurement.segmentation import Cleaner, cleaner_for
 from palpate.measurement.surface_gaps import Surface, gaps
+from palpate.measurement.tool_pose import find_shaft_axis, tool_poses
 from palpate.mesh.graded_mesh import SCREEN_GRID
 from palpate.registration.registration import Registration, setup_from
 from palpate.replay.equilibrium import Equilibrium
@@ -29,33 +29,35 @@ from palpate.setup.setup import Setup, Shape
 __all__ = ["PhantomDrift", "align_sequences", "measure_drift", "recorded_camera", "shift_sequences"]
 
 LEAST, SURE = 1.5e-4, 5.0
-"""Less than this [m], or than so many standard deviations, is no displacement."""
+"""Smallest displacement [m], and smallest number of standard deviations, that are significant."""
 _FRAMES = 8
-"""Untouched frames that are looked at."""
+"""Largest number of untouched frames that are used."""
 _CLEAR = 1.5e-3
-"""A tool farther than this from the stated block [m] does not touch it."""
+"""Distance between tool and stated block beyond which the block counts as untouched [m]."""
 _ROUNDS = 3
+"""Number of Gauss-Newton steps."""
 _ALONG_TABLE, _EXPLAINED = 0.25, 0.8
-"""A block that moved over the table rises by less than this share of its way; and that way is most
-of what has changed in it. A camera that was moved makes other changes too."""
+"""Largest rise over the way along the table [1], and least share of the change that the way
+explains [1]. A camera that was moved causes other changes too."""
 _DOUBT, _NEVER = 1.5e-4, 1e30
-"""A direction that no side shows this exactly [m] counts as unseen; the weight that holds it."""
+"""Standard deviation from which a direction counts as undetermined [m], and the weight that fixes
+it."""
 _FEWEST, _PATCH = 12, 8e-3
-"""Patches that must be seen both then and now, and their edge [m]: of a side at a low angle a cloud
-has few points."""
+"""Least number of patches that are visible both times, and their edge [m]. The patches are large
+because a cloud has few points of a side at a low angle."""
 _GRAZING = 0.12
-"""Cosine between ray and normal from which a point counts: a side that is seen at a low angle tells
-best where it lies, for the error is along the ray."""
+"""Least cosine between ray and normal of a point [1]. Sides at a low angle are included: the error
+is along the ray, so they determine their position best."""
 
 
 @dataclass(frozen=True, eq=False)
 class PhantomDrift:
-    """How far the block lies from where the rest cloud shows it as a sequence begins.
+    """Displacement of the block since the rest cloud, at the begin of a sequence.
 
     Attributes:
-        way: (3,) along x, y, z [m], zero along what no side shows.
+        way: (3,) along x, y, z [m], zero along undetermined directions.
         deviation: (3,) standard deviations [m].
-        explained: share of the changes beyond noise that its way along the table accounts for [1].
+        explained: share of the changes beyond noise that the way along the table explains [1].
     """
 
     way: FloatArray
@@ -64,28 +66,28 @@ class PhantomDrift:
 
 
 def align_sequences(dataset: Dataset, registration: Registration) -> tuple[Dataset, Registration]:
-    """The dataset with each sequence as seen from the block where it stood; its registration warns
-    where that is elsewhere.
+    """Move each sequence so that the block lies where the rest cloud shows it.
+
+    Returns:
+        the dataset, and the registration with a warning that names displaced sequences.
     """
     found = measure_drift(dataset, registration)
     if not found:
         return dataset, registration
     rows = ", ".join(f"{name} by {1e3 * np.linalg.norm(way):.1f} mm" for name, way in found.items())
-    told = (
-        f"The block does not lie where rest.ply shows it as these begin: {rows}. It slid before, or was moved; each is compared "
-        "from where it lay."
+    message = (
+        f"The block does not lie where rest.ply shows it as these begin: {rows}. It slid before, "
+        "or was moved; each is compared from where it lay."
     )
     return shift_sequences(dataset, registration, found), replace(
-        registration, warnings=(*registration.warnings, told)
+        registration, warnings=(*registration.warnings, message)
     )
 
 
 def shift_sequences(
     dataset: Dataset, registration: Registration, ways: Mapping[str, FloatArray]
 ) -> Dataset:
-    """The dataset with these sequences as seen from a block that lies `ways` (2,) [m] along x and y
-    from where it was.
-    """
+    """Move sequences back by `ways` (2,) [m] along x and y, by name of the sequence."""
     return replace(
         dataset,
         loaded=tuple(
@@ -95,9 +97,7 @@ def shift_sequences(
 
 
 def recorded_camera(sequence: Sequence, pose: Transform) -> Transform:
-    """The camera's pose that puts clouds as they were recorded beside the block as the sequence is
-    seen from it.
-    """
+    """The camera's pose for clouds as recorded, where the sequence has been shifted."""
     return pose if sequence.shift is None else pose @ Transform(translation=sequence.shift)
 
 
@@ -107,8 +107,7 @@ def _shift_sequence(
     if way is None:
         return sequence
     back = -np.append(way, 0.0)
-    # Where touches were of other landmarks, which way the robot's axes point is what the mended
-    # ones say.
+    # Touches that were paired with wrong landmarks give wrong directions of the robot's axes.
     robot = registration.repaired.phantom_from_robot
     return sequence.moved(
         registration.phantom_from_camera.inverse().rotate(back), robot.inverse().rotate(back)
@@ -116,11 +115,10 @@ def _shift_sequence(
 
 
 def measure_drift(dataset: Dataset, registration: Registration) -> dict[str, FloatArray]:
-    """How far (2,) along x and y [m] the block lies from where the rest cloud shows it, of each
-    sequence where it surely does.
+    """Measure the significant displacements (2,) [m] along x and y of the block, by sequence.
 
-    Counted from the sequence in which it lies nearest: by what all are displaced, the camera was
-    moved and not the block.
+    They are relative to the sequence with the smallest one: a displacement common to all is a
+    motion of the camera, not of the block.
     """
     if isinstance(dataset.geometry, Shape) or not dataset.has_rest:
         return {}
@@ -159,9 +157,7 @@ def _significant(found: Mapping[str, PhantomDrift]) -> dict[str, FloatArray]:
 def _untouched_points(
     sequence: Sequence, setup: Setup, cleaner: Cleaner, shaft: FloatArray | None
 ) -> FloatArray:
-    """Cleaned points (n, 3) [m], camera frame, of frames before the tool first comes near the
-    block; none where there is none.
-    """
+    """Segmented points (n, 3) [m], camera frame, of frames before the tool first comes near."""
     times = np.asarray(sequence.cloud_times)
     if not len(times):
         return np.empty((0, 3))
@@ -184,7 +180,9 @@ def _untouched_points(
 def _means(
     setup: Setup, points: FloatArray, way: FloatArray, bare: Equilibrium, surface: Surface
 ) -> PatchMeans:
-    """Of cleaned points (n, 3) [m], camera frame, against the block moved by `way` (3,) [m]."""
+    """Average distances of segmented points (n, 3) [m], camera frame, to the block moved by `way`
+    (3,) [m].
+    """
     pose = setup.phantom_from_camera
     seen = gaps(pose.apply(points) - way, pose.translation - way, bare, surface, grazing=_GRAZING)
     return patch_means(seen.gap, seen.patch, surface.patches)
@@ -193,8 +191,10 @@ def _means(
 def _fit_drift(
     setup: Setup, points: FloatArray, before: PatchMeans, bare: Equilibrium, surface: Surface
 ) -> PhantomDrift | None:
-    """By least squares: a side that moved by d along its normal n has its points n d farther
-    out."""
+    """Fit the displacement by least squares; a side with normal n moves outwards by n d.
+
+    None where too few patches are visible both times.
+    """
     way, first = np.zeros(3), 1.0
     for number in range(_ROUNDS):
         now = _means(setup, points, way, bare, surface)
@@ -209,7 +209,7 @@ def _fit_drift(
         matrix = (rows * weight[:, None]).T @ rows
         matrix += np.diag(np.where(np.diag(matrix) < _DOUBT**-2, _NEVER, 0.0))
         step = np.linalg.solve(matrix, (rows * weight[:, None]).T @ change)
-        if number < _ROUNDS - 1:  # the last round says what the way along the table has left
+        if number < _ROUNDS - 1:  # the last step gives what the way along the table leaves
             way[:2] += step[:2]
     explained = 1.0 - max(left - 1.0, 0.0) / max(first - 1.0, 1e-9)
     return PhantomDrift(

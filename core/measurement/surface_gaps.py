@@ -1,10 +1,10 @@
-"""What the camera sees of a replay, and where the two differ.
+"""Signed distances of measured points to a simulated surface, along camera rays.
 
-A measured point lies somewhere along its camera ray, since a depth camera errs along the ray. So
-the model's point for it is where that ray meets the simulated surface, not the nearest one: nearest
-points follow the noise and turn it into bias on curved or slanted parts. The difference is then
-taken along the surface normal. 45 000 noisy points become a few hundred averages over patches of
-the rest surface, which move with the material.
+The error of a depth camera is along the ray. The simulated point of a measured one is therefore the
+intersection of its ray with the surface, not the nearest point: nearest points follow the noise and
+turn it into bias on curved or slanted parts. The distance is taken along the surface normal. 45 000
+noisy points become a few hundred averages over patches of the rest surface, which move with the
+material.
 """
 
 from __future__ import annotations
@@ -21,25 +21,27 @@ from palpate.setup.setup import Box, Setup
 __all__ = ["Gaps", "Surface", "gaps", "gaps_beside"]
 
 SIDES = ("+z", "-y", "+y", "-x", "+x")
+"""Sides of the free surface."""
 GRAZING = 0.3
-"""Cosine between ray and normal below which a depth error counts for too much along the surface."""
+"""Least cosine between ray and normal [1]; below it, depth noise moves points along the surface."""
 _EDGE = 1.5e-3
-"""Points this near to an edge of the block [m] are left out: depth cameras round edges off."""
+"""Distance to an edge of the block below which points are left out [m]; depth cameras round
+edges."""
 _OUTLIER = 8e-3
+"""Distance beyond which a point is an outlier [m]."""
 _BESIDE = 1e-3
-"""How far from a material point others are taken to span its plane [m]."""
+"""Distance of the material points that span a tangent plane [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """The free surface of a block as a triangle mesh of material points, and its patches; in number
-    those of the stated block.
+    """The free surface of a block as a triangle mesh of material points, divided into patches.
 
     Attributes:
         geometry: the block.
-        spacing: of the vertices, at most [m].
-        patch: edge length of a patch, about [m].
-        stated: the block whose lengths count for spacing and patch; None where that is `geometry`.
+        spacing: largest distance of vertices [m].
+        patch: approximate edge length of a patch [m].
+        stated: the block whose lengths set the numbers of vertices and patches; `geometry` if None.
     """
 
     geometry: Box
@@ -49,7 +51,7 @@ class Surface:
 
     @classmethod
     def of(cls, setup: Setup, spacing: float = 1.5e-3) -> Surface:
-        """That of a setup."""
+        """The surface of a setup's block."""
         return cls(setup.box, spacing=spacing, stated=setup.registered)
 
     def axes(self, side: str) -> tuple[int, int, int]:
@@ -65,11 +67,11 @@ class Surface:
 
     @cached_property
     def _lengths(self) -> FloatArray:
-        """Of the stated block (3,) [m]."""
+        """Edge lengths (3,) [m] of the stated block."""
         return np.array((self.stated or self.geometry).size)
 
     def own(self, places: FloatArray) -> FloatArray:
-        """Rest positions (m, 3) [m] of the material that lies there in the stated block."""
+        """Rest positions (m, 3) [m] in this block of rest positions in the stated block."""
         return (
             places
             if self.stated is None
@@ -77,7 +79,7 @@ class Surface:
         )
 
     def on_stated(self, places: FloatArray) -> FloatArray:
-        """The inverse of `own`."""
+        """Rest positions (m, 3) [m] in the stated block, the inverse of `own`."""
         return (
             places
             if self.stated is None
@@ -146,7 +148,7 @@ class Surface:
         return int(self._layout[1][-1])
 
     def patch_of(self, points: FloatArray, side: IntArray) -> IntArray:
-        """Patch (m,) of rest positions (m, 3) [m] that lie on these sides (m,)."""
+        """Patch numbers (m,) of rest positions (m, 3) [m] on sides (m,)."""
         low, high = self.bounds
         shapes, offsets = self._layout
         result = np.empty(len(points), dtype=np.int64)
@@ -188,8 +190,8 @@ class Surface:
         return np.concatenate(normals)
 
     def edge_distance(self, points: FloatArray, side: IntArray) -> FloatArray:
-        """Distance (m,) [m] of rest positions to the nearest edge of their side; the base counts as
-        one.
+        """Distance (m,) [m] of rest positions to the nearest edge of their side, the base
+        included.
         """
         low, high = self.bounds
         inside = np.minimum(points - low, high - points)
@@ -204,13 +206,13 @@ class Gaps:
     """Signed distances of measured points to a simulated surface.
 
     Attributes:
-        index: (m,) which of the given points met the surface.
+        index: (m,) rows of the given points whose rays meet the surface.
         gap: (m,) measured minus simulated along the outward normal [m].
-        foot: (m, 3) rest positions of the material points they met.
-        normal: (m, 3) outward, of the deformed surface.
-        facing: (m,) cosine of the angle between the normal and the way back to the camera.
-        patch: (m,).
-        side: (m,).
+        foot: (m, 3) rest positions of the material points that they meet [m].
+        normal: (m, 3) outward normals of the deformed surface.
+        facing: (m,) cosine between the normal and the direction to the camera [1].
+        patch: (m,) patch numbers.
+        side: (m,) numbers in SIDES.
     """
 
     index: IntArray
@@ -234,8 +236,11 @@ def gaps(
 ) -> Gaps:
     """Compare measured points with the surface of one frame, along the camera's rays.
 
+    Unless `everything` is set, points are left out whose ray grazes the block, passes near an edge,
+    meets it too low, or ends more than 8 mm away.
+
     Args:
-        points: (n, 3) [m], phantom frame, cleaned.
+        points: (n, 3) segmented points [m], phantom frame.
         camera: (3,) optical centre [m], phantom frame.
         frame: the simulated block.
         surface: its material points.
@@ -243,9 +248,6 @@ def gaps(
         grazing: cosine between ray and normal below which a ray grazes it [1].
         lowest: height of the lowest material point that counts [m]
             (`palpate.measurement.segmentation.Cleaner.lowest`).
-
-    Otherwise points whose ray grazes it, passes near an edge, meets it too low, or ends more than 8
-    mm away are left out, too.
     """
     import open3d as o3d
 
@@ -269,8 +271,7 @@ def gaps(
     one, two, three = moved[surface.faces.T]
     across = np.cross(two - one, three - one)
     normal = across[triangle] / lengths(across)[triangle][:, None]
-    # The triangles are chords of the curved surface; the gap is taken to the finite elements' own
-    # point.
+    # The triangles are chords of the curved surface; the gap refers to the finite elements' point.
     gap = np.einsum("mi,mi->m", points[hit] - frame.move(foot), normal)
     side = surface.side[triangle]
     facing = -np.einsum("mi,mi->m", rays, normal)
@@ -293,15 +294,16 @@ def gaps_beside(
     foot: FloatArray,
     side: IntArray,
 ) -> Gaps:
-    """Compare measured points with the planes that touch the surface at given material points: for
-    rays that just miss the block.
+    """Compare measured points with tangent planes at given material points, for rays that just miss
+    the block.
 
     Args:
         points: (n, 3) [m], phantom frame.
         camera: (3,) optical centre [m].
         frame: the simulated block.
-        foot: (n, 3) rest positions [m] of the material points.
-        side: (n,) in SIDES, on which they lie.
+        surface: its material points.
+        foot: (n, 3) rest positions of the material points [m].
+        side: (n,) numbers in SIDES of their sides.
     """
     low, high = surface.bounds
     here, along = frame.move(foot), np.zeros((2, len(foot), 3))

@@ -1,16 +1,13 @@
-"""The touches that the robot's registration rests on, under another belief about where they were
-made.
+"""Correction of the robot's registration for touches that were not at the stated landmarks.
 
-A registration lays the touches on their landmarks by the best rigid motion. If the landmarks
-sagged, the block has another size, or the touches were of other places, then the same touches, laid
-on where they really were, give another registration. The touches are known only through what they
-left: moved by the stated registration they lie at landmark plus miss, so that a fit from there
-leads from the stated registration to the true one, exactly, for any number of touches and however
-far off the stated one is. Without misses it is the fit of the landmarks themselves, which is exact
-too where the touches were: a rigid fit's inverse is the fit back.
+A registration fits the touches to their landmarks by a rigid motion. If the landmarks sagged, the
+block has another size, or other places were touched, then the same touches, fitted to the true
+places, give another registration. A setup stores the touches as residuals: moved by the stated
+registration, a touch lies at landmark plus residual. The rigid fit from there to the true places
+leads from the stated registration to the true one, exactly, for any number of touches and any size
+of the error.
 
-A polygon that shrank about its middle lies as well as before: it moves nothing, and shows in the
-misses alone.
+A touched polygon that is smaller about its middle moves nothing; it shows in the residuals alone.
 """
 
 from __future__ import annotations
@@ -28,8 +25,7 @@ __all__ = ["touch_correction", "touch_misses", "touched_places"]
 
 
 def touched_places(setup: Setup) -> FloatArray:
-    """Where on the block at rest each touch really was, before it sagged (n, 3) [m], phantom
-    frame."""
+    """True places (n, 3) [m], phantom frame, of the touches on the block before it sags."""
     landmarks, touching = np.array(setup.landmarks) * setup.scale, setup.touching
     places = landmarks[touching.order(len(landmarks))]
     middle = places.mean(axis=0)
@@ -38,27 +34,25 @@ def touched_places(setup: Setup) -> FloatArray:
 
 
 def touch_correction(setup: Setup, grid: Meshing) -> Transform:
-    """Stated to true phantom_from_robot; the grid is for the sag of the landmarks."""
+    """Motion from the stated to the true phantom_from_robot; `grid` is used for the sag."""
     if _as_stated(setup):
         return Transform()
-    made, places = _made_and_meant(setup, grid)
+    made, places = _touched_and_expected(setup, grid)
     rotation, translation, _ = rigid_fits(made, places[None])
     return Transform(rotation[0], translation[0])
 
 
 def touch_misses(setup: Setup, grid: Meshing) -> FloatArray:
-    """Each moved touch minus where the tool's centre would have been (n, 3) [m], phantom frame,
-    under this setup's registration.
+    """Residuals (n, 3) [m], phantom frame, of the touches after the corrected registration: moved
+    touch minus expected tool centre.
     """
-    made, places = _made_and_meant(setup, grid)
+    made, places = _touched_and_expected(setup, grid)
     rotation, translation, _ = rigid_fits(made, places[None])
     return np.asarray(made @ rotation[0].T + translation[0] - places)
 
 
 def _as_stated(setup: Setup) -> bool:
-    """Whether the touches were where they were stated to be; with fewer than three, nothing was
-    registered by them.
-    """
+    """Whether the touches need no correction; fewer than three register nothing."""
     plain = Touching(misses=setup.touching.misses, lift=setup.touching.lift)
     moved = (
         setup.load.specific_weight_over_stiffness
@@ -68,10 +62,8 @@ def _as_stated(setup: Setup) -> bool:
     return len(setup.landmarks) < 3 or not moved
 
 
-def _made_and_meant(setup: Setup, grid: Meshing) -> tuple[FloatArray, FloatArray]:
-    """Tool centres (n, 3) [m] as the stated registration has them, and as they should be on the
-    block as it is.
-    """
+def _touched_and_expected(setup: Setup, grid: Meshing) -> tuple[FloatArray, FloatArray]:
+    """Tool centres (n, 3) [m] by the stated registration, and expected at the true places."""
     landmarks, lift = np.array(setup.landmarks), np.array([0.0, 0.0, setup.touching.lift])
     misses = np.array(setup.touching.misses) if setup.touching.misses else np.zeros_like(landmarks)
     places = touched_places(setup)

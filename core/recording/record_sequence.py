@@ -17,8 +17,9 @@ from palpate.foundation.arrays import FloatArray
 from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.metrics import paper_distance
 from palpate.measurement.phantom_drift import recorded_camera
-from palpate.measurement.segmentation import Cleaner, tool_poses
+from palpate.measurement.segmentation import Cleaner
 from palpate.measurement.surface_gaps import Gaps, Surface, gaps
+from palpate.measurement.tool_pose import tool_poses
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.interpolation import neighbourhood_means
 from palpate.mesh.protocol import Meshing

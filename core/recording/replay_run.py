@@ -19,7 +19,8 @@ from palpate.foundation.errors import DatasetError
 from palpate.foundation.processes import ProcessPool
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.phantom_drift import align_sequences
-from palpate.measurement.segmentation import cleaner_for, find_shaft_axis
+from palpate.measurement.segmentation import cleaner_for
+from palpate.measurement.tool_pose import find_shaft_axis
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.recording.record_sequence import record
 from palpate.registration.registration import register, setup_from

@@ -32,7 +32,8 @@ def accepted_camera_fit(
     warnings = list(fit.warnings)
     if apart > APART:
         warnings.append(
-            f"The accepted registration {accepted.name} lies {apart * 1e3:.1f} mm from where the rest cloud would draw it "
+            f"The accepted registration {accepted.name} lies {apart * 1e3:.1f} mm from where the "
+            "rest cloud would draw it "
             f"(under {APART * 1e3:.0f} mm is expected): look at it again."
         )
     return replace(

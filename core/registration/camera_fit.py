@@ -11,14 +11,8 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
-from palpate.registration.faces import (
-    FACES,
-    TABLE_REACH,
-    Assignment,
-    assign,
-    box_distance,
-    camera_planes,
-)
+from palpate.registration.coarse_icp import align_by_icp
+from palpate.registration.faces import FACES, Assignment, assign, box_distance, camera_planes
 from palpate.registration.guess import automatic_guess, half_turn
 from palpate.registration.pose import motion_jacobian, small_motion
 from palpate.registration.uncertainty import PRIOR, estimate, make_patches, weak_directions
@@ -95,7 +89,7 @@ def fit_camera(
     poses = []
     failure = None
     if guess is not None:
-        poses.append(_refine(cloud, size, _coarse(cloud, size, guess), guess, gate))
+        poses.append(_refine(cloud, size, align_by_icp(cloud, size, guess), guess, gate))
     try:
         found = automatic_guess(cloud, size, depth_sigma)
         starts = sorted((found, half_turn() @ found), key=lambda pose: _preference(pose, guess))
@@ -129,7 +123,7 @@ def refine_camera(
             points=len(cloud),
         )
     gate = max(2.0 * depth_sigma, 3.0e-3)
-    pose = _refine(cloud, size, _coarse(cloud, size, start), start, gate)
+    pose = _refine(cloud, size, align_by_icp(cloud, size, start), start, gate)
     return _conclude(
         cloud, size, pose, _explained(cloud, size, pose, depth_sigma), gate, pose, automatic=False
     )
@@ -142,71 +136,6 @@ def _preference(pose: Transform, guess: Transform | None) -> float:
     if guess is None:
         return float(pose.translation[1])
     return float(-np.trace(pose.rotation @ guess.rotation.T))
-
-
-def _coarse(cloud: FloatArray, size: tuple[float, float, float], guess: Transform) -> Transform:
-    """ICP of Open3D (point to plane) against points sampled on the visible faces and the table
-    around them.
-    """
-    import open3d as o3d
-
-    points, normals = _sampled(size, guess.translation)
-    target = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-    target.normals = o3d.utility.Vector3dVector(normals)
-    source = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud)).voxel_down_sample(2.0e-3)
-    registration = o3d.pipelines.registration
-    pose = guess.matrix
-    for reach in (0.015, 0.008, 0.004):
-        to_plane = registration.TransformationEstimationPointToPlane(
-            registration.TukeyLoss(k=reach)
-        )
-        criteria = registration.ICPConvergenceCriteria(max_iteration=40)
-        pose = np.asarray(
-            registration.registration_icp(
-                source, target, reach, pose, to_plane, criteria
-            ).transformation
-        )
-    found = Transform.from_matrix(pose)
-    moved = np.linalg.norm(
-        (found @ guess.inverse()).apply(np.array([0.0, 0.0, size[2]]))
-        - np.array([0.0, 0.0, size[2]])
-    )
-    return found if moved < 0.05 else guess
-
-
-def _sampled(
-    size: tuple[float, float, float], camera: FloatArray, step: float = 1.5e-3
-) -> tuple[FloatArray, FloatArray]:
-    """Points (m, 3) [m] and normals (m, 3) on the faces that a camera at (3,) sees, and on the
-    table beside them.
-    """
-    planes = camera_planes(size, camera)
-    reach = np.array(size) / 2 + np.array([TABLE_REACH, TABLE_REACH, 0.0])
-    axes = [np.arange(-r, r, step) for r in reach]
-    x, y = (grid.ravel() for grid in np.meshgrid(axes[0], axes[1]))
-    half_x, half_y, height = size[0] / 2, size[1] / 2, size[2]
-    over = (np.abs(x) < half_x) & (np.abs(y) < half_y)
-    points = [np.column_stack([x, y, np.where(over, height, 0.0)])]
-    normals = [np.tile([0.0, 0.0, 1.0], (len(x), 1))]
-    for k, (axis, sign) in enumerate(((0, -1), (0, 1), (1, -1), (1, 1)), start=1):
-        if planes.visible[k]:
-            along, z = (
-                grid.ravel()
-                for grid in np.meshgrid(
-                    np.arange(-size[1 - axis] / 2, size[1 - axis] / 2, step),
-                    np.arange(0, height, step),
-                )
-            )
-            side, normal = np.zeros((len(along), 3)), np.zeros((len(along), 3))
-            side[:, axis], side[:, 1 - axis], side[:, 2], normal[:, axis] = (
-                sign * size[axis] / 2,
-                along,
-                z,
-                sign,
-            )
-            points.append(side)
-            normals.append(normal)
-    return np.concatenate(points), np.concatenate(normals)
 
 
 def _pivot(size: tuple[float, float, float]) -> FloatArray:
@@ -241,7 +170,8 @@ def _refine(
         )
         if len(found.rows) < LEAST_POINTS:
             raise RegistrationError(
-                f"{len(found.rows)} of {len(cloud)} points of the rest cloud lie on the phantom's faces or the table, "
+                f"{len(found.rows)} of {len(cloud)} points of the rest cloud lie on the phantom's "
+                "faces or the table, "
                 f"at least {LEAST_POINTS} are needed: check [phantom] size and [camera] to_phantom"
             )
         weights = _weights(found, _noise(found), tukey=step >= 8)
@@ -364,7 +294,8 @@ def _doubts(
         )
     if guess is None:
         doubts.append(
-            "A plain block looks the same after half a turn: its heading cannot be told from the rest cloud; "
+            "A plain block looks the same after half a turn: its heading cannot be told from the "
+            "rest cloud; "
             "give [camera] to_phantom to settle it."
         )
     else:
@@ -375,7 +306,8 @@ def _doubts(
         )
         if shift > 0.015 or turn > np.radians(8.0):
             doubts.append(
-                f"The fit lies {shift * 1e3:.1f} mm and {np.degrees(turn):.1f} degrees from [camera] to_phantom: check that guess."
+                f"The fit lies {shift * 1e3:.1f} mm and {np.degrees(turn):.1f} degrees from "
+                "[camera] to_phantom: check that guess."
             )
     if (
         "top" in offsets
@@ -384,7 +316,8 @@ def _doubts(
     ):
         doubts.append(
             f"The top lies {abs(offsets['top'] - offsets['table']) * 1e3:.1f} mm "
-            f"{'higher' if offsets['top'] > offsets['table'] else 'lower'} over the table than [phantom] size says: "
+            f"{'higher' if offsets['top'] > offsets['table'] else 'lower'} over the table than "
+            "[phantom] size says: "
             "it sags under its weight, has another size, or something lies under it."
         )
     return doubts

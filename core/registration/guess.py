@@ -57,7 +57,8 @@ def _block_top(
     layer = points[np.abs(points[:, 2] - size[2]) < max(2.5 * thickness, 0.08 * size[2])]
     if len(layer) < 30:
         raise RegistrationError(
-            f"{len(layer)} points of the rest cloud lie {size[2] * 1e3:.1f} mm over the table, where the phantom's top should be: "
+            f"{len(layer)} points of the rest cloud lie {size[2] * 1e3:.1f} mm over the table, "
+            "where the phantom's top should be: "
             "check [phantom] size, or give [camera] to_phantom as a first guess"
         )
     flat = layer * np.array([1.0, 1.0, 0.0])
@@ -69,7 +70,8 @@ def _block_top(
     )
     if labels.max() < 0:
         raise RegistrationError(
-            "the points at the height of the phantom's top do not hang together: give [camera] to_phantom"
+            "the points at the height of the phantom's top do not hang together: give [camera] "
+            "to_phantom"
         )
     return np.asarray(layer[labels == np.bincount(labels[labels >= 0]).argmax()])
 

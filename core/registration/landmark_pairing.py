@@ -160,13 +160,20 @@ def _pairing_sentence(
         for row, (old, new) in enumerate(zip(stated, pairing, strict=True))
         if old != new
     ]
-    fit = f"RMS {before * 1e3:.1f} mm as stated, {after * 1e3:.1f} mm ({after / before - 1:+.0%}) with {', '.join(changes)}."
+    fit = (
+        f"RMS {before * 1e3:.1f} mm as stated, {after * 1e3:.1f} mm "
+        f"({after / before - 1:+.0%}) with {', '.join(changes)}."
+    )
     why = (
-        f" As stated, the tool would be inside the block or under the table at the start of {blocked:.0%} of the sequences."
+        " As stated, the tool would be inside the block or under the table at the start of "
+        f"{blocked:.0%} of the sequences."
         if blocked >= IMPOSSIBLE
         else ""
     )
-    return f"The touches seem to be paired with the wrong landmarks: {fit}{why} Correct the landmark names in touches.csv if so."
+    return (
+        f"The touches seem to be paired with the wrong landmarks: {fit}{why} Correct the "
+        "landmark names in touches.csv if so."
+    )
 
 
 def _scale_sentence(
@@ -175,7 +182,10 @@ def _scale_sentence(
     reach = float(np.sqrt(((corners - corners.mean(axis=0)) ** 2).sum(axis=1).mean()))
     size, side = ("smaller", "inside") if scale < 1 else ("larger", "outside")
     return (
-        f"The touched polygon is {abs(scale - 1):.1%} (+- {sigma:.1%}) {size} than the landmarks, each touch about "
-        f"{abs(scale - 1) * reach * 1e3:.1f} mm {side} its landmark: with that size the RMS falls from {before * 1e3:.1f} to "
-        f"{after * 1e3:.1f} mm. Check where the landmarks were touched, the tip's offset and the phantom's size."
+        f"The touched polygon is {abs(scale - 1):.1%} (+- {sigma:.1%}) {size} than the landmarks, "
+        "each touch about "
+        f"{abs(scale - 1) * reach * 1e3:.1f} mm {side} its landmark: with that size the RMS falls "
+        f"from {before * 1e3:.1f} to "
+        f"{after * 1e3:.1f} mm. Check where the landmarks were touched, the tip's offset and the "
+        "phantom's size."
     )

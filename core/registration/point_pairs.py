@@ -21,7 +21,7 @@ from palpate.registration.faces import box_distance
 from palpate.registration.robot_fit import rigid_fits
 from palpate.registration.uncertainty import NAMES
 
-__all__ = ["PairRegistration", "PairFit", "fit_pairs", "register_pairs"]
+__all__ = ["PairFit", "PairRegistration", "fit_pairs", "register_pairs"]
 
 REPEATED = 1.0e-3
 """Points of two pairs nearer than this [m] are the same point clicked twice."""
@@ -154,7 +154,8 @@ def fit_pairs(cloud: FloatArray, mesh: FloatArray) -> PairFit:
     if misses.max() > DOUBTFUL:
         worst = int(misses.argmax())
         warnings.append(
-            f"Pair {worst + 1} misses by {misses[worst] * 1e3:.1f} mm (under {DOUBTFUL * 1e3:.0f} mm is expected): click it again."
+            f"Pair {worst + 1} misses by {misses[worst] * 1e3:.1f} mm (under {DOUBTFUL * 1e3:.0f} "
+            "mm is expected): click it again."
         )
     return PairFit(pose, residuals, tuple(warnings))
 
@@ -199,7 +200,8 @@ def _refuse_repeated(points: FloatArray, name: str) -> None:
         apart = float(np.linalg.norm(points[i] - points[j]))
         if apart < REPEATED:
             raise RegistrationError(
-                f"pairs {i + 1} and {j + 1} have the same point on the {name} ({apart * 1e3:.2f} mm apart, at least "
+                f"pairs {i + 1} and {j + 1} have the same point on the {name} ({apart * 1e3:.2f} "
+                "mm apart, at least "
                 f"{REPEATED * 1e3:.0f} mm is needed): delete one of them",
                 pairs=f"{i + 1}, {j + 1}",
             )
@@ -210,13 +212,15 @@ def _check_spread(points: FloatArray, name: str) -> list[str]:
     ratio = float(widths[1] / widths[0])
     if ratio < ON_LINE:
         raise RegistrationError(
-            f"the points on the {name} lie on one line (width over length {ratio:.3f}, at least {ON_LINE} is needed), so the "
+            f"the points on the {name} lie on one line (width over length {ratio:.3f}, at least "
+            f"{ON_LINE} is needed), so the "
             "rotation about it is open: click one aside",
             ratio=ratio,
         )
     if ratio < NEARLY_ON_LINE:
         return [
-            f"The points on the {name} lie nearly on one line (width over length {ratio:.2f}): click one further aside."
+            f"The points on the {name} lie nearly on one line (width over length {ratio:.2f}): "
+            "click one further aside."
         ]
     return []
 
@@ -229,7 +233,8 @@ def _refuse_mirrored(cloud: FloatArray, mesh: FloatArray, pose: Transform, rms: 
     if rms > 2.0e-3 and reflected[0] < MIRRORED * rms:
         told, swap = _exchanged(cloud, mesh)
         raise RegistrationError(
-            f"the pairs are mirrored: a reflection leaves {reflected[0] * 1e3:.1f} mm RMS, the best motion {rms * 1e3:.1f} mm: "
+            f"the pairs are mirrored: a reflection leaves {reflected[0] * 1e3:.1f} mm RMS, the "
+            f"best motion {rms * 1e3:.1f} mm: "
             f"left and right are exchanged between cloud and mesh{told}",
             rms=rms,
             pairs=swap,
@@ -237,7 +242,8 @@ def _refuse_mirrored(cloud: FloatArray, mesh: FloatArray, pose: Transform, rms: 
     if pose.translation[2] < 0.0:
         told, swap = _exchanged(cloud, mesh)
         raise RegistrationError(
-            f"the pairs are mirrored: they put the camera {-pose.translation[2] * 1e3:.0f} mm under the table: the points go round "
+            f"the pairs are mirrored: they put the camera {-pose.translation[2] * 1e3:.0f} mm "
+            "under the table: the points go round "
             f"the other way on cloud and mesh{told}",
             height=float(pose.translation[2]),
             pairs=swap,

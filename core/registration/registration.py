@@ -112,7 +112,8 @@ def register(dataset: Dataset, report: Report = silent) -> Registration:
         config = dataset.config
         if isinstance(dataset.geometry, Shape):
             raise RegistrationError(
-                f"{config.surface}: clouds are registered to a block only, not to other shapes yet; leave the clouds of this "
+                f"{config.surface}: clouds are registered to a block only, not to other shapes "
+                "yet; leave the clouds of this "
                 "dataset out, so that its forces are compared"
             )
         if dataset.accepted is not None:
@@ -199,7 +200,8 @@ def _touch_warnings(robot: RobotFit, proposal: TouchProposal | None) -> tuple[st
     if robot.rms > DOUBTFUL_TOUCHES:
         worst = np.linalg.norm(robot.residuals, axis=1)
         warnings += (
-            f"The touches miss their landmarks by {robot.rms * 1e3:.1f} mm RMS (at most {worst.max() * 1e3:.1f} mm, "
+            f"The touches miss their landmarks by {robot.rms * 1e3:.1f} mm RMS (at most "
+            f"{worst.max() * 1e3:.1f} mm, "
             f"row {worst.argmax() + 1}; under {DOUBTFUL_TOUCHES * 1e3:.0f} mm is expected): "
             "what is found from this registration is doubtful.",
         )
@@ -213,7 +215,8 @@ def _doubt_tool(dataset: Dataset, camera: CameraFit, misfit: float) -> CameraFit
         return camera
     doubt = (
         f"The camera sees the tool {misfit * 1e3:.0f} mm from where the kinematics put its centre, "
-        f"at most {expected * 1e3:.0f} mm is expected: check touches.csv, [camera] to_phantom and that both clocks agree."
+        f"at most {expected * 1e3:.0f} mm is expected: check touches.csv, [camera] to_phantom and "
+        "that both clocks agree."
     )
     return replace(camera, warnings=(*camera.warnings, doubt))
 
@@ -231,8 +234,10 @@ def _settle_heading(
     if not camera.automatic:
         if decided and turned < as_is:
             doubt = (
-                f"The camera sees the tool {as_is * 1e3:.0f} mm from where the kinematics put it, and {turned * 1e3:.0f} mm "
-                "with the block half a turn about z: the landmarks in touches.csv or [camera] to_phantom are half a turn off."
+                f"The camera sees the tool {as_is * 1e3:.0f} mm from where the kinematics put it, "
+                f"and {turned * 1e3:.0f} mm "
+                "with the block half a turn about z: the landmarks in touches.csv or [camera] "
+                "to_phantom are half a turn off."
             )
             return replace(camera, warnings=(*camera.warnings, doubt))
         return _doubt_tool(dataset, camera, as_is)

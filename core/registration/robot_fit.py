@@ -94,7 +94,8 @@ def fit_robot(touches: FloatArray, landmarks: FloatArray) -> RobotFit:
         widths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         if widths[1] < 1e-3 or widths[1] < 0.02 * widths[0]:
             raise RegistrationError(
-                f"the {name} lie on one line (within {widths[1] * 1e3:.2f} mm), so the rotation about it is open: touch one aside"
+                f"the {name} lie on one line (within {widths[1] * 1e3:.2f} mm), so the rotation "
+                "about it is open: touch one aside"
             )
     rotation, translation, rms = rigid_fits(touches, landmarks[None])
     fit = Transform(rotation[0], translation[0])

@@ -73,7 +73,8 @@ def find_table(cloud: FloatArray, thickness: float) -> Table:
     planes = find_planes(cloud, thickness)
     if not planes:
         raise RegistrationError(
-            f"no plane holds {LEAST_SHARE:.0%} of the {len(cloud)} points of the rest cloud, a table was expected: "
+            f"no plane holds {LEAST_SHARE:.0%} of the {len(cloud)} points of the rest cloud, a "
+            "table was expected: "
             "record it with the table in view, or give [camera] to_phantom as a first guess"
         )
     return min(

@@ -14,7 +14,8 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.phantom_drift import align_sequences
-from palpate.measurement.segmentation import cleaner_for, find_shaft_axis, tool_poses
+from palpate.measurement.segmentation import cleaner_for
+from palpate.measurement.tool_pose import find_shaft_axis, tool_poses
 from palpate.registration.registration import register, setup_from
 from palpate.setup.box import CLEARANCE, distance_to_block
 from palpate.setup.setup import Setup

@@ -19,7 +19,8 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.foundation.processes import at_once
 from palpate.foundation.progress import Report, silent
-from palpate.measurement.segmentation import Cleaner, cleaner_for, find_shaft_axis, tool_poses
+from palpate.measurement.segmentation import Cleaner, cleaner_for
+from palpate.measurement.tool_pose import find_shaft_axis, tool_poses
 from palpate.registration.registration import Registration
 from palpate.setup.box import CLEARANCE, distance_to_block
 from palpate.setup.setup import Setup

@@ -136,9 +136,11 @@ def test_stopped_suite_keeps_what_is_done_and_leaves_no_process_behind(tmp_path:
 
 def test_suite_that_is_killed_leaves_no_process_behind(tmp_path: Path) -> None:
     suite = (
-        "from pathlib import Path; import sys, blind_processes; from palpate.blind import Case, run_suite\n"
+        "from pathlib import Path; import sys, blind_processes; from palpate.blind import Case, "
+        "run_suite\n"
         "if __name__ == '__main__':\n"
-        "    run_suite(Path(sys.argv[1]), [Case('waits', 1, 'control')], 1, run=blind_processes.finish_or_wait)\n"
+        "    run_suite(Path(sys.argv[1]), [Case('waits', 1, 'control')], 1, "
+        "run=blind_processes.finish_or_wait)\n"
     )
     (tmp_path / "suite.py").write_text(suite)
     searched = os.pathsep.join(str(path) for path in (TESTS, TESTS.parent))

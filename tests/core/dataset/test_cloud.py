@@ -26,7 +26,10 @@ def write(folder: Path, header: str, body: bytes, newline: str = "\n") -> None:
 def test_binary_clouds_of_either_byte_order_and_precision(
     order: str, sign: str, kind: str, code: str, tmp_path: Path
 ) -> None:
-    header = f"format binary_{order}_endian 1.0|element vertex 57|property {kind} x|property {kind} y|property {kind} z"
+    header = (
+        f"format binary_{order}_endian 1.0|element vertex 57|property {kind} x|property "
+        f"{kind} y|property {kind} z"
+    )
     write(tmp_path, header, POINTS.astype(sign + code).tobytes())
     found = read_cloud(tmp_path, "cloud.ply")
     assert found.dtype == np.float64
@@ -38,7 +41,10 @@ def test_coordinates_are_found_by_name_among_other_properties(tmp_path: Path) ->
     records = np.zeros(57, layout)
     for axis, name in enumerate("xyz"):
         records[name] = POINTS[:, axis]
-    kinds = "property uchar red|property float z|property double x|property ushort quality|property float y"
+    kinds = (
+        "property uchar red|property float z|property double x|property ushort "
+        "quality|property float y"
+    )
     write(
         tmp_path,
         f"format binary_little_endian 1.0|comment by a camera|element vertex 57|{kinds}",
@@ -49,7 +55,10 @@ def test_coordinates_are_found_by_name_among_other_properties(tmp_path: Path) ->
 
 def test_ascii_with_other_properties_and_other_line_ends(tmp_path: Path) -> None:
     body = "".join(f"{x:.9f} {y:.9f} {z:.9f} 200\r\n" for x, y, z in POINTS).encode()
-    header = "format ascii 1.0|element vertex 57|property float x|property float y|property float z|property uchar red"
+    header = (
+        "format ascii 1.0|element vertex 57|property float x|property float y|property float "
+        "z|property uchar red"
+    )
     write(tmp_path, header, body, newline="\r\n")
     np.testing.assert_allclose(read_cloud(tmp_path, "cloud.ply"), POINTS, atol=1e-8)
 
@@ -60,7 +69,8 @@ def test_elements_before_and_after_the_points_are_stepped_over(tmp_path: Path) -
         b"\x03" + np.arange(3, dtype="<i4").tobytes(),
     )
     header = (
-        "format binary_little_endian 1.0|element camera 2|property float a|property float b|element vertex 57|property float x"
+        "format binary_little_endian 1.0|element camera 2|property float a|property float "
+        "b|element vertex 57|property float x"
         "|property float y|property float z|element face 1|property list uchar int vertex_indices"
     )
     write(tmp_path, header, camera + POINTS.astype("<f4").tobytes() + faces)
@@ -102,7 +112,8 @@ def test_the_header_tells_the_count_without_the_points(tmp_path: Path) -> None:
         ("format ascii 1.0|element vertex 1|property float x|property float x", "comes twice"),
         ("format binary_little_endian 1.0|property float x", "'property float x'"),
         (
-            "format binary_little_endian 1.0|element face 1|property list uchar int i|element vertex 1|property float x",
+            "format binary_little_endian 1.0|element face 1|property list uchar int i|element "
+            "vertex 1|property float x",
             "vertex first",
         ),
     ],

@@ -79,7 +79,10 @@ def test_force_only_mesh_is_registered_checked_and_set_up(tmp_path: Path) -> Non
 
 def test_rest_cloud_without_other_clouds_is_no_reason_to_register_a_camera(tmp_path: Path) -> None:
     root = _dataset(tmp_path, *box_surface(SIZE))
-    header = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0.4\n"
+    header = (
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+        "y\nproperty float z\nend_header\n0 0 0.4\n"
+    )
     (root / "rest.ply").write_text(header)
     assert register(open_dataset(root)).camera is None
 

@@ -7,15 +7,8 @@ import numpy as np
 import pytest
 
 from palpate.dataset import open_dataset
-from palpate.measurement.segmentation import (
-    CleanCloud,
-    Cleaner,
-    ToolPose,
-    cleaner_for,
-    find_shaft_axis,
-    locate_tool,
-    tool_poses,
-)
+from palpate.measurement.segmentation import CleanCloud, Cleaner, cleaner_for
+from palpate.measurement.tool_pose import ToolPose, find_shaft_axis, locate_tool, tool_poses
 from palpate.registration.faces import box_distance
 from palpate.registration.registration import register, small_motion
 
