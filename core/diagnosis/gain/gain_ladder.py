@@ -1,13 +1,14 @@
-"""The gain: what naming the cause is worth on sequences that nothing was fitted on.
+"""The gain of the extended model on held-out sequences with clouds.
 
-What counts as an error, and what as the camera's fixed pattern, stands in
-`palpate.diagnosis.gain.probe_errors`.
+`palpate.diagnosis.gain.probe_errors` says what counts as an error and what as the camera's fixed
+pattern.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -26,16 +27,17 @@ class SurfaceGain:
     reducible error that is removed.
 
     Attributes:
-        baseline, extended: of the stated and the extended model.
-        noise_floor: what the scatter of single points leaves.
-        removed: (value, low, high) of (baseline - extended) / (baseline - noise floor); 95 %
-            interval from resampled probes.
+        baseline: RMS of the stated model [m].
+        extended: RMS of the extended model [m].
+        noise_floor: RMS that the scatter of single points leaves [m].
+        removed: (value, low, high) of (baseline - extended) / (baseline - noise floor) [1]; 95 %
+            interval from resampled pushes.
         paper: the paper's metric (baseline, extended) [m].
-        probes: how many pushes of the tool were resampled.
+        probes: number of pushes that were resampled.
         force: RMS of measured minus simulated force (baseline, extended, noise floor) [N]; None
-            where none was measured.
-        tuned: as `removed`, of the stated model with what is known only to its accuracy as fitted,
-            and no cause; None if not asked.
+            without measured forces.
+        tuned: as `removed`, for the stated model with fitted nuisances and no cause; None if it was
+            not requested.
     """
 
     baseline: float
@@ -47,6 +49,35 @@ class SurfaceGain:
     force: tuple[float, float, float] | None = None
     tuned: tuple[float, float, float] | None = None
 
+    def to_json(self, split: str) -> dict[str, Any]:
+        """Plain values in millimetres and newtons, as in the report."""
+        found: dict[str, Any] = {
+            "split": split,
+            "unit": "mm",
+            "baseline": round(self.baseline * 1e3, 4),
+            "extended": round(self.extended * 1e3, 4),
+            "noise_floor": round(self.noise_floor * 1e3, 4),
+            "reducible_removed": _interval(self.removed),
+            "paper_metric": {
+                "baseline": round(self.paper[0] * 1e3, 4),
+                "extended": round(self.paper[1] * 1e3, 4),
+            },
+            "probes": self.probes,
+        }
+        if self.tuned is not None:
+            found["tuned"] = _interval(self.tuned)
+        if self.force is not None:
+            names = ("baseline", "extended", "noise_floor")
+            found["force"] = {"unit": "N"} | {
+                name: round(value, 5) for name, value in zip(names, self.force, strict=True)
+            }
+        return found
+
+
+def _interval(shares: tuple[float, float, float]) -> dict[str, float]:
+    value, low, high = (round(part, 4) for part in shares)
+    return {"value": value, "low": low, "high": high}
+
 
 def surface_gain(
     data: Sequence[Observations],
@@ -56,10 +87,18 @@ def surface_gain(
     found: Setup,
     seed: int,
 ) -> SurfaceGain:
-    """Compare two models on test sequences; probes are resampled whole.
+    """Compare two models on held-out sequences; the bootstrap resamples whole pushes.
 
-    Groups in touch count, and where a push leaves something (a dent, a block that slid) also those
-    after it.
+    Groups in contact count. Where a push leaves a mark (a dent, a block that slid), those after it
+    count, too.
+
+    Args:
+        data: the sequences.
+        baseline: their predictions by the stated model.
+        extended: their predictions by the extended model.
+        stated: the stated setup.
+        found: the extended setup.
+        seed: of the bootstrap.
     """
     sums = probe_sums(data, (baseline, extended), found.pushes_leave_traces)
     drawn, whole = sums.rms(sums.draws(seed)), sums.rms()[0]
@@ -76,7 +115,7 @@ def surface_gain(
 
 
 def _paper(data: Sequence[Observations], predictions: Sequence[Prediction], setup: Setup) -> float:
-    """The paper's metric [m], mean over touched groups."""
+    """Mean of the paper's metric over touched groups [m]."""
     found = list(paper_sums(data, predictions, setup).values())
     return (
         sum(total for total, _ in found) / sum(count for _, count in found)
@@ -88,8 +127,8 @@ def _paper(data: Sequence[Observations], predictions: Sequence[Prediction], setu
 def _force(
     baseline: Sequence[Prediction], extended: Sequence[Prediction]
 ) -> tuple[float, float, float] | None:
-    """RMS force error (baseline, extended, noise floor) [N] in groups in which the tool of either
-    model presses.
+    """RMS force error (baseline, extended, noise floor) [N] in groups in which either model is in
+    contact.
     """
     before, after = [], []
     for one, other in zip(baseline, extended, strict=True):

@@ -1,5 +1,5 @@
-"""From findings to the report: verdict, causes with intervals, ranking, what this data cannot tell,
-and what is left.
+"""The report of a diagnosis: verdict, causes with intervals, ranking of effects, what the data
+cannot determine, and the error that is left.
 """
 
 from __future__ import annotations
@@ -23,12 +23,11 @@ from palpate.effects.geometry import MeshResolution
 
 __all__ = ["report_of", "verdict_of"]
 
-
 _NOT_FITTED = ", on which nothing was fitted"
 
 
 def verdict_of(findings: Findings) -> str:
-    """One of found, none, ambiguous, unexplained."""
+    """Return the verdict: found, none, ambiguous or unexplained."""
     if findings.best is None:
         return (
             "unexplained"
@@ -41,7 +40,7 @@ def verdict_of(findings: Findings) -> str:
 
 
 def _probabilities(findings: Findings) -> dict[tuple[str, ...], float]:
-    """Of the sets of causes that were tried, each by the fit that gains most, and of none."""
+    """Probability of each set of causes that was tried, by its best fit, and of no cause."""
     surplus: dict[tuple[str, ...], float] = {}
     for trial in findings.trials:
         surplus[trial.model.names] = max(
@@ -51,17 +50,18 @@ def _probabilities(findings: Findings) -> dict[tuple[str, ...], float]:
 
 
 def _removed(findings: Findings, misfit: float) -> float:
-    """Share of the misfit above noise that a model removes on the sequences it was fitted on."""
+    """Share of the misfit above noise that a model removes on the fitted sequences [1]."""
     return float(np.clip((findings.misfit - misfit) / max(findings.misfit - 1.0, 1e-9), 0.0, 1.0))
 
 
 def _causes(bench: Bench, findings: Findings, trials: list[Trial]) -> list[dict[str, Any]]:
+    """Named causes with probability and parameters; a cause that rival sets share comes once."""
     chances = _probabilities(findings)
     found: list[dict[str, Any]] = []
     for trial in trials:
         for effect, entry in zip(trial.model.effects, intervals(bench, trial.model), strict=True):
             if any(row["effect"] == effect.name for row in found):
-                continue  # rival pairs share a cause
+                continue
             chance = sum(p for names, p in chances.items() if effect.name in names)
             found.append(
                 {"effect": effect.name, "probability": round(chance, 4), "parameters": entry}
@@ -70,6 +70,7 @@ def _causes(bench: Bench, findings: Findings, trials: list[Trial]) -> list[dict[
 
 
 def _ranking(bench: Bench, findings: Findings, named: set[str]) -> list[dict[str, Any]]:
+    """Effects that are not named, by the gain as the only cause: fitted, or else linear."""
     chances = _probabilities(findings)
     rows = []
     for kind in bench.weighed:
@@ -92,16 +93,15 @@ def _ranking(bench: Bench, findings: Findings, named: set[str]) -> list[dict[str
 
 
 def _model(trial: Trial) -> dict[str, Any]:
-    """A set of causes that was fitted, and which data speak for it."""
+    """A set of causes that was fitted, with its gain split by block of data."""
     blocks = [*(block.name for block in trial.model.blocks), "stated accuracies"]
     parts = [
         {"of": name, "gain_nats": round(part, 2)}
         for name, part in zip(blocks, trial.parts, strict=bool(trial.parts))
     ]
     effects = [effect.to_json() for effect in trial.model.effects]
-    asked = (
-        round(trial.asked, 2) if np.isfinite(trial.asked) else None
-    )  # refused, although it gains what was asked
+    # A set that is refused although its gain is large enough has an infinite required gain.
+    asked = round(trial.asked, 2) if np.isfinite(trial.asked) else None
     gain, misfit = round(trial.gain, 2), round(trial.misfit, 4)
     return {
         "effects": effects,
@@ -113,8 +113,7 @@ def _model(trial: Trial) -> dict[str, Any]:
 
 
 def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
-    """How much of the structured error is left, over what chance gives, and where and when it
-    sits."""
+    """Structured error that is left: its share over chance, the place and the sequence."""
     model = findings.best.model if findings.best else findings.baseline
     before, left, note = findings.structure, findings.left, ""
     if findings.missed and findings.beyond is not None:
@@ -161,7 +160,7 @@ def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
 
 
 def _all_clear(findings: Findings) -> dict[str, Any]:
-    """What an all-clear was checked against; nothing where none was given."""
+    """Results of the checks behind a verdict of none; empty for other verdicts."""
     found: dict[str, Any] = {}
     if findings.beyond is not None:
         beyond = findings.beyond.structure
@@ -179,94 +178,84 @@ def report_of(
     gain: SurfaceGain | ForceGain | None,
     split: str,
 ) -> dict[str, Any]:
-    """The report contract."""
+    """Build the report as it is written to report.json.
+
+    Args:
+        dataset: that was diagnosed.
+        bench: the fitted sequences.
+        findings: of the search.
+        gain: on held-out sequences; None without them.
+        split: their split.
+    """
     verdict = verdict_of(findings)
     best = [findings.best] if findings.best else []
     trials = [*best, *findings.rivals()] if verdict == "ambiguous" else best
     causes = _causes(bench, findings, trials)
     named = {cause["effect"] for cause in causes}
     known, unknown = _modulus(bench, findings, named)
-    coarse = (
-        ""
-        if bench.on_own_grid
-        else too_coarse(findings.screened.get(MeshResolution.name, 0.0), findings.bound)
-    )
-    told = (
-        findings.withdrawn,
-        coarse,
-        findings.ripple.warning,
-        findings.unusual.warning if findings.unusual else "",
-    )
-    report: dict[str, Any] = {
+    return {
         "format": 1,
         "dataset": dataset.name,
         "verdict": verdict,
         "causes": causes,
         "interval_level": CRITERIA.intervals.level,
+        "criteria": CRITERIA.to_json(),
         "ranking": _ranking(bench, findings, named),
         "models": [_model(trial) for trial in findings.trials],
         "identified": known,
         "not_identifiable": unknown,
         "unexplained": _unexplained(bench, findings),
-        "gain": None,
+        "gain": None if gain is None else gain.to_json(split),
         "ambiguity_map": [one.to_json() for one in findings.told],
-        "evidence": {
-            "gain_nats": round(findings.best.gain, 2) if findings.best else 0.0,
-            "bound_nats": round(findings.bound, 2),
-            "baseline_misfit": round(findings.misfit, 4),
-            "structure": round(findings.structure.ratio, 4),
-            "structure_bound": round(findings.structure.bound / findings.structure.expected, 4),
-            "evaluations": bench.evaluations,
-            "fitted_on": list(bench.names),
-            **_all_clear(findings),
-        },
-        "warnings": [*bench.registration.warnings, *(text for text in told if text)],
+        "evidence": _evidence(bench, findings),
+        "warnings": _warnings(bench, findings),
     }
-    if isinstance(gain, ForceGain):
-        report["gain"] = gain.to_json(split)
-    elif gain is not None:
-        value, low, high = gain.removed
-        report["gain"] = {
-            "split": split,
-            "unit": "mm",
-            "baseline": round(gain.baseline * 1e3, 4),
-            "extended": round(gain.extended * 1e3, 4),
-            "noise_floor": round(gain.noise_floor * 1e3, 4),
-            "reducible_removed": {
-                "value": round(value, 4),
-                "low": round(low, 4),
-                "high": round(high, 4),
-            },
-            "paper_metric": {
-                "baseline": round(gain.paper[0] * 1e3, 4),
-                "extended": round(gain.paper[1] * 1e3, 4),
-            },
-            "probes": gain.probes,
-        }
-        if gain.tuned is not None:
-            report["gain"]["tuned"] = dict(
-                zip(("value", "low", "high"), (round(part, 4) for part in gain.tuned), strict=True)
-            )
-        if gain.force is not None:
-            names = ("baseline", "extended", "noise_floor")
-            report["gain"]["force"] = {"unit": "N"} | {
-                n: round(v, 5) for n, v in zip(names, gain.force, strict=True)
-            }
-    return report
+
+
+def _evidence(bench: Bench, findings: Findings) -> dict[str, Any]:
+    """Figures behind the verdict."""
+    structure = findings.structure
+    return {
+        "gain_nats": round(findings.best.gain, 2) if findings.best else 0.0,
+        "bound_nats": round(findings.bound, 2),
+        "baseline_misfit": round(findings.misfit, 4),
+        "structure": round(structure.ratio, 4),
+        "structure_bound": round(structure.bound / structure.expected, 4),
+        "evaluations": bench.evaluations,
+        "fitted_on": list(bench.names),
+        **_all_clear(findings),
+    }
+
+
+def _warnings(bench: Bench, findings: Findings) -> list[str]:
+    """Sentences for people, those of the registration first."""
+    coarse = (
+        ""
+        if bench.on_own_grid
+        else too_coarse(findings.screened.get(MeshResolution.name, 0.0), findings.bound)
+    )
+    texts = (
+        findings.withdrawn,
+        coarse,
+        findings.ripple.warning,
+        findings.unusual.warning if findings.unusual else "",
+    )
+    return [*bench.registration.warnings, *(text for text in texts if text)]
 
 
 def _modulus(
     bench: Bench, findings: Findings, named: set[str]
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """What the data tell of Young's modulus where it is no cause: its entry of `identified`, or
-    that of `not_identifiable`.
-    """
+    """Young's modulus where it is no cause: its entry of `identified`, or of `not_identifiable`."""
     if YoungModulus.name in named:
         return [], []
     model = findings.best.model if findings.best else findings.baseline
     interval = modulus_interval(bench, model)
     if interval is None:
-        why = "the tool is driven by position and no force was measured: a block of any stiffness takes the same shape"
+        why = (
+            "the tool is driven by position and no force was measured: "
+            "a block of any stiffness takes the same shape"
+        )
         return [], [
             _unknown(
                 why, "the force on the tool (forces.csv), or a drop of known weight on the block"
@@ -274,10 +263,16 @@ def _modulus(
         ]
     value, low, high = interval
     if high > CRITERIA.verdict.most_modulus_ratio * value:
-        why = f"the measured forces leave anything between {low:.3g} and {high:.3g} Pa open: they hardly stand out of their noise"
+        why = (
+            f"the measured forces leave anything between {low:.3g} and {high:.3g} Pa open: "
+            "they hardly stand out of their noise"
+        )
         return [], [_unknown(why, "deeper pushes, or with a sensor of less noise")]
     stated = bench.setup.material.young_modulus
-    why = f"the measured forces fix it within {100 * (high / value - 1):.0f} %; {stated:.4g} Pa were stated"
+    why = (
+        f"the measured forces fix it within {100 * (high / value - 1):.0f} %; "
+        f"{stated:.4g} Pa were stated"
+    )
     parameters = {"E": {"value": value, "unit": "Pa", "low": low, "high": high}}
     return [
         {"effect": YoungModulus.name, "why": why, "stated": stated, "parameters": parameters}
@@ -285,4 +280,5 @@ def _modulus(
 
 
 def _unknown(why: str, instead: str) -> dict[str, str]:
+    """Entry of `not_identifiable` for Young's modulus."""
     return {"effect": YoungModulus.name, "why": why, "measure_instead": instead}
