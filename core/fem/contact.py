@@ -1,10 +1,11 @@
-"""A rigid, frictionless sphere against the free surface, and the table under a detached base.
+"""Contact of a rigid, frictionless sphere with the free surface, and of a detached base with the
+table.
 
-Both are penalties at the surface's quadrature points, not at nodes: a ball pushed deep would slip
-between nodes. Stiffness is given over E, so that the shape does not depend on the modulus. A point
-is only pushed when its outward normal faces the sphere's centre; without that test the far side of
-the block can come to rest inside the ball. The test may be made at every evaluation, or once
-before: then the energy does not jump where a point turns away while an equilibrium is sought.
+Both are penalties at the surface's quadrature points instead of nodes: a ball pushed deep would
+slip between nodes. The stiffness is over E, so that the shape does not depend on the modulus. A
+point is pushed only if its outward normal faces the sphere's centre; otherwise the far side of the
+body could come to rest inside the ball. The test is made at every evaluation, or once before a
+solve: then the energy does not jump where a point turns away during the solve.
 """
 
 from __future__ import annotations
@@ -29,8 +30,9 @@ def _gap(
     facing: bool,
     direction: Any,
 ) -> float:
-    """Signed gap of a surface point [m], negative inside the obstacle; `direction` gets the unit
-    vector that opens the gap.
+    """Signed gap of a surface point [m], negative inside the obstacle.
+
+    `direction` receives the unit vector that opens the gap.
     """
     x, s, t = np.zeros(3), np.zeros(3), np.zeros(3)
     for a in range(face.shape[0]):
@@ -58,7 +60,7 @@ def _gap(
 
 @njit(cache=True)
 def _in_reach(positions: Any, face: Any, centre: Any, radius: float, flat: bool) -> bool:
-    """Cheap test that spares most faces the quadrature."""
+    """Whether a face may touch; a cheap test that excludes most faces from the quadrature."""
     if flat:
         return True
     nearest, size = np.inf, 0.0
@@ -84,11 +86,19 @@ def contact_energy(
     facing: bool,
     stiffness: float,
 ) -> float:
-    """Penalty energy over E [m^3]: stiffness/2 gap^2 over the touched area; stiffness over E [1/m].
-    `flat` is the plane z = 0.
+    """Penalty energy over E [m^3]: stiffness/2 gap^2 over the touched area.
 
-    With `facing` only points that face the sphere's centre are pushed, otherwise all that have an
-    area.
+    Args:
+        faces: (f, b) nodes.
+        areas: (f, p) weights of the points [m^2].
+        shapes: (p, b) shape functions.
+        gradients: (p, b, 2) of them.
+        positions: (n, 3) [m].
+        centre: of the sphere (3,) [m].
+        radius: of the sphere [m].
+        flat: the obstacle is the plane z = 0 instead of the sphere.
+        facing: push only points that face the sphere's centre; otherwise all with an area.
+        stiffness: over E [1/m].
     """
     direction, total = np.empty(3), 0.0
     for f in range(faces.shape[0]):
@@ -131,12 +141,15 @@ def assemble_contact(
     data: Any,
     resultant: Any,
 ) -> float:
-    """Add the penalty's gradient over E to `force` (n, 3) [m^2], its tangent to `data` [m], the
-    push on the body to `resultant`.
+    """Add the penalty's gradient, tangent and resultant; returns the deepest penetration [m].
 
-    `facing` as in `contact_energy`, `slots` (f, 3 b, 3 b) as in `assemble_elastic`; an empty `data`
-    leaves the tangent out, `bending` False the part from the sphere's curvature, which is not
-    positive. Returns the deepest penetration [m].
+    Args as in `contact_energy`, and:
+        bending: False leaves out the tangent's part from the sphere's curvature, which is not
+            positive.
+        slots: (f, 3 b, 3 b) as in `assemble_elastic`.
+        force: (n, 3) the gradient over E is added here [m^2].
+        data: the tangent is added here [m]; empty leaves it out.
+        resultant: (3,) the push on the body is added here [m^2].
     """
     direction, deepest = np.empty(3), 0.0
     for f in range(faces.shape[0]):

@@ -1,13 +1,13 @@
-"""The body linearised once, its contact solved exactly: many steps from one factor.
+"""Static condensation of a linearised body on the nodes near the tool, with exact contact.
 
-Pushing a ball into a soft block changes the elastic tangent slowly, but which points touch changes
-with every step. So the body's answer M^-1 to forces on the surface near the tool is computed once
-(a static condensation on those nodes), and each step solves
+Pushing a ball into a soft block changes the elastic tangent slowly, but the set of touching points
+changes with every step. So the body's response M^-1 to forces on the surface near the tool is
+computed once (static condensation on those nodes), and each step solves
 
     r(u) + M e - K e + f(u + e) - f(u) = 0
 
 for the change e, with r the residual, f the true contact force and K the contact's share of M: a
-small dense system by Newton's method. What is left is the change of the elastic tangent, by which
+small dense system, solved by Newton's method. The error left is the change of the elastic tangent;
 the residual shrinks from step to step.
 """
 
@@ -27,15 +27,15 @@ from palpate.foundation.arrays import FloatArray, IntArray
 __all__ = ["CondensedContact"]
 
 _MARGIN, _EDGES = 5e-4, 0.3
-"""Surface nodes this far from the ball [m], or this share of their side's length, may come to touch
-it in the steps to come. Where one further off does, the residual says so, and the next
-linearisation has it."""
+"""Surface nodes within this distance of the ball [m], or this share of their side's length, are
+condensed: they may come into contact in the next steps. A node further off that does so shows in
+the residual, and is included by the next linearisation."""
 _INNER_STEPS = 25
 _INNER_TOLERANCE = 1e-8
 
 
 class CondensedContact:
-    """The answer of a body to forces near the tool, linearised at one state; `at` makes one."""
+    """The body's response to forces near the tool, linearised at one state; made by `at`."""
 
     def __init__(
         self,
@@ -52,12 +52,12 @@ class CondensedContact:
         self._local = np.ascontiguousarray(where[model.topology.surface[faces]])
         self._slots = _dense_slots(self._local, len(nodes))
         self._share = self._contact(model, positions[nodes], tool, bending=False)[1]
-        self._held = np.linalg.inv(model.topology.factor.inverse_entries(self._unknown))
-        self._stiffness = self._held - self._share
+        self._condensed = np.linalg.inv(model.topology.factor.inverse_entries(self._unknown))
+        self._stiffness = self._condensed - self._share
         self._topology, self._generation = model.topology, model.topology.factor.generation
 
     def fits(self, model: BlockModel) -> bool:
-        """Whether the factor this rests on is still there, and of a grid with the same elements."""
+        """Whether the factor is still stored, and belongs to a grid with the same elements."""
         return (
             model.topology is self._topology
             and model.topology.factor.generation == self._generation
@@ -65,8 +65,9 @@ class CondensedContact:
 
     @classmethod
     def at(cls, model: BlockModel, positions: FloatArray, tool: ToolSphere) -> Self | None:
-        """Linearise at these positions (n, 3) [m]; None when nothing is near the tool or the
-        tangent has no factor.
+        """Linearise at these positions (n, 3) [m].
+
+        Returns None if nothing is near the tool or the tangent has no factor.
         """
         top = model.topology
         distance = np.linalg.norm(positions[top.surface] - tool.centre, axis=2)
@@ -91,8 +92,8 @@ class CondensedContact:
     def _contact(
         self, model: BlockModel, positions: FloatArray, tool: ToolSphere, *, bending: bool = True
     ) -> tuple[FloatArray, FloatArray]:
-        """Contact force (m,) and its tangent (m, m) on the nodes near the tool, at these positions
-        of theirs.
+        """Contact force (m,) and its tangent (m, m) on the nodes near the tool, at these
+        positions.
         """
         force, data = np.zeros_like(positions), np.zeros(positions.size**2)
         assemble_contact(
@@ -113,8 +114,8 @@ class CondensedContact:
             np.zeros(3),
         )
         if model.friction_potential is not None:
-            grip = model.friction_potential.of(self._faces)
-            grip.assemble(
+            friction = model.friction_potential.of(self._faces)
+            friction.assemble(
                 self._local,
                 model.face,
                 positions,
@@ -129,25 +130,26 @@ class CondensedContact:
     def step(
         self, model: BlockModel, positions: FloatArray, residual: FloatArray, tool: ToolSphere
     ) -> FloatArray | None:
-        """Positions after one step; None when the contact finds no balance."""
+        """Positions after one step; None if the contact finds no balance."""
         free = model.topology.factor.approximate(residual)
         here = positions[self._nodes]
-        touched, _ = self._contact(model, here, tool)
-        change = self._balance(model, here, tool, self._held @ free[self._unknown] - touched)
+        contact, _ = self._contact(model, here, tool)
+        change = self._balance(model, here, tool, self._condensed @ free[self._unknown] - contact)
         if change is None:
             return None
         force, _ = self._contact(model, here + change.reshape(-1, 3), tool)
         moved = positions.copy()
         further = np.zeros_like(residual)
-        further[self._unknown] = force - touched - self._share @ change
+        further[self._unknown] = force - contact - self._share @ change
         moved[model.topology.free] -= free + model.topology.factor.approximate(further)
         return moved
 
     def _balance(
         self, model: BlockModel, here: FloatArray, tool: ToolSphere, load: FloatArray
     ) -> FloatArray | None:
-        """The change (m,) that minimises the condensed body's energy and the contact's, by Newton's
-        method with a line search.
+        """The change (m,) that minimises the energy of condensed body and contact.
+
+        Newton's method with a line search; None if it does not converge.
         """
         change = np.zeros(len(load))
         energy = self._energy(model, here, tool, load, change)
@@ -172,8 +174,9 @@ class CondensedContact:
         load: FloatArray,
         change: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
-        """Gradient of the condensed energy (m,) and Newton's step; without the contact's bending
-        where that is not positive.
+        """Gradient of the condensed energy (m,) and Newton's step (m,).
+
+        The contact's curvature is left out if the tangent with it is not positive.
         """
         force, tangent = self._contact(model, here + change.reshape(-1, 3), tool)
         slope = self._stiffness @ change + load + force
@@ -193,7 +196,7 @@ class CondensedContact:
         change: FloatArray,
     ) -> float:
         """Energy over E [m^3] of the condensed body and the contact."""
-        touched = contact_energy(
+        contact = contact_energy(
             self._local,
             model.areas[self._faces],
             model.face.shapes,
@@ -206,15 +209,16 @@ class CondensedContact:
             CONTACT_STIFFNESS,
         )
         if model.friction_potential is not None:
-            touched += model.friction_potential.of(self._faces).energy(
+            contact += model.friction_potential.of(self._faces).energy(
                 self._local, model.face, here + change.reshape(-1, 3), tool.centre
             )
-        return float(0.5 * change @ self._stiffness @ change + load @ change + touched)
+        return float(0.5 * change @ self._stiffness @ change + load @ change + contact)
 
 
 def _dense_slots(local: IntArray, count: int) -> IntArray:
-    """Where the entries of each face's matrix belong in a dense one of all nodes, (f, 3 b, 3 b); -1
-    for nodes that are none.
+    """Positions of the entries of each face's matrix in a dense matrix of all nodes (f, 3 b, 3 b).
+
+    They are -1 for nodes outside.
     """
     numbers = (3 * local[:, :, None] + np.arange(3)).reshape(len(local), -1)
     return np.ascontiguousarray(numbers[:, :, None] * 3 * count + numbers[:, None, :]).astype(

@@ -1,4 +1,6 @@
-"""From one place of the tool to the next, in steps short enough for Newton's method."""
+"""Load continuation: from one tool position to the next in steps short enough for Newton's
+method.
+"""
 
 from __future__ import annotations
 
@@ -17,17 +19,18 @@ from palpate.setup.setup import Box, Shape
 __all__ = ["FREE_STEP", "HARDENING_PENETRATION", "STAGE_TOLERANCE", "first_touch", "move_tool"]
 
 FREE_STEP = 1.5e-3
-"""Longest motion in contact [m] that is tried at once."""
+"""Longest motion in contact that is tried in one step [m]."""
 STAGE_TOLERANCE = 0.2
-"""Residual at which a place on the way counts as reached: the next stage only begins from it."""
+"""Relative residual at which an intermediate position counts as reached; only the next stage starts
+from it."""
 
 HARDENING_PENETRATION = 2e-4
-"""Penetration [m] from which on the contact is hardened, by _HARDER at a time, to _HARDEST times
-what it is at first."""
+"""Penetration [m] above which the contact is hardened, by _HARDER at a time, to at most _HARDEST
+times its initial stiffness."""
 _HARDER, _HARDEST = 4.0, 64.0
 _HALVINGS = 40
-"""Of the way to the first touch, down to rounding: a rough one jumps as the tool's place or radius
-changes."""
+"""Bisections of the path to first contact, down to rounding: a rough solution jumps as the tool's
+position or radius changes."""
 
 
 def move_tool(
@@ -40,17 +43,25 @@ def move_tool(
     *,
     haste: bool = False,
 ) -> Solution:
-    """Equilibrium at `tool`, led there from an equilibrium (n, 3) [m] with the tool at `before`;
-    in haste only if that is easy.
+    """Find the equilibrium with the tool at `tool`, from one with the tool at `before`.
 
-    Where the tool is pressed in so hard that the contact's penalty gives way, the contact is
+    If penetration under the pressed tool is too large for the contact's penalty, the contact is
     hardened step by step.
+
+    Args:
+        model: the body.
+        positions: (n, 3) equilibrium with the tool at `before` [m].
+        before: tool at the start.
+        tool: tool at the end.
+        tolerance: relative residual at which to stop.
+        quick_solver: modified Newton method, tried first.
+        haste: give up if the quick solver and a plain Newton step fail.
     """
     model.harden(1.0)
     solution = _move_in_stages(model, positions, (before, tool), tolerance, quick_solver, haste)
     while solution.converged and model.add_penetrated(solution.positions, tool):
-        wary = solve(model, tool, solution.positions, tool, tolerance)
-        solution = replace(wary, iterations=solution.iterations + wary.iterations)
+        checked = solve(model, tool, solution.positions, tool, tolerance)
+        solution = replace(checked, iterations=solution.iterations + checked.iterations)
     while (
         solution.converged
         and solution.penetration > HARDENING_PENETRATION
@@ -74,8 +85,9 @@ def _move_in_stages(
     quick_solver: ModifiedNewton,
     haste: bool,
 ) -> Solution:
-    """Places on the way are reached roughly at first; where that leads astray, the way is gone
-    again with care.
+    """Move the tool through intermediate positions.
+
+    They are solved roughly at first; if that fails, the path is repeated with full tolerance.
     """
     before, tool = tools
     steps = max(1, int(np.ceil(float(np.linalg.norm(tool.centre - before.centre)) / FREE_STEP)))
@@ -104,11 +116,11 @@ def _move_in_stages(
 def _predicted_positions(
     model: BlockModel, positions: FloatArray, before: ToolSphere, tool: ToolSphere
 ) -> FloatArray:
-    """Positions (n, 3) [m] from which a step begins: those given, or with the surface carried along
-    as the ball moves and grows.
+    """Positions (n, 3) [m] from which a step begins.
 
-    A ball that draws back or shrinks loses touch with a body that stays where it is, whose whole
-    push is then out of balance.
+    They are those given, or with the surface predicted along as the ball moves and grows, whichever
+    has the smaller residual. A ball that retreats or shrinks loses contact with a body that stays
+    in place, so that its whole push would be out of balance.
     """
     arm = positions - before.centre
     distance = np.linalg.norm(arm, axis=1, keepdims=True)
@@ -118,10 +130,10 @@ def _predicted_positions(
         - before.centre
         + (tool.radius - before.radius) * arm / np.maximum(distance, 1e-12)
     )
-    carried = np.where(model.topology.free, positions + move, positions)
-    there, here = (model.assemble(place, tool, tangent=False) for place in (carried, positions))
+    predicted = np.where(model.topology.free, positions + move, positions)
+    there, here = (model.assemble(place, tool, tangent=False) for place in (predicted, positions))
     return (
-        carried if relative_residual(model, there) < relative_residual(model, here) else positions
+        predicted if relative_residual(model, there) < relative_residual(model, here) else positions
     )
 
 
@@ -133,20 +145,22 @@ def _pass_stages(
     quick_solver: ModifiedNewton | None,
     careful: bool,
 ) -> Solution:
-    """The last of the solutions at each place after the first, or the first that is none."""
+    """Solve at each tool position after the first; returns the last solution, or the first that
+    fails.
+    """
     rough = tolerance if careful else max(tolerance, STAGE_TOLERANCE)
     iterations = 0
     for last, tool in pairwise(tools):
-        wanted = tolerance if tool is tools[-1] else rough
+        required = tolerance if tool is tools[-1] else rough
         near = None
         if quick_solver is not None:
             near = quick_solver.solve(
-                model, tool, _predicted_positions(model, positions, last, tool), wanted
+                model, tool, _predicted_positions(model, positions, last, tool), required
             )
         solution = (
             near
             if near is not None
-            else solve(model, tool, positions, last if careful else None, wanted)
+            else solve(model, tool, positions, last if careful else None, required)
         )
         iterations += solution.iterations
         if not solution.converged:
@@ -156,11 +170,18 @@ def _pass_stages(
 
 
 def first_touch(
-    before: ToolSphere, tool: ToolSphere, body: Box | Shape, away: Callable[[ToolSphere], bool]
+    before: ToolSphere, tool: ToolSphere, body: Box | Shape, is_clear: Callable[[ToolSphere], bool]
 ) -> ToolSphere:
-    """The last place on the way to `tool` that is clear of the body at rest, as `away` tells."""
+    """The last position on the path to `tool` at which the tool does not touch the body at rest.
+
+    Args:
+        before: tool at the start.
+        tool: tool at the end.
+        body: geometry.
+        is_clear: whether a tool does not touch.
+    """
     low, high = 0.0, 1.0
-    if np.linalg.norm(before.centre - tool.centre) > 1.0 or not away(before):
+    if np.linalg.norm(before.centre - tool.centre) > 1.0 or not is_clear(before):
         middle = (body.low + body.high) / 2
         before = ToolSphere(
             tool.centre + (tool.centre - middle) / np.linalg.norm(tool.centre - middle) * 0.05,
@@ -168,6 +189,8 @@ def first_touch(
         )
     for _ in range(_HALVINGS):
         share = (low + high) / 2
-        clear = away(ToolSphere(before.centre + share * (tool.centre - before.centre), tool.radius))
+        clear = is_clear(
+            ToolSphere(before.centre + share * (tool.centre - before.centre), tool.radius)
+        )
         low, high = (share, high) if clear else (low, share)
     return ToolSphere(before.centre + low * (tool.centre - before.centre), tool.radius)

@@ -1,6 +1,4 @@
-"""Elastic energy density point by point: how hard each place of a body is strained, for pictures of
-its inside.
-"""
+"""Elastic energy density at each point of a body, for pictures of its inside."""
 
 from __future__ import annotations
 
@@ -13,28 +11,29 @@ __all__ = ["energy_density", "nodal_density"]
 
 
 def energy_density(model: BlockModel, positions: FloatArray) -> FloatArray:
-    """Energy per rest volume over E (e, q) [1] at the quadrature points; its sum with their weights
-    is `elastic_energy`.
+    """Energy per rest volume over E (e, q) [1] at the quadrature points.
+
+    Its sum with the quadrature weights is `elastic_energy`.
 
     Args:
         model: the body with its law, see `palpate.fem.constitutive.elastic`.
-        positions: (n, 3) current node positions [m], no element inverted.
+        positions: (n, 3) current node positions [m], with no element inverted.
     """
     law, rule, nodes = model.law, model.rule, model.topology.elements
     deformed = positions[nodes].swapaxes(1, 2)[:, None] @ rule.gradients
     if law.corotational:
         left, stretches, right = np.linalg.svd(deformed)
-        turned = np.linalg.det(left @ right)  # of a reflection the smallest stretch counts negative
+        turned = np.linalg.det(left @ right)  # a reflection has a negative smallest stretch
         stretches[..., -1] *= turned
         density = model.mu * np.sum((stretches - 1) ** 2, axis=-1)
-        theta = _followed(model, stretches.sum(axis=-1) - 3)
+        theta = _projected(model, stretches.sum(axis=-1) - 3)
         density = density + model.bulk / 2 * theta**2
     else:
         volume = np.linalg.det(deformed)
         strain = np.sum(deformed**2, axis=(-2, -1)) / np.cbrt(volume**2) - 3
         if law.stiffening:
             strain = -np.log(1 - law.stiffening * strain) / law.stiffening
-        theta = _followed(model, volume)
+        theta = _projected(model, volume)
         density = model.mu / 2 * strain + model.bulk / 4 * (theta**2 - 1 - 2 * np.log(theta))
     if law.gamma:
         square = np.sum((deformed @ law.direction) ** 2, axis=-1)
@@ -42,16 +41,17 @@ def energy_density(model: BlockModel, positions: FloatArray) -> FloatArray:
     return np.asarray(density)
 
 
-def _followed(model: BlockModel, values: FloatArray) -> FloatArray:
-    """The part of values (e, q) that the elements' pressures can follow."""
+def _projected(model: BlockModel, values: FloatArray) -> FloatArray:
+    """Projection of values (e, q) on the elements' pressures."""
     rule = model.rule
     share = np.einsum("eq,eqm,eq->em", rule.weights, rule.pressures, values)
     return np.asarray(np.einsum("eqm,em->eq", rule.pressures, share))
 
 
 def nodal_density(model: BlockModel, positions: FloatArray) -> FloatArray:
-    """The same at the nodes (n,) [1], each the mean of the points around it, weighed by the square
-    of its shape function.
+    """Energy density at the nodes (n,) [1].
+
+    It is the mean of the points around each, weighted by the square of its shape function.
     """
     top, rule = model.topology, model.rule
     total, weight, shares = (

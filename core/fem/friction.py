@@ -1,12 +1,12 @@
-"""Coulomb's friction between the tool and the surface, with stick and slip: a return mapping at the
-contact's quadrature points.
+"""Coulomb friction between tool and surface, by a return mapping at the contact's quadrature
+points.
 
-A touched point sticks to an anchor that travels with the tool. Its tangential traction is k_t d, d
-the tangential way from the anchor, for as long as that is below mu p, with p the contact's
+A touched point sticks to an anchor that travels with the tool. Its tangential traction is k_t d,
+with d the tangential distance from the anchor, as long as that is below mu p, with p the contact
 pressure; beyond, the anchor is dragged along (Simo and Laursen 1992; Wriggers 2006, ch. 5).
-Pressure and normals are kept while an equilibrium is sought, and renewed after it, until nothing
-changes: so each search is for the minimum of an energy (Tresca's friction as a fixed point:
-Haslinger 1983), as it is without.
+Pressure and normals are constant during each solve and updated after it, until nothing changes: so
+each solve minimises an energy, as it does without friction (Tresca friction as a fixed point:
+Haslinger 1983).
 """
 
 from __future__ import annotations
@@ -24,20 +24,19 @@ from palpate.mesh.elements import Face
 __all__ = ["STICK_STIFFNESS", "FrictionHistory", "FrictionPotential"]
 
 STICK_STIFFNESS = 5e4
-"""Tangential traction over E per way from the anchor [1/m], times the surface's stiffness over
+"""Tangential traction over E per distance from the anchor [1/m], times the surface's stiffness over
 E."""
 _NEIGHBOURS = 4
 
 
 @dataclass(frozen=True, eq=False)
 class FrictionPotential:
-    """What holds the surface while one equilibrium is sought, at the quadrature points (g, p) of
-    those faces that touch.
+    """Friction potential during one solve, at the quadrature points (g, p) of the touching faces.
 
     Attributes:
         faces: (g,) numbers of the faces.
-        anchors: (g, p, 3) seen from the tool's centre [m].
-        normals: (g, p, 3) from it.
+        anchors: (g, p, 3) relative to the tool's centre [m].
+        normals: (g, p, 3) outward from the tool.
         limits: (g, p) largest tangential force over E [m^2].
         stiffness: (g, p) of the stick over E [m].
     """
@@ -49,7 +48,7 @@ class FrictionPotential:
     stiffness: FloatArray
 
     def of(self, faces: IntArray) -> Self:
-        """The part of it on these faces (h,), by their places among them."""
+        """The part of it on these faces (h,), numbered by their places among them."""
         number = np.full(int(max(faces.max(initial=0), self.faces.max(initial=0))) + 1, -1)
         number[faces] = np.arange(len(faces))
         own = number[self.faces] >= 0
@@ -59,8 +58,13 @@ class FrictionPotential:
     def energy(
         self, surface: IntArray, face: Face, positions: FloatArray, centre: FloatArray
     ) -> float:
-        """Over E [m^3], with the tool's centre here (3,) [m]; `surface` (f, b) are all faces'
-        nodes.
+        """Energy over E [m^3].
+
+        Args:
+            surface: (f, b) nodes of all faces.
+            face: quadrature of a face.
+            positions: (n, 3) [m].
+            centre: of the tool (3,) [m].
         """
         points = (self.anchors, self.normals, self.limits, self.stiffness)
         return float(_energy(surface[self.faces], face.shapes, *points, positions, centre))
@@ -76,11 +80,17 @@ class FrictionPotential:
         data: FloatArray,
         push: FloatArray,
     ) -> None:
-        """Add the energy's gradient over E to `force` (n, 3) [m^2], its tangent to `data` [m], the
-        drag on the body to `push`.
+        """Add the energy's gradient, tangent and resultant.
 
-        `slots` (f, 3 b, 3 b) of all faces as in `assemble_elastic`; an empty `data` leaves the
-        tangent out.
+        Args:
+            surface: (f, b) nodes of all faces.
+            face: quadrature of a face.
+            positions: (n, 3) [m].
+            centre: of the tool (3,) [m].
+            slots: (f, 3 b, 3 b) of all faces as in `assemble_elastic`.
+            force: (n, 3) the gradient over E is added here [m^2].
+            data: the tangent is added here [m]; empty leaves it out.
+            push: (3,) the drag on the body is added here [m^2].
         """
         points = (self.anchors, self.normals, self.limits, self.stiffness)
         _assemble(
@@ -98,9 +108,13 @@ class FrictionPotential:
 
 @dataclass(frozen=True, eq=False)
 class FrictionHistory:
-    """What one frame leaves to the next: points of the surface at rest (m, 3) [m], tangential ways
-    from their anchors (m, 3) [m], which of them (m,) are touched, and what friction holds at most,
-    over E and area (m,) [1]; none touched is a fresh start.
+    """State of friction that one frame passes to the next; no touched points for a fresh start.
+
+    Attributes:
+        places: (m, 3) points of the surface at rest [m].
+        ways: (m, 3) tangential distances from their anchors [m].
+        touched: (m,) True for points in contact.
+        limits: (m,) largest tangential traction over E [1].
     """
 
     places: FloatArray
@@ -110,11 +124,13 @@ class FrictionHistory:
 
     @classmethod
     def nothing(cls) -> Self:
-        """Before the first touch."""
+        """The state before the first contact."""
         return cls(np.empty((0, 3)), np.empty((0, 3)), np.empty(0, dtype=bool), np.empty(0))
 
     def at(self, places: FloatArray) -> Self:
-        """The same at other points of the surface (..., 3) [m], as a grid that moved has them."""
+        """Interpolate the state at other points of the surface (..., 3) [m], as on a grid that
+        moved.
+        """
         shape = places.shape[:-1]
         if not self.touched.any():
             return type(self)(
@@ -128,7 +144,7 @@ class FrictionHistory:
         )
 
     def on(self, faces: IntArray) -> Self:
-        """The part of it on these faces (g,), where the points lie face by face."""
+        """The part of it on these faces (g,); the points must be stored face by face."""
         return type(self)(
             self.places[faces], self.ways[faces], self.touched[faces], self.limits[faces]
         )
@@ -136,8 +152,11 @@ class FrictionHistory:
     def _near(
         self, places: FloatArray
     ) -> tuple[IntArray, FloatArray, np.ndarray[Any, np.dtype[np.bool_]]]:
-        """Own points next to each place (m, k), their weights, none where the nearest was not
-        touched, and whether it was (m,).
+        """Find the stored points next to each place (m, 3) [m].
+
+        Returns:
+            numbers (m, k), weights (m, k), zero if the nearest was not touched, and whether it was
+                (m,).
         """
         distance, near = (
             np.asarray(part) for part in cKDTree(self.places).query(places, k=_NEIGHBOURS)
@@ -151,7 +170,7 @@ class FrictionHistory:
 def _way(
     positions: Any, face: Any, shapes: Any, centre: Any, anchor: Any, normal: Any, way: Any
 ) -> float:
-    """Fill the tangential way from the anchor (3,) [m] and return its length."""
+    """Fill the tangential distance from the anchor (3,) [m] and return its length."""
     along = 0.0
     for i in range(3):
         way[i] = -centre[i] - anchor[i]
@@ -176,9 +195,7 @@ def _energy(
     positions: Any,
     centre: Any,
 ) -> float:
-    """Of sticking points k/2 d^2, of slipping ones limit (d - limit / 2 k), over E [m^3]; faces (g,
-    b).
-    """
+    """Energy over E [m^3]: k/2 d^2 of sticking points, limit (d - limit / 2 k) of slipping ones."""
     way, total = np.empty(3), 0.0
     for f in range(faces.shape[0]):
         for q in range(shapes.shape[0]):
@@ -209,9 +226,7 @@ def _assemble(
     data: Any,
     resultant: Any,
 ) -> None:
-    """As `FrictionPotential.assemble`, for the faces (g, b) and slots (g, 3 b, 3 b) of the grip; the tangent is
-    never negative.
-    """
+    """Kernel of `FrictionPotential.assemble`; the tangent is positive semidefinite."""
     way = np.empty(3)
     for f in range(faces.shape[0]):
         for q in range(shapes.shape[0]):

@@ -1,13 +1,12 @@
-"""Stresses that stay the same over a step in time, as a potential, and the stress from which they
-come.
+"""Constant stress over a time step, as a potential, and the shear stress that it comes from.
 
 A second Piola-Kirchhoff stress H that does not change with the deformation has the energy density H
-: (C - I) / 2, quadratic in the positions: so a step in time of a material with memory is one more
-equilibrium (see `palpate.replay.material_history`), and all that finds equilibria finds it. Its
+: (C - I) / 2, quadratic in the positions. So a time step of a material with history is one more
+equilibrium (see `palpate.replay.material_history`), which every solver of equilibria can find. Its
 tangent is H's geometric stiffness, constant over the step and in general indefinite.
 
 Symmetric tensors are rows (6,) of xx, yy, zz, yz, xz, xy. Stresses are over the local shear
-modulus, so that a lump's edge is in the modulus alone.
+modulus, so that an inclusion's edge is in the modulus alone.
 """
 
 from __future__ import annotations
@@ -20,15 +19,15 @@ import scipy.sparse as sp
 from numba import njit
 
 from palpate.fem.constitutive.elastic import Law
-from palpate.fem.constitutive.hyperelastic import scatter
+from palpate.fem.constitutive.scatter import scatter
 from palpate.fem.model import BlockModel
 from palpate.foundation.arrays import FloatArray
 
 __all__ = ["ConstantStress", "cauchy_green", "from_log_strain", "log_strain", "shear_stress"]
 
 _LEAST_DETERMINANT, _MOST_HARDENING = 1e-3, 50.0
-"""Between quadrature points an element may be inverted or past Gent's limit where these are not:
-there the stress ends growing."""
+"""Smallest determinant of C, and largest hardening: between quadrature points an element may be
+inverted or beyond Gent's limit although it is not at them; there the stress stops growing."""
 _NEAR = 0.03
 """Distance from no strain up to which logarithm and exponential are quotients of polynomials (Pade
 of order 3 over 3): their next terms, x^7 / 2800 and less, are below 1e-14 there, and no eigenvalues
@@ -39,7 +38,11 @@ _EXP_ABOVE, _EXP_BELOW = (1.0, 0.5, 0.1, 1 / 120), (1.0, -0.5, 0.1, -1 / 120)
 
 @njit(cache=True)
 def cauchy_green(tangents: Any) -> Any:
-    """C (m, 6) from the derivatives (m, 3, 3) of the positions along x, y, z, one row each [1]."""
+    """Right Cauchy-Green tensors C (m, 6).
+
+    Args:
+        tangents: (m, 3, 3) derivatives of the positions along x, y, z, one row each [1].
+    """
     found = np.empty((tangents.shape[0], 6))
     for m in range(tangents.shape[0]):
         t = tangents[m]
@@ -50,7 +53,7 @@ def cauchy_green(tangents: Any) -> Any:
 
 @njit(cache=True, inline="always")
 def _invert(c: Any, inverse: Any) -> float:
-    """Cofactors of C over its determinant into `inverse` (6,); returns the determinant."""
+    """Write C^-1 into `inverse` (6,); returns the determinant."""
     inverse[0], inverse[1], inverse[2] = (
         c[1] * c[2] - c[3] * c[3],
         c[0] * c[2] - c[4] * c[4],
@@ -91,10 +94,9 @@ def _shear_stress(c: Any, stiffening: float, gamma: float, direction: Any) -> An
 
 
 def shear_stress(law: Law, c: FloatArray) -> FloatArray:
-    """What goes with the shear modulus in the second Piola-Kirchhoff stress, over it (m, 6) [1]:
-    all but the pressure.
+    """Second Piola-Kirchhoff stress without the pressure, over the shear modulus (m, 6) [1].
 
-    J^(-2/3) (I - tr C / 3 C^-1) / (1 - k x), k = 1 / J_m, and along fibres 2 gamma (I4 - 1) a a'.
+    J^(-2/3) (I - tr C / 3 C^-1) / (1 - k x), k = 1 / J_m, and with fibres 2 gamma (I4 - 1) a a'.
     """
     return np.asarray(_shear_stress(c, law.stiffening, law.gamma, law.direction))
 
@@ -262,8 +264,16 @@ def from_log_strain(strain: FloatArray) -> FloatArray:
 def _add(
     gradients: Any, weights: Any, nodes: Any, stress: Any, slots: Any, load: Any, data: Any
 ) -> None:
-    """Take the forces at rest from `load` (n, 3) [m^2], and add the tangent to `data` [m]; `slots`
-    as in `assemble_elastic`.
+    """Subtract the forces at rest from `load` and add the tangent to `data`.
+
+    Args:
+        gradients: (e, q, a, 3) [1/m].
+        weights: (e, q) [m^3].
+        nodes: (e, a).
+        stress: (e, q, 6) over E [1].
+        slots: as in `assemble_elastic`.
+        load: (n, 3) [m^2].
+        data: [m].
     """
     corners = nodes.shape[1]
     matrix, pulled = np.empty((3 * corners, 3 * corners)), np.empty((corners, 3))
@@ -287,11 +297,13 @@ def _add(
 
 @dataclass(frozen=True, eq=False)
 class ConstantStress:
-    """1/2 d' Q d - b' d of the unknowns' displacements d (u,): H : (C - I) / 2 over the body, over
-    E.
+    """Energy H : (C - I) / 2 over the body as a quadratic form of the unknowns' displacements d
+    (u,).
+
+    It is 1/2 d' Q d - b' d, over E.
 
     Attributes:
-        upper: triangle and diagonal of Q [m].
+        upper: upper triangle and diagonal of Q [m].
         data: its entries in the tangent's pattern.
         load: b (u,) [m^2].
     """
@@ -302,7 +314,9 @@ class ConstantStress:
 
     @classmethod
     def of(cls, model: BlockModel, stress: FloatArray) -> Self:
-        """Of the stress H over E (e, q, 6) [1] at the model's quadrature points."""
+        """Make the potential of the stress H over E (e, q, 6) [1] at the model's quadrature
+        points.
+        """
         top = model.topology
         load, data = np.zeros_like(model.mesh.nodes), np.zeros(top.pattern.nnz)
         _add(model.rule.gradients, model.rule.weights, top.elements, stress, top.slots, load, data)
@@ -320,9 +334,9 @@ class ConstantStress:
         return np.asarray(whole)
 
     def energy(self, displacement: FloatArray) -> float:
-        """Over E [m^3]."""
+        """Energy over E [m^3]."""
         return float(displacement @ (0.5 * self._turned(displacement) - self.load))
 
     def force(self, displacement: FloatArray) -> FloatArray:
-        """Its gradient over E (u,) [m^2]."""
+        """Gradient of the energy over E (u,) [m^2]."""
         return np.asarray(self._turned(displacement) - self.load)

@@ -1,10 +1,9 @@
-"""Where a material remembers: points that stay at the same rest coordinates while grids may come
-and go.
+"""Points at which a material with history stores its state, fixed in the material.
 
 On a grid that never moves they are its quadrature points, and nothing is interpolated. A graded
-grid moves with the tool; handing what is remembered from each to the next would smear it a little
-every time, so there it stays on a fine even grid of cells: the strain is its mean over a cell, and
-is read back by interpolation between the cells' middles, once.
+grid moves with the tool; passing the state from each grid to the next would smear it slightly every
+time. So it is stored on a fine even grid of cells: the strain is its mean over a cell, and is
+interpolated once between the cells' centres.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from palpate.fem.model import element_quadrature
+from palpate.fem.mesh_quadrature import element_quadrature
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import MeshError
 from palpate.mesh.box_mesh import BoxMesh, GridSpec
@@ -32,27 +31,25 @@ __all__ = [
 ]
 
 _CELLS_PER_EDGE, _MOST_CELLS = 1.5, 64
-"""Cells along the finest edge of the grid, and at most along an axis. After a poke by 5 mm and
-release the dent that memory left was 0.024 mm RMS off a converged one on a quadratic grid of 1.5
-mm, whether it remembered in such cells or, not moving, at its quadrature points; in cells of twice
-the grid's edge 0.044 mm."""
+"""Cells per finest edge of the grid, and largest number of cells along an axis. Measured after a
+poke by 5 mm and release: the dent left was 0.024 mm RMS off a converged one on a quadratic grid of
+1.5 mm, both with such cells and with a fixed grid's quadrature points; with cells of twice the
+grid's edge 0.044 mm."""
 
 
 class MaterialPoints(Protocol):
-    """Points of a material and how they are reached from a grid."""
+    """Points of a material, and the interpolation between them and a grid."""
 
     def tangents(self, mesh: Mesh, positions: FloatArray) -> FloatArray:
-        """Derivatives (m, 3, 3) of the nodes' positions (n, 3) along x, y, z, one row each, at the
-        points [1].
-        """
+        """Derivatives (m, 3, 3) of the nodes' positions (n, 3) along x, y, z at the points [1]."""
 
     def read(self, mesh: Mesh, field: FloatArray) -> FloatArray:
-        """A field (m, c) of the points at the quadrature points (e, q, c) of a grid."""
+        """Interpolate a field (m, c) of the points at the quadrature points (e, q, c) of a grid."""
 
 
 def quadrature_tangents(mesh: Mesh, positions: FloatArray) -> FloatArray:
-    """Derivatives (e, q, 3, 3) of the positions (n, 3) along x, y, z, one row each, at the
-    quadrature points [1].
+    """Derivatives (e, q, 3, 3) of the positions (n, 3) along x, y, z at the quadrature
+    points [1].
     """
     gradients = element_quadrature(mesh).gradients
     return np.asarray(np.swapaxes(gradients, 2, 3) @ positions[mesh.connectivity.elements][:, None])
@@ -67,23 +64,26 @@ class QuadraturePoints:
     def _same(self, mesh: Mesh) -> None:
         if mesh is not self._mesh and not np.array_equal(mesh.nodes, self._mesh.nodes):
             raise MeshError(
-                "what is remembered at a grid's quadrature points is lost when the grid moves"
+                "the history stored at a grid's quadrature points is lost when the grid moves"
             )
 
     def tangents(self, mesh: Mesh, positions: FloatArray) -> FloatArray:
-        """As `MaterialPoints` has it."""
+        """See `MaterialPoints`."""
         self._same(mesh)
         return quadrature_tangents(mesh, positions).reshape(-1, 3, 3)
 
     def read(self, mesh: Mesh, field: FloatArray) -> FloatArray:
-        """As `MaterialPoints` has it."""
+        """See `MaterialPoints`."""
         self._same(mesh)
         return field.reshape(*element_quadrature(mesh).weights.shape, -1)
 
 
 class CellPoints:
-    """The cells of a fine even grid, whatever grids the block is solved on; edge lengths of the
-    block [m], cells along x, y, z.
+    """The cells of a fine even grid, independent of the grids on which the block is solved.
+
+    Args:
+        size: edge lengths of the block [m].
+        cells: number along x, y, z.
     """
 
     def __init__(self, size: tuple[float, float, float], cells: tuple[int, int, int]) -> None:
@@ -92,7 +92,7 @@ class CellPoints:
         self._corners = tuple(even_axis(low, high, count + 1) for low, high, count in spans)
 
     def tangents(self, mesh: Mesh, positions: FloatArray) -> FloatArray:
-        """As `MaterialPoints` has it: means over the cells of the field between their corners."""
+        """See `MaterialPoints`: means over the cells of the field between their corners."""
         assert isinstance(mesh, BoxMesh)
         nx, ny, nz = mesh.shape
         (mx, dx), (my, dy), (mz, dz) = (_means(self, mesh, axis) for axis in range(3))
@@ -106,7 +106,7 @@ class CellPoints:
         return np.stack([row.reshape(-1, 3) for row in rows], axis=1)
 
     def read(self, mesh: Mesh, field: FloatArray) -> FloatArray:
-        """As `MaterialPoints` has it."""
+        """See `MaterialPoints`."""
         assert isinstance(mesh, BoxMesh)
         found = field.reshape(*self._counts[::-1], -1)
         for axis in range(3):
@@ -117,12 +117,12 @@ class CellPoints:
 
     @property
     def _counts(self) -> list[int]:
-        """Cells along x, y, z."""
+        """Number of cells along x, y, z."""
         return [len(corners) - 1 for corners in self._corners]
 
 
 def _along(matrix: FloatArray, field: FloatArray, axis: int) -> FloatArray:
-    """The matrix (p, n) on one axis of n of a field."""
+    """Apply a matrix (p, n) to one axis of n of a field."""
     return np.asarray(np.moveaxis(np.tensordot(matrix, field, axes=(1, axis)), 0, axis))
 
 
@@ -132,14 +132,15 @@ def _elements(mesh: BoxMesh) -> tuple[int, int, int]:
 
 
 def _points_along(mesh: BoxMesh) -> int:
-    """Of the quadrature of an element, along one edge."""
+    """Number of quadrature points of an element along one edge."""
     return round(float(np.cbrt(element_quadrature(mesh).weights.shape[1])))
 
 
 @lru_cache(maxsize=96)
 def _means(cells: CellPoints, mesh: BoxMesh, axis: int) -> tuple[FloatArray, FloatArray]:
-    """Mean value and mean slope (c, n), (c, n) [1/m] over the cells along an axis, from the values
-    at the grid's nodes.
+    """Mean value (c, n) and mean slope (c, n) [1/m] over the cells along an axis.
+
+    The matrices apply to values at the grid's nodes.
     """
     corners = cells._corners[axis]
     at_corners = mesh.shapes_along(axis, corners)
@@ -150,8 +151,8 @@ def _means(cells: CellPoints, mesh: BoxMesh, axis: int) -> tuple[FloatArray, Flo
 
 @lru_cache(maxsize=96)
 def _reading(cells: CellPoints, mesh: BoxMesh, axis: int) -> FloatArray:
-    """The value (p, c) at the grid's quadrature points along an axis, on straight lines through the
-    values in the cells.
+    """Linear interpolation (p, c) from the cells' centres to the grid's quadrature points, along an
+    axis.
     """
     corners, points = cells._corners[axis], _points_along(mesh)
     middles = (corners[1:] + corners[:-1]) / 2
@@ -166,7 +167,7 @@ def _reading(cells: CellPoints, mesh: BoxMesh, axis: int) -> FloatArray:
 
 
 def material_points(setup: Setup, grid: Meshing, mesh: Mesh) -> MaterialPoints:
-    """The points for a body that is meshed like this, of which this mesh is one."""
+    """The points for a body with this mesh specification, of which `mesh` is one."""
     spacing = grid.spacing if isinstance(grid, Grading | GridSpec) else None
     if spacing is None:
         return QuadraturePoints(mesh)

@@ -1,82 +1,75 @@
-"""The potential of a block under a tool: elastic energy, own weight, bonded or detached base,
-contact.
+"""Potential of a body under a tool: elastic energy, weight, bonded or detached base, contact.
 
-Everything is over E, so stiffness cancels where only positions are given; forces are multiplied by
-E when they leave.
+Everything is divided by E, so that stiffness cancels if only positions are given; forces are
+multiplied by E where they leave the engine.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
 
+from palpate.fem.base_support import BOND_STIFFNESS, base_can_move, held_share
 from palpate.fem.constitutive.elastic import Law, assemble_elastic, elastic_energy, lame
-from palpate.fem.constitutive.stiffness_field import (
-    SurfaceQuadrature,
-    log_stiffness,
-    surface_stiffness,
-)
+from palpate.fem.constitutive.stiffness_field import log_stiffness, surface_stiffness
 from palpate.fem.contact import assemble_contact, contact_energy
 from palpate.fem.friction import FrictionPotential
-from palpate.fem.linalg.sparsity import face_slots, factor_of, upper_pattern
+from palpate.fem.mesh_quadrature import element_quadrature, surface_quadrature
+from palpate.fem.topology import topology
 from palpate.foundation.arrays import BoolArray, FloatArray
-from palpate.mesh.elements import Face, Quadrature, face_weights, quadrature
-from palpate.mesh.protocol import Connectivity, Mesh
+from palpate.mesh.elements import face_weights
+from palpate.mesh.protocol import Mesh
 from palpate.setup.closest_point import winding_number
-from palpate.setup.setup import Box, Detachment, Setup, Shape, Support
+from palpate.setup.setup import Setup
 
-__all__ = [
-    "CONTACT_STIFFNESS",
-    "Assembly",
-    "BlockModel",
-    "ToolSphere",
-    "Topology",
-    "element_quadrature",
-    "surface_quadrature",
-    "topology",
-]
+__all__ = ["CONTACT_STIFFNESS", "Assembly", "BlockModel", "ToolSphere"]
 
 CONTACT_STIFFNESS = 5e4
 """Contact pressure over E per penetration [1/m]: 0.02 mm at a pressure equal to E."""
-BOND_STIFFNESS = 2e4
-"""The same for a bonded base that is not simply held [1/m]."""
-_BOND_EDGE = 1e-3
-"""Width over which a bond ends at a detached strip's edge [m]: the result changes smoothly with the
-strip's extent."""
 _EMPTY = np.empty(0)
 
 
 @dataclass(frozen=True, eq=False)
 class ToolSphere:
-    """The tool at one instant: centre (3,) [m] in the phantom frame, radius [m]."""
+    """The tool at one instant.
+
+    Attributes:
+        centre: (3,) [m], phantom frame.
+        radius: [m].
+    """
 
     centre: FloatArray
     radius: float
 
 
 class AddedPotential(Protocol):
-    """A quadratic potential of the unknowns' displacements that one step in time adds
-    (`palpate.fem.history_stress`).
+    """A quadratic potential of the unknowns' displacements, constant over one time step.
+
+    `palpate.fem.history_stress` makes one.
     """
 
     @property
     def data(self) -> FloatArray:
-        """Its tangent's entries over E, in the pattern of the model's [m]."""
+        """Entries of its tangent over E [m], in the pattern of the model's."""
 
     def energy(self, displacement: FloatArray) -> float:
-        """Over E [m^3]."""
+        """Energy over E [m^3]."""
 
     def force(self, displacement: FloatArray) -> FloatArray:
-        """Its gradient over E (u,) [m^2]."""
+        """Gradient of the energy over E (u,) [m^2]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """Residual (u,) [m^2], entries of the tangent [m], push of the tool on the body (3,) [m^2] (all
-    over E), penetration [m].
+    """Residual and tangent at one state, over E.
+
+    Attributes:
+        residual: (u,) [m^2].
+        data: entries of the tangent [m].
+        push: of the tool on the body (3,) [m^2].
+        penetration: deepest [m].
     """
 
     residual: FloatArray
@@ -85,99 +78,38 @@ class Assembly:
     penetration: float
 
 
-class Topology:
-    """What meshes of one connectivity share wherever their nodes lie: numbering, matrix pattern,
-    symbolic factorisation.
-    """
-
-    def __init__(self, connectivity: Connectivity, held: bool) -> None:
-        self.element = connectivity.element
-        self.elements = connectivity.elements
-        self.surface, self.base, self.hull = (
-            connectivity.surface,
-            connectivity.base,
-            connectivity.hull,
-        )
-        free = np.ones((connectivity.count, 3), dtype=bool)
-        if held:
-            free[connectivity.base_nodes] = False
-        self.free = free
-        self.unknown = np.where(free, np.cumsum(free).reshape(free.shape) - 1, -1)
-        pattern, self.slots = upper_pattern(self.elements, self.unknown)
-        self.surface_slots = face_slots(pattern, self.surface, self.unknown)
-        self.base_slots = face_slots(pattern, self.base, self.unknown)
-        self.pattern = pattern
-        rows = np.repeat(np.arange(pattern.shape[0]), np.diff(pattern.indptr))
-        self.diagonal = np.flatnonzero(rows == pattern.indices)
-        self.factor = factor_of(pattern, single=True)
-
-
-@lru_cache(maxsize=5)
-def topology(connectivity: Connectivity, held: bool) -> Topology:
-    """The shared part of all meshes with this connectivity; `held` leaves the base nodes out of the
-    unknowns.
-    """
-    return Topology(connectivity, held)
-
-
-def _held_share(
-    detached: tuple[Detachment, ...], body: Box | Shape, points: FloatArray
-) -> FloatArray:
-    """Share of the bond (0 to 1) left at base points (..., 3) [m]."""
-    held = np.ones(points.shape[:-1])
-    for strip in detached:
-        axis, sign = "xy".index(strip.edge[1]), -1 if strip.edge[0] == "-" else 1
-        inwards = sign * ((body.low if sign < 0 else body.high)[axis] - points[..., axis])
-        held *= 0.5 * (1 + np.tanh((inwards - strip.extent) / _BOND_EDGE))
-    return held
-
-
-def _sprung(support: Support) -> bool:
-    """Whether the base can move against what it stands on."""
-    return bool(support.detached) or support.stiffness_over_E is not None
-
-
-@lru_cache(maxsize=12)
-def element_quadrature(mesh: Mesh) -> Quadrature:
-    """Quadrature of the elements: the mesh's alone."""
-    shared = mesh.connectivity
-    return quadrature(shared.element, mesh.nodes[shared.elements])
-
-
-@lru_cache(maxsize=12)
-def surface_quadrature(mesh: Mesh, face: Face) -> SurfaceQuadrature:
-    """The free surface's points in this quadrature of the elements' sides."""
-    corners = mesh.nodes[mesh.connectivity.surface]
-    return SurfaceQuadrature(
-        np.einsum("qa,fai->fqi", face.shapes, corners), np.sqrt(face_weights(face, corners))
-    )
-
-
 class BlockModel:
-    """One block on one mesh: energy, residual and tangent as functions of the node positions (n, 3)
-    [m] and the tool.
+    """One body on one mesh: energy, residual and tangent as functions of positions and tool.
+
+    Node positions are (n, 3) [m].
 
     Attributes:
-        mu, bulk: (e, q) over E at the quadrature points [1].
-        unrelaxed: mu before a step in time changes it (`palpate.replay.material_history`).
-        areas: (f, p) of the free surface's quadrature points, times the stiffness there over E and
-            the hardness [m^2], with which contact goes.
-        hardness: of the contact, one unless `harden` was called [1].
-        face: where the free surface feels the tool.
+        mu: (e, q) shear modulus over E at the quadrature points [1].
+        bulk: (e, q) volumetric modulus over E [1].
+        unrelaxed: `mu` before a time step changes it (`palpate.replay.material_history`).
+        areas: (f, p) weights of the contact at the free surface's quadrature points [m^2]: area
+            times surface stiffness over E times `hardness`.
+        hardness: factor on the contact stiffness [1], one unless `harden` was called.
+        face: quadrature of the sides at which contact is evaluated.
     """
 
     def __init__(self, setup: Setup, mesh: Mesh, *, dense: bool = False) -> None:
-        """`dense` feels the tool at so many points that none fits between them (see
-        `palpate.mesh.elements.Element`).
+        """Make the model.
+
+        Args:
+            setup: the experiment.
+            mesh: of the body.
+            dense: evaluate contact at so many points that no tool fits between them (see
+                `palpate.mesh.elements.Element`).
         """
         self.mesh, self.setup = mesh, setup
-        self.topology = topology(mesh.connectivity, held=not _sprung(setup.support))
+        self.topology = topology(mesh.connectivity, held=not base_can_move(setup.support))
         element, height = self.topology.element, setup.geometry.height
         self.law, self.dense = Law.of(setup.material), dense
         self.face, self._base_face = element.dense_face if dense else element.face, element.face
-        self.rule, spots = element_quadrature(mesh), surface_quadrature(mesh, self.face)
+        self.rule, surface = element_quadrature(mesh), surface_quadrature(mesh, self.face)
         self.areas, self.hardness = (
-            spots.edges**2 * surface_stiffness(setup.material, spots, height),
+            surface.edges**2 * surface_stiffness(setup.material, surface, height),
             1.0,
         )
         self._all_areas = self.areas
@@ -185,8 +117,8 @@ class BlockModel:
         factor = np.exp(log_stiffness(setup.material, self.rule, height))
         self.mu, self.bulk = mu * factor, bulk * factor
         self.unrelaxed = self.mu
-        # Sums of squares near three lose their last digits when three is taken off, in proportion
-        # to this stiffness times volume.
+        # Rounding error of the energy: sums of squares near three lose their last digits when three
+        # is subtracted, in proportion to stiffness times volume.
         self.rounding = 4e-16 * float(np.vdot(self.mu, self.rule.weights))
         self.added_potential: AddedPotential | None = None
         self.friction_potential: FrictionPotential | None = None
@@ -199,21 +131,24 @@ class BlockModel:
         self.topology.factor.factorise(data, near[near >= 0])
 
     def harden(self, hardness: float) -> None:
-        """Make the contact so many times as stiff as it is at first [1]."""
+        """Multiply the contact stiffness by this factor over its initial value [1]."""
         if hardness != self.hardness:
             self.areas, self.hardness = self.areas * (hardness / self.hardness), hardness
 
     def restrict_to_facing(self, positions: FloatArray, tools: tuple[ToolSphere, ...]) -> None:
-        """Feel these tools at all points that face one of them from positions (n, 3) [m], however
-        they turn; only if dense.
+        """Evaluate contact at all points that face one of the tools at these positions, and no
+        others.
+
+        Points keep their state while they turn. Only a dense model is changed.
         """
         if self.dense:
             facing = np.any([self.facing(positions, tool)[0] for tool in tools], axis=0)
             self.areas = np.where(facing, self._all_areas * self.hardness, 0.0)
 
     def add_penetrated(self, positions: FloatArray, tool: ToolSphere) -> bool:
-        """Feel the tool also at points that have come to face it from within; whether there are
-        any.
+        """Evaluate contact also at points inside the tool that have come to face it.
+
+        Returns True if there are any.
         """
         if not self.dense:
             return False
@@ -223,7 +158,7 @@ class BlockModel:
         return bool(new.any())
 
     def facing(self, positions: FloatArray, tool: ToolSphere) -> tuple[BoolArray, FloatArray]:
-        """Which points (f, p) of the surface face a tool, and how deep they lie in it [m]."""
+        """Which points (f, p) of the surface face a tool, and their depth inside it (f, p) [m]."""
         corners = positions[self.topology.surface]
         seen = np.einsum("qa,fai->fqi", self.face.shapes, corners) - tool.centre
         tangents = np.einsum("qac,fai->fqci", self.face.gradients, corners)
@@ -239,14 +174,14 @@ class BlockModel:
         return specific * share
 
     def _prepare_base(self, setup: Setup) -> None:
-        self.detached, self.sprung = bool(setup.support.detached), _sprung(setup.support)
+        self.detached, self.sprung = bool(setup.support.detached), base_can_move(setup.support)
         if not self.sprung:
             return
         corners = self.mesh.nodes[self.topology.base]
         areas, shapes = face_weights(self._base_face, corners), self._base_face.shapes
         points = np.einsum("qa,fai->fqi", shapes, corners)
         self.base_areas = areas
-        held = areas * _held_share(setup.support.detached, setup.geometry, points)
+        held = areas * held_share(setup.support.detached, setup.geometry, points)
         softness = 1 / BOND_STIFFNESS + (
             1 / setup.support.stiffness_over_E if setup.support.stiffness_over_E else 0.0
         )
@@ -258,7 +193,7 @@ class BlockModel:
         return np.asarray(np.einsum("fab,fbi->fai", self.bond, moved))
 
     def energy(self, positions: FloatArray, tool: ToolSphere | None) -> float:
-        """Total potential over E [m^3]; infinite when an element is inverted."""
+        """Total potential over E [m^3]; infinite if an element is inverted."""
         top = self.topology
         total = elastic_energy(self.law, self.rule, top.elements, self.mu, self.bulk, positions)
         if not np.isfinite(total):
@@ -309,8 +244,13 @@ class BlockModel:
         tangent: bool = True,
         bending: bool = True,
     ) -> Assembly:
-        """Residual and, if wanted, tangent at these positions; without `bending` the contact's
-        tangent is positive.
+        """Assemble residual and tangent at these positions.
+
+        Args:
+            positions: (n, 3) [m].
+            tool: None for no tool.
+            tangent: False leaves the tangent out.
+            bending: False leaves out the contact's curvature, which makes its tangent positive.
         """
         top = self.topology
         force = np.zeros_like(positions)
@@ -388,13 +328,12 @@ class BlockModel:
         )
 
     def depth_inside(self, positions: FloatArray, tool: ToolSphere) -> float:
-        """How deep the deepest node of the free surface lies inside the tool [m], whichever way it
+        """Depth of the deepest node of the free surface inside the tool [m], whichever way it
         faces.
         """
         distance = np.linalg.norm(positions[self.topology.surface.ravel()] - tool.centre, axis=1)
         return max(0.0, tool.radius - float(distance.min()))
 
     def encloses(self, positions: FloatArray, tool: ToolSphere) -> bool:
-        """Whether the tool's centre lies within the deformed block, where no contact would be
-        felt."""
+        """Whether the tool's centre lies inside the deformed body, where contact has no effect."""
         return bool(winding_number(self.topology.hull, positions, tool.centre) > 0.5)

@@ -1,4 +1,4 @@
-"""Equilibria along a motion of small steps, from few factors."""
+"""Modified Newton method: equilibria along a motion of small steps, from few factors."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ __all__ = ["ModifiedNewton"]
 
 _MOST_STEPS = 12
 _TIRED = 5
-"""After so many steps in one frame the next one is given a new linearisation."""
+"""Steps in one frame after which the next frame gets a new linearisation."""
 _SHRINKING = 0.5
 _ATTEMPTS = 4
 _LONGEST_PAUSE = 4
 
 
 class ModifiedNewton:
-    """Keeps the body's linearisation from frame to frame for as long as its steps shrink the
+    """Solver that keeps the body's linearisation from frame to frame while its steps shrink the
     residual.
     """
 
@@ -32,15 +32,15 @@ class ModifiedNewton:
 
     @property
     def failing(self) -> bool:
-        """Whether the last frame was not found so."""
+        """Whether the last frame was not found by this method."""
         return self._failures > 0
 
     def solve(
         self, model: BlockModel, tool: ToolSphere, start: FloatArray, tolerance: float
     ) -> Solution | None:
-        """Equilibrium near `start` (n, 3) [m]; None where it takes a full Newton method to find it.
+        """Find the equilibrium near `start` (n, 3) [m]; None if it takes a full Newton method.
 
-        Failing again and again (as where a base comes loose) it does not even try for some frames.
+        After repeated failures (as where a base comes loose) it skips some frames without trying.
         """
         if self._pause:
             self._pause -= 1
@@ -73,7 +73,7 @@ class ModifiedNewton:
         positions: FloatArray,
         tolerance: float,
     ) -> Solution:
-        """Step while the residual shrinks; the best positions met when that does not reach the
+        """Step while the residual shrinks; the best positions found if that does not reach the
         tolerance.
         """
         state = model.assemble(positions, tool, tangent=False)

@@ -1,6 +1,4 @@
-"""Equilibrium by Newton's method with a line search on the energy; a motion that is too much at
-once is split.
-"""
+"""Equilibrium by Newton's method with a line search on the energy; long motions are split."""
 
 from __future__ import annotations
 
@@ -24,38 +22,50 @@ __all__ = [
 ]
 
 RELATIVE_TOLERANCE = 1e-6
-"""Converged: the residual's norm is below this share of the tool's push and of the body's internal
-forces."""
+"""Converged: the residual's norm is below this share of the tool's push and of the weight."""
 MAX_ITERATIONS = 40
 MAX_SPLITS, _MOST_ITERATIONS = 6, 400
-"""Of a motion that is split: how often it is halved, and Newton steps in all its parts."""
+"""Halvings of a motion that is split, and Newton steps in all its parts."""
 MAX_PENETRATION = 4e-4
-"""Of the surface into the tool [m]; more is no contact."""
+"""Largest penetration of the surface into the tool that counts as contact [m]."""
 _LONGEST = 0.5
 
 
 class Outcome(Enum):
-    """How a solve ended, as the sentence a user reads."""
+    """Result of a solve, as the sentence a user reads."""
 
     CONVERGED = "converged"
-    ITERATIONS = "no equilibrium within the allowed iterations; the motion between frames is too large or the load too high"
+    ITERATIONS = (
+        "no equilibrium within the allowed iterations; "
+        "the motion between frames is too large or the load too high"
+    )
     INDEFINITE = (
         "the stiffness stayed indefinite: the block buckles or an element is almost inverted"
     )
     INVERTED = "an element is inverted at the start of the solve"
     TOOL_SWINGS = (
-        "the tool gives way so much that no place was found where its spring balances the block"
+        "the tool's mount is so compliant that no place was found "
+        "where its spring balances the block"
     )
-    BASE_SLIDES = "the base slides on and on and finds no place where friction holds it"
-    GRIP_SWINGS = "pressure and friction under the tool do not come to agree; the motion between frames is too large"
-    BASE_IN_TOOL = "the tool reaches into the base, which is held: nothing can make way for it"
+    BASE_SLIDES = "the base keeps sliding and finds no place where friction holds it"
+    GRIP_SWINGS = (
+        "pressure and friction under the tool do not agree; the motion between frames is too large"
+    )
+    BASE_IN_TOOL = "the tool reaches into the base, which is fixed: nothing can yield to it"
     INSIDE_TOOL = "the material came to rest inside the tool, or the tool inside the material"
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Equilibrium positions (n, 3) [m], push of the tool on the body over E (3,) [m^2], and how it
-    was reached.
+    """Node positions and how they were reached.
+
+    Attributes:
+        positions: (n, 3) [m].
+        push: of the tool on the body over E (3,) [m^2].
+        outcome: whether this is an equilibrium, or why not.
+        iterations: number of Newton steps.
+        residual: relative.
+        penetration: of the surface into the tool [m].
     """
 
     positions: FloatArray
@@ -72,16 +82,14 @@ class Solution:
 
 
 def relative_residual(model: BlockModel, state: Assembly) -> float:
-    """The residual's norm over the push, the weight, and a tiny share of E times the base."""
+    """The residual's norm over the push, the weight, and a tiny share of E times the base area."""
     size = model.setup.geometry.size
     scale = np.linalg.norm(state.push) + model.weight_force.sum() + 1e-5 * size[0] * size[1]
     return float(np.linalg.norm(state.residual) / scale)
 
 
 def contact_outcome(model: BlockModel, tool: ToolSphere | None, positions: FloatArray) -> Outcome:
-    """What a balance of forces is worth: it must not be with the material on the wrong side of the
-    tool.
-    """
+    """Outcome of a balance of forces: the material must not be on the wrong side of the tool."""
     if tool is None:
         return Outcome.CONVERGED
     inside = (
@@ -92,8 +100,8 @@ def contact_outcome(model: BlockModel, tool: ToolSphere | None, positions: Float
 
 
 def _unfelt_depth(model: BlockModel, positions: FloatArray, tool: ToolSphere) -> float:
-    """How deep the deepest point of the surface lies inside the tool [m] that does not feel it,
-    such as one in a fold.
+    """Depth inside the tool [m] of the deepest surface point without contact force, as in a
+    fold.
     """
     apart = model.face.shapes @ positions[model.topology.surface] - tool.centre
     if (
@@ -105,8 +113,12 @@ def _unfelt_depth(model: BlockModel, positions: FloatArray, tool: ToolSphere) ->
 
 
 def blocked_by_base(model: BlockModel, positions: FloatArray, tool: ToolSphere) -> Solution | None:
-    """What there is to say where the tool reaches into nodes that are held: no equilibrium, at
-    these positions (n, 3) [m].
+    """A failed solution if the tool reaches into fixed nodes; else None.
+
+    Args:
+        model: the body.
+        positions: (n, 3) for the solution [m].
+        tool: the tool.
     """
     held = model.mesh.nodes[~model.topology.free.any(axis=1)]
     depth = tool.radius - float(np.linalg.norm(held - tool.centre, axis=1).min(initial=np.inf))
@@ -120,8 +132,9 @@ def blocked_by_base(model: BlockModel, positions: FloatArray, tool: ToolSphere) 
 def _direction(
     model: BlockModel, tool: ToolSphere | None, positions: FloatArray, state: Assembly
 ) -> tuple[FloatArray, bool] | None:
-    """Newton step of the unknowns, and whether it is exact: an indefinite tangent loses the
-    contact's curvature, then is shifted until it has a factor.
+    """Newton step of the unknowns, and whether it is exact; None if there is none.
+
+    An indefinite tangent loses the contact's curvature, then is shifted until it has a factor.
     """
     top = model.topology
     data = state.data
@@ -148,16 +161,17 @@ def _search(
     energy: float,
     exact: bool,
 ) -> tuple[FloatArray, float]:
-    """Halve the step until the energy falls as it should (Armijo), rounding allowed for; the same
-    positions when it never does.
+    """Halve the step until the energy falls enough (Armijo), up to rounding.
 
-    A step that is not exact is too short where the block gives way, and is doubled for as long as
-    that pays.
+    An inexact step is too short where the body yields, and is doubled while the energy falls.
+
+    Returns:
+        new positions and energy; the same positions if the energy never falls.
     """
     move = np.zeros_like(positions)
     move[model.topology.free] = step
-    # Nothing moves by more than half the tool's radius at once: beyond its centre no contact would
-    # be felt.
+    # No node moves by more than half the tool's radius at once: beyond the tool's centre contact
+    # has no effect.
     longest = (
         np.inf if tool is None else _LONGEST * tool.radius / max(float(np.abs(step).max()), 1e-300)
     )
@@ -183,8 +197,11 @@ def _stretched(
     lengths: tuple[float, float],
     energy: float,
 ) -> tuple[FloatArray, float]:
-    """Double a step of the first of these lengths, which leads to this energy, while that pays and
-    it is below the second.
+    """Double a step while the energy falls.
+
+    Args:
+        lengths: of the step, and upper bound of the doubled one.
+        energy: after the step.
     """
     length, longest = lengths
     while 2 * length < longest:
@@ -198,7 +215,7 @@ def _stretched(
 def _step(
     model: BlockModel, tool: ToolSphere | None, positions: FloatArray, energy: float
 ) -> tuple[FloatArray, float, Outcome | None]:
-    """One Newton step with a line search; an outcome when there is none."""
+    """One Newton step with a line search; an outcome if there is none."""
     state = model.assemble(positions, tool)
     found = _direction(model, tool, positions, state)
     if found is None:
@@ -245,15 +262,15 @@ def solve(
     """Find the equilibrium next to `start` with the tool at `tool`.
 
     Args:
-        model: the block.
-        tool: the tool, or None without one.
-        start: (n, 3) positions [m] to begin from, usually those of the frame before.
-        before: the tool in that frame; when the whole motion at once finds no equilibrium, it is
+        model: the body.
+        tool: None without a tool.
+        start: (n, 3) positions to begin from [m], usually those of the frame before.
+        before: the tool in that frame; if the whole motion at once finds no equilibrium, it is
             split between the two.
-        tolerance: residual at which to stop, over the push of the tool.
+        tolerance: relative residual at which to stop.
 
     Returns:
-        the solution; look at `outcome`. With a failure the positions are the last ones reached.
+        the solution; see `outcome`. After a failure the positions are the last ones reached.
     """
     solution = _newton(model, tool, start, tolerance)
     if solution.converged or before is None or tool is None or before is tool:
@@ -268,9 +285,7 @@ def _split(
     tolerance: float,
     solution: Solution,
 ) -> Solution:
-    """The motion between two places of the tool in parts, halved where one fails and doubled after
-    two that do not.
-    """
+    """Move the tool in parts, halved after a failure and doubled after two successes."""
     before, tool = tools
     done, part, eased, iterations = 0.0, 0.5, False, solution.iterations
     while done < 1.0 and part >= 0.5**MAX_SPLITS and iterations < _MOST_ITERATIONS:

@@ -12,7 +12,8 @@ import numpy as np
 
 from palpate.fem.continuation import move_tool
 from palpate.fem.friction import STICK_STIFFNESS, FrictionHistory, FrictionPotential
-from palpate.fem.model import CONTACT_STIFFNESS, BlockModel, ToolSphere, surface_quadrature
+from palpate.fem.mesh_quadrature import surface_quadrature
+from palpate.fem.model import CONTACT_STIFFNESS, BlockModel, ToolSphere
 from palpate.fem.modified_newton import ModifiedNewton
 from palpate.fem.newton import Outcome, Solution, relative_residual
 from palpate.foundation.arrays import FloatArray, IntArray

@@ -23,7 +23,7 @@ from palpate.effects.elastic_material import PoissonRatio
 from palpate.effects.support import BaseSlip
 from palpate.effects.tool import ToolRadius
 from palpate.fem.constitutive.stiffness_field import lump_share
-from palpate.fem.model import element_quadrature
+from palpate.fem.mesh_quadrature import element_quadrature
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.gradients.displacement_changes import displacement_changes

@@ -14,7 +14,7 @@ from palpate.diagnosis.forward.ray_comparison import PointComparison, averaging_
 from palpate.diagnosis.forward.slip_derivatives import Sliding
 from palpate.effects.base import LOG_PER_CONTRAST
 from palpate.fem.constitutive.stiffness_field import lump_share
-from palpate.fem.model import element_quadrature
+from palpate.fem.mesh_quadrature import element_quadrature
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.gradients.displacement_changes import displacement_changes
@@ -25,7 +25,7 @@ from palpate.measurement.camera_model import camera_model_for
 from palpate.replay.replay import Equilibrium, Replay
 from palpate.setup.setup import Inclusion, Setup
 
-__all__ = ["TOOL_COLUMNS", "Columns", "Wanted"]
+__all__ = ["TOOL_COLUMNS", "Columns", "JacobianRequest"]
 
 TOOL_COLUMNS = 6
 """Columns that always come first: the tool moved along x, y, z and turned about the robot
@@ -33,7 +33,7 @@ registration's pivot."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Wanted:
+class JacobianRequest:
     """Which changes a prediction shall state.
 
     Attributes:
@@ -55,7 +55,7 @@ class Columns:
     tool, if that is `felt`.
     """
 
-    def __init__(self, block: Replay, wanted: Wanted, forces: bool) -> None:
+    def __init__(self, block: Replay, wanted: JacobianRequest, forces: bool) -> None:
         self.block, self.wanted, self.forces = block, wanted, forces
         here = block.setup
         self._seen = {at_rest: camera_model_for(here, reference=at_rest) for at_rest in (False, True)}

@@ -1,7 +1,7 @@
-"""Kernels of the corotational law, for comparison with the engines that have only this one.
+"""Kernels of the corotational law, for comparison with engines that have only this one.
 
-W = mu |F - R|^2 at each point, and lambda/2 theta^2, theta the projection of tr(R^T F) - 3 on the
-element's pressures, F = R S the polar decomposition.
+W = mu |F - R|^2 at each point, and lambda/2 theta^2, with theta the projection of tr(R^T F) - 3 on
+the element's pressures and F = R S the polar decomposition.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from palpate.fem.constitutive.hyperelastic import project, scatter
+from palpate.fem.constitutive.hyperelastic import project
+from palpate.fem.constitutive.scatter import scatter
 
 __all__ = ["assemble", "energy"]
 
@@ -36,7 +37,7 @@ def _cofactor(f: Any, cof: Any) -> float:
 
 @njit(cache=True)
 def _polar(f: Any, rotation: Any) -> None:
-    """The rotation nearest to f, by Higham's scaled Newton iteration."""
+    """Compute the rotation nearest to f by Higham's scaled Newton iteration."""
     rotation[:] = f
     cof = np.empty((3, 3))
     for _ in range(30):
@@ -54,8 +55,9 @@ def _polar(f: Any, rotation: Any) -> None:
 
 @njit(cache=True)
 def _dilatation(f: Any, rotation: Any) -> float:
-    """Trace of the stretch minus three, whose element mean carries the volumetric energy; NaN when
-    inverted.
+    """Trace of the stretch minus three; NaN if inverted.
+
+    Its projection carries the volumetric energy.
     """
     if _cofactor(f, rotation) <= 0:
         return np.nan
@@ -69,7 +71,7 @@ def _dilatation(f: Any, rotation: Any) -> float:
 
 @njit(cache=True)
 def _density(f: Any, rotation: Any) -> float:
-    """Energy density of the part at a point, over mu."""
+    """Energy density of the deviatoric part at a point, over mu."""
     total = 0.0
     for i in range(3):
         for j in range(3):
@@ -100,17 +102,18 @@ def energy(
 
 @njit(cache=True)
 def _stress(
-    f: Any, rotation: Any, mu: float, pressure: float, wanted: bool, stress: Any, tangent: Any
+    f: Any, rotation: Any, mu: float, pressure: float, with_tangent: bool, stress: Any, tangent: Any
 ) -> None:
-    """First Piola stress of the point's part and, if wanted, the tangent of both parts at a fixed
-    pressure.
+    """First Piola-Kirchhoff stress of the deviatoric part and, if required, the tangent of both
+    parts.
 
-    dR = R [w]x with (tr S - S) w the axial vector of R^T dF - dF^T R, exact (not the usual dR = 0).
+    The tangent is that at a fixed pressure. dR = R [w]x with (tr S - S) w the axial vector of R^T
+    dF - dF^T R, exact (not the usual dR = 0).
     """
     for i in range(3):
         for j in range(3):
             stress[i, j] = 2 * mu * (f[i, j] - rotation[i, j])
-    if not wanted:
+    if not with_tangent:
         return
     stretch = rotation.T @ f
     inverse = np.linalg.inv((stretch[0, 0] + stretch[1, 1] + stretch[2, 2]) * np.eye(3) - stretch)
@@ -143,7 +146,7 @@ def _press(
     work: Any,
     press: Any,
 ) -> None:
-    """F, its rotation and the pressure at all points of an element."""
+    """Compute F, its rotation and the pressure at all points of an element."""
     dilatation, theta = np.empty(weights.shape[0]), np.empty(weights.shape[0])
     for q in range(weights.shape[0]):
         _deformation(gradients[q], positions, nodes, f[q])
@@ -165,10 +168,11 @@ def assemble(
     force: Any,
     data: Any,
 ) -> None:
-    """Add the energy's gradient to `force` and, if `data` is not empty, its tangent to it, as
-    `assemble_elastic` has them.
+    """Add the energy's gradient to `force` and, if `data` is not empty, its tangent to it.
+
+    Args as in `assemble_elastic`.
     """
-    points, size, wanted = weights.shape[1], 3 * nodes.shape[1], data.shape[0] > 0
+    points, size, with_tangent = weights.shape[1], 3 * nodes.shape[1], data.shape[0] > 0
     f, work, press = np.empty((points, 3, 3)), np.empty((points, 3, 3)), np.empty(points)
     stress, tangent, half = np.empty((3, 3)), np.empty((3, 3, 3, 3)), np.empty((3, 3, size))
     moved, matrix = np.empty((modes.shape[2], size)), np.empty((size, size))
@@ -178,7 +182,7 @@ def assemble(
         _press(gradients[e], weights[e], modes[e], bulk[e], positions, nodes[e], f, work, press)
         for q in range(points):
             w = weights[e, q]
-            _stress(f[q], work[q], mu[e, q], press[q], wanted, stress, tangent)
+            _stress(f[q], work[q], mu[e, q], press[q], with_tangent, stress, tangent)
             for a in range(nodes.shape[1]):
                 for i in range(3):
                     turned = np.sum(work[q, i] * gradients[e, q, a])
@@ -187,9 +191,9 @@ def assemble(
                     )
                     for m in range(modes.shape[2]):
                         moved[m, 3 * a + i] += w * modes[e, q, m] * turned
-            if wanted:
+            if with_tangent:
                 _add_point(tangent, gradients[e, q], w, half, matrix)
-        if wanted:
+        if with_tangent:
             for m in range(modes.shape[2]):
                 for n in range(modes.shape[2]):
                     matrix += np.sum(
@@ -200,8 +204,9 @@ def assemble(
 
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
 def _add_point(tangent: Any, gradients: Any, weight: float, half: Any, matrix: Any) -> None:
-    """Add one quadrature point's B^T A B to the upper blocks of the element's matrix; rows are
-    long, for vector instructions.
+    """Add one quadrature point's B^T A B to the upper blocks of the element's matrix.
+
+    Rows are long, for vector instructions.
     """
     for b in range(gradients.shape[0]):
         g0, g1, g2 = weight * gradients[b, 0], weight * gradients[b, 1], weight * gradients[b, 2]

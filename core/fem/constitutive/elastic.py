@@ -1,12 +1,15 @@
 """Elastic energy of elements, its gradient and its tangent, for a modulus of one.
 
-Each law is split into a part at each quadrature point and a volumetric part that sees the volume change only as the element's
-pressures can follow it (see `palpate.mesh.elements`), which keeps the elements free of volumetric locking up to nu = 0.49 and beyond.
+Each law is split into a part at each quadrature point and a volumetric part that depends on the
+volume change only as far as the element's pressures can represent it (see `palpate.mesh.elements`).
+That keeps the elements free of volumetric locking up to nu = 0.49 and beyond.
 
-neo_hooke     W = mu/2 x + kappa/4 (theta^2 - 1 - 2 ln theta), x = J^(-2/3) tr F^T F - 3, theta from J = det F
-gent          as neo_hooke, with -mu J_m/2 ln(1 - x / J_m) instead of mu/2 x: no stretch takes x to J_m
-corotational  W = mu |F - R|^2 + lambda/2 theta^2, theta from tr(R^T F) - 3, F = R S the polar decomposition
-fibres        to any of them: mu gamma/2 (|F a|^2 - 1)^2, a along the fibres
+- neo_hooke: W = mu/2 x + kappa/4 (theta^2 - 1 - 2 ln theta), with x = J^(-2/3) tr F^T F - 3 and
+theta from J = det F.
+- gent: as neo_hooke, with -mu J_m/2 ln(1 - x / J_m) instead of mu/2 x; no stretch takes x to J_m.
+- corotational: W = mu |F - R|^2 + lambda/2 theta^2, with theta from tr(R^T F) - 3 and F = R S the
+polar decomposition.
+- fibres, added to any of them: mu gamma/2 (|F a|^2 - 1)^2, with a along the fibres.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ from typing import Self
 
 import numpy as np
 
-from palpate.fem.constitutive import corotational, fibres, hyperelastic
+from palpate.fem.constitutive import corotational, fibres, hyperelastic, hyperelastic_tangent
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.mesh.elements import Quadrature
 from palpate.setup.setup import Material
@@ -26,12 +29,12 @@ __all__ = ["Law", "assemble_elastic", "elastic_energy", "lame", "reinforcement"]
 
 @dataclass(frozen=True)
 class Law:
-    """Which energy.
+    """An elastic law.
 
     Attributes:
-        corotational: or hyperelastic.
-        stiffening: 1 / J_m of Gent's law [1], zero without.
-        gamma: stiffness of the fibres over the shear modulus [1], zero without.
+        corotational: instead of hyperelastic.
+        stiffening: 1 / J_m of Gent's law [1], zero for neo-Hooke.
+        gamma: stiffness of the fibres over the shear modulus [1], zero without fibres.
         angle: of the fibres from the x axis [rad].
     """
 
@@ -58,8 +61,8 @@ class Law:
 
 
 def reinforcement(stiffness_ratio: float, poisson_ratio: float) -> float:
-    """The fibres' gamma [1] that makes Young's modulus along them so many times that across, at
-    small strain.
+    """The fibres' gamma [1] for a ratio of Young's moduli along and across the fibres, at small
+    strain.
 
     Along: E_a = E + 4 gamma mu. Across, where the fibres hinder the contraction: E / E_c = 1 - nu^2
     (1 - E / E_a).
@@ -69,8 +72,9 @@ def reinforcement(stiffness_ratio: float, poisson_ratio: float) -> float:
 
 
 def lame(law: Law, poisson_ratio: float) -> tuple[float, float]:
-    """Shear modulus and volumetric stiffness (kappa, or lambda for the corotational law), both over
-    E [1].
+    """Shear modulus and volumetric modulus over E [1].
+
+    The volumetric one is kappa, or lambda for the corotational law.
     """
     mu = 0.5 / (1 + poisson_ratio)
     kappa = 1.0 / (3 * (1 - 2 * poisson_ratio))
@@ -85,11 +89,14 @@ def elastic_energy(
     bulk: FloatArray,
     positions: FloatArray,
 ) -> float:
-    """Elastic energy over E [m^3]; infinite when an element is inverted at a quadrature point.
+    """Elastic energy over E [m^3]; infinite if an element is inverted at a quadrature point.
 
     Args:
+        law: of elasticity.
+        rule: quadrature of the mesh.
         nodes: (e, a).
-        mu, bulk: (e, q) moduli over E at the quadrature points.
+        mu: (e, q) shear modulus over E.
+        bulk: (e, q) volumetric modulus over E.
         positions: (n, 3) current node positions [m].
     """
     parts = (rule.weights, rule.pressures, nodes, mu, bulk)
@@ -117,12 +124,13 @@ def assemble_elastic(
     force: FloatArray,
     data: FloatArray,
 ) -> None:
-    """Add the energy's gradient over E to `force` (n, 3) [m^2] and, if `data` is not empty, its
-    tangent [m] to it.
+    """Add the energy's gradient and, if `data` is not empty, its tangent.
 
-    `slots` (e, 3 a, 3 a) says where in `data` an entry of the element's matrix goes; -1 drops it
-    (constrained, or below the diagonal of the symmetric matrix). Elements must not be inverted.
-    Other arguments as in `elastic_energy`.
+    Elements must not be inverted. Args as in `elastic_energy`, and:
+        slots: (e, 3 a, 3 a) index into `data` of each entry of an element's matrix; -1 drops it (a
+            constrained unknown, or below the diagonal of the symmetric matrix).
+        force: (n, 3) the gradient over E is added here [m^2].
+        data: the tangent over E is added here [m].
     """
     parts = (rule.weights, rule.pressures, nodes, mu, bulk)
     if law.gamma:
@@ -135,4 +143,6 @@ def assemble_elastic(
         return
     hyperelastic.add_forces(rule.slopes, *parts, law.stiffening, positions, force)
     if len(data):
-        hyperelastic.add_matrices(rule.slopes, *parts, law.stiffening, positions, slots, data)
+        hyperelastic_tangent.add_matrices(
+            rule.slopes, *parts, law.stiffening, positions, slots, data
+        )

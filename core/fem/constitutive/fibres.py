@@ -1,8 +1,8 @@
-"""Kernels of fibres along one direction, which add to any law: the standard reinforcing model (Qiu
-and Pence 1997).
+"""Kernels of fibres along one direction, added to any law: the standard reinforcing model (Qiu and
+Pence 1997).
 
-W = g/2 (I4 - 1)^2 with I4 = |F a|^2, a the direction at rest. The whole stretch counts and not its
-isochoric part, which would let a nearly incompressible body change its volume instead of its
+W = g/2 (I4 - 1)^2 with I4 = |F a|^2, a the direction at rest. I4 is of the whole stretch, not of
+its isochoric part: that would let a nearly incompressible body change its volume instead of its
 fibres' length (Helfenstein et al. 2010).
 """
 
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from palpate.fem.constitutive.hyperelastic import scatter
+from palpate.fem.constitutive.scatter import scatter
 
 __all__ = ["add_forces", "add_matrices", "energy"]
 
@@ -22,8 +22,9 @@ __all__ = ["add_forces", "add_matrices", "energy"]
 def _stretch(
     gradients: Any, positions: Any, nodes: Any, direction: Any, turned: Any, along: Any
 ) -> float:
-    """I4 of one point; `turned` (3,) gets F a, `along` (a,) each node's gradient along the fibres
-    [1/m].
+    """I4 of one point.
+
+    `turned` (3,) receives F a, `along` (a,) each node's gradient along the fibres [1/m].
     """
     turned[:] = 0.0
     for a in range(nodes.shape[0]):

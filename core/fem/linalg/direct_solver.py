@@ -1,4 +1,4 @@
-"""What the engine asks of a sparse direct solver."""
+"""Interface of the sparse direct solvers."""
 
 from __future__ import annotations
 
@@ -10,27 +10,28 @@ __all__ = ["Factor", "NotPositiveDefinite"]
 
 
 class NotPositiveDefinite(Exception):
-    """The matrix has no Cholesky factor, to the precision that the factor has."""
+    """The matrix has no Cholesky factor, to the factor's precision."""
 
 
 class Factor(Protocol):
-    """Factors of symmetric positive definite matrices that share one pattern, analysed once.
+    """Factors of symmetric positive definite matrices with one pattern, analysed once.
 
-    Single precision is enough for a block's: at nu = 0.4999, the most that a Setup takes, replays
-    take the same Newton steps as with double.
+    Single precision is sufficient for a block: at nu = 0.4999, the largest value of a Setup,
+    replays take the same Newton steps as with double.
 
     Attributes:
-        generation: number of the factor that is held.
+        generation: number of the factor that is stored.
     """
 
     generation: int
 
     def factorise(self, data: FloatArray, requested: IntArray | None = None) -> None:
-        """Factorise the matrix with these entries of its upper triangle; raises
-        NotPositiveDefinite.
+        """Factorise the matrix; raises NotPositiveDefinite.
 
-        `inverse_entries` between unknowns that are among those `requested` (m,) may be had for less; others are
-        as right.
+        Args:
+            data: entries of its upper triangle.
+            requested: (m,) unknowns between which `inverse_entries` should be fast; others stay
+                correct.
         """
 
     def solve(self, right: FloatArray) -> FloatArray:
@@ -38,13 +39,15 @@ class Factor(Protocol):
         ...
 
     def approximate(self, right: FloatArray) -> FloatArray:
-        """The same to the factor's own precision: five digits of a single one, for what the next
-        residual sets right.
+        """Solve to the factor's own precision: five digits in single precision.
+
+        That serves where the next residual corrects the error.
         """
         ...
 
     def inverse_entries(self, unknowns: IntArray) -> FloatArray:
-        """The inverse's entries (m, m) between these unknowns (m,): how each answers to a unit
-        load, to the factor's precision.
+        """Entries of the inverse (m, m) between these unknowns (m,), to the factor's precision.
+
+        They are the responses to unit loads.
         """
         ...

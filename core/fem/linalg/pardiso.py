@@ -1,4 +1,4 @@
-"""MKL's Pardiso: the fastest direct solver for systems of this size (shared out by pypardiso)."""
+"""MKL's Pardiso, the fastest direct solver for systems of this size (distributed by pypardiso)."""
 
 from __future__ import annotations
 
@@ -26,22 +26,24 @@ _POSITIVE_DEFINITE = 2
 _ANALYSE, _FACTORISE, _SOLVE, _FORWARD, _RELEASE = 11, 22, 33, 331, -1
 _ZERO_PIVOT = -4
 _DOMAIN = 4
-"""MKL's number for Pardiso where threads are set by domain."""
+"""MKL's domain number of Pardiso, for thread settings."""
 _CHOSEN, _ORDERING, _ALGORITHM, _PRECISION, _PARTIAL = 0, 1, 23, 27, 30
 _NESTED_DISSECTION, _TWO_LEVEL, _SINGLE, _SPARSE_RIGHT_SIDES = 2, 1, 1, 1
 _NONE = np.empty(0, dtype=np.int64)
 _SAME = {np.dtype(np.float32): 1e-3, np.dtype(np.float64): 1e-9}
-"""Cheap answers are right to this share of the largest."""
+"""Fast inverse entries are correct to this share of the largest [1]."""
 _SETTLED, _MOST_ROUNDS = 1e-5, 10
-"""A solution is refined until it changes by no more than this share of it: each round leaves as
-much of the error again."""
+"""A solution is refined until it changes by no more than this share of it, and at most so many
+rounds; each round reduces the error by the same factor."""
 _ANY, _INTEGERS = ctypes.c_void_p, ctypes.POINTER(ctypes.c_int32)
 
 
 @lru_cache(maxsize=1)
 def _pardiso() -> Any:
-    """MKL's entry point. pypardiso looks through the whole environment for the library, for a
-    second or three in each process.
+    """MKL's entry point.
+
+    pypardiso searches the whole environment for the library, for one to three seconds in each
+    process.
     """
     beside = sorted((Path(sys.prefix) / "lib").glob("libmkl_rt.so*"))
     if beside:  # said before the import, which looks for the library already
@@ -49,15 +51,15 @@ def _pardiso() -> Any:
     from pypardiso import PyPardisoSolver
 
     solver = PyPardisoSolver()
-    # A factor made by one number of threads and used by another ends the process, as where
-    # MKL_NUM_THREADS asks for several and a solve is bounded to one (`palpate.foundation.threads`).
+    # A factor made with one number of threads and used with another ends the process, as when
+    # MKL_NUM_THREADS requests several and a solve is limited to one (`palpate.foundation.threads`).
     solver.libmkl.MKL_Domain_Set_Num_Threads(1, _DOMAIN)
     return solver._mkl_pardiso
 
 
-def _room(shape: tuple[int, ...], kind: np.dtype[Any]) -> Any:
-    """An array in column order that begins at a cache line: MKL's last digits depend on where an
-    array lies.
+def _aligned_array(shape: tuple[int, ...], kind: np.dtype[Any]) -> Any:
+    """An array in column order that begins at a cache line: MKL's last digits depend on the
+    address.
     """
     size, line = math.prod(shape), 64 // kind.itemsize
     memory = np.empty(size + line, dtype=kind)
@@ -66,11 +68,11 @@ def _room(shape: tuple[int, ...], kind: np.dtype[Any]) -> Any:
 
 
 class _Handle:
-    """One matrix in MKL's memory, with everything its calls need that does not change between them.
+    """One matrix in MKL's memory, with the constant arguments of its calls.
 
     Args:
         pattern: as of `Pardiso`.
-        requested: (m,) unknowns between which entries of the inverse will be wanted.
+        requested: (m,) unknowns between which entries of the inverse are needed.
         single: precision.
     """
 
@@ -82,34 +84,39 @@ class _Handle:
         self.columns = pattern.indices.astype(np.int32) + 1
         self.memory = np.zeros(64, dtype=np.int64)
         self.options = np.zeros(64, dtype=np.int32)
-        # MKL's own defaults refine every solution, which a Cholesky factor does not need: a solve
-        # takes three times as long.
+        # MKL's defaults refine every solution, which a Cholesky factor does not need; a solve takes
+        # three times as long with them.
         self.options[_CHOSEN], self.options[_ORDERING] = 1, _NESTED_DISSECTION
         self.options[_PRECISION] = _SINGLE if single else 0
         self.order = np.zeros(self.size, dtype=np.int32)
         self.requested = np.zeros(self.size, dtype=bool)
         self.requested[requested] = True
         if len(requested):
-            # Of MKL's two ways to factorise, the usual one answers sparse right sides wrongly, and
-            # takes ten times as long.
+            # MKL's usual factorisation solves sparse right sides wrongly, and takes ten times as
+            # long.
             self.options[_ALGORITHM] = _TWO_LEVEL
         self.call = _pardiso()
         self.run(_ANALYSE, np.zeros(self.size), requested)
 
     def run(self, phase: int, right: FloatArray, sparse: IntArray = _NONE) -> FloatArray:
-        """Carry out a phase; returns the solution (n,) or (n, m) in column order and this precision
-        where the phase has one.
+        """Carry out a phase.
 
-        Of right sides that are empty but in the unknowns `sparse` the solution is right only there.
-        These are among those requested, all of which are to be named when the matrix is analysed
-        and when it is factorised.
+        Args:
+            phase: MKL's number of it.
+            right: right sides (n,) or (n, m).
+            sparse: unknowns outside which the right sides are zero, and for which alone the
+                solution is correct. They are among the requested ones, which must be passed to
+                analysis and factorisation.
+
+        Returns:
+            the solution (n,) or (n, m) in column order and this precision, if the phase has one.
         """
         self.options[_PARTIAL] = _SPARSE_RIGHT_SIDES if len(sparse) else 0
         self.order[:] = 0
         self.order[sparse] = 1
         solution, given, error = (
-            _room(right.shape, self.kind),
-            _room(right.shape, self.kind),
+            _aligned_array(right.shape, self.kind),
+            _aligned_array(right.shape, self.kind),
             ctypes.c_int32(0),
         )
         given[...] = right
@@ -148,11 +155,11 @@ def _release(handle: _Handle) -> None:
 
 
 class Pardiso:
-    """As `Factor`.
+    """A `Factor` by MKL.
 
-    A factor of single precision takes half the time and memory; what it leaves of a right side,
-    reckoned in double precision, is solved for again until the solution is a double's (iterative
-    refinement: Higham and Mary 2022, Acta Numerica 31, section 7).
+    A single-precision factor takes half the time and memory. The residual, computed in double
+    precision, is solved for again until the solution has double precision (iterative refinement:
+    Higham and Mary 2022, Acta Numerica 31, section 7).
 
     Args:
         pattern: upper triangle (with diagonal) in CSR form, indices sorted; its `data` is the array
@@ -171,8 +178,9 @@ class Pardiso:
         self._requested: IntArray | None = None
 
     def _analyse(self, requested: IntArray) -> None:
-        """Analyse the pattern, with cheap answers between these unknowns (m,): in which order they
-        are eliminated hangs on it.
+        """Analyse the pattern for fast inverse entries between these unknowns (m,).
+
+        The elimination order depends on them.
         """
         self._handle, self._requested, self._checked = (
             _Handle(self._matrix, requested, self._single),
@@ -184,15 +192,17 @@ class Pardiso:
         self._forget.atexit = False
 
     def factorise(self, data: FloatArray, requested: IntArray | None = None) -> None:
-        """Factorise the matrix with these entries of its upper triangle; raises
-        NotPositiveDefinite.
+        """Factorise the matrix; raises NotPositiveDefinite.
 
-        `inverse_entries` between unknowns that are all among those `requested` (m,) take a fifth of the time;
-        asking for others than the last time takes an analysis. The factor there is stays where it
-        is of these very entries.
+        Requested inverse entries take a fifth of the time; requesting others than the last time
+        takes an analysis. An existing factor of exactly these entries is kept.
+
+        Args:
+            data: entries of its upper triangle.
+            requested: (m,) unknowns between which `inverse_entries` should be fast.
         """
-        wanted = requested if requested is not None and self._trusted else _NONE
-        same = self._requested is not None and np.array_equal(wanted, self._requested)
+        current = requested if requested is not None and self._trusted else _NONE
+        same = self._requested is not None and np.array_equal(current, self._requested)
         if same and self._current and np.array_equal(data, self._matrix.data):
             return
         self.generation += 1
@@ -200,16 +210,14 @@ class Pardiso:
         if not same:
             if self._requested is not None:
                 self._forget()
-            self._analyse(wanted)
+            self._analyse(current)
         self._matrix.data[:] = data
         self._handle.entries[:] = data
-        self._handle.run(_FACTORISE, self._idle, wanted)
+        self._handle.run(_FACTORISE, self._idle, current)
         self._current = True
 
     def approximate(self, right: FloatArray) -> FloatArray:
-        """Solve for one (n,) or several (n, m) right sides, as well as the last factor has it by
-        itself.
-        """
+        """Solve for one (n,) or several (n, m) right sides, to the factor's precision."""
         return np.ascontiguousarray(self._handle.run(_SOLVE, right), dtype=float)
 
     def solve(self, right: FloatArray) -> FloatArray:
@@ -223,16 +231,16 @@ class Pardiso:
         return self._in_double(right) if self._single else found
 
     def _times(self, vectors: FloatArray) -> FloatArray:
-        """The matrix times one (n,) or several (n, m) vectors."""
+        """Multiply the matrix by one (n,) or several (n, m) vectors."""
         upper = self._matrix
         diagonal = upper.data[upper.indptr[:-1]]
         return np.asarray(upper @ vectors + upper.T @ vectors - (diagonal * vectors.T).T)
 
     def _in_double(self, right: FloatArray) -> FloatArray:
-        """As `solve`, of a matrix that single precision is not enough for, nor for those to
-        come."""
+        """Solve in double precision from now on, for matrices too ill-conditioned for single."""
         log.warning(
-            "a stiffness matrix is too ill-conditioned for single precision: solving in double takes about twice as long"
+            "a stiffness matrix is too ill-conditioned for single precision: solving in double "
+            "takes about twice as long"
         )
         self._forget()
         self._single, self._current, requested = False, False, self._requested
@@ -241,11 +249,10 @@ class Pardiso:
         return self.solve(right)
 
     def inverse_entries(self, unknowns: IntArray) -> FloatArray:
-        """The inverse's entries (m, m) between these unknowns (m,): with A = L L^T they are those
-        of Y^T Y, Y = L^-1 of unit loads.
+        """Entries of the inverse (m, m) between these unknowns (m,).
 
-        Half a solution is half the work, and most rows of Y are empty; but where these unknowns
-        were requested, MKL passes over all that is empty itself.
+        With A = L L^T they are those of Y^T Y, Y = L^-1 of unit loads. Half a solution is half the
+        work, and most rows of Y are zero. For requested unknowns MKL itself skips the zeros.
         """
         if not len(unknowns):
             return np.empty((0, 0))
@@ -253,15 +260,16 @@ class Pardiso:
         unit[unknowns, np.arange(len(unknowns))] = 1.0
         if self._handle.requested[unknowns].all():
             found = self._handle.run(_SOLVE, unit, unknowns)[unknowns]
-            if self._believed(found, unknowns):
+            if self._is_correct(found, unknowns):
                 return np.asarray(found, dtype=float)
         half = self._handle.run(_FORWARD, unit)
         filled = half[half.any(axis=1)]
         return np.asarray(filled.T @ filled, dtype=float)
 
-    def _believed(self, found: FloatArray, unknowns: IntArray) -> bool:
-        """Whether cheap answers (m, m) are those of a whole solution: looked at once after each
-        analysis, for one of them.
+    def _is_correct(self, found: FloatArray, unknowns: IntArray) -> bool:
+        """Whether fast inverse entries (m, m) agree with a full solution.
+
+        One column is checked once after each analysis.
         """
         if not self._checked:
             load = self._idle.copy()
@@ -273,6 +281,7 @@ class Pardiso:
             )
             if not self._trusted:
                 log.warning(
-                    "MKL's answers to sparse loads are wrong on this machine: they are done without, which takes longer"
+                    "MKL's answers to sparse loads are wrong on this machine: they are done "
+                    "without, which takes longer"
                 )
         return self._trusted

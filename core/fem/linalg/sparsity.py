@@ -1,4 +1,4 @@
-"""Sparse symmetric systems: their pattern, and the best direct solver that this machine has."""
+"""Patterns of sparse symmetric systems, and the choice of a direct solver."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ def _superlu(pattern: sp.csr_matrix, single: bool = False) -> Factor:
 
 
 SOLVERS: dict[str, Callable[..., Factor]] = {"pardiso": _pardiso, "superlu": _superlu}
-"""By name, fastest first."""
+"""Solvers by name, fastest first."""
 
 
 @lru_cache(maxsize=1)
 def _best() -> str:
-    """The first solver that works here; a slow one is told of."""
+    """Name of the first solver that works on this machine; a slow one is logged."""
     trial = sp.csr_matrix(sp.eye(2))
     for name, make in SOLVERS.items():
         try:
@@ -49,18 +49,20 @@ def _best() -> str:
 
 
 def factor_of(pattern: sp.csr_matrix, solver: str | None = None, *, single: bool = False) -> Factor:
-    """A solver for matrices with this pattern (upper triangle and diagonal in CSR form, indices
-    sorted): the best, unless named.
+    """Make a solver for matrices with this pattern.
 
-    With factors of `single` precision where it has them: in half the time, for Newton steps and
-    whatever else is no end in itself.
+    Args:
+        pattern: upper triangle and diagonal in CSR form, indices sorted.
+        solver: name; the best by default.
+        single: single precision if the solver has it, in half the time: for Newton steps and other
+            intermediate results.
     """
     return SOLVERS[solver or _best()](pattern, single)
 
 
 def upper_pattern(elements: IntArray, unknown: IntArray) -> tuple[sp.csr_matrix, IntArray]:
-    """Pattern of the stiffness matrix of the unknowns, and where each entry of each element's
-    matrix belongs in its data.
+    """Pattern of the stiffness matrix of the unknowns, and the index of each element's entries in
+    its data.
 
     Args:
         elements: (e, a) nodes.
@@ -69,7 +71,7 @@ def upper_pattern(elements: IntArray, unknown: IntArray) -> tuple[sp.csr_matrix,
 
     Returns:
         upper triangle in CSR form; (e, 3a, 3a) slots, -1 below the diagonal and for given
-        displacements.
+            displacements.
     """
     numbers = unknown[elements].reshape(len(elements), -1)
     rows = np.repeat(numbers, numbers.shape[1], axis=1).ravel()
@@ -87,7 +89,7 @@ def upper_pattern(elements: IntArray, unknown: IntArray) -> tuple[sp.csr_matrix,
 
 
 def face_slots(pattern: sp.csr_matrix, faces: IntArray, unknown: IntArray) -> IntArray:
-    """As the slots of `upper_pattern`, for faces (f, a) whose nodes share an element."""
+    """Slots as of `upper_pattern`, for faces (f, a) whose nodes share an element."""
     numbers = unknown[faces].reshape(len(faces), -1)
     rows = np.repeat(numbers, numbers.shape[1], axis=1).ravel()
     columns = np.tile(numbers, (1, numbers.shape[1])).ravel()

@@ -1,4 +1,4 @@
-"""SuperLU, which comes with scipy: for machines that have no MKL."""
+"""SuperLU, which comes with scipy, for machines without MKL."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ __all__ = ["SuperLUFactor"]
 
 
 class SuperLUFactor:
-    """As `Factor`; the pattern is analysed anew for every matrix, since scipy keeps no analysis.
+    """A `Factor` by SuperLU; the pattern is analysed for every matrix, since scipy stores no
+    analysis.
 
     Args:
         pattern: upper triangle (with diagonal) in CSR form, indices sorted.
@@ -35,7 +36,9 @@ class SuperLUFactor:
 
     def factorise(self, data: FloatArray, requested: IntArray | None = None) -> None:
         """Factorise the matrix with these entries of its upper triangle; raises
-        NotPositiveDefinite. All `requested` cost alike.
+        NotPositiveDefinite.
+
+        `requested` has no effect.
         """
         self.generation += 1
         matrix = sp.csc_matrix(
@@ -51,7 +54,7 @@ class SuperLUFactor:
             )
         except RuntimeError as error:  # an exactly singular matrix
             raise NotPositiveDefinite("the matrix has no Cholesky factor") from error
-        # With pivots taken from the diagonal, as many are negative as eigenvalues (Sylvester's law
+        # With pivots on the diagonal, as many of them are negative as eigenvalues (Sylvester's law
         # of inertia).
         on_diagonal = np.array_equal(self._lu.perm_r, self._lu.perm_c)
         if not on_diagonal or not (self._lu.U.diagonal() > 0).all():
@@ -68,5 +71,5 @@ class SuperLUFactor:
         return self.solve(right)
 
     def inverse_entries(self, unknowns: IntArray) -> FloatArray:
-        """The inverse's entries (m, m) between these unknowns (m,)."""
+        """Entries of the inverse (m, m) between these unknowns (m,)."""
         return self.solve(np.eye(self._shape[0])[:, unknowns])[unknowns]

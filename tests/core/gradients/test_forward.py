@@ -10,7 +10,8 @@ from pushed_block import GRID, SETUP, SIZE, poke
 
 from palpate.fem.constitutive.elastic import elastic_energy
 from palpate.fem.constitutive.stiffness_field import lump_share
-from palpate.fem.model import BlockModel, element_quadrature
+from palpate.fem.mesh_quadrature import element_quadrature
+from palpate.fem.model import BlockModel
 from palpate.fem.newton import solve
 from palpate.foundation.arrays import FloatArray
 from palpate.gradients.displacement_changes import displacement_changes

@@ -54,7 +54,7 @@ def test_place_that_is_not_found_is_said(monkeypatch):
     monkeypatch.setattr("palpate.replay.compliance_and_slip._MOST_PLACES", 1)
     frame = replay(_giving(60.0), POKE[:2], GRID)[-1]
     assert frame.outcome is Outcome.TOOL_SWINGS and "spring" in frame.outcome.value
-    with pytest.raises(SolveError, match="frame 0: the tool gives way"):
+    with pytest.raises(SolveError, match="frame 0: the tool's mount is so compliant"):
         require_converged([frame])
 
 

@@ -7,8 +7,8 @@ import scipy.sparse as sp
 from palpate.fem.linalg import sparsity as linear
 from palpate.fem.linalg.direct_solver import NotPositiveDefinite
 from palpate.fem.linalg.sparsity import SOLVERS, face_slots, factor_of, upper_pattern
-from palpate.fem.model import topology
 from palpate.fem.newton import Outcome
+from palpate.fem.topology import topology
 from palpate.mesh.box_mesh import GridSpec, box_mesh
 from palpate.replay.replay import replay
 from palpate.setup.setup import Box, Setup, Tool
