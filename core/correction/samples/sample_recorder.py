@@ -13,7 +13,8 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.camera_model import CameraModel
 from palpate.measurement.phantom_drift import align_sequences
-from palpate.measurement.segmentation import Cleaner, cleaner_for, find_shaft_axis
+from palpate.measurement.segmentation import Cleaner, cleaner_for
+from palpate.measurement.tool_pose import find_shaft_axis
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.mesh.protocol import Meshing
