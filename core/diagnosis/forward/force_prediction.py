@@ -1,6 +1,4 @@
-"""Forces of a sequence without clouds under one setup, and how they would change with anything that
-might be wrong.
-"""
+"""Prediction of a sequence with forces and no clouds under a setup, and its Jacobian."""
 
 from __future__ import annotations
 
@@ -9,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.forward.history_replay import forgetful
-from palpate.diagnosis.forward.jacobian import Columns, Wanted
+from palpate.diagnosis.forward.history_replay import without_history
+from palpate.diagnosis.forward.jacobian import Columns, JacobianRequest
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.forward.tool_path import tool_path_of
 from palpate.diagnosis.observation.force_record import ForceComparison
@@ -29,28 +27,32 @@ def predict_forces(
     data: Observations,
     setup: Setup,
     grid: Meshing,
-    wanted: Wanted | None = None,
+    request: JacobianRequest | None = None,
     starts: Sequence[Equilibrium] | None = None,
     tolerance: float = CRITERIA.replay.tolerance,
 ) -> Prediction:
-    """Replay a sequence's pushes and compare the forces; of the surface nothing is predicted, as
-    nothing of it was seen.
+    """Replay a sequence's pushes and compare the forces; the prediction has no surface patches.
 
-    Each push begins from rest. What hangs on all that was done before is left out: between short
-    pushes a body recovers.
+    Each push begins from rest, without history: between short pushes a body recovers.
 
     Args:
-        starts: equilibria of a similar setup, one per group, to begin from.
-        wanted: changes to state; none without it.
+        data: the sequence.
+        setup: under which it is replayed.
+        grid: the mesh.
+        request: the columns of the Jacobian that are computed; none without it.
+        starts: equilibria of a similar setup, one for each group, as initial guesses.
+        tolerance: of the replay, over the tool's push [1].
+
+    Raises DiagnosisError if the sequence has no forces.
     """
-    setup = forgetful(setup)
-    block, way = Replay(setup, grid, tolerance), tool_path_of(data, setup, grid, wanted)
-    if way.measured is None:
+    setup = without_history(setup)
+    block, path = Replay(setup, grid, tolerance), tool_path_of(data, setup, grid, request)
+    if path.measured is None:
         raise DiagnosisError(f"{data.name}: has neither clouds nor forces")
-    columns = None if wanted is None else Columns(block, wanted, forces=True)
+    columns = None if request is None else Columns(block, request, forces=True)
     frames: list[Equilibrium] = []
     changes: list[FloatArray] = []
-    for number, (group, centre) in enumerate(zip(data.groups, way.centres, strict=True)):
+    for number, (group, centre) in enumerate(zip(data.groups, path.centres, strict=True)):
         same = bool(number) and data.groups[number - 1].probe == group.probe
         begin = [frames[-1]] if same and frames[-1].outcome is Outcome.CONVERGED else []
         if starts is not None and starts[number].in_contact:
@@ -58,14 +60,16 @@ def predict_forces(
         frame = block.solve_from_any(centre, begin or [None])
         frames.append(frame)
         if columns is not None:
-            changed = columns.of_group(frame, way.moves[:, number])
+            changed = columns.of_group(frame, path.moves[:, number])
             changes.append(
-                columns.of_force(changed, way.measured[0][number], way.turned).astype(np.float32)
+                columns.of_force(changed, path.measured[0][number], path.rotations).astype(
+                    np.float32
+                )
             )
     rows, count = len(frames), columns.count if columns is not None else 0
     nothing = np.zeros((rows, 0))
     forces = ForceComparison.of(
-        way.measured, frames, changes, np.array([group.probe for group in data.groups])
+        path.measured, frames, changes, np.array([group.probe for group in data.groups])
     )
     return Prediction(
         data.name, nothing, nothing, nothing, np.zeros((rows, 0, count)), tuple(frames), (), forces

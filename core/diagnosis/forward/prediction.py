@@ -1,6 +1,4 @@
-"""One sequence under one setup: gaps by group and patch, and how they would change with anything
-that might be wrong.
-"""
+"""Prediction of a sequence with clouds under a setup: gaps of surface patches, and their Jacobian."""
 
 from __future__ import annotations
 
@@ -10,14 +8,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.forward.history_replay import Past, forgetful, travel
-from palpate.diagnosis.forward.jacobian import Columns, Wanted
-from palpate.diagnosis.forward.ray_comparison import PointSample, choose_points, compare
-from palpate.diagnosis.forward.tool_path import tool_path_of
+from palpate.diagnosis.forward.history_replay import HistoryReplay, longest_step, without_history
+from palpate.diagnosis.forward.jacobian import Columns, JacobianRequest
+from palpate.diagnosis.forward.ray_comparison import (
+    PointComparison,
+    PointSample,
+    choose_points,
+    compare,
+)
+from palpate.diagnosis.forward.tool_path import ToolPath, tool_path_of
 from palpate.diagnosis.observation.force_record import ForceComparison
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
+from palpate.measurement.patch_averages import PatchMeans
 from palpate.measurement.surface_gaps import Surface
 from palpate.mesh.protocol import Meshing
 from palpate.replay.replay import Equilibrium, Replay
@@ -28,19 +32,19 @@ __all__ = ["PointSample", "Prediction", "predict"]
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """One sequence under one setup.
+    """One sequence under one setup: g groups, p surface patches, k columns of the Jacobian.
 
     Attributes:
-        gap: (g, p) mean of measured minus simulated [m], NaN where unseen.
-        count: (g, p) points.
-        spread: (g, p) [m].
-        columns: (g, p, k) change of gap: TOOL_COLUMNS, then setups, then lumps.
-        elsewhere: (g, p) share of the points that meet another side of this model than of the one
-            that chose them [1]; None where there are no points.
-        equilibria: of each group.
-        samples: of each group, for the predictions of other models; none without clouds, where
-            there are no patches.
-        felt: forces, if there are any.
+        name: of the sequence.
+        gap: (g, p) mean of measured minus simulated distance [m]; NaN without points.
+        count: (g, p) number of points.
+        spread: (g, p) standard deviation of single points [m].
+        columns: (g, p, k) change of gap: `TOOL_COLUMNS`, then setups, then inclusions.
+        equilibria: one for each group.
+        samples: points of each group, for the predictions of other models; empty without clouds.
+        forces: comparison of forces; None where none were measured.
+        other_side: (g, p) share of the points that meet another side of this model than of the
+            model that chose them [1]; None without points.
     """
 
     name: str
@@ -55,18 +59,18 @@ class Prediction:
 
     @property
     def force_only(self) -> bool:
-        """Whether there are forces alone."""
+        """Whether the sequence has forces and no clouds."""
         return not self.gap.shape[1]
 
     @property
     def failed(self) -> tuple[int, ...]:
-        """Groups without equilibrium."""
+        """Numbers of the groups without equilibrium."""
         return tuple(
             i for i, frame in enumerate(self.equilibria) if frame.outcome is not Outcome.CONVERGED
         )
 
     def of_groups(self, index: Sequence[int]) -> Prediction:
-        """These groups alone."""
+        """Return the prediction of these groups alone."""
         own = list(index)
         frames = tuple(self.equilibria[row] for row in own)
         points = tuple(self.samples[row] for row in own) if self.samples else ()
@@ -82,25 +86,27 @@ class Prediction:
         )
 
     def replace_columns(self, columns: FloatArray) -> Prediction:
-        """With other columns (g, p, k), or (g, p + 3, k) where the last rows are the force's."""
+        """Return it with other columns (g, p, k), or (g, p + 3, k) with the force's rows last."""
         patches = self.gap.shape[1]
         forces = None if self.forces is None else replace(self.forces, columns=columns[:, patches:])
         return replace(self, columns=columns[:, :patches], forces=forces)
 
-    def beside(self, surface: FloatArray, force: FloatArray | None = None) -> Prediction:
-        """With further columns last: of the surface's gap (g, p, m), and of the force's (g, 3, m),
-        which are else zero.
+    def append_columns(self, surface: FloatArray, force: FloatArray | None = None) -> Prediction:
+        """Append columns: of the surface's gap (g, p, m), and of the force's gap (g, 3, m), which
+        are zero without them.
         """
         columns = np.concatenate([self.columns, surface], axis=2)
         if self.forces is None:
             return replace(self, columns=columns)
         none = np.zeros((len(surface), 3, surface.shape[2]))
         return replace(
-            self, columns=columns, forces=self.forces.beside(none if force is None else force)
+            self,
+            columns=columns,
+            forces=self.forces.append_columns(none if force is None else force),
         )
 
     def replace_column(self, other: Prediction, column: int, step: float) -> Prediction:
-        """With what another setup changes over its step in place of a column."""
+        """Replace a column by the difference of another setup's prediction over its step."""
         surface, force = other.change_from(self)
         columns = [self.columns] if self.forces is None else [self.columns, self.forces.columns]
         changed = np.concatenate(columns, axis=1)
@@ -110,21 +116,19 @@ class Prediction:
         return self.replace_columns(changed)
 
     def transferred(self, base: Prediction, origin: Prediction) -> Prediction:
-        """With gaps as if what this model changes over `origin`, both on another mesh, had been
-        done to `base`.
-        """
+        """Add this model's change from `origin` to `base`, which is on another mesh."""
         forces = self.forces
         if forces is not None and base.forces is not None and origin.forces is not None:
             forces = replace(forces, gap=base.forces.gap + forces.gap - origin.forces.gap)
         return replace(self, gap=base.gap + self.gap - origin.gap, forces=forces)
 
     def without_details(self) -> Prediction:
-        """The gaps without what takes most of the memory: for what is only compared."""
+        """Drop columns, equilibria and samples, which take most of the memory."""
         return replace(self, columns=self.columns[..., :0], equilibria=(), samples=())
 
     def change_from(self, origin: Prediction) -> tuple[FloatArray, FloatArray | None]:
-        """What this model's gaps have over another's, of the surface (g, p) [m] and of the force
-        (g, 3) [N]; zero where unseen.
+        """Gaps minus those of another model: of the surface (g, p) [m] and of the force (g, 3)
+        [N]; zero where there is no measurement.
         """
         forces = (
             None
@@ -134,11 +138,32 @@ class Prediction:
         return np.nan_to_num(self.gap - origin.gap), forces
 
 
+@dataclass(frozen=True, eq=False)
+class _GroupResult:
+    """One group's equilibrium, patch averages, and columns; see `Prediction`.
+
+    Attributes:
+        frame: equilibrium without the steps that led to it.
+        sample: points that were compared.
+        means: patch averages of the gaps.
+        other_side: (p,) [1].
+        columns: (p, k) change of the gaps; None if no Jacobian was requested.
+        force_columns: (3, k) change of the force's gap; None also without measured forces.
+    """
+
+    frame: Equilibrium
+    sample: PointSample
+    means: PatchMeans
+    other_side: FloatArray
+    columns: FloatArray | None
+    force_columns: FloatArray | None
+
+
 def predict(
     data: Observations,
     setup: Setup,
     grid: Meshing,
-    wanted: Wanted | None = None,
+    request: JacobianRequest | None = None,
     starts: Sequence[Equilibrium] | None = None,
     tolerance: float = CRITERIA.replay.tolerance,
     samples: Sequence[PointSample] | None = None,
@@ -146,43 +171,30 @@ def predict(
     """Replay a sequence's groups and compare each with its points.
 
     Args:
-        starts: equilibria of a similar setup, one per group, to begin from.
-        wanted: changes to state; none without it.
-        samples: which points to average; chosen anew without them.
+        data: the sequence.
+        setup: under which it is replayed.
+        grid: the mesh.
+        request: the columns of the Jacobian that are computed; none without it.
+        starts: equilibria of a similar setup, one for each group, as initial guesses.
+        tolerance: of the replay, over the tool's push [1].
+        samples: points to average, one sample for each group; chosen by this model without them.
     """
-    surface, block = Surface.of(setup), Replay(setup, grid, tolerance, travel(setup))
-    way = tool_path_of(data, setup, grid, wanted)
-    true_from_stated, centres, moves, turned, measured = (
-        way.correction,
-        way.centres,
-        way.moves,
-        way.turned,
-        way.measured,
-    )
-    columns = (
-        Columns(block, wanted, measured is not None) if wanted and not setup.has_history else None
-    )
-    gap, count, spread, changes, pressed, frames, chosen, other_side = (
-        [],
-        [],
-        [],
-        [],
-        [],
-        [],
-        [],
-        [],
-    )
-    past = Past(data, block, true_from_stated) if setup.has_history else None
+    surface, block = Surface.of(setup), Replay(setup, grid, tolerance, longest_step(setup))
+    path = tool_path_of(data, setup, grid, request)
+    with_forces = path.measured is not None
+    columns = Columns(block, request, with_forces) if request and not setup.has_history else None
+    history = HistoryReplay(data, block, path.correction) if setup.has_history else None
+    results: list[_GroupResult] = []
     previous: Equilibrium | None = None
-    for number, (group, centre, turn) in enumerate(
-        zip(data.groups, centres, way.turns, strict=True)
+    for number, (group, centre, deepest) in enumerate(
+        zip(data.groups, path.centres, path.deepest, strict=True)
     ):
-        if turn is not None:
-            deepest = block.step(turn[0], previous)
+        if deepest is not None:
+            passed = block.step(deepest[0], previous)
             if columns is not None:
-                columns.passed(deepest, turn[1])
-        if past is not None:
-            frame = past.reach(centre, data.instant(group, setup))
+                columns.passed(passed, deepest[1])
+        if history is not None:
+            frame = history.reach(centre, data.instant(group, setup))
         else:
             start = starts[number] if starts is not None and starts[number].in_contact else previous
             frame = block.solve_from_any(centre, (start, previous))
@@ -191,41 +203,73 @@ def predict(
             samples[number] if samples is not None else choose_points(group, setup, frame, surface)
         )
         compared = compare(group, setup, frame, surface, sample)
-        chosen.append(sample)
-        gap.append(compared.means.mean)
-        count.append(compared.means.count)
-        spread.append(compared.means.spread)
-        other_side.append(compared.other_side(sample))
-        frames.append(replace(frame, way=()))  # what was on the way to it is for this replay alone
-        if columns is not None:
-            moved = columns.of_group(frame, moves[:, number])
-            changes.append(
-                columns.project(frame, moved, moves[:, number], compared, group.reference).astype(
-                    np.float32
-                )
-            )
-            if measured is not None:
-                pressed.append(
-                    columns.of_force(moved, measured[0][number], turned).astype(np.float32)
-                )
-    stacked: FloatArray = np.stack(changes) if changes else np.zeros((len(gap), surface.patches, 0))
-    if wanted and past is not None:
-        # What a little change does to all that a frame hangs on is no first-order change of the
-        # frame: it is stated without memory.
-        plain = replace(wanted, setups=tuple(forgetful(other) for other in wanted.setups))
-        forgotten = predict(data, forgetful(setup), grid, plain, starts, tolerance, chosen)
-        stacked, pressed = (
-            forgotten.columns,
-            [] if forgotten.forces is None else list(forgotten.forces.columns),
+        own, force = (
+            (None, None)
+            if columns is None
+            else _group_columns(columns, frame, compared, path, number, group.reference)
         )
+        results.append(
+            _GroupResult(
+                replace(frame, way=()),
+                sample,
+                compared.means,
+                compared.other_side(sample),
+                own,
+                force,
+            )
+        )
+    found = _collected(data, results, path)
+    if request is None or history is None:
+        return found
+    # A small change of a parameter changes the whole history, which is no first-order change of
+    # one frame. The columns are those of the setup without history.
+    plain = replace(request, setups=tuple(without_history(other) for other in request.setups))
+    return _with_columns_of(
+        found, predict(data, without_history(setup), grid, plain, starts, tolerance, found.samples)
+    )
+
+
+def _group_columns(
+    columns: Columns,
+    frame: Equilibrium,
+    compared: PointComparison,
+    path: ToolPath,
+    number: int,
+    reference: bool,
+) -> tuple[FloatArray, FloatArray | None]:
+    """Changes of a group's patch averages (p, k) and force gap (3, k), in single precision."""
+    moves = path.moves[:, number]
+    changed = columns.of_group(frame, moves)
+    own = columns.project(frame, changed, moves, compared, reference).astype(np.float32)
+    if path.measured is None:
+        return own, None
+    force = columns.of_force(changed, path.measured[0][number], path.rotations)
+    return own, force.astype(np.float32)
+
+
+def _collected(data: Observations, results: Sequence[_GroupResult], path: ToolPath) -> Prediction:
+    """The prediction of a sequence from the results of its groups."""
+    gap = np.array([one.means.mean for one in results])
+    own = [one.columns for one in results if one.columns is not None]
+    force = [one.force_columns for one in results if one.force_columns is not None]
+    columns: FloatArray = np.stack(own) if own else np.zeros((*gap.shape, 0))
+    frames = tuple(one.frame for one in results)
     return Prediction(
         data.name,
-        np.array(gap),
-        np.array(count, dtype=float),
-        np.array(spread),
-        stacked,
-        tuple(frames),
-        tuple(chosen),
-        None if measured is None else ForceComparison.of(measured, frames, pressed),
-        np.array(other_side),
+        gap,
+        np.array([one.means.count for one in results], dtype=float),
+        np.array([one.means.spread for one in results]),
+        columns,
+        frames,
+        tuple(one.sample for one in results),
+        None if path.measured is None else ForceComparison.of(path.measured, frames, force),
+        np.array([one.other_side for one in results]),
     )
+
+
+def _with_columns_of(found: Prediction, other: Prediction) -> Prediction:
+    """A prediction with the columns of another one."""
+    if found.forces is None or other.forces is None:
+        return replace(found, columns=other.columns)
+    forces = replace(found.forces, columns=other.forces.columns)
+    return replace(found, columns=other.columns, forces=forces)

@@ -16,9 +16,9 @@ from scipy.stats import gamma
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, draw_rights
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.noise_model import smooth_basis
 from palpate.foundation.arrays import FloatArray
 
@@ -64,20 +64,20 @@ def _depth(item: Prediction) -> FloatArray:
     return np.asarray(size / max(size.max(), 1e-9))
 
 
-def _with_modes(model: Model, bench: Bench) -> list[Block]:
+def _with_modes(model: Model, evaluator: Evaluator) -> list[Block]:
     """The model's blocks whose last columns are the modes."""
     seen = (
-        smooth_basis(bench.surface.patch_centres, CRITERIA.structure.mode_length)
-        if bench.seen
+        smooth_basis(evaluator.problem.surface.patch_centres, CRITERIA.structure.mode_length)
+        if evaluator.problem.clouds
         else np.zeros((0, 0))
     )
     forces = (
-        smooth_basis(bench.pushed[0], CRITERIA.structure.force_mode_length)
-        if len(bench.pushed[0])
+        smooth_basis(evaluator.problem.pushes[0], CRITERIA.structure.force_mode_length)
+        if len(evaluator.problem.pushes[0])
         else np.zeros((0, 0))
     )
     blocks, at = [], 0
-    for noise, item in zip(bench.noises, model.predictions, strict=True):
+    for noise, item in zip(evaluator.state.noises, model.predictions, strict=True):
         modes = max(seen.shape[1], forces.shape[1])
         if item.forces is not None and item.force_only:
             push = np.asarray(item.forces.push)
@@ -85,10 +85,10 @@ def _with_modes(model: Model, bench: Bench) -> list[Block]:
             own = forces[at + np.searchsorted(names, push)]
             at += len(names)
             force = _wide(item.forces.force[:, :, None] * own[:, None, :], modes)
-            blocks.append(noise.block(item.beside(np.zeros((len(own), 0, modes)), force)))
+            blocks.append(noise.block(item.append_columns(np.zeros((len(own), 0, modes)), force)))
         else:
             blocks.append(
-                noise.block(item.beside(_wide(_depth(item)[:, None, None] * seen, modes)))
+                noise.block(item.append_columns(_wide(_depth(item)[:, None, None] * seen, modes)))
             )
     return blocks
 
@@ -130,13 +130,13 @@ def explained_by_modes(
     return found
 
 
-def structure_of(bench: Bench, model: Model, seed: int) -> Structure:
+def structure_of(evaluator: Evaluator, model: Model, seed: int) -> Structure:
     """Structured error that a model leaves."""
-    blocks = _with_modes(model, bench)
+    blocks = _with_modes(model, evaluator)
     size = blocks[0].gram.shape[0] - 1
     first = model.predictions[0].columns.shape[2]
     fitted = [*model.nuisance[:-1], size - 1, *model.columns]  # the mesh's error is the last column
-    precision = bench.held(model)
+    precision = evaluator.bounded_precision(model)
     modes = range(first, size - 1)
     data = np.array([[block.gram[1:, 0] for block in blocks]])
     rights = draw_rights(

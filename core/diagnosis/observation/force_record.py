@@ -188,7 +188,7 @@ class ForceComparison:
             columns=factor * self.columns,
         )
 
-    def beside(self, added: FloatArray) -> ForceComparison:
+    def append_columns(self, added: FloatArray) -> ForceComparison:
         """With further columns (g, 3, m) last."""
         return replace(self, columns=np.concatenate([self.columns, added], axis=2))
 
