@@ -24,7 +24,7 @@ from palpate.app.storage.disk_usage import Disk
 from palpate.app.storage.registration_store import RegistrationStore
 from palpate.app.storage.run_store import RunStore
 
-__all__ = ["Services", "CurrentServices", "IdempotencyKey"]
+__all__ = ["CurrentServices", "IdempotencyKey", "Services"]
 
 
 @dataclass(frozen=True)

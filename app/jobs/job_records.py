@@ -13,7 +13,7 @@ from typing import Any
 
 from palpate.app.http_errors import Missing
 
-__all__ = ["Job", "JobState", "Note", "JobRecords"]
+__all__ = ["Job", "JobRecords", "JobState", "Note"]
 
 SCHEMA = """
 create table if not exists jobs (

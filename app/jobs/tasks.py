@@ -21,7 +21,7 @@ from palpate.foundation.progress import Report, part
 if TYPE_CHECKING:
     from palpate.dataset.accepted_registration import AcceptedRegistration
 
-__all__ = ["TARGETS", "import_dataset", "diagnose", "diagnose_into", "evaluate", "sweep", "train"]
+__all__ = ["TARGETS", "diagnose", "diagnose_into", "evaluate", "import_dataset", "sweep", "train"]
 
 TARGETS = {
     "diagnosis": "palpate.app.jobs.tasks:diagnose",

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from palpate.recording.interactive import InteractiveFrame, InteractiveReplay
     from palpate.recording.resolve_frame import ResolvedFrame
 
-__all__ = ["InteractiveSession", "InteractiveSolver", "FrameSolver"]
+__all__ = ["FrameSolver", "InteractiveSession", "InteractiveSolver"]
 
 MOST_HANDS = 8
 """Blocks under hands that a process keeps; the one longest untouched goes first, and begins anew

@@ -8,8 +8,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from palpate.app.reporting.html_document import INK, themed
 from palpate.app.reporting.quantities import SHOWN
+from palpate.app.reporting.svg_figure import INK, to_svg
 from palpate.blind.parameter_errors import ReportedParameter
 from palpate.foundation.figure import new_figure
 
@@ -58,7 +58,7 @@ def reliability_plot(curve: Sequence[dict[str, Any]]) -> str:
         xlabel="probability stated",
         ylabel="share that is true",
     )
-    return themed(drawn)
+    return to_svg(drawn)
 
 
 def gain_plot(removed: Sequence[float]) -> str:
@@ -83,7 +83,7 @@ def gain_plot(removed: Sequence[float]) -> str:
     )
     axes.set(xlim=(0, 100), xlabel="reducible error removed [%]", ylabel="cases")
     axes.yaxis.get_major_locator().set_params(integer=True)
-    return themed(drawn)
+    return to_svg(drawn)
 
 
 def parameter_plot(groups: dict[str, list[ReportedParameter]]) -> str:
@@ -108,7 +108,7 @@ def parameter_plot(groups: dict[str, list[ReportedParameter]]) -> str:
         axes.set_visible(False)
     drawn.supxlabel("true", fontsize=10, color=INK["text-3"])
     drawn.supylabel("said", fontsize=10, color=INK["text-3"])
-    return themed(drawn)
+    return to_svg(drawn)
 
 
 def _panel(axes: Any, said: Sequence[ReportedParameter], factor: float) -> None:

@@ -1,22 +1,24 @@
-"""The tables of the blind suite's page."""
+"""Tables of the blind suite, as the template blind.html shows them."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Sequence
-from html import escape
+from dataclasses import dataclass
 from typing import Any
 
-from palpate.app.reporting.html_document import table
-from palpate.app.reporting.quantities import NARROW, parameters_text, quantity
+from palpate.app.reporting.html_page import Cell, Table
+from palpate.app.reporting.quantities import NARROW, parameters_text, quantity, words
 from palpate.blind import CaseResult
 
 __all__ = [
     "POSE",
     "TITLES",
+    "ConfusionMatrix",
     "calibration_table",
     "case_table",
-    "confusion_table",
+    "confusion_matrix",
+    "coverage_note",
     "figure_text",
     "gain_table",
     "hidden_text",
@@ -103,27 +105,50 @@ def _number(value: float, unit: str) -> str:
     return quantity(value, "1" if unit == "nu" else unit)
 
 
-def target_table(targets: Sequence[dict[str, Any]]) -> str:
-    """Each target with what is reached; a verdict that chance could turn is in brackets."""
+@dataclass(frozen=True)
+class Count:
+    """An entry of the confusion matrix.
+
+    Attributes:
+        count: number of cases.
+        share: of the row's cases [1].
+        right: whether the name or verdict is the right one.
+    """
+
+    count: int
+    share: float
+    right: bool
+
+
+@dataclass(frozen=True)
+class ConfusionRow:
+    """Counts of the cases in which one effect, or nothing, was hidden."""
+
+    hidden: str
+    counts: Sequence[Count]
+
+
+@dataclass(frozen=True)
+class ConfusionMatrix:
+    """Names and verdicts (columns) by what was hidden (rows)."""
+
+    columns: Sequence[str]
+    rows: Sequence[ConfusionRow]
+
+
+def target_table(targets: Sequence[dict[str, Any]]) -> Table:
+    """Each target with what is reached; a verdict that could be chance is in brackets."""
     rows = []
     for one in targets:
         figure, interval = figure_text(one["reached"], one["unit"])
         mark = "no cases" if one["met"] is None else "✓ met" if one["met"] else "✗ missed"
-        kind = {True: "met", False: "missed", None: "dim"}[one["met"]]
+        style = {True: "met", False: "missed", None: "dim"}[one["met"]]
         mark = mark if one["met"] is None or one["sure"] else f"({mark})"
-        rows.append(
-            (
-                escape(one["text"]),
-                target_text(one),
-                figure,
-                interval,
-                f"<span class='{kind}'>{mark}</span>",
-            )
-        )
-    return table(("", "target", "reached", "95 % interval", ""), rows)
+        rows.append((one["text"], target_text(one), figure, interval, Cell(mark, style=style)))
+    return Table(("", "target", "reached", "95 % interval", ""), rows)
 
 
-def kind_table(kinds: dict[str, dict[str, Any]]) -> str:
+def kind_table(kinds: dict[str, dict[str, Any]]) -> Table:
     """Cases of each kind: right, first, among, false names, and the verdicts."""
     rows = []
     for kind, counted in kinds.items():
@@ -147,20 +172,18 @@ def kind_table(kinds: dict[str, dict[str, Any]]) -> str:
         "error",
         "verdicts",
     )
-    return table(columns, rows, (1,))
+    return Table(columns, rows, (1,))
 
 
-def _hits(measured: dict[str, Any] | None, counted: bool = False) -> str:
-    if measured is None:
-        return "<span class='dim'>–</span>"
-    if not measured["n"]:
-        return "<span class='dim'>–</span>"
+def _hits(measured: dict[str, Any] | None, counted: bool = False) -> Cell:
+    if measured is None or not measured["n"]:
+        return Cell("–", style="dim")
     low, high = 100 * measured["low"], 100 * measured["high"]
-    of = f" of {measured['n']}" if counted else ""
-    return f"{measured['hits']}{of} <span class='dim'>({low:.0f}–{high:.0f}{NARROW}%)</span>"
+    total = f" of {measured['n']}" if counted else ""
+    return Cell(f"{measured['hits']}{total}", f"({low:.0f}–{high:.0f}{NARROW}%)")
 
 
-def calibration_table(calibration: dict[str, Any]) -> str:
+def calibration_table(calibration: dict[str, Any]) -> Table:
     """Brier score and calibration error, of the most probable effect and of all."""
     rows = []
     for key, text in (
@@ -168,141 +191,110 @@ def calibration_table(calibration: dict[str, Any]) -> str:
         ("every_effect", "every effect in every case"),
     ):
         own = calibration[key]
-        rows.append(
-            (text, str(own["n"]), *(_plain(own[name]) for name in ("brier", "calibration_error")))
-        )
-    return table(("", "n", "Brier score", "calibration error"), rows, (1,))
+        scores = (_score(own[name]) for name in ("brier", "calibration_error"))
+        rows.append((text, str(own["n"]), *scores))
+    return Table(("", "n", "Brier score", "calibration error"), rows, (1,))
 
 
-def _plain(measured: dict[str, Any]) -> str:
+def _score(measured: dict[str, Any]) -> Cell:
     if measured["value"] is None:
-        return "–"
-    return f"{measured['value']:.3f} <span class='dim'>({measured['low']:.3f} to {measured['high']:.3f})</span>"
+        return Cell("–")
+    return Cell(f"{measured['value']:.3f}", f"({measured['low']:.3f} to {measured['high']:.3f})")
 
 
-def gain_table(gain: dict[str, Any]) -> str:
-    """Medians by kind of the share removed, and of what is left over the noise floor."""
+def gain_table(gain: dict[str, Any]) -> Table:
+    """Medians by kind of the share removed, and of the rest over the noise floor."""
     rows = []
     for kind, own in gain.items():
         share, interval = figure_text(own["removed"])
         left = own["left_over_noise_floor"]["value"]
         rows.append((TITLES[kind], share, interval, "–" if left is None else f"{left:.2f}"))
-    return table(("median", "removed", "95 % interval", "left / floor"), rows, (3,))
+    return Table(("median", "removed", "95 % interval", "left / floor"), rows, (3,))
 
 
-def confusion_table(confusion: dict[str, dict[str, int]]) -> str:
-    """A matrix with shades: teal where the name or verdict is what is hidden, amber where it is
-    not.
-    """
+def confusion_matrix(confusion: dict[str, dict[str, int]]) -> ConfusionMatrix:
+    """Counts of names and verdicts by what was hidden, in the order of the catalogue."""
     from palpate.synthetic import DISTURBANCES, HIDDEN
 
-    good = {
+    right = {
         "nothing": ("none",),
         "young_modulus": ("none",),
         **dict.fromkeys(DISTURBANCES, ("ambiguous", "unexplained")),
     }
     order = [*HIDDEN, *DISTURBANCES, "nothing"]
     hidden = sorted(confusion, key=lambda row: order.index(row) if row in order else len(HIDDEN))
-    named = [row for row in hidden if any(row in counts for counts in confusion.values())]
-    others = sorted(
-        {column for counts in confusion.values() for column in counts} - set(named) - set(VERDICTS)
-    )
-    columns = [
-        *named,
-        *others,
-        *(
-            verdict
-            for verdict in VERDICTS
-            if any(verdict in counts for counts in confusion.values())
-        ),
-    ]
-    head = "".join(f"<th>{_words(column)}</th>" for column in columns)
-    body = "".join(
-        f"<tr><th>{_words(row)}</th>{_cells(confusion[row], columns, {row, *good.get(row, ())})}</tr>"
+    seen = {column for counts in confusion.values() for column in counts}
+    named = [row for row in hidden if row in seen]
+    others = sorted(seen - set(named) - set(VERDICTS))
+    columns = [*named, *others, *(verdict for verdict in VERDICTS if verdict in seen)]
+    rows = [
+        ConfusionRow(row, _counts(confusion[row], columns, {row, *right.get(row, ())}))
         for row in hidden
-    )
-    return f"<table class='matrix'><thead><tr><th></th>{head}</tr></thead><tbody>{body}</tbody></table>"
+    ]
+    return ConfusionMatrix(columns, rows)
 
 
-def _cells(counts: dict[str, int], columns: Sequence[str], good: Collection[str]) -> str:
-    total, cells = sum(counts.values()), []
-    for column in columns:
-        count = counts.get(column, 0)
-        kind = "yes" if column in good else "no"
-        cells.append(
-            f"<td class='{kind}' style='--share:{count / total:.3f}'>{count}</td>"
-            if count
-            else "<td></td>"
-        )
-    return "".join(cells)
+def _counts(counts: dict[str, int], columns: Sequence[str], right: Collection[str]) -> list[Count]:
+    total = sum(counts.values())
+    return [
+        Count(counts.get(column, 0), counts.get(column, 0) / total, column in right)
+        for column in columns
+    ]
 
 
-def _words(name: str) -> str:
-    return escape(name.replace("_", " "))
-
-
-def pair_table(pairs: dict[str, int]) -> str:
-    """Of two hidden effects how many are named."""
-    if not pairs:
-        return ""
+def pair_table(pairs: dict[str, int]) -> Table:
+    """How many of two hidden effects are named."""
     rows = [(text, str(count)) for text, count in sorted(pairs.items(), key=lambda row: -row[1])]
-    return f"<div class='narrow'>{table(('two effects hidden', 'cases'), rows, (1,))}</div>"
+    return Table(("two effects hidden", "cases"), rows, (1,))
 
 
-def parameter_table(summary: dict[str, Any]) -> str:
-    """Median error of each parameter, the largest, the bias, and how many intervals hold the
-    truth."""
-    rows = []
+def parameter_table(summary: dict[str, Any]) -> Table:
+    """Median error of each parameter, the largest, the bias, and the coverage of the intervals."""
+    rows: list[tuple[str | Cell, ...]] = []
     for key, own in sorted(summary["parameters"].items()):
         unit = "nu" if own["unit"] in ("1", "") else own["unit"]
         median, interval = figure_text(own["median"], unit)
-        cells = (
-            _number(own["largest"], unit),
-            _number(own["mean_signed"], unit),
-            _hits(own["covered"], counted=True),
-        )
-        rows.append((_words(key.replace(".", ": ")), median, interval, *cells))
+        errors = (_number(own["largest"], unit), _number(own["mean_signed"], unit))
+        covered = _hits(own["covered"], counted=True)
+        rows.append((words(key.replace(".", ": ")), median, interval, *errors, covered))
     for key, own in sorted(summary["words"].items()):
-        rows.append(
-            (
-                _words(key.replace(".", ": ")),
-                f"right in {own['hits']} of {own['n']}",
-                "",
-                "",
-                "",
-                "",
-            )
-        )
-    level = f"{100 * summary['coverage']['level_scored']:.0f}{NARROW}%"
-    stated = " and ".join(
-        f"{100 * one:.0f}{NARROW}%" for one in summary["coverage"]["level_stated"]
+        right = f"right in {own['hits']} of {own['n']}"
+        rows.append((words(key.replace(".", ": ")), right, "", "", "", ""))
+    columns = (
+        "",
+        "median error",
+        "95 % interval",
+        "largest",
+        "mean, signed",
+        f"{_scored_level(summary)} intervals that hold",
     )
-    note = f"<p>The reports state {stated} intervals; they are scored narrowed to {level}, as a normal distribution's would be.</p>"
-    shown = table(
-        (
-            "",
-            "median error",
-            "95 % interval",
-            "largest",
-            "mean, signed",
-            f"{level} intervals that hold",
-        ),
-        rows,
-    )
-    return note + shown if stated else shown
+    return Table(columns, rows)
 
 
-def case_table(results: Sequence[CaseResult]) -> str:
-    """What was hidden and said in each case; wrong ones stand out."""
+def coverage_note(summary: dict[str, Any]) -> str:
+    """How the intervals of the reports are scored; empty where no report states a level."""
+    levels = [f"{100 * one:.0f}{NARROW}%" for one in summary["coverage"]["level_stated"]]
+    if not levels:
+        return ""
+    return (
+        f"The reports state {' and '.join(levels)} intervals; they are scored narrowed to "
+        f"{_scored_level(summary)}, as a normal distribution's would be."
+    )
+
+
+def _scored_level(summary: dict[str, Any]) -> str:
+    return f"{100 * summary['coverage']['level_scored']:.0f}{NARROW}%"
+
+
+def case_table(results: Sequence[CaseResult]) -> Table:
+    """Hidden effects and diagnosis of each case; wrong ones are highlighted."""
     rows = []
     for one in results:
         removed = "–" if one.removed is None else f"{100 * one.removed:.0f}{NARROW}%"
         size = "–" if one.size is None else f"{one.size:.1f}"
-        mark = "<span class='met'>✓</span>" if one.right else "<span class='missed'>✗</span>"
-        texts = (
-            escape(text) for text in (one.name, hidden_text(one), one.verdict, named_text(one))
-        )
-        gain = f"{one.gain:.0f} <span class='dim'>({one.bound:.0f})</span>"
+        mark = Cell("✓", style="met") if one.right else Cell("✗", style="missed")
+        texts = (one.name, hidden_text(one), one.verdict, named_text(one))
+        gain = Cell(f"{one.gain:.0f}", f"({one.bound:.0f})")
         rows.append((*texts, gain, removed, size, f"{one.seconds:.0f}{NARROW}s", mark))
     columns = (
         "case",
@@ -315,4 +307,5 @@ def case_table(results: Sequence[CaseResult]) -> str:
         "time",
         "",
     )
-    return table(columns, rows, (4, 5, 6, 7), [not one.right for one in results])
+    wrong = [number for number, one in enumerate(results) if not one.right]
+    return Table(columns, rows, (4, 5, 6, 7), wrong)

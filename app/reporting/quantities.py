@@ -8,11 +8,12 @@ from typing import Any
 __all__ = [
     "NARROW",
     "SHOWN",
-    "with_interval",
-    "measured",
     "parameter_texts",
     "parameters_text",
     "quantity",
+    "value_and_ends",
+    "with_interval",
+    "words",
 ]
 
 NARROW = "\N{NO-BREAK SPACE}"
@@ -44,7 +45,7 @@ def _with_unit(text: str, shown: str) -> str:
     return f"{text}{'' if shown in ('', '°') else NARROW}{shown}"
 
 
-def measured(entry: dict[str, Any]) -> tuple[str, str, str]:
+def value_and_ends(entry: dict[str, Any]) -> tuple[str, str, str]:
     """Value, low and high end of a report's parameter, with as many decimals as tell the ends
     apart: 1.043, 1.038, 1.048.
 
@@ -80,7 +81,7 @@ def with_interval(entry: dict[str, Any]) -> str:
     """A parameter of a report with its interval: 5.1 kPa (4.8 to 5.4); with the value alone where
     there is none.
     """
-    value, low, high = measured(entry)
+    value, low, high = value_and_ends(entry)
     return f"{value} ({low.split(NARROW)[0]} to {high.split(NARROW)[0]})" if low and high else value
 
 
@@ -94,3 +95,8 @@ def parameter_texts(cause: dict[str, Any]) -> list[str]:
 def parameters_text(cause: dict[str, Any]) -> str:
     """All parameters of a cause or of a hidden effect, separated by commas."""
     return ", ".join(parameter_texts(cause))
+
+
+def words(name: str) -> str:
+    """The name of an effect or parameter as plain text."""
+    return name.replace("_", " ")

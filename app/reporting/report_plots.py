@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.app.reporting.html_document import INK, themed
+from palpate.app.reporting.svg_figure import INK, to_svg
 from palpate.app.storage.run_store import RecordedReplay
 from palpate.foundation.figure import new_figure
 
@@ -21,7 +21,7 @@ def error_plots(replays: Sequence[RecordedReplay], splits: dict[str, str]) -> st
     """RMS distance [mm] over time [s], one panel for each sequence on a common scale: stated and
     extended model, noise floor.
     """
-    return themed(drawn_errors(replays, splits)) if replays else ""
+    return to_svg(drawn_errors(replays, splits)) if replays else ""
 
 
 def drawn_errors(replays: Sequence[RecordedReplay], splits: dict[str, str]) -> Any:

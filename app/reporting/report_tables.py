@@ -1,25 +1,28 @@
-"""The tables and lists of a report that is one file."""
+"""Tables, bars and lists of a diagnosis report, as the template report.html shows them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
+from dataclasses import dataclass
 from typing import Any
 
-from palpate.app.reporting.html_document import table
+from palpate.app.reporting.html_page import Bar, Cell, Table
 from palpate.app.reporting.model_comparison import SequenceErrors
-from palpate.app.reporting.quantities import NARROW, measured
-from palpate.app.reporting.sentences import control_sentences, limit_phrase, probe_sentence
+from palpate.app.reporting.quantities import NARROW, value_and_ends, words
+from palpate.app.reporting.sentences import limit_phrase
 
 __all__ = [
-    "cause_tables",
-    "control_list",
-    "ladder_bars",
+    "NamedCause",
+    "Removed",
+    "Step",
+    "ladder_steps",
     "limit_table",
-    "probe_list",
+    "named_causes",
+    "percent",
     "ranking_table",
+    "removed_share",
     "sequence_table",
-    "untold_list",
+    "unidentifiable_texts",
 ]
 
 _STEPS = (
@@ -29,166 +32,159 @@ _STEPS = (
     ("Extended + network", "extended_network", "corrected"),
     ("Noise floor", "noise_floor", "floor"),
 )
-_ALIKE = 0.3
+_SIMILAR = 0.3
+"""Least share of an effect's pattern that another one has to imitate to be mentioned [1]."""
 
 
-def cause_tables(causes: Sequence[dict[str, Any]]) -> str:
-    """Each cause with its probability, and its parameters with their intervals."""
-    parts = []
+@dataclass(frozen=True)
+class NamedCause:
+    """A cause with its probability, and its parameters with their intervals."""
+
+    effect: str
+    probability: str
+    parameters: Table
+
+
+@dataclass(frozen=True)
+class Step:
+    """A bar of the error ladder: error of one model.
+
+    Attributes:
+        label: name of the model.
+        percent: length of the bar [%].
+        value: the error with its unit.
+        style: class that gives the colour.
+    """
+
+    label: str
+    percent: float
+    value: str
+    style: str
+
+
+@dataclass(frozen=True)
+class Removed:
+    """Share of the reducible error that is removed, and the text that follows it."""
+
+    share: str
+    text: str
+
+
+def named_causes(causes: Sequence[dict[str, Any]]) -> list[NamedCause]:
+    """The causes of a report, each with a table of its parameters."""
+    named = []
     for cause in causes:
         rows = [
-            (_words(name), f"<b>{escape(measured(entry)[0])}</b>", escape(_interval(entry)))
+            (words(name), Cell(value_and_ends(entry)[0], style="b"), _interval(entry))
             for name, entry in cause.get("parameters", {}).items()
         ]
-        probable = _percent(cause.get("probability"))
-        parts.append(
-            f"<h3>{_words(cause['effect']).capitalize()} <span>probability {probable}</span></h3>"
-        )
-        parts.append(table(("", "value", "interval"), rows))
-    return "".join(parts)
+        table = Table(("", "value", "interval"), rows)
+        named.append(NamedCause(cause["effect"], percent(cause.get("probability")), table))
+    return named
 
 
 def _interval(entry: dict[str, Any]) -> str:
-    told = entry.get("identifiability", "interval")
-    _, low, high = measured(entry)
-    if told in ("at least", "at most"):
-        return f"{told} {low if told == 'at least' else high}"
-    return (
-        f"{low} to {high}"
-        if told == "interval" and low and high
-        else ""
-        if told == "interval"
-        else "not determined"
-    )
+    kind = entry.get("identifiability", "interval")
+    _, low, high = value_and_ends(entry)
+    if kind in ("at least", "at most"):
+        return f"{kind} {low if kind == 'at least' else high}"
+    if kind != "interval":
+        return "not determined"
+    return f"{low} to {high}" if low and high else ""
 
 
-def ladder_bars(gain: dict[str, Any], named: bool) -> str:
-    """The errors of the models as bars, down to the noise floor, and what of it is removed."""
-    added = named or isinstance(gain.get("baseline_network"), (int, float))
-    steps = [
-        (label, float(gain[key]), kind)
-        for label, key, kind in _STEPS
-        if isinstance(gain.get(key), (int, float)) and (added or key != "extended")
+def ladder_steps(gain: dict[str, Any], named: bool) -> list[Step]:
+    """The errors of the models as bars, down to the noise floor.
+
+    Args:
+        gain: of the report.
+        named: whether a cause was named; otherwise the extended model is the raw one.
+    """
+    extended = _has_extended(gain, named)
+    errors = [
+        (label, float(gain[key]), style)
+        for label, key, style in _STEPS
+        if isinstance(gain.get(key), (int, float)) and (extended or key != "extended")
     ]
-    if not steps:
-        return ""
-    most, unit = max(value for _, value, _ in steps) or 1.0, escape(str(gain.get("unit", "mm")))
-    bars = "".join(
-        f"<span>{label}</span><div class='bar'><i class='{kind}' style='width: {100 * value / most:.1f}%'></i></div>"
-        f"<span>{value:.3f}{NARROW}{unit}</span>"
-        for label, value, kind in steps
-    )
-    return f"<div class='ladder'>{bars}</div>{_removed(gain, added)}"
+    largest = max((error for _, error, _ in errors), default=0.0) or 1.0
+    unit = gain.get("unit", "mm")
+    return [
+        Step(label, 100 * error / largest, f"{error:.3f}{NARROW}{unit}", style)
+        for label, error, style in errors
+    ]
 
 
-def _removed(gain: dict[str, Any], added: bool) -> str:
+def removed_share(gain: dict[str, Any], named: bool) -> Removed | None:
+    """Share of the reducible error that the named causes remove; None where it is unknown."""
     removed, tuned = gain.get("reducible_removed") or {}, gain.get("tuned") or {}
-    if not added:
-        return "<p>No cause was named, so the model stays as it was.</p>"
+    if not _has_extended(gain, named):
+        return Removed("", "No cause was named, so the model stays as it was.")
     if not isinstance(removed.get("value"), (int, float)):
-        return ""
-    ends = (
-        f" ({_percent(removed['low'])} to {_percent(removed['high'])})"
-        if isinstance(removed.get("low"), (int, float))
-        else ""
-    )
-    said = f"<b>{_percent(removed['value'])}</b>{ends} of the error above the noise floor is gone."
+        return None
+    text = " of the error above the noise floor is gone."
+    if isinstance(removed.get("low"), (int, float)):
+        text = f" ({percent(removed['low'])} to {percent(removed['high'])}){text}"
     if isinstance(tuned.get("value"), (int, float)):
-        said += (
-            f" Of that, {_percent(max(0.0, tuned['value']))} also go by fitting the robot's pose, the tool's radius and "
-            "Poisson's ratio within their stated accuracies, with no cause named."
+        text += (
+            f" Of that, {percent(max(0.0, tuned['value']))} also go by fitting the robot's pose, "
+            "the tool's radius and Poisson's ratio within their stated accuracies, "
+            "with no cause named."
         )
-    return f"<p>{said}</p>"
+    return Removed(percent(removed["value"]), text)
 
 
-def sequence_table(rows: Sequence[SequenceErrors]) -> str:
-    """Both models on each sequence; those that nothing was fitted on stand out."""
+def _has_extended(gain: dict[str, Any], named: bool) -> bool:
+    return named or isinstance(gain.get("baseline_network"), (int, float))
+
+
+def sequence_table(rows: Sequence[SequenceErrors]) -> Table:
+    """Errors of both models on each sequence; test sequences are bold."""
     cells = []
     for row in rows:
-        name, split = escape(row.sequence), escape(row.split or "–")
-        name = f"<b>{name}</b>" if row.split == "test" else name
-        cells.append(
-            (
-                name,
-                split,
-                str(row.frames),
-                *map(_millimetres, (row.raw, row.extended, row.noise_floor)),
-                _percent(row.removed),
-            )
-        )
-    return table(
-        ("sequence", "split", "frames", "raw", "extended", "floor", "removed"),
-        cells,
-        (2, 3, 4, 5, 6),
-    )
+        name = Cell(row.sequence, style="b" if row.split == "test" else "")
+        errors = [_millimetres(error) for error in (row.raw, row.extended, row.noise_floor)]
+        cells.append((name, row.split or "–", str(row.frames), *errors, percent(row.removed)))
+    columns = ("sequence", "split", "frames", "raw", "extended", "floor", "removed")
+    return Table(columns, cells, (2, 3, 4, 5, 6))
 
 
-def ranking_table(report: dict[str, Any]) -> str:
-    """What each cause alone removes; those that are named stand out."""
+def ranking_table(report: dict[str, Any]) -> Table:
+    """Error that each cause alone removes, and its probability; named causes are coloured."""
     named = {cause["effect"] for cause in report.get("causes", [])}
     rows = []
     for entry in (report.get("ranking") or [])[:8]:
         removed = entry.get("error_removed")
-        width = 100 * min(1.0, max(0.0, removed or 0.0))
-        kind = " class='extended'" if entry["effect"] in named else ""
-        bar = f"<div class='bar'><i{kind} style='width: {width:.1f}%'></i></div>"
+        length = 100 * min(1.0, max(0.0, removed or 0.0))
+        bar = Bar(length, "extended" if entry["effect"] in named else "")
         rows.append(
-            (_words(entry["effect"]), bar, _percent(removed), _percent(entry.get("probability")))
+            (words(entry["effect"]), bar, percent(removed), percent(entry.get("probability")))
         )
-    return table(("effect", "error removed", "", "probability"), rows, (2, 3)) if rows else ""
+    return Table(("effect", "error removed", "", "probability"), rows, (2, 3))
 
 
-def limit_table(report: dict[str, Any]) -> str:
-    """Each effect's detection limit, and what looks most like it."""
+def limit_table(report: dict[str, Any]) -> Table:
+    """Detection limit of each effect, and the effect that is most similar to it."""
     rows = []
     for row in report.get("ambiguity_map") or []:
-        alike = next((one for one in row["alike"] if one["share"] >= _ALIKE), None)
-        like = (
-            f"{_words(alike['effect'])} ({_percent(alike['share'])})" if alike else "nothing else"
-        )
-        rows.append((_words(row["effect"]), escape(limit_phrase(row)), like))
-    return table(("effect", "would be named from", "looks most like"), rows) if rows else ""
+        alike = next((one for one in row["alike"] if one["share"] >= _SIMILAR), None)
+        like = f"{words(alike['effect'])} ({percent(alike['share'])})" if alike else "nothing else"
+        rows.append((words(row["effect"]), limit_phrase(row), like))
+    return Table(("effect", "would be named from", "looks most like"), rows)
 
 
-def control_list(report: dict[str, Any]) -> str:
-    """One sentence for each thing that the controls say."""
-    return _list(control_sentences(report.get("controls") or []))
+def unidentifiable_texts(report: dict[str, Any]) -> list[str]:
+    """Each effect that the data cannot show: why, and what to measure instead."""
+    texts = []
+    for row in report.get("not_identifiable") or []:
+        text = f"{words(row['effect'])}: {row.get('why', '')}"
+        if row.get("measure_instead"):
+            text += f"; measure instead: {row['measure_instead']}"
+        texts.append(text)
+    return texts
 
 
-def probe_list(report: dict[str, Any]) -> str:
-    """What to measure next, what would tell most first."""
-    return _list([probe_sentence(row) for row in report.get("next_probe") or []])
-
-
-def untold_list(report: dict[str, Any]) -> str:
-    """What cannot be told, why, and what would tell it."""
-    rows = report.get("not_identifiable") or []
-    return _list(
-        [
-            f"{one['effect'].replace('_', ' ')}: {one.get('why', '')}"
-            + (f"; measure instead: {one['measure_instead']}" if one.get("measure_instead") else "")
-            for one in rows
-        ]
-    )
-
-
-def _list(lines: Sequence[str]) -> str:
-    return (
-        f"<ul>{''.join(f'<li>{escape(_capital(line))}</li>' for line in lines)}</ul>"
-        if lines
-        else ""
-    )
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
-def _words(name: str) -> str:
-    return escape(name.replace("_", " "))
-
-
-def _percent(value: Any) -> str:
+def percent(value: Any) -> str:
+    """A share [1] as a percentage; a dash where it is no number."""
     if not isinstance(value, (int, float)):
         return "–"
     return f"more than 99{NARROW}%" if 0.995 < value < 1.0 else f"{100 * value:.0f}{NARROW}%"

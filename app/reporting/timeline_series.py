@@ -18,9 +18,9 @@ from palpate.foundation.errors import PalpateError
 __all__ = [
     "by_model",
     "contact_force",
-    "timeline_series",
     "models_of",
     "push_depth",
+    "timeline_series",
     "touching",
     "worst_frames",
 ]

@@ -19,9 +19,9 @@ __all__ = [
     "Figure",
     "LabelFigure",
     "LinesFigure",
-    "SurfaceFigure",
     "PointArray",
     "Rgb",
+    "SurfaceFigure",
     "ToolFigure",
     "checksum",
 ]

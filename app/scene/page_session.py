@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from palpate.recording.interactive import InteractiveFrame
     from palpate.recording.resolve_frame import ResolvedFrame
 
-__all__ = ["Session", "Sessions", "InteractiveOverride", "FrameOverride"]
+__all__ = ["FrameOverride", "InteractiveOverride", "Session", "Sessions"]
 
 log = logging.getLogger(__name__)
 MOST_RENDERERS = 6

@@ -23,7 +23,7 @@ from palpate.app.scene.viewpoint import FIELD_OF_VIEW, Viewpoint
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-__all__ = ["RecordingScene", "PageScene", "ViserScene"]
+__all__ = ["PageScene", "RecordingScene", "ViserScene"]
 
 POINT_SIZE = 0.00026
 SHAFT = 0.022

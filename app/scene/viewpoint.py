@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["FIELD_OF_VIEW", "LOOKS", "Viewpoint", "Direction", "lookout"]
+__all__ = ["FIELD_OF_VIEW", "LOOKS", "Direction", "Viewpoint", "lookout"]
 
 Direction = Literal["reset", "top", "front", "side"]
 LOOKS: tuple[Direction, ...] = get_args(Direction)

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from palpate.app.reporting.quantities import NARROW, measured, quantity, with_interval
+from palpate.app.reporting.quantities import NARROW, value_and_ends, quantity, with_interval
 
 
 def _plain(text: str) -> str:
@@ -52,12 +52,14 @@ def test_value_without_an_interval_stands_alone() -> None:
 
 
 def test_value_without_bounds_is_said_and_no_error() -> None:
-    assert measured({"value": float("inf"), "low": 2.0, "high": float("inf"), "unit": "1"}) == (
-        "inf",
-        "2",
-        "",
-    )
+    assert value_and_ends(
+        {"value": float("inf"), "low": 2.0, "high": float("inf"), "unit": "1"}
+    ) == ("inf", "2", "")
 
 
 def test_open_end_is_left_empty_and_the_other_told() -> None:
-    assert measured({"value": 3.2, "low": 2.1, "high": None, "unit": "1"}) == ("3.20", "2.10", "")
+    assert value_and_ends({"value": 3.2, "low": 2.1, "high": None, "unit": "1"}) == (
+        "3.20",
+        "2.10",
+        "",
+    )

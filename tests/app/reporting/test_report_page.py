@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from palpate.app.cli import app
 from palpate.app.reporting.report_page import report_page
-from palpate.app.reporting.report_tables import ladder_bars
+from palpate.app.reporting.report_tables import ladder_steps, removed_share
 from palpate.app.storage.run_store import Run
 from palpate.foundation.errors import RunError
 
@@ -100,24 +100,25 @@ def test_what_a_dataset_says_is_never_markup(run: Run) -> None:
 
 def test_bars_are_as_long_as_the_errors() -> None:
     gain = {"unit": "mm", "baseline": 0.4, "extended": 0.3, "noise_floor": 0.1}
-    assert re.findall(r"width: ([\d.]+)%", ladder_bars(gain, named=True)) == [
-        "100.0",
-        "75.0",
-        "25.0",
-    ]
-    assert re.findall(r"width: ([\d.]+)%", ladder_bars(gain, named=False)) == ["100.0", "25.0"]
-    assert ladder_bars({}, named=True) == ""
+    lengths = [step.percent for step in ladder_steps(gain, named=True)]
+    assert lengths == pytest.approx([100.0, 75.0, 25.0])
+    assert [step.percent for step in ladder_steps(gain, named=False)] == [100.0, 25.0]
+    assert ladder_steps({}, named=True) == []
 
 
-def test_tuning_alone_is_told_beside_the_gain() -> None:
+def test_tuning_alone_is_told_beside_the_gain(run: Run) -> None:
     gain = {
         "baseline": 0.4,
         "extended": 0.3,
         "reducible_removed": {"value": 0.5, "low": 0.4, "high": 0.6},
         "tuned": {"value": 0.12},
     }
-    said = ladder_bars(gain, named=True).replace("\N{NO-BREAK SPACE}", " ")
-    assert "50 %</b> (40 % to 60 %)" in said and "Of that, 12 %" in said
+    removed = removed_share(gain, named=True)
+    assert removed is not None
+    text = removed.text.replace("\N{NO-BREAK SPACE}", " ")
+    assert removed.share.startswith("50") and "(40 % to 60 %)" in text and "Of that, 12 %" in text
+    page = report_page(changed(run, gain=gain)).replace("\N{NO-BREAK SPACE}", " ")
+    assert "50 %</b> (40 % to 60 %)" in page
 
 
 def test_page_over_rest_is_a_download(client: httpx.Client, run_name: str) -> None:
