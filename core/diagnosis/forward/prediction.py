@@ -1,4 +1,4 @@
-"""Prediction of a sequence with clouds under a setup: gaps of surface patches, and their Jacobian."""
+"""Prediction of a sequence with clouds: gaps of surface patches, forces, and their Jacobian."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.frame_groups import Group
-from palpate.diagnosis.observation.stray_points import agrees_with_neighbours
+from palpate.diagnosis.observation.outlier_patches import agrees_with_neighbours
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.patch_averages import PatchMeans, plain_means, within_spread

@@ -1,9 +1,8 @@
-"""Sequences without clouds: what the force says at chosen instants of each short push.
+"""Observations of sequences that have forces and no clouds.
 
-A push that presses and holds says two things: how hard the body resists at full depth, averaged
-over the hold, and at half of it on the way in, which tells a body that stiffens from a tool that
-came a little deeper than it was told. Nothing else is kept; thousands of samples between them say
-the same again.
+Two values of each push are used: the force at full depth, averaged over the hold, and the force at
+about half of that depth on the way in. The second one separates a body that stiffens from a tool
+that came a little deeper than stated. The samples between them carry no further information.
 """
 
 from __future__ import annotations
@@ -29,14 +28,19 @@ from palpate.setup.setup import Setup
 
 __all__ = ["deepest_rows", "observe_each", "observe_forces", "pushed_places"]
 
-_NOTHING = np.empty((0, 3))
+_NO_POINTS = np.empty((0, 3))
 
 
 def observe_forces(sequence: Sequence, setup: Setup, most: int) -> Observations:
-    """Instants of a sequence's pushes, at most so many groups of them, with its forces.
+    """Choose the instants of a sequence's pushes that are compared.
 
-    Raises DiagnosisError where the sensor is never clear of the body, so that its bias is unknown,
-    or where nothing is pushed.
+    Args:
+        sequence: with forces.
+        setup: as stated.
+        most: largest number of groups.
+
+    Raises DiagnosisError if the tool is never clear of the body, so that the sensor's bias is
+    unknown, or if nothing is pushed.
     """
     home = f"sequences/{sequence.name}"
     if sequence.forces is None:
@@ -48,8 +52,8 @@ def observe_forces(sequence: Sequence, setup: Setup, most: int) -> Observations:
     record = ForceRecord.of(stream, clear)
     if record is None:
         raise DiagnosisError(
-            f"{home}/forces.csv: the tool is hardly ever clear of the phantom, so that the sensor's bias is unknown; record "
-            "a second or more before it touches",
+            f"{home}/forces.csv: the tool is hardly ever clear of the phantom, so that the "
+            "sensor's bias is unknown; record a second or more before it touches",
             file=f"{home}/forces.csv",
         )
     begin, end = max(clock.time[0], stream.time[0]), min(clock.time[-1], stream.time[-1])
@@ -59,31 +63,30 @@ def observe_forces(sequence: Sequence, setup: Setup, most: int) -> Observations:
     if not pushes:
         deepest = 1e3 * float(depth.max(initial=-np.inf))
         raise DiagnosisError(
-            f"{home}: nothing is pressed by {1e3 * CRITERIA.force_only.least_depth:.1f} mm or more (at most {deepest:.2f} mm into the phantom as "
-            "stated); check touches.csv and the surface, or leave it out of [splits]",
+            f"{home}: nothing is pressed by {1e3 * CRITERIA.force_only.least_depth:.1f} mm or more "
+            f"(at most {deepest:.2f} mm into the phantom as stated); check touches.csv and the "
+            "surface, or leave it out of [splits]",
             file=home,
         )
-    instants, groups = _instants(times, depth, _kept(pushes, most))
+    instants, groups = _instants(times, depth, _thinned(pushes, most))
     return Observations(sequence.name, instants, clock, groups, record, force_only=True)
 
 
 def _gap(setup: Setup, centres: FloatArray) -> FloatArray:
-    """Between the tool and the phantom as stated (m,) [m], of centres (m, 3) [m] in the robot
-    frame.
-    """
+    """Distance (m,) [m] between tool and stated phantom, from centres (m, 3) [m], robot frame."""
     return setup.geometry.facing(setup.phantom_from_robot.apply(centres))[0] - setup.tool.radius
 
 
 def _pushes(depth: FloatArray) -> list[slice]:
-    """Runs of the path that are in touch and go deep enough."""
+    """Runs of the path (t,) [m] in contact that are deep enough."""
     touching = np.concatenate([[False], depth > 0, [False]])
     edges = np.flatnonzero(np.diff(touching.astype(int)))
     runs = [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
     return [run for run in runs if depth[run].max() >= CRITERIA.force_only.least_depth]
 
 
-def _kept(pushes: list[slice], most: int) -> list[slice]:
-    """As many pushes as `most` groups hold, evenly spread."""
+def _thinned(pushes: list[slice], most: int) -> list[slice]:
+    """Evenly spread pushes, as many as `most` groups can hold."""
     count = max(1, most // (1 + len(CRITERIA.force_only.depth_shares)))
     chosen = np.unique(np.linspace(0, len(pushes) - 1, min(count, len(pushes))).round().astype(int))
     return [pushes[number] for number in chosen]
@@ -92,29 +95,27 @@ def _kept(pushes: list[slice], most: int) -> list[slice]:
 def _instants(
     times: FloatArray, depth: FloatArray, pushes: list[slice]
 ) -> tuple[FloatArray, tuple[Group, ...]]:
-    """Times (f,) [s] and the groups of them: each push on its way in, and held."""
+    """Times (f,) [s] of the instants, and their groups: each push on the way in, and held."""
     found, groups, count = [], [], 0
     for probe, run in enumerate(pushes, start=1):
         own, when = depth[run], times[run]
         full = int(own.argmax())
         for share in CRITERIA.force_only.depth_shares:
-            # The last time that it was shallower: a tool may hover and come back.
+            # The last time at which it was shallower, because a tool may hover and come back.
             before = np.flatnonzero(own[: full + 1] < share * own[full])
             if len(before) and before[-1] + 1 < full:
                 found.append(when[before[-1] + 1])
-                groups.append(Group((count,), _NOTHING, False, probe=probe))
+                groups.append(Group((count,), _NO_POINTS, False, probe=probe))
                 count += 1
         held = _held(when, own, full)
         found += held.tolist()
-        groups.append(Group(tuple(range(count, count + len(held))), _NOTHING, False, probe=probe))
+        groups.append(Group(tuple(range(count, count + len(held))), _NO_POINTS, False, probe=probe))
         count += len(held)
     return np.array(found), tuple(groups)
 
 
 def _held(when: FloatArray, depth: FloatArray, full: int) -> FloatArray:
-    """Instants [s] about the deepest while the tool is held there, so far apart that their averages
-    share no sample.
-    """
+    """Instants [s] of the hold at full depth, so far apart that their averages share no sample."""
     low = high = full
     while low > 0 and depth[low - 1] > depth[full] - CRITERIA.force_only.hold_tolerance:
         low -= 1
@@ -136,8 +137,8 @@ def _held(when: FloatArray, depth: FloatArray, full: int) -> FloatArray:
 
 
 def pushed_places(data: Ordered[Observations], setup: Setup) -> tuple[FloatArray, FloatArray]:
-    """Places (k, 3) [m] of the stated surface that are pushed, one for each push without clouds,
-    and the outward normals (k, 3).
+    """Places (k, 3) [m] of the k pushes without clouds on the stated surface, and the outward
+    normals (k, 3).
     """
     places, normals = [], []
     for item in data:
@@ -154,7 +155,7 @@ def pushed_places(data: Ordered[Observations], setup: Setup) -> tuple[FloatArray
 
 
 def deepest_rows(item: Observations) -> list[int]:
-    """For each push the row of the group in which it is held, in their order."""
+    """Number of the group in which each push is held, in the order of the pushes."""
     last = {group.probe: row for row, group in enumerate(item.groups)}
     return list(last.values())
 
@@ -168,8 +169,16 @@ def observe_each(
     report: Report = silent,
     begin: Callable[..., Future[Observations]] = at_once,
 ) -> list[Observations]:
-    """Observations of these sequences, with clouds or without, at most so many groups of each;
-    `begin` as of `observe_all`.
+    """Observe sequences with and without clouds.
+
+    Args:
+        dataset: that holds them.
+        names: of the sequences.
+        setup: as stated.
+        registration: of camera and robot.
+        most: largest number of groups of a sequence with clouds, and of one without.
+        report: progress.
+        begin: starts a task, as in `observe_all`.
     """
     seen = [name for name in names if len(dataset.sequence(name))]
     known = observe_all(dataset, seen, setup, registration, most[0], report, begin) if seen else []

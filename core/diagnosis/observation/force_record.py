@@ -1,10 +1,9 @@
-"""Forces as one more measurement: what the sensor in the tool says without its bias, and what a
-model makes of it.
+"""Measured forces without the sensor's bias, and their comparison with simulated ones.
 
-A force sensor is off by a bias that wanders. While the tool is clear of the block it shows nothing
-else; in between the bias is taken to lie on the straight way, and may have strayed from it as a
-random walk does, whose rate the untouched stretches show. How well the engine knows a force is
-stated beside that: each push by a common factor, each place by a little of its own.
+The sensor's bias wanders. While the tool is clear of the phantom the sensor reads the bias alone.
+In between the bias is interpolated linearly, with the variance of a Brownian bridge whose rate is
+estimated from the untouched stretches. The engine's own error of a force is one common factor for
+each push, and a smaller independent error for each group.
 """
 
 from __future__ import annotations
@@ -36,24 +35,27 @@ BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 @dataclass(frozen=True, eq=False)
 class ForceRecord:
-    """The forces of one sequence, robot frame, and how well they are known.
+    """The forces of one sequence, robot frame, and their variances.
 
     Attributes:
         time: (n,) [s].
-        force: (n, 3) on the tool, its bias taken off [N].
-        white: variance of an average over the usual time [N^2].
-        strayed: (n,) variance of the bias about what was taken off [N^2].
+        force: (n, 3) on the tool, without bias [N].
+        white: variance of an average over the smoothing time [N^2].
+        bias_variance: (n,) variance of the interpolated bias [N^2].
     """
 
     time: FloatArray
     force: FloatArray
     white: float
-    strayed: FloatArray
+    bias_variance: FloatArray
 
     @classmethod
     def of(cls, forces: Forces, untouched: BoolArray) -> ForceRecord | None:
-        """From a stream and at which of its stamps (n,) the tool is surely clear; None where it
-        hardly ever is.
+        """Remove the bias of a stream; None if the tool is hardly ever clear.
+
+        Args:
+            forces: the stream.
+            untouched: (n,) stamps at which the tool is surely clear of the phantom.
         """
         time, force = forces.time, forces.force
         centre, mean, count = _readings(time, force, untouched)
@@ -67,25 +69,23 @@ class ForceRecord:
             time,
             free,
             _white(time, free, untouched, sample),
-            _strayed(time, centre, rate, sample / count),
+            _bias_variance(time, centre, rate, sample / count),
         )
 
     def at(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Force (m, 3) [N] at times (m,) [s], averaged as the tool's place is, and the bias's
-        variance (m,) [N^2].
-
-        NaN beyond the stream.
+        variance (m,) [N^2]. The force is NaN beyond the stream.
         """
         known = (times >= self.time[0]) & (times <= self.time[-1])
         force = np.where(known[:, None], averaged(self.time, self.force, times), np.nan)
-        return force, np.interp(times, self.time, self.strayed)
+        return force, np.interp(times, self.time, self.bias_variance)
 
 
 def _readings(
     time: FloatArray, force: FloatArray, untouched: BoolArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Time (c,) [s] and mean (c, 3) [N] of each untouched stretch, none longer than _CELL, and its
-    samples (c,).
+    """Bias readings: time (c,) [s], mean (c, 3) [N] and number of samples (c,) of each untouched
+    stretch, which is cut at the longest interval of a reading.
     """
     run = np.cumsum(np.diff(untouched.astype(int), prepend=0) == 1)
     start = np.full(run.max() + 1, time[0])
@@ -106,15 +106,17 @@ def _readings(
 
 
 def _wandering(centre: FloatArray, mean: FloatArray, variance: FloatArray) -> float:
-    """Rate [N^2/s] of the random walk that the readings' differences show beyond their noise."""
+    """Rate [N^2/s] of the bias's random walk, from the readings' differences beyond their noise."""
     if len(centre) < 2:
         return 0.0
     beyond = (np.diff(mean, axis=0) ** 2).mean(axis=1) - variance[1:] - variance[:-1]
     return max(float(beyond.sum() / np.diff(centre).sum()), 0.0)
 
 
-def _strayed(time: FloatArray, centre: FloatArray, rate: float, variance: FloatArray) -> FloatArray:
-    """Variance (n,) [N^2] of a bridge of the random walk between readings, and of these."""
+def _bias_variance(
+    time: FloatArray, centre: FloatArray, rate: float, variance: FloatArray
+) -> FloatArray:
+    """Variance (n,) [N^2] of the Brownian bridge between readings, plus that of the readings."""
     after = np.clip(np.searchsorted(centre, time), 0, len(centre) - 1)
     before = np.where(time < centre[after], np.maximum(after - 1, 0), after)
     back, ahead = np.abs(time - centre[before]), np.abs(centre[after] - time)
@@ -123,9 +125,7 @@ def _strayed(time: FloatArray, centre: FloatArray, rate: float, variance: FloatA
 
 
 def _white(time: FloatArray, force: FloatArray, untouched: BoolArray, sample: float) -> float:
-    """Variance [N^2] of averages over the usual time, from whole windows of it in which nothing was
-    touched.
-    """
+    """Variance [N^2] of averages over the smoothing time, from whole untouched windows."""
     step = float(np.median(np.diff(time)))
     width = max(round(2 * SMOOTHING / step), 1)
     whole = len(time) // width * width
@@ -140,15 +140,14 @@ def _white(time: FloatArray, force: FloatArray, untouched: BoolArray, sample: fl
 
 @dataclass(frozen=True, eq=False)
 class ForceComparison:
-    """The forces of a sequence's groups under one setup, phantom frame.
+    """Measured and simulated forces of a sequence's g groups under one setup, phantom frame.
 
     Attributes:
         gap: (g, 3) measured minus simulated force on the tool [N]; NaN where none was measured.
-        noise: (g,) its deviation [N].
+        noise: (g,) standard deviation of one component of the measured force [N].
         force: (g, 3) simulated [N].
-        columns: (g, 3, k) change of gap by what the columns of the surface's gap stand for.
-        push: (g,) number of each group's push, from 1; None where a push ends with a group that is
-            clear.
+        columns: (g, 3, k) change of gap, with the same columns as the surface's gap.
+        push: (g,) number of each group's push, from 1; None if a clear group ends each push.
     """
 
     gap: FloatArray
@@ -165,22 +164,27 @@ class ForceComparison:
         columns: Sequence[Any],
         push: IntArray | None = None,
     ) -> ForceComparison:
-        """From forces and their deviations, a model's frames, and the changes (3, k) of each, if
-        any.
+        """Compare forces with a model.
+
+        Args:
+            measured: forces (g, 3) and their standard deviations (g,) [N].
+            frames: the model's equilibria.
+            columns: for each group its changes (3, k); may be empty.
+            push: (g,) number of each group's push.
         """
         force = np.array([frame.force if frame.in_contact else np.zeros(3) for frame in frames])
         stacked: FloatArray = np.stack(columns) if columns else np.zeros((len(frames), 3, 0))
         return cls(measured[0] - force, measured[1], force, stacked, push)
 
     def of_groups(self, index: list[int]) -> ForceComparison:
-        """These groups alone."""
+        """Return the comparison of these groups alone."""
         push = None if self.push is None else self.push[index]
         return ForceComparison(
             self.gap[index], self.noise[index], self.force[index], self.columns[index], push
         )
 
     def scaled(self, factor: float) -> ForceComparison:
-        """Of a body so many times as stiff: a simulated force goes with the modulus."""
+        """Scale the simulated forces, which are proportional to Young's modulus."""
         return replace(
             self,
             gap=self.gap + (1 - factor) * self.force,
@@ -189,18 +193,18 @@ class ForceComparison:
         )
 
     def append_columns(self, added: FloatArray) -> ForceComparison:
-        """With further columns (g, 3, m) last."""
+        """Append columns (g, 3, m)."""
         return replace(self, columns=np.concatenate([self.columns, added], axis=2))
 
 
 def force_scatter(forces: ForceComparison) -> FloatArray:
-    """Variance (g, 3) [N^2] of each measured force: the sensor's, and the engine's own."""
+    """Variance (g, 3) [N^2] of each force: the sensor's, and the engine's own."""
     engine = CRITERIA.force_error.group_error * np.linalg.norm(forces.force, axis=1)
     return np.repeat((forces.noise**2 + engine**2)[:, None], 3, axis=1)
 
 
 def force_discrepancy(forces: ForceComparison, frames: Sequence[Equilibrium]) -> FloatArray:
-    """Columns (g, 3, pushes) [N] of the engine's own error, one for each push, of unit variance."""
+    """Columns (g, 3, pushes) [N] of the engine's relative error of each push, of unit variance."""
     return np.asarray(
         CRITERIA.force_error.push_error
         * forces.force[:, :, None]
@@ -209,9 +213,7 @@ def force_discrepancy(forces: ForceComparison, frames: Sequence[Equilibrium]) ->
 
 
 def depth_discrepancy(forces: ForceComparison, frames: Sequence[Equilibrium]) -> FloatArray:
-    """Columns (g, 3, pushes) [N] of how deep each push really went, along its force, of unit
-    variance.
-    """
+    """Columns (g, 3, pushes) [N] of the error of each push's depth, of unit variance."""
     along = forces.force / np.maximum(np.linalg.norm(forces.force, axis=1, keepdims=True), 1e-12)
     deeper = np.einsum("gik,gk->gi", forces.columns[..., :3], along)
     return np.asarray(
@@ -222,7 +224,7 @@ def depth_discrepancy(forces: ForceComparison, frames: Sequence[Equilibrium]) ->
 
 
 def _pushes(forces: ForceComparison, frames: Sequence[Equilibrium]) -> BoolArray:
-    """Which groups belong to which push (g, pushes)."""
+    """Membership (g, pushes) of groups in pushes."""
     touched = np.array([frame.in_contact for frame in frames])
     push = (
         np.cumsum(np.diff(touched.astype(int), prepend=0) == 1)
@@ -233,8 +235,8 @@ def _pushes(forces: ForceComparison, frames: Sequence[Equilibrium]) -> BoolArray
 
 
 def rms_force(forces: Sequence[tuple[ForceComparison, BoolArray]]) -> tuple[float, float]:
-    """RMS length of measured minus simulated force [N] over groups chosen by masks (g,), and that
-    of the sensor's noise.
+    """RMS length of measured minus simulated force [N] over groups that masks (g,) choose, and RMS
+    length of the sensor's noise.
     """
     gaps = np.concatenate([one.gap[chosen] for one, chosen in forces])
     noise = np.concatenate([one.noise[chosen] for one, chosen in forces])

@@ -1,5 +1,6 @@
-"""What a sequence says, grouped: frames with the tool at nearly one place share one equilibrium and
-one set of patch averages.
+"""Observations of a sequence in groups of frames.
+
+Frames with the tool at nearly one place share one equilibrium and one set of patch averages.
 """
 
 from __future__ import annotations
@@ -28,12 +29,13 @@ from palpate.setup.setup import Setup
 __all__ = ["Group", "Observations", "observe", "observe_all"]
 
 FAR = np.array([0.0, 0.0, 10.0])
-"""Where the tool is said to be when there is none [m]."""
+"""Place that stands for a tool which is not there [m]."""
 
 
 def _depth(size: tuple[float, float, float], centres: FloatArray) -> FloatArray:
-    """How far points (m, 3) lie below the nearest side of the stated block (m,) [m], negative
-    outside; the base does not count.
+    """Depth (m,) [m] of points (m, 3) below the nearest side of the stated block, negative outside.
+
+    The base does not count as a side.
     """
     sides = np.array([size[0] / 2, size[1] / 2]) - np.abs(centres[:, :2])
     inside = np.minimum(sides.min(axis=1), size[2] - centres[:, 2])
@@ -46,12 +48,12 @@ class Group:
 
     Attributes:
         frames: their numbers.
-        points: (n, 3) cleaned points of all of them [m], camera frame.
-        free: whether the tool is surely clear of the block.
-        reference: whether this is the rest cloud instead, taken when the camera was registered and
-            without a tool.
-        probe: which push of the sequence this belongs to.
-        lowest: height of the lowest points of a side that are free of the table's [m].
+        points: (n, 3) segmented points of all of them [m], camera frame.
+        free: whether the tool is surely clear of the phantom.
+        reference: whether this is the rest cloud, which was taken without a tool when the camera
+            was registered.
+        probe: number of the push that the group belongs to; 0 before the first.
+        lowest: height of the lowest points of a side that are surely not of the table [m].
     """
 
     frames: tuple[int, ...]
@@ -64,15 +66,15 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """One sequence as the diagnosis sees it.
+    """One sequence as the diagnosis uses it.
 
     Attributes:
-        times: (f,) cloud stamps [s].
+        name: of the sequence.
+        times: (f,) stamps of the clouds, or instants of the pushes [s].
         kinematics: the robot's stream.
         groups: in the order of time.
-        forces: on the tool, if they were measured.
-        force_only: whether there are no clouds, so that groups hold instants of the pushes and no
-            points.
+        forces: on the tool; None where none were measured.
+        force_only: whether there are forces and no clouds, so that groups have no points.
     """
 
     name: str
@@ -83,7 +85,7 @@ class Observations:
     force_only: bool = False
 
     def centres(self, setup: Setup) -> FloatArray:
-        """Stated tool centre (g, 3) [m] of each group, phantom frame, under the setup's clock and
+        """Stated tool centre (g, 3) [m] of each group, phantom frame, by the setup's clock and
         registration.
         """
         places = self._places(setup)
@@ -92,13 +94,13 @@ class Observations:
         )
 
     def _places(self, setup: Setup) -> FloatArray:
-        """The same (f, 3) [m] of each frame."""
+        """Stated tool centre (f, 3) [m] of each frame, phantom frame."""
         return setup.phantom_from_robot.apply(
             smooth_centres(self.kinematics, self.times - setup.sensor.time_offset)
         )
 
     def instant(self, group: Group, setup: Setup) -> float | None:
-        """When a group's frames were taken, on the robot's clock [s]; None for the rest cloud."""
+        """Mean time of a group's frames on the robot's clock [s]; None for the rest cloud."""
         return (
             float(self.times[list(group.frames)].mean()) - setup.sensor.time_offset
             if group.frames
@@ -106,10 +108,10 @@ class Observations:
         )
 
     def grouping_holds(self, setup: Setup) -> bool:
-        """Whether under this setup's clock every frame was taken about where its group is replayed.
+        """Whether the grouping is valid under this setup's clock.
 
-        That is within TRAVEL of the group's place, or with the tool out of touch where it is said
-        to be clear of the block.
+        It is valid if the tool of every frame is near its group's place
+        (`CRITERIA.grouping.travel`), or out of contact in a group that counts as clear.
         """
         if self.force_only:
             return True
@@ -126,8 +128,8 @@ class Observations:
         return True
 
     def path(self, setup: Setup) -> tuple[FloatArray, FloatArray]:
-        """Times (t,) [s] of the recording, on the robot's clock, and stated tool centres (t, 3)
-        [m], phantom frame.
+        """Sample the tool's path: times (t,) [s] on the robot's clock, and stated tool centres
+        (t, 3) [m], phantom frame.
         """
         times = (
             np.arange(self.times[0], self.times[-1], CRITERIA.grouping.path_step)
@@ -138,34 +140,35 @@ class Observations:
     def force_in_groups(
         self, phantom_from_robot: Transform, late: float
     ) -> tuple[FloatArray, FloatArray] | None:
-        """Force on the tool (g, 3) [N] in each group, phantom frame, and its standard deviation
-        (g,) [N]; NaN where none is known.
+        """Measured force on the tool (g, 3) [N] in each group, phantom frame, and its standard
+        deviation (g,) [N]; NaN where none is known. None without a force record.
 
-        `late` is the cloud stamp minus the robot's of one instant [s]. Forces and poses have one
-        clock. Where the camera's is off, both are those of another instant, and still of the same
-        one.
+        Args:
+            phantom_from_robot: pose of the robot.
+            late: cloud stamp minus robot stamp of one instant [s]. Forces and poses have one
+                clock, so that both are those of the same instant whatever the camera's clock is.
         """
         if self.forces is None:
             return None
-        measured, strayed = self.forces.at(self.times - late)
+        measured, bias_variance = self.forces.at(self.times - late)
         frames = [list(group.frames) for group in self.groups]
         force = np.array(
             [measured[one].mean(axis=0) if one else np.full(3, np.nan) for one in frames]
         )
         variance = [
-            self.forces.white / len(one) + strayed[one].mean() if one else np.nan for one in frames
+            self.forces.white / len(one) + bias_variance[one].mean() if one else np.nan
+            for one in frames
         ]
         return force @ phantom_from_robot.rotation.T, np.sqrt(variance)
 
     def deepest_places(self, setup: Setup) -> list[int | None]:
-        """For each group at which place of the `path` the tool was deepest since the group before;
-        None where that is its own place.
+        """For each group the place on `path` at which the tool was deepest since the group before;
+        None where that is the group's own place.
 
-        A base that slides has gone as far as the deepest push took it, whether a cloud was taken
-        there or not.
+        The deepest push determines how far a base slides, even if no cloud was taken there.
         """
-        times, way = self.path(setup)
-        depths = _depth(setup.box.size, way)
+        times, path = self.path(setup)
+        depths = _depth(setup.box.size, path)
         found: list[int | None] = []
         last = np.inf
         for group, centre in zip(self.groups, self.centres(setup), strict=True):
@@ -184,8 +187,13 @@ class Observations:
 
 
 def _split(centres: FloatArray, free: np.ndarray, times: FloatArray) -> list[list[int]]:
-    """Runs of frames: all clear of the block, and about as long after a release; or within TRAVEL
-    of the run's first.
+    """Split frames into runs: clear of the phantom and about as long after a release, or near the
+    first frame's place (`CRITERIA.grouping.travel`).
+
+    Args:
+        centres: (f, 3) of the tool [m].
+        free: (f,) whether the tool is clear.
+        times: (f,) [s].
     """
     runs: list[list[int]] = []
     released = -np.inf
@@ -213,7 +221,7 @@ def _split(centres: FloatArray, free: np.ndarray, times: FloatArray) -> list[lis
 
 
 def _thin(runs: list[list[int]], free: np.ndarray, most: int) -> list[list[int]]:
-    """Keep all runs clear of the block and at most `most` of the others, evenly spread."""
+    """Keep all runs that are clear of the phantom and at most `most` others, evenly spread."""
     touched = [run for run in runs if not free[run[0]]]
     if len(touched) <= most:
         return runs
@@ -232,11 +240,14 @@ def observe(
     most: int,
     rest: FloatArray | None = None,
 ) -> Observations:
-    """Group a sequence's frames by where the tool was under the setup's clock, and clean their
-    clouds.
+    """Group a sequence's frames by the tool's place, and segment their clouds.
 
     Args:
-        most: groups with the tool near the block, at most.
+        sequence: with clouds.
+        setup: as stated; its clock places the tool.
+        cleaner: segments clouds.
+        shaft: axis of the tool's shaft (3,), tool frame; None if unknown.
+        most: largest number of groups with the tool near the phantom.
         rest: the raw rest cloud, which becomes the first group.
     """
     kinematics, times = sequence.kinematics, np.asarray(sequence.cloud_times)
@@ -289,9 +300,7 @@ def observe(
 
 
 def _forces(sequence: Sequence, setup: Setup) -> ForceRecord | None:
-    """The sequence's forces without their bias, which shows wherever the tool is clear of the block
-    as stated.
-    """
+    """The sequence's forces without bias; None without forces, or if the tool is never clear."""
     if sequence.forces is None:
         return None
     centres = setup.phantom_from_robot.apply(
@@ -311,8 +320,16 @@ def observe_all(
     report: Report = silent,
     begin: Callable[..., Future[Observations]] = at_once,
 ) -> list[Observations]:
-    """Observations of these sequences; `begin` is where `observe` is carried out, as in a pool of
-    processes.
+    """Observe sequences with clouds.
+
+    Args:
+        dataset: that holds them.
+        names: of the sequences.
+        setup: as stated.
+        registration: of camera and robot.
+        most: largest number of groups with the tool near the phantom, in each sequence.
+        report: progress.
+        begin: starts `observe`, for instance in a pool of processes.
     """
     cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration)
     rest = dataset.rest_cloud() if dataset.has_rest else None

@@ -12,12 +12,12 @@ from virtual_push import hide, simulate_push
 from palpate.dataset import Forces, open_dataset
 from palpate.dataset.tool_smoothing import SMOOTHING
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS, Wanted
+from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS, JacobianRequest
 from palpate.diagnosis.forward.prediction import predict
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.inference.credible_intervals import modulus_interval
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.observation.force_record import (
     ForceComparison,
     ForceRecord,
@@ -31,7 +31,7 @@ from palpate.effects.elastic_material import StiffInclusion, YoungModulus
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.frames import Transform
 from palpate.mesh.graded_mesh import REPLAY_GRID
-from palpate.registration.registration import small_motion
+from palpate.registration.pose import small_motion
 from palpate.replay.replay import replay
 from palpate.setup.setup import Inclusion, Setup, Tool
 
@@ -80,7 +80,7 @@ def test_noise_of_an_average_is_that_of_the_samples_in_it():
     record = ForceRecord.of(forces, untouched)
     assert record is not None
     assert np.sqrt(record.white) == pytest.approx(NOISE / np.sqrt(2 * SMOOTHING * RATE), rel=0.1)
-    assert record.strayed.max() < (1.5 * NOISE / np.sqrt(RATE)) ** 2
+    assert record.bias_variance.max() < (1.5 * NOISE / np.sqrt(RATE)) ** 2
 
 
 def test_sensor_that_is_never_clear_of_the_block_says_nothing():
@@ -119,7 +119,7 @@ STIFFER, LATER = (
     YoungModulus(E=5.005e3).apply(SETUP),
     replace(SETUP, sensor=replace(SETUP.sensor, time_offset=1e-4)),
 )
-WANTED = Wanted(
+WANTED = JacobianRequest(
     setups=(replace(SETUP, tool=Tool(radius=5.0003e-3)), STIFFER, LATER),
     steps=(3e-7, float(np.log(1.001)), 1e-4),
     lumps=(LUMP,),
@@ -255,30 +255,30 @@ def _cloud(rest: FloatArray, faces: IntArray, moved: FloatArray, seed: int) -> F
 
 
 @pytest.fixture(scope="module")
-def bench() -> Iterator[Bench]:
+def evaluator() -> Iterator[Evaluator]:
     """Two short sequences with forces, each with a clear tool first, and two pushes."""
     data = [_sequence("poke-01", False, DEPTHS[1]), _sequence("side-01", True, DEPTHS[1])]
     with Workers(data, 1) as workers:
         names = [item.name for item in data]
-        yield Bench(SETUP, registration(), workers, names, None, QUICK, QUICK.finer(), forces=True)
+        yield Evaluator(SETUP, registration(), workers, names, None, QUICK, QUICK.finer(), forces=True)
 
 
 @pytest.fixture(scope="module")
-def baseline(bench) -> Model:
-    return bench.baseline((), LUMPS)
+def baseline(evaluator) -> Model:
+    return evaluator.baseline((), LUMPS)
 
 
-def test_modulus_is_told_from_forces_whatever_was_stated(bench, baseline):
-    interval = modulus_interval(bench, baseline)
+def test_modulus_is_told_from_forces_whatever_was_stated(evaluator, baseline):
+    interval = modulus_interval(evaluator, baseline)
     assert interval is not None
     value, low, high = interval
     assert value == pytest.approx(TRUE, rel=0.1)
     assert low < TRUE < high < 1.5 * low
 
 
-def test_report_says_the_modulus_that_the_forces_show(bench, baseline, tmp_path):
+def test_report_says_the_modulus_that_the_forces_show(evaluator, baseline, tmp_path):
     dataset = open_dataset(write_valid_dataset(tmp_path / "small-block"))
-    report = report_of(dataset, bench, Findings(baseline), None, "test")
+    report = report_of(dataset, evaluator, Findings(baseline), None, "test")
     assert report["not_identifiable"] == []
     (entry,) = report["identified"]
     assert entry["effect"] == "young_modulus" and entry["stated"] == 5e3
@@ -288,19 +288,19 @@ def test_report_says_the_modulus_that_the_forces_show(bench, baseline, tmp_path)
     assert "young_modulus" in {row["effect"] for row in report["ranking"]}
 
 
-def test_another_modulus_gains_what_the_stated_one_costs(bench, baseline):
-    model = bench.refit([YoungModulus.neutral(SETUP)], baseline.predictions)
+def test_another_modulus_gains_what_the_stated_one_costs(evaluator, baseline):
+    model = evaluator.refit([YoungModulus.neutral(SETUP)], baseline.predictions)
     assert model.setup.material.young_modulus == pytest.approx(
         TRUE, rel=0.12
     )  # the rest lies within what was stated
-    refined = bench.refine(model)
+    refined = evaluator.refine(model)
     assert refined.setup.material.young_modulus == pytest.approx(TRUE, rel=0.1)
-    gain = bench.score(model).sum() - bench.score(baseline).sum()
+    gain = evaluator.score(model).sum() - evaluator.score(baseline).sum()
     assert gain > 25.0
 
 
 def test_without_forces_nothing_is_said_of_it(baseline):
     with Workers([], 1) as workers:
-        other = Bench(SETUP, registration(), workers, ["poke-01"], None, QUICK, QUICK)
+        other = Evaluator(SETUP, registration(), workers, ["poke-01"], None, QUICK, QUICK)
     assert modulus_interval(other, baseline) is None
     assert len(other.nuisances.precision) == 15

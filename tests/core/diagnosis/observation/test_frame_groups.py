@@ -17,7 +17,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.segmentation import Cleaner
 from palpate.mesh.box_mesh import GridSpec
-from palpate.registration.registration import small_motion
+from palpate.registration.pose import small_motion
 from palpate.replay.replay import rest
 from palpate.setup.box import distance_to_block
 from palpate.setup.setup import Sensor

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.diagnosis.observation.stray_points import agrees_with_neighbours
+from palpate.diagnosis.observation.outlier_patches import agrees_with_neighbours
 from palpate.measurement.surface_gaps import Surface
 from palpate.setup.setup import Box
 

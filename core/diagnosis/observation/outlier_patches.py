@@ -1,9 +1,8 @@
-"""Stray points that a whole patch is left with: where the tool hides nearly all of it, a few points
-past its rim lie on neither.
+"""Outlier patches: patches whose points disagree with the patches around.
 
-A depth camera mixes near and far along an outline. Among a patch's many points such a mixture
-stands out by itself; where only two or three are seen there is nothing it could stand out from but
-the patches around.
+A depth camera mixes near and far surfaces along an outline. Among the many points of a well-covered
+patch such a mixture is an outlier by itself. A patch that the tool nearly hides has too few points
+for that, and is compared with its neighbours.
 """
 
 from __future__ import annotations
@@ -19,10 +18,14 @@ __all__ = ["agrees_with_neighbours"]
 
 
 def agrees_with_neighbours(gap: FloatArray, patch: IntArray, surface: Surface) -> MaskArray:
-    """Which points (m,) with these gaps (m,) [m] to keep: not those of patches (m,) far off all
-    around.
+    """Mask (m,) of the points whose patch lies near its neighbours.
 
-    A nearly hidden patch is far off sooner than one that is seen well.
+    A nearly hidden patch must lie nearer to them than a well-covered one.
+
+    Args:
+        gap: (m,) of the points [m].
+        patch: (m,) number of each point's patch.
+        surface: with the patches.
     """
     count = np.bincount(patch, minlength=surface.patches)
     seen = np.flatnonzero(count)
