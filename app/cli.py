@@ -1,4 +1,4 @@
-"""The terminal: `palpate VERB`, the same verbs as REST and the page."""
+"""The command line: `palpate VERB`."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ app.command()(service.serve)
 
 
 def main() -> NoReturn:
-    """Run a verb: 0 when it is done, 2 with one clear message for bad input, 130 when it was
-    stopped.
+    """Run a command. Exit codes: 0 when it is done, 2 with one clear message for bad input, 130
+    when it was stopped.
     """
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")

@@ -1,9 +1,11 @@
-"""The REST service from Python: diagnoses and sweeps asked for, followed, and their results
-fetched.
+"""The REST service from Python: request jobs, follow them, and fetch their results.
 
-with Client("http://127.0.0.1:8321") as palpate:
-    job = palpate.sweep("block-01", {"poisson_ratio.nu": (0.3, 0.49)}, steps=7)
-    palpate.wait(job["id"], print) print(palpate.sweep_result(job["id"])["summary"]["best"])
+::
+
+    with Client("http://127.0.0.1:8321") as palpate:
+        job = palpate.sweep("block-01", {"poisson_ratio.nu": (0.3, 0.49)}, steps=7)
+        palpate.wait(job["id"], print)
+        print(palpate.sweep_result(job["id"])["summary"]["best"])
 """
 
 from __future__ import annotations
@@ -22,12 +24,13 @@ from palpate.foundation.errors import PalpateError
 __all__ = ["ApiError", "Client", "JobError"]
 
 PATIENCE = 120.0
-"""Seconds that one answer may take: a registration is made while one waits."""
+"""Longest time of one answer [s]; a registration is computed while the client waits."""
+
 PAUSE = 0.3
 
 
 class ApiError(PalpateError):
-    """What the service refused, in its own words; `kind` and `status` say of which sort it is."""
+    """The service refused a request; `status` is the HTTP status, `kind` the class of the error."""
 
     def __init__(self, status: int, kind: str, message: str, where: Mapping[str, Any]) -> None:
         super().__init__(
@@ -37,19 +40,23 @@ class ApiError(PalpateError):
 
 
 class JobError(PalpateError):
-    """A job that ended without its result; `job` is its last record."""
+    """A job ended without its result; `job` is its last record."""
 
     def __init__(self, job: dict[str, Any]) -> None:
-        said = (job["error"] or {}).get("message", job["text"])
-        super().__init__(f"{job['kind']} {job['id']} is {job['state']}: {said}", job=job["id"])
+        message = (job["error"] or {}).get("message", job["text"])
+        super().__init__(f"{job['kind']} {job['id']} is {job['state']}: {message}", job=job["id"])
         self.job = job
 
 
 class Client:
-    """One server. `token` is what `palpate serve` printed, where it asks for one.
+    """Client of one server.
 
-    All methods raise ApiError for what the service refuses, and httpx.TransportError where nothing
-    answers.
+    All methods raise ApiError for refused requests, and httpx.TransportError where nothing answers.
+
+    Args:
+        address: of the server.
+        token: printed by `palpate serve`, if it needs a login.
+        timeout: of one answer [s].
     """
 
     def __init__(self, address: str, token: str | None = None, timeout: float = PATIENCE) -> None:
@@ -78,7 +85,7 @@ class Client:
         return list(self._get("/datasets")["datasets"])
 
     def check(self, dataset: str) -> dict[str, Any]:
-        """What a dataset holds, after every file was read."""
+        """Read every file of a dataset and describe it."""
         return dict(self._get(f"/datasets/{dataset}/check"))
 
     def import_archive(self, file: Path, name: str, key: str | None = None) -> dict[str, Any]:
@@ -101,24 +108,24 @@ class Client:
         return self._ask("/imports/folder", {"folder": folder, "name": name}, key)
 
     def registrations(self, dataset: str) -> list[str]:
-        """Names of the registrations that were accepted for a dataset."""
+        """Names of the accepted registrations of a dataset."""
         return list(self._get(f"/datasets/{dataset}/registrations")["registrations"])
 
     def registration(self, dataset: str, name: str) -> dict[str, Any]:
-        """One of them."""
+        """One accepted registration."""
         return dict(self._get(f"/datasets/{dataset}/registrations/{name}"))
 
     def register(
         self, dataset: str, accept: str | None = None, key: str | None = None
     ) -> dict[str, Any]:
-        """Queue the automatic registration of a dataset, to be kept under a name."""
+        """Queue the automatic registration of a dataset, and store it under a name."""
         return self._ask(f"/datasets/{dataset}/registrations/automatic", {"accept": accept}, key)
 
     def register_pairs(
         self, dataset: str, pairs: Sequence[Mapping[str, Any]], accept: str | None = None
     ) -> dict[str, Any]:
-        """Register by pairs of points `{"cloud": [x, y, z], "mesh": [x, y, z]}` [m], then ICP; kept
-        under a name if given.
+        """Register by pairs of points `{"cloud": [x, y, z], "mesh": [x, y, z]}` [m], then ICP; the
+        result is stored if a name is given.
         """
         body = {"pairs": [dict(pair) for pair in pairs], "accept": accept}
         return dict(self._answer(self._http.post(f"/datasets/{dataset}/registrations", json=body)))
@@ -131,7 +138,7 @@ class Client:
         key: str | None = None,
         registration: str | None = None,
     ) -> dict[str, Any]:
-        """Queue a replay of sequences (all without) with effects of one's own; the job's id will be
+        """Queue a replay of sequences (all if empty) with these effects; the id of the job will be
         its run's.
         """
         body = {
@@ -145,7 +152,7 @@ class Client:
     def export(
         self, run: str, what: Sequence[str] = ("report", "model"), key: str | None = None
     ) -> dict[str, Any]:
-        """Queue the writing of parts of a run as files."""
+        """Queue the export of parts of a run as files."""
         return self._ask("/exports", {"run": run, "what": list(what)}, key)
 
     def download(self, export: str, file: str) -> bytes:
@@ -154,14 +161,14 @@ class Client:
         return answer.content if answer.is_success else bytes(self._answer(answer))
 
     def effects(self) -> list[dict[str, Any]]:
-        """The catalogue, with parameters, units and bounds (SI)."""
+        """The catalogue of effects with parameters, units and bounds (SI)."""
         return list(self._get("/effects"))
 
     def diagnose(
         self, dataset: str, seed: int = 0, key: str | None = None, registration: str | None = None
     ) -> dict[str, Any]:
-        """Queue a diagnosis, with an accepted registration if one is named; the job's id will be
-        its run's.
+        """Queue a diagnosis, with an accepted registration if named; the id of the job will be its
+        run's.
         """
         return self._ask(
             "/diagnoses", {"dataset": dataset, "seed": seed, "registration": registration}, key
@@ -174,8 +181,13 @@ class Client:
         key: str | None = None,
         **further: Any,
     ) -> dict[str, Any]:
-        """Queue a sweep of `effect.parameter` between two values each (SI); `further` as POST
-        /api/sweeps takes it.
+        """Queue a sweep of `effect.parameter` between two values each (SI).
+
+        Args:
+            dataset: name of the dataset.
+            parameters: range of each parameter.
+            key: repeated requests with the same key make one job.
+            further: as in POST /api/sweeps.
         """
         axes = [
             {"parameter": name, "low": low, "high": high}
@@ -184,11 +196,11 @@ class Client:
         return self._ask("/sweeps", {"dataset": dataset, "parameters": axes, **further}, key)
 
     def sweep_result(self, identity: str) -> dict[str, Any]:
-        """A sweep: what was asked, and its summary once it has ended."""
+        """A sweep: the request, and its summary once it has ended."""
         return dict(self._get(f"/sweeps/{identity}"))
 
     def points(self, identity: str) -> list[dict[str, Any]]:
-        """The points of a sweep that have ended by now, in that order."""
+        """The finished points of a sweep, in the order of their ends."""
         found: list[dict[str, Any]] = []
         while more := self._get(f"/sweeps/{identity}/points", after=len(found))["points"]:
             found += more
@@ -197,25 +209,23 @@ class Client:
     def train(
         self, dataset: str, run: str | None = None, key: str | None = None, **further: Any
     ) -> dict[str, Any]:
-        """Queue a training on the stated model, or on a run's extended one; `further` as POST
-        /api/trainings takes it.
+        """Queue a training on the raw model, or on a run's extended one; `further` as in POST
+        /api/trainings.
         """
         return self._ask("/trainings", {"dataset": dataset, "run": run, **further}, key)
 
     def training(self, identity: str) -> dict[str, Any]:
-        """A training: what was asked, its history by epoch, and its summary once it has ended."""
+        """A training: the request, its history by epoch, and its summary once it has ended."""
         return dict(self._get(f"/trainings/{identity}"))
 
     def evaluate(
         self, dataset: str, run: str | None = None, key: str | None = None, **further: Any
     ) -> dict[str, Any]:
-        """Queue a ladder of a dataset's test sequences; `further` as POST /api/evaluations takes
-        it.
-        """
+        """Queue an evaluation of the test sequences; `further` as in POST /api/evaluations."""
         return self._ask("/evaluations", {"dataset": dataset, "run": run, **further}, key)
 
     def evaluation(self, identity: str) -> dict[str, Any]:
-        """A ladder: its summary once it has ended."""
+        """An evaluation: its summary once it has ended."""
         return dict(self._get(f"/evaluations/{identity}"))
 
     def report(self, run: str) -> dict[str, Any]:
@@ -236,7 +246,7 @@ class Client:
     def wait(
         self, identity: str, report: Callable[[float, str], object] = lambda *_: None
     ) -> dict[str, Any]:
-        """The job once it is done, with `report(fraction, text)` on the way; JobError where it ends
+        """Wait until a job is done, calling `report(fraction, text)`; raises JobError where it ends
         otherwise.
         """
         while (job := self.job(identity))["state"] in ("queued", "running"):
@@ -252,14 +262,14 @@ class Client:
         return dict(self._answer(self._http.post(f"/jobs/{identity}/cancel")))
 
     def retry(self, identity: str) -> dict[str, Any]:
-        """Have a job that ended without its result done once more."""
+        """Repeat a job that ended without its result."""
         return dict(self._answer(self._http.post(f"/jobs/{identity}/retry")))
 
     def _get(self, path: str, **query: Any) -> Any:
         return self._answer(self._http.get(path, params=query))
 
     def _ask(self, path: str, body: dict[str, Any], key: str | None) -> dict[str, Any]:
-        """Ask for a job; once more where the connection broke, which the key makes harmless."""
+        """Request a job; repeat once where the connection broke, which the key makes harmless."""
         headers = {"idempotency-key": key or uuid4().hex}
         try:
             answer = self._http.post(path, json=body, headers=headers)
@@ -271,8 +281,8 @@ class Client:
         if answer.is_success:
             return answer.json()
         try:
-            said = answer.json()
-            raise ApiError(answer.status_code, said["kind"], said["message"], said["where"])
+            body = answer.json()
+            raise ApiError(answer.status_code, body["kind"], body["message"], body["where"])
         except (ValueError, KeyError, TypeError):
             raise ApiError(
                 answer.status_code, "HttpError", f"{answer.url} answered {answer.status_code}", {}

@@ -1,4 +1,4 @@
-"""Problems that only the service knows, and how every problem goes over the wire."""
+"""Errors of the service, and all errors as JSON with a status code."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ __all__ = ["Conflict", "Missing", "as_dict", "status_code"]
 
 
 class Missing(PalpateError):
-    """A name that nothing here has."""
+    """Nothing has the requested name."""
 
 
 class Conflict(PalpateError):
-    """A request that does not fit the state of the thing it names."""
+    """The request does not fit the state of the thing that it names."""
 
 
 def as_dict(error: PalpateError) -> dict[str, Any]:
-    """The problem as `{kind, message, where}` with plain values."""
+    """An error as `{kind, message, where}` with plain values."""
     where = {
         key: value if isinstance(value, (int, float, str, bool)) else str(value)
         for key, value in error.where.items()
@@ -27,8 +27,8 @@ def as_dict(error: PalpateError) -> dict[str, Any]:
 
 
 def status_code(error: PalpateError) -> int:
-    """404 for what is not there, 409 for what does not fit now, 422 for data and values that are
-    off.
+    """404 for a missing name, 409 for a conflict or a damaged result, 422 for invalid data or
+    values.
     """
     if isinstance(error, Missing):
         return 404

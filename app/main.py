@@ -1,4 +1,4 @@
-"""The web service: `create_app(settings)`; nothing happens at import."""
+"""The web application: `create_app(settings)`."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from starlette.exceptions import HTTPException
 from palpate.app.api import (
     datasets,
     diagnoses,
+    disk_space,
     effects,
     evaluations,
     imports,
     jobs,
+    registering,
     registrations,
+    replays_and_exports,
     runs,
     sessions,
     sweeps,
     trainings,
     whatif,
 )
-from palpate.app.api import disk_space as disk
-from palpate.app.api import registering as clicking
-from palpate.app.api import replays_and_exports as verbs
 from palpate.app.http_errors import as_dict, status_code
 from palpate.app.jobs.tasks import TARGETS
 from palpate.app.schemas import PROBLEMS
-from palpate.app.server import viser_proxy as relay
+from palpate.app.server import viser_proxy
 from palpate.app.server.login import Login
 from palpate.app.server.login import router as login_router
 from palpate.app.server.request_guard import RequestGuard
@@ -46,17 +46,18 @@ __all__ = ["create_app"]
 
 ABOUT = """Replay palpations, find what a simulation gets wrong, and measure the gain.
 
-Lengths are in m, pressures in Pa, times in s. Every problem is answered as `{kind, message, where}`. What takes long is a job: it
-is answered with 202 and the job, and followed by GET /api/jobs/{id} or by the server-sent events of GET /api/jobs/events.
+Lengths are in m, pressures in Pa, times in s. The body of every error is `{kind, message, where}`.
+Long tasks are jobs: the answer is 202 and the job. GET /api/jobs/{id}, or the server-sent events of
+GET /api/jobs/events, have its progress.
 """
 
 MODULES = (
     datasets,
     imports,
-    disk,
-    verbs,
+    disk_space,
+    replays_and_exports,
     registrations,
-    clicking,
+    registering,
     diagnoses,
     jobs,
     runs,
@@ -70,8 +71,11 @@ MODULES = (
 
 
 def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> FastAPI:
-    """The service for one folder of runs and one of datasets; `targets` names the function of each
-    kind of job.
+    """Make the application for one folder of runs and one of datasets.
+
+    Args:
+        settings: folders, address and limits.
+        targets: function of each kind of job, as "module:function".
     """
     login = Login(Token.load(settings.runs)) if settings.needs_login else None
 
@@ -94,7 +98,7 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
     app.add_middleware(RequestGuard, settings=settings, login=login)
     for module in MODULES:
         app.include_router(module.router, prefix="/api", responses=PROBLEMS)
-    app.include_router(relay.router)
+    app.include_router(viser_proxy.router)
     app.include_router(login_router)
     _answer_problems(app)
 
@@ -124,7 +128,10 @@ def _answer_problems(app: FastAPI) -> None:
 
     @app.exception_handler(Exception)
     def fault(request: Request, error: Exception) -> JSONResponse:
-        message = f"{request.method} {request.url.path} stopped: {type(error).__name__}: {error}; the server's log has more"
+        message = (
+            f"{request.method} {request.url.path} stopped: {type(error).__name__}: {error}; "
+            "the server's log has more"
+        )
         return JSONResponse(
             {"kind": "InternalError", "message": message, "where": {}}, status_code=500
         )

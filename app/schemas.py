@@ -1,4 +1,4 @@
-"""What goes over the wire."""
+"""Bodies of requests and answers that several endpoints share."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ __all__ = [
 
 
 class Problem(BaseModel):
-    """What every problem looks like: its kind, a sentence that says what to do, and where it is
-    (file, row, key, value ...).
+    """Body of every error: its kind, a sentence on what to do, and its place (file, row, key, value
+    ...).
     """
 
     kind: str
@@ -56,8 +56,8 @@ Row = Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)]
 
 
 class HalfPair(BaseModel):
-    """A pair as it is being clicked: a point [m] on the cloud, camera frame, and one on the mesh,
-    phantom frame, or not yet.
+    """A pair that is being clicked: a point [m] on the cloud, camera frame, and one on the mesh,
+    phantom frame; each may be missing.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -67,8 +67,8 @@ class HalfPair(BaseModel):
 
 
 class WeakDirection(BaseModel):
-    """A motion that the cloud determines weakly: parts of translation and rotation along the
-    phantom's axes, and its text.
+    """A motion that the cloud determines weakly: its translation and rotation along the phantom's
+    axes, and a text.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -79,11 +79,11 @@ class WeakDirection(BaseModel):
 
 
 class Shown(BaseModel):
-    """What a page shows while a person registers by hand.
+    """Manual registration as a page shows it.
 
-    `mode` is the side that clicks are for; `pose` (phantom_from_camera) is where the cloud was
-    fitted to, if it was, `start` how it is shown before: as stated in dataset.toml, levelled by its
-    table, or as the camera sees it; `over` the phantom, or beside it.
+    `mode` is the side that clicks select. The cloud is drawn by `pose` (phantom_from_camera) if it
+    was fitted, else by `start`: as stated in dataset.toml, levelled by its table, or as the camera
+    sees it; `over` the phantom, or beside it.
     """
 
     model_config = ConfigDict(
@@ -109,8 +109,8 @@ class Shown(BaseModel):
 
 
 class DiagnosisRequest(BaseModel):
-    """Which dataset to diagnose, named by its folder; with which accepted registration of the
-    camera, if not the automatic one.
+    """A dataset to diagnose, by its folder's name, and an accepted registration that replaces the
+    automatic one.
     """
 
     model_config = ConfigDict(
@@ -134,7 +134,7 @@ class EffectIn(BaseModel):
 
 
 class WhatIfRequest(BaseModel):
-    """A frame of a recording and the causes to solve it with; `page` shows it there."""
+    """A frame of a recording and the effects to solve it with; `page` shows the result."""
 
     model_config = ConfigDict(
         frozen=True,
@@ -156,10 +156,9 @@ class WhatIfRequest(BaseModel):
 
 
 class LiveRequest(BaseModel):
-    """Where a hand leads the tool's centre to [m], phantom frame, and the model that answers;
-    `page` shows it there.
+    """Requested position of the tool's centre [m], phantom frame, and the model that answers.
 
-    `shown` is the run's model in whose place it is drawn.
+    `page` shows the result in place of the run's model `shown`.
     """
 
     model_config = ConfigDict(
@@ -176,10 +175,10 @@ class LiveRequest(BaseModel):
 
 
 class JobOut(BaseModel):
-    """A job as the page sees it: without folders of this machine.
+    """A job without folders of this machine.
 
-    Times are seconds since 1970; `remaining` is in seconds, if it goes on as until now; `can_retry`
-    says whether POST /api/jobs/{id}/retry would have it done once more.
+    Times are seconds since 1970. `remaining` is estimated [s]. `can_retry` says whether POST
+    /api/jobs/{id}/retry would repeat it.
     """
 
     id: str
@@ -199,7 +198,7 @@ class JobOut(BaseModel):
 
 
 class NoteOut(BaseModel):
-    """A line of a job's log: when [s since 1970], how grave (info, warning or error), what."""
+    """A line of a job's log: time [s since 1970], level (info, warning or error), text."""
 
     at: float
     level: str
@@ -207,7 +206,7 @@ class NoteOut(BaseModel):
 
 
 class Notes(BaseModel):
-    """Lines of a log in the order of time, and where to go on next time."""
+    """Lines of a log in the order of time, and the `after` of the next request."""
 
     notes: list[NoteOut]
     next: int

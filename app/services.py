@@ -1,4 +1,4 @@
-"""Everything the endpoints share, made once per server."""
+"""The parts of a running server that the endpoints share."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Services:
                 targets,
                 settings.preload,
                 [settings.datasets / STAGING],
-                lambda: _tidied(disk),
+                lambda: _tidy(disk),
             ),
             disk=disk,
             sessions=sessions,
@@ -82,8 +82,8 @@ class Services:
         key: str | None = None,
         registration: str | None = None,
     ) -> Job:
-        """Queue the diagnosis of a dataset folder, with an accepted registration if named; the
-        job's id will be the run's.
+        """Queue the diagnosis of a dataset folder, with an accepted registration if named; the id
+        of the job will be the run's.
         """
         places = {"dataset": str(dataset), "runs": str(self.settings.runs)}
         request = {
@@ -96,8 +96,8 @@ class Services:
         return self.jobs.submit("diagnosis", request, name, key)
 
     def registered(self, dataset: str, registration: str | None) -> dict[str, Any]:
-        """What a job's request says of an accepted registration: all of it, so that the job means
-        the same whenever it is done.
+        """The part of a job's request that has an accepted registration: all of it, so that later
+        changes do not affect the job.
         """
         if registration is None:
             return {}
@@ -115,18 +115,21 @@ class Services:
         return frozenset(str(job.request.get("archive")) for job in jobs)
 
     def close(self) -> None:
-        """Cancel what runs and stop the inner viewer."""
+        """Cancel the running job and stop the inner viewer."""
         self.jobs.close()
         self.viewer.close()
         self.frame_solver.close()
         self.interactive_solver.close()
 
 
-def _tidied(disk: Disk) -> str:
-    """Make room if need be, and say so."""
+def _tidy(disk: Disk) -> str:
+    """Delete old caches if necessary; returns a text for the log, empty where there is nothing to
+    say.
+    """
     now = disk.trim()
     if now.used > now.limit:
-        return f"the results take {now.used / 2**30:.1f} GiB of {now.limit / 2**30:.1f} GiB: delete some of them"
+        used, limit = now.used / 2**30, now.limit / 2**30
+        return f"the results take {used:.1f} GiB of {limit:.1f} GiB: delete some of them"
     return f"dropped {now.dropped / 2**20:.0f} MiB of the oldest caches" if now.dropped else ""
 
 
@@ -143,6 +146,7 @@ IdempotencyKey = Annotated[
         alias="Idempotency-Key",
         min_length=1,
         max_length=200,
-        description="A name for this request: the same one again, with the same body, answers with the job that is there.",
+        description="A name for this request: a repeated request with the same name and body "
+        "gets the existing job.",
     ),
 ]

@@ -1,6 +1,4 @@
-"""One frozen description of how the server runs, read once from arguments or the environment
-(PALPATE_...).
-"""
+"""Settings of the server, read once from arguments or the environment (PALPATE_...)."""
 
 from __future__ import annotations
 
@@ -15,25 +13,26 @@ __all__ = ["Settings"]
 
 
 class Settings(BaseSettings):
-    """Where data and results lie and where the page is served.
+    """Folders, address and limits of the server.
 
     Attributes:
-        runs: folder of finished diagnoses, one folder each; the job records lie beside them.
-        datasets: folder below which the datasets lie; nothing outside it is reachable from the
-            page.
+        host: address to listen on.
+        port: port to listen on; 0 takes a free one.
+        runs: folder of finished diagnoses, one folder each, and of the job records.
+        datasets: folder of the datasets; requests reach nothing outside it.
         workers: processes that one diagnosis may use.
         scheduler: address of a dask scheduler whose workers do the replays of sweeps; this machine
-            does them without.
+            does them if None.
+        static: folder of the page's files.
         preload: modules that the worker processes import once, before the first job.
         allow_host: names besides loopback and `host` by which browsers may call the server, for
             example behind a proxy.
-        import_from: folders below which those lie that may be imported by their path; without any,
-            every folder where only this machine's own users reach the server, and none where others
-            do.
-        largest_body: bytes that a request may bring.
-        largest_upload: the same for an archive that is imported.
-        largest_dataset: bytes that a dataset may have, unpacked.
-        disk_limit: bytes of the runs folder beyond which the oldest caches are dropped.
+        import_from: folders from which datasets may be imported by path. If empty: any folder where
+            no login is needed, else none.
+        largest_body: bytes of a request.
+        largest_upload: bytes of an uploaded archive.
+        largest_dataset: bytes of an unpacked dataset.
+        disk_limit: bytes of the runs folder beyond which the oldest caches are deleted.
     """
 
     model_config = SettingsConfigDict(env_prefix="PALPATE_", frozen=True)
@@ -59,9 +58,7 @@ class Settings(BaseSettings):
 
     @property
     def needs_login(self) -> bool:
-        """Whether others than this machine's own users can reach the server, by its address or by a
-        name given to it.
-        """
+        """Whether other machines can reach the server, by its address or by a name given to it."""
         return not all(map(_is_loopback, (self.host, *self.allow_host)))
 
     @property

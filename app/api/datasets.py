@@ -1,4 +1,4 @@
-"""Datasets by folder name: what there is, and whether it is in order."""
+"""Datasets by folder name: their list, and checks of one."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ router = APIRouter(prefix="/datasets", tags=["datasets"])
 
 @router.get("")
 def listed(services: CurrentServices) -> dict[str, Any]:
-    """The folder that is looked into and the names found there."""
+    """The datasets folder and the names of the datasets in it."""
     return {"folder": str(services.settings.datasets), "datasets": services.library.names()}
 
 
 @router.get("/{name}")
 def one(name: str, services: CurrentServices) -> dict[str, Any]:
-    """Phantom, tool, splits and sequences of one dataset, after the checks that opening makes."""
+    """Phantom, tool, splits and sequences of one dataset, after the checks of opening it."""
     return dataset_summary(services.library.open(name))
 
 
 @router.get("/{name}/check")
 def check(name: str, services: CurrentServices) -> dict[str, Any]:
-    """The same after reading every file, with what is doubtful; 422 with place and expectation if
-    anything is off.
+    """The same after reading every file, with warnings and missing data; 422 names the place of an
+    error and the expected value.
     """
     dataset = services.library.open(name)
     found = check_dataset(dataset)

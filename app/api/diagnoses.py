@@ -1,4 +1,4 @@
-"""Diagnoses: start one, see the list, read a report."""
+"""Diagnoses: start one, list them, read a report."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ router = APIRouter(prefix="/diagnoses", tags=["diagnoses"])
 def start(
     request: DiagnosisRequest, services: CurrentServices, key: IdempotencyKey = None
 ) -> JobOut:
-    """Check the dataset completely, then queue its diagnosis; the answer's id names the job now and
-    the run later.
+    """Check the dataset completely, then queue its diagnosis; the id of the answer names the job
+    and later the run.
     """
     dataset = services.library.open(request.dataset)
     dataset.validate()
@@ -34,8 +34,8 @@ def start(
 
 @router.get("")
 def listed(services: CurrentServices, response: Response, page: RequestedPage) -> list[JobOut]:
-    """Diagnoses that were asked for here, the newest first; the header X-Total-Count says how many
-    there are.
+    """Diagnoses that were requested here, the newest first; the header X-Total-Count has their
+    number.
     """
     found = [job for job in services.jobs.all() if job.kind == "diagnosis"]
     return [job_out(job) for job in paginate(found, page, response)]

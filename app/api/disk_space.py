@@ -1,4 +1,4 @@
-"""What results and caches take on the disk, and how to make room."""
+"""Disk usage of results and caches, and deletion of caches."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ router = APIRouter(prefix="/disk", tags=["disk"])
 
 @router.get("")
 def usage(services: CurrentServices) -> dict[str, Any]:
-    """Bytes below the runs folder: all, what of it are caches, and the limit beyond which the
-    oldest caches are dropped.
+    """Bytes below the runs folder: all of them, those of caches, and the limit beyond which the
+    oldest caches are deleted.
     """
     return asdict(services.disk.usage())
 
 
 @router.post("/empty")
 def empty(services: CurrentServices) -> dict[str, Any]:
-    """Drop all caches: what is lost can be worked out once more. Results, and archives that wait
-    for their import, stay.
+    """Delete all caches. Their content can be computed again. Results, and archives that wait for
+    their import, stay.
     """
     return asdict(services.disk.trim(0, services.awaited()))

@@ -1,4 +1,4 @@
-"""The causes that can be named, with parameters, units and bounds, straight from the catalogue."""
+"""The catalogue of effects with parameters, units and bounds."""
 
 from __future__ import annotations
 
@@ -16,11 +16,10 @@ router = APIRouter(prefix="/effects", tags=["effects"])
 
 @router.get("")
 def listed() -> list[dict[str, Any]]:
-    """The catalogue; bounds are SI, null where there is none. What is not `diagnosed` only a replay
-    knows.
+    """The catalogue of effects. Only replays and sweeps use those that are not `diagnosed`.
 
-    `scale` is a step that matters, of the logarithm where `log`, of the contrast (k - 1) / (k +
-    3/2) where `contrast`.
+    Bounds are SI, null where there is none. `scale` is a significant step: of the logarithm where
+    `log`, of the contrast (k - 1) / (k + 3/2) where `contrast`.
     """
     return [_described(effect) for effect in CATALOGUE]
 

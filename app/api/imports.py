@@ -1,6 +1,4 @@
-"""Datasets that are brought: an archive as the body of a request, or a folder that the server can
-read.
-"""
+"""Imports of datasets: an archive as the body of a request, or a folder on the server's disk."""
 
 from __future__ import annotations
 
@@ -36,7 +34,7 @@ _BODY = {
 
 
 class FolderRequest(BaseModel):
-    """A folder on the server's disk, and the name that the dataset gets."""
+    """A folder on the server's disk, and the name of the new dataset."""
 
     model_config = ConfigDict(
         frozen=True,
@@ -55,8 +53,8 @@ async def upload(
     name: Annotated[str, Query(min_length=1, max_length=64)],
     key: IdempotencyKey = None,
 ) -> JobOut:
-    """Take the body as an archive and queue its import: checked whole, then a dataset of this name,
-    or nothing.
+    """Take the body as an archive and queue its import. The archive is checked completely; the
+    dataset appears whole or not at all.
     """
     _free(name, services)
     archive = await _received(request, services)
@@ -65,15 +63,16 @@ async def upload(
 
 @router.post("/folder", status_code=202)
 def folder(request: FolderRequest, services: CurrentServices, key: IdempotencyKey = None) -> JobOut:
-    """Queue the import of a folder on the server's disk, from where that is allowed; it is copied,
-    never changed.
+    """Queue the import of a folder on the server's disk, from an allowed place. The folder is
+    copied and not changed.
     """
     _free(request.name, services)
     path = Path(request.folder).resolve()
     allowed = services.settings.import_roots
     if allowed is not None and not any(path.is_relative_to(root.resolve()) for root in allowed):
         raise DatasetError(
-            f"{request.folder} may not be imported from: start the server with --import-from FOLDER for one that may",
+            f"{request.folder} may not be imported from: start the server with "
+            "--import-from FOLDER for one that may",
             key="folder",
         )
     if not path.is_dir():
@@ -102,7 +101,7 @@ def _queue(services: Services, name: str, source: dict[str, str], key: str | Non
 
 
 async def _received(request: Request, services: Services) -> Path:
-    """The body as a file below the uploads, named by its digest: the same archive sent twice is one
+    """Store the body below the uploads, named by its digest: the same archive sent twice is one
     file.
     """
     folder = services.settings.runs / UPLOADS
@@ -115,7 +114,8 @@ async def _received(request: Request, services: Services) -> Path:
                 await asyncio.to_thread(sink.write, chunk)
         if not await asyncio.to_thread(is_archive, coming):
             raise DatasetError(
-                "the body is neither a zip nor a tar; send the dataset's folder packed as one of them",
+                "the body is neither a zip nor a tar; "
+                "send the dataset's folder packed as one of them",
                 key="body",
             )
         whole = folder / f"{digest.hexdigest()[:32]}.archive"

@@ -11,14 +11,7 @@ from palpate.app.services import Services
 from palpate.app.storage.result_store import ResultStore
 from palpate.foundation.errors import RunError
 
-__all__ = [
-    "cancel_job",
-    "job_of",
-    "job_out",
-    "listed_result",
-    "names_and_jobs",
-    "result_and_job",
-]
+__all__ = ["cancel_job", "job_of", "job_out", "listed_result", "names_and_jobs", "result_and_job"]
 
 
 def job_out(job: Job) -> JobOut:
@@ -62,7 +55,7 @@ def result_and_job(store: ResultStore, name: str, job: dict[str, Any] | None) ->
 
 
 def listed_result(store: ResultStore, name: str, job: dict[str, Any] | None) -> dict[str, Any]:
-    """One result in a list: a damaged file leaves its content out, so that the others are listed."""
+    """One result in a list; the content of a damaged file is left out."""
     try:
         return result_and_job(store, name, job)
     except RunError:

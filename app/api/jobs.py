@@ -1,4 +1,4 @@
-"""Jobs: how far they are, live, what they did, and how to stop and retry them."""
+"""Jobs: list, progress, log, cancel and retry."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SHOWN = 50
 
 @router.get("")
 def listed(services: CurrentServices, response: Response, page: RequestedPage) -> list[JobOut]:
-    """Jobs, the newest first; the header X-Total-Count says how many there are."""
+    """Jobs, the newest first; the header X-Total-Count has their number."""
     response.headers[TOTAL] = str(services.jobs.count())
     return [job_out(job) for job in services.jobs.all(page.most, page.after)]
 
@@ -42,7 +42,7 @@ def events(request: Request, services: CurrentServices) -> StreamingResponse:
 
 @router.get("/{identity}")
 def one(identity: str, services: CurrentServices) -> JobOut:
-    """One job: how far it is, or how it ended."""
+    """One job: its progress, or its result."""
     return job_out(services.jobs.get(identity))
 
 
@@ -54,8 +54,8 @@ def cancel(identity: str, services: CurrentServices) -> JobOut:
 
 @router.post("/{identity}/retry", status_code=202)
 def retry(identity: str, services: CurrentServices) -> JobOut:
-    """Have a job that failed, was cancelled or interrupted done once more, under its name; 409 if
-    it runs, waits or is done.
+    """Run a failed, cancelled or interrupted job again under its name; 409 if it runs, waits or is
+    done.
     """
     return job_out(services.jobs.retry(identity))
 
@@ -64,8 +64,7 @@ def retry(identity: str, services: CurrentServices) -> JobOut:
 def notes(
     identity: str, services: CurrentServices, after: Annotated[int, Query(ge=0, le=10**9)] = 0
 ) -> Notes:
-    """What a job did, and of what it was warned, from the `after`-th line on: at most 1000
-    lines."""
+    """Lines of a job's log from the `after`-th on: at most 1000."""
     found = [
         NoteOut(at=note.at, level=note.level, text=note.text)
         for note in services.jobs.notes(identity, after)

@@ -1,4 +1,4 @@
-"""Manual registration in the scene of a page: what it shows, and which points its clicks mean."""
+"""Manual registration in the scene of a page: drawing, and picking of points by clicks."""
 
 from __future__ import annotations
 
@@ -22,9 +22,7 @@ Step = Annotated[FiniteFloat, Field(ge=-0.1, le=0.1)]
 
 
 class Nudge(BaseModel):
-    """A point of one side, and how far it is to go [m], to the right and upwards as the person sees
-    it.
-    """
+    """A point of one side, and its shift [m] to the right and upwards on the screen."""
 
     model_config = ConfigDict(
         frozen=True,
@@ -41,8 +39,12 @@ class Nudge(BaseModel):
 
 
 class Aim(BaseModel):
-    """A ray in the frame of the scene [m], as a click makes it; `pixel` is the angle of a pixel
-    [rad].
+    """A ray of a click, in the frame of the scene.
+
+    Attributes:
+        origin: [m].
+        direction: of any length.
+        pixel: angle of a pixel [rad].
     """
 
     model_config = ConfigDict(
@@ -60,8 +62,8 @@ class Aim(BaseModel):
 
 @router.post("")
 def show(page: PageId, shown: Shown, services: CurrentServices) -> dict[str, Any]:
-    """Show rest cloud and phantom with these pairs; says how many points and ends are drawn, and by
-    which pose the cloud is [m].
+    """Show rest cloud and phantom with these pairs; the answer has the numbers of points and marks,
+    and the pose of the cloud [m].
     """
     return services.manual_registrations.open(page).show(shown)
 
@@ -74,9 +76,7 @@ def look(page: PageId, services: CurrentServices) -> None:
 
 @router.post("/nudge")
 def nudge(page: PageId, asked: Nudge, services: CurrentServices) -> dict[str, Any]:
-    """A point moved a little on its surface, as an arrow key asks for it; 404 while no scene is
-    open.
-    """
+    """Move a point on its surface by an arrow key; 404 while no scene is open."""
     return {
         "point": services.manual_registrations.open(page).nudge(
             asked.side, asked.point, asked.right, asked.up
@@ -86,9 +86,7 @@ def nudge(page: PageId, asked: Nudge, services: CurrentServices) -> dict[str, An
 
 @router.post("/pick")
 def pick(page: PageId, aim: Aim, services: CurrentServices) -> dict[str, Any]:
-    """The point that a ray means on the side that is picked on: what a click in the scene would
-    give.
-    """
+    """The point that a click along this ray selects on the active side."""
     return services.manual_registrations.open(page).pick(
         Ray(np.array(aim.origin), np.array(aim.direction), aim.pixel)
     )
@@ -96,7 +94,7 @@ def pick(page: PageId, aim: Aim, services: CurrentServices) -> dict[str, Any]:
 
 @router.websocket("/clicks")
 async def clicks(websocket: WebSocket, page: PageId, services: CurrentServices) -> None:
-    """Each click of a person in the scene, as the point that it means."""
+    """Send the point of each click in the scene."""
     await websocket.accept()
     loop, waiting = asyncio.get_running_loop(), asyncio.Queue[dict[str, Any]]()
 

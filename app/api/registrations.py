@@ -1,5 +1,4 @@
-"""Registration by hand: pairs of points in, fit and ICP out, kept under a name where one is
-given."""
+"""Registrations of a dataset: from pairs of points and ICP, or automatic; stored under a name."""
 
 from __future__ import annotations
 
@@ -29,7 +28,7 @@ PAIRS: list[JsonValue] = [
 
 
 class PointPair(BaseModel):
-    """One point [m] on the cloud, camera frame, and the same on the mesh, phantom frame."""
+    """The same point [m] on the cloud, camera frame, and on the mesh, phantom frame."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -38,7 +37,7 @@ class PointPair(BaseModel):
 
 
 class FitRequest(BaseModel):
-    """Pairs to be fitted."""
+    """Pairs of points to fit."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", json_schema_extra={"examples": [{"pairs": PAIRS}]}
@@ -48,7 +47,7 @@ class FitRequest(BaseModel):
 
 
 class RegistrationRequest(FitRequest):
-    """Pairs, and the name to accept the result under; without one nothing is kept."""
+    """Pairs of points, and the name to store the result under; without a name it is not stored."""
 
     model_config = ConfigDict(
         frozen=True,
@@ -61,23 +60,21 @@ class RegistrationRequest(FitRequest):
 
 @router.get("")
 def listed(name: str, services: CurrentServices) -> dict[str, Any]:
-    """The names of the registrations kept for a dataset."""
+    """Names of the registrations of a dataset."""
     services.library.path(name)
     return {"registrations": RegistrationStore(services.settings.runs, name).names()}
 
 
 @router.get("/{registration}")
 def one(name: str, registration: str, services: CurrentServices) -> dict[str, Any]:
-    """One registration as it was accepted."""
+    """One stored registration."""
     services.library.path(name)
     return RegistrationStore(services.settings.runs, name).request(registration)
 
 
 @router.post("/fit")
 def fitted(name: str, request: FitRequest, services: CurrentServices) -> dict[str, Any]:
-    """The rigid fit of the pairs alone, with each pair's residual, at once: what to look at while
-    clicking.
-    """
+    """Rigid fit of the pairs alone, with the residual of each pair; answers at once."""
     services.library.path(name)
     pairs = request.pairs
     return fit_pairs(
@@ -86,7 +83,7 @@ def fitted(name: str, request: FitRequest, services: CurrentServices) -> dict[st
 
 
 class AutomaticRequest(BaseModel):
-    """The name to keep it under; a free one without."""
+    """The name to store the registration under; without one a free name is used."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", json_schema_extra={"examples": [{"accept": "automatic-1"}]}
@@ -99,9 +96,7 @@ class AutomaticRequest(BaseModel):
 def automatic(
     name: str, request: AutomaticRequest, services: CurrentServices, key: IdempotencyKey = None
 ) -> JobOut:
-    """Queue the automatic registration of a dataset; what it finds is kept under a name like one
-    made by hand.
-    """
+    """Queue the automatic registration of a dataset; the result is stored under a name."""
     folder, store = services.library.path(name), RegistrationStore(services.settings.runs, name)
     if request.accept is not None:
         store.check_name(request.accept)
@@ -116,8 +111,8 @@ def automatic(
 
 @router.post("")
 def made(name: str, request: RegistrationRequest, services: CurrentServices) -> dict[str, Any]:
-    """Fit the pairs, lay the rest cloud against the block from there, and keep it if a name is
-    given; a taken name is refused.
+    """Fit the pairs, refine by ICP, and store the result if a name is given; 409 for a name that is
+    taken.
     """
     folder, store = services.library.path(name), RegistrationStore(services.settings.runs, name)
     if request.accept is not None:

@@ -1,4 +1,4 @@
-"""Replays of a setup of one's own, and files to take away: both are jobs."""
+"""Replays with chosen effects, and exports of results as files; both are jobs."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ EXAMPLE: JsonDict = {
 
 
 class ReplayRequest(BaseModel):
-    """Which sequences (all with clouds without), with which effects in the stated setup, and which
-    accepted registration.
+    """Sequences to replay (all with clouds if empty), the effects to add to the stated setup, and
+    an accepted registration.
     """
 
     model_config = ConfigDict(
@@ -72,7 +72,7 @@ class ExportRequest(BaseModel):
 
 @router.post("/replays", status_code=202)
 def replay(request: ReplayRequest, services: CurrentServices, key: IdempotencyKey = None) -> JobOut:
-    """Check what is asked, then queue the replay; its result is a run of the job's id, with the
+    """Check the request, then queue the replay. Its result is a run with the job's id and the
     effects as its extended model.
     """
     from palpate.recording.saved_model import effects_from
@@ -96,7 +96,7 @@ def replay(request: ReplayRequest, services: CurrentServices, key: IdempotencyKe
 
 @router.post("/exports", status_code=202)
 def export(request: ExportRequest, services: CurrentServices, key: IdempotencyKey = None) -> JobOut:
-    """Queue the writing of files; the job's result names them for GET
+    """Queue the export; the result of the job names the files for GET
     /api/exports/{identity}/{file}.
     """
     if request.run is not None:
@@ -118,7 +118,7 @@ def export(request: ExportRequest, services: CurrentServices, key: IdempotencyKe
 
 @router.get("/exports/{identity}")
 def exported(identity: str, services: CurrentServices) -> dict[str, Any]:
-    """The files of a finished export, with their sizes in bytes."""
+    """The files of a finished export with their sizes in bytes."""
     return {
         "files": {
             path.name: path.stat().st_size

@@ -1,4 +1,4 @@
-"""Finished diagnoses: reports, patterns, pictures, and the numbers of each frame."""
+"""Finished diagnoses: reports, patterns, pictures, and values of each frame."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ router = APIRouter(prefix="/runs", tags=["runs"])
 def listed(
     services: CurrentServices, response: Response, page: RequestedPage
 ) -> list[dict[str, Any]]:
-    """Runs, the newest first, each with its verdict; one whose report cannot be read says so.
-    X-Total-Count: how many there are.
+    """Runs, the newest first, each with its verdict, or `unreadable`. The header X-Total-Count has
+    their number.
     """
     return [_listed(run) for run in paginate(services.runs.all(), page, response)]
 
 
 @router.get("/{name}")
 def one(name: str, services: CurrentServices) -> dict[str, Any]:
-    """One run: verdict sentence, phantom and, per sequence, its split and both models' errors where
-    the stated one is worst [m].
+    """One run: verdict sentence, phantom, and for each sequence its split and both models' errors
+    [m] in the raw model's worst frame.
     """
     run = services.runs.get(name)
     replays = [run.replay(sequence) for sequence in run.sequences]
@@ -77,7 +77,7 @@ def report(name: str, services: CurrentServices) -> dict[str, Any]:
     responses={200: {"content": {"text/html": {"schema": {"type": "string"}}}}},
 )
 def page(name: str, services: CurrentServices) -> HTMLResponse:
-    """The report as one HTML file that needs nothing but itself, to keep, print or send."""
+    """The report as one self-contained HTML file."""
     from palpate.app.reporting.report_page import report_page
 
     text = report_page(services.runs.get(name))
@@ -90,8 +90,8 @@ def page(name: str, services: CurrentServices) -> HTMLResponse:
 def comparison(
     name: str, services: CurrentServices, beside: Annotated[tuple[str, ...], Query()] = ()
 ) -> dict[str, Any]:
-    """By sequence the errors [m] of this run's models, and of those `beside` it, which must be of
-    the same dataset.
+    """Errors [m] of this run's models by sequence, next to those of the runs in `beside`, which
+    must have the same dataset.
     """
     return compared([services.runs.get(one) for one in dict.fromkeys([name, *beside])])
 
@@ -104,8 +104,8 @@ def model(name: str, services: CurrentServices) -> dict[str, Any]:
 
 @router.get("/{name}/patterns")
 def patterns(name: str, services: CurrentServices) -> dict[str, Any]:
-    """Patches with the measured and predicted error pattern, all [m], null where unseen; `limit`
-    ends their common scale.
+    """Patches with the measured and predicted error pattern [m], null where unseen; `limit` is the
+    end of their common scale.
     """
     arrays = services.runs.get(name).patterns()
     values = {
@@ -130,11 +130,11 @@ def picture(name: str, picture: str, services: CurrentServices) -> FileResponse:
 
 @router.get("/{name}/sequences/{sequence}")
 def sequence(name: str, sequence: str, services: CurrentServices) -> dict[str, Any]:
-    """Times [s] and errors [m] of each frame, push depth [m], force [N], spells of touch, and what
+    """Times [s], errors [m], push depth [m], force [N] and contact spells of each frame, and what
     the scene can show.
 
-    `limits` are the robust ends of the scales, null where the run does not hold a quantity;
-    `inside` says why it has no inside.
+    `limits` are the robust ends of the scales, null where the run does not contain a quantity;
+    `inside` says why the interior is missing.
     """
     renderer = services.sessions.renderer(name, sequence)
     replay = renderer.replay
@@ -161,7 +161,7 @@ def sequence(name: str, sequence: str, services: CurrentServices) -> dict[str, A
 
 
 def _worst(replay: RecordedReplay) -> dict[str, Any]:
-    """Errors [m] of both models in the frame in which the stated one is furthest off."""
+    """Errors [m] of both models in the frame in which the raw model's is largest."""
     keys = ("distance_raw", "distance_extended")
     seen = np.flatnonzero(np.isfinite(replay[keys[0]]))
     if not len(seen):

@@ -1,6 +1,4 @@
-"""What each open page shows: a view in, what is held back; over one websocket, or request by
-request.
-"""
+"""Views of open pages: over a websocket, or request by request."""
 
 from __future__ import annotations
 
@@ -28,7 +26,7 @@ Pixels = Annotated[int, Query(ge=16, le=4096)]
 
 @router.get("/palette")
 def colours() -> dict[str, Any]:
-    """The colour of each thing and the map of signed errors."""
+    """Colours of all things, and the colour maps."""
     return palette()
 
 
@@ -48,7 +46,7 @@ def look(page: PageId, services: CurrentServices, where: Direction = "reset") ->
 
 @router.put("/sessions/{page}/camera", status_code=204)
 def stand(page: PageId, camera: Camera, services: CurrentServices) -> None:
-    """Look at a run from a place of one's own, also in scenes of the page that open later."""
+    """Look at a run from a chosen place, also in scenes of the page that open later."""
     place, target = np.array(camera.position), np.array(camera.target)
     services.sessions.open(page).stand(
         camera.run, Viewpoint(place, target, np.array([0.0, 0.0, 1.0]))
@@ -63,8 +61,8 @@ def stand(page: PageId, camera: Camera, services: CurrentServices) -> None:
 def still(
     page: PageId, services: CurrentServices, width: Pixels = 1280, height: Pixels = 720
 ) -> Response:
-    """What the page's scene shows now, as its browser renders it; the background is transparent.
-    404 where no browser shows it.
+    """The page's scene as its browser renders it, with a transparent background; 404 where no
+    browser shows it.
     """
     from PIL import Image
 
@@ -79,15 +77,13 @@ def still(
 
 @router.get("/sessions/{page}/state")
 def state(page: PageId, services: CurrentServices) -> dict[str, Any]:
-    """The view held for a page and counts and a digest of the arrays drawn."""
+    """The view of a page, with counts and a digest of the arrays drawn."""
     return services.sessions.get(page).state()
 
 
 @router.websocket("/sessions/{page}/socket")
 async def socket(websocket: WebSocket, page: PageId, services: CurrentServices) -> None:
-    """Views in, states out; views that come while one is being drawn replace each other, so the
-    newest wins.
-    """
+    """Receive views, send states. Views that arrive while one is being drawn replace each other."""
     await newest_wins(websocket, lambda text: _answer(services, page, text))
 
 

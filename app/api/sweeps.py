@@ -1,4 +1,4 @@
-"""Sweeps: start one, follow its points as they come, stop it."""
+"""Sweeps: start one, follow its points, stop it."""
 
 from __future__ import annotations
 
@@ -26,9 +26,7 @@ EXAMPLE: JsonDict = {
 
 
 class SweptParameter(BaseModel):
-    """One parameter by `effect.parameter` of GET /api/effects, and between which values it moves
-    (SI).
-    """
+    """One parameter as `effect.parameter` of GET /api/effects, and its range (SI)."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -38,7 +36,7 @@ class SweptParameter(BaseModel):
 
 
 class SweepRequest(BaseModel):
-    """What is swept, over which clouds, and how; see `palpate.sweep.sweep_spec.SweepSpec`."""
+    """Parameters, clouds and method of a sweep; see `palpate.sweep.sweep_spec.SweepSpec`."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", json_schema_extra={"examples": [EXAMPLE]}
@@ -60,7 +58,7 @@ class SweepRequest(BaseModel):
 
 @router.post("", status_code=202)
 def start(request: SweepRequest, services: CurrentServices, key: IdempotencyKey = None) -> JobOut:
-    """Check what is asked, then queue it; the answer's id names job and sweep."""
+    """Check the request, then queue it; the id of the answer names job and sweep."""
     asked = SweepSpec.from_json(request.model_dump(exclude={"dataset", "registration"}))
     dataset = services.library.open(request.dataset)
     for name in asked.sequences:

@@ -1,4 +1,4 @@
-"""Trainings of the correction network: start one, follow its error epoch by epoch, stop it."""
+"""Trainings of the correction network: start one, follow its error by epoch, stop it."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ EXAMPLE: JsonDict = {"dataset": "block-01", "kind": "unet2d", "epochs": 20}
 
 
 class TrainingRequest(BaseModel):
-    """What is trained on which dataset, on the stated model or on the extended one of a run; see
+    """A training on the raw model of a dataset, or on the extended model of a run; see
     `palpate.correction.training_spec`.
 
-    `trust` is how far the simulation may be corrected along each axis [voxels], `hold` the weight
-    that keeps hidden vertices near it [1/mm], `every` each how many clouds one is learned from.
+    `trust` limits the correction along each axis [voxels], `hold` is the weight [1/mm] that keeps
+    hidden vertices near the simulation, of `every` clouds one is used for training.
     """
 
     model_config = ConfigDict(
@@ -58,7 +58,7 @@ class TrainingRequest(BaseModel):
     seed: int = Field(default=0, ge=0, lt=2**31)
 
     def asked(self) -> dict[str, Any]:
-        """As `palpate.evaluation.train_network.TrainingPlan` has it."""
+        """The request as `palpate.evaluation.train_network.TrainingPlan` reads it."""
         if any(not 1 <= width <= 4096 for width in self.features):
             raise CorrectionError(f"features = {self.features}; expected 1 to 4096", key="features")
         network = {
@@ -77,8 +77,8 @@ class TrainingRequest(BaseModel):
 def start(
     request: TrainingRequest, services: CurrentServices, key: IdempotencyKey = None
 ) -> JobOut:
-    """Check what is asked, then queue it; the answer's id names job and training. Retried, it goes
-    on where it was.
+    """Check the request, then queue it; the id of the answer names job and training. A retry
+    resumes it.
     """
     dataset, settings = services.library.open(request.dataset), services.settings
     if request.run is not None:

@@ -139,7 +139,10 @@ def _nothing_of(folder: Path, wanted: int) -> str:
     others = len(read_results(folder / RESULTS_FILE))
     if not others:
         return f"{folder} holds no {RESULTS_FILE} with results to score"
-    return f"{folder / RESULTS_FILE}: none of its {others} results is of these {wanted} cases; give the options that it was made with"
+    return (
+        f"{folder / RESULTS_FILE}: none of its {others} results is of these {wanted} cases; "
+        "give the options that it was made with"
+    )
 
 
 def _parted(text: str | None) -> list[str] | None:

@@ -41,7 +41,8 @@ __all__ = [
 Registration = Annotated[
     str | None,
     typer.Option(
-        help="Camera as accepted by hand: a name kept by the page for this dataset, or a file; automatic without."
+        help="Accepted registration of the camera: a name stored for this dataset, or a file; "
+        "automatic without."
     ),
 ]
 """The option by which verbs take an accepted registration."""

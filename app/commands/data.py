@@ -91,7 +91,8 @@ def replay(
     ] = "graded",
     registration: Registered = None,
     runs: Annotated[
-        Path, typer.Option(help="AcceptedRegistration registrations are looked for below this folder.")
+        Path,
+        typer.Option(help="AcceptedRegistration registrations are looked for below this folder."),
     ] = Path("runs"),
 ) -> None:
     """Simulate one sequence as the setup states it: one equilibrium per cloud, written to an .npz

@@ -27,7 +27,8 @@ def demo(
     palpation: Annotated[
         str | None,
         typer.Option(
-            help="Palpate by force alone, without a camera: a box or an organ, with a lump or with --effects 0."
+            help="Palpate by force alone, without a camera: a box or an organ, with a lump "
+            "or with --effects 0."
         ),
     ] = None,
     show: Annotated[

@@ -45,8 +45,8 @@ if TYPE_CHECKING:
 __all__ = ["diagnose", "print_report", "run_diagnosis", "true_effects", "truth_beside"]
 
 ALIKE = 0.3
-"""Share of a pattern from which on a rival that imitates so much of it is mentioned [1]; the page
-has the same."""
+"""Least share of a pattern that another effect has to imitate to be mentioned [1]; the page has the
+same value."""
 
 
 def diagnose(
@@ -63,7 +63,8 @@ def diagnose(
     seed: Annotated[int, typer.Option(min=0, help="Seed of all random draws.")] = 0,
     registration: Registration = None,
     runs: Annotated[
-        Path, typer.Option(help="AcceptedRegistration registrations are looked for below this folder.")
+        Path,
+        typer.Option(help="AcceptedRegistration registrations are looked for below this folder."),
     ] = Path("runs"),
 ) -> None:
     """Name what the simulation of each dataset misses, and what naming it gains on sequences
@@ -222,7 +223,8 @@ def _refuse_place(file: Path | None, run: Path | None, several: bool) -> None:
         )
     if not several and run is not None and file.resolve() == run.resolve():
         raise typer.BadParameter(
-            f"--out and --run are both {file}: the one is a file, the other a folder that has the report, too"
+            f"--out and --run are both {file}: the one is a file, the other a folder "
+            "that has the report, too"
         )
 
 
@@ -232,7 +234,8 @@ def _refuse_broken(datasets: list[Path]) -> None:
     names = [path.name for path in datasets]
     if len(set(names)) < len(names):
         raise DatasetError(
-            f"two of the datasets have the same folder name: {', '.join(sorted(names))}; diagnose them one by one"
+            f"two of the datasets have the same folder name: {', '.join(sorted(names))}; "
+            "diagnose them one by one"
         )
     for path in datasets:
         try:

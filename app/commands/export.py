@@ -33,7 +33,8 @@ def export(
 
     if not (run / "report.json").is_file():
         raise RunError(
-            f"{run} is no run: it has no report.json; keep one by palpate diagnose DATASET --run {run}",
+            f"{run} is no run: it has no report.json; "
+            f"make one by palpate diagnose DATASET --run {run}",
             file=str(run),
         )
     path = file or Path(f"{run.resolve().name}.html")

@@ -31,7 +31,8 @@ def serve(
     import_from: Annotated[
         list[Path] | None,
         typer.Option(
-            help="Folder below which datasets may be imported by path; any, where there is no login."
+            help="Folder below which datasets may be imported by path; any, where there is no "
+            "login."
         ),
     ] = None,
     disk_limit: Annotated[

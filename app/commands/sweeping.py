@@ -104,7 +104,8 @@ def _axis(text: str) -> dict[str, Any]:
         return {"parameter": name, "low": float(low), "high": float(high)}
     except ValueError:
         raise EffectError(
-            f"{text!r} is no range; expected EFFECT.PARAMETER=LOW:HIGH, as in poisson_ratio.nu=0.3:0.49"
+            f"{text!r} is no range; expected EFFECT.PARAMETER=LOW:HIGH, "
+            "as in poisson_ratio.nu=0.3:0.49"
         ) from None
 
 
@@ -134,7 +135,8 @@ def _print(found: dict[str, Any], rows: list[dict[str, Any]], units: dict[str, s
     out.print(table)
     if found["stated"] is not None:
         out.print(
-            f"as stated: {1e3 * found['stated']:.4f} mm; {found['points']} points, {found['failed']} failed",
+            f"as stated: {1e3 * found['stated']:.4f} mm; {found['points']} points, "
+            f"{found['failed']} failed",
             highlight=False,
         )
     for one in found["directions"]:

@@ -100,7 +100,8 @@ def train(
         found = learn(request, report)
     gain = 100 * (1 - found["error"] / found["without"])
     out.print(
-        f"mean distance in validation: {found['error']:.3f} mm, {found['without']:.3f} mm without the network ({gain:.0f} % less)",
+        f"mean distance in validation: {found['error']:.3f} mm, "
+        f"{found['without']:.3f} mm without the network ({gain:.0f} % less)",
         highlight=False,
     )
     out.print(f"{runs / 'trainings' / found['training']}", highlight=False, soft_wrap=True)

@@ -1,6 +1,4 @@
-"""What runs in a worker process: one job, telling its progress through one pipe. Imports nothing
-heavy.
-"""
+"""The process of one job, which reports its progress through a pipe. Imports nothing heavy."""
 
 from __future__ import annotations
 
@@ -28,9 +26,7 @@ log = logging.getLogger(__name__)
 
 
 def context(preload: Iterable[str]) -> ForkServerContext:
-    """The start method of all jobs: a server that has imported `preload` once and forks for each
-    job.
-    """
+    """The start method of all jobs: a fork server that has imported `preload`."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     method = multiprocessing.get_context("forkserver")
@@ -40,8 +36,9 @@ def context(preload: Iterable[str]) -> ForkServerContext:
 
 
 def work(target: str, request: dict[str, Any], pipe: Connection) -> None:
-    """Do one job: `target` is "module:function", its result or its error goes into the pipe
-    last."""
+    """Do one job: `target` is "module:function". Its result or its error is the last message in the
+    pipe.
+    """
     os.setpgid(0, 0)
     with contextlib.suppress(OSError):
         os.nice(5)
@@ -59,7 +56,7 @@ def work(target: str, request: dict[str, Any], pipe: Connection) -> None:
 
 
 class _ToLog(logging.Handler):
-    """What libraries and our own code warn of goes into the job's log."""
+    """Sends warnings of libraries and of our own code to the job's log."""
 
     def __init__(self, tell: Callable[..., None]) -> None:
         super().__init__(logging.WARNING)
@@ -73,7 +70,7 @@ class _ToLog(logging.Handler):
 
 
 def _voice(pipe: Connection) -> Callable[..., None]:
-    """Sends messages from any thread, one at a time."""
+    """A function that sends messages from any thread, one at a time."""
     one = threading.Lock()
 
     def tell(*message: Any) -> None:
@@ -102,8 +99,8 @@ def _outcome(target: str, request: dict[str, Any], report: Report) -> tuple[str,
 
 
 def _end_with_parent(pipe: Connection) -> None:
-    """End this process and those it started when the server is gone: the parent never sends, so any
-    end is its end.
+    """End this process and its children when the server is gone. The server never sends anything,
+    so any end of the pipe is its end.
     """
     with contextlib.suppress(EOFError, OSError):
         pipe.recv()

@@ -1,8 +1,7 @@
-"""Long verbs as jobs: one queue, one worker process each, progress through a pipe, cancel =
-terminate.
+"""Long tasks as jobs: one queue, one worker process each, progress through a pipe.
 
-The queue is the table of records, so that what waits outlives the server, and what ran when the
-server or its worker was killed is known to have been interrupted.
+The table of records is the queue, so that waiting jobs outlive the server, and jobs that ran when
+the server or the worker was killed are known to be interrupted.
 """
 
 from __future__ import annotations
@@ -31,20 +30,24 @@ __all__ = ["JobQueue"]
 
 log = logging.getLogger(__name__)
 PAUSE = 0.1
-"""Seconds between two entries of a job's progress: more often than anyone looks would only wear the
-disk."""
+"""Least time between two entries of a job's progress [s]; limits writes to the disk."""
 _ENDING = 10.0
-"""Seconds that a cancelled job's processes may take to end."""
+"""Longest time that a cancelled job's processes may take to end [s]."""
 _NUMBERS = re.compile(r"\d+(\.\d+)?")
 
 
 class JobQueue:
     """Runs jobs one after another and keeps their records.
 
-    Each job has a scratch folder, named in its request, that is gone when the job has ended,
-    however it ended: a result is what the work renamed out of it. In the folders `beside` it may
-    have another one of its id, which goes the same way. `tidy` is called before each job; what it
-    says stands in the job's log.
+    Each job has a scratch folder, named in its request, that is deleted at the end of the job;
+    results are renamed out of it.
+
+    Args:
+        folder: of the records.
+        targets: function of each kind of job, as "module:function".
+        preload: modules that the worker processes import in advance.
+        beside: folders in which a job may have another scratch folder of its id.
+        tidy: is called before each job; its text goes into the job's log.
     """
 
     def __init__(
@@ -82,8 +85,8 @@ class JobQueue:
     ) -> Job:
         """Queue a job; its id is the label, the time and four random characters.
 
-        Asked again under the same `key` it is the same job, and a Conflict if something else is
-        asked.
+        A second request with the same `key` gives the same job; raises Conflict if its content
+        differs.
         """
         identity = f"{label}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(2)}"
         job = Job(
@@ -102,7 +105,7 @@ class JobQueue:
         return self._records.get(identity)
 
     def all(self, most: int = -1, after: int = 0) -> list[Job]:
-        """Jobs, the newest first: at most so many from the `after`-th on, or all."""
+        """Jobs, the newest first: at most `most` from the `after`-th on, or all."""
         return self._records.all(most, after)
 
     def count(self) -> int:
@@ -125,9 +128,7 @@ class JobQueue:
         return self.get(identity)
 
     def retry(self, identity: str) -> Job:
-        """Have a job that ended without its result done once more, under its name: a sweep goes on
-        where it ended.
-        """
+        """Repeat a job that ended without a result, under its name; sweeps and trainings resume."""
         job = self.get(identity)
         if job.kind not in self._targets:
             raise Missing(
@@ -145,8 +146,8 @@ class JobQueue:
         return self.get(identity)
 
     def close(self) -> None:
-        """End the server's jobs: the running one is interrupted, those that wait do so until the
-        next start.
+        """Interrupt the running job and stop the server's thread; waiting jobs wait for the next
+        start.
         """
         self._closing = True
         self._waiting.put(None)
@@ -220,9 +221,9 @@ class JobQueue:
             self._running.pop(identity, None)
 
     def _ended(self, identity: str, ending: tuple[Any, ...] | None, code: int | None) -> None:
-        """Close the record with what the worker said last, now that its folders are gone.
+        """Close the record with the worker's last message, after its folders are deleted.
 
-        A worker that ended without a word and was killed from outside interrupted its job.
+        A worker that was killed without a last message interrupted its job.
         """
         if ending is not None and ending[0] == "failed":
             self._finish(identity, JobState.FAILED, error=ending[1])
@@ -231,7 +232,8 @@ class JobQueue:
         elif ending is not None:
             self._finish(identity, JobState.DONE, result=ending[1], fraction=1.0, text="done")
         elif code is not None and code < 0:
-            message = f"the worker process was ended from outside ({signal.Signals(-code).name}); retry it"
+            name = signal.Signals(-code).name
+            message = f"the worker process was ended from outside ({name}); retry it"
             self._finish(
                 identity,
                 JobState.INTERRUPTED,
@@ -246,9 +248,7 @@ class JobQueue:
             )
 
     def _follow(self, identity: str, pipe: Connection) -> tuple[Any, ...] | None:
-        """Write down what the worker tells, until its last message, which is returned: None of a
-        worker that died.
-        """
+        """Record the worker's messages; returns the last one, or None if the worker died."""
         written, stage = 0.0, ""
         while True:
             try:

@@ -1,4 +1,4 @@
-"""Job records in SQLite: what was asked, how far it is, how it ended."""
+"""Job records in SQLite: request, progress and result."""
 
 from __future__ import annotations
 
@@ -17,22 +17,25 @@ __all__ = ["Job", "JobRecords", "JobState", "Note"]
 
 SCHEMA = """
 create table if not exists jobs (
-    id text primary key, kind text not null, request text not null, state text not null, fraction real not null,
-    text text not null, created real not null, started real, finished real, error text, result text
+    id text primary key, kind text not null, request text not null, state text not null,
+    fraction real not null, text text not null, created real not null, started real,
+    finished real, error text, result text
 );
-create table if not exists log (job text not null, at real not null, level text not null, text text not null);
+create table if not exists log (
+    job text not null, at real not null, level text not null, text text not null
+);
 create index if not exists log_of_job on log (job);
 """
 LATER = {"attempt": "integer not null default 1", "key": "text"}
 """Columns that files of earlier versions lack."""
 FORESEEN = 0.03
-"""Share of a job that must be done before its end is foretold."""
+"""Share of a job that must be done before its remaining time is estimated [1]."""
 MOST_NOTES = 5000
-"""Lines that are kept of one job; of a longer log the first ones."""
+"""Lines that are stored of one job: the first ones of a longer log."""
 
 
 class JobState(StrEnum):
-    """Where a job stands; the last four are final until somebody has it tried again."""
+    """State of a job; the last four are final until a retry."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -43,12 +46,12 @@ class JobState(StrEnum):
 
     @property
     def is_finished(self) -> bool:
-        """Whether nothing will change by itself any more."""
+        """Whether the state is final until a retry."""
         return self not in (JobState.QUEUED, JobState.RUNNING)
 
     @property
     def can_be_retried(self) -> bool:
-        """Whether it ended without what it was to make."""
+        """Whether the job ended without its result."""
         return self.is_finished and self is not JobState.DONE
 
 
@@ -56,8 +59,8 @@ class JobState(StrEnum):
 class Job:
     """A copy of one record; times are seconds since 1970, `fraction` runs from 0 to 1.
 
-    `attempt` counts from 1; `key` is what its asker calls the request, so that asking twice is
-    doing once.
+    `attempt` counts from 1. `key` names the request, so that a repeated request does not make
+    another job.
     """
 
     id: str
@@ -76,8 +79,8 @@ class Job:
 
     @property
     def remaining(self) -> float | None:
-        """Seconds that are left if it goes on as it went until now; None where that cannot be told
-        yet.
+        """Estimated remaining time [s] at the average speed so far; None before it can be
+        estimated.
         """
         if self.state is not JobState.RUNNING or self.started is None or self.fraction < FORESEEN:
             return None
@@ -86,7 +89,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Note:
-    """One line of a job's log: when [s since 1970], how grave (info, warning, error), what."""
+    """One line of a job's log: time [s since 1970], level (info, warning, error), text."""
 
     at: float
     level: str
@@ -115,15 +118,13 @@ class JobRecords:
         self.version = 0
 
     def add(self, job: Job) -> bool:
-        """A new record; False, and nothing added, where its key is taken."""
+        """Add a record; returns False, and adds nothing, where its key is taken."""
         values = [_stored(name, getattr(job, name)) for name in COLUMNS]
         columns = f"({', '.join(COLUMNS)}) values ({', '.join('?' * len(COLUMNS))})"
         return self._change(f"insert into jobs {columns} on conflict (key) do nothing", values)
 
     def update(self, identity: str, **values: Any) -> bool:
-        """New values for some columns; False, and nothing changed, where the job has already
-        finished.
-        """
+        """Set some columns; returns False, and changes nothing, where the job has finished."""
         assignments = ", ".join(f"{name} = ?" for name in values)
         stored = [_stored(name, value) for name, value in values.items()]
         return self._change(
@@ -132,15 +133,16 @@ class JobRecords:
         )
 
     def reopen(self, identity: str) -> bool:
-        """Have a job that ended without a result wait anew; False where it is open or done."""
+        """Queue a job again that ended without a result; returns False where it is open or done."""
         return self._change(
-            "update jobs set state = 'queued', fraction = 0, text = 'waiting for its turn', started = null, finished = null, "
-            "error = null, result = null, attempt = attempt + 1 where id = ? and state in ('failed', 'cancelled', 'interrupted')",
+            "update jobs set state = 'queued', fraction = 0, text = 'waiting for its turn', "
+            "started = null, finished = null, error = null, result = null, attempt = attempt + 1 "
+            "where id = ? and state in ('failed', 'cancelled', 'interrupted')",
             [identity],
         )
 
     def interrupt_running(self, message: str) -> None:
-        """Close every record that was running when a server ended; what waited still waits."""
+        """Mark every running record as interrupted; waiting ones stay."""
         for job in self._select("where state = 'running'", []):
             error = {"kind": "Interrupted", "message": message, "where": {}}
             if self.update(
@@ -153,15 +155,15 @@ class JobRecords:
                 self.note(job.id, "error", message)
 
     def waiting(self) -> list[Job]:
-        """Those in the queue, the oldest first."""
+        """Queued jobs, the oldest first."""
         return self._select("where state = 'queued' order by created", [])
 
     def by_key(self, key: str) -> Job | None:
-        """The job that was asked for under this key."""
+        """The job of the request with this key."""
         return next(iter(self._select("where key = ?", [key])), None)
 
     def note(self, identity: str, level: str, text: str) -> None:
-        """A line for a job's log."""
+        """Add a line to a job's log."""
         self._change(
             "insert into log select ?, ?, ?, ? where (select count(*) from log where job = ?) < ?",
             [identity, time.time(), level, text, identity, MOST_NOTES],
@@ -178,13 +180,13 @@ class JobRecords:
         return [Note(*row) for row in rows]
 
     def get(self, identity: str) -> Job:
-        """One job, or Missing."""
+        """One job; raises Missing where there is none of this id."""
         for job in self._select("where id = ?", [identity]):
             return job
         raise Missing(f"there is no job {identity}", job=identity)
 
     def all(self, most: int = -1, after: int = 0) -> list[Job]:
-        """Jobs, the newest first: at most so many from the `after`-th on, or all."""
+        """Jobs, the newest first: at most `most` from the `after`-th on, or all."""
         return self._select("order by created desc, id limit ? offset ?", [most, after])
 
     def count(self) -> int:

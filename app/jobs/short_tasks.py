@@ -1,4 +1,4 @@
-"""The shorter verbs as worker functions: register, replay, and export."""
+"""Functions of the shorter jobs: register, replay, and export."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ EXPORTS = "exports"
 
 
 def register(request: dict[str, Any], report: Report) -> dict[str, Any]:
-    """The job: relate robot, camera and phantom of `request["dataset"]`, and keep the camera's
+    """Register robot, camera and phantom of `request["dataset"]`, and store the camera's
     registration under a name.
     """
     from palpate.dataset import open_dataset
@@ -78,8 +78,8 @@ def _save_under_free_name(registrations: RegistrationStore, stored: dict[str, An
 
 
 def replay(request: dict[str, Any], report: Report) -> dict[str, Any]:
-    """The job: replay chosen sequences as stated and with effects of one's own choice; kept as a
-    run, for the page.
+    """Replay chosen sequences with the stated setup and with the requested effects; the result is a
+    run.
     """
     from palpate.dataset import open_dataset
     from palpate.dataset.accepted_registration import AcceptedRegistration
@@ -117,7 +117,7 @@ def _origin(dataset: Dataset) -> dict[str, Any]:
 
 
 def export(request: dict[str, Any], report: Report) -> dict[str, Any]:
-    """The job: what was chosen of a run or of a registration as files to take away."""
+    """Write the requested parts of a run, or a registration, as files."""
     runs, scratch = Path(request["runs"]), Path(request["scratch"])
     made = scratch / "files"
     made.mkdir(parents=True)

@@ -1,5 +1,6 @@
-"""Ctrl-C and a polite kill: raised at once, and remembered, since an import may swallow what is
-raised inside it.
+"""Handler of SIGINT and SIGTERM.
+
+It raises KeyboardInterrupt and also records the signal, since an import may swallow the exception.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ __all__ = ["Stop", "stop"]
 
 
 class Stop:
-    """The handler of both signals; `asked` says whether one came."""
+    """The handler of both signals; `asked` is True after one of them."""
 
     asked = False
 

@@ -1,4 +1,4 @@
-"""The long verbs as worker functions: a plain request in, progress out, a plain result back."""
+"""Functions of the long jobs: a plain request and a progress callback in, a plain result out."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ TARGETS = {
 
 
 def diagnose(request: dict[str, Any], report: Report) -> dict[str, Any]:
-    """Diagnose `request["dataset"]`; the run folder gets the name of the scratch folder, below
-    `request["runs"]`.
+    """Diagnose `request["dataset"]`; the run folder, below `request["runs"]`, has the name of the
+    scratch folder.
     """
     from palpate.dataset.accepted_registration import AcceptedRegistration
 
@@ -66,9 +66,10 @@ def diagnose_into(
     report: Report,
     accepted: AcceptedRegistration | None = None,
 ) -> dict[str, Any]:
-    """Diagnose into `scratch`, note the origin, and rename the whole to `run`; returns the report.
+    """Diagnose into `scratch`, write the origin, and rename the result to `run`; returns the
+    report.
 
-    `accepted` is a registration of the camera that is used in place of the automatic one.
+    `accepted` is a registration of the camera that replaces the automatic one.
     """
     from palpate.dataset import open_dataset
     from palpate.diagnosis.pipeline import diagnose as find_cause
@@ -98,9 +99,7 @@ def diagnose_into(
 
 
 def sweep(request: dict[str, Any], report: Report) -> dict[str, Any]:
-    """The job: sweep `request["dataset"]` as `request["sweep"]` asks; the folder has the name of
-    the job.
-    """
+    """Sweep `request["dataset"]` by `request["sweep"]`; the folder has the name of the job."""
     from palpate.dataset import open_dataset
     from palpate.dataset.accepted_registration import AcceptedRegistration
     from palpate.sweep.run_sweep import run_sweep
@@ -124,10 +123,8 @@ def sweep(request: dict[str, Any], report: Report) -> dict[str, Any]:
 
 
 def train(request: dict[str, Any], report: Report) -> dict[str, Any]:
-    """The job: train on `request["dataset"]` as `request["training"]` asks; the folder has the name
-    of the job.
-
-    A job that is done once more goes on where it was.
+    """Train on `request["dataset"]` by `request["training"]`; the folder has the name of the job. A
+    repeated job resumes.
     """
     from palpate.dataset import open_dataset
     from palpate.evaluation.train_network import TrainingPlan, train_network
@@ -156,7 +153,7 @@ def train(request: dict[str, Any], report: Report) -> dict[str, Any]:
 
 
 def _show(run: Run, dataset: Any, training: Path, runs: Path, report: Report) -> None:
-    """The corrected model beside the others of a run."""
+    """Record the corrected model for the frames of a run."""
     from palpate.evaluation.loaded_network import LoadedNetwork
     from palpate.evaluation.record_corrections import record_corrections
 
@@ -174,7 +171,7 @@ def _show(run: Run, dataset: Any, training: Path, runs: Path, report: Report) ->
 
 
 def evaluate(request: Mapping[str, Any], report: Report) -> dict[str, Any]:
-    """The job: the ladder of `request["dataset"]`; the folder has the name of the job."""
+    """Evaluate `request["dataset"]`; the folder has the name of the job."""
     from palpate.dataset import open_dataset
     from palpate.evaluation.run_evaluation import EvaluationSpec
     from palpate.evaluation.run_evaluation import evaluate as climb
@@ -211,11 +208,11 @@ def evaluate(request: Mapping[str, Any], report: Report) -> dict[str, Any]:
 
 
 def import_dataset(request: dict[str, Any], report: Report) -> dict[str, Any]:
-    """The job: unpack `request["archive"]`, or copy `request["folder"]`, check every file, and make
-    it the dataset `name`.
+    """Unpack `request["archive"]`, or copy `request["folder"]`, check every file, and make it the
+    dataset `name`.
 
-    An archive is kept until it was taken or refused, so that an interrupted import can be done once
-    more.
+    The archive stays until it is accepted or refused, so that an interrupted import can be
+    repeated.
     """
     from palpate.dataset import open_dataset
     from palpate.dataset.dataset_problems import refuse_problems

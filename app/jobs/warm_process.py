@@ -1,4 +1,4 @@
-"""One process that solves, kept warm, started when first asked and again after it died."""
+"""A process that is started at the first task, kept, and restarted after it died."""
 
 from __future__ import annotations
 
@@ -15,13 +15,11 @@ __all__ = ["WarmProcess"]
 
 T = TypeVar("T")
 _PATIENCE = 60.0
-"""A frame that finds no equilibrium, or a long past, may take so long [s] before it is given up."""
+"""Longest time of a task [s]: of a frame without an equilibrium, or with a long history."""
 
 
 class WarmProcess:
-    """Answers one question at a time in a process of its own: the newest answer is what a page
-    waits for.
-    """
+    """Runs one task at a time in another process."""
 
     def __init__(self, patience: float = _PATIENCE) -> None:
         self._patience = patience
@@ -29,7 +27,9 @@ class WarmProcess:
         self._lock = threading.Lock()
 
     def ask(self, task: Callable[..., T], *args: Any) -> T:
-        """The task's answer; RunError where it takes too long or its process ends."""
+        """Run a task and return its result; raises RunError where it takes too long or its process
+        ends.
+        """
         with self._lock:
             if self._pool is None:
                 self._pool = ProcessPool(1)
@@ -38,7 +38,8 @@ class WarmProcess:
             except TooLong:
                 self._end()
                 raise RunError(
-                    f"this frame found no answer within {self._patience:.0f} s and was given up; take values nearer to the model's"
+                    f"this frame was not solved within {self._patience:.0f} s; "
+                    "take values nearer to the model's"
                 ) from None
             except BrokenProcessPool:
                 self._end()

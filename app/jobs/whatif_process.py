@@ -1,4 +1,4 @@
-"""What-if over the wire: single frames of runs solved again, and a tool led by hand."""
+"""Processes for what-if: single frames of runs solved again, and interactive replays."""
 
 from __future__ import annotations
 
@@ -23,25 +23,30 @@ when touched again."""
 
 
 class FrameSolver(WarmProcess):
-    """Solves frames of runs again, one at a time, in a process of its own."""
+    """Solves frames of runs again, one at a time, in another process."""
 
     def beginnings(self, run: Run, sequence: str) -> list[dict[str, Any]]:
-        """A finite size of each effect, from which to go on by hand."""
+        """An instance of each effect with a finite size, as a starting point for changes."""
         return self.ask(_beginnings, *_key(run, sequence))
 
     def solve(
         self, run: Run, sequence: str, frame: int, effects: list[dict[str, Any]], tuned: bool
     ) -> ResolvedFrame:
-        """The frame with these effects; RunError where the solve takes too long or its process
-        ends.
+        """Solve the frame with these effects; raises RunError where this takes too long or the
+        process ends.
         """
         return self.ask(_solve, *_key(run, sequence), frame, effects, tuned)
 
 
 @dataclass(frozen=True)
 class InteractiveSession:
-    """One who leads the tool: `name` tells hands apart, whose blocks each remember their own way;
-    `key` says of which sequence.
+    """An interactive replay of one sequence.
+
+    Attributes:
+        name: tells sessions apart; each has a history of its own.
+        key: arguments that open the sequence.
+        effects: of the model, as JSON.
+        tuned: whether the model has the fitted nuisance parameters.
     """
 
     name: str
@@ -53,17 +58,17 @@ class InteractiveSession:
     def of(
         cls, name: str, run: Run, sequence: str, effects: list[dict[str, Any]], tuned: bool
     ) -> Self:
-        """Of a run's sequence; RunError where it does not say where its data are."""
+        """Session of a run's sequence; raises RunError where the run does not name its dataset."""
         return cls(name, _key(run, sequence), effects, tuned)
 
 
 class InteractiveSolver(WarmProcess):
-    """Blocks under tools that hands lead, all in one process of their own."""
+    """Solves interactive replays, all in one process of their own."""
 
     def at(
         self, hand: InteractiveSession, centre: tuple[float, float, float], within: bool = False
     ) -> InteractiveFrame:
-        """What the block answers with the tool there [m]; RunError where it takes too long or the
+        """Solve with the tool's centre there [m]; raises RunError where this takes too long or the
         process ends.
         """
         return self.ask(_felt, hand, centre, within)

@@ -1,4 +1,4 @@
-"""A report said in words: one sentence of verdict, the same in the terminal and on the page."""
+"""A report in words: the sentences of the terminal, the page and the HTML report."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from palpate.app.reporting.quantities import NARROW, quantity, with_interval
+from palpate.app.reporting.quantities import NARROW, quantity, with_interval, words
 
 __all__ = [
     "cause_phrase",
@@ -30,13 +30,21 @@ SIDES = {
 
 
 def verdict_sentence(report: dict[str, Any], size: Sequence[float] | None = None) -> str:
-    """What a diagnosis says; `size` (x, y, z) [m] of the phantom places things below its top."""
+    """The result of a diagnosis.
+
+    Args:
+        report: of the diagnosis.
+        size: edge lengths (x, y, z) of the phantom [m]; with it depths below the top are given.
+    """
     verdict = report.get("verdict")
     phrases = [cause_phrase(cause, size) for cause in report.get("causes", [])]
     if verdict == "replay":
         return f"Replayed with {_listed(phrases, 'and')}." if phrases else "Replayed as stated."
     if verdict == "none":
-        return "The simulation misses nothing that this data could show: what is left is noise and the stated accuracies."
+        return (
+            "The simulation misses nothing that this data could show: what is left is noise and "
+            "the stated accuracies."
+        )
     if verdict == "unexplained":
         return "Structured error remains that no known effect removes."
     if verdict == "ambiguous":
@@ -45,7 +53,7 @@ def verdict_sentence(report: dict[str, Any], size: Sequence[float] | None = None
 
 
 def cause_phrase(cause: dict[str, Any], size: Sequence[float] | None = None) -> str:
-    """One cause as a noun phrase."""
+    """One cause as a noun phrase; `size` as in `verdict_sentence`."""
     values = {name: entry.get("value") for name, entry in cause.get("parameters", {}).items()}
     phrase = PHRASES.get(cause["effect"])
     if cause["effect"] == "stiff_inclusion" and "depth" in cause:
@@ -61,9 +69,7 @@ def cause_phrase(cause: dict[str, Any], size: Sequence[float] | None = None) -> 
 
 
 def limit_phrase(row: dict[str, Any]) -> str:
-    """The smallest size of an effect that this data would show, from a row of the report's
-    ambiguity map.
-    """
+    """Detection limit of an effect, from a row of the report's ambiguity map."""
     factors = [limit["factor"] for limit in row["limits"] if "factor" in limit]
     shares = [limit["share"] for limit in row["limits"] if "share" in limit]
     if None in (*factors, *shares, *(limit.get("change", 0.0) for limit in row["limits"])):
@@ -93,65 +99,66 @@ def limit_phrase(row: dict[str, Any]) -> str:
 
 
 def control_sentences(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """What the controls of each cause say: one sentence on those that it passed, one on each that
-    it did not.
+    """Results of the controls of each cause: one sentence on the passed ones, one on each failed
+    one.
     """
-    said = []
+    sentences = []
     for effect in dict.fromkeys(row["effect"] for row in rows):
         own, name = [row for row in rows if row["effect"] == effect], effect.replace("_", " ")
         passed = [row for row in own if row["passed"]]
         if passed:
             most = max(0.0, *(row["kept"] or 0.0 for row in passed))
             where = _listed([f"the {row['control']}" for row in passed], "or")
-            said.append(f"with {where}, {name} keeps {100 * most:.0f}{NARROW}% of its gain at most")
+            sentences.append(
+                f"with {where}, {name} keeps {100 * most:.0f}{NARROW}% of its gain at most"
+            )
         for row in own:
             if row["passed"] is False:
                 kept = f"still keeps {100 * row['kept']:.0f}{NARROW}% of its gain"
-                said.append(
-                    f"with the {row['control']}, {name} {kept}, so that it may not come of the pushes"
+                sentences.append(
+                    f"with the {row['control']}, {name} {kept}, "
+                    "so that it may not come of the pushes"
                 )
         if all(row["passed"] is None for row in own):
-            said.append(
-                f"none says anything of {name}: {own[0].get('why', 'it does not depend on the pushes')}"
+            sentences.append(
+                f"none says anything of {name}: "
+                + own[0].get("why", "it does not depend on the pushes")
             )
-    return said
+    return sentences
 
 
 def probe_sentence(row: dict[str, Any]) -> str:
-    """A row of the report's next probes: what to do, and what it would tell."""
+    """A row of the report's next probes: what to do, and which causes it separates."""
     apart = " from ".join(
         "nothing" if name == "none" else name.replace("_", " ") for name in row["separates"]
     )
     likely = row.get("probability")
-    chance = (
-        ""
-        if likely is None
-        else f", {'more than 99' if likely > 0.99 else f'{100 * likely:.0f}'}{NARROW}% likely to decide"
-    )
+    chance = ""
+    if likely is not None:
+        percent = "more than 99" if likely > 0.99 else f"{100 * likely:.0f}"
+        chance = f", {percent}{NARROW}% likely to decide"
     return f"{row['text']}: tells {apart}{chance}"
 
 
 def determined_sentences(causes: Sequence[dict[str, Any]]) -> list[str]:
-    """Of each cause the parameters that the data do not enclose on both sides."""
-    said = []
+    """The parameters of the causes that the data do not bound on both sides."""
+    sentences = []
     for cause in causes:
         for name, entry in cause.get("parameters", {}).items():
-            told, label = (
-                entry.get("identifiability", "interval"),
-                f"{cause['effect']} {name}".replace("_", " "),
-            )
-            if told in ("at least", "at most"):
-                said.append(
-                    f"{label} is {told} {quantity(entry['low' if told == 'at least' else 'high'], entry['unit'])}"
-                )
-            elif told != "interval":
-                said.append(f"{label} is {told} from this data")
-    return said
+            kind = entry.get("identifiability", "interval")
+            label = words(f"{cause['effect']} {name}")
+            if kind in ("at least", "at most"):
+                end = entry["low" if kind == "at least" else "high"]
+                sentences.append(f"{label} is {kind} {quantity(end, entry['unit'])}")
+            elif kind != "interval":
+                sentences.append(f"{label} is {kind} from this data")
+    return sentences
 
 
 def left_sentences(report: dict[str, Any]) -> list[str]:
-    """Where the structured error sits that no cause explains, and when; beside a cause also how
-    much of it is left.
+    """Place and time of the structured error that no cause explains.
+
+    If there are causes, also its share.
     """
     left = report.get("unexplained") or {}
     if not left.get("fraction"):
@@ -177,7 +184,10 @@ def _gain(report: dict[str, Any]) -> str:
         "young_modulus"
     ] and force:  # no shape tells of it
         before, after = (quantity(force[name], "N") for name in ("baseline", "extended"))
-        return f"; {naming} brings the error of the force on the test sequences from {before} to {after}"
+        return (
+            f"; {naming} brings the error of the force on the test sequences "
+            f"from {before} to {after}"
+        )
     if removed["value"] < 0.005:
         return f"; on the test sequences {naming} removes no error, so that they do not confirm it"
     return (
@@ -202,30 +212,29 @@ def _lump(values: Values, size: Sequence[float] | None) -> str:
 
 
 def _felt_lump(cause: dict[str, Any], values: Values) -> str:
-    """A lump that was felt and not seen: how deep it lies below the skin next to it."""
+    """A lump that was found from forces alone: its depth below the nearest skin."""
     kind = "stiff" if values["stiffness_ratio"] >= 1.0 else "soft"
-    return f"a {kind} lump, {quantity(2 * values['radius'], 'm')} across, its centre {with_interval(cause['depth'])} under the surface"
+    across, depth = quantity(2 * values["radius"], "m"), with_interval(cause["depth"])
+    return f"a {kind} lump, {across} across, its centre {depth} under the surface"
 
 
 def palpation_sentences(report: dict[str, Any]) -> list[str]:
-    """What was pushed, and of each lump where on the surface it is felt and how much tissue lies
-    above it.
-    """
+    """The pushes, and for each lump its area on the surface and the tissue above it."""
     palpation = report.get("palpation")
     if not palpation:
         return []
     depth, force = (
         quantity(palpation[name]["value"], palpation[name]["unit"]) for name in ("depth", "force")
     )
-    said = [f"{palpation['pushes']} pushes, about {depth} deep, against about {force}"]
+    sentences = [f"{palpation['pushes']} pushes, about {depth} deep, against about {force}"]
     for cause in report.get("causes", []):
         if footprint := cause.get("footprint"):
             x, y, z = (quantity(value, "m") for value in footprint["middle"])
             area = f"{1e4 * footprint['area']:.1f}{NARROW}cm²"
-            said.append(f"it is felt over {area} of the surface around ({x}, {y}, {z})")
+            sentences.append(f"it is felt over {area} of the surface around ({x}, {y}, {z})")
         if cover := cause.get("cover"):
-            said.append(f"{with_interval(cover)} of tissue lie above it")
-    return said
+            sentences.append(f"{with_interval(cover)} of tissue lie above it")
+    return sentences
 
 
 def _shift(values: Values, _: Sequence[float] | None) -> str:
@@ -247,22 +256,30 @@ def _late(values: Values, _: Sequence[float] | None) -> str:
 
 def _fibres(values: Values, _: Sequence[float] | None) -> str:
     stiffer = f"{values['stiffness_ratio']:.2g} times as stiff along one direction as across"
-    return f"fibres: the phantom is {stiffer}, {quantity(values['direction'], 'rad')} from its long side"
+    angle = quantity(values["direction"], "rad")
+    return f"fibres: the phantom is {stiffer}, {angle} from its long side"
 
 
 def _relaxing(values: Values, _: Sequence[float] | None) -> str:
     share, time = 100 * values["relaxed_fraction"], quantity(values["time_constant"], "s")
-    return f"that the material relaxes, by {share:.0f} % of its stiffness with a time constant of {time}"
+    return (
+        f"that the material relaxes, by {share:.0f} % of its stiffness "
+        f"with a time constant of {time}"
+    )
 
 
 def _gradient(values: Values, _: Sequence[float] | None) -> str:
     ratio = values["log_ratio"]
     where, other = ("top", "base") if ratio >= 0 else ("base", "top")
-    return f"that the stiffness changes with the height: the {where} is {math.exp(abs(ratio)):.2g} times as stiff as the {other}"
+    factor = f"{math.exp(abs(ratio)):.2g}"
+    return (
+        "that the stiffness changes with the height: "
+        f"the {where} is {factor} times as stiff as the {other}"
+    )
 
 
 def _paired(pairing: str) -> str:
-    """How touches were really paired, by the rows of touches.csv."""
+    """The true pairing of touches, by the rows of touches.csv."""
     kind, *rows = pairing.split("-")
     if kind == "swap":
         return f"rows {rows[0]} and {rows[1]} were taken for each other"
@@ -294,7 +311,8 @@ PHRASES: dict[str, Callable[[Any, Sequence[float] | None], str]] = {
     "poisson_ratio": lambda v, _: f"another compressibility: Poisson's ratio is {v['nu']:.3g}",
     "tool_radius": lambda v, _: f"the size of the tool: its radius is {quantity(v['radius'], 'm')}",
     "base_slip": lambda v, _: (
-        f"that the base slides on the table, with a friction coefficient of {v['friction_coefficient']:.2g}"
+        "that the base slides on the table, "
+        f"with a friction coefficient of {v['friction_coefficient']:.2g}"
     ),
     "base_detachment": lambda v, _: (
         f"that the base is loose {quantity(v['extent'], 'm')} inwards from {SIDES[v['edge']]}"
@@ -311,17 +329,18 @@ PHRASES: dict[str, Callable[[Any, Sequence[float] | None], str]] = {
     ),
     "anisotropy": _fibres,
     "base_compliance": lambda v, _: (
-        f"a support that gives way, with springs of {v['stiffness_over_E']:.2g} E per metre"
+        f"a compliant support, with springs of {v['stiffness_over_E']:.2g} E per metre"
     ),
     "tool_compliance": lambda v, _: (
-        f"a tool that gives way under load, C E = {v['compliance_times_stiffness']:.2g} per metre"
+        f"a tool that bends under load, C E = {v['compliance_times_stiffness']:.2g} per metre"
     ),
     "viscoelasticity": _relaxing,
     "permanent_set": lambda v, _: (
         f"that {100 * v['retained_fraction']:.0f} % of the deformation stays after release"
     ),
     "tool_friction": lambda v, _: (
-        f"that the tool drags the surface along, with a friction coefficient of {v['friction_coefficient']:.2g}"
+        "that the tool drags the surface along, "
+        f"with a friction coefficient of {v['friction_coefficient']:.2g}"
     ),
     "depth_bias": lambda v, _: (
         f"a camera that misreads depth, by {quantity(v['offset'], 'm')} and {v['scale']:.3g} times"
@@ -336,7 +355,7 @@ PHRASES: dict[str, Callable[[Any, Sequence[float] | None], str]] = {
 
 
 def registration_sentences(report: dict[str, Any]) -> list[str]:
-    """Where the camera's registration comes from, if it is not the automatic one."""
+    """Origin of the camera's registration, if it is not the automatic one."""
     found = report.get("registration")
     if not found:
         return []

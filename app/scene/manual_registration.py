@@ -122,7 +122,8 @@ class ManualRegistration:
             if found is None:
                 other = "the phantom" if side == "mesh" else "the cloud"
                 return {
-                    "problem": f"There is nothing of {other} under this click, and clicks are for {other} now."
+                    "problem": f"There is nothing of {other} under this click, "
+                    f"and clicks are for {other} now."
                 }
             point, landmark = found
             pair = None if ray.mark is None else ray.mark[0]

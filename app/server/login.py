@@ -1,4 +1,4 @@
-"""Who is logged in: session cookies, bearer tokens, and how often a wrong token may be tried."""
+"""Login: session cookies, bearer tokens, and a limit on wrong tokens."""
 
 from __future__ import annotations
 
@@ -19,14 +19,17 @@ from palpate.app.server.tokens import Token
 __all__ = ["Login", "router"]
 
 COOKIE = "palpate_session"
-INSIDE = "palpate_inside"  # tells the page that there is something to log out of; opens nothing
-LASTS = 12 * 3600.0  # [s] that a session is good for
-TRIES, WINDOW = 5, 60.0  # so many wrong tokens from one address within so many seconds
+INSIDE = "palpate_inside"
+"""Cookie that lets the page show "log out"; it authorises nothing."""
+LASTS = 12 * 3600.0
+"""Lifetime of a session [s]."""
+TRIES, WINDOW = 5, 60.0
+"""Number of wrong tokens that one address may send within a time [s]."""
 router = APIRouter(include_in_schema=False)
 
 
 class Login:
-    """The sessions of one server. They live in memory: a restart logs everybody out."""
+    """The sessions of one server. They are in memory: a restart logs everybody out."""
 
     def __init__(self, token: Token, clock: Callable[[], float] = time.monotonic) -> None:
         self._token = token
@@ -34,28 +37,26 @@ class Login:
         self._sessions: dict[str, float] = {}
         self._wrong: dict[str, list[float]] = {}
         self._key = secrets.token_bytes(32)
-        self._known = b""  # keyed digest of the right token once it was shown, so that a bearer costs no scrypt each time
+        # Keyed digest of the right token after its first use, so that later bearers cost no scrypt.
+        self._known = b""
 
     async def is_logged_in(self, headers: Mapping[str, str], peer: str) -> bool:
-        """Whether a request with these headers comes from somebody who is logged in."""
+        """Whether the headers carry a valid session cookie or bearer token."""
         if self._sessions.get(_digest(session_of(headers)), -1.0) > self._clock():
             return True
         scheme, _, text = headers.get("authorization", "").partition(" ")
         return scheme.lower() == "bearer" and await self.right(text.strip(), peer)
 
     async def right(self, text: str, peer: str) -> bool:
-        """Whether this is the token; while an address is throttled no new token of it is even
-        looked at.
-        """
+        """Whether this is the token. While an address is throttled, no token from it is checked."""
         fingerprint = hmac.digest(self._key, text.encode(), "sha256")
         if hmac.compare_digest(fingerprint, self._known):
             return True
         if self.wait(peer):
             return False
         tried = self._wrong.setdefault(peer, [])
-        tried.append(
-            self._clock()
-        )  # counted before it is compared, so that many at once are not let through
+        # Counted before the comparison, so that simultaneous attempts do not pass the limit.
+        tried.append(self._clock())
         if not await asyncio.to_thread(self._token.matches, text):
             return False
         self._known = fingerprint
@@ -63,7 +64,7 @@ class Login:
         return True
 
     def wait(self, peer: str) -> float:
-        """For how long [s] tokens from this address are refused."""
+        """Time [s] for which tokens from this address are refused."""
         now = self._clock()
         self._wrong = {
             who: [when for when in times if when > now - WINDOW]
@@ -74,29 +75,29 @@ class Login:
         return times[-TRIES] + WINDOW - now if len(times) >= TRIES else 0.0
 
     def begin(self) -> str:
-        """A new session; its name goes to the browser, only its digest stays here."""
+        """Start a session and return its name for the browser; only its digest is stored."""
         now, name = self._clock(), secrets.token_urlsafe(32)
-        self._sessions = {kept: end for kept, end in self._sessions.items() if end > now}
+        self._sessions = {known: end for known, end in self._sessions.items() if end > now}
         self._sessions[_digest(name)] = now + LASTS
         return name
 
     def end(self, name: str) -> None:
-        """Forget a session."""
+        """Delete a session."""
         self._sessions.pop(_digest(name), None)
 
 
 def session_of(headers: Mapping[str, str]) -> str:
-    """The session that the cookie names, empty if none."""
+    """The session that the cookie names; empty if there is none."""
     try:
-        found = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
+        cookie = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
     except CookieError:
         return ""
-    return found.value if found else ""
+    return cookie.value if cookie else ""
 
 
 @router.get("/login")
 def page(request: Request) -> FileResponse:
-    """The page that asks for the token."""
+    """The login page."""
     return FileResponse(
         request.app.state.settings.static / "login.html", headers={"cache-control": "no-store"}
     )
@@ -104,8 +105,8 @@ def page(request: Request) -> FileResponse:
 
 @router.post("/login")
 async def enter(request: Request) -> Response:
-    """The token for a session. It always leads to the page and nowhere else: there is no address to
-    be led to.
+    """Exchange the token for a session and redirect to the page; no other redirect target can be
+    requested.
     """
     login: Login | None = request.app.state.login
     if login is None:

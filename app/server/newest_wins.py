@@ -1,4 +1,4 @@
-"""Talking over a websocket with whoever asks faster than is answered."""
+"""Websocket loop that answers only the newest of the waiting messages."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ __all__ = ["newest_wins"]
 
 
 async def newest_wins(websocket: WebSocket, answer: Callable[[str], dict[str, Any]]) -> None:
-    """Texts in, what `answer` makes of them out, in a thread; those that come meanwhile replace
-    each other, so nothing queues.
+    """Answer messages of a websocket with `answer`, which runs in a thread. Messages that arrive
+    meanwhile replace each other.
 
     Returns when the connection has ended and no answer is being made any more.
     """

@@ -1,6 +1,4 @@
-"""Long lists by pages: `after` and `most` in the query, the whole number in a header, since a list
-stays a plain list.
-"""
+"""Pagination of lists: `after` and `most` in the query, the total number in a header."""
 
 from __future__ import annotations
 
@@ -18,7 +16,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Page:
-    """Which part of a list: at most `most` rows from the `after`-th on."""
+    """A part of a list: at most `most` rows from the `after`-th on."""
 
     after: int
     most: int
@@ -35,6 +33,6 @@ RequestedPage = Annotated[Page, Depends(_page)]
 
 
 def paginate(rows: Sequence[T], page: Page, response: Response) -> Sequence[T]:
-    """The wanted part of a list, and in the answer's header of how many."""
+    """The requested part of a list; the total number goes into the answer's header."""
     response.headers[TOTAL] = str(len(rows))
     return rows[page.after : page.after + page.most]

@@ -1,6 +1,4 @@
-"""Who may talk to the server: pages of its own, by its own names, logged in where others can reach
-it; and what they may send.
-"""
+"""Middleware: Host and Origin allow-list, authentication, plain paths, body-size limits."""
 
 from __future__ import annotations
 
@@ -18,17 +16,18 @@ __all__ = ["RequestGuard", "same_origin"]
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
 PAGE_POLICY = (
-    "default-src 'self'; img-src 'self' data: blob:; style-src 'self'; script-src 'self'; connect-src 'self'; frame-src 'self'; "
-    "frame-ancestors 'self'; base-uri 'none'; form-action 'self'; object-src 'none'"
+    "default-src 'self'; img-src 'self' data: blob:; style-src 'self'; script-src 'self'; "
+    "connect-src 'self'; frame-src 'self'; frame-ancestors 'self'; "
+    "base-uri 'none'; form-action 'self'; object-src 'none'"
 )
 VIEWER_POLICY = (
-    "default-src 'self' data: blob:; script-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:; "
+    "default-src 'self' data: blob:; "
+    "script-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:; "
     "worker-src blob: data:; style-src 'self' 'unsafe-inline'; connect-src 'self' data: blob:; "
     "frame-ancestors 'self'; object-src 'none'"
 )
 
-
-# Nobody's data: the page's own files, and the way in.
+# Accessible without login: the page's own files and the login.
 OPEN = ("/login", "/logout")
 OPEN_BELOW = "/static/"
 UPLOAD = "/api/imports"
@@ -37,9 +36,8 @@ TRICKS = (b"%2f", b"%5c", b"%2e", b"%00", b"//", b"\\")
 
 
 class RequestGuard:
-    """Refuses foreign Host names (DNS rebinding), foreign Origins (other sites' pages), whoever is
-    not logged in, paths that read as two things, and bodies that are too large; for requests and
-    websockets alike.
+    """Refuses foreign Host names (DNS rebinding), foreign Origins (other sites' pages), requests
+    without login, ambiguous paths, and bodies that are too large; for requests and websockets.
     """
 
     def __init__(self, app: ASGIApp, settings: Settings, login: Login | None = None) -> None:
@@ -52,7 +50,7 @@ class RequestGuard:
         }
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on what is welcome, with the security headers; answer the rest."""
+        """Pass on accepted requests, with security headers; answer the others."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -77,16 +75,16 @@ class RequestGuard:
 
     def _misplaced(self, scope: Scope, headers: dict[str, str]) -> JSONResponse | None:
         names = self._names
-        if self._wild and scope.get(
-            "server"
-        ):  # bound to every address: the one that was called is a name as well
+        # A server that listens on every address also answers to the one that was called.
+        if self._wild and scope.get("server"):
             names = names | {_bracketed(scope["server"][0])}
         if not same_origin(headers.get("host", ""), headers.get("origin"), names):
             source = headers.get("origin") or headers.get("host")
             return _answer(
                 403,
                 "Refused",
-                f"requests from {source} are refused; open the page by its own address, or --allow-host it",
+                f"requests from {source} are refused; open the page by its own address, "
+                "or --allow-host it",
             )
         if ambiguous(scope):
             return _answer(
@@ -94,7 +92,8 @@ class RequestGuard:
                 "RequestError",
                 "the path has an empty, encoded or dotted part; write it plainly",
             )
-        length = headers.get("content-length", "0")  # what is no number is counted as it comes in
+        # A length that is no number is checked while the body arrives.
+        length = headers.get("content-length", "0")
         if (
             scope["type"] == "http"
             and length.isascii()
@@ -121,12 +120,13 @@ class RequestGuard:
         )
 
     def _most(self, scope: Scope) -> int:
-        """Bytes that a request may bring to this path."""
+        """Largest body of a request to this path [bytes]."""
         return self._largest_upload if scope["path"] == UPLOAD else self._largest
 
     def _limited(self, receive: Receive, most: int) -> Receive:
-        """The same body; 413 once it is longer than allowed, whatever length it was said to
-        have."""
+        """The same body; raises HTTP 413 once it is longer than allowed, whatever its stated
+        length.
+        """
         got = 0
 
         async def limited() -> Message:
@@ -142,16 +142,14 @@ class RequestGuard:
 
 
 def same_origin(host: str, origin: str | None, names: Collection[str] = LOOPBACK) -> bool:
-    """Whether the Host is one of our names and the Origin, if a browser sent one, is a page of that
-    same host.
-    """
+    """Whether the Host is one of `names` and the Origin, if sent, is a page of that host."""
     name = host.rsplit(":", 1)[0] if not host.endswith("]") else host
     return name.lower() in names and (origin is None or urlsplit(origin).netloc == host)
 
 
 def ambiguous(scope: Scope) -> bool:
-    """Whether a path could be read as another one: by its dots, its doubled slashes, or what it
-    encodes.
+    """Whether a path could be read as another one: dotted parts, doubled slashes, or encoded
+    separators.
     """
     raw = (scope.get("raw_path") or b"").split(b"?")[0].lower()
     return any(trick in raw for trick in TRICKS) or any(
@@ -179,9 +177,7 @@ def _headers(policy: str) -> list[tuple[bytes, bytes]]:
     return [
         (b"content-security-policy", policy.encode()),
         (b"x-content-type-options", b"nosniff"),
-        (
-            b"referrer-policy",
-            b"same-origin",
-        ),  # with no-referrer a form of our own page would send Origin: null
+        # With no-referrer a form of our own page would send Origin: null.
+        (b"referrer-policy", b"same-origin"),
         (b"cross-origin-resource-policy", b"same-origin"),
     ]

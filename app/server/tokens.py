@@ -1,6 +1,4 @@
-"""The token that lets people in from other machines: made once, shown once, kept only as a salted
-hash.
-"""
+"""The login token: shown once when it is made, stored as a salted hash."""
 
 from __future__ import annotations
 
@@ -17,20 +15,22 @@ from palpate.foundation.errors import SetupError
 __all__ = ["FILE", "Token"]
 
 FILE = "login.json"
-COST = {"n": 2**14, "r": 8, "p": 1}  # 16 MB and some 50 ms for each guess
+COST = {"n": 2**14, "r": 8, "p": 1}
+"""Parameters of scrypt: 16 MB and about 50 ms for each guess."""
 
 
 @dataclass(frozen=True)
 class Token:
-    """What is known of a token: its salt and its scrypt hash (RFC 7914), not itself."""
+    """Salt and scrypt hash (RFC 7914) of a token."""
 
     salt: bytes
     digest: bytes
 
     @classmethod
     def make(cls, folder: Path) -> str:
-        """A new token in place of any before; its hash goes to a file that only its owner can
-        read."""
+        """Make a token that replaces any before; its hash goes to a file that only its owner can
+        read.
+        """
         text, salt = secrets.token_urlsafe(24), secrets.token_bytes(16)
         folder.mkdir(parents=True, exist_ok=True)
         aside = folder / f".{FILE}-{secrets.token_hex(4)}"
@@ -41,14 +41,14 @@ class Token:
 
     @classmethod
     def load(cls, folder: Path) -> Token:
-        """The token of this folder; SetupError if there is none, if it cannot be read, or if others
-        may read it.
+        """Read the token of a folder; raises SetupError if it is missing, unreadable, or readable
+        by others.
         """
         path = folder / FILE
         try:
             mode = path.stat().st_mode & 0o777
-            kept = json.loads(path.read_text())
-            token = cls(bytes.fromhex(kept["salt"]), bytes.fromhex(kept["scrypt"]))
+            stored = json.loads(path.read_text())
+            token = cls(bytes.fromhex(stored["salt"]), bytes.fromhex(stored["scrypt"]))
         except FileNotFoundError as error:
             raise SetupError(
                 f"{path}: there is no token; make one with palpate serve --new-token", key="token"

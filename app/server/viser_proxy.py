@@ -1,5 +1,4 @@
-"""The viewer at /viser/<page>: its one HTML file, and its websocket passed on to the inner
-server."""
+"""The viewer at /viser/<page>: its HTML file, and a relay of its websocket to the inner server."""
 
 from __future__ import annotations
 
@@ -22,10 +21,11 @@ router = APIRouter()
 PageId = Annotated[str, Parameter(pattern=r"^[A-Za-z0-9-]{8,64}$")]
 
 SENDABLE = (1000, 1001, 1002, 1003, 1008, 1011, 1012, 1013)
-# The viewer's own panel, logo and notices would lie over the scene; the page around it has all
-# controls.
+# Hides the viewer's own panel, logo and notices, which cover the scene; the page has all controls.
 STYLE = """<style>
-[data-floating-window], [data-dock-leaf], .mantine-Notifications-root, .mantine-Notification-root { display: none !important; }
+[data-floating-window], [data-dock-leaf], .mantine-Notifications-root, .mantine-Notification-root {
+  display: none !important;
+}
 html, body, body div[style*="background-color"] { background: transparent !important; }
 </style>"""
 
@@ -49,7 +49,7 @@ def viewer(page: PageId) -> HTMLResponse:
 
 @router.websocket("/viser/{page}")
 async def relay(websocket: WebSocket, page: PageId) -> None:
-    """Both directions until either side ends."""
+    """Relay both directions of the websocket until either side ends."""
     port = websocket.app.state.services.viewer.port
     offered = [Subprotocol(name) for name in websocket.scope.get("subprotocols", [])]
     try:

@@ -1,4 +1,4 @@
-"""AcceptedRegistration registrations by name, below the runs folder: never in the dataset, never overwritten."""
+"""Accepted registrations by name, below the runs folder; none is overwritten."""
 
 from __future__ import annotations
 

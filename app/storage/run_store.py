@@ -106,7 +106,7 @@ class Run:
 
     @cached_property
     def origin(self) -> dict[str, Any]:
-        """Folder of the dataset, time and seed of the run; empty where the run does not state them."""
+        """Dataset folder, time and seed of the run; empty where the run does not state them."""
         return self._json("origin.json") if (self.path / "origin.json").is_file() else {}
 
     @property
@@ -136,7 +136,7 @@ class Run:
         return self.path.parent / CORRECTIONS / self.name / f"{name}.npz"
 
     def _corrected(self, name: str) -> dict[str, Any]:
-        """Arrays of the corrected model; empty where no training on this run's model was shown."""
+        """Arrays of the corrected model; empty where they were not recorded."""
         file = self._correction(name)
         return self._arrays(os.path.relpath(file, self.path), CORRECTED) if file.is_file() else {}
 
