@@ -1,6 +1,4 @@
-"""A block under a tool that a hand leads: one equilibrium for each place that is asked for, from
-the last one on.
-"""
+"""Interactive replay: one equilibrium for each requested tool position, from the last one on."""
 
 from __future__ import annotations
 
@@ -23,29 +21,29 @@ from palpate.setup.setup import Setup
 __all__ = ["DEEPEST", "InteractiveFrame", "InteractiveReplay"]
 
 DEEPEST = 0.25
-"""Of the block's shortest side, how far a hand may push: beyond, an answer takes longer than a hand
-likes to wait."""
+"""Largest depth of an interactive push, over the block's shortest side [1]: deeper ones take too
+long to solve."""
 _FAR = 0.06
-"""Nor is the tool led further from the block than this [m]."""
+"""Largest distance of the tool from the block [m]."""
 _TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class InteractiveFrame:
-    """What the block answers, phantom frame, SI; the arrays are as a recording has them.
+    """Response of the block, phantom frame, SI; arrays as in a recording.
 
     Attributes:
-        surface: (v, 3) moved material vertices; those of the last equilibrium where there is none.
-        error: (v,) NaN, for nobody measured it.
-        tool: (3,) true centre.
-        radius: of the tool.
+        surface: (v, 3) moved material vertices [m]; those of the last equilibrium if this is none.
+        error: (v,) NaN, because nothing was measured.
+        tool: (3,) true centre [m].
+        radius: of the tool [m].
         camera: (4, 4) phantom_from_camera.
-        inside: its nodes, as a recording of one frame, where they were asked for.
-        depth: how far the tool reaches into the block at rest.
-        force: (3,) on the tool.
+        inside: interior fields as of a recording of one frame; None if not requested.
+        depth: of the tool in the block at rest [m].
+        force: (3,) on the tool [N].
         converged: whether this is an equilibrium.
         outcome: how the solve ended.
-        seconds: that it took.
+        seconds: duration of the solve [s].
     """
 
     surface: FloatArray
@@ -62,8 +60,11 @@ class InteractiveFrame:
 
 
 class InteractiveReplay:
-    """A setup whose tool is led by hand; what it remembers (a material's past, friction) is that of
-    the hand's way.
+    """A replay whose tool is moved by hand; history and friction follow the path of the hand.
+
+    Args:
+        setup: the experiment.
+        grid: mesh specification.
     """
 
     def __init__(self, setup: Setup, grid: Meshing) -> None:
@@ -77,8 +78,9 @@ class InteractiveReplay:
         self._begun = time.monotonic()
 
     def at(self, centre: FloatArray, *, within: bool = False) -> InteractiveFrame:
-        """The block with the tool's centre (3,) [m] there, or where `reachable` puts it; `within`
-        asks for its inside, too.
+        """The block with the tool's centre (3,) [m] there, or where `reachable` moves it.
+
+        `within` requests the interior fields.
         """
         start, wanted = time.perf_counter(), self.reachable(centre)
         frame = self._replay.solve_from_any(wanted, (self._last,), time.monotonic() - self._begun)
@@ -104,12 +106,12 @@ class InteractiveReplay:
         )
 
     def depth(self, centre: FloatArray) -> float:
-        """How far a tool at (3,) [m] reaches into the block at rest [m]."""
+        """Depth of a tool at (3,) [m] in the block at rest [m]."""
         return max(0.0, self.setup.tool.radius - self._apart(centre)[0])
 
     def reachable(self, centre: FloatArray) -> FloatArray:
-        """The place (3,) [m] next to this one where a tool may be: not beyond the base, not too
-        deep, not too far away.
+        """The nearest permitted position (3,) [m]: not below the base, not too deep, not too far
+        away.
         """
         low, high = self.setup.box.low, self.setup.box.high
         radius, deepest = self.setup.tool.radius, DEEPEST * float(np.min(self.setup.box.size))
@@ -119,8 +121,10 @@ class InteractiveReplay:
         return np.asarray(place + max(0.0, radius - deepest - apart) * outwards)
 
     def _apart(self, place: FloatArray) -> tuple[float, FloatArray]:
-        """Signed distance [m] of a place (3,) to the block, whose base is no way out, and the
-        direction (3,) in which it grows.
+        """Signed distance [m] of a point (3,) to the block, and the direction (3,) in which it
+        grows.
+
+        The base does not count as a side.
         """
         low, high = self.setup.box.low - np.array([0.0, 0.0, 1.0]), self.setup.box.high
         outside = place - np.clip(place, low, high)

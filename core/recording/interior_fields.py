@@ -1,9 +1,9 @@
-"""A block's interior in each frame of a recording: every node's displacement and energy density,
-small enough to be kept.
+"""Interior fields of a block in each frame of a recording: displacement and energy density of every
+node.
 
-Meshes follow the tool, so that each frame has node coordinates of its own; three axes say them.
-What is asked for between the nodes is interpolated linearly: pictures want no more, and quadratic
-shape functions would make negative energies.
+Meshes follow the tool, so that each frame stores its node coordinates, as three axes. Values
+between the nodes are interpolated linearly: that is enough for pictures, and quadratic shape
+functions would give negative energies.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ class InteriorFields:
         counts: (f, 3) nodes along x, y, z.
         axes: their coordinates at rest in the stated block, frame after frame [m].
         moved: (n, 3) displacement of all nodes [m], frame after frame, x fastest.
-        energy: (n,) elastic energy density over E [1]; NaN where a frame has no equilibrium with
-            all elements upright.
-        modulus: E as believed [Pa].
+        energy: (n,) elastic energy density over E [1]; NaN in frames without equilibrium or with an
+            inverted element.
+        modulus: E as assumed [Pa].
     """
 
     counts: IntArray
@@ -48,7 +48,7 @@ class InteriorFields:
 
     @classmethod
     def of(cls, setup: Setup, frames: Sequence[Equilibrium]) -> Self:
-        """Of a replay's frames on block meshes."""
+        """Compute the fields of a replay's frames on block meshes."""
         counts: list[tuple[int, int, int]] = []
         axes: list[FloatArray] = []
         moved: list[FloatArray] = []
@@ -60,9 +60,8 @@ class InteriorFields:
                 raise TypeError("only a block's frames have axes")
             counts.append(mesh.shape)
             axes.extend(axis / part for axis, part in zip(mesh.axes, longer, strict=True))
-            places = frame.move(
-                mesh.nodes
-            )  # a correction that stands on the equilibrium counts, too
+            # A correction on top of the equilibrium is included.
+            places = frame.move(mesh.nodes)
             moved.append(places - mesh.nodes / longer)
             with np.errstate(invalid="ignore", divide="ignore"):
                 energy.append(nodal_density(BlockModel(setup, mesh), places))
@@ -76,38 +75,40 @@ class InteriorFields:
             )
 
     def arrays(self, model: str) -> dict[str, Any]:
-        """Arrays for a file, named after the model."""
+        """Arrays for a file, with names that end with the model's."""
         values = (self.counts, self.axes, self.moved, self.energy, np.array(self.modulus))
         return {f"{part}_{model}": value for part, value in zip(_PARTS, values, strict=True)}
 
     @classmethod
     def read(cls, arrays: Mapping[str, Any], model: str) -> Self | None:
-        """From such a file; None where it has none of this model."""
+        """Read the fields from such a file; None if it has none of this model."""
         if any(f"{part}_{model}" not in arrays for part in _PARTS):
             return None
         counts, axes, moved, energy, modulus = (arrays[f"{part}_{model}"] for part in _PARTS)
         return cls(counts, axes, moved, energy, float(modulus))
 
     def displacement(self, frame: int, places: FloatArray) -> FloatArray:
-        """How far the material has moved (m, 3) [m] that lies at `places` (m, 3) [m] in the stated
-        block at rest.
+        """Displacement (m, 3) [m] of the material at rest positions `places` (m, 3) [m] in the
+        stated block.
         """
         return self._between(self.moved, frame, places)
 
     def energy_density(self, frame: int, places: FloatArray) -> FloatArray:
-        """Elastic energy per rest volume (m,) [J/m^3] there, with the modulus as believed."""
+        """Elastic energy per rest volume (m,) [J/m^3] at the same places, with the assumed
+        modulus.
+        """
         return self._between(self.energy, frame, places) * self.modulus
 
     @cached_property
     def _begins(self) -> tuple[IntArray, IntArray]:
-        """Where each frame's axes and nodes begin."""
+        """Index of the first axis coordinate and the first node of each frame."""
         nodes = np.prod(self.counts.astype(np.int64), axis=1)
         return np.cumsum(self.counts.sum(axis=1)) - self.counts.sum(axis=1), np.cumsum(
             nodes
         ) - nodes
 
     def _between(self, values: FloatArray, frame: int, places: FloatArray) -> FloatArray:
-        """Trilinear interpolation of nodal values of one frame."""
+        """Interpolate nodal values of one frame trilinearly."""
         nx, ny, nz = (int(count) for count in self.counts[frame])
         at, first = self._begins[0][frame], self._begins[1][frame]
         own = np.split(np.asarray(self.axes[at : at + nx + ny + nz], dtype=float), [nx, nx + ny])
@@ -122,8 +123,8 @@ def _small(parts: list[FloatArray], kind: type[Any]) -> Any:
 
 
 def trilinear(axes: Sequence[FloatArray], grid: FloatArray, places: FloatArray) -> FloatArray:
-    """Values (m, ...) at places (m, 3) of a grid (nz, ny, nx, ...) on these axes; outside is moved
-    to the border.
+    """Interpolate a grid (nz, ny, nx, ...) on these axes at places (m, 3); outside is moved to the
+    border.
     """
     lower, parts = [], []
     for axis, at in zip(axes, places.T, strict=True):

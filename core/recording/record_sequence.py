@@ -1,12 +1,14 @@
-"""What the page shows of one sequence: surfaces, tool and errors of the stated and of the extended
-model, frame by frame.
+"""Recording of one sequence for the page: surfaces, tool and errors of two models, frame by frame.
+
+The models are the stated one and the extended one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -30,16 +32,30 @@ from palpate.setup.setup import Setup
 __all__ = ["ModelRecording", "compare_with_clouds", "record"]
 
 MOST_FRAMES = 100
+"""Largest number of frames of a recording."""
 VERTEX_SPACING = 2.5e-3
+"""Spacing of the surface's material vertices [m]."""
 _REACH = 3.5e-3
+"""Distance from a vertex within which points count [m]."""
 _LEAST = 3
+"""Smallest number of such points."""
 
 
 @dataclass(frozen=True, eq=False)
 class ModelRecording:
-    """One model's side of a recording; arrays over frames (f, ...), SI, phantom frame.
+    """One model's part of a recording; arrays over frames (f, ...), SI, phantom frame.
 
-    `distance` is the RMS of `error`, `force` the size of the block's force on the tool.
+    Attributes:
+        surface: (f, v, 3) moved material vertices [m].
+        tool: (f, 3) true centre [m].
+        error: (f, v) mean gap of the measured points around each vertex [m]; NaN if unseen.
+        distance: (f,) RMS of `error` [m].
+        paper: (f,) metric of `palpate.measurement.metrics.paper_distance` [m].
+        outcome: (f,) 0 for an equilibrium, else 1.
+        free: (f,) True without contact.
+        force: (f,) size of the block's force on the tool [N].
+        iterations: (f,) of the solver.
+        inside: interior fields.
     """
 
     surface: FloatArray
@@ -55,10 +71,10 @@ class ModelRecording:
 
 
 def _vertex_errors(seen: Gaps, surface: Surface) -> FloatArray:
-    """Mean gap (v,) [m] of the points around each material vertex on its own side; NaN where too
-    few were seen.
+    """Mean gap (v,) [m] of the points around each vertex on its own side; NaN for too few
+    points.
     """
-    # Points on another side of an edge are near in space but say nothing of this side.
+    # Points on another side of an edge are near in space but carry no information on this side.
     errors = np.full(len(surface.vertices), np.nan)
     for number in np.unique(seen.side):
         own = np.unique(surface.faces[surface.side == number])
@@ -70,8 +86,9 @@ def _vertex_errors(seen: Gaps, surface: Surface) -> FloatArray:
 
 
 def _rms(errors: FloatArray) -> float:
-    """Over what was seen, of errors (v,) [m] that are averages already: single points would show
-    little but the sensor's noise.
+    """RMS of the finite errors (v,) [m].
+
+    They are averages: single points would show little but the sensor's noise.
     """
     seen = errors[np.isfinite(errors)]
     return float(np.sqrt(np.mean(seen**2))) if len(seen) else np.nan
@@ -83,10 +100,14 @@ def compare_with_clouds(
     clouds: Sequence[FloatArray],
     other: tuple[Setup, ModelRecording] | None = None,
 ) -> ModelRecording:
-    """These frames of a setup against cleaned clouds, (n, 3) each, camera frame [m].
+    """Compare frames of a setup with segmented clouds.
 
-    Frames at rest, which are half of them, need not be looked at again where the `other` setup has
-    looked at the same block from the same place.
+    Args:
+        setup: of the frames.
+        frames: equilibria.
+        clouds: (n, 3) each, camera frame [m].
+        other: another setup and its recording; frames at rest, half of all, are copied from it if
+            both setups look the same at rest.
     """
     surface, sight = Surface.of(setup, VERTEX_SPACING), camera_model_for(setup)
     known = other[1] if other is not None and _looks_alike(other[0], setup) else None
@@ -129,13 +150,23 @@ def _looks_alike(one: Setup, other: Setup) -> bool:
 def record(
     sequence: Recording,
     stated: Setup,
-    found: Setup,
+    extended: Setup,
     cleaner: Cleaner,
     shaft: FloatArray | None,
     grid: Meshing,
     target: Path,
 ) -> str:
-    """Replay one sequence under both models and write `target`; returns the sequence's name."""
+    """Replay one sequence with both models and write the recording; returns the sequence's name.
+
+    Args:
+        sequence: of the dataset.
+        stated: setup of the model "raw".
+        extended: setup of the model "extended".
+        cleaner: segmentation of the phantom.
+        shaft: axis of the tool's shaft, as of `palpate.measurement.tool_pose`.
+        grid: mesh specification.
+        target: file to write.
+    """
     total = len(sequence)
     index = np.unique(np.linspace(0, total - 1, min(total, MOST_FRAMES)).round().astype(int))
     times = np.asarray(sequence.cloud_times)[index]
@@ -144,15 +175,47 @@ def record(
     clouds = [
         cloud[cleaner.clean(cloud, pose).indices] for cloud, pose in zip(raw, poses, strict=True)
     ]
-    sides: dict[str, ModelRecording] = {}
+    models = _replayed_models(sequence, stated, extended, grid, times, clouds)
+    cameras = {
+        f"camera_{model}": recorded_camera(sequence, camera_model_for(setup).pose).matrix
+        for model, setup in (("raw", stated), ("extended", extended))
+    }
+    radii = {
+        f"tool_radius_{model}": np.array(setup.tool.radius)
+        for model, setup in (("raw", stated), ("extended", extended))
+    }
+    surface = Surface.of(stated, VERTEX_SPACING)
+    np.savez_compressed(
+        target,
+        time=times,
+        cloud_index=index,
+        faces=surface.faces,
+        rest=surface.vertices.astype(np.float32),
+        **cameras,
+        **radii,
+        **_model_arrays(models),
+    )
+    return sequence.name
+
+
+def _replayed_models(
+    sequence: Recording,
+    stated: Setup,
+    extended: Setup,
+    grid: Meshing,
+    times: FloatArray,
+    clouds: Sequence[FloatArray],
+) -> dict[str, ModelRecording]:
+    """Replay the frames at these times (f,) [s] with both models, named "raw" and "extended"."""
+    models: dict[str, ModelRecording] = {}
     frames: list[Equilibrium] = []
-    for model, setup in (("raw", stated), ("extended", found)):
-        if sides and found is stated:
-            sides[model] = sides["raw"]
+    for model, setup in (("raw", stated), ("extended", extended)):
+        if models and extended is stated:
+            models[model] = models["raw"]
             continue
         robot = touch_correction(setup, grid) @ setup.phantom_from_robot
         centres = robot.apply(smooth_centres(sequence.kinematics, times - setup.sensor.time_offset))
-        # What hangs on the past is replayed in the order of time, and from frame to frame.
+        # A setup with history is replayed in the order of time, from frame to frame.
         starts = None if setup.has_history else frames or None
         frames = replay(
             setup,
@@ -162,40 +225,30 @@ def record(
             starts=starts,
             tolerance=1e-3,
         )
-        sides[model] = compare_with_clouds(
-            setup, frames, clouds, (stated, sides["raw"]) if sides else None
+        models[model] = compare_with_clouds(
+            setup, frames, clouds, (stated, models["raw"]) if models else None
         )
-    before, after = sides["raw"], sides["extended"]
-    surface = Surface.of(stated, VERTEX_SPACING)
+    return models
+
+
+def _model_arrays(models: Mapping[str, ModelRecording]) -> dict[str, Any]:
+    """Arrays of both models for the file of a recording."""
+    before, after = models["raw"], models["extended"]
     floor = after.distance[after.free] if after.free.any() else after.distance
-    np.savez_compressed(
-        target,
-        time=times,
-        cloud_index=index,
-        faces=surface.faces,
-        rest=surface.vertices.astype(np.float32),
-        raw=before.surface.astype(np.float32),
-        extended=after.surface.astype(np.float32),
-        tool_raw=before.tool,
-        tool_extended=after.tool,
-        tool_radius_raw=np.array(stated.tool.radius),
-        tool_radius_extended=np.array(found.tool.radius),
-        error_raw=before.error.astype(np.float32),
-        error_extended=after.error.astype(np.float32),
-        distance_raw=before.distance,
-        distance_extended=after.distance,
-        paper_raw=before.paper,
-        paper_extended=after.paper,
-        noise_floor=np.array(float(np.nanmean(floor))),
-        camera_raw=recorded_camera(sequence, camera_model_for(stated).pose).matrix,
-        camera_extended=recorded_camera(sequence, camera_model_for(found).pose).matrix,
-        outcome=np.maximum(before.outcome, after.outcome),
-        **{
-            f"{key}_{model}": getattr(side, key)
-            for model, side in sides.items()
-            for key in ("outcome", "force", "iterations")
-        },
-        **before.inside.arrays("raw"),
-        **after.inside.arrays("extended"),
-    )
-    return sequence.name
+    arrays: dict[str, Any] = {
+        "noise_floor": np.array(float(np.nanmean(floor))),
+        "outcome": np.maximum(before.outcome, after.outcome),
+    }
+    for name, model in models.items():
+        arrays |= {
+            name: model.surface.astype(np.float32),
+            f"tool_{name}": model.tool,
+            f"error_{name}": model.error.astype(np.float32),
+            f"distance_{name}": model.distance,
+            f"paper_{name}": model.paper,
+            f"outcome_{name}": model.outcome,
+            f"force_{name}": model.force,
+            f"iterations_{name}": model.iterations,
+            **model.inside.arrays(name),
+        }
+    return arrays

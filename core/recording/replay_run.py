@@ -1,6 +1,4 @@
-"""A dataset replayed as stated and with effects of one's own choice, in the form of a run, so that
-it is seen like a diagnosis.
-"""
+"""Replay of a dataset as stated and with chosen effects, stored as a run like a diagnosis."""
 
 from __future__ import annotations
 
@@ -24,6 +22,7 @@ from palpate.measurement.tool_pose import find_shaft_axis
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.recording.record_sequence import record
 from palpate.registration.registration import register, setup_from
+from palpate.setup.setup import Setup
 
 __all__ = ["replay_into"]
 
@@ -37,30 +36,24 @@ def replay_into(
     workers: int = 2,
     report: Report = silent,
 ) -> int:
-    """Replay these sequences (all with clouds where none is named) into the run folder `out`;
-    returns frames without equilibrium.
+    """Replay sequences into the run folder `out`; returns the number of frames without equilibrium.
 
-    "raw" of the recordings is the stated setup, "extended" the one with the effects. EffectError
-    for effects that do not fit the setup, DatasetError for sequences without clouds.
+    "raw" of the recordings is the stated setup, "extended" the one with the effects. Raises
+    EffectError for effects that do not fit the setup, DatasetError for sequences without clouds.
+
+    Args:
+        dataset: to replay.
+        out: folder, which exists.
+        sequences: names; empty for all with clouds.
+        effects: of the extended model.
+        workers: processes.
+        report: progress.
     """
-    names = tuple(dict.fromkeys(sequences)) or tuple(
-        name for name in dataset.sequences if len(dataset.sequence(name))
-    )
-    for name in names:
-        if not len(dataset.sequence(name)):
-            raise DatasetError(
-                f"{name} has no clouds to compare with; choose other sequences",
-                file=f"sequences/{name}",
-            )
-    if not names:
-        raise DatasetError(
-            "no sequence has clouds, and a replay is compared with clouds; record some",
-            key="sequences",
-        )
+    names = _with_clouds(dataset, sequences)
     report(0.0, "relating robot, camera and phantom")
     dataset, registration = align_sequences(dataset, register(dataset))
     stated = setup_from(dataset, registration)
-    found = with_effects(stated, effects) if effects else stated
+    extended = with_effects(stated, effects) if effects else stated
     cleaner, shaft = (
         cleaner_for(dataset, registration),
         find_shaft_axis(dataset, registration.repaired),
@@ -74,7 +67,7 @@ def replay_into(
                 record,
                 dataset.sequence(name),
                 stated,
-                found,
+                extended,
                 cleaner,
                 shaft,
                 grid,
@@ -90,18 +83,38 @@ def replay_into(
     failed = sum(
         int((np.load(out / "replays" / f"{name}.npz")["outcome"] != 0).sum()) for name in names
     )
-    registered = {"registration": dataset.accepted.to_json()} if dataset.accepted else {}
     warnings = [
         *registration.warnings,
         *([f"{failed} frames found no equilibrium."] if failed else []),
     ]
-    said = {
-        "format": 1,
-        "dataset": dataset.name,
-        "verdict": "replay",
-        "causes": [_cause(one) for one in effects],
-        "warnings": warnings,
-    }
+    _write_run(out, dataset, extended, effects, warnings)
+    return failed
+
+
+def _with_clouds(dataset: Dataset, sequences: Sequence[str]) -> tuple[str, ...]:
+    """The named sequences, or all with clouds; DatasetError if one or all have none."""
+    names = tuple(dict.fromkeys(sequences)) or tuple(
+        name for name in dataset.sequences if len(dataset.sequence(name))
+    )
+    for name in names:
+        if not len(dataset.sequence(name)):
+            raise DatasetError(
+                f"{name} has no clouds to compare with; choose other sequences",
+                file=f"sequences/{name}",
+            )
+    if not names:
+        raise DatasetError(
+            "no sequence has clouds, and a replay is compared with clouds; record some",
+            key="sequences",
+        )
+    return names
+
+
+def _write_run(
+    out: Path, dataset: Dataset, extended: Setup, effects: Sequence[Effect], warnings: Sequence[str]
+) -> None:
+    """Write model.json and report.json of a replay."""
+    registered = {"registration": dataset.accepted.to_json()} if dataset.accepted else {}
     model = {
         "format": 1,
         "version": 1,
@@ -109,15 +122,23 @@ def replay_into(
         "parent": None,
         "fitted_on": [],
         "effects": [one.to_json() for one in effects],
-        "setup": found.as_dict(),
+        "setup": extended.as_dict(),
+        **registered,
+    }
+    report = {
+        "format": 1,
+        "dataset": dataset.name,
+        "verdict": "replay",
+        "causes": [_cause(one) for one in effects],
+        "warnings": list(warnings),
         **registered,
     }
     (out / "model.json").write_text(json.dumps(model, indent=1))
-    (out / "report.json").write_text(json.dumps({**said, **registered}, indent=1))
-    return failed
+    (out / "report.json").write_text(json.dumps(report, indent=1))
 
 
 def _cause(effect: Effect) -> dict[str, Any]:
+    """An effect in the form of a cause in report.json."""
     units = {item.name: item.unit for item in effect.parameters()}
     values = effect.to_json()["parameters"]
     return {

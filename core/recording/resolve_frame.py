@@ -1,6 +1,4 @@
-"""One frame of a recorded sequence, solved again with causes of one's own choice: what if the base
-were soft, the lump smaller?
-"""
+"""One frame of a recorded sequence, solved again with chosen causes."""
 
 from __future__ import annotations
 
@@ -38,23 +36,23 @@ from palpate.setup.setup import Setup, Shape
 __all__ = ["FrameResolver", "ResolvedFrame", "open_resolver"]
 
 _TOLERANCE = 1e-3
-"""Residual over the push at which a frame counts as converged; that of the recording."""
+"""Relative residual at which a frame counts as converged; that of the recording."""
 
 
 @dataclass(frozen=True, eq=False)
 class ResolvedFrame:
-    """One frame under one's own causes, phantom frame, SI.
+    """One frame with chosen causes, phantom frame, SI.
 
     Attributes:
-        surface: (v, 3) moved material vertices, in the order of the recording.
-        error: (v,) mean gap of the measured points around each, NaN where unseen.
-        distance: RMS of `error`.
-        tool: (3,) centre.
-        radius: of the tool.
+        surface: (v, 3) moved material vertices, in the order of the recording [m].
+        error: (v,) mean gap of the measured points around each [m]; NaN if unseen.
+        distance: RMS of `error` [m].
+        tool: (3,) true centre [m].
+        radius: of the tool [m].
         outcome: how the solve ended.
-        converged: whether that is an equilibrium.
+        converged: whether this is an equilibrium.
         camera: (4, 4) phantom_from_camera.
-        inside: its nodes, as a recording of one frame.
+        inside: interior fields as of a recording of one frame.
     """
 
     surface: FloatArray
@@ -74,8 +72,8 @@ class FrameResolver:
     Args:
         folder: of the dataset.
         sequence: name.
-        clouds: (f,) which clouds the recording has.
-        extended: the model's setup as in model.json, of which the registration as fitted is taken.
+        clouds: (f,) numbers of the clouds of the recording.
+        extended: the model as in model.json, which has the fitted registration.
     """
 
     def __init__(
@@ -108,7 +106,7 @@ class FrameResolver:
         return len(self._clouds)
 
     def beginnings(self) -> list[dict[str, Any]]:
-        """A finite size of each effect of the catalogue, from which to go on by hand."""
+        """One finite size of each effect of the catalogue, to start from by hand."""
         found = []
         for effect in DIAGNOSED:
             starts = effect.starts(self.stated)
@@ -121,20 +119,21 @@ class FrameResolver:
         return with_effects(self.tuned if tuned else self.stated, effects)
 
     def live(self, effects: Sequence[Effect], tuned: bool = True) -> InteractiveReplay:
-        """The same block under a tool that a hand leads."""
+        """The same block as an interactive replay."""
         return InteractiveReplay(self.setup(effects, tuned), self._grid)
 
     def solve(self, frame: int, effects: Sequence[Effect], tuned: bool = True) -> ResolvedFrame:
-        """The frame with these causes added to the stated setup.
+        """Solve a frame with these causes added to the stated setup.
+
+        If a frame depends on those before it (material history, friction at the tool), all up to it
+        are solved. Raises RunError for a frame that does not exist, EffectError for parameters out
+        of bounds.
 
         Args:
             frame: index into the recording.
-            tuned: whether robot pose, tool radius and Poisson's ratio are as the diagnosis fitted
-                them within their accuracies, or as stated.
-
-        Where a frame hangs on those before it (memory, friction at the tool), all up to it are
-        solved. Raises RunError for a frame that is not there, EffectError for parameters out of
-        bounds.
+            effects: the causes.
+            tuned: robot pose, tool radius and Poisson's ratio as the diagnosis fitted them within
+                their accuracies, instead of as stated.
         """
         if not 0 <= frame < len(self):
             raise RunError(
@@ -188,5 +187,5 @@ class FrameResolver:
 def open_resolver(
     folder: str, sequence: str, clouds: tuple[int, ...], extended: str
 ) -> FrameResolver:
-    """The same, kept for the next question; `extended` is the text of model.json."""
+    """A resolver, cached for the next question; `extended` is the text of model.json."""
     return FrameResolver(Path(folder), sequence, clouds, json.loads(extended))

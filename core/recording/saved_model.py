@@ -1,4 +1,4 @@
-"""Models that were kept (model.json of a run), as setups again."""
+"""Setups of stored models (model.json of a run)."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ __all__ = ["effects_from", "setup_of_model", "with_fitted_values"]
 
 
 def with_fitted_values(stated: Setup, model: Mapping[str, Any]) -> Setup:
-    """The stated setup with the robot's pose, the tool's radius and Poisson's ratio of a model,
-    where no cause of it sets them.
+    """The stated setup with a model's robot pose, tool radius and Poisson's ratio.
+
+    Radius and ratio stay as stated if one of the model's causes sets them.
     """
     pose = Transform.from_matrix(np.array(model["setup"]["phantom_from_robot"]))
     named = {one["effect"] for one in model["effects"]}
@@ -40,32 +41,37 @@ def with_fitted_values(stated: Setup, model: Mapping[str, Any]) -> Setup:
 
 
 def setup_of_model(stated: Setup, model: Mapping[str, Any]) -> Setup:
-    """The setup of a model: its causes, and what is known only to its accuracy as it was fitted."""
+    """The setup of a model: its causes, and its fitted values of quantities known only to their
+    accuracy.
+    """
     tuned = with_fitted_values(stated, model)
-    found = with_effects(tuned, effects_from(model["effects"]))
-    # Tuning went on from the causes, so that these values stand even where a cause sets them, too.
+    setup = with_effects(tuned, effects_from(model["effects"]))
+    # These values were fitted after the causes, so they hold even if a cause sets them, too.
     return replace(
-        found,
-        tool=replace(found.tool, radius=float(model["setup"]["tool"]["radius"])),
+        setup,
+        tool=replace(setup.tool, radius=float(model["setup"]["tool"]["radius"])),
         material=replace(
-            found.material, poisson_ratio=float(model["setup"]["material"]["poisson_ratio"])
+            setup.material, poisson_ratio=float(model["setup"]["material"]["poisson_ratio"])
         ),
     )
 
 
 def effects_from(rows: Sequence[Mapping[str, Any]]) -> list[Effect]:
-    """Effects from plain values as `Effect.to_json` gives them; EffectError for names and values
-    that are none.
+    """Make effects from plain values as of `Effect.to_json`; EffectError for unknown names and
+    values.
     """
-    found = []
+    effects = []
     for row in rows:
         kind, given = effect_named(str(row["effect"])), dict(row["parameters"])
-        wanted = {item.name: item for item in kind.parameters()}
-        if set(given) != set(wanted):
-            told = f"{kind.name} has the parameters {', '.join(wanted)}; given are {', '.join(map(str, given)) or 'none'}"
-            raise EffectError(told, parameter=kind.name)
+        expected = {item.name: item for item in kind.parameters()}
+        if set(given) != set(expected):
+            message = (
+                f"{kind.name} has the parameters {', '.join(expected)}; "
+                f"given are {', '.join(map(str, given)) or 'none'}"
+            )
+            raise EffectError(message, parameter=kind.name)
         for name, value in given.items():
-            if not wanted[name].choices and (
+            if not expected[name].choices and (
                 isinstance(value, bool) or not isinstance(value, (int, float))
             ):
                 raise EffectError(
@@ -73,5 +79,5 @@ def effects_from(rows: Sequence[Mapping[str, Any]]) -> list[Effect]:
                     parameter=name,
                     value=str(value),
                 )
-        found.append(kind(**given))
-    return found
+        effects.append(kind(**given))
+    return effects

@@ -1,4 +1,4 @@
-"""What gives way when it is pushed: a tool on a spring, and a base that slides on the table."""
+"""A tool on a spring, and a base that slips on the table."""
 
 from __future__ import annotations
 
@@ -26,15 +26,16 @@ GRAVITY = 9.81
 """Acceleration of free fall [m/s^2]."""
 
 _PLACED, _MOST_PLACES = 1e-2, 30
-"""How well a tool that gives way is placed [m], over the tolerance, and how often that is tried."""
+"""Accuracy to which a compliant tool is placed [m], over the replay's tolerance, and largest number
+of attempts."""
 _LONGEST_SLIDE = 1e-3
 _SHALLOWEST = 2e-4
 _HELD = 2e-4
-"""A base stays where friction holds all but this share of the push [1]."""
+"""A base stays if friction holds all but this share of the push [1]."""
 _STIFFENING = 1.5
-"""Stiffness of a push over its force by its depth [1]: of a ball on a flat, whose force grows with
-the depth to the power 1.5 (Hertz); of deeper ones it is less. A slide by this falls short of where
-friction holds; one that went beyond would stay there."""
+"""Stiffness of a push over the ratio of its force and depth [1]. It is 1.5 for a ball on a flat,
+whose force grows with the depth to the power 1.5 (Hertz), and less for deeper ones. A slip by this
+value stops short of where friction holds; a base moved beyond that point would stay there."""
 
 
 def solve_compliant_tool(
@@ -44,18 +45,19 @@ def solve_compliant_tool(
     tolerance: float,
     placed: Callable[[FloatArray, Equilibrium], Equilibrium],
 ) -> Equilibrium:
-    """Equilibrium with the tool on a spring whose other end is at `centre` (3,) [m], by Broyden's
-    method on its true centre.
+    """Solve for the equilibrium with the tool on a spring, by Broyden's method on its true centre.
 
     Args:
-        start: to begin from.
+        centre: (3,) of the spring's fixed end [m].
+        start: frame to begin from.
+        setup: the experiment.
         tolerance: of the replay.
-        placed: the equilibrium with the tool held at a place, begun from another.
+        placed: solves with the tool's centre fixed at a position, from a start.
     """
-    giving, modulus = setup.tool.compliance_times_stiffness, setup.material.young_modulus
-    softness, place = giving / modulus, centre + giving / modulus * start.force
+    compliance, modulus = setup.tool.compliance_times_stiffness, setup.material.young_modulus
+    softness, place = compliance / modulus, centre + compliance / modulus * start.force
     inverse = np.eye(3) / (
-        1 + giving * 2 * setup.tool.radius
+        1 + compliance * 2 * setup.tool.radius
     )  # a punch of the ball's size resists the most
     frame = placed(place, start)
     for _ in range(_MOST_PLACES):
@@ -72,12 +74,12 @@ def solve_compliant_tool(
 
 
 def slip_step(frame: Equilibrium, friction: float, weight: float) -> FloatArray | None:
-    """How far the base moves on (2,) [m] where Coulomb's friction does not hold it; None where it
-    does.
+    """Next slip of the base (2,) [m]; None if Coulomb friction holds it.
 
     Args:
+        frame: the equilibrium.
         friction: coefficient [1].
-        weight: of the block [N]; with the tool's push it loads the base.
+        weight: of the block [N]; it loads the base together with the tool's push.
     """
     if _excess(frame.force, friction, weight) <= _HELD * friction * weight:
         return None
@@ -85,8 +87,13 @@ def slip_step(frame: Equilibrium, friction: float, weight: float) -> FloatArray 
 
 
 def slip_from_force(force: FloatArray, reach: float, friction: float, weight: float) -> FloatArray:
-    """The same of a base that does slide, by the force on the tool (3,) [N] and the sideways
-    indentation [m] it stands for.
+    """Next slip (2,) [m] of a base that friction does not hold.
+
+    Args:
+        force: on the tool (3,) [N].
+        reach: sideways indentation that belongs to it [m].
+        friction: coefficient [1].
+        weight: of the block [N].
     """
     push, pull = -force[:2], float(np.linalg.norm(force[:2]))
     stiffness = _STIFFENING * pull / max(reach, _SHALLOWEST)
@@ -101,12 +108,12 @@ def _excess(force: FloatArray, friction: float, weight: float) -> float:
 
 
 def weight_of(setup: Setup) -> float:
-    """Of the block [N]."""
+    """Weight of the block [N]."""
     return setup.mass * GRAVITY
 
 
 def nearest_node(frame: Equilibrium) -> int:
-    """The node next to the tool's centre."""
+    """Number of the node nearest to the tool's centre."""
     surface = frame.mesh.nodes + frame.displacement
     return int(
         np.argmin(
@@ -116,7 +123,5 @@ def nearest_node(frame: Equilibrium) -> int:
 
 
 def sideways_indentation(frame: Equilibrium) -> float:
-    """Sideways indentation [m] that the push stands for: the tool's displacement of the material it
-    touches.
-    """
+    """Sideways indentation that belongs to the push [m]: displacement of the touched material."""
     return float(np.linalg.norm(frame.displacement[nearest_node(frame), :2]))

@@ -1,4 +1,4 @@
-"""The block in one frame of a replay."""
+"""Equilibrium of the block in one frame of a replay."""
 
 from __future__ import annotations
 
@@ -24,17 +24,21 @@ class Equilibrium:
     """The block in one frame.
 
     Attributes:
-        mesh: its elements.
-        displacement: (n, 3) of the nodes against the stated shape [m], without `slip`.
-        slip: (2,) how far the base has slid along x and y [m].
-        tool: the tool (true centre and radius), phantom frame.
+        mesh: of the block.
+        displacement: (n, 3) of the nodes from the stated shape [m], without `slip`.
+        slip: (2,) accumulated slip of the base along x and y [m].
+        tool: true centre and radius, phantom frame.
         force: (3,) of the block on the tool [N].
-        outcome, iterations, residual, penetration: how it was reached.
+        outcome: whether this is an equilibrium, or why not.
+        iterations: number of Newton steps.
+        residual: relative.
+        penetration: of the surface into the tool [m].
+        in_contact: whether the tool touches the block.
+        friction_history: state of friction for the next frame; None without friction.
         hardness: of the contact, see `palpate.fem.model.BlockModel.harden`.
-        dense: whether the surface felt the tool at many points, see `palpate.fem.model.BlockModel`.
-        friction_history: what friction leaves to the next frame; None without.
-        path: with friction at the tool or under the base, equilibria on the way from the frame
-            before.
+        dense: whether contact was evaluated at many points, see `palpate.fem.model.BlockModel`.
+        path: with friction at the tool or under the base, equilibria between the frame before and
+            this one.
     """
 
     mesh: Mesh
@@ -58,7 +62,7 @@ class Equilibrium:
 
     @cached_property
     def at_rest(self) -> bool:
-        """Whether every point of the block is where it is stated to be."""
+        """Whether every point of the block is at its stated position."""
         return not self._moved.any()
 
     def move(self, points: FloatArray) -> FloatArray:
@@ -67,12 +71,12 @@ class Equilibrium:
 
 
 def require_converged(frames: Sequence[Equilibrium]) -> None:
-    """Raise SolveError that names the first frame without equilibrium, its residual and the
-    cause."""
+    """Raise SolveError for the first frame without equilibrium, with its residual and cause."""
     for number, frame in enumerate(frames):
         if frame.outcome is not Outcome.CONVERGED:
             raise SolveError(
-                f"frame {number}: {frame.outcome.value} (residual {frame.residual:.2g} after {frame.iterations} iterations)",
+                f"frame {number}: {frame.outcome.value} "
+                f"(residual {frame.residual:.2g} after {frame.iterations} iterations)",
                 frame=number,
                 residual=frame.residual,
                 outcome=frame.outcome.name,
@@ -85,10 +89,16 @@ def extrapolated(
     positions: FloatArray,
     tool: ToolSphere,
 ) -> FloatArray:
-    """Where the last two frames point to (n, 3) [m], if that lies lower in energy than the last
-    one's `positions`.
+    """Extrapolate the last two frames, if that has a lower energy than `positions`.
 
-    `tool` is the tool's next place, seen from the slid block.
+    Args:
+        model: of the block.
+        last: the last two frames.
+        positions: (n, 3) of the last frame [m].
+        tool: next, in the frame of the block.
+
+    Returns:
+        positions (n, 3) [m].
     """
     earlier, start = last
     if not (earlier.in_contact and earlier.mesh is start.mesh is model.mesh):
@@ -109,14 +119,18 @@ def predict_from_similar(
     positions: FloatArray,
     tool: ToolSphere,
 ) -> FloatArray:
-    """Where a frame of a similar setup points to (n, 3) [m], together with what the last one was
-    found to be off by.
+    """Predict a frame from a similar setup's frame, corrected by the last frame's prediction error.
 
     Args:
-        lesson: the last frame's start, and what was found from there.
-        start: of the frame that is sought, whose `positions` are on the model's mesh; they are
-            returned where the lesson leads to no lower energy.
-        tool: as for `extrapolated`.
+        model: of the block.
+        lesson: the start of the last frame, and the equilibrium found from there.
+        start: of the frame to be solved.
+        positions: (n, 3) of `start` on the model's mesh [m]; returned if the prediction has no
+            lower energy.
+        tool: next, in the frame of the block.
+
+    Returns:
+        positions (n, 3) [m].
     """
     other, found = lesson
     here = start.tool.centre - np.append(start.slip, 0.0)

@@ -1,4 +1,4 @@
-"""One step of a tool that drags the surface along: equilibria and renewed grips in turn, until they
+"""One step of a tool with friction: equilibria and updated friction potentials in turn, until they
 agree.
 """
 
@@ -31,20 +31,23 @@ __all__ = [
 ]
 
 _AGREED = 1e-4
-"""Residual with the renewed grip, over the push, at which pressure and friction agree."""
+"""Relative residual with the updated friction at which pressure and friction agree."""
 _MOST_TURNS = 30
 _FIRST_SHARE = 0.34
-"""Half as much again is how far the first turn goes to the renewed grip; all the way, the body
-would often be led astray [1]."""
+"""The first update goes 1.5 times this share of the way to the updated friction [1]; the ways way
+would often lead the body astray."""
 _ROUGH, _CLOSER = 1e-2, 0.2
-"""Residual of the first equilibrium, and of each further one over the one with the grip renewed,
-where `_AGREED` is enough."""
+"""Relative residual of the first equilibrium; and residual of each further one over the one with
+updated friction, if `_AGREED` is sufficient."""
 
 
 @dataclass(frozen=True, eq=False)
 class FrictionState:
-    """The step's beginning, at the quadrature points (f, p) of the model's surface: where they were
-    seen from the tool's centre (f, p, 3) [m], and what held them, seen there, too.
+    """State before the step, at the quadrature points (f, p) of the model's surface.
+
+    Attributes:
+        seen: (f, p, 3) positions relative to the tool's centre [m].
+        friction_history: state of friction, at the same points.
     """
 
     seen: FloatArray
@@ -52,7 +55,7 @@ class FrictionState:
 
     @classmethod
     def of(cls, model: BlockModel, start: Equilibrium, before: ToolSphere) -> Self:
-        """As the frame before left it, in which the tool was at `before`."""
+        """The state left by the frame before, in which the tool was at `before`."""
         places = surface_quadrature(model.mesh, model.face).places
         flat = places.reshape(-1, 3)
         seen = (flat + start.mesh.interpolate(start.displacement, flat)).reshape(
@@ -66,14 +69,14 @@ class FrictionState:
 
 
 def points_from_tool(model: BlockModel, positions: FloatArray, tool: ToolSphere) -> FloatArray:
-    """The surface's quadrature points (f, p, 3) from the tool's centre [m]."""
+    """The surface's quadrature points (f, p, 3) relative to the tool's centre [m]."""
     return np.asarray(
         np.einsum("qa,fai->fqi", model.face.shapes, positions[model.topology.surface]) - tool.centre
     )
 
 
 def contact_depth(model: BlockModel, positions: FloatArray, tool: ToolSphere) -> FloatArray:
-    """How deep each point is pressed (f, p) [m]; zero where it is not touched or not felt."""
+    """Depth of each point inside the tool (f, p) [m]; zero without contact."""
     facing, depth = model.facing(positions, tool)
     return np.where(model.areas > 0 if model.dense else facing, np.maximum(depth, 0.0), 0.0)
 
@@ -81,7 +84,7 @@ def contact_depth(model: BlockModel, positions: FloatArray, tool: ToolSphere) ->
 def updated_friction(
     model: BlockModel, positions: FloatArray, tool: ToolSphere, past: FrictionState, friction: float
 ) -> FrictionPotential:
-    """The grip that goes with the pressure at these positions."""
+    """The friction potential that belongs to the pressure at these positions."""
     seen = points_from_tool(model, positions, tool)
     depth = contact_depth(model, positions, tool)
     faces = np.flatnonzero((depth > 0).any(axis=1))
@@ -99,19 +102,27 @@ def friction_potential_of(
     radius: float,
     friction: float,
 ) -> FrictionPotential:
-    """The grip of faces (g,) whose points are seen from the tool here (g, p, 3) [m], pressed in by
-    `depth` (g, p) [m].
+    """The friction potential of some faces.
 
-    A point that was not touched before sticks from where the tool met it: for the share of its way
-    that came after. As that place moves while the equilibrium is sought, its stick is given that
-    share of the stiffness instead, and the whole way.
+    A point that was not touched before sticks from where the tool met it: for the share of its path
+    after that. Because that place moves during the solve, its stick has that share of the stiffness
+    instead, and the ways path.
+
+    Args:
+        faces: (g,) numbers.
+        seen: (g, p, 3) their points relative to the tool [m].
+        depth: (g, p) inside the tool [m].
+        past: state before the step on these faces.
+        areas: (g, p) weights of the contact [m^2].
+        radius: of the tool [m].
+        friction: coefficient [1].
     """
-    gap, held = (
+    gap, touched = (
         np.maximum(np.linalg.norm(past.seen, axis=2) - radius, 0.0),
         past.friction_history.touched,
     )
-    late = np.where(held, 1.0, depth / np.maximum(depth + gap, 1e-12))
-    anchors = np.where(held[..., None], past.seen - past.friction_history.ways, past.seen)
+    late = np.where(touched, 1.0, depth / np.maximum(depth + gap, 1e-12))
+    anchors = np.where(touched[..., None], past.seen - past.friction_history.ways, past.seen)
     normals = seen / np.linalg.norm(seen, axis=2, keepdims=True)
     return FrictionPotential(
         faces,
@@ -123,52 +134,59 @@ def friction_potential_of(
 
 
 def _initial_friction(model: BlockModel, past: FrictionState) -> FrictionPotential | None:
-    """The grip that the step begins with: of those points that were held, as they were; None of
+    """The friction potential at the start of the step, of the points in contact; None if there are
     none.
     """
-    held = past.friction_history
-    faces = np.flatnonzero(held.touched.any(axis=1))
+    history = past.friction_history
+    faces = np.flatnonzero(history.touched.any(axis=1))
     if not len(faces):
         return None
     here, areas = past.seen[faces], surface_quadrature(model.mesh, model.face).edges[faces] ** 2
     normals = here / np.linalg.norm(here, axis=2, keepdims=True)
     return FrictionPotential(
         faces,
-        here - held.ways[faces],
+        here - history.ways[faces],
         normals,
-        held.limits[faces] * areas,
+        history.limits[faces] * areas,
         STICK_STIFFNESS * model.areas[faces],
     )
 
 
-def remaining_slip(seen: FloatArray, grip: FrictionPotential, areas: FloatArray) -> FloatArray:
-    """Ways from the anchors (g, p, 3) [m] of the grip's points, seen from the tool here (g, p, 3),
-    once the anchors were dragged along as far as their points slip; their tangential force is that
-    times the area and the stick's stiffness.
+def remaining_slip(seen: FloatArray, potential: FrictionPotential, areas: FloatArray) -> FloatArray:
+    """Tangential distances from the anchors (g, p, 3) [m] after the anchors were dragged along.
+
+    The tangential force is this distance times the area and the stick's stiffness.
+
+    Args:
+        seen: (g, p, 3) points relative to the tool [m].
+        potential: the friction potential.
+        areas: (g, p) weights of the contact [m^2].
     """
-    ways = seen - grip.anchors
-    ways -= grip.normals * np.einsum("gpi,gpi->gp", ways, grip.normals)[..., None]
-    drag = grip.stiffness * np.linalg.norm(ways, axis=2)
-    share = np.minimum(1.0, grip.limits / np.maximum(drag, 1e-300)) * grip.stiffness
+    ways = seen - potential.anchors
+    ways -= potential.normals * np.einsum("gpi,gpi->gp", ways, potential.normals)[..., None]
+    drag = potential.stiffness * np.linalg.norm(ways, axis=2)
+    share = np.minimum(1.0, potential.limits / np.maximum(drag, 1e-300)) * potential.stiffness
     share /= np.maximum(
         STICK_STIFFNESS * areas, 1e-300
-    )  # what is not felt has no area, and does not stick
+    )  # points without contact have no area, and do not stick
     return np.asarray(ways * share[..., None])
 
 
 def friction_history_of(
-    model: BlockModel, positions: FloatArray, tool: ToolSphere, grip: FrictionPotential
+    model: BlockModel, positions: FloatArray, tool: ToolSphere, potential: FrictionPotential
 ) -> FrictionHistory:
-    """What is left to the next step."""
-    seen, spots = (
+    """The state of friction for the next step."""
+    seen, surface = (
         points_from_tool(model, positions, tool),
         surface_quadrature(model.mesh, model.face),
     )
-    whole, limits = np.zeros_like(seen), np.zeros(seen.shape[:2])
-    whole[grip.faces] = remaining_slip(seen[grip.faces], grip, model.areas[grip.faces])
-    limits[grip.faces] = grip.limits / spots.edges[grip.faces] ** 2
+    ways, limits = np.zeros_like(seen), np.zeros(seen.shape[:2])
+    ways[potential.faces] = remaining_slip(
+        seen[potential.faces], potential, model.areas[potential.faces]
+    )
+    limits[potential.faces] = potential.limits / surface.edges[potential.faces] ** 2
     return FrictionHistory(
-        spots.places.reshape(-1, 3), whole.reshape(-1, 3), limits.ravel() > 0, limits.ravel()
+        surface.places.reshape(-1, 3), ways.reshape(-1, 3), limits.ravel() > 0, limits.ravel()
     )
 
 
@@ -182,31 +200,33 @@ def solve_with_friction(
     quick_solver: ModifiedNewton,
     recall: Callable[[BlockModel, FloatArray], None] | None = None,
 ) -> tuple[Solution, FrictionHistory]:
-    """Equilibrium with friction.
+    """Solve for the equilibrium with friction.
 
     Args:
+        model: of the block.
         positions: (n, 3) to begin from [m].
-        tools: the tool before and now.
-        past: the step's beginning.
+        tools: before and now.
+        past: state before the step.
         friction: coefficient [1].
-        tolerance: residual of each equilibrium; the last one's, with pressure and friction in
-            agreement, is at most the larger of it and 1e-4.
-        recall: puts what a material keeps of positions (n, 3) into the model.
+        tolerance: relative residual of each equilibrium; the last one's, with pressure and friction
+            in agreement, is at most the larger of it and 1e-4.
+        quick_solver: modified Newton method.
+        recall: applies the material's history at positions (n, 3) to the model.
 
     Returns:
-        the solution, whose push has the drag in it, and what the step leaves to the next.
+        the solution, whose push includes the drag, and the state of friction for the next step.
     """
     before, tool = tools
     iterations, share, last = 0, _FIRST_SHARE, np.inf
     model.friction_potential = _initial_friction(model, past)
-    wanted = _ROUGH if tolerance >= _AGREED else tolerance
+    required = _ROUGH if tolerance >= _AGREED else tolerance
     try:
         solution = move_tool(
             model,
             positions,
             before,
             tool,
-            max(wanted, tolerance),
+            max(required, tolerance),
             quick_solver,
             haste=not model.dense,
         )
@@ -214,29 +234,29 @@ def solve_with_friction(
             iterations += solution.iterations
             if not solution.converged:
                 return replace(solution, iterations=iterations), FrictionHistory.nothing()
-            grip = updated_friction(model, solution.positions, tool, past, friction)
+            potential = updated_friction(model, solution.positions, tool, past, friction)
             if recall is not None:
                 recall(model, solution.positions)
             old: FrictionPotential | None = model.friction_potential
-            model.friction_potential = grip
+            model.friction_potential = potential
             residual = relative_residual(
                 model, model.assemble(solution.positions, tool, tangent=False)
             )
             if residual <= max(tolerance, _AGREED):
                 return replace(
                     solution, iterations=iterations, residual=residual
-                ), friction_history_of(model, solution.positions, tool, grip)
+                ), friction_history_of(model, solution.positions, tool, potential)
             share = (
                 max(share / 2, 0.1) if residual > last else min(1.5 * share, 1.0)
-            )  # halves, where they go to and fro
+            )  # halved if the iteration oscillates
             last = residual
-            model.friction_potential = _blended(old, grip, share)
+            model.friction_potential = _blended(old, potential, share)
             solution = move_tool(
                 model,
                 solution.positions,
                 tool,
                 tool,
-                max(min(wanted, _CLOSER * residual), tolerance),
+                max(min(required, _CLOSER * residual), tolerance),
                 quick_solver,
             )
         return replace(
@@ -249,7 +269,7 @@ def solve_with_friction(
 def _blended(
     old: FrictionPotential | None, new: FrictionPotential, share: float
 ) -> FrictionPotential:
-    """The new grip with limits only part of the way from the old ones'."""
+    """The new friction potential with limits only part of the way from the old one's."""
     if old is None or share == 1.0:
         return new
     before = np.zeros(

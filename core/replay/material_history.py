@@ -1,21 +1,26 @@
-"""What a material remembers of its past: relaxation, and strain that stays. Both act on the shear stress; the pressure is elastic.
+"""Material history: stress relaxation and permanent set. Both act on the shear stress; the pressure
+is elastic.
 
-Finite linear viscoelasticity (Simo 1987; Holzapfel 2000, sec. 6.10): with S the second Piola-Kirchhoff shear stress of the elastic
-law, fibres included, T that of the strain that stays, and a Prony series of shares g_i and time constants tau_i,
+Finite linear viscoelasticity (Simo 1987; Holzapfel 2000, sec. 6.10): with S the second
+Piola-Kirchhoff shear stress of the elastic law, fibres included, T that of the permanent strain,
+and a Prony series of shares g_i and time constants tau_i,
 
     stress = pressure + (1 - sum g_i) (S - T) + sum h_i,    h_i' + h_i / tau_i = g_i (S - T)'
 
-so E is the modulus of a motion faster than any tau. Over a step of length t in which S - T changes evenly the solution is exact,
-h_i <- e^(-t/tau_i) h_i + g_i r_i (change of S - T) with r_i = (1 - e^(-t/tau_i)) tau_i / t (Taylor, Pister and Goudreau 1970),
-however long the step; what the strain did between two frames other than to change evenly is lost. In a step the new stress is a
-multiple of S and a part that the past has fixed (`palpate.fem.history_stress`), which keeps the direction it had in the body while the strain
-goes on: a pressure of second order in the strain's change, that a stiff bulk hides.
+so E is the modulus of a motion faster than any tau. Over a step of length t in which S - T changes
+evenly the solution is exact, h_i <- e^(-t/tau_i) h_i + g_i r_i (change of S - T) with r_i = (1 -
+e^(-t/tau_i)) tau_i / t (Taylor, Pister and Goudreau 1970), however long the step; any other change
+of the strain between two frames is lost. In a step the new stress is a multiple of S and a part
+fixed by the past (`palpate.fem.history_stress`), which keeps its direction in the body while the
+strain goes on. That causes a pressure of second order in the strain's change, which a stiff bulk
+modulus hides.
 
-Permanent set: with L the logarithmic strain without the part in the volume, a point keeps a strain M that grows along L by as
-much as |L| exceeds the largest there was (backward Euler from frame to frame). The share of M that is retained is free of stress: a
-bar stretched to l, its volume kept, and let go stays at l^share. The set is there at once, so a first push is softer than a second
-by about that share; the second changes nothing unless it goes further. There is no strain below which none is kept, and none creeps
-back.
+Permanent set: with L the logarithmic strain without the volumetric part, a point stores a strain M
+that grows along L by the excess of |L| over its largest earlier value (backward Euler from frame to
+frame). The retained share of M is free of stress: a bar stretched to l at constant volume, and
+released, stays at l^share. The set is immediate, so a first push is softer than a second by about
+that share; the second changes nothing unless it goes further. There is no threshold strain, and no
+recovery by creep.
 """
 
 from __future__ import annotations
@@ -28,17 +33,12 @@ import numpy as np
 
 from palpate.fem.constitutive.elastic import Law
 from palpate.fem.continuation import move_tool
-from palpate.fem.history_stress import (
-    ConstantStress,
-    cauchy_green,
-    from_log_strain,
-    log_strain,
-    shear_stress,
-)
+from palpate.fem.history_stress import ConstantStress, shear_stress
 from palpate.fem.material_points import MaterialPoints, material_points
 from palpate.fem.model import BlockModel, ToolSphere
 from palpate.fem.modified_newton import ModifiedNewton
 from palpate.fem.newton import Outcome, Solution, relative_residual, solve
+from palpate.fem.strain_tensors import cauchy_green, from_log_strain, log_strain
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SetupError
 from palpate.mesh.protocol import Mesh, Meshing
@@ -48,14 +48,14 @@ from palpate.setup.setup import Material, Setup
 __all__ = ["HistoryVariables", "MaterialHistory", "ReplayState", "TimeStep", "require_memoryless"]
 
 _MOST_ROUNDS = 100
-"""Equilibria in one frame until one brings its own set: each leaves about the retained share of
-what the last one missed by."""
+"""Largest number of equilibria in one frame until one is consistent with its own set. Each leaves
+about the retained share of the last one's error."""
 
 
 @dataclass(frozen=True, eq=False)
 class HistoryVariables:
-    """What is remembered after a frame, at the material's points; stresses are over the local shear
-    modulus [1].
+    """State of the material after a frame, at its points; stresses are over the local shear modulus
+    [1].
 
     Attributes:
         time: of the frame [s]; None before the first.
@@ -78,8 +78,11 @@ class HistoryVariables:
 
 @dataclass(frozen=True, eq=False)
 class ReplayState:
-    """From where a replay can go on: its last frame, and what the material remembers then; None for
-    one without memory.
+    """State from which a replay can continue.
+
+    Attributes:
+        frame: the last one.
+        history: of the material after it; None without history.
     """
 
     frame: Equilibrium
@@ -88,8 +91,12 @@ class ReplayState:
 
 @dataclass(frozen=True, eq=False)
 class TimeStep:
-    """One step in time: what is left of each h (k,), what it takes from the change of S - T (k,),
-    and S's factor in the stress.
+    """Coefficients of one time step.
+
+    Attributes:
+        left: (k,) factor on each h.
+        taken: (k,) factor on the change of S - T in each h.
+        factor: of S in the stress.
     """
 
     left: FloatArray
@@ -98,21 +105,29 @@ class TimeStep:
 
 
 def require_memoryless(material: Material, what: str) -> None:
-    """Raise SetupError that says what knows nothing of the past, when the material remembers it."""
+    """Raise SetupError if the material has history.
+
+    Args:
+        material: to check.
+        what: begins the message; names what ignores the past.
+    """
     if material.has_history:
         key = "relaxation" if material.relaxation else "retained_fraction"
         raise SetupError(f"{what} leave out the material's {key}", key=key)
 
 
 class MaterialHistory:
-    """The memory of one block: `begin` a step in time, let the models `recall`, and `end` it with
-    what was found.
+    """History of one block's material.
+
+    `begin` a time step, `apply_to` the models, and `end` it with the equilibrium.
 
     Attributes:
-        history: as of the last frame that was an equilibrium; before the first, that of a block
-            which has long been at rest.
-        step: the one that is under way.
-        law, points, fraction: what S is by, where it is remembered, and what of M is retained.
+        history: after the last frame that was an equilibrium; before the first, that of a block
+            long at rest.
+        step: the current one.
+        law: of S.
+        points: at which the history is stored.
+        fraction: retained share of M.
     """
 
     def __init__(self, setup: Setup, points: MaterialPoints, mesh: Mesh) -> None:
@@ -129,8 +144,9 @@ class MaterialHistory:
 
     @classmethod
     def of(cls, setup: Setup, grid: Meshing, mesh: Mesh) -> Self | None:
-        """For a block on such a grid, of which this mesh is one; None for a material without
-        memory.
+        """Make the history of a block with this mesh specification, of which `mesh` is one.
+
+        None for a material without history.
         """
         return (
             cls(setup, material_points(setup, grid, mesh), mesh)
@@ -140,23 +156,23 @@ class MaterialHistory:
 
     @property
     def fresh(self) -> bool:
-        """Whether the tool was never there."""
+        """Whether the tool was never in contact."""
         return not self.history.touched
 
     def rest(self) -> None:
-        """Set out for the long rest before the first frame, in which all relaxes that can."""
+        """Begin the long rest before the first frame, in which all stress relaxes that can."""
         none = np.zeros(len(self._times))
         self.step, self._time = TimeStep(none, none, 1 - float(self._shares.sum())), 0.0
 
     def start(self, rest: Equilibrium) -> None:
-        """Begin with a block that has long been at rest like this."""
+        """Start with a block that has long been at rest in this equilibrium."""
         self.history = replace(self.after(rest), time=None, delayed=self.history.delayed)
 
     def begin(self, time: float | None) -> None:
-        """Set out for an instant [s]; the first one is reached at once from rest."""
+        """Begin the step to an instant [s]; the first instant follows the rest without delay."""
         if time is None or not math.isfinite(time):
             raise SetupError(
-                "a material with memory needs every frame, and the time of each: give `times`",
+                "a material with history needs every frame, and the time of each: give `times`",
                 key="times",
             )
         last = self.history.time
@@ -174,7 +190,9 @@ class MaterialHistory:
         self.step, self._time = TimeStep(np.exp(-spans), taken, factor), float(time)
 
     def apply_to(self, model: BlockModel, positions: FloatArray | None = None) -> None:
-        """Put the step into a model; with positions (n, 3) [m], with the set that they bring."""
+        """Apply the step to a model; with positions (n, 3) [m], including the set that they
+        cause.
+        """
         past, step, mesh = self.history, self.step, model.mesh
         fixed = np.einsum("k,kmc->mc", step.left, past.delayed) - step.taken.sum() * past.driving
         kept = past
@@ -185,7 +203,7 @@ class MaterialHistory:
         model.added_potential = ConstantStress.of(model, stress * model.unrelaxed[..., None])
 
     def _set(self, strained: FloatArray) -> HistoryVariables:
-        """The history with the set that these C (m, 6) bring."""
+        """The history with the permanent set that these C (m, 6) cause."""
         past = self.history
         if not self.fraction:
             return past
@@ -198,7 +216,7 @@ class MaterialHistory:
         return replace(past, largest=np.maximum(size, past.largest), kept=kept, free=free)
 
     def after(self, frame: Equilibrium) -> HistoryVariables:
-        """The history with a frame in it, at the end of the step that is under way."""
+        """The history after a frame, at the end of the current step."""
         past, step = self.history, self.step
         strained = cauchy_green(
             self.points.tangents(frame.mesh, frame.mesh.nodes + frame.displacement)
@@ -219,8 +237,14 @@ class MaterialHistory:
         tolerance: float,
         quick_solver: ModifiedNewton,
     ) -> Solution:
-        """The equilibrium that brings its own set, from one under the set that was, with the tool
-        where it is.
+        """Find the equilibrium that is consistent with the permanent set it causes.
+
+        Args:
+            model: of the block.
+            tool: stays where it is; None without a tool.
+            solution: equilibrium under the earlier set.
+            tolerance: relative residual.
+            quick_solver: modified Newton method.
         """
         if not self.fraction:
             return solution
@@ -241,8 +265,9 @@ class MaterialHistory:
         return replace(solution, iterations=iterations, outcome=Outcome.ITERATIONS)
 
     def end(self, frame: Equilibrium) -> None:
-        """Remember a frame; one that is no equilibrium leaves everything as it was, and the next
-        step begins where this one did.
+        """Store a frame.
+
+        A frame without equilibrium changes nothing, and the next step begins where this one did.
         """
         if frame.outcome is Outcome.CONVERGED:
             self.history = self.after(frame)

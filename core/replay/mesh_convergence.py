@@ -1,11 +1,10 @@
-"""How far a replay is from the limit of fine grids, from a second solve of its hardest frames on a
-finer one.
+"""Discretisation error of a replay, from a second solve of its hardest frames on a finer grid.
 
 The difference to a grid 1.5 times finer is itself the estimate. Richardson's factor 1 / (1 - r^-p)
-would be right for errors that fall smoothly, but a contact zone's jump with where its edge lies
-among the nodes: over even and graded, linear and quadratic grids the true error at pokes of 4 and 8
-mm was 0.7 to 1.5 times the difference. A coarser second grid would be cheaper, and overstates the
-error up to ten times.
+would be correct for errors that fall smoothly, but a contact zone's error jumps with the position
+of its edge among the nodes. Measured over even and graded, linear and quadratic grids: the true
+error at pokes of 4 and 8 mm was 0.7 to 1.5 times the difference. A coarser second grid would cost
+less, and overstates the error up to ten times.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ __all__ = ["MeshErrorEstimate", "hardest_frames", "mesh_errors"]
 
 @dataclass(frozen=True)
 class MeshErrorEstimate:
-    """What the grid leaves out in one frame.
+    """Discretisation error in one frame.
 
     Attributes:
         frame: its number.
@@ -45,8 +44,9 @@ class MeshErrorEstimate:
 
 
 def hardest_frames(frames: Sequence[Equilibrium]) -> list[int]:
-    """The equilibrium with the strongest push of each touch; frames that are none are passed
-    over."""
+    """Numbers of the equilibria with the strongest push of each touch; failed frames are
+    skipped.
+    """
     found: list[int] = []
     touching = False
     for number, frame in enumerate(frames):
@@ -66,11 +66,14 @@ def mesh_errors(
 ) -> tuple[MeshErrorEstimate, ...]:
     """Estimate the grid's error in the hardest frame of each touch.
 
-    Args:
-        setup, grid: what the frames were replayed with.
+    A touch without equilibrium on the finer grid is left out; `hardest_frames` tells how many there
+    are.
 
-    A touch that finds no equilibrium on the finer grid is left out: `hardest_frames` tells how many
-    there are.
+    Args:
+        setup: of the replay.
+        frames: of the replay.
+        grid: of the replay.
+        report: progress.
     """
     require_memoryless(
         setup.material,

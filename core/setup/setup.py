@@ -15,6 +15,7 @@ from palpate.foundation.errors import SetupError
 from palpate.foundation.frames import Transform
 from palpate.setup.bounds import require_within
 from palpate.setup.box import Box
+from palpate.setup.landmark_touches import PAIRINGS, Touching
 from palpate.setup.material import Fibres, Inclusion, Layer, Material, MaterialLaw, Relaxation
 from palpate.setup.shape import Shape
 
@@ -39,21 +40,6 @@ __all__ = [
 ]
 
 Edge = Literal["-x", "+x", "-y", "+y"]
-PAIRINGS = (
-    "as-paired",
-    "swap-1-2",
-    "swap-1-3",
-    "swap-1-4",
-    "swap-2-3",
-    "swap-2-4",
-    "swap-3-4",
-    "turn-1",
-    "turn-2",
-    "turn-3",
-    "reversed",
-)
-"""Possible true pairings of touches with landmarks: as stated, two rows of touches.csv exchanged,
-each touch with the landmark so many rows further on (cyclic), or all in the reverse order."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,59 +135,6 @@ class Sensor:
     def __post_init__(self) -> None:
         require_within("sensor depth_offset", self.depth_offset, -0.2, 0.2, "m")
         require_within("sensor depth_scale", self.depth_scale, 0.5, 2.0, "")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Touching:
-    """The landmark touches from which phantom_from_robot was computed.
-
-    Attributes:
-        misses: (x, y, z) [m] of each touch minus its landmark under the stated registration,
-            phantom frame; empty if no touch is off.
-        lift: height of the tool's centre over the landmark at a touch [m].
-        pairing: the true pairing of touches with landmarks, one of PAIRINGS.
-        scale: size of the touched polygon over that of the landmarks [1].
-        inset: distance of each touch inwards from its landmark, along x and along y [m]: a ball
-            does not stay on a corner.
-    """
-
-    misses: tuple[tuple[float, float, float], ...] = ()
-    lift: float = 0.0
-    pairing: str = "as-paired"
-    scale: float = 1.0
-    inset: float = 0.0
-
-    def __post_init__(self) -> None:
-        if self.pairing not in PAIRINGS:
-            raise SetupError(
-                f"pairing = {self.pairing!r} is none of {', '.join(PAIRINGS)}",
-                key="pairing",
-                value=self.pairing,
-            )
-        require_within("touching scale", self.scale, 0.1, 10.0, "")
-
-    def order(self, count: int) -> list[int]:
-        """The landmark, by its row, that each of `count` touches truly belongs to.
-
-        Raises SetupError if there are too few touches for the pairing.
-        """
-        order, (kind, *words) = list(range(count)), self.pairing.split("-")
-        if kind == "as":
-            return order
-        if kind == "reversed":
-            return order[::-1]
-        rows = [int(word) for word in words]
-        if max(rows) > count - (kind == "turn"):
-            raise SetupError(
-                f"pairing {self.pairing!r} needs more than {count} touches",
-                key="pairing",
-                value=self.pairing,
-            )
-        if kind == "turn":
-            return order[rows[0] :] + order[: rows[0]]
-        first, second = (row - 1 for row in rows)
-        order[first], order[second] = second, first
-        return order
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,20 +17,14 @@ from functools import cached_property
 import numpy as np
 
 from palpate.diagnosis.forward.loading_history import LoadingHistory
-from palpate.effects import Effect
-from palpate.effects.time_dependence import PermanentSet, Viscoelasticity
 from palpate.fem.constitutive.elastic import Law
-from palpate.fem.history_stress import (
-    ConstantStress,
-    cauchy_green,
-    from_log_strain,
-    log_strain,
-    shear_stress,
-)
+from palpate.fem.history_stress import ConstantStress, shear_stress
 from palpate.fem.material_points import material_points
 from palpate.fem.model import BlockModel
+from palpate.fem.strain_tensors import cauchy_green, from_log_strain, log_strain
 from palpate.foundation.arrays import FloatArray
 from palpate.replay.replay import Equilibrium, Replay
+from palpate.setup.setup import Relaxation, Setup
 
 __all__ = ["Recollection"]
 
@@ -57,18 +51,21 @@ class Recollection:
             for frame in own
         ]
 
-    def lacks(self, effect: Effect) -> Iterator[FloatArray | None]:
-        """For each group, in order of time, the stress (m, 6) over the shear modulus that it takes
-        from the material's points.
+    def stress_losses(self, changed: Setup) -> Iterator[FloatArray | None]:
+        """Yield for each group, in order of time, the stress that its material points lose.
 
-        None where it takes none. One at a time: those of all groups and effects would fill half a
-        gigabyte.
+        It is (m, 6), over the shear modulus; None where nothing is lost. One group at a time: the
+        stresses of all groups and effects would fill half a gigabyte.
+
+        Args:
+            changed: the setup with a material that has history.
         """
-        if isinstance(effect, Viscoelasticity):
-            return self._relaxed(effect)
-        if isinstance(effect, PermanentSet):
-            return self._set(effect)
-        raise TypeError(f"{effect.name} is nothing that a material remembers")
+        material = changed.material
+        parts = [self._relaxed(term) for term in material.relaxation]
+        if material.retained_fraction:
+            parts.append(self._set(material.retained_fraction))
+        for _ in self.order:
+            yield _sum([next(part) for part in parts])
 
     def load(self, model: BlockModel, stress: FloatArray, displacement: FloatArray) -> FloatArray:
         """On the unknowns of a model over E (u,) [m^2], as it stands displaced (n, 3) [m], where
@@ -81,12 +78,11 @@ class Recollection:
     def _stresses(self) -> list[FloatArray]:
         return [shear_stress(self._law, strained) for strained in self._strained]
 
-    def _relaxed(self, effect: Viscoelasticity) -> Iterator[FloatArray | None]:
+    def _relaxed(self, term: Relaxation) -> Iterator[FloatArray | None]:
         rates = (
-            np.where(self._time.depths > 0, 1.0, 1.0 - effect.relaxed_fraction)
-            / effect.time_constant
+            np.where(self._time.depths > 0, 1.0, 1.0 - term.fraction) / term.time_constant
         )
-        left = effect.relaxed_fraction * self._time.faded(rates)
+        left = term.fraction * self._time.faded(rates)
         return (self._mixed(left[number], self._stresses) for number in self.order)
 
     def _mixed(self, shares: FloatArray, fields: Sequence[FloatArray]) -> FloatArray | None:
@@ -101,7 +97,7 @@ class Recollection:
     def _strains(self) -> list[FloatArray]:
         return [log_strain(strained) for strained in self._strained]
 
-    def _set(self, effect: PermanentSet) -> Iterator[FloatArray | None]:
+    def _set(self, retained_fraction: float) -> Iterator[FloatArray | None]:
         """Strain is kept along the way as `palpate.replay.material_history` keeps it, from one peak
         to the next.
         """
@@ -124,7 +120,13 @@ class Recollection:
                 largest = np.maximum(size, largest)
             known = np.isfinite(instant) and len(kept)
             yield (
-                shear_stress(self._law, from_log_strain(effect.retained_fraction * kept))
+                shear_stress(self._law, from_log_strain(retained_fraction * kept))
                 if known
                 else None
             )
+
+
+def _sum(stresses: Sequence[FloatArray | None]) -> FloatArray | None:
+    """Return the sum of those that are there; None without any."""
+    known = [stress for stress in stresses if stress is not None]
+    return np.asarray(sum(known[1:], start=known[0])) if known else None

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from palpate.fem.constitutive.elastic import Law
-from palpate.fem.history_stress import ConstantStress, cauchy_green, shear_stress
+from palpate.fem.history_stress import ConstantStress, shear_stress
 from palpate.fem.material_points import CellPoints, QuadraturePoints
 from palpate.fem.model import BlockModel, ToolSphere
 from palpate.fem.newton import Outcome, solve
+from palpate.fem.strain_tensors import cauchy_green
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import MeshError
 from palpate.mesh.box_mesh import GridSpec, box_mesh

@@ -221,7 +221,7 @@ def test_what_one_frame_was_off_by_begins_the_next_where_the_base_comes_loose(mo
     led = replay(loose, centres, GRADED, starts=starts)
     factors.append(0)
     monkeypatch.setattr(
-        "palpate.replay.replay.predict_from_similar",
+        "palpate.replay.fixed_base.predict_from_similar",
         lambda model, lesson, start, positions, tool: positions,
     )
     alone = replay(loose, centres, GRADED, starts=starts)

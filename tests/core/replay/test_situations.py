@@ -39,7 +39,7 @@ def test_situation_that_once_had_no_equilibrium_has_one(seed, grid):
 
 def test_trial_tells_its_seed_effects_and_grid():
     trial = attempt(5)
-    assert trial.found == () and len(trial.outcomes) == len(draw_situation(5).centres)
+    assert trial.faults == () and len(trial.outcomes) == len(draw_situation(5).centres)
     assert str(trial).startswith("seed 5 (") and "by size" in str(trial)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.fem.history_stress import cauchy_green, from_log_strain, log_strain
+from palpate.fem.strain_tensors import cauchy_green, from_log_strain, log_strain
 
 
 def test_logarithmic_strain_is_that_of_the_stretches_and_back():
