@@ -1,4 +1,4 @@
-"""`palpate blind`: how often the verdict is right when nobody knows what is hidden."""
+"""`palpate blind`: how often the diagnosis of hidden effects is right."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rich.box import SIMPLE
 from rich.console import Group
 from rich.table import Table
 
-from palpate.app.commands.console import look_at, out, progress, write_json
+from palpate.app.commands.console import out, print_serve_command, progress, write_json
 from palpate.app.reporting.blind_tables import (
     TITLES,
     figure_text,
@@ -93,11 +93,10 @@ def blind(
         ),
     ] = False,
 ) -> None:
-    """Hide effects, what no effect expresses, and nothing; say how often, and how well, a diagnosis
-    that is not told finds it.
+    """Hide effects, disturbances outside the catalogue, and nothing; score the diagnosis of each
+    case.
 
-    Writes results.jsonl, summary.json and report.html into the folder. Can be stopped and taken up
-    again.
+    Writes results.jsonl, summary.json and report.html into the folder. Can be stopped and resumed.
     """
     wanted, kept = _parted(effects), folder / "kept"
     if scenarios is None:
@@ -131,11 +130,11 @@ def blind(
         out.print(f"{TITLES[kind]}: {right['hits']} of {right['n']} right{named}", highlight=False)
     out.print(f"{folder / 'report.html'}", highlight=False, soft_wrap=True)
     if kept.exists():
-        look_at(kept)
+        print_serve_command(kept)
 
 
 def _nothing_of(folder: Path, wanted: int) -> str:
-    """What is in a folder whose results are none of the cases that are asked for."""
+    """The message for a folder that has no results of the requested cases."""
     others = len(read_results(folder / RESULTS_FILE))
     if not others:
         return f"{folder} holds no {RESULTS_FILE} with results to score"
@@ -159,9 +158,7 @@ def _write(folder: Path, summary: dict[str, Any], results: Sequence[CaseResult])
 
 
 def _cases(results: Sequence[CaseResult]) -> Table:
-    """A line for each case, and below it what was hidden and what was named: parameters need the
-    whole width.
-    """
+    """One row for each case, and below it the hidden and the named effects over the whole width."""
     table = Table(
         title="blind suite", header_style="bold", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False
     )
@@ -188,7 +185,7 @@ def _cases(results: Sequence[CaseResult]) -> Table:
 
 
 def _targets(targets: Sequence[dict[str, Any]]) -> Table:
-    """Those that these cases say something about."""
+    """The targets that these cases can test."""
     table = Table(title="targets", header_style="bold")
     for column in ("", "target", "reached", "95 % interval", ""):
         table.add_column(column, overflow="fold")

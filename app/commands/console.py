@@ -1,6 +1,4 @@
-"""What all verbs of the terminal share: where they print, how they show progress, and how a verdict
-looks.
-"""
+"""Output that all commands share: progress, warnings, errors and verdicts."""
 
 from __future__ import annotations
 
@@ -26,11 +24,11 @@ from palpate.foundation.errors import Cancelled, PalpateError
 from palpate.foundation.progress import Report
 
 __all__ = [
-    "Registration",
+    "RegistrationOption",
     "errors",
-    "look_at",
     "out",
     "print_problem",
+    "print_serve_command",
     "print_warnings",
     "progress",
     "verdict_cells",
@@ -38,7 +36,7 @@ __all__ = [
     "write_json",
 ]
 
-Registration = Annotated[
+RegistrationOption = Annotated[
     str | None,
     typer.Option(
         help="Accepted registration of the camera: a name stored for this dataset, or a file; "
@@ -48,7 +46,7 @@ Registration = Annotated[
 """The option by which verbs take an accepted registration."""
 
 BETWEEN_LINES = 30.0
-"""Between two lines of progress in a log [s]."""
+"""Least time between two lines of progress in a log [s]."""
 
 out = Console()
 errors = Console(stderr=True)
@@ -56,9 +54,7 @@ errors = Console(stderr=True)
 
 @contextmanager
 def progress(title: str) -> Iterator[Report]:
-    """A bar with elapsed and remaining time on the error channel, so that the output can be piped;
-    in a log a line now and then.
-    """
+    """Show a progress bar on the error channel, so that the output can be piped; lines in a log."""
     shown = _bar(title) if errors.is_terminal else _lines(title)
     with shown as show:
 
@@ -87,7 +83,7 @@ def _bar(title: str) -> Iterator[Report]:
 
 @contextmanager
 def _lines(title: str) -> Iterator[Report]:
-    """For those who look at a log: what is being done, at most twice a minute."""
+    """Print the progress at most twice a minute."""
     began = last = time.monotonic()
 
     def show(fraction: float, text: str) -> None:
@@ -105,15 +101,15 @@ def _lines(title: str) -> Iterator[Report]:
     yield show
 
 
-def look_at(folder: Path) -> None:
-    """Say how to look at the runs and datasets in a folder."""
+def print_serve_command(folder: Path) -> None:
+    """Print the command that shows the runs and datasets of a folder."""
     look = f"{sys.argv[0]} serve --runs {folder / 'runs'} --datasets {folder / 'datasets'}"
     out.print(f"to look at it: [bold]{escape(look)}[/]", highlight=False, soft_wrap=True)
 
 
 def verdict_table(with_truth: bool, title: str | None = None) -> Table:
-    """The columns of a table of verdicts; "removed" is the share of the reducible error that naming
-    the cause removes.
+    """An empty table of verdicts; "removed" is the share of the reducible error that the causes
+    remove.
     """
     table = Table(
         title=title,
@@ -161,7 +157,7 @@ def verdict_cells(
 
 
 def agrees(report: dict[str, Any], truth: dict[str, Any]) -> bool:
-    """Whether verdict and causes are those of the truth, in any order."""
+    """Whether verdict and causes are the true ones, in any order."""
     named = {cause["effect"] for cause in report.get("causes", [])}
     return report.get("verdict") == truth["verdict"] and named == {
         one["effect"] for one in truth["effects"]
@@ -169,13 +165,13 @@ def agrees(report: dict[str, Any], truth: dict[str, Any]) -> bool:
 
 
 def print_warnings(warnings: Sequence[str]) -> None:
-    """One by one, as they stand."""
+    """Print warnings, one on a line."""
     for warning in warnings:
         out.print(f"[yellow]warning[/] {escape(warning)}", highlight=False)
 
 
 def print_problem(error: PalpateError, place: str = "") -> None:
-    """One clear message on the error channel."""
+    """Print an error on the error channel."""
     errors.print(
         f"[bold red]{type(error).__name__}[/]{escape(place)}: {escape(error.message)}",
         soft_wrap=True,
@@ -184,7 +180,7 @@ def print_problem(error: PalpateError, place: str = "") -> None:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write aside and rename, so that a reader never sees half of it."""
+    """Write a JSON file; readers see the old or the new content, never a part."""
     path.parent.mkdir(parents=True, exist_ok=True)
     aside = path.with_name(f".{path.name}.part")
     aside.write_text(json.dumps(value, indent=1) + "\n")

@@ -1,10 +1,9 @@
-"""`palpate check`, `register` and `replay`: what is there, how the frames relate, what the
-simulation says.
-"""
+"""`palpate check`, `register` and `replay`."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,21 +13,30 @@ from rich.box import SIMPLE
 from rich.markup import escape
 from rich.table import Table
 
-from palpate.app.commands.console import Registration as Registered
-from palpate.app.commands.console import out, print_problem, print_warnings, progress
+from palpate.app.commands.console import (
+    RegistrationOption,
+    out,
+    print_problem,
+    print_warnings,
+    progress,
+)
+from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError, PalpateError, RegistrationError
 from palpate.foundation.progress import part
 
 if TYPE_CHECKING:
     from palpate.dataset import Dataset
     from palpate.dataset.check import DatasetSummary
+    from palpate.mesh.box_mesh import BoxMesh
     from palpate.registration.registration import Registration
+    from palpate.replay.equilibrium import Equilibrium
+    from palpate.replay.mesh_convergence import MeshErrorEstimate
 
 __all__ = ["check", "register", "replay"]
 
 Folder = Annotated[Path, typer.Argument(help="A dataset folder.", show_default=False)]
-_SHOWN = (25, 9, 9)
-"""Nodes whose way is written where the mesh itself follows the tool."""
+_NODES = (25, 9, 9)
+"""Nodes whose motion is written where the mesh itself follows the tool."""
 
 
 def check(
@@ -38,9 +46,7 @@ def check(
         typer.Option(help="Write a picture of where the tool touched (one dataset only)."),
     ] = None,
 ) -> None:
-    """Read everything in a dataset and say what it holds, what is doubtful, and what it cannot
-    tell.
-    """
+    """Read everything in a dataset and print its content, warnings, and what it cannot show."""
     if picture is not None and len(datasets) != 1:
         raise DatasetError(
             f"--picture shows one dataset, {len(datasets)} were named; check them one by one"
@@ -57,7 +63,7 @@ def check(
 
 
 def register(dataset: Folder) -> None:
-    """Relate robot, camera and phantom, each with its uncertainty."""
+    """Register robot, camera and phantom, each with its uncertainty."""
     from palpate.dataset import open_dataset
     from palpate.registration.registration import register as relate
 
@@ -89,26 +95,24 @@ def replay(
     grid: Annotated[
         str, typer.Option(help="Even nodes along x, y, z, as in 13x5x5; or finest at the tool.")
     ] = "graded",
-    registration: Registered = None,
+    registration: RegistrationOption = None,
     runs: Annotated[
-        Path,
-        typer.Option(help="AcceptedRegistration registrations are looked for below this folder."),
+        Path, typer.Option(help="Accepted registrations are looked for below this folder.")
     ] = Path("runs"),
 ) -> None:
-    """Simulate one sequence as the setup states it: one equilibrium per cloud, written to an .npz
+    """Simulate one sequence with the stated setup: one equilibrium per cloud, written to an .npz
     file.
 
-    Frames without equilibrium are named, marked in the file, and make the exit code 1.
+    Frames without equilibrium are listed, marked in the file, and make the exit code 1.
     """
-    import palpate.registration.registration as relating
+    import palpate.registration.registration as registering
     import palpate.replay.replay as simulation
     from palpate.app.storage.registration_store import accepted_for
     from palpate.dataset import open_dataset
-    from palpate.fem.newton import Outcome
     from palpate.mesh.box_mesh import GridSpec, box_mesh
     from palpate.mesh.graded_mesh import REPLAY_GRID
     from palpate.mesh.protocol import Meshing
-    from palpate.replay.mesh_convergence import hardest_frames, mesh_errors
+    from palpate.replay.mesh_convergence import mesh_errors
 
     even = None if grid == "graded" else GridSpec.parse(grid)
     opened = open_dataset(dataset).registered(accepted_for(dataset, registration, runs))
@@ -116,12 +120,40 @@ def replay(
     times = opened.sequence(sequence).cloud_times
     times = times if len(times) else kinematics.time
     with progress(f"replay {sequence}") as report:
-        setup = relating.setup_from(opened, relating.register(opened, part(report, 0.0, 0.1)))
+        relation = registering.register(opened, part(report, 0.0, 0.1))
+        setup = registering.setup_from(opened, relation)
         spec: Meshing = even or REPLAY_GRID.for_tool(setup.tool.radius)
         centres = setup.phantom_from_robot.apply(kinematics.position_at(times))
         frames = simulation.replay(setup, centres, spec, times=times, report=part(report, 0.1, 0.8))
-        misses = mesh_errors(setup, frames, spec, report=part(report, 0.8, 1.0))
-    mesh = box_mesh(setup.box.size, even or GridSpec(nodes=_SHOWN))
+        errors = mesh_errors(setup, frames, spec, report=part(report, 0.8, 1.0))
+    mesh = box_mesh(setup.box.size, even or GridSpec(nodes=_NODES))
+    _save_frames(file, mesh, times, centres, frames, errors)
+    failed = _failed(frames)
+    where = f"{grid} nodes" if even else "a mesh that follows the tool"
+    out.print(
+        f"{len(frames)} frames on {where}, {len(frames) - len(failed)} converged: {file}",
+        highlight=False,
+    )
+    _print_mesh_errors(frames, errors)
+    for number in failed:
+        frame = frames[number]
+        out.print(
+            f"[yellow]frame {number}[/] {frame.outcome.value} (residual {frame.residual:.2g})",
+            highlight=False,
+        )
+    if failed:
+        raise typer.Exit(1)
+
+
+def _save_frames(
+    file: Path,
+    mesh: BoxMesh,
+    times: FloatArray,
+    centres: FloatArray,
+    frames: Sequence[Equilibrium],
+    errors: Sequence[MeshErrorEstimate],
+) -> None:
+    """Write the frames with the surface of a mesh of the block at rest."""
     used, quads = np.unique(mesh.free_surface, return_inverse=True)
     rest = mesh.nodes[used]
     _save(
@@ -135,35 +167,34 @@ def replay(
         residual=np.array([frame.residual for frame in frames]),
         outcome=np.array([frame.outcome.name for frame in frames]),
         mesh_error=np.array(
-            [(miss.frame, miss.displacement, miss.relative, miss.force) for miss in misses]
+            [(error.frame, error.displacement, error.relative, error.force) for error in errors]
         ).reshape(-1, 4),
     )
-    failed = [
-        number for number, frame in enumerate(frames) if frame.outcome is not Outcome.CONVERGED
-    ]
-    where = f"{grid} nodes" if even else "a mesh that follows the tool"
-    out.print(
-        f"{len(frames)} frames on {where}, {len(frames) - len(failed)} converged: {file}",
-        highlight=False,
-    )
-    if misses:
-        worst = max(misses, key=lambda miss: miss.displacement)
-        size = f"{1e3 * worst.displacement:.2f} mm RMS ({worst.relative:.0%}) and {worst.force:.0%} of the force"
+
+
+def _failed(frames: Sequence[Equilibrium]) -> list[int]:
+    """Indices of the frames without equilibrium."""
+    from palpate.fem.newton import Outcome
+
+    return [number for number, frame in enumerate(frames) if frame.outcome != Outcome.CONVERGED]
+
+
+def _print_mesh_errors(frames: Sequence[Equilibrium], errors: Sequence[MeshErrorEstimate]) -> None:
+    from palpate.replay.mesh_convergence import hardest_frames
+
+    if errors:
+        worst = max(errors, key=lambda error: error.displacement)
+        size = f"{1e3 * worst.displacement:.2f} mm RMS ({worst.relative:.0%})"
         out.print(
-            f"the grid's own error, by a finer one: {size} at frame {worst.frame}, the worst of {len(misses)} touches"
+            f"the grid's own error, by a finer one: {size} and {worst.force:.0%} of the force "
+            f"at frame {worst.frame}, the worst of {len(errors)} touches"
         )
-    for number in sorted(set(hardest_frames(frames)) - {miss.frame for miss in misses}):
+    for number in sorted(set(hardest_frames(frames)) - {error.frame for error in errors}):
         out.print(
-            f"[yellow]frame {number}[/] no equilibrium on the finer grid, so its mesh error is unknown",
+            f"[yellow]frame {number}[/] no equilibrium on the finer grid, "
+            "so its mesh error is unknown",
             highlight=False,
         )
-    for number in failed:
-        out.print(
-            f"[yellow]frame {number}[/] {frames[number].outcome.value} (residual {frames[number].residual:.2g})",
-            highlight=False,
-        )
-    if failed:
-        raise typer.Exit(1)
 
 
 def _check_one(path: Path, picture: Path | None) -> None:
@@ -225,13 +256,13 @@ def _print_summary(dataset: Dataset, summary: DatasetSummary, found: Registratio
     felt = [one for one in summary.sequences if one.forces]
     if felt:
         fitted = any(one.split in ("train", "validation") for one in felt)
-        told = (
+        use = (
             "so that Young's modulus can be told"
             if fitted
             else "but in none to fit on, so that Young's modulus cannot be told"
         )
         out.print(
-            f"forces in {len(felt)} of {len(summary.sequences)} sequences, {told}", highlight=False
+            f"forces in {len(felt)} of {len(summary.sequences)} sequences, {use}", highlight=False
         )
     for lack in summary.lacks:
         out.print(f"[yellow]lacks[/] {escape(lack.sentence)}", highlight=False)

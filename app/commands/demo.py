@@ -10,7 +10,13 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from palpate.app.commands.console import look_at, out, progress, verdict_cells, verdict_table
+from palpate.app.commands.console import (
+    out,
+    print_serve_command,
+    progress,
+    verdict_cells,
+    verdict_table,
+)
 from palpate.app.commands.diagnosis import print_report, run_diagnosis
 from palpate.app.commands.service import announce
 from palpate.app.settings import Settings
@@ -38,8 +44,8 @@ def demo(
     port: Annotated[int, typer.Option(min=0, max=65535)] = 8321,
     workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
 ) -> None:
-    """Make a virtual phantom with a hidden effect, run the whole loop, and compare the verdict with
-    the truth.
+    """Make a virtual phantom with a hidden effect, diagnose it, and compare the verdict with the
+    truth.
     """
     if palpation not in (None, "box", "organ"):
         raise typer.BadParameter(f"--palpation is box or organ, not {palpation!r}")
@@ -70,14 +76,13 @@ def demo(
             lambda address: announce(address, f"/?run={run.name}"),
         )
     else:
-        look_at(folder)
+        print_serve_command(folder)
 
 
 def _make(
     dataset: Path, seed: int, effects: int, workers: int, palpation: str | None
 ) -> dict[str, Any]:
-    """The dataset of this seed with its truth; one that is there already is the same and is
-    kept."""
+    """Make the dataset of this seed and return its truth; an existing one is used again."""
     from palpate.app.commands.diagnosis import truth_beside
     from palpate.synthetic import (
         SHORT_PROTOCOL,

@@ -1,4 +1,4 @@
-"""`palpate diagnose`: name what the simulation misses, for one dataset or several."""
+"""`palpate diagnose`: find the causes of the simulation's error, for one dataset or several."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rich.table import Table
 from rich.text import Text
 
 from palpate.app.commands.console import (
-    Registration,
+    RegistrationOption,
     out,
     print_warnings,
     progress,
@@ -61,14 +61,13 @@ def diagnose(
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
     seed: Annotated[int, typer.Option(min=0, help="Seed of all random draws.")] = 0,
-    registration: Registration = None,
+    registration: RegistrationOption = None,
     runs: Annotated[
-        Path,
-        typer.Option(help="AcceptedRegistration registrations are looked for below this folder."),
+        Path, typer.Option(help="Accepted registrations are looked for below this folder.")
     ] = Path("runs"),
 ) -> None:
-    """Name what the simulation of each dataset misses, and what naming it gains on sequences
-    nothing was fitted on.
+    """Find the causes of the simulation's error in each dataset, and what they gain on sequences
+    that nothing was fitted on.
     """
     from palpate.app.storage.registration_store import accepted_for
 
@@ -80,7 +79,7 @@ def diagnose(
     with_truth = any(truths.values())
     table = verdict_table(with_truth)
     for path in datasets:
-        with _kept(run / path.name if run and several else run, path.name) as place:
+        with _run_folder(run / path.name if run and several else run, path.name) as place:
             report, seconds = run_diagnosis(path, place, workers, seed, registered[path])
         table.add_row(*verdict_cells(path.name, report, seconds, truths[path], with_truth))
         if file is not None:
@@ -96,8 +95,8 @@ def diagnose(
 def run_diagnosis(
     dataset: Path, run: Path, workers: int, seed: int, accepted: AcceptedRegistration | None = None
 ) -> tuple[dict[str, Any], float]:
-    """Diagnose with a progress bar; the run folder is whole at `run`, or not there at all. Returns
-    report and seconds.
+    """Diagnose with a progress bar; returns report and time [s]. The run folder appears whole or
+    not at all.
     """
     from palpate.app.jobs.tasks import diagnose_into
 
@@ -115,8 +114,9 @@ def run_diagnosis(
 
 
 def truth_beside(dataset: Path) -> dict[str, Any] | None:
-    """What is known to be hidden, from `<dataset>.truth.json`; only ever compared with, never
-    used."""
+    """Content of `<dataset>.truth.json`; None where there is none. It is only compared with
+    results.
+    """
     path = dataset.resolve().with_name(f"{dataset.resolve().name}.truth.json")
     try:
         truth = json.loads(path.read_text())
@@ -126,8 +126,8 @@ def truth_beside(dataset: Path) -> dict[str, Any] | None:
 
 
 def true_effects(dataset: Path) -> list[dict[str, Any]]:
-    """What is hidden in a virtual dataset, as `Effect.to_json` has it; RunError where nothing is
-    known of it.
+    """Hidden effects of a virtual dataset, as `Effect.to_json`; raises RunError where they are
+    unknown.
     """
     truth, file = truth_beside(dataset), f"{dataset.resolve().name}.truth.json"
     if truth is None:
@@ -142,7 +142,7 @@ def true_effects(dataset: Path) -> list[dict[str, Any]]:
 
 
 def print_report(report: dict[str, Any]) -> None:
-    """The verdict in one sentence, then what it rests on."""
+    """Print the verdict in one sentence, then the results that support it."""
     lines: list[Any] = [Text(verdict_sentence(report), style="bold")]
     gain = report.get("gain") or {}
     steps = {
@@ -180,7 +180,7 @@ def print_report(report: dict[str, Any]) -> None:
     if report.get("ranking"):
         out.print(_ranking(report["ranking"]))
     if report.get("ambiguity_map"):
-        out.print(_told(report["ambiguity_map"]))
+        out.print(_limits(report["ambiguity_map"]))
 
 
 def _ranking(entries: list[dict[str, Any]]) -> Table:
@@ -197,7 +197,7 @@ def _ranking(entries: list[dict[str, Any]]) -> Table:
     return table
 
 
-def _told(rows: list[dict[str, Any]]) -> Table:
+def _limits(rows: list[dict[str, Any]]) -> Table:
     table = Table(header_style="bold", title="What this data can tell", title_justify="left")
     table.add_column("effect")
     table.add_column("would be named from")
@@ -210,7 +210,7 @@ def _told(rows: list[dict[str, Any]]) -> Table:
 
 
 def _refuse_place(file: Path | None, run: Path | None, several: bool) -> None:
-    """Before the work, not after it: raise BadParameter where the report could not be written."""
+    """Raise BadParameter, before the diagnosis, where the report could not be written."""
     if file is None:
         return
     if several and file.is_file():
@@ -247,8 +247,8 @@ def _refuse_broken(datasets: list[Path]) -> None:
 
 
 @contextmanager
-def _kept(run: Path | None, name: str) -> Iterator[Path]:
-    """The run folder to be kept, or one in a temporary place that is gone afterwards."""
+def _run_folder(run: Path | None, name: str) -> Iterator[Path]:
+    """The requested run folder, or one in a temporary place that is deleted afterwards."""
     if run is not None:
         if run.exists():
             raise RunError(

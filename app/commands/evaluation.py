@@ -1,4 +1,6 @@
-"""`palpate evaluate`: the ladder of a dataset's test sequences, and the tables of the paper."""
+"""`palpate evaluate`: errors of models and networks on test sequences, and the tables
+of the paper.
+"""
 
 from __future__ import annotations
 
@@ -70,8 +72,7 @@ def evaluate(
     workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
     runs: Annotated[Path, typer.Option(help="Results go to RUNS/evaluations.")] = Path("runs"),
 ) -> None:
-    """Say what a network, a named cause and both are worth on the test sequences: from the stated
-    model to the noise floor.
+    """Compare the raw model, the extended model and their networks on the test sequences.
 
     With --paper: the paper's searches for the modulus, and its corrections at 5e3, 1e4 and 1e1 Pa,
     in 2D and 3D.
@@ -154,7 +155,7 @@ def _share(share: dict[str, float]) -> str:
 
 
 def _make(dataset: Path, size: str, workers: int) -> None:
-    """The virtual dataset of the paper's protocol, unless it is there."""
+    """Make the virtual dataset of the paper's protocol, unless it exists."""
     from palpate.synthetic import PAPER_SEED, PAPER_SIZES, make_dataset, paper_scenario
 
     wanted = next((one for one in PAPER_SIZES if one == size), None)

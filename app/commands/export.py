@@ -25,9 +25,7 @@ def export(
         typer.Option("--out", dir_okay=False, help="The page; RUN.html where you are without it."),
     ] = None,
 ) -> None:
-    """Write the report of a run as one HTML page that needs nothing but itself: to keep, print or
-    send.
-    """
+    """Write the report of a run as one self-contained HTML page: to keep, print or send."""
     from palpate.app.reporting.report_page import report_page
     from palpate.app.storage.run_store import Run
 

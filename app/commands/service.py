@@ -69,6 +69,6 @@ def serve(
 
 
 def announce(address: str, path: str = "/") -> None:
-    """Say where the page is."""
+    """Print the address of the page."""
     out.print(f"Palpate is at [bold]{address}{path}[/]  (Ctrl-C ends it)", highlight=False)
     out.file.flush()

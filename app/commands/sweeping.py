@@ -1,4 +1,4 @@
-"""`palpate sweep`: the error against parameters of the setup and of effects."""
+"""`palpate sweep`: the error as a function of parameters of the setup and of effects."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from palpate.app.commands.console import Registration, out, progress
+from palpate.app.commands.console import RegistrationOption, out, progress
 from palpate.app.reporting.quantities import quantity
 from palpate.foundation.errors import EffectError
 
@@ -45,15 +45,15 @@ def sweep(
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a dask scheduler whose workers replay instead.")
     ] = None,
-    registration: Registration = None,
+    registration: RegistrationOption = None,
     runs: Annotated[
         Path, typer.Option(help="Points go to RUNS/sweeps; what is known there is not done again.")
     ] = Path("runs"),
 ) -> None:
-    """Replay a dataset over a range of parameters, and say where the error is least and along which
-    parameters it says nothing.
+    """Replay a dataset over a range of parameters; print where the error is smallest and which
+    parameters do not affect it.
 
-    Can be stopped at any time: the same command goes on where it was.
+    Can be stopped at any time: the same command resumes.
     """
     from palpate.app.storage.registration_store import accepted_for
     from palpate.app.storage.result_store import request_name

@@ -1,5 +1,5 @@
-"""`palpate train`: the correction network of a dataset, on the stated model or on the extended one
-of a run.
+"""`palpate train`: the correction network of a dataset, on the raw model or on a run's extended
+one.
 """
 
 from __future__ import annotations
@@ -58,10 +58,10 @@ def train(
     workers: Annotated[int, typer.Option(min=1, help="Processes that replay.")] = 2,
     runs: Annotated[Path, typer.Option(help="The training goes to RUNS/trainings.")] = Path("runs"),
 ) -> None:
-    """Train the network that corrects what a model's replay leaves, on the dataset's train
-    sequences; validation stops it.
+    """Train the network that corrects the replay of a model, on the train sequences, until the
+    validation error stops falling.
 
-    Can be stopped at any time: the same command goes on where it was.
+    Can be stopped at any time: the same command resumes.
     """
     from palpate.app.jobs.tasks import train as learn
     from palpate.app.storage.result_store import request_name
