@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from palpate.effects.base import Effect, Parameter, Slot, parameter
+from palpate.effects.base import Effect, Slot
 from palpate.effects.elastic_material import PoissonRatio, StiffInclusion, YoungModulus
 from palpate.effects.geometry import GeometryScale, MeshResolution
 from palpate.effects.heterogeneity import (
@@ -19,7 +19,9 @@ from palpate.effects.heterogeneity import (
     StrainStiffening,
     SurfaceLayer,
 )
+from palpate.effects.linearisation import Linearisation, Measurement, NuisanceBlock, Tangent
 from palpate.effects.load import Gravity
+from palpate.effects.parameter import Parameter, parameter
 from palpate.effects.plugins import outside_effects
 from palpate.effects.sensor import CameraRegistration, DepthBias, TimeOffset
 from palpate.effects.support import BaseCompliance, BaseDetachment, BaseSlip
@@ -38,8 +40,12 @@ __all__ = [
     "DIAGNOSED",
     "OUTSIDE",
     "Effect",
+    "Linearisation",
+    "Measurement",
+    "NuisanceBlock",
     "Parameter",
     "Slot",
+    "Tangent",
     "effect_named",
     "from_json",
     "parameter",

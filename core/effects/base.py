@@ -1,5 +1,7 @@
-"""What an effect is: parameters with unit, bounds and prior, and one pure function from setup to
-setup.
+"""The base class of effects: parameters, one pure function from setup to setup, and properties.
+
+A subclass declares by class attributes how a diagnosis screens it, which data show it, and where a
+fit starts. All of them have defaults.
 """
 
 from __future__ import annotations
@@ -7,25 +9,27 @@ from __future__ import annotations
 import dataclasses
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from types import MappingProxyType
 from typing import Any, ClassVar, Self
 
+from palpate.effects.linearisation import Linearisation, Measurement, NuisanceBlock, Tangent
+from palpate.effects.parameter import Parameter
 from palpate.foundation.errors import EffectError
-from palpate.setup.setup import Setup
+from palpate.setup.setup import Inclusion, Setup
 
-__all__ = ["LOG_PER_CONTRAST", "Effect", "Parameter", "Slot", "parameter", "with_effects"]
+__all__ = ["MEASURE_SIZE", "Effect", "Slot", "with_effects"]
 
-_SHORT = 1e-3
-_MATRIX = 1.5
-LOG_PER_CONTRAST = 1.0 + _MATRIX
-"""Change of a stiffness ratio's logarithm per change of its contrast, where the ratio is one."""
+MEASURE_SIZE = "measure the block with a calliper"
+"""Measurement that tells the phantom's size from effects that look like it."""
 
 
 class Slot(Enum):
-    """The part of the experiment an effect enters; SENSOR changes only the observation, so nothing
-    is solved anew.
+    """The part of the experiment that an effect changes.
+
+    SENSOR effects change the observation only, so that no equilibrium is solved anew.
     """
 
     GEOMETRY = "geometry"
@@ -37,130 +41,47 @@ class Slot(Enum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameter:
-    """What fit, REST, slider and report need to know of a parameter.
-
-    Attributes:
-        name, unit: as in effects.md, SI.
-        low, high: bounds.
-        scale: a step that matters, for trust regions and differences.
-        choices: allowed words, for a parameter that is not a number.
-        log: whether it is searched by its logarithm; then `scale` and `accuracy` are of the
-            logarithm.
-        contrast: whether a ratio k of stiffness is searched by (k - 1) / (k + 3/2), and `scale` and
-            `accuracy` are of that: in proportion to it a ball in an incompressible matrix moves
-            what surrounds it (Eshelby 1957), so that k = 10 and k = 50 are next to each other, as
-            they are in data.
-        accuracy: standard deviation that the replay's own error leaves, however good the data.
-        periodic: whether it comes round, as an axis does: its upper bound is its lower one.
-    """
-
-    name: str
-    unit: str
-    low: float = -math.inf
-    high: float = math.inf
-    scale: float = 1.0
-    choices: tuple[str, ...] = ()
-    log: bool = False
-    contrast: bool = False
-    accuracy: float = 0.0
-    periodic: bool = False
-
-    def coordinate(self, value: float) -> float:
-        """What a search moves instead of the value."""
-        if self.contrast:
-            return (value - 1.0) / (value + _MATRIX)
-        return math.log(value) if self.log else value
-
-    def value(self, coordinate: float) -> float:
-        """The inverse of `coordinate`, brought back into the bounds."""
-        return self.bounded(self._free(coordinate))
-
-    def bounded(self, value: float) -> float:
-        """The value in its bounds that is next to this one; of a periodic parameter the one that is
-        the same.
-        """
-        if self.periodic:
-            return self.low + (value - self.low) % (self.high - self.low)
-        return min(max(value, self.low), self.high)
-
-    @property
-    def ends(self) -> tuple[float, float]:
-        """Search coordinates of the bounds; infinite where the parameter comes round."""
-        return (
-            (-math.inf, math.inf)
-            if self.periodic
-            else (self.coordinate(self.low), self.coordinate(self.high))
-        )
-
-    def interval(self, coordinate: float, width: float) -> tuple[float, float]:
-        """Values at so much to either side; of a periodic parameter they may pass its bounds, as -3
-        to 5 degrees do.
-        """
-        if self.periodic:
-            width = min(width, (self.high - self.low) / 2)
-            return self.bounded(coordinate) - width, self.bounded(coordinate) + width
-        return self.value(coordinate - width), self.value(coordinate + width)
-
-    def within(self, coordinate: float) -> float:
-        """The value at this coordinate, a thousandth of a scale short of the bounds at least."""
-        (low, high), short = self.ends, _SHORT * self.scale
-        return self.value(min(max(coordinate, low + short), high - short))
-
-    def factor(self, size: float) -> float | None:
-        """That to which one grows with a coordinate's change by `size`; None of a parameter that is
-        searched as it is.
-        """
-        return self._free(self.coordinate(1.0) + size) if self.log or self.contrast else None
-
-    def _free(self, coordinate: float) -> float:
-        if self.contrast:
-            return (
-                (1.0 + _MATRIX * coordinate) / (1.0 - coordinate) if coordinate < 1.0 else math.inf
-            )
-        return math.exp(min(coordinate, 700.0)) if self.log else coordinate
-
-
-def parameter(
-    unit: str,
-    *,
-    low: float = 0.0,
-    high: float = 0.0,
-    scale: float = 1.0,
-    choices: tuple[str, ...] = (),
-    log: bool = False,
-    contrast: bool = False,
-    accuracy: float = 0.0,
-    periodic: bool = False,
-) -> Any:
-    """A dataclass field that carries a Parameter."""
-    return dataclasses.field(
-        metadata={
-            "unit": unit,
-            "low": low,
-            "high": high,
-            "scale": scale,
-            "choices": choices,
-            "log": log,
-            "contrast": contrast,
-            "accuracy": accuracy,
-            "periodic": periodic,
-        }
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
 class Effect(ABC):
-    """One cause. A subclass is a frozen dataclass whose fields are made by `parameter`, and
-    `apply`.
+    """One possible cause of a simulation's error.
+
+    A subclass is a frozen dataclass whose fields are made by `parameter`. It must have `name`,
+    `enters`, `summary`, `neutral`, `starts` and `apply`; the other members have defaults.
     """
 
     name: ClassVar[str]
+    """Name in reports, unique in the catalogue."""
     enters: ClassVar[Slot]
+    """Part of the experiment that the effect changes."""
     summary: ClassVar[str]
+    """One clause that states the cause, for reports."""
+    linearisation: ClassVar[Linearisation] = Linearisation.FINITE_DIFFERENCE
+    """How the screening makes columns of the effect."""
+    amplitude: ClassVar[str] = ""
+    """Number in proportion to which the effect grows; the others then only say where it is. Empty:
+    each number has a column of its own."""
+    amplitude_deviation: ClassVar[float | None] = None
+    """Prior standard deviation of the amplitude's search coordinate; None for the usual number of
+    its scales."""
+    joint: ClassVar[bool] = False
+    """Whether all numbers together are one candidate, as none of them is plausible alone."""
+    nuisance: ClassVar[NuisanceBlock | None] = None
+    """Nuisance parameters whose columns the effect shares, in the order of its numbers; stated for
+    the linearisation NUISANCE."""
+    shown_by: ClassVar[frozenset[Measurement]] = frozenset({Measurement.CLOUDS})
+    """Kinds of measurement any of which shows the effect."""
+    needs_box: ClassVar[bool] = False
+    """Whether only a box can have it, and no body of another shape."""
     kinked: ClassVar[bool] = False
-    """Whether something begins or ends with its numbers, as a slide does: a fit then looks beyond
-    what derivatives show."""
+    """Whether something begins or ends with its numbers, as a slide does: a fit then tries values
+    to either side, and single pushes have no derivative by them."""
+    strongly_nonlinear: ClassVar[bool] = False
+    """Whether a derivative says little about finite sizes: the effect is then refitted whatever
+    its gain in the linear screening."""
+    needs_fine_mesh: ClassVar[bool] = False
+    """Whether finite differences need the mesh of the diagnosis; the coarse mesh of the screening
+    does for others."""
+    told_apart_by: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    """Name of another effect to a measurement, which is no push, that tells the two apart."""
 
     def __post_init__(self) -> None:
         for item in self.parameters():
@@ -168,13 +89,15 @@ class Effect(ABC):
             if item.choices:
                 if value not in item.choices:
                     raise EffectError(
-                        f"{self.name}: {item.name} = {value!r} is none of {', '.join(item.choices)}",
+                        f"{self.name}: {item.name} = {value!r} is none of "
+                        f"{', '.join(item.choices)}",
                         parameter=item.name,
                         value=value,
                     )
             elif not (math.isfinite(value) and item.low <= value <= item.high):
                 raise EffectError(
-                    f"{self.name}: {item.name} = {value:g} {item.unit} is outside {item.low:g} to {item.high:g} {item.unit}",
+                    f"{self.name}: {item.name} = {value:g} {item.unit} is outside "
+                    f"{item.low:g} to {item.high:g} {item.unit}",
                     parameter=item.name,
                     value=value,
                     low=item.low,
@@ -183,61 +106,129 @@ class Effect(ABC):
 
     @classmethod
     def parameters(cls) -> tuple[Parameter, ...]:
-        """The parameters in the order of the fields."""
+        """Return the parameters in the order of the fields."""
         return tuple(
             Parameter(name=field.name, **field.metadata) for field in dataclasses.fields(cls)
         )
 
     @classmethod
     def numbers(cls) -> tuple[Parameter, ...]:
-        """The parameters that are numbers, which a fit may move."""
+        """Return the parameters that are numbers, which a fit may change."""
         return tuple(item for item in cls.parameters() if not item.choices)
-
-    @classmethod
-    def at_rest(cls) -> bool:
-        """Whether the rest cloud or the touches show it, so that a diagnosis asks what it changes
-        there.
-        """
-        return cls.enters in (Slot.LOAD, Slot.GEOMETRY)
 
     @classmethod
     @abstractmethod
     def neutral(cls, setup: Setup) -> Self:
-        """The instance that changes nothing in this setup."""
+        """Return the instance that changes nothing in this setup."""
 
     @classmethod
     @abstractmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:
-        """Finite sizes from which a search begins, spread over what is plausible for this setup."""
+        """Return finite sizes at which a search begins, spread over what is plausible."""
 
     @abstractmethod
     def apply(self, setup: Setup) -> Setup:
-        """The setup with this cause in it."""
+        """Return the setup with this effect in it."""
+
+    # -- properties that a diagnosis reads --------------------------------------------------------
+
+    @classmethod
+    def at_rest(cls) -> bool:
+        """Return whether the rest cloud or the touches show the effect."""
+        return cls.enters in (Slot.LOAD, Slot.GEOMETRY)
+
+    @classmethod
+    def has_history(cls) -> bool:
+        """Return whether a frame with the effect depends on the frames before it."""
+        return cls.linearisation is Linearisation.HISTORY
+
+    @classmethod
+    def has_derivative(cls) -> bool:
+        """Return whether a replay with the effect has derivatives by its numbers."""
+        return not cls.has_history()
+
+    @classmethod
+    def tangents(cls, setup: Setup) -> Sequence[Tangent]:
+        """Return the columns of an effect with the linearisation TANGENT.
+
+        By default one column of the amplitude at each start that differs in the other numbers; or,
+        without an amplitude, one column of each number.
+        """
+        neutral = cls.neutral(setup)
+        if not cls.amplitude:
+            return [Tangent(effect=neutral, of=item.name) for item in cls.numbers()]
+        value = {cls.amplitude: getattr(neutral, cls.amplitude)}
+        points = dict.fromkeys(dataclasses.replace(start, **value) for start in cls.starts(setup))
+        return [
+            Tangent(effect=point, of=cls.amplitude, deviation=cls.amplitude_deviation)
+            for point in points
+        ]
+
+    def initial_guess(self, changes: Mapping[str, float]) -> Self:
+        """Return the effect from which a fit starts, where columns belong to single numbers.
+
+        Args:
+            changes: name of a number to the change of its search coordinate that the linear fit
+                found, clipped to what is plausible.
+        """
+        coordinates = self.coordinates
+        for place, item in enumerate(self.numbers()):
+            coordinates[place] += changes.get(item.name, 0.0)
+        return self.at(coordinates)
+
+    def scaled(self, share: float) -> Self:
+        """Return the effect from which a fit starts, where one column is its whole change.
+
+        By default the effect itself, as the size of a nonlinear effect does not follow from it.
+
+        Args:
+            share: multiple [1] of the effect's change that the linear fit found, clipped to what
+                is plausible.
+        """
+        return self
+
+    @property
+    def inclusion(self) -> Inclusion | None:
+        """The ball of other stiffness that the effect puts into the body; None for most."""
+        return None
+
+    @classmethod
+    def placed(cls, place: Inclusion) -> Self:
+        """Return the neutral effect at a place, for the linearisation LOCAL_STIFFNESS."""
+        raise EffectError(f"{cls.name} has no place in the body")
+
+    @classmethod
+    def of_touches(cls, pairing: str) -> Self | None:
+        """Return the effect of touching the landmarks in this order; None for most effects."""
+        return None
+
+    # -- values -----------------------------------------------------------------------------------
 
     def values(self) -> dict[str, float | str]:
-        """Name to value, SI."""
+        """Return the value of each parameter by name, in SI units."""
         return {item.name: getattr(self, item.name) for item in self.parameters()}
 
     def reported(self, setup: Setup) -> dict[str, tuple[float | str, str]]:
-        """Name to (value, unit) as a report states them of this setup; more than the fields where
-        that helps the reader.
+        """Return (value, unit) by name as a report states them for this setup.
+
+        These are the parameters; an effect may add numbers that follow from them.
         """
         return {item.name: (getattr(self, item.name), item.unit) for item in self.parameters()}
 
     def moved(self, values: Sequence[float]) -> Self:
-        """The same effect with other numbers, brought back into their bounds."""
+        """Return the same effect with other numbers, clipped to their bounds."""
         pairs = zip(self.numbers(), values, strict=True)
         return dataclasses.replace(self, **{item.name: item.bounded(float(v)) for item, v in pairs})
 
     @property
     def coordinates(self) -> list[float]:
-        """Where a search stands: the numbers, or their logarithms."""
+        """Search coordinates of the numbers."""
         return [item.coordinate(getattr(self, item.name)) for item in self.numbers()]
 
     def at(self, coordinates: Sequence[float]) -> Self:
-        """The same effect at other search coordinates, brought back to just within the bounds.
+        """Return the same effect at other search coordinates, clipped to just within the bounds.
 
-        At a bound an effect can be absent, as a base is rigid there: what is absent has no
+        At a bound an effect can be absent, as a base is rigid there. An absent effect has no
         first-order changes.
         """
         return self.moved(
@@ -245,12 +236,12 @@ class Effect(ABC):
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values from which `palpate.effects.from_json` makes the same effect."""
+        """Return plain values from which `palpate.effects.from_json` makes the same effect."""
         return {"effect": self.name, "parameters": self.values()}
 
 
 def with_effects(setup: Setup, effects: Sequence[Effect]) -> Setup:
-    """The setup with all of them in it, one after another."""
+    """Return the setup with all of the effects in it, applied one after another."""
     for effect in effects:
         setup = effect.apply(setup)
     return setup

@@ -6,19 +6,55 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
-from palpate.effects.base import Effect, Slot, parameter
+from palpate.effects.base import Effect, Slot
+from palpate.effects.linearisation import Linearisation, Measurement, NuisanceBlock
+from palpate.effects.parameter import parameter
 from palpate.setup.setup import Inclusion, Setup
 
-__all__ = ["PoissonRatio", "StiffInclusion", "YoungModulus"]
+__all__ = [
+    "MODULUS_ACCURACY",
+    "POISSON_BOUNDS",
+    "PoissonRatio",
+    "StiffInclusion",
+    "YoungModulus",
+    "inclusion_grid",
+]
+
+POISSON_BOUNDS = (0.0, 0.495)
+"""Poisson's ratios that a replay can have [1]."""
+MODULUS_ACCURACY = 0.03
+"""Relative standard deviation of a modulus that the replay's own error leaves [1]. Grid and law
+contribute in equal parts, and so does the sensor's gain."""
+
+
+def inclusion_grid(setup: Setup) -> tuple[Inclusion, ...]:
+    """Return inclusions on a coarse grid of places in the block, five times as stiff as it."""
+    x, y, z = setup.box.size
+    return tuple(
+        Inclusion(
+            x=(i - 0.5 * 6) / 7 * x,
+            y=(j - 1) / 3 * y,
+            z=height * z,
+            radius=7e-3,
+            stiffness_ratio=5.0,
+        )
+        for i in range(7)
+        for j in range(3)
+        for height in (0.45, 0.72)
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class PoissonRatio(Effect):
-    """Another compressibility than assumed."""
+    """A compressibility other than assumed."""
 
     name, enters = "poisson_ratio", Slot.MATERIAL
     summary = "the material is more or less compressible than assumed"
-    nu: float = parameter("1", low=0.0, high=0.495, scale=0.02, accuracy=8e-3)
+    linearisation, nuisance = Linearisation.NUISANCE, NuisanceBlock.POISSON_RATIO
+    shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
+    nu: float = parameter(
+        "1", low=POISSON_BOUNDS[0], high=POISSON_BOUNDS[1], scale=0.02, accuracy=8e-3
+    )
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
@@ -34,10 +70,13 @@ class PoissonRatio(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class StiffInclusion(Effect):
-    """A ball of other stiffness inside: a tumour, a bubble."""
+    """A ball of other stiffness inside, such as a tumour or a bubble."""
 
     name, enters = "stiff_inclusion", Slot.MATERIAL
     summary = "a lump of other stiffness lies inside"
+    linearisation, amplitude = Linearisation.LOCAL_STIFFNESS, "stiffness_ratio"
+    amplitude_deviation = 0.8
+    shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
     x: float = parameter("m", low=-0.5, high=0.5, scale=3e-3)
     y: float = parameter("m", low=-0.5, high=0.5, scale=3e-3)
     z: float = parameter("m", low=0.0, high=0.5, scale=3e-3, accuracy=5e-4)
@@ -52,48 +91,45 @@ class StiffInclusion(Effect):
 
     @classmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:
-        """Places all over the block; which of them deserve a solve is decided from element
+        """Return inclusions all over the block; their gains are screened by element
         sensitivities.
         """
-        x, y, z = setup.box.size
         return [
-            cls(
-                x=(i - 0.5 * 6) / 7 * x,
-                y=(j - 1) / 3 * y,
-                z=height * z,
-                radius=7e-3,
-                stiffness_ratio=ratio,
-            )
-            for i in range(7)
-            for j in range(3)
-            for height in (0.45, 0.72)
-            for ratio in (5.0,)
+            replace(cls.placed(place), stiffness_ratio=place.stiffness_ratio)
+            for place in inclusion_grid(setup)
         ]
+
+    @classmethod
+    def placed(cls, place: Inclusion) -> Self:
+        return cls(x=place.x, y=place.y, z=place.z, radius=place.radius, stiffness_ratio=1.0)
+
+    @property
+    def inclusion(self) -> Inclusion:
+        """The ball with its place, radius and stiffness ratio."""
+        return Inclusion(
+            x=self.x, y=self.y, z=self.z, radius=self.radius, stiffness_ratio=self.stiffness_ratio
+        )
 
     def apply(self, setup: Setup) -> Setup:
         if self.stiffness_ratio == 1.0:
             return setup
-        lump = Inclusion(
-            x=self.x, y=self.y, z=self.z, radius=self.radius, stiffness_ratio=self.stiffness_ratio
-        )
-        return replace(
-            setup, material=replace(setup.material, inclusions=(*setup.material.inclusions, lump))
-        )
+        inclusions = (*setup.material.inclusions, self.inclusion)
+        return replace(setup, material=replace(setup.material, inclusions=inclusions))
 
 
 @dataclass(frozen=True, kw_only=True)
 class YoungModulus(Effect):
-    """Another stiffness than assumed; shows only against something with a force scale of its own, a
-    measured force above all.
+    """A stiffness other than assumed; only measured forces show it.
 
-    What is stated over E (own weight, springs, a tool that gives way) stays as it is over E. The
-    replay's force is right to about 3 %: its grid and its law in equal parts, and the sensor's
-    gain.
+    Quantities that are stated over E (own weight, springs, tool compliance) keep their value over
+    E. The replay's force is right to about 3 %.
     """
 
     name, enters = "young_modulus", Slot.MATERIAL
     summary = "the material is stiffer or softer than assumed, in all"
-    E: float = parameter("Pa", low=10.0, high=1e8, scale=0.15, log=True, accuracy=0.03)
+    linearisation, nuisance = Linearisation.NUISANCE, NuisanceBlock.YOUNG_MODULUS
+    shown_by = frozenset({Measurement.FORCES})
+    E: float = parameter("Pa", low=10.0, high=1e8, scale=0.15, log=True, accuracy=MODULUS_ACCURACY)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

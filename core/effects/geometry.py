@@ -1,4 +1,4 @@
-"""Causes in the block's shape, and in what it is cut into."""
+"""Causes in the block's shape and in its mesh."""
 
 from __future__ import annotations
 
@@ -6,26 +6,29 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
-from palpate.effects.base import Effect, Slot, parameter
+from palpate.effects.base import Effect, Slot
+from palpate.effects.linearisation import Linearisation, NuisanceBlock
+from palpate.effects.parameter import parameter
 from palpate.setup.setup import Box, Setup
 
-__all__ = ["GeometryScale", "MeshResolution"]
+__all__ = ["DIAGNOSIS_GRID", "GeometryScale", "MeshResolution"]
 
 _FINEST = 2e-3
-"""Edges of elements [m] up to which a grid is not called coarse, whatever it is."""
+"""Edge of elements [m] up to which no grid counts as coarse."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class GeometryScale(Effect):
-    """The phantom is not the stated size: its true lengths over the stated ones.
+    """The phantom's true lengths over the stated ones.
 
-    The registrations took it for the stated size. With the true one the same touches and the same
-    rest cloud put robot and camera elsewhere (see `palpate.measurement.touch_correction` and
+    The registrations assumed the stated size. With the true size the same touches and the same
+    rest cloud give other poses of robot and camera (see `palpate.measurement.touch_correction` and
     `palpate.measurement.camera_model`).
     """
 
     name, enters = "geometry_scale", Slot.GEOMETRY
     summary = "the phantom is not the stated size"
+    linearisation, joint = Linearisation.TANGENT, True
     scale_x: float = parameter("1", low=0.7, high=1.4, scale=0.01)
     scale_y: float = parameter("1", low=0.7, high=1.4, scale=0.01)
     scale_z: float = parameter("1", low=0.7, high=1.4, scale=0.01, accuracy=2.5e-3)
@@ -51,17 +54,24 @@ class GeometryScale(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class MeshResolution(Effect):
-    """Nothing in the world: the simulation's own grid is too coarse. An even grid of trilinear
-    hexahedra of this size.
+    """The simulation's grid is too coarse: an even grid of trilinear hexahedra of this size.
+
+    It shares the difference between the two grids of a diagnosis, which is a nuisance.
     """
 
     name, enters = "mesh_resolution", Slot.GEOMETRY
     summary = "the simulation's own grid is too coarse"
+    linearisation, nuisance = Linearisation.NUISANCE, NuisanceBlock.MESH_ERROR
     element_size: float = parameter("m", low=_FINEST, high=2e-2, scale=0.3, log=True)
 
     @classmethod
     def at_rest(cls) -> bool:
-        """A block that nothing pushes has its shape on any grid."""
+        """Return False: a block that nothing pushes has its shape on any grid."""
+        return False
+
+    @classmethod
+    def has_derivative(cls) -> bool:
+        """Return False: a grid changes by whole elements."""
         return False
 
     @classmethod
@@ -80,3 +90,7 @@ class MeshResolution(Effect):
         return replace(
             setup, element_size=None if self.element_size <= _FINEST else self.element_size
         )
+
+
+DIAGNOSIS_GRID = MeshResolution(element_size=_FINEST)
+"""The grid of the diagnosis in place of a stated one."""

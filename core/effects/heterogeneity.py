@@ -1,27 +1,35 @@
-"""Causes in how the material is built: skins, gradients, fibres, and stiffening with strain."""
+"""Causes in the build of the material: skins, gradients, fibres, and strain stiffening."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
-from palpate.effects.base import Effect, Slot, parameter
+from palpate.effects.base import Effect, Slot
+from palpate.effects.linearisation import Linearisation, Measurement, Tangent
+from palpate.effects.parameter import parameter
 from palpate.setup.setup import Fibres, Layer, Setup
 
 __all__ = ["Anisotropy", "StiffnessGradient", "StrainStiffening", "SurfaceLayer"]
 
 _UNLIMITED = 1e4
-"""J_m from which on a material is taken to have no limit [1]."""
+"""J_m from which on a material counts as having no limit of stretch [1]."""
+_SCREENED_LIMIT = 6.0
+"""J_m [1] whose whole first-order change is the column of strain stiffening. Measured: it has a
+correlation of 0.99 with replays of J_m 1 and 3."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceLayer(Effect):
-    """A skin of other stiffness on the top: a coating, a capsule."""
+    """A skin of other stiffness on the top, such as a coating or a capsule."""
 
     name, enters = "surface_layer", Slot.MATERIAL
     summary = "a skin of other stiffness lies on the top"
+    linearisation, amplitude = Linearisation.TANGENT, "stiffness_ratio"
+    shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
+    needs_box = True
     thickness: float = parameter("m", low=3e-4, high=2e-2, scale=5e-4, accuracy=3e-4)
     stiffness_ratio: float = parameter("1", low=0.02, high=50.0, scale=0.5, log=True, accuracy=0.15)
 
@@ -34,6 +42,17 @@ class SurfaceLayer(Effect):
     def starts(cls, setup: Setup) -> Sequence[Self]:
         return [cls(thickness=2e-3, stiffness_ratio=ratio) for ratio in (0.3, 4.0)]
 
+    @classmethod
+    def tangents(cls, setup: Setup) -> Sequence[Tangent]:
+        """Return the columns of a thin and of a thick skin.
+
+        Measured: a skin of 0.3 or 4 times the stiffness has a correlation of 0.98 with them.
+        """
+        return [
+            Tangent(effect=cls(thickness=thickness, stiffness_ratio=1.0), of=cls.amplitude)
+            for thickness in (2e-3, 5e-3)
+        ]
+
     def apply(self, setup: Setup) -> Setup:
         if self.stiffness_ratio == 1.0 and setup.material.layer is None:
             return setup
@@ -43,12 +62,16 @@ class SurfaceLayer(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class StiffnessGradient(Effect):
-    """Stiffness that changes through the height, its geometric mean kept: log_ratio = ln(E top / E
-    base).
+    """Stiffness that changes through the height at the same geometric mean.
+
+    log_ratio is ln(E top / E base). Measured: the column has a correlation of 0.999 with replays of
+    gradients of 0.7 and -1.2.
     """
 
     name, enters = "stiffness_gradient", Slot.MATERIAL
     summary = "the stiffness changes from the base to the top"
+    linearisation = Linearisation.TANGENT
+    shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
     log_ratio: float = parameter("1", low=-3.0, high=3.0, scale=0.2, accuracy=0.04)
 
     @classmethod
@@ -69,6 +92,8 @@ class StrainStiffening(Effect):
 
     name, enters = "strain_stiffening", Slot.MATERIAL
     summary = "the material stiffens with strain"
+    linearisation = Linearisation.TANGENT
+    shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
     J_m: float = parameter("1", low=0.5, high=_UNLIMITED, scale=0.3, log=True)
 
     @classmethod
@@ -80,6 +105,15 @@ class StrainStiffening(Effect):
     def starts(cls, setup: Setup) -> Sequence[Self]:
         return [cls(J_m=limit) for limit in (3.0, 12.0)]
 
+    @classmethod
+    def tangents(cls, setup: Setup) -> Sequence[Tangent]:
+        """Return one column, which is a share of the whole change of a moderate limit."""
+        return [Tangent(effect=cls(J_m=_SCREENED_LIMIT), deviation=1.0)]
+
+    def scaled(self, share: float) -> Self:
+        """Return the limit at which the material stiffens by this share [1]."""
+        return self.moved([self.J_m / share])
+
     def apply(self, setup: Setup) -> Setup:
         limit = None if self.J_m >= _UNLIMITED else self.J_m
         return replace(setup, material=replace(setup.material, stretch_limit=limit))
@@ -87,10 +121,16 @@ class StrainStiffening(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Anisotropy(Effect):
-    """Fibres along one direction in the plane."""
+    """Fibres along one direction in the plane.
+
+    Measured: fibres of 3 times the stiffness have a correlation of 0.95 with the columns.
+    """
 
     name, enters = "anisotropy", Slot.MATERIAL
     summary = "the material is stiffer along one direction"
+    linearisation, amplitude = Linearisation.TANGENT, "stiffness_ratio"
+    amplitude_deviation = 2.0
+    shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
     direction: float = parameter("rad", low=0.0, high=math.pi, scale=0.3, periodic=True)
     stiffness_ratio: float = parameter("1", low=1.0, high=30.0, scale=0.3, log=True)
 
@@ -105,6 +145,14 @@ class Anisotropy(Effect):
             cls(direction=angle, stiffness_ratio=3.0)
             for angle in (0.0, math.pi / 4, math.pi / 2, 3 * math.pi / 4)
         ]
+
+    def initial_guess(self, changes: Mapping[str, float]) -> Self:
+        """Return fibres that are stiffer; softer along one direction is stiffer across it."""
+        change = changes[self.amplitude]
+        if change >= 0:
+            return super().initial_guess(changes)
+        across = replace(self, direction=(self.direction + math.pi / 2) % math.pi)
+        return super(Anisotropy, across).initial_guess({self.amplitude: -change})
 
     def apply(self, setup: Setup) -> Setup:
         if self.stiffness_ratio == 1.0 and setup.material.fibres is None:

@@ -11,7 +11,8 @@ from collections.abc import Iterable
 from dataclasses import is_dataclass
 from importlib.metadata import EntryPoint, entry_points
 
-from palpate.effects.base import Effect, Parameter, Slot
+from palpate.effects.base import Effect, Slot
+from palpate.effects.parameter import Parameter
 from palpate.foundation.errors import EffectError
 
 __all__ = ["GROUP", "checked", "outside_effects"]

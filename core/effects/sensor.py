@@ -1,18 +1,38 @@
-"""Causes in clock and camera: only the observation changes."""
+"""Causes in clock and camera, which change the observation only."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Self
 
 import numpy as np
 
-from palpate.effects.base import Effect, Slot, parameter
+from palpate.effects.base import MEASURE_SIZE, Effect, Slot
+from palpate.effects.linearisation import Linearisation, NuisanceBlock
+from palpate.effects.parameter import parameter
 from palpate.foundation.frames import Transform
 from palpate.setup.setup import Setup
 
-__all__ = ["CameraRegistration", "DepthBias", "TimeOffset"]
+__all__ = ["CameraRegistration", "DepthBias", "TimeOffset", "with_moved_camera"]
+
+
+def with_moved_camera(setup: Setup, motion: Sequence[float]) -> Setup:
+    """Return the setup with a camera that has moved since its registration.
+
+    Args:
+        setup: of the camera as registered.
+        motion: translation [m] and rotation vector [rad] about the middle of the block (6,).
+    """
+    shift = _camera_shift(setup, motion) @ setup.sensor.camera_shift
+    return replace(setup, sensor=replace(setup.sensor, camera_shift=shift))
+
+
+def _camera_shift(setup: Setup, motion: Sequence[float]) -> Transform:
+    middle = np.array([0.0, 0.0, setup.stated_geometry.size[2] / 2])
+    turn = Transform.from_vector(np.zeros(3), list(motion[3:]))
+    return Transform(turn.rotation, middle - turn.rotation @ middle + np.array(motion[:3]))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,6 +41,7 @@ class TimeOffset(Effect):
 
     name, enters = "time_offset", Slot.SENSOR
     summary = "the camera's clock and the robot's differ"
+    linearisation = Linearisation.TANGENT
     offset: float = parameter("s", low=-1.0, high=1.0, scale=0.05)
 
     @classmethod
@@ -31,6 +52,10 @@ class TimeOffset(Effect):
     def starts(cls, setup: Setup) -> Sequence[Self]:
         return [cls(offset=seconds) for seconds in (-0.3, -0.1, 0.1, 0.3)]
 
+    def initial_guess(self, changes: Mapping[str, float]) -> Self:
+        """Return the effect itself: the linear fit holds for a fraction of a frame's duration."""
+        return self
+
     def apply(self, setup: Setup) -> Setup:
         return replace(setup, sensor=replace(setup.sensor, time_offset=self.offset))
 
@@ -39,12 +64,13 @@ class TimeOffset(Effect):
 class CameraRegistration(Effect):
     """The camera moved after its registration, or was registered wrongly.
 
-    Fitted as a rigid motion about the middle of the block (see `centre`), so that turning and
-    shifting stay apart.
+    It is fitted as a rigid motion about the middle of the block, so that rotation and translation
+    stay apart.
     """
 
     name, enters = "camera_registration", Slot.SENSOR
     summary = "the camera is not where it was registered"
+    linearisation, nuisance = Linearisation.NUISANCE, NuisanceBlock.CAMERA_POSE
     tx: float = parameter("m", low=-3e-2, high=3e-2, scale=1e-3)
     ty: float = parameter("m", low=-3e-2, high=3e-2, scale=1e-3)
     tz: float = parameter("m", low=-3e-2, high=3e-2, scale=1e-3)
@@ -61,27 +87,17 @@ class CameraRegistration(Effect):
         return [cls.neutral(setup)]
 
     def shift(self, setup: Setup) -> Transform:
-        """Stated to true position of a measured point, phantom frame."""
-        middle = np.array([0.0, 0.0, setup.stated_geometry.size[2] / 2])
-        turn = Transform.from_vector(np.zeros(3), [self.rx, self.ry, self.rz])
-        return Transform(
-            turn.rotation, middle - turn.rotation @ middle + np.array([self.tx, self.ty, self.tz])
-        )
+        """Return the stated to true position of a measured point, phantom frame."""
+        return _camera_shift(setup, self.coordinates)
 
     def apply(self, setup: Setup) -> Setup:
-        return replace(
-            setup,
-            sensor=replace(
-                setup.sensor, camera_shift=self.shift(setup) @ setup.sensor.camera_shift
-            ),
-        )
+        return with_moved_camera(setup, self.coordinates)
 
     def reported(self, setup: Setup) -> dict[str, tuple[float | str, str]]:
-        """Magnitudes of the motion in the phantom frame first, then the full pose about the block's
-        middle.
+        """Return the magnitudes of the motion first, then the pose about the block's middle.
 
-        The translation is that of the frame's origin, the middle of the base: a turn about the
-        block's middle moves it, too.
+        The translation is that of the phantom frame's origin, the middle of the base, which a
+        rotation about the block's middle moves too.
         """
         shift = self.shift(setup)
         return {
@@ -93,22 +109,28 @@ class CameraRegistration(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class DepthBias(Effect):
-    """The camera reads too near or far, or stretches depth: a depth z along its axis is read as
-    scale z + offset.
+    """The camera reads a depth z along its axis as scale z + offset.
 
-    It read so already when it was registered. A registration makes up for all of it that is a rigid
-    motion, which is nearly all of an offset; a scale makes the block look larger or smaller (see
-    `palpate.measurement.camera_model`).
+    The bias was there when the camera was registered. The registration compensates the part of it
+    that is a rigid motion, which is nearly all of an offset; a scale makes the block look larger or
+    smaller (see `palpate.measurement.camera_model`).
     """
 
     name, enters = "depth_bias", Slot.SENSOR
     summary = "the camera reads too near or far, or stretches depth"
+    linearisation, joint = Linearisation.TANGENT, True
+    told_apart_by = MappingProxyType(
+        {
+            "geometry_scale": MEASURE_SIZE,
+            "camera_registration": "record the untouched block from nearer and from farther away",
+        }
+    )
     offset: float = parameter("m", low=-0.05, high=0.05, scale=2e-3, accuracy=3e-3)
     scale: float = parameter("1", low=0.85, high=1.15, scale=5e-3, accuracy=7e-3)
 
     @classmethod
     def at_rest(cls) -> bool:
-        """The cloud of a block at rest is misread like any other."""
+        """Return True: the rest cloud is misread like any other."""
         return True
 
     @classmethod

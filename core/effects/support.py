@@ -6,34 +6,35 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self, cast
 
-from palpate.effects.base import Effect, Slot, parameter
+from palpate.effects.base import Effect, Slot
+from palpate.effects.linearisation import Measurement
+from palpate.effects.parameter import parameter
 from palpate.setup.setup import Detachment, Edge, Setup
 
 __all__ = ["BaseCompliance", "BaseDetachment", "BaseSlip"]
 
 _EDGES = ("-x", "+x", "-y", "+y")
 _RIGID = 1e5
-"""Springs under the base from which on it counts as rigid [1/m]."""
+"""Stiffness of the springs under the base over E from which on the base counts as rigid [1/m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BaseSlip(Effect):
-    """The base slides on the table as a whole, with Coulomb friction against its weight and the
+    """The base slides on the table as a whole, with Coulomb friction under its weight and the
     push.
     """
 
     name, enters = "base_slip", Slot.SUPPORT
     summary = "the base slides on the table"
     kinked = True  # a push that slides at one friction holds at the next
-    # Friction is told from the sideways force, which a replay on the grid for diagnosis has to some
-    # percent only.
+    # The accuracy is that of the sideways force, which the grid of a diagnosis has to some percent.
     friction_coefficient: float = parameter(
         "1", low=0.01, high=3.0, scale=0.2, log=True, accuracy=0.04
     )
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
-        """So rough that nothing in this catalogue's motions slides."""
+        """Return a friction at which no usual push makes the base slide."""
         return cls(friction_coefficient=3.0)
 
     @classmethod
@@ -48,7 +49,7 @@ class BaseSlip(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class BaseDetachment(Effect):
-    """A strip of the base along one edge is not held: it may lift, but not go through the table."""
+    """A strip of the base along one edge is not held: it may lift, but not go into the table."""
 
     name, enters = "base_detachment", Slot.SUPPORT
     summary = "a strip of the base is not held"
@@ -76,12 +77,11 @@ class BaseDetachment(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class BaseCompliance(Effect):
-    """An elastic support instead of a rigid one: springs per area in all directions, over Young's
-    modulus.
-    """
+    """An elastic support: springs per area in all directions, over Young's modulus."""
 
     name, enters = "base_compliance", Slot.SUPPORT
     summary = "the support under the base gives way"
+    shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
     stiffness_over_E: float = parameter("1/m", low=5.0, high=_RIGID, scale=0.3, log=True)
 
     @classmethod
@@ -94,6 +94,10 @@ class BaseCompliance(Effect):
     @classmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:
         return [cls(stiffness_over_E=60.0)]
+
+    def scaled(self, share: float) -> Self:
+        """Return springs that yield by this share [1]."""
+        return self.moved([self.stiffness_over_E / share])
 
     def apply(self, setup: Setup) -> Setup:
         stiffness = None if self.stiffness_over_E >= _RIGID else self.stiffness_over_E

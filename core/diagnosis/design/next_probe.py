@@ -20,32 +20,16 @@ from scipy.stats import norm
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.design.candidate_pushes import Push, depth_reached, pushes, speed_reached
 from palpate.diagnosis.design.predictive_distance import Scene, Survivor, nats_of, survivor
-from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.noise_model import patch_variance
 from palpate.diagnosis.observation.frame_groups import Observations
-from palpate.diagnosis.search.candidates import lump_places
 from palpate.diagnosis.search.findings import Findings, Trial
-from palpate.diagnosis.search.identifiability import Told
-from palpate.effects import Effect
+from palpate.diagnosis.search.identifiability import Identifiability
+from palpate.diagnosis.search.inclusion_grid import inclusion_places
+from palpate.effects import Effect, Slot
 from palpate.measurement.camera_model import camera_model_for
 
 __all__ = ["Advice", "Pair", "next_probe", "pairs_of"]
-
-_INSTEAD = {
-    frozenset(
-        {"viscoelasticity", "permanent_set"}
-    ): "let the block rest for several time constants after a release and record it",
-    frozenset(
-        {"gravity", "camera_registration"}
-    ): "record the untouched block again from another side, or turned on its side",
-    frozenset({"gravity", "geometry_scale"}): "measure the block with a calliper",
-    frozenset({"depth_bias", "geometry_scale"}): "measure the block with a calliper",
-    frozenset({"landmark_mismatch", "geometry_scale"}): "measure the block with a calliper",
-    frozenset(
-        {"camera_registration", "depth_bias"}
-    ): "record the untouched block from nearer and from farther away",
-}
-"""What tells families apart that no push does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,15 +77,15 @@ class Advice:
 
 
 def next_probe(
-    bench: Bench, data: Sequence[Observations], findings: Findings
+    evaluator: Evaluator, data: Sequence[Observations], findings: Findings
 ) -> list[dict[str, Any]]:
     """Rows of the report, best first: up to three pushes, and before them what no push but another
     measurement would tell.
     """
-    pairs = pairs_of(bench, findings)
+    pairs = pairs_of(evaluator, findings)
     if not pairs:
         return []
-    bench.tell("which push would tell most")
+    evaluator.report("which push would tell most")
     setups = [model.setup for pair in pairs for model in pair.models]
     clocks = len({setup.sensor.time_offset for setup in setups}) > 1
     memory = any(setup.material.has_history for setup in setups)
@@ -110,48 +94,49 @@ def next_probe(
         for setup in setups
     )
     speed = (
-        speed_reached(data, bench.setup) * (CRITERIA.design.fast if clocks else 1.0)
+        speed_reached(data, evaluator.problem.setup) * (CRITERIA.design.fast if clocks else 1.0)
         if clocks or memory
         else 0.0
     )
     tried = pushes(
-        bench.setup,
-        depth_reached(data, bench.setup),
+        evaluator.problem.setup,
+        depth_reached(data, evaluator.problem.setup),
         drags=drags,
         speed=speed,
         holds=(0.0, CRITERIA.design.hold) if memory else (0.0,),
     )
-    scene = _scene(bench, findings)
+    scene = _scene(evaluator, findings)
     pending = [
-        bench.workers.run(nats_of, scene, [pair.models for pair in pairs], push) for push in tried
+        evaluator.workers.run(nats_of, scene, [pair.models for pair in pairs], push)
+        for push in tried
     ]
     found = [
         _advice(push, pairs, future.result()) for push, future in zip(tried, pending, strict=True)
     ]
     return [
-        *_instead(pairs),
+        *_other_measurements(evaluator.problem.catalogue, pairs),
         *(one.to_json() for one in _choices(sorted(found, key=lambda one: -one.chances))),
     ]
 
 
-def _scene(bench: Bench, findings: Findings) -> Scene:
+def _scene(evaluator: Evaluator, findings: Findings) -> Scene:
     """What the camera sees, as it has seen it so far."""
     predictions, surface = (
         [item for item in findings.baseline.predictions if not item.force_only],
-        bench.surface,
+        evaluator.problem.surface,
     )
     counts = [item.count[[frame.in_contact for frame in item.equilibria]] for item in predictions]
     return Scene(
-        stated=survivor(bench, findings.baseline),
-        lumps=lump_places(bench),
+        stated=survivor(evaluator, findings.baseline),
+        lumps=inclusion_places(evaluator.problem),
         centres=surface.patch_centres,
         normals=surface.patch_normals,
         count=np.concatenate(counts).mean(axis=0),
         variance=patch_variance(predictions),
-        eye=camera_model_for(bench.setup).pose.translation,
-        pivot=bench.registration.robot_pivot,
-        grid=bench.rough,
-        temperature=bench.temperature,
+        eye=camera_model_for(evaluator.problem.setup).pose.translation,
+        pivot=evaluator.problem.registration.robot_pivot,
+        grid=evaluator.problem.coarse_grid,
+        temperature=evaluator.state.temperature,
     )
 
 
@@ -186,31 +171,42 @@ def _choices(found: Sequence[Advice]) -> list[Advice]:
     return chosen[: CRITERIA.design.shown]
 
 
-def _instead(pairs: Sequence[Pair]) -> list[dict[str, Any]]:
-    """Measurements that are no push, where the models differ in a family that only these tell
-    apart.
+def _other_measurements(
+    catalogue: Sequence[type[Effect]], pairs: Sequence[Pair]
+) -> list[dict[str, Any]]:
+    """Return measurements that are no push, for pairs that differ in two effects told apart by it.
+
+    Args:
+        catalogue: of the effects, which state these measurements.
+        pairs: to tell apart.
     """
-    rows = []
+    kinds, rows = {kind.name: kind for kind in catalogue}, []
     for pair in pairs:
         names = [set(name.split(" + ")) for name in pair.names]
-        differing = frozenset(names[0] ^ names[1])
-        rows += [
-            {"kind": "measurement", "separates": list(pair.names), "text": text}
-            for family, text in _INSTEAD.items()
-            if differing == family
-        ]
+        differing = names[0] ^ names[1]
+        texts = {
+            kinds[name].told_apart_by[other]
+            for name in differing & set(kinds)
+            for other in differing
+            if other in kinds[name].told_apart_by
+        }
+        if len(differing) == 2:
+            rows += [
+                {"kind": "measurement", "separates": list(pair.names), "text": text}
+                for text in sorted(texts)
+            ]
     return rows
 
 
-def pairs_of(bench: Bench, findings: Findings) -> list[Pair]:
+def pairs_of(evaluator: Evaluator, findings: Findings) -> list[Pair]:
     """What is still to be told apart: rivals; else the cause found and those that came next; else
     nothing and what hides best.
     """
     best = findings.best
     if best is None:
-        return [] if findings.structure.significant else _imagined(bench, findings)
+        return [] if findings.structure.significant else _imagined(evaluator, findings)
     others: list[Trial] = findings.rivals() or _next_best(findings, best)
-    mine, name = survivor(bench, best.model), " + ".join(best.model.names)
+    mine, name = survivor(evaluator, best.model), " + ".join(best.model.names)
     pairs = []
     for trial in others:
         lead = (
@@ -221,14 +217,14 @@ def pairs_of(bench: Bench, findings: Findings) -> list[Pair]:
         names = (name, " + ".join(trial.model.names))
         pairs.append(
             Pair(
-                (mine, survivor(bench, trial.model)),
+                (mine, survivor(evaluator, trial.model)),
                 names,
                 (CRITERIA.naming.rival - lead, CRITERIA.naming.rival + lead),
             )
         )
     return pairs or [
         Pair(
-            (mine, survivor(bench, findings.baseline)),
+            (mine, survivor(evaluator, findings.baseline)),
             (name, "none"),
             (findings.bound, findings.bound),
         )
@@ -247,32 +243,39 @@ def _next_best(findings: Findings, best: Trial) -> list[Trial]:
     return [trial for trial in others[:1] if best.gain - trial.gain < CRITERIA.design.settled_gap]
 
 
-def _imagined(bench: Bench, findings: Findings) -> list[Pair]:
+def _imagined(evaluator: Evaluator, findings: Findings) -> list[Pair]:
     """Nothing against the effects that would stay unseen longest, each as large as it may be
     without being named.
     """
-    nothing, needed = survivor(bench, findings.baseline), (findings.bound, findings.bound)
-    told = [
-        one for one in findings.told if one.candidate.start.enters.value not in ("load", "sensor")
+    nothing, needed = survivor(evaluator, findings.baseline), (findings.bound, findings.bound)
+    others = [
+        one
+        for one in findings.identifiability
+        if one.candidate.start.enters not in (Slot.LOAD, Slot.SENSOR)
     ]
     pairs = []
-    for one in sorted(told, key=lambda one: -_hidden(one))[: CRITERIA.design.simulated_effects]:
+    for one in sorted(others, key=lambda one: -_hidden(one))[: CRITERIA.design.simulated_effects]:
         effect, part = _at_limit(one)
         pairs.append(
-            Pair((nothing, Survivor(effect.apply(bench.setup))), ("none", one.effect), needed, part)
+            Pair(
+                (nothing, Survivor(effect.apply(evaluator.problem.setup))),
+                ("none", one.effect),
+                needed,
+                part,
+            )
         )
     return pairs
 
 
-def _hidden(told: Told) -> float:
-    """The detection limit over what is plausible for the effect [1]."""
-    spread = [*told.candidate.widened.values(), *told.candidate.spread]
-    return max(limit.size / deviation for limit, deviation in zip(told.limits, spread, strict=True))
+def _hidden(one: Identifiability) -> float:
+    """Return the largest detection limit over its prior deviation [1]."""
+    spread = [*one.candidate.widened.values(), *one.candidate.spread]
+    return max(limit.size / deviation for limit, deviation in zip(one.limits, spread, strict=True))
 
 
-def _at_limit(told: Told) -> tuple[Effect, float]:
-    """The effect as large as it may be unseen, or a finite one and the share of it."""
-    start, limit = told.candidate.start, told.limits[0]
+def _at_limit(one: Identifiability) -> tuple[Effect, float]:
+    """Return the effect at its detection limit, or a finite effect and the share of it [1]."""
+    start, limit = one.candidate.start, one.limits[0]
     if limit.item is None:
         return start, min(limit.size, 1.0)
     number = [item.name for item in start.numbers()].index(limit.item.name)

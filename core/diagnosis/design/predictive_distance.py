@@ -5,23 +5,20 @@ camera would see of it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.design.candidate_pushes import Push
-from palpate.diagnosis.forward.history_replay import TRACED
-from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS
+from palpate.diagnosis.inference.effect_derivative import stepped_setup
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import fit
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.noise_model import smooth_basis
-from palpate.effects.base import with_effects
-from palpate.effects.elastic_material import PoissonRatio
-from palpate.effects.support import BaseSlip
-from palpate.effects.tool import ToolRadius
+from palpate.diagnosis.inference.nuisances import poisson_change
+from palpate.effects import NuisanceBlock
 from palpate.fem.constitutive.stiffness_field import lump_share
 from palpate.fem.mesh_quadrature import element_quadrature
 from palpate.fem.newton import Outcome
@@ -40,14 +37,24 @@ _SHAFT = np.array(CRITERIA.design.shaft_places)
 """Places along the shaft [m] at which spheres of the tool's radius stand for it."""
 
 
+_OPEN = (
+    NuisanceBlock.TOOL_POSITION,
+    NuisanceBlock.TOOL_ROTATION,
+    NuisanceBlock.TOOL_RADIUS,
+    NuisanceBlock.POISSON_RATIO,
+)
+"""Nuisances whose uncertainty blurs the prediction of a push."""
+
+
 @dataclass(frozen=True, eq=False)
 class Survivor:
-    """A model that the data so far leave, and how well they know it.
+    """A model that the data so far do not exclude, with its uncertainty.
 
     Attributes:
+        setup: of the model.
         varied: its setup with one search coordinate a little changed, and the step.
-        covariance: (8 + k, 8 + k) of the tool's six motions, its radius, Poisson's ratio, and the
-            `varied` coordinates; None for one that is imagined and not fitted.
+        covariance: of the tool's motion and radius, Poisson's ratio, and the k `varied`
+            coordinates (8 + k, 8 + k); None for a model that is imagined and not fitted.
     """
 
     setup: Setup
@@ -56,37 +63,30 @@ class Survivor:
 
     @property
     def ways(self) -> list[tuple[Setup, float]]:
-        """Setups that differ a little, in the order of the covariance after the tool's motions, and
-        the steps.
+        """Setups that differ a little, and the steps.
+
+        The order is that of the covariance after the tool's motion.
         """
-        radius, ratio = self.setup.tool.radius, self.setup.material.poisson_ratio
-        change = -2e-4 if ratio > 0.494 else 2e-4
-        return [
-            (ToolRadius(radius=radius + TOOL_STEP).apply(self.setup), TOOL_STEP),
-            (PoissonRatio(nu=ratio + change).apply(self.setup), change),
-            *self.varied,
-        ]
+        tool = self.setup.tool
+        wider = replace(self.setup, tool=replace(tool, radius=tool.radius + TOOL_STEP))
+        return [(wider, TOOL_STEP), poisson_change(self.setup), *self.varied]
 
 
-def survivor(bench: Bench, model: Model) -> Survivor:
-    """From a fitted model, with what the data leave open in its nuisances and parameters."""
+def survivor(evaluator: Evaluator, model: Model) -> Survivor:
+    """Return a fitted model with the covariance of its nuisances and parameters."""
     covariance = fit(
-        bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model)
+        evaluator.tempered(model), [*model.nuisance, *model.columns], evaluator.precision(model)
     ).covariance
-    kept, varied, at = list(range(TOOL_COLUMNS + 2)), [], len(model.nuisance)
+    used, varied, at = list(evaluator.problem.blocks.places(*_OPEN)), [], len(model.nuisance)
+    stated, step = evaluator.problem.setup, CRITERIA.design.step
     for index, effect in enumerate(model.effects):
-        for number, item in enumerate(effect.numbers()):
-            coordinates, step = effect.coordinates, CRITERIA.design.step * item.scale
-            if item.coordinate(item.high) - coordinates[number] < step:
-                step = -step
-            coordinates[number] += step
-            changed = [*model.effects[:index], effect.at(coordinates), *model.effects[index + 1 :]]
-            # What hangs on all that was done before has no derivative here.
-            if not isinstance(effect, (BaseSlip, *TRACED)):
-                varied.append((with_effects(bench.setup, changed), step))
-                kept.append(at)
+        for number in range(len(effect.numbers())):
+            # A single push has no derivative where it depends on the frames before it.
+            if not (effect.kinked or effect.has_history()):
+                varied.append(stepped_setup(stated, model.effects, index, number, step))
+                used.append(at)
             at += 1
-    return Survivor(model.setup, tuple(varied), covariance[np.ix_(kept, kept)])
+    return Survivor(model.setup, tuple(varied), covariance[np.ix_(used, used)])
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import fit
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.noise_model import rows_of
 from palpate.effects import Parameter
 from palpate.effects.base import with_effects
@@ -103,45 +103,45 @@ def combination(covariance: FloatArray, items: Sequence[Parameter], index: int) 
     return f"the data look the same while {items[index].name} grows and {' and '.join(ways)}"
 
 
-def _settled(bench: Bench, model: Model) -> tuple[FloatArray, FloatArray]:
+def _settled(evaluator: Evaluator, model: Model) -> tuple[FloatArray, FloatArray]:
     """Prior precision of the nuisances, and the covariance (n, n) of the model's own
     coordinates."""
-    nuisances = bench.nuisances.beside(model.effects)
+    nuisances = evaluator.problem.nuisances.with_effects(model.effects)
     solution = fit(
-        bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model, nuisances)
+        evaluator.tempered(model),
+        [*model.nuisance, *model.columns],
+        evaluator.precision(model, nuisances),
     )
     return nuisances, solution.covariance[len(model.nuisance) :, len(model.nuisance) :]
 
 
-def _evidence(bench: Bench, model: Model, nuisances: FloatArray) -> Callable[[FloatArray], float]:
+def _evidence(
+    evaluator: Evaluator, model: Model, nuisances: FloatArray
+) -> Callable[[FloatArray], float]:
     """Of the model's coordinates; the nuisances' columns are those at the model."""
 
     def value(coordinates: FloatArray) -> float:
-        effects, at = [], 0
-        for effect in model.effects:
-            number = len(effect.numbers())
-            effects.append(effect.at(coordinates[at : at + number].tolist()))
-            at += number
+        effects = model.effects_at(coordinates)
         if np.array_equal(coordinates, model.coordinates):
-            return bench.objective(model, nuisances)
-        replayed = [future.result() for future in bench.predict(effects, None, model.predictions)]
+            return evaluator.objective(model, nuisances)
+        replayed = evaluator.replayed(effects, model.predictions)
         moved = [
             there.replace_columns(rows_of(here)[1])
             for here, there in zip(model.predictions, replayed, strict=True)
         ]
-        return bench.objective(
-            bench.assemble(tuple(effects), with_effects(bench.setup, effects), moved, (), 0),
-            nuisances,
-        )
+        setup = with_effects(evaluator.problem.setup, effects)
+        return evaluator.objective(evaluator.assemble(effects, setup, moved), nuisances)
 
     return value
 
 
-def profiles(bench: Bench, model: Model) -> tuple[list[dict[str, str]], list[dict[str, Any]]]:
+def profiles(
+    evaluator: Evaluator, model: Model
+) -> tuple[list[dict[str, str]], list[dict[str, Any]]]:
     """For each effect: parameter to verdict; and rows of the report for those that no data of this
     kind determine.
     """
-    nuisances, covariance = _settled(bench, model)
+    nuisances, covariance = _settled(evaluator, model)
     items = [item for effect in model.effects for item in effect.numbers()]
     names = [
         (place, effect.name) for place, effect in enumerate(model.effects) for _ in effect.numbers()
@@ -151,12 +151,12 @@ def profiles(bench: Bench, model: Model) -> tuple[list[dict[str, str]], list[dic
     for index, (place, item) in enumerate(zip((place for place, _ in names), items, strict=True)):
         if index not in unsure:
             told[place][item.name] = "interval"
-    evidence = _evidence(bench, model, nuisances)
+    evidence = _evidence(evaluator, model, nuisances)
     for index in unsure:
         if left < 2:
             break
         place, effect = names[index]
-        bench.tell(f"how far {items[index].name} of {effect} may be off")
+        evaluator.report(f"how far {items[index].name} of {effect} may be off")
         found = profile(evidence, model.coordinates, covariance, index, items[index])
         left -= found.evaluations
         told[place][items[index].name] = found.told

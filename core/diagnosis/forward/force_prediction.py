@@ -53,7 +53,7 @@ def predict_forces(
     frames: list[Equilibrium] = []
     changes: list[FloatArray] = []
     for number, (group, centre) in enumerate(zip(data.groups, path.centres, strict=True)):
-        same = bool(number) and data.groups[number - 1].probe == group.probe
+        same = bool(number) and data.groups[number - 1].push == group.push
         begin = [frames[-1]] if same and frames[-1].outcome is Outcome.CONVERGED else []
         if starts is not None and starts[number].in_contact:
             begin.insert(0, starts[number])
@@ -69,7 +69,7 @@ def predict_forces(
     rows, count = len(frames), columns.count if columns is not None else 0
     nothing = np.zeros((rows, 0))
     forces = ForceComparison.of(
-        path.measured, frames, changes, np.array([group.probe for group in data.groups])
+        path.measured, frames, changes, np.array([group.push for group in data.groups])
     )
     return Prediction(
         data.name, nothing, nothing, nothing, np.zeros((rows, 0, count)), tuple(frames), (), forces

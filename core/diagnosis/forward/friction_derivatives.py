@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.diagnosis.forward.loading_history import LoadingHistory
-from palpate.effects.tool import ToolFriction
 from palpate.fem.model import CONTACT_STIFFNESS, BlockModel
 from palpate.foundation.arrays import FloatArray
 from palpate.gradients.frame_tangent import local_tool
@@ -64,9 +63,15 @@ def spot_of(model: BlockModel, frame: Equilibrium) -> Spot | None:
     return Spot(answer, pull.T @ answer, normal / np.linalg.norm(normal), held)
 
 
-def pulls(effect: ToolFriction, time: LoadingHistory, spots: Sequence[Spot | None]) -> FloatArray:
-    """The drag on the block over E (k, 3) [m^2] at each of the groups in contact, whose spots these
-    are.
+def pulls(
+    friction_coefficient: float, time: LoadingHistory, spots: Sequence[Spot | None]
+) -> FloatArray:
+    """Return the drag on the block over E (k, 3) [m^2] at each of the groups in contact.
+
+    Args:
+        friction_coefficient: of the tool [1].
+        time: what lies between the groups.
+        spots: contact of each of these groups; None where no force is seen.
     """
     found = np.zeros((len(spots), 3))
     usable = [number for number, spot in enumerate(spots) if spot is not None]
@@ -93,7 +98,7 @@ def pulls(effect: ToolFriction, time: LoadingHistory, spots: Sequence[Spot | Non
                 ** 1.5
             )
             drag *= min(
-                1.0, effect.friction_coefficient * hold / max(float(np.linalg.norm(drag)), 1e-300)
+                1.0, friction_coefficient * hold / max(float(np.linalg.norm(drag)), 1e-300)
             )
         for number in np.flatnonzero(upcoming == row):
             found[number] = drag

@@ -1,10 +1,10 @@
-"""Patterns of what hangs on the past, for the screening: one linear solve for each group and
-effect, and no replay.
+"""First-order changes by effects with history: one linear solve for each group and effect.
 
-A replay that remembers is led along the tool's whole way
-(`palpate.diagnosis.forward.history_replay`), which costs many plain ones. Whether it is worth that
-is told by its trace: the change that it would bring about, taken from the plain replay's
-equilibria.
+A replay with history follows the tool's whole path (`palpate.diagnosis.forward.history_replay`),
+which costs as much as many plain replays. The screening uses its trace instead: the first-order
+change, derived from the equilibria of the plain replay. The material's history and the tool's
+friction follow from the setup with the effect in it, so that any effect that changes them has a
+trace.
 """
 
 from __future__ import annotations
@@ -18,14 +18,12 @@ import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.friction_derivatives import Spot, pulls, spot_of
-from palpate.diagnosis.forward.history_replay import TRACED
 from palpate.diagnosis.forward.loading_history import LoadingHistory, loading_history_of
 from palpate.diagnosis.forward.memory_derivatives import Recollection
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.forward.ray_comparison import PointSample, averaging_matrix, compare
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.effects import Effect
-from palpate.effects.tool import ToolFriction
 from palpate.fem.linalg.direct_solver import NotPositiveDefinite
 from palpate.fem.model import BlockModel
 from palpate.fem.newton import Outcome
@@ -38,20 +36,30 @@ from palpate.mesh.protocol import Meshing
 from palpate.replay.replay import Equilibrium, Replay
 from palpate.setup.setup import Setup
 
-__all__ = ["Trace", "moved", "moves", "traces_of", "with_traces"]
+__all__ = [
+    "Trace",
+    "changes_tool_friction",
+    "perturbed",
+    "perturbed_effects",
+    "traces_of",
+    "with_history_columns",
+]
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """What an effect changes, to first order: measured minus simulated gaps (g, p) [m], and forces
-    on the tool (g, 3) [N].
+    """The first-order change by an effect.
+
+    Attributes:
+        gap: change of measured minus simulated gaps (g, p) [m].
+        force: change of measured minus simulated forces on the tool (g, 3) [N].
     """
 
     gap: FloatArray
     force: FloatArray
 
     def on(self, plain: Prediction) -> Prediction:
-        """The plain prediction with the change in it."""
+        """Return the plain prediction with the change in it."""
         forces = (
             None
             if plain.forces is None
@@ -62,8 +70,9 @@ class Trace:
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """One group: its frame, or the block without a tool on the grid of the last contact, and the
-    model factorised there.
+    """The tangent of one group: its frame, and the model factorised there.
+
+    Without contact the frame is that of the block without a tool, on the grid of the last contact.
     """
 
     frame: Equilibrium
@@ -71,7 +80,7 @@ class _Look:
 
     @cached_property
     def coupling(self) -> FloatArray:
-        """How the residual changes with the tool's place (u, 3), over E [m]."""
+        """Derivative of the residual by the tool's position (u, 3), over E [m]."""
         return tool_derivatives(
             self.model, self.frame.mesh.nodes + self.frame.displacement, local_tool(self.frame)
         )[0]
@@ -85,26 +94,34 @@ def traces_of(
     samples: Sequence[PointSample],
     effects: Sequence[Effect],
 ) -> list[Trace]:
-    """One trace of each effect, of the size that it has.
+    """Return the trace of each effect, at the size that it has.
 
     Args:
-        setup: without a memory.
-        frames: of its replay, one for each group.
+        data: the sequence.
+        setup: without history.
+        grid: mesh.
+        frames: of the replay of this setup, one for each group.
         samples: the points that are averaged.
+        effects: with history.
     """
     block, surface = Replay(setup, grid), Surface.of(setup)
     time = loading_history_of(data, setup, touch_correction(setup, grid), tuple(frames))
-    rough = [effect for effect in effects if isinstance(effect, ToolFriction)]
-    lasting = [effect for effect in effects if not isinstance(effect, ToolFriction)]
     past = Recollection(block, frames, time)
-    lacks = {id(effect): past.lacks(effect) for effect in lasting}
+    losses = [past.stress_losses(effect.apply(setup)) for effect in effects]
+    frictions = {
+        row: effect.apply(setup).tool.friction_coefficient
+        for row, effect in enumerate(effects)
+        if changes_tool_friction(effect, setup)
+    }
     spots: dict[int, Spot | None] = {}
     shape, modulus = (len(frames), surface.patches), setup.material.young_modulus
-    found = {id(effect): Trace(np.zeros(shape), np.zeros((len(frames), 3))) for effect in effects}
-    kept: dict[int, tuple[_Look, Any]] = {}
+    traces = [Trace(np.zeros(shape), np.zeros((len(frames), 3))) for _ in effects]
+    stored: dict[int, tuple[_Look, Any]] = {}
     for number in past.order:
         group, touched = data.groups[number], number in time.touched
-        missing = {name: stress for name, own in lacks.items() if (stress := next(own)) is not None}
+        missing = {
+            row: stress for row, own in enumerate(losses) if (stress := next(own)) is not None
+        }
         look = _look(block, frames, number, time) if touched or missing else None
         if look is None:
             continue
@@ -112,29 +129,34 @@ def traces_of(
             look.frame, compare(group, setup, look.frame, surface, samples[number])
         )
         answers = {
-            name: look.model.topology.factor.approximate(
+            row: look.model.topology.factor.approximate(
                 past.load(look.model, stress, look.frame.displacement)
             )
-            for name, stress in missing.items()
+            for row, stress in missing.items()
         }
-        if touched and rough:
+        if touched and frictions:
             spots[number] = spot_of(look.model, look.frame)
-            kept[number] = (look, seen)
-        for name, answer in answers.items():
-            _state(found[name], number, look, seen, answer, modulus)
+            stored[number] = (look, seen)
+        for row, answer in answers.items():
+            _add(traces[row], number, look, seen, answer, modulus)
     held = [spots.get(number) for number in time.touched]
-    for effect in rough:
-        for pull, spot, number in zip(pulls(effect, time, held), held, time.touched, strict=True):
+    for row, friction in frictions.items():
+        for pull, spot, number in zip(pulls(friction, time, held), held, time.touched, strict=True):
             if spot is not None and pull.any():
-                look, seen = kept[number]
-                _state(found[id(effect)], number, look, seen, spot.answer @ pull, modulus, pull)
-    return [found[id(effect)] for effect in effects]
+                look, seen = stored[number]
+                _add(traces[row], number, look, seen, spot.answer @ pull, modulus, pull)
+    return traces
+
+
+def changes_tool_friction(effect: Effect, setup: Setup) -> bool:
+    """Return whether the effect changes the friction between tool and surface in this setup."""
+    return effect.apply(setup).tool.friction_coefficient != setup.tool.friction_coefficient
 
 
 def _look(
     block: Replay, frames: Sequence[Equilibrium], number: int, time: LoadingHistory
 ) -> _Look | None:
-    """None where no equilibrium, or no factor, is to be had."""
+    """Return the tangent of a group; None without an equilibrium, or without a factor."""
     frame = frames[number]
     if frame.outcome is not Outcome.CONVERGED:
         return None
@@ -154,7 +176,7 @@ def _look(
     return _Look(still, model)
 
 
-def _state(
+def _add(
     trace: Trace,
     number: int,
     look: _Look,
@@ -163,21 +185,29 @@ def _state(
     modulus: float,
     drag: FloatArray | float = 0.0,
 ) -> None:
-    """Put what the answer (u,) [m] changes into a group's row; `drag` (3,) pulls at the block
-    itself, over E [m^2].
+    """Add a change to a group's row of a trace.
+
+    Args:
+        trace: to be changed.
+        number: of the group.
+        look: tangent of the group.
+        seen: averages of the points by patch, as a matrix.
+        answer: displacement of the unknowns (u,) [m].
+        modulus: Young's modulus [Pa].
+        drag: on the block, over E (3,) [m^2].
     """
     change = np.zeros_like(look.frame.displacement)
     change[look.model.topology.free] = answer
-    trace.gap[number] = -(seen @ change.ravel())
+    trace.gap[number] -= seen @ change.ravel()
     if not look.frame.in_contact:
         return
-    # Measured minus simulated force on the tool, which the coupling of the residual tells (see
-    # `palpate.gradients.force_changes.force_changes`).
-    trace.force[number] = modulus * (answer @ look.coupling + drag)
+    # The force on the tool follows from the coupling of the residual
+    # (see `palpate.gradients.force_changes.force_changes`).
+    trace.force[number] += modulus * (answer @ look.coupling + drag)
 
 
-def moved(effect: Effect, number: int) -> tuple[Effect, float]:
-    """With one search coordinate a step further, and the step."""
+def perturbed(effect: Effect, number: int) -> tuple[Effect, float]:
+    """Return the effect with one search coordinate a step further, and the step."""
     item, coordinates = effect.numbers()[number], effect.coordinates
     step = CRITERIA.history.trace_step * item.scale
     step = -step if coordinates[number] + step > item.coordinate(item.high) else step
@@ -185,36 +215,37 @@ def moved(effect: Effect, number: int) -> tuple[Effect, float]:
     return effect.at(coordinates), step
 
 
-def moves(effects: Sequence[Effect]) -> list[Effect]:
-    """Those of the effects that are traced, each followed by itself with every number a step
-    further.
-    """
+def perturbed_effects(effects: Sequence[Effect]) -> list[Effect]:
+    """Return the effects with history, each followed by itself with every number a step further."""
     found = []
     for effect in effects:
-        if isinstance(effect, TRACED):
+        if effect.has_history():
             found += [
                 effect,
-                *(moved(effect, number)[0] for number in range(len(effect.numbers()))),
+                *(perturbed(effect, number)[0] for number in range(len(effect.numbers()))),
             ]
     return found
 
 
-def with_traces(
-    led: Prediction,
+def with_history_columns(
+    replayed: Prediction,
     plain: Prediction,
     traces: Sequence[Trace],
     effects: Sequence[Effect],
     first: int,
     extra: int,
 ) -> Prediction:
-    """A replay along the whole way with columns: those of the plain replay, and of traced effects
-    the differences of their traces.
+    """Return a replay along the tool's path with columns.
+
+    They are those of the plain replay, and for effects with history the differences of traces.
 
     Args:
-        plain: without the traced effects, whose columns have those of the other effects from
-            `first` on, and then the extra ones.
-        traces: of `moves(effects)`.
-        extra: how many of them to keep.
+        replayed: along the path.
+        plain: without the effects with history.
+        traces: of `perturbed_effects(effects)`.
+        effects: of the model.
+        first: column of the first effect without history in `plain`.
+        extra: number of columns of `plain` after those of the effects, which are used too.
     """
     columns = (
         plain.columns
@@ -229,27 +260,27 @@ def with_traces(
     whole, scale = np.zeros_like(plain.gap), 1.0
     for effect in effects:
         count = len(effect.numbers())
-        if not isinstance(effect, TRACED):
+        if not effect.has_history():
             parts.append(columns[..., at : at + count])
             at += count
             continue
         whole = whole + traces[own].gap
-        steps = [moved(effect, number)[1] for number in range(count)]
+        steps = [perturbed(effect, number)[1] for number in range(count)]
         parts.append(
             np.stack(
                 [(rows[own + 1 + n] - rows[own]) / step for n, step in enumerate(steps)], axis=-1
             )
         )
         own += 1 + count
-    changed = led.change_from(plain)[0]
+    changed = replayed.change_from(plain)[0]
     if whole.any():
         scale = float(
             np.clip(
-                np.sum(led.count * changed * whole) / np.sum(led.count * whole**2),
+                np.sum(replayed.count * changed * whole) / np.sum(replayed.count * whole**2),
                 CRITERIA.history.least_trace_scale,
                 CRITERIA.history.most_trace_scale,
             )
         )
     for place, effect in enumerate(effects):
-        parts[1 + place] = parts[1 + place] * (scale if isinstance(effect, TRACED) else 1.0)
-    return led.replace_columns(np.concatenate([*parts, columns[..., at : at + extra]], axis=2))
+        parts[1 + place] = parts[1 + place] * (scale if effect.has_history() else 1.0)
+    return replayed.replace_columns(np.concatenate([*parts, columns[..., at : at + extra]], axis=2))

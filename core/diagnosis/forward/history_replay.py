@@ -1,9 +1,7 @@
-"""Replays in which a group hangs on all that was done before it: the tool drags the surface, or the
-material remembers.
+"""Replays in which each group depends on the frames before it: material history, tool friction.
 
-Groups are few and lie far apart in time. Between two of them the replay is led along the way that
-the tool took, by places so near to one another that a drag is followed, and a hold, or the rest
-after a release, is lived through.
+Groups are few and far apart in time. Between two of them the replay follows the tool's path in
+steps that are short enough for a drag, a hold, and the rest after a release.
 """
 
 from __future__ import annotations
@@ -14,9 +12,6 @@ import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.frame_groups import FAR, Observations
-from palpate.effects import Effect
-from palpate.effects.time_dependence import PermanentSet, Viscoelasticity
-from palpate.effects.tool import ToolFriction
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
@@ -24,38 +19,34 @@ from palpate.replay.replay import Equilibrium, Replay
 from palpate.setup.box import CLEARANCE, distance_to_block
 from palpate.setup.setup import Setup
 
-__all__ = ["TRACED", "Past", "forgetful", "travel"]
-
-TRACED: tuple[type[Effect], ...] = (Viscoelasticity, PermanentSet, ToolFriction)
-"""Effects whose replays are led along the tool's whole way; what they do is screened by traces of
-the plain replay."""
+__all__ = ["HistoryReplay", "longest_step", "without_history"]
 
 
-def forgetful(setup: Setup) -> Setup:
-    """The setup without what makes a frame hang on those before it."""
+def without_history(setup: Setup) -> Setup:
+    """Return the setup without what makes a frame depend on the frames before it."""
     material = replace(setup.material, relaxation=(), retained_fraction=0.0)
     return replace(setup, material=material, tool=replace(setup.tool, friction_coefficient=0.0))
 
 
-def travel(setup: Setup) -> float:
-    """Longest motion between two places [m]."""
+def longest_step(setup: Setup) -> float:
+    """Return the longest motion between two places of a replay along the path [m]."""
     return (
         CRITERIA.history.travel if setup.material.has_history else CRITERIA.history.friction_travel
     )
 
 
-class Past:
-    """Leads a block from group to group in order of time.
+class HistoryReplay:
+    """Replays a block from group to group in order of time.
 
     Args:
         data: the sequence.
-        block: its replay, whose setup remembers.
-        moved: from stated to true places of the tool.
+        block: its replay, whose setup has history.
+        moved: stated to true places of the tool.
     """
 
     def __init__(self, data: Observations, block: Replay, moved: Transform) -> None:
         self._block, self._last, self._left = block, -np.inf, -np.inf
-        self._travel = travel(block.setup)
+        self._travel = longest_step(block.setup)
         self._frame: Equilibrium | None = None
         self._times, way = data.path(block.setup)
         self._way = moved.apply(way)

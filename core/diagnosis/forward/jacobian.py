@@ -12,7 +12,7 @@ import numpy as np
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.ray_comparison import PointComparison, averaging_matrix
 from palpate.diagnosis.forward.slip_derivatives import Sliding
-from palpate.effects.base import LOG_PER_CONTRAST
+from palpate.effects.parameter import LOG_PER_CONTRAST
 from palpate.fem.constitutive.stiffness_field import lump_share
 from palpate.fem.mesh_quadrature import element_quadrature
 from palpate.fem.newton import Outcome

@@ -1,10 +1,9 @@
-"""What a sequence's block went through between the groups that are compared, told from those groups
-alone.
+"""Loading history of the phantom between groups, interpolated from the groups alone.
 
-A push is an interval in which the tool reaches into the stated block. Within it anything that a
-group shows (a strain, a pressure) is taken to change evenly in time from one group to the next,
-from nothing where the push begins to nothing where it ends, and in proportion to how deep the tool
-is: a hold that was not compared is as long, and a turn as deep, as the robot says.
+A push is an interval in which the tool reaches into the stated block. Within a push, any quantity
+of a group (a strain, a pressure) is interpolated linearly in time between groups, from zero at the
+start of the push to zero at its end, and scaled by the depth of the tool. Holds and turning points
+between groups thus have the duration and the depth of the robot's stream.
 """
 
 from __future__ import annotations
@@ -27,15 +26,15 @@ __all__ = ["LoadingHistory", "loading_history_of"]
 
 @dataclass(frozen=True, eq=False)
 class LoadingHistory:
-    """One sequence.
+    """Loading history of one sequence: t times, g groups, k of them in contact.
 
     Attributes:
-        times: (t,) [s], evenly.
-        depths: (t,) of the tool in the stated block [m], zero outside.
-        places: (t, 3) of its centre [m].
-        instants: (g,) of the groups [s], NaN for the rest cloud.
-        touched: (k,) numbers of those in which the tool is in contact.
-        shares: (t, k) of what the touched groups show, at every time.
+        times: (t,) evenly spaced [s].
+        depths: (t,) of the tool in the stated block [m]; zero outside.
+        places: (t, 3) of the tool's centre, phantom frame [m].
+        instants: (g,) of the groups [s]; NaN for the rest cloud.
+        touched: (k,) numbers of the groups in contact.
+        shares: (t, k) weights of the groups in contact at every time [1].
     """
 
     times: FloatArray
@@ -46,16 +45,16 @@ class LoadingHistory:
     shares: FloatArray
 
     def faded(self, rates: FloatArray) -> FloatArray:
-        """Shares (g, k) that a memory still has of the touched groups at each group, whose
-        forgetting has these rates (t,) [1/s].
+        """Weights (g, k) of the groups in contact in an internal variable, at each group.
 
-        The memory c follows what is there, c' = rate (share - c), from nothing.
+        The internal variable c relaxes towards the current state: c' = rate (share - c), c(0) = 0.
+
+        Args:
+            rates: (t,) [1/s].
         """
         held, found = np.zeros(len(self.touched)), np.zeros((len(self.instants), len(self.touched)))
         steps = np.diff(self.times, append=2 * self.times[-1] - self.times[-2])
-        upcoming = np.searchsorted(
-            self.times, self.instants
-        )  # past the end where an instant is not a number
+        upcoming = np.searchsorted(self.times, self.instants)  # NaN is past the end
         for number, (step, rate) in enumerate(zip(steps, rates, strict=True)):
             found[upcoming == number] = held
             held = held + (self.shares[number] - held) * -np.expm1(-rate * step)
@@ -64,7 +63,7 @@ class LoadingHistory:
 
     def peaks(self) -> list[tuple[float, FloatArray]]:
         """Times [s] of the groups in contact and of each push's deepest instant, in order, with
-        their shares (k,).
+        their weights (k,).
         """
         found = [
             (float(self.instants[group]), np.eye(len(self.touched))[number])
@@ -80,9 +79,16 @@ class LoadingHistory:
 def loading_history_of(
     data: Observations, setup: Setup, moved: Transform, frames: tuple[Equilibrium, ...]
 ) -> LoadingHistory:
-    """Of a sequence and its plain replay; `moved` leads from stated to true places of the tool."""
-    times, way = data.path(setup)
-    places = moved.apply(way) + np.array(setup.tool.offset)
+    """Interpolate the loading history of a sequence.
+
+    Args:
+        data: the sequence.
+        setup: with the robot's registration and clock.
+        moved: from stated to true places of the tool.
+        frames: equilibria of the groups without history.
+    """
+    times, path = data.path(setup)
+    places = moved.apply(path) + np.array(setup.tool.offset)
     instants = [data.instant(group, setup) for group in data.groups]
     seen = np.array([np.nan if instant is None else instant for instant in instants])
     touched = tuple(
@@ -119,6 +125,6 @@ def loading_history_of(
 
 
 def _pushes(depths: FloatArray) -> list[tuple[int, int]]:
-    """Where each interval of contact begins, and the first number after it."""
+    """First number of each interval of contact, and the first number after it."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], (depths > 0).astype(int), [0]])))
     return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]

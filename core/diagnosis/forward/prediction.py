@@ -210,7 +210,7 @@ def predict(
         )
         results.append(
             _GroupResult(
-                replace(frame, way=()),
+                replace(frame, path=()),
                 sample,
                 compared.means,
                 compared.other_side(sample),

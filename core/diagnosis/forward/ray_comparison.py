@@ -1,6 +1,4 @@
-"""What a group's points say of one model: where they meet its surface or its tool, and their
-averages by patch.
-"""
+"""Comparison of a group's points with a model along the camera's rays, and averages by patch."""
 
 from __future__ import annotations
 
@@ -25,23 +23,22 @@ __all__ = ["PointComparison", "PointSample", "averaging_matrix", "choose_points"
 
 @dataclass(frozen=True, eq=False)
 class PointSample:
-    """Which of a group's points are averaged where: settled by the baseline and kept for every
-    other model.
+    """The points of a group that are averaged, and their patches, as the baseline chose them.
 
-    Were each model to choose anew, points would change patches with the model, and the noise they
-    carry would look like a difference between models. Nor may a model turn its sides towards the
-    camera or away from it, and the noise along the rays with them: gaps count along the ray, times
-    the cosine that the baseline's surface has. A ray that misses the model is compared with the
-    plane at the material point that the baseline showed it: were the baseline's gap to stand, the
-    truth would pay for it.
+    Every other model uses the same choice. If each model chose anew, points would change patches
+    with the model, and their noise would look like a difference between models. For the same reason
+    gaps are measured along the ray and multiplied by the cosine of the baseline's surface, so that
+    no model reduces the noise by turning its sides. A ray that misses the model is compared with
+    the plane at the material point that it met in the baseline; keeping the baseline's gap there
+    would penalise the true model.
 
     Attributes:
-        index: (m,) of the group's points.
-        patch: (m,).
-        gap: (m,) of the baseline [m], which stands where nothing is near.
-        foot: (m, 3) rest positions on the stated block of the material points that they met [m].
-        side: (m,) on which these lie.
-        facing: (m,) cosine between the baseline's normal and the way back to the camera.
+        index: (m,) numbers of the group's points.
+        patch: (m,) numbers of their patches.
+        gap: (m,) of the baseline [m], kept where a model has nothing near.
+        facing: (m,) cosine between the baseline's normal and the direction to the camera.
+        foot: (m, 3) rest positions, on the stated phantom, of the material points they met [m].
+        side: (m,) of the phantom on which these lie.
     """
 
     index: IntArray
@@ -56,20 +53,20 @@ class PointSample:
 class PointComparison:
     """A group's sample under one model.
 
-    Gaps are lengths as the camera reads them: a model that says it reads them too long would
-    otherwise shrink the noise with the cloud, and gain by it whatever is true.
+    Gaps are lengths as the camera reads them. In true lengths, a model whose camera reads too long
+    would shrink the noise together with the cloud, and gain by it whether it is true or not.
 
     Attributes:
-        places: (m, 3) where the points' rays meet the model, phantom frame [m]; of points on the
-            tool they themselves.
-        seen: those that lie on the surface.
-        means: of the gaps, by patch.
-        tool: (t,) those that lie on the tool instead.
-        away: (t, 3) unit vectors from its centre.
-        off: (t,) their gaps [m].
-        patch: (t,) where they count.
-        scale: how much longer than it is the camera reads a length along its ray [1], which normals
-            have in them, and not `away`.
+        places: (m, 3) intersections of the points' rays with the model, phantom frame [m]; for
+            points on the tool the points themselves.
+        seen: the points on the surface, with gaps and normals.
+        means: patch averages of the gaps.
+        tool: (t,) numbers of the points on the tool.
+        away: (t, 3) unit vectors from its centre to them.
+        off: (t,) their distances from its surface [m].
+        patch: (t,) their patches.
+        scale: length that the camera reads over the true length along a ray [1]. The normals of
+            `seen` contain it, `away` does not.
     """
 
     places: FloatArray
@@ -82,14 +79,13 @@ class PointComparison:
     scale: float = 1.0
 
     def average(self, values: FloatArray, patch: IntArray) -> FloatArray:
-        """Sums over the points of each patch (p, k) of (n, k) values, over all the patch's
-        points."""
+        """Sum values (n, k) by patch, over the number of all its points: (p, k)."""
         total = np.zeros((len(self.means.mean), values.shape[1]))
         np.add.at(total, patch, values)
         return np.asarray(total / np.maximum(self.means.count, 1)[:, None])
 
     def other_side(self, sample: PointSample) -> FloatArray:
-        """Share (p,) of each patch's points that meet another side of this model than of the one
+        """Share (p,) of each patch's points that meet another side of this model than of the model
         that chose them [1].
         """
         other = self.seen.side != sample.side[self.seen.index]
@@ -97,12 +93,15 @@ class PointComparison:
         return np.asarray(found / np.maximum(self.means.count, 1))
 
     def along_sight(self, moved: FloatArray, scale: float = 1.0) -> FloatArray:
-        """Change of the averages (p,) [m] when the camera sees the places at (m, 3) [m] instead,
-        and reads lengths `scale` [1].
+        """Change of the averages (p,) [m] if the camera sees `places` elsewhere.
 
-        A gap is a length along its ray: it changes by how the ray passes the surface, not by how
-        the noisy point does that it leads to. Taken at the points, the noise of 35 000 of them,
-        turned a little, made a slope of tens of nats out of nothing.
+        A gap is a length along its ray. It changes with the place at which the ray meets the
+        surface, not with the noisy point. Measured: taken at the points, the noise of 35 000 of
+        them, rotated slightly, made a slope of tens of nats without any signal.
+
+        Args:
+            moved: (m, 3) the other places [m].
+            scale: length that the camera reads over the true length [1].
         """
         shift = moved - self.places
         surface = np.einsum("mi,mi->m", shift[self.seen.index], self.seen.normal)
@@ -118,9 +117,7 @@ class PointComparison:
 
 
 def averaging_matrix(frame: Equilibrium, compared: PointComparison) -> sp.csr_matrix:
-    """Patch averages of the displacement along the normal as a linear function of the nodes'
-    displacement (p, 3n).
-    """
+    """Matrix (p, 3n) from the displacement of n nodes to patch averages along the normal."""
     seen, patches = compared.seen, len(compared.means.mean)
     nodes, weights = frame.mesh.locate(seen.foot)
     share = 1.0 / np.maximum(compared.means.count, 1)[seen.patch]
@@ -134,9 +131,7 @@ def averaging_matrix(frame: Equilibrium, compared: PointComparison) -> sp.csr_ma
 
 
 def choose_points(group: Group, setup: Setup, frame: Equilibrium, surface: Surface) -> PointSample:
-    """The points to average, by the model at hand: those on clear parts of the surface, without
-    stray ones.
-    """
+    """Choose the points that are averaged: those on this model's surface, without outliers."""
     sight = camera_model_for(setup, reference=group.reference)
     seen = gaps(
         sight.place(group.points), sight.pose.translation, frame, surface, lowest=group.lowest
@@ -155,9 +150,12 @@ def choose_points(group: Group, setup: Setup, frame: Equilibrium, surface: Surfa
 
 
 def _along_rays(seen: Gaps, sample: PointSample, scale: float) -> Gaps:
-    """Gaps, and the normals that say how they change, as long as the baseline's surface would have
-    made them of these rays, and as a camera reads them whose lengths are `scale` times what they
-    are [1].
+    """Scale gaps and normals to the baseline's inclination and to lengths as the camera reads them.
+
+    Args:
+        seen: true gaps.
+        sample: with the cosines of the baseline.
+        scale: length that the camera reads over the true length [1].
     """
     factor = scale * np.minimum(
         sample.facing[seen.index] / np.maximum(seen.facing, 1e-6), CRITERIA.rays.most_stretch
@@ -166,9 +164,7 @@ def _along_rays(seen: Gaps, sample: PointSample, scale: float) -> Gaps:
 
 
 def _places(points: FloatArray, camera: FloatArray, seen: Gaps, sample: PointSample) -> FloatArray:
-    """Where the rays of points (m, 3) [m] meet the model; the points themselves where they meet
-    nothing.
-    """
+    """Intersections of the rays of points (m, 3) [m] with the model; the points without one."""
     places, rays = points.copy(), points[seen.index] - camera
     ahead = seen.gap / np.maximum(
         seen.facing, sample.facing[seen.index] / CRITERIA.rays.most_stretch
@@ -178,6 +174,7 @@ def _places(points: FloatArray, camera: FloatArray, seen: Gaps, sample: PointSam
 
 
 def _taken(part: Gaps, rows: IntArray) -> Gaps:
+    """These rows alone."""
     return Gaps(*(getattr(part, item.name)[rows] for item in fields(Gaps)))
 
 
@@ -188,12 +185,12 @@ def _met_or_beside(
     surface: Surface,
     sample: PointSample,
 ) -> Gaps:
-    """Gaps of the sample's points to the model: where their rays meet it, or beside it where they
-    miss.
+    """Gaps of the sample's points to the model along their rays, or beside them.
 
-    A ray that meets the model far from where it met the baseline has passed over the rim of a dent
-    or an edge; such a point counts from the other place where that is much nearer, so that its gap
-    does not jump by millimetres as the rim passes its ray.
+    A ray that meets the model far from its material point in the baseline has passed over an edge
+    or the rim of a dent. Such a point is compared with the plane at that material point if it is much
+    nearer, so that its gap does not jump by millimetres. A ray that misses the model is treated
+    alike.
     """
     met = gaps(points, camera, frame, surface, everything=True)
     usual = surface.own(sample.foot.astype(float))
@@ -222,8 +219,16 @@ def _met_or_beside(
 def compare(
     group: Group, setup: Setup, frame: Equilibrium, surface: Surface, sample: PointSample
 ) -> PointComparison:
-    """The sample's points, where they meet the surface, and their averages; points of the model's
-    tool lie off the tool.
+    """Compare the sample's points with a model.
+
+    Points near the model's tool have their distance from it as gap.
+
+    Args:
+        group: with the points.
+        setup: of the model.
+        frame: its equilibrium in the group.
+        surface: of the stated phantom, with the patches.
+        sample: the points and their patches.
     """
     sight = camera_model_for(setup, reference=group.reference)
     points, camera = sight.place(group.points[sample.index]), sight.pose.translation

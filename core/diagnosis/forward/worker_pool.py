@@ -1,4 +1,4 @@
-"""Replays of all sequences under one setup, spread over processes that keep the measurements."""
+"""A pool of processes that hold the measurements and predict sequences."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import numpy as np
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.force_prediction import predict_forces
 from palpate.diagnosis.forward.history_columns import Trace, traces_of
-from palpate.diagnosis.forward.jacobian import Wanted
+from palpate.diagnosis.forward.jacobian import JacobianRequest
 from palpate.diagnosis.forward.prediction import Prediction, predict
 from palpate.diagnosis.forward.ray_comparison import PointSample
 from palpate.diagnosis.observation.frame_groups import Observations
@@ -33,11 +33,11 @@ __all__ = ["Pending", "Workers"]
 P = ParamSpec("P")
 T = TypeVar("T")
 _READ: dict[Path, Observations] = {}
-"""What this process has read of the measurements that are held, by file."""
+"""Measurements that this process has read, by file."""
 
 
 def _ready() -> None:
-    """Load what every task needs: libraries, and the compiled kernels of a replay."""
+    """Load libraries and the compiled kernels of a replay, which every task needs."""
     importlib.import_module("open3d")
     block = Replay(
         Setup(geometry=Box(size=(0.03, 0.03, 0.02)), tool=Tool(radius=5e-3)),
@@ -48,7 +48,7 @@ def _ready() -> None:
 
 
 def _measured(file: Path) -> Observations:
-    """What a sequence's file says; measurements that were held before are forgotten."""
+    """Read a sequence's file once; measurements that were held before are dropped."""
     if file not in _READ:
         for other in [other for other in _READ if other.parent != file.parent]:
             del _READ[other]
@@ -58,8 +58,11 @@ def _measured(file: Path) -> Observations:
 
 @dataclass(frozen=True)
 class _Tidily(Generic[P, T]):
-    """A task of a module's top level that leaves its process holding no memory which is not in
-    use."""
+    """A task that returns the memory it has freed to the operating system.
+
+    Attributes:
+        task: function of a module's top level.
+    """
 
     task: Callable[P, T]
 
@@ -74,29 +77,32 @@ def _task(
     file: Path,
     setup: Setup,
     grid: Meshing,
-    wanted: Wanted | None,
+    request: JacobianRequest | None,
     starts: Sequence[Equilibrium] | None,
     samples: Sequence[PointSample] | None,
     tolerance: float,
 ) -> Prediction:
     data = _measured(file)
     if data.force_only:
-        return predict_forces(data, setup, grid, wanted, starts, tolerance)
-    found = predict(data, setup, grid, wanted, starts, tolerance, samples)
+        return predict_forces(data, setup, grid, request, starts, tolerance)
+    found = predict(data, setup, grid, request, starts, tolerance, samples)
     return found if samples is None else replace(found, samples=())
 
 
 @dataclass(frozen=True, eq=False)
 class Pending:
-    """A prediction under way. Points that were chosen before are not sent back: they are most of
-    what there is to send.
+    """A pending prediction.
+
+    Attributes:
+        future: the prediction, without samples that were given.
+        samples: given ones. They are not sent back, because they are most of the data.
     """
 
     future: Future[Prediction]
     samples: tuple[PointSample, ...] | None
 
     def result(self) -> Prediction:
-        """Wait for it."""
+        """Wait for the prediction."""
         found = self.future.result()
         return found if self.samples is None else replace(found, samples=self.samples)
 
@@ -127,14 +133,14 @@ class Workers:
         self.hold(data)
 
     def start(self) -> None:
-        """Start the processes now, which takes seconds, and not with the first tasks."""
+        """Start the processes, which takes seconds, before the first tasks."""
         for _ in range(self._count):
             self._pool.submit(_ready)
 
     def hold(self, data: Sequence[Observations]) -> None:
-        """Let other measurements be predicted from now on; what is under way is of the old ones.
+        """Replace the measurements; pending predictions are of the old ones.
 
-        They are handed over in files, which a process reads when it first needs them.
+        They are passed in files, which a process reads when it first needs them.
         """
         self._held += 1
         self._home.mkdir()
@@ -168,23 +174,28 @@ class Workers:
         names: Sequence[str],
         setup: Setup,
         grid: Meshing,
-        wanted: Wanted | None = None,
+        request: JacobianRequest | None = None,
         starts: Sequence[Prediction] | None = None,
         tolerance: float = CRITERIA.replay.tolerance,
         same_points: bool = True,
     ) -> list[Pending]:
-        """Begin predicting these sequences under a setup.
+        """Start predicting sequences under a setup.
 
         Args:
-            starts: predictions to begin from, in the same order.
-            same_points: average the same points in the same patches as they.
+            names: of the sequences.
+            setup: under which they are replayed.
+            grid: the mesh.
+            request: the columns of the Jacobian that are computed; none without it.
+            starts: predictions with initial guesses, in the same order.
+            tolerance: of the replays, over the tool's push [1].
+            same_points: whether to use the points of `starts`.
         """
         pending = []
         for number, name in enumerate(names):
             begin = None if starts is None else starts[number].equilibria
             points = None if starts is None or not same_points else starts[number].samples or None
             future = self.run(
-                _task, self._file(name), setup, grid, wanted, begin, points, tolerance
+                _task, self._file(name), setup, grid, request, begin, points, tolerance
             )
             pending.append(Pending(future, points))
         return pending
@@ -197,7 +208,7 @@ class Workers:
         plain: Sequence[Prediction],
         effects: Sequence[Effect],
     ) -> list[Future[list[Trace]]]:
-        """Begin the traces of these effects in these sequences, whose replays without them are
+        """Start computing the traces of effects in sequences, whose predictions without them are
         `plain`.
         """
         return [
@@ -206,5 +217,5 @@ class Workers:
         ]
 
     def run(self, task: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Begin a task of a module's top level."""
+        """Start a task of a module's top level."""
         return self._pool.submit(_Tidily(task), *args, **kwargs)

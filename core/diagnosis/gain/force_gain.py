@@ -1,8 +1,7 @@
-"""The gain of a palpation without clouds: how much nearer the extended model's forces come on
-pushes that nothing was fitted on.
+"""The gain of the extended model on held-out sequences with forces and no clouds.
 
-Where the modulus is no cause each model has the one that its fitted sequences' forces give: a
-stated modulus that is off is no gain of a lump, and would hide what the lump is worth.
+If Young's modulus is no cause, each model has the modulus that fits the forces of its fitted
+sequences. A wrong stated modulus would otherwise hide the gain of an inclusion.
 """
 
 from __future__ import annotations
@@ -24,15 +23,16 @@ __all__ = ["ForceGain", "force_gain"]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ForceGain:
-    """RMS length of measured minus simulated force [N] while the tool presses, and the share of the
-    reducible error removed.
+    """RMS length of measured minus simulated force [N] in contact, and the share of the reducible
+    error that is removed.
 
     Attributes:
-        baseline, extended: of the stated and the extended model.
-        noise_floor: what the sensor's noise and bias alone leave.
-        removed: (value, low, high) of (baseline - extended) / (baseline - noise floor); 95 %
+        baseline: RMS of the stated model [N].
+        extended: RMS of the extended model [N].
+        noise_floor: RMS that the sensor's noise and bias alone leave [N].
+        removed: (value, low, high) of (baseline - extended) / (baseline - noise floor) [1]; 95 %
             interval from resampled pushes.
-        probes: how many pushes were resampled.
+        probes: number of pushes that were resampled.
     """
 
     baseline: float
@@ -42,7 +42,7 @@ class ForceGain:
     probes: int
 
     def to_json(self, split: str) -> dict[str, Any]:
-        """As the report has it, in millinewtons."""
+        """Plain values in millinewtons, as in the report."""
         value, low, high = (round(part, 4) for part in self.removed)
         steps = {
             "baseline": self.baseline,
@@ -66,10 +66,16 @@ def force_gain(
     seed: int,
     stiffer: tuple[float, float] = (1.0, 1.0),
 ) -> ForceGain:
-    """Compare two models on the pushes of test sequences, which are resampled whole.
+    """Compare two models on held-out sequences; the bootstrap resamples whole pushes.
 
     Args:
-        stiffer: modulus of each over the one that was replayed [1].
+        data: the sequences.
+        baseline: their predictions by the stated model.
+        extended: their predictions by the extended model.
+        seed: of the bootstrap.
+        stiffer: Young's modulus of each model over the one that was replayed [1].
+
+    Raises DiagnosisError if no push has a known force.
     """
     rows: list[tuple[str, float, float, float]] = []
     for item, before, after in zip(data, baseline, extended, strict=True):
@@ -89,7 +95,7 @@ def force_gain(
             one, other = (float((side.gap[number] ** 2).sum()) for side in forces)
             rows.append(
                 (
-                    f"{item.name}/{group.probe}",
+                    f"{item.name}/{group.push}",
                     one,
                     other,
                     3 * float(before.forces.noise[number]) ** 2,
@@ -116,13 +122,12 @@ def force_gain(
 
 
 def _rms(sums: FloatArray) -> FloatArray:
-    """(d, 3) [N] from sums of squares and, last, of groups (d, 4)."""
+    """RMS (d, 3) [N] from sums of squares and, last, the number of groups (d, 4)."""
     return np.asarray(np.sqrt(sums[:, :3] / sums[:, 3:]))
 
 
 def _share(rms: FloatArray) -> FloatArray:
-    """Removed share (d,), at most all; nothing is reducible where the baseline lies at the
-    floor."""
+    """Removed share (d,) of the reducible error, at most 1; 0 if the baseline is at the floor."""
     reducible = rms[:, 0] - rms[:, 2]
     some = reducible > np.sqrt(CRITERIA.gain.least_reducible_force)
     return np.where(

@@ -1,12 +1,11 @@
-"""Errors of models on the same patches of the same pushes, as sums from which any average, and any
-resampling, can be taken.
+"""Errors of models on the same patches of the same pushes, as sums for averages and resampling.
 
 The camera has a fixed pattern of some tenths of a millimetre, which is no error of the simulation.
-In each model it is what the untouched frames show, and it is taken off there. But a model that is
-wrong about the untouched block, too (sag, a camera that was moved), has its error in that very
-pattern. What all patterns hold along the difference of two models' is given back to each: a sag of
-which two thirds were named leaves one third in the extended model. Nothing here is fitted in favour
-of one of them.
+For each model it is the mean gap in untouched frames, and is subtracted. A model that is also wrong
+about the untouched phantom (sag, a moved camera) has its error in that pattern. Therefore the
+component of each pattern along the difference of two models' patterns counts as error: a sag of
+which two thirds were named leaves one third in the extended model. Nothing is fitted in favour of
+either model.
 """
 
 from __future__ import annotations
@@ -32,16 +31,15 @@ __all__ = ["ProbeSums", "fixed_pattern", "paper_sums", "probe_sums", "removed_sh
 
 @dataclass(frozen=True, eq=False)
 class ProbeSums:
-    """Of k pushes under m models, over all patches of their groups, each weighed by its points.
+    """Sums over all patches of k pushes under m models; each patch counts by its points.
 
     Attributes:
         names: of the pushes, "sequence/number".
         squares: (k, m) squared errors without the fixed patterns [m^2].
-        along: (k, m) each fixed pattern times the difference of two of them, along which they are
-            errors.
-        size: (k,) it squared.
-        floor: (k,) what the scatter of single points leaves [m^2].
-        points: (k,).
+        along: (k, m) each fixed pattern times the difference of two models' patterns [m^2].
+        size: (k,) squared difference of the two patterns [m^2].
+        floor: (k,) squared error that the scatter of single points leaves [m^2].
+        points: (k,) number of points.
     """
 
     names: tuple[str, ...]
@@ -52,7 +50,7 @@ class ProbeSums:
     points: FloatArray
 
     def of(self, rows: Sequence[int]) -> ProbeSums:
-        """These pushes alone."""
+        """Return the sums of these pushes alone."""
         own = list(rows)
         arrays = (
             values[own] for values in (self.squares, self.along, self.size, self.floor, self.points)
@@ -60,11 +58,11 @@ class ProbeSums:
         return ProbeSums(tuple(self.names[row] for row in own), *arrays)
 
     def rms(self, chosen: IntArray | None = None, still: bool = True) -> FloatArray:
-        """RMS of every model, the noise floor last (d, m + 1) [m]; of pushes drawn with repetition
-        (d, n), or of all (1, m + 1).
+        """RMS of every model, and the noise floor last, (d, m + 1) [m].
 
-        Without what is `still`, what a model is wrong about in the untouched block, too, does not
-        count: sag, for one.
+        Args:
+            chosen: (d, n) numbers of pushes, drawn with repetition; each push once without it.
+            still: whether errors that are also in the untouched phantom count, such as sag.
         """
         rows = np.arange(len(self.names))[None] if chosen is None else chosen
         size, points = self.size[rows].sum(axis=1), np.maximum(self.points[rows].sum(axis=1), 1)
@@ -80,15 +78,19 @@ class ProbeSums:
         return np.asarray(np.sqrt(mean))
 
     def draws(self, seed: int, draws: int = CRITERIA.gain.draws) -> IntArray:
-        """Pushes drawn with repetition (draws, k)."""
+        """Draw numbers of pushes with repetition (draws, k)."""
         return np.random.default_rng(seed).integers(
             0, len(self.names), size=(draws, len(self.names))
         )
 
 
 def removed_share(baseline: FloatArray, model: FloatArray, floor: FloatArray) -> FloatArray:
-    """Share of the reducible error that is gone, at most all; nothing is reducible where the
-    baseline already lies at the floor.
+    """Share of the reducible error that is removed, at most 1; 0 if the baseline is at the floor.
+
+    Args:
+        baseline: RMS of the stated model [m].
+        model: RMS of the other model [m].
+        floor: RMS of the noise [m].
     """
     reducible = baseline - floor
     some = reducible > CRITERIA.gain.least_reducible
@@ -99,14 +101,17 @@ def removed_share(baseline: FloatArray, model: FloatArray, floor: FloatArray) ->
 def fixed_pattern(
     item: Observations, model: Prediction, before: bool = False
 ) -> tuple[FloatArray, FloatArray]:
-    """The camera's fixed pattern (p,) [m] in the frames clear of the block, and how many points it
-    rests on (p,).
+    """The camera's fixed pattern (p,) [m] in the frames clear of the phantom, and the number of
+    points behind it (p,).
 
-    Of a block that may keep a dent, or stay where it slid to, only those `before` the first touch
-    count, if there are any.
+    Args:
+        item: the sequence.
+        model: its prediction.
+        before: whether only frames before the first contact count, if there are any; for a phantom
+            that keeps a dent or stays where it slid to.
     """
     free = np.array([group.free for group in item.groups])[:, None]
-    early = np.array([group.free and not group.probe for group in item.groups])[:, None]
+    early = np.array([group.free and not group.push for group in item.groups])[:, None]
     free = early if before and early.any() else free
     count = np.where(free & np.isfinite(model.gap), model.count, 0.0)
     total = count.sum(axis=0)
@@ -119,15 +124,17 @@ def probe_sums(
     lasting: bool = False,
     ends: tuple[int, int] = (0, -1),
 ) -> ProbeSums:
-    """Sums over the touched groups of sequences under several models.
+    """Sum errors over the touched groups of sequences under several models.
 
     Args:
+        data: the sequences.
         models: for each model its predictions, one for each sequence.
-        lasting: whether also what a push has left counts, a dent or a block that slid.
-        ends: the two models along whose difference fixed patterns are errors; the second one's
+        lasting: whether groups after a push count, too, because it leaves a dent or a block that
+            slid.
+        ends: the two models along whose difference fixed patterns are errors. The second one's
             scatter and points make the noise floor and the weights.
 
-    Raises DiagnosisError where a sequence has no untouched frame, or none of them a touched one.
+    Raises DiagnosisError if a sequence has no untouched frame, or no sequence has a touched one.
     """
     seen = [row for row in zip(data, *models, strict=True) if not row[0].force_only]
     variance = patch_variance([row[1:][end] for row in seen for end in ends])
@@ -136,7 +143,8 @@ def probe_sums(
         found += _rows(item, own, variance, lasting, ends)
     if not found:
         raise DiagnosisError(
-            "the test sequences have no frame in which the tool touches the phantom; name others in [splits] test"
+            "the test sequences have no frame in which the tool touches the phantom; "
+            "name others in [splits] test"
         )
     names, table, count = (
         np.array([row[0] for row in found]),
@@ -158,16 +166,17 @@ def _rows(
     lasting: bool,
     ends: tuple[int, int],
 ) -> list[tuple[str, FloatArray]]:
-    """Of one sequence: the push that each group belongs to, and its sums."""
+    """Name of the push of each group of one sequence, and the group's sums."""
     patterns = [fixed_pattern(item, model, lasting) for model in own]
     difference, known = patterns[ends[0]][0] - patterns[ends[1]][0], patterns[ends[1]][1]
     if not known.sum():
         raise DiagnosisError(
-            f"{item.name} has no untouched frame, so its noise floor is unknown; name others in [splits] test"
+            f"{item.name} has no untouched frame, so its noise floor is unknown; "
+            "name others in [splits] test"
         )
     found = []
     for number, group in enumerate(item.groups):
-        left = lasting and group.probe > 0
+        left = lasting and group.push > 0
         if (group.free and not left) or any(number in model.failed for model in own):
             continue
         seen = np.all([np.isfinite(model.gap[number]) for model in own], axis=0) & (
@@ -184,14 +193,14 @@ def _rows(
             difference**2,
         ]
         sums = [(values[seen] * count).sum() for values in products]
-        found.append((f"{item.name}/{group.probe}", np.array([*sums, floor, count.sum()])))
+        found.append((f"{item.name}/{group.push}", np.array([*sums, floor, count.sum()])))
     return found
 
 
 def paper_sums(
     data: Sequence[Observations], predictions: Sequence[Prediction], setup: Setup
 ) -> dict[str, tuple[float, int]]:
-    """Sum of the paper's metric over touched groups [m], and their number, by push
+    """Sum of the paper's metric over touched groups [m] and their number, by push
     ("sequence/number").
     """
     surface, sight = Surface.of(setup), camera_model_for(setup)
@@ -199,7 +208,7 @@ def paper_sums(
     for item, prediction in zip(data, predictions, strict=True):
         for number, group in enumerate(item.groups):
             if not item.force_only and not group.free and number not in prediction.failed:
-                name = f"{item.name}/{group.probe}"
+                name = f"{item.name}/{group.push}"
                 distance = paper_distance(
                     sight.place(group.points[: CRITERIA.gain.paper_points]),
                     prediction.equilibria[number],

@@ -1,9 +1,9 @@
-"""What a found model is worth on sequences that nothing was fitted on.
+"""The gain of a found model on held-out sequences.
 
-A fit weighs its causes together with all that is known only to its stated accuracy: where the robot
-stands, the tool's radius, Poisson's ratio. The extended model has these as the fit left them, for a
-cause that shows by less than the registration is off would else be of no use. What that tuning is
-worth by itself, without a cause, is told beside it.
+A fit estimates its causes together with the nuisances: the robot's pose, the tool's radius and
+Poisson's ratio. The extended model has the fitted nuisances, because a cause that changes less than
+the registration's error would otherwise gain nothing. The gain of the fitted nuisances without a
+cause is computed beside it.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.forward.worker_pool import Pending, Workers
 from palpate.diagnosis.gain.force_gain import ForceGain, force_gain
 from palpate.diagnosis.gain.gain_ladder import SurfaceGain, surface_gain
 from palpate.diagnosis.inference.credible_intervals import modulus_interval
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import fit
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.search.findings import Findings
-from palpate.effects.elastic_material import PoissonRatio, YoungModulus
-from palpate.effects.tool import ToolRadius
+from palpate.effects import NuisanceBlock
+from palpate.effects.elastic_material import POISSON_BOUNDS
+from palpate.effects.tool import RADIUS_BOUNDS
 from palpate.mesh.protocol import Meshing
 from palpate.registration.pose import small_motion
 from palpate.setup.setup import Setup
@@ -34,26 +34,27 @@ from palpate.setup.setup import Setup
 __all__ = ["held_out_gain", "tuned_setup"]
 
 
-def tuned_setup(bench: Bench, model: Model) -> Setup:
-    """The model's setup with the robot's pose, the tool's radius and Poisson's ratio as the fit
-    left them.
+def tuned_setup(evaluator: Evaluator, model: Model) -> Setup:
+    """The model's setup with the fitted pose of the robot, tool radius and Poisson's ratio.
 
-    Not the camera's pose: the fixed pattern of each sequence holds what it is off. Not the modulus:
-    no surface shows it.
+    The camera's pose stays as stated, because the fixed pattern of each sequence contains its
+    error. So does Young's modulus, because no surface shows it.
     """
-    change = fit(bench.tempered(model), [*model.nuisance, *model.columns], bench.held(model)).change
-    moved, radius, nu = (
-        change[:TOOL_COLUMNS],
-        float(change[TOOL_COLUMNS]),
-        float(change[TOOL_COLUMNS + 1]),
-    )
-    setup = model.setup
+    change = fit(
+        evaluator.tempered(model),
+        [*model.nuisance, *model.columns],
+        evaluator.bounded_precision(model),
+    ).change
+    problem, setup = evaluator.problem, model.setup
+    motion = problem.blocks.places(NuisanceBlock.TOOL_POSITION, NuisanceBlock.TOOL_ROTATION)
+    (wider,) = problem.blocks.places(NuisanceBlock.TOOL_RADIUS)
+    (softer,) = problem.blocks.places(NuisanceBlock.POISSON_RATIO)
     pose = (
-        small_motion(np.asarray(moved), bench.registration.robot_pivot) @ setup.phantom_from_robot
+        small_motion(change[list(motion)], problem.registration.robot_pivot)
+        @ setup.phantom_from_robot
     )
-    bounds = {item.name: item for kind in (ToolRadius, PoissonRatio) for item in kind.numbers()}
-    radius = float(np.clip(setup.tool.radius + radius, bounds["radius"].low, bounds["radius"].high))
-    nu = float(np.clip(setup.material.poisson_ratio + nu, bounds["nu"].low, bounds["nu"].high))
+    radius = float(np.clip(setup.tool.radius + float(change[wider]), *RADIUS_BOUNDS))
+    nu = float(np.clip(setup.material.poisson_ratio + float(change[softer]), *POISSON_BOUNDS))
     return replace(
         setup,
         phantom_from_robot=pose,
@@ -63,7 +64,7 @@ def tuned_setup(bench: Bench, model: Model) -> Setup:
 
 
 def held_out_gain(
-    bench: Bench,
+    evaluator: Evaluator,
     findings: Findings,
     held_out: list[Observations],
     pool: Workers,
@@ -71,19 +72,27 @@ def held_out_gain(
     seed: int,
     alone: bool = False,
 ) -> SurfaceGain | ForceGain | None:
-    """Of the stated and the found model on test sequences; `alone` adds what tuning without a cause
-    would give.
+    """Compare the stated and the found model on held-out sequences.
 
-    Where touches were surely of other landmarks the stated tool is far off, and the found model
-    says which points count. None where the stated setup then finds an equilibrium in no frame in
-    which the tool touches.
+    If touches were surely of other landmarks, the stated tool is far off, and the found model
+    chooses the points. The result is None if the stated setup then has no equilibrium in any frame
+    in contact.
+
+    Args:
+        bench: the fitted sequences.
+        findings: of the search.
+        held_out: the sequences.
+        pool: processes that hold their measurements.
+        grid: the mesh.
+        seed: of the bootstrap.
+        alone: whether to add the gain of fitted nuisances without a cause.
     """
-    names, stated = [item.name for item in held_out], bench.setup
-    found = tuned_setup(bench, findings.best.model) if findings.best else stated
+    names, stated = [item.name for item in held_out], evaluator.problem.setup
+    found = tuned_setup(evaluator, findings.best.model) if findings.best else stated
     first, second = (found, stated) if findings.known else (stated, found)
     forces = all(item.force_only for item in held_out)
     without = (
-        tuned_setup(bench, findings.baseline)
+        tuned_setup(evaluator, findings.baseline)
         if alone and findings.best and not findings.known and not forces
         else None
     )
@@ -100,7 +109,7 @@ def held_out_gain(
     ):
         return None
     if forces:
-        return force_gain(held_out, baseline, extended, seed, _stiffer(bench, findings))
+        return force_gain(held_out, baseline, extended, seed, _stiffer(evaluator, findings))
     gain = surface_gain(held_out, baseline, extended, stated, found, seed)
     if without is not None:
         gain = replace(
@@ -113,10 +122,11 @@ def held_out_gain(
 def _begun(
     pool: Workers, names: Sequence[str], setups: Sequence[Setup], grid: Meshing
 ) -> tuple[list[Prediction], list[list[Pending]]]:
-    """Replays under the first setup, and those under each of the others, which begin from them and
-    are under way.
+    """Predictions under the first setup, and pending ones under each other setup, which start from
+    them.
 
-    Each sequence goes on as soon as it can: one may take three times as long as the others.
+    Each sequence continues as soon as its first prediction is there, because one may take three
+    times as long as the others.
     """
     first, *others = setups
     plain = pool.submit(names, first, grid)
@@ -132,18 +142,21 @@ def _begun(
 
 
 def _found(begun: Sequence[Pending]) -> list[Prediction]:
+    """Wait for predictions."""
     return [pending.result() for pending in begun]
 
 
-def _stiffer(bench: Bench, findings: Findings) -> tuple[float, float]:
-    """The modulus that fitted forces give for both models over the stated one; as stated where it
-    is a cause, or without forces.
+def _stiffer(evaluator: Evaluator, findings: Findings) -> tuple[float, float]:
+    """Young's modulus that fits the forces under both models, over the stated one [1].
+
+    Both are 1 if the modulus is a cause, or without forces.
     """
     found = findings.best.model if findings.best else findings.baseline
-    if YoungModulus.name in found.names:
+    if any(effect.nuisance is NuisanceBlock.YOUNG_MODULUS for effect in found.effects):
         return 1.0, 1.0
-    known = [modulus_interval(bench, model) for model in (findings.baseline, found)]
+    known = [modulus_interval(evaluator, model) for model in (findings.baseline, found)]
     first, second = (
-        1.0 if one is None else one[0] / bench.setup.material.young_modulus for one in known
+        1.0 if one is None else one[0] / evaluator.problem.setup.material.young_modulus
+        for one in known
     )
     return first, second

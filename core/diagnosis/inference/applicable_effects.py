@@ -1,52 +1,30 @@
-"""Which effects a dataset can weigh: what was measured decides, and of what shape the phantom is.
-
-With clouds a diagnosis weighs the whole catalogue. With forces alone it weighs what changes how
-hard a body resists from place to place and with the depth; what is seen alone (the camera, its
-clock, the size of a block) says nothing there, and what hangs on the time since a push is over
-between short ones.
-"""
+"""The effects that a dataset can show."""
 
 from __future__ import annotations
 
-from palpate.effects import DIAGNOSED, Effect
-from palpate.effects.elastic_material import PoissonRatio, StiffInclusion, YoungModulus
-from palpate.effects.heterogeneity import (
-    Anisotropy,
-    StiffnessGradient,
-    StrainStiffening,
-    SurfaceLayer,
-)
-from palpate.effects.support import BaseCompliance
-from palpate.effects.tool import ToolCompliance, ToolOffset, ToolRadius
-from palpate.setup.setup import Setup, Shape
+from collections.abc import Sequence
 
-__all__ = ["FELT", "FELT_IN_A_BLOCK", "weighed"]
+from palpate.effects import CATALOGUE, Effect, Measurement
+from palpate.setup.setup import Box, Setup
 
-FELT: tuple[type[Effect], ...] = (
-    PoissonRatio,
-    StiffInclusion,
-    ToolRadius,
-    ToolOffset,
-    StiffnessGradient,
-    StrainStiffening,
-    Anisotropy,
-    BaseCompliance,
-    ToolCompliance,
-)
-"""Effects that forces alone can tell, of a body of any shape."""
-FELT_IN_A_BLOCK: tuple[type[Effect], ...] = (SurfaceLayer,)
-"""Those that need a block's flat top besides."""
+__all__ = ["applicable_effects"]
 
 
-def weighed(setup: Setup, *, seen: bool, forces: bool) -> tuple[type[Effect], ...]:
-    """The effects to weigh, in the catalogue's order, the modulus last.
+def applicable_effects(
+    setup: Setup, *, clouds: bool, forces: bool, catalogue: Sequence[type[Effect]] = CATALOGUE
+) -> tuple[type[Effect], ...]:
+    """Return the effects that these measurements can show, in the catalogue's order.
 
     Args:
-        seen: whether any sequence has clouds.
+        setup: as stated; some effects need a box.
+        clouds: whether any sequence has clouds.
         forces: whether any has forces.
+        catalogue: to choose from.
     """
-    modulus: tuple[type[Effect], ...] = (YoungModulus,) if forces else ()
-    if seen:
-        return (*DIAGNOSED, *modulus)
-    felt = FELT if isinstance(setup.geometry, Shape) else (*FELT, *FELT_IN_A_BLOCK)
-    return (*(kind for kind in DIAGNOSED if kind in felt), *modulus)
+    made = {Measurement.CLOUDS: clouds, Measurement.FORCES: forces}
+    box = isinstance(setup.geometry, Box)
+    return tuple(
+        kind
+        for kind in catalogue
+        if any(made[item] for item in kind.shown_by) and (box or not kind.needs_box)
+    )

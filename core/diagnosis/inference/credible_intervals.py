@@ -1,4 +1,4 @@
-"""How well each parameter of a named cause is known."""
+"""Credible intervals of the parameters of named causes, and of the modulus."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ import numpy as np
 from scipy.stats import t
 
 from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, fit
-from palpate.diagnosis.inference.hypothesis import TWINS, Model
-from palpate.diagnosis.inference.inference_problem import Bench
-from palpate.effects.elastic_material import YoungModulus
-from palpate.effects.sensor import CameraRegistration
+from palpate.diagnosis.inference.hypothesis import Model
+from palpate.diagnosis.inference.posterior import Posterior
+from palpate.effects import Effect, NuisanceBlock
+from palpate.effects.elastic_material import MODULUS_ACCURACY
 from palpate.foundation.arrays import FloatArray
 from palpate.setup.setup import Setup
 
-__all__ = ["intervals", "modulus_interval", "spread_of", "stands"]
+__all__ = ["intervals", "is_supported_by_all_sequences", "modulus_interval", "spread_of"]
 
 
 def _robust(
     blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray, own: slice
 ) -> tuple[FloatArray, FloatArray]:
-    """Most probable change of the columns in `own` (n,), and the half widths (n,) of its 95 %
-    intervals over 1.96.
+    """Return the most probable change of the columns in `own` (n,), and its deviations (n,).
 
-    The larger of two: Laplace's approximation, which trusts the noise model, and the robust spread
-    of Liang and Zeger (1986): how far whole sequences pull in different directions, with as many
-    degrees of freedom as there are sequences, less one.
+    The deviations are half widths of 95 % intervals over 1.96: the larger of Laplace's
+    approximation, which trusts the noise model, and the robust spread of Liang and Zeger (1986)
+    from the pulls of whole sequences, with one degree of freedom less than there are sequences.
     """
     solution = fit(blocks, columns, precision)
     change, laplace = solution.change[own], np.sqrt(np.diag(solution.covariance)[own])
@@ -49,80 +49,80 @@ def _robust(
     )
 
 
-def spread_of(bench: Bench, model: Model) -> FloatArray:
-    """Half widths of the 95 % intervals over 1.96, one for each search coordinate, with what the
-    replay's own error leaves.
+def spread_of(posterior: Posterior, model: Model) -> FloatArray:
+    """Return the deviation of each search coordinate, the replay's own error included.
+
+    It is the half width of the 95 % interval over 1.96.
     """
     own = slice(len(model.nuisance), None)
     robust = _robust(
-        bench.tempered(model), [*model.nuisance, *model.columns], bench.precision(model), own
+        posterior.tempered(model),
+        [*model.nuisance, *model.columns],
+        posterior.precision(model),
+        own,
     )[1]
-    replayed = np.array([item.accuracy for effect in model.effects for item in effect.numbers()])
+    replayed = np.array([item.accuracy for item in model.parameters])
     return np.asarray(np.hypot(robust, replayed))
 
 
-def stands(bench: Bench, model: Model, without: Model) -> bool:
-    """Whether sequences agree that the model's last cause is there: the interval of how much of it
-    they see leaves out none.
+def is_supported_by_all_sequences(evaluator: Evaluator, model: Model, without: Model) -> bool:
+    """Return whether sequences agree on the model's last cause: its share is surely above zero.
 
-    What the cause changes against the model `without` it is one pattern; its share in the data is
-    one where it is right, and is pulled elsewhere by sequences that know nothing of it. The cause's
-    own numbers could not tell: a lump of 50 times the stiffness is like one of 10, and its place
-    means nothing where it is as stiff as the rest.
+    The change of the cause against the model `without` it is one pattern. Its share in the data is
+    one where the cause is right; sequences that show nothing of it pull the share elsewhere. The
+    cause's own numbers could not decide: an inclusion of 50 times the stiffness is like one of 10,
+    and its place means nothing where it is as stiff as the rest.
     """
-    extended = bench.block_with(without, [(model.effects[-1], model.predictions)], without)
-    columns = [*extended.nuisance, *extended.columns, *extended.extra["signatures"]]
+    signature = [(model.effects[-1], model.predictions)]
+    extended = evaluator.with_signatures(without, signature, without)
+    columns = [*extended.nuisance, *extended.columns, *extended.layout.signatures]
     precision = np.zeros((len(columns), len(columns)))
     precision[:-1, :-1], precision[-1, -1] = (
-        bench.precision(extended),
+        evaluator.precision(extended),
         CRITERIA.intervals.pattern_share**-2,
     )
-    share, spread = _robust(bench.tempered(extended), columns, precision, slice(-1, None))
+    share, spread = _robust(evaluator.tempered(extended), columns, precision, slice(-1, None))
     return bool(share[0] > CRITERIA.intervals.normal_quantile * spread[0])
 
 
-def intervals(bench: Bench, model: Model) -> list[dict[str, dict[str, Any]]]:
-    """For each effect: name to value, unit and 95 % interval (magnitudes by sampling)."""
-    spread = spread_of(bench, model)
-    found, at = [], 0
-    for effect in model.effects:
-        number = len(effect.numbers())
+def intervals(posterior: Posterior, model: Model) -> list[dict[str, dict[str, Any]]]:
+    """Return for each effect a mapping from name to value, unit and 95 % interval.
+
+    Intervals of reported numbers that follow from the parameters, such as magnitudes, are sampled.
+    """
+    spread, setup, found = spread_of(posterior, model), posterior.problem.setup, []
+    for effect, own in model.split(spread):
         entry: dict[str, dict[str, Any]] = {}
-        for item, value, sd in zip(
-            effect.numbers(), effect.coordinates, spread[at : at + number], strict=True
-        ):
-            low, high = item.interval(value, CRITERIA.intervals.normal_quantile * sd)
+        for item, value, deviation in zip(effect.numbers(), effect.coordinates, own, strict=True):
+            low, high = item.interval(value, CRITERIA.intervals.normal_quantile * deviation)
             entry[item.name] = {
                 "value": item.value(value),
                 "unit": item.unit,
                 "low": low,
                 "high": high,
             }
-        for name, (reported, unit) in effect.reported(bench.setup).items():
+        for name, (reported, unit) in effect.reported(setup).items():
             entry.setdefault(name, {"value": reported, "unit": unit})
-        if isinstance(effect, CameraRegistration):
-            entry |= _magnitudes(effect, spread[at : at + number], bench.setup)
-        found.append(entry)
-        at += number
+        found.append(entry | _derived_intervals(effect, own, setup))
     return found
 
 
-def modulus_interval(bench: Bench, model: Model) -> tuple[float, float, float] | None:
-    """Young's modulus and its 95 % interval [Pa] by the forces alone, whatever was stated of it;
-    None without forces.
+def modulus_interval(posterior: Posterior, model: Model) -> tuple[float, float, float] | None:
+    """Return Young's modulus and its 95 % interval [Pa] by the forces alone; None without forces.
 
-    For a model that does not have the modulus among its causes.
+    The stated modulus has no weight. The model must not have the modulus among its causes.
     """
-    if not bench.nuisances.forces:
+    problem = posterior.problem
+    if not problem.forces:
         return None
-    (own,) = TWINS[YoungModulus]
-    nuisances = bench.nuisances.precision.copy()
+    (own,) = problem.blocks.places(NuisanceBlock.YOUNG_MODULUS)
+    nuisances = problem.nuisances.precision.copy()
     nuisances[own, own] *= CRITERIA.priors.flat_factor
-    columns, precision = [*model.nuisance, *model.columns], bench.precision(model, nuisances)
-    change, deviation = _robust(bench.tempered(model), columns, precision, slice(own, own + 1))
+    columns, precision = [*model.nuisance, *model.columns], posterior.precision(model, nuisances)
+    change, deviation = _robust(posterior.tempered(model), columns, precision, slice(own, own + 1))
     # A force is linear in the modulus, so that the fit is exact in it and not in its logarithm.
     factor = max(1.0 + float(change[0]), CRITERIA.intervals.least_modulus_factor)
-    spread = float(np.hypot(deviation[0] / factor, YoungModulus.numbers()[0].accuracy))
+    spread = float(np.hypot(deviation[0] / factor, MODULUS_ACCURACY))
     low, value, high = (
         model.setup.material.young_modulus
         * factor
@@ -131,17 +131,21 @@ def modulus_interval(bench: Bench, model: Model) -> tuple[float, float, float] |
     return float(value), float(low), float(high)
 
 
-def _magnitudes(
-    effect: CameraRegistration, spread: FloatArray, setup: Setup
+def _derived_intervals(
+    effect: Effect, deviations: FloatArray, setup: Setup
 ) -> dict[str, dict[str, Any]]:
-    drawn = np.array(effect.coordinates) + spread * np.random.default_rng(0).standard_normal(
-        (CRITERIA.intervals.draws, 6)
-    )
-    magnitudes, found = [effect.moved(one.tolist()).reported(setup) for one in drawn], {}
-    for name in ("translation", "rotation"):
-        value, unit = effect.reported(setup)[name]
-        low, high = np.quantile([float(one[name][0]) for one in magnitudes], [0.025, 0.975])
-        # Noise only ever lengthens a short vector, so that the draws may all lie above its value.
+    """Return value, unit and sampled 95 % interval of reported numbers that are no parameters."""
+    reported = effect.reported(setup)
+    names = [name for name in reported if name not in effect.values()]
+    if not names:
+        return {}
+    noise = np.random.default_rng(0).standard_normal((CRITERIA.intervals.draws, len(deviations)))
+    drawn = np.array(effect.coordinates) + deviations * noise
+    sampled, found = [effect.moved(one.tolist()).reported(setup) for one in drawn], {}
+    for name in names:
+        value, unit = reported[name]
+        low, high = np.quantile([float(one[name][0]) for one in sampled], [0.025, 0.975])
+        # Noise only lengthens a short vector, so that all draws may lie above its value.
         found[name] = {
             "value": value,
             "unit": unit,

@@ -1,49 +1,66 @@
-"""What the screening asks of an effect whose action near nothing is a straight line."""
+"""Setups that differ a little in one number of an effect, from which columns are derived."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.effects import Effect
+from palpate.effects import Effect, Tangent
+from palpate.effects.base import with_effects
 from palpate.setup.setup import Setup
 
-__all__ = ["Tangent", "changed_at_rest"]
+__all__ = ["SetupChange", "changes_at_rest", "prior_deviation", "stepped_setup", "tangent_setup"]
+
+SetupChange = tuple[Setup, float]
+"""A setup that differs a little, and the size of the difference in the column's units."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Tangent:
-    """One column: how the data change with one number of an effect, or to first order with all that
-    the effect does.
+def tangent_setup(tangent: Tangent, setup: Setup) -> SetupChange:
+    """Return the setup with a tangent's change in it, and the size of the change."""
+    effect = tangent.effect
+    if not tangent.of:
+        return effect.apply(setup), 1.0
+    coordinates, names = effect.coordinates, [item.name for item in effect.numbers()]
+    place = names.index(tangent.of)
+    step = CRITERIA.derivatives.step * effect.numbers()[place].scale
+    coordinates[place] += step
+    return effect.at(coordinates).apply(setup), step
 
-    Attributes:
-        effect: where nothing is wrong yet, or of the size whose action is meant.
-        of: the number whose search coordinate the column changes by one; empty for the effect's
-            whole action.
-        spread: prior standard deviation of the column's factor.
+
+def prior_deviation(tangent: Tangent) -> float:
+    """Return the prior standard deviation of a tangent's factor."""
+    if tangent.deviation is not None:
+        return tangent.deviation
+    scale = next(item.scale for item in tangent.effect.numbers() if item.name == tangent.of)
+    return CRITERIA.priors.parameter_steps * scale
+
+
+def stepped_setup(
+    stated: Setup, effects: Sequence[Effect], index: int, number: int, step: float
+) -> SetupChange:
+    """Return the setup with one number of one of its effects a step further, and the step.
+
+    Args:
+        stated: without the effects.
+        effects: all of the setup's effects.
+        index: of the effect.
+        number: of its number.
+        step: in the number's scale; it is taken backwards where the upper bound is too close.
     """
-
-    effect: Effect
-    of: str = ""
-    spread: float
-
-    def changed(self, setup: Setup) -> tuple[Setup, float]:
-        """The setup with the change in it, and how many of the column's units that is."""
-        if not self.of:
-            return self.effect.apply(setup), 1.0
-        coordinates, names = self.effect.coordinates, [item.name for item in self.effect.numbers()]
-        place = names.index(self.of)
-        step = CRITERIA.derivatives.step * self.effect.numbers()[place].scale
-        coordinates[place] += step
-        return self.effect.at(coordinates).apply(setup), step
+    effect, item = effects[index], effects[index].numbers()[number]
+    coordinates, size = effect.coordinates, step * item.scale
+    if item.coordinate(item.high) - coordinates[number] < size:
+        size = -size
+    coordinates[number] += size
+    changed = [*effects[:index], effect.at(coordinates), *effects[index + 1 :]]
+    return with_effects(stated, changed), size
 
 
-def changed_at_rest(
-    tangents: Sequence[Tangent], places: Sequence[int], setup: Setup
-) -> dict[int, tuple[Setup, float]]:
-    """Columns of the tangents that show while nothing is pushed: to the setup a little changed, and
-    the step.
-    """
-    own = zip(places, tangents, strict=True)
-    return {place: tangent.changed(setup) for place, tangent in own if tangent.effect.at_rest()}
+def changes_at_rest(
+    tangents: Sequence[Tangent], columns: Sequence[int], setup: Setup
+) -> dict[int, SetupChange]:
+    """Return the changed setup by column for the tangents that the block at rest shows."""
+    own = zip(columns, tangents, strict=True)
+    return {
+        column: tangent_setup(tangent, setup) for column, tangent in own if tangent.effect.at_rest()
+    }

@@ -1,10 +1,9 @@
-"""Fitting a hypothesis: Gauss-Newton with a trust region, and a look beyond the kinks that
-derivatives do not see.
+"""Fits of a hypothesis by Gauss-Newton with a trust region, followed by a poll around kinks.
 
-A push that slides the base at one friction holds at a slightly higher one. Just below, the fit has
-a kink: to first order no step promises anything, and a few percent away lies a friction that is
-better by a hundred nats. So where an effect has kinks, a fit that has come to rest is asked again a
-little to either side (a poll step of a direct search; Kolda, Lewis and Torczon 2003).
+A push that slides the base at one friction holds at a slightly higher one. Just below that friction
+the objective has a kink: no step promises a gain to first order, and a friction a few percent away
+is better by a hundred nats. Where an effect has kinks, a fit that has converged is therefore tried
+again a little to either side (a poll step of a direct search; Kolda, Lewis and Torczon 2003).
 """
 
 from __future__ import annotations
@@ -15,53 +14,105 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.evidence import explained, within_reach
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.effects import Effect
 from palpate.foundation.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from palpate.diagnosis.inference.inference_problem import Bench
+    from palpate.diagnosis.inference.evaluate import Evaluator
 
-__all__ = ["fitted"]
+__all__ = ["best_fit", "refine", "refit"]
 
 
-def fitted(
-    bench: Bench,
+def refit(
+    evaluator: Evaluator,
+    effects: Sequence[Effect],
+    starts: Sequence[Prediction] | None,
+    hopeless: float = -np.inf,
+) -> Model:
+    """Fit the numbers of these effects and return the best model met.
+
+    Args:
+        evaluator: of the inference problem.
+        effects: as the fit starts.
+        starts: predictions to begin from, one for each sequence.
+        hopeless: a model whose log evidence will hardly reach this [nats] is given up.
+    """
+    evaluator.report(f"fitting {' and '.join(effect.name for effect in effects)}")
+    model = evaluator.evaluate(effects, starts)
+    return best_fit(evaluator, model, evaluator.problem.nuisances.precision, hopeless)
+
+
+def refine(evaluator: Evaluator, model: Model) -> Model:
+    """Fit an accepted model once more, with the mesh error of this model and shared nuisances held.
+
+    Its log evidence no longer compares with that of models scored before. The mesh error of effects
+    with history, whose replay on a fine mesh is expensive, is taken to be that of a replay without
+    them.
+    """
+    problem, state = evaluator.problem, evaluator.state
+    evaluator.report("fitting the causes once more on two meshes")
+    plain = tuple(effect for effect in model.effects if not effect.has_history())
+    if plain:
+        here = (
+            model.predictions
+            if plain == model.effects
+            else evaluator.evaluate(plain, model.predictions).predictions
+        )
+        fine = evaluator.replayed(plain, here, problem.fine_grid)
+        state.noises = [
+            noise.remeshed(coarse, finer)
+            for noise, coarse, finer in zip(state.noises, here, fine, strict=True)
+        ]
+    start = evaluator.assemble(model.effects, model.setup, model.predictions)
+    held = problem.nuisances.with_effects(start.effects)
+    return best_fit(evaluator, start, held, worth=CRITERIA.fits.settled)
+
+
+def best_fit(
+    evaluator: Evaluator,
     model: Model,
     nuisances: FloatArray,
     hopeless: float = -np.inf,
     worth: float = CRITERIA.fits.worth,
 ) -> Model:
-    """The best model met from here on; one whose log evidence will hardly reach `hopeless` is given
-    up.
+    """Return the best model met in a fit that starts from this one.
+
+    Args:
+        evaluator: of the inference problem.
+        model: to start from.
+        nuisances: prior precision of the nuisances.
+        hopeless: a model whose log evidence will hardly reach this [nats] is given up.
+        worth: a step that promises less [nats] is not made.
     """
-    found = _descended(bench, model, nuisances, hopeless, worth)
+    best = _descended(evaluator, model, nuisances, hopeless, worth)
     for _ in range(CRITERIA.fits.polls):
-        better = _polled(bench, found, nuisances, hopeless, worth)
+        better = _polled(evaluator, best, nuisances, hopeless, worth)
         if better is None:
             break
-        found = _descended(bench, better, nuisances, hopeless, worth)
-    return found
+        best = _descended(evaluator, better, nuisances, hopeless, worth)
+    return best
 
 
 def _descended(
-    bench: Bench, model: Model, nuisances: FloatArray, hopeless: float, worth: float
+    evaluator: Evaluator, model: Model, nuisances: FloatArray, hopeless: float, worth: float
 ) -> Model:
-    """Gauss-Newton."""
-    best, radius = bench.objective(model, nuisances), CRITERIA.fits.trust
+    """Return the model after Gauss-Newton steps."""
+    best, radius = evaluator.objective(model, nuisances), CRITERIA.fits.trust
     for iteration in range(CRITERIA.fits.iterations):
-        promised = _promised(bench, model, nuisances)
+        promised = _promised(evaluator, model, nuisances)
         lost = best + CRITERIA.fits.optimism[min(iteration, 1)] * promised < hopeless or (
             iteration == 2 and best < hopeless
         )
         if lost or promised < worth:
             break
-        step = _step(bench, model, nuisances, radius)
+        step = _step(evaluator, model, nuisances, radius)
         if np.abs(step / model.scales).max() < CRITERIA.fits.least_step:
             break
-        trial = bench.evaluate(_shifted(model, step), model.predictions)
-        value = bench.objective(trial, nuisances)
+        trial = _shifted(evaluator, model, step)
+        value = evaluator.objective(trial, nuisances)
         if value > best:
             gained, model, best = value - best, trial, value
             if gained < 2 * worth:
@@ -74,23 +125,24 @@ def _descended(
 
 
 def _polled(
-    bench: Bench, model: Model, nuisances: FloatArray, hopeless: float, worth: float
+    evaluator: Evaluator, model: Model, nuisances: FloatArray, hopeless: float, worth: float
 ) -> Model | None:
-    """The first model a little to a side that is better, None without one, or where the fit was
-    given up.
+    """Return the first better model a little to a side; None if there is none.
+
+    None also for a fit that was given up.
     """
-    best = bench.objective(model, nuisances)
+    best = evaluator.objective(model, nuisances)
     if best < hopeless:
         return None
-    for step in _aside(model):
-        trial = bench.evaluate(_shifted(model, step), model.predictions)
-        if bench.objective(trial, nuisances) > best + worth:
+    for step in _poll_steps(model):
+        trial = _shifted(evaluator, model, step)
+        if evaluator.objective(trial, nuisances) > best + worth:
             return trial
     return None
 
 
-def _aside(model: Model) -> Iterator[FloatArray]:
-    """Steps to either side along each number of an effect that has kinks."""
+def _poll_steps(model: Model) -> Iterator[FloatArray]:
+    """Yield steps to either side along each number of an effect that has kinks."""
     kinked = [effect.kinked for effect in model.effects for _ in effect.numbers()]
     for row in np.flatnonzero(kinked):
         for way in (CRITERIA.fits.poll_step, -CRITERIA.fits.poll_step):
@@ -99,25 +151,22 @@ def _aside(model: Model) -> Iterator[FloatArray]:
             yield step
 
 
-def _step(bench: Bench, model: Model, nuisances: FloatArray, reach: float) -> FloatArray:
-    """Most probable change of the search coordinates, none by more than `reach` of its scales."""
+def _step(evaluator: Evaluator, model: Model, nuisances: FloatArray, reach: float) -> FloatArray:
+    """Return the most probable change of the search coordinates, at most `reach` scales each."""
     columns, first = [*model.nuisance, *model.columns], len(model.nuisance)
-    own, precision = range(first, len(columns)), bench.held(model, nuisances)
-    return within_reach(bench.tempered(model), columns, precision, own, model.scales, reach)[first:]
+    own, precision = range(first, len(columns)), evaluator.bounded_precision(model, nuisances)
+    blocks = evaluator.tempered(model)
+    return within_reach(blocks, columns, precision, own, model.scales, reach)[first:]
 
 
-def _promised(bench: Bench, model: Model, nuisances: FloatArray) -> float:
-    """What the best values of the model's search coordinates would gain to first order [nats]."""
-    blocks, whole = bench.tempered(model), bench.held(model, nuisances)
+def _promised(evaluator: Evaluator, model: Model, nuisances: FloatArray) -> float:
+    """Return the gain of the best search coordinates to first order [nats]."""
+    blocks, whole = evaluator.tempered(model), evaluator.bounded_precision(model, nuisances)
     return explained(blocks, [*model.nuisance, *model.columns], whole) - explained(
         blocks, model.nuisance, nuisances
     )
 
 
-def _shifted(model: Model, step: FloatArray) -> Sequence[Effect]:
-    effects, at = [], 0
-    for effect in model.effects:
-        number = len(effect.numbers())
-        effects.append(effect.at((np.array(effect.coordinates) + step[at : at + number]).tolist()))
-        at += number
-    return effects
+def _shifted(evaluator: Evaluator, model: Model, step: FloatArray) -> Model:
+    """Return the model with its search coordinates a step further."""
+    return evaluator.evaluate(model.effects_at(model.coordinates + step), model.predictions)

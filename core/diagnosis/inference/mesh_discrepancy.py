@@ -1,10 +1,9 @@
-"""Whether the grid is too coarse for the data: the pattern that tells a replay from the same one on
-a finer grid.
+"""The test of the diagnosis's grid, by the difference between replays on two grids.
 
 A diagnosis replays the stated setup on two grids of its own, whose difference is a nuisance of
-every model. Data that ask for much more of it than that say that both are too coarse. A setup that
-states an even grid of its own is replayed on that, and the diagnosis's grid is then one more model,
-which names the stated one where it explains what was measured better.
+every model. Data that need a large multiple of it show that both are too coarse. A setup that
+states an even grid of its own is replayed on that grid. The grid of the diagnosis is then one more
+model, which names the stated grid as a cause where it explains the data better.
 """
 
 from __future__ import annotations
@@ -16,34 +15,30 @@ import numpy as np
 
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.noise_model import Noise, rows_of
-from palpate.effects.geometry import MeshResolution
 
-__all__ = ["OWN_GRID", "too_coarse", "under_stated", "with_columns"]
-
-OWN_GRID = MeshResolution(element_size=MeshResolution.numbers()[0].low)
-"""A grid so fine is no grid of the setup's any more."""
+__all__ = ["too_coarse", "under_stated", "with_columns"]
 
 
 def too_coarse(screened: float, bound: float) -> str:
-    """What a report says where the data ask for a finer grid than the diagnosis has; empty where
-    they do not.
+    """Return the warning that the data need a finer grid than the diagnosis has, or no text.
 
     Args:
-        screened: gain of `mesh_candidate` [nats].
+        screened: linear gain of the mesh error [nats].
         bound: gain from which a cause is named [nats].
     """
     if screened <= bound:
         return ""
     return (
-        f"the data ask for a finer grid than the diagnosis replays on: more of the difference between its two grids gains "
-        f"{screened:.0f} nats, {bound:.0f} are chance; what is named may owe some of its gain to the grid"
+        "the data ask for a finer grid than the diagnosis replays on: more of the difference "
+        f"between its two grids gains {screened:.0f} nats, {bound:.0f} are chance; what is named "
+        "may owe some of its gain to the grid"
     )
 
 
 def with_columns(
     replayed: Sequence[Prediction], stated: Sequence[Prediction]
 ) -> tuple[Prediction, ...]:
-    """Replays on another grid with the columns of those on the stated one."""
+    """Return replays on another grid with the columns of those on the stated one."""
     return tuple(
         here.replace_columns(rows_of(there)[1])
         for here, there in zip(replayed, stated, strict=True)
@@ -51,8 +46,9 @@ def with_columns(
 
 
 def under_stated(noises: Sequence[Noise], stated: Sequence[Prediction]) -> list[Noise]:
-    """The noise as measured on the diagnosis's own grids, for a stated model on another: what is
-    lost falls back on it.
+    """Return the noise of the diagnosis's own grids for a stated model on another grid.
+
+    Its residual is the one that counts where a model has no value.
     """
     found = []
     for noise, item in zip(noises, stated, strict=True):

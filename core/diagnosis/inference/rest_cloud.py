@@ -22,15 +22,15 @@ from palpate.measurement.patch_averages import patch_means
 from palpate.measurement.segmentation import Cleaner
 from palpate.measurement.surface_gaps import Surface, gaps
 from palpate.mesh.protocol import Meshing
-from palpate.registration.registration import motion_jacobian
+from palpate.registration.pose import motion_jacobian
 from palpate.replay.replay import rest
 from palpate.setup.setup import Setup
 
-__all__ = ["StaticChannel"]
+__all__ = ["RestCloud"]
 
 
 @dataclass(frozen=True, eq=False)
-class StaticChannel:
+class RestCloud:
     """The rest cloud, reduced; every model is compared at the same places.
 
     Attributes:
@@ -50,7 +50,7 @@ class StaticChannel:
     errors: CameraErrors
 
     @classmethod
-    def of(cls, cloud: FloatArray, cleaner: Cleaner, setup: Setup, grid: Meshing) -> StaticChannel:
+    def of(cls, cloud: FloatArray, cleaner: Cleaner, setup: Setup, grid: Meshing) -> RestCloud:
         """From the raw rest cloud (n, 3) [m], camera frame, under the stated setup."""
         clean = cleaner.clean(cloud)
         table, height, scatter = _table_cells(clean.table_points)

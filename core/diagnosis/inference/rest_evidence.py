@@ -15,14 +15,14 @@ import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.evidence import Block
-from palpate.diagnosis.inference.rest_cloud import StaticChannel
+from palpate.diagnosis.inference.rest_cloud import RestCloud
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.touch_correction import touch_misses, touched_places
 from palpate.mesh.protocol import Meshing
-from palpate.registration.registration import motion_jacobian
+from palpate.registration.pose import motion_jacobian
 from palpate.setup.setup import Setup
 
-__all__ = ["Still", "touch_block"]
+__all__ = ["RestEvidence", "touch_block"]
 
 
 Varied = dict[int, tuple[Setup, float]]
@@ -30,15 +30,15 @@ Varied = dict[int, tuple[Setup, float]]
 
 
 @dataclass(frozen=True, eq=False)
-class Still:
+class RestEvidence:
     """All evidence without a push, as one block of data."""
 
-    cloud: StaticChannel
+    cloud: RestCloud
 
     def block(
         self, stated: Setup, setup: Setup, grid: Meshing, columns: int, varied: Varied
     ) -> Block:
-        """Quadratic form of a model; as `StaticChannel.block`, whose arguments these are, with the
+        """Quadratic form of a model; as `RestCloud.block`, whose arguments these are, with the
         touches beside the cloud.
         """
         cloud, touches = (
@@ -56,7 +56,7 @@ def touch_block(setup: Setup, grid: Meshing, columns: int, varied: Varied) -> Bl
         setup: of the model.
         grid: for the sag of the landmarks.
         columns: total number of columns.
-        varied: as for `StaticChannel`.
+        varied: as for `RestCloud`.
 
     Of three touches or more; fewer registered nothing, and say nothing.
     """

@@ -17,7 +17,8 @@ from palpate.dataset import Dataset, Sequence
 from palpate.dataset.tool_smoothing import SMOOTHING, smooth_centres
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.force_record import ForceRecord
-from palpate.diagnosis.observation.frame_groups import Group, Observations, observe_all
+from palpate.diagnosis.observation.frame_groups import Group, Observations
+from palpate.diagnosis.observation.observe_clouds import observe_all
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DiagnosisError
 from palpate.foundation.processes import at_once
@@ -97,7 +98,7 @@ def _instants(
 ) -> tuple[FloatArray, tuple[Group, ...]]:
     """Times (f,) [s] of the instants, and their groups: each push on the way in, and held."""
     found, groups, count = [], [], 0
-    for probe, run in enumerate(pushes, start=1):
+    for push, run in enumerate(pushes, start=1):
         own, when = depth[run], times[run]
         full = int(own.argmax())
         for share in CRITERIA.force_only.depth_shares:
@@ -105,11 +106,11 @@ def _instants(
             before = np.flatnonzero(own[: full + 1] < share * own[full])
             if len(before) and before[-1] + 1 < full:
                 found.append(when[before[-1] + 1])
-                groups.append(Group((count,), _NO_POINTS, False, probe=probe))
+                groups.append(Group((count,), _NO_POINTS, False, push=push))
                 count += 1
         held = _held(when, own, full)
         found += held.tolist()
-        groups.append(Group(tuple(range(count, count + len(held))), _NO_POINTS, False, probe=probe))
+        groups.append(Group(tuple(range(count, count + len(held))), _NO_POINTS, False, push=push))
         count += len(held)
     return np.array(found), tuple(groups)
 
@@ -145,8 +146,8 @@ def pushed_places(data: Ordered[Observations], setup: Setup) -> tuple[FloatArray
         if not item.force_only:
             continue
         centres = item.centres(setup)
-        for probe in sorted({group.probe for group in item.groups}):
-            rows = [row for row, group in enumerate(item.groups) if group.probe == probe]
+        for push in sorted({group.push for group in item.groups}):
+            rows = [row for row, group in enumerate(item.groups) if group.push == push]
             first = centres[rows[0]][None]
             distance, normal = setup.geometry.facing(first)
             places.append(first[0] - distance[0] * normal[0])
@@ -156,7 +157,7 @@ def pushed_places(data: Ordered[Observations], setup: Setup) -> tuple[FloatArray
 
 def deepest_rows(item: Observations) -> list[int]:
     """Number of the group in which each push is held, in the order of the pushes."""
-    last = {group.probe: row for row, group in enumerate(item.groups)}
+    last = {group.push: row for row, group in enumerate(item.groups)}
     return list(last.values())
 
 

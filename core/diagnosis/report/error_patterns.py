@@ -1,6 +1,4 @@
-"""The two pictures that convince: the measured error pattern, and the pattern that the named cause
-predicts.
-"""
+"""Patterns of the measured error and of the error that the named causes predict, as a figure."""
 
 from __future__ import annotations
 
@@ -14,8 +12,8 @@ import numpy as np
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.gain.probe_errors import fixed_pattern
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DiagnosisError
@@ -27,8 +25,13 @@ __all__ = ["ErrorPatterns", "draw_patterns", "error_patterns"]
 
 @dataclass(frozen=True, eq=False)
 class ErrorPatterns:
-    """Error by patch (p,) [m], NaN where unseen: measured minus stated model, and extended minus
-    stated model.
+    """Error patterns over p surface patches.
+
+    Attributes:
+        centres: (p, 3) of the patches, phantom frame [m].
+        normals: (p, 3) outwards.
+        measured: (p,) measured minus stated model [m]; NaN without points.
+        predicted: (p,) extended minus stated model [m]; NaN without points.
     """
 
     centres: FloatArray
@@ -48,14 +51,15 @@ class ErrorPatterns:
 
 
 def error_patterns(
-    bench: Bench, data: Sequence[Observations], baseline: Model, found: Model
+    evaluator: Evaluator, data: Sequence[Observations], baseline: Model, found: Model
 ) -> ErrorPatterns:
-    """The error of the one push in which the cause matters most, and what the cause predicts of it,
-    smoothed alike.
+    """Compute the error of one push and the causes' prediction of it, with the same smoothing.
 
-    A cause that shows in the push is compared without what the untouched frames show, the camera's
-    pattern; one that shows in the untouched block already (sag, a camera that was moved) with it.
-    Where no cause is named it is the push with the largest error.
+    It is the push that the causes change most; if no cause is named, the push with the largest
+    error. The camera's fixed pattern is subtracted, unless the causes change the untouched phantom
+    more than the push (sag, a moved camera).
+
+    Raises DiagnosisError if the tool touches the phantom in no fitted sequence.
     """
     pairs = [
         row
@@ -76,29 +80,36 @@ def error_patterns(
     unnamed = not any(rows.change.any() for _, _, rows in compared)
     best: tuple[float, _Rows] | None = None
     for touched, _, rows in compared:
-        for probe in np.unique(touched[touched > 0]):
-            points = rows.points * (touched == probe)[:, None]
+        for push in np.unique(touched[touched > 0]):
+            points = rows.points * (touched == push)[:, None]
             size = float(((rows.error if unnamed else rows.change) ** 2 * points).sum())
             if best is None or size > best[0]:
                 best = (size, _Rows(points, rows.error, rows.change))
     if best is None:
         raise DiagnosisError("the tool touches the phantom in no sequence that was fitted on")
     points, error, change = best[1].points, best[1].error, best[1].change
-    near, weight = _kernel(bench.surface), points.sum(axis=0)
+    near, weight = _kernel(evaluator.problem.surface), points.sum(axis=0)
     total = near @ weight
     shown = np.where((total >= CRITERIA.figures.least_points) & (weight > 0), total, np.nan)
     measured, predicted = (
         near @ (points * values).sum(axis=0) / shown for values in (error, change)
     )
     return ErrorPatterns(
-        bench.surface.patch_centres, bench.surface.patch_normals, measured, predicted
+        evaluator.problem.surface.patch_centres,
+        evaluator.problem.surface.patch_normals,
+        measured,
+        predicted,
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Points, error of the stated model and what the cause changes, by group and patch (g, p); zero
-    where unseen.
+    """One sequence by group and patch, (g, p) each; zero without points.
+
+    Attributes:
+        points: number of points.
+        error: of the stated model [m].
+        change: by the causes [m].
     """
 
     points: FloatArray
@@ -109,10 +120,17 @@ class _Rows:
 def _compare(
     item: Observations, before: Prediction, after: Prediction, *, whole: bool, lasting: bool
 ) -> tuple[FloatArray, float, _Rows]:
-    """Probe of each touched group (g,), how much the cause changes untouched frames, and the errors
-    in the touched ones.
+    """Compare both models with one sequence.
 
-    What a push leaves behind (`lasting`: a dent, a block that slid) is of that push.
+    Args:
+        item: the sequence.
+        before: its prediction by the stated model.
+        after: its prediction by the extended model.
+        whole: whether to keep the camera's fixed pattern.
+        lasting: whether groups after a push count as its own, because it leaves a mark.
+
+    Returns the number of the push plus one of each touched group (g,), else 0; the squared change
+    of untouched frames; and the errors of the touched groups.
     """
     (own, known), other = (
         fixed_pattern(item, before, lasting),
@@ -121,9 +139,9 @@ def _compare(
     seen = (
         np.isfinite(before.gap) & np.isfinite(after.gap) & (known >= CRITERIA.figures.least_points)
     )
-    counts = [not group.free or (lasting and group.probe > 0) for group in item.groups]
+    counts = [not group.free or (lasting and group.push > 0) for group in item.groups]
     touched = np.array(
-        [1 + group.probe if one else 0 for group, one in zip(item.groups, counts, strict=True)]
+        [1 + group.push if one else 0 for group, one in zip(item.groups, counts, strict=True)]
     )
     points = np.where(seen & (touched > 0)[:, None], before.count, 0.0)
     still = np.where(known >= CRITERIA.figures.least_points, own - other, 0.0)
@@ -144,8 +162,9 @@ def _kernel(surface: Surface) -> FloatArray:
 
 
 def draw_patterns(found: ErrorPatterns, surface: Surface, path: Path) -> None:
-    """Both patterns, or the error alone where no cause is named, on the unfolded block, one colour
-    scale in mm, as PNG.
+    """Draw both patterns, or the error alone if no cause is named, on the unfolded block, as PNG.
+
+    Both have one colour scale [mm].
     """
     shown = [("measured error", found.measured), ("predicted by the cause", found.predicted)]
     shown = shown if np.nan_to_num(found.predicted).any() else shown[:1]
@@ -171,7 +190,7 @@ def draw_patterns(found: ErrorPatterns, surface: Surface, path: Path) -> None:
 def _unfold(
     axes: Any, found: ErrorPatterns, values: FloatArray, surface: Surface, limit: float
 ) -> Any:
-    """Scatter the patches of the top and, folded out around it, of the four sides."""
+    """Scatter the patches of the top and, folded out around it, those of the four sides."""
     x, y, z = surface.geometry.size
     centres, normals = found.centres, found.normals
     place = centres[:, :2].copy()

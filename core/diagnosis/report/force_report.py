@@ -1,4 +1,4 @@
-"""What a report says of a palpation without clouds: each push, the modulus, and of a lump its
+"""The report of a palpation without clouds: each push, Young's modulus, and an inclusion's
 footprint, depth and cover.
 """
 
@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.observation.force_only import deepest_rows
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.report.inclusion_footprint import Footprint, depth_of, footprint_of
 from palpate.diagnosis.search.findings import Findings
+from palpate.effects import NuisanceBlock
 from palpate.effects.base import with_effects
-from palpate.effects.elastic_material import StiffInclusion
 from palpate.foundation.arrays import FloatArray
 
 __all__ = ["PushForces", "push_forces", "with_palpation"]
@@ -25,13 +25,15 @@ __all__ = ["PushForces", "push_forces", "with_palpation"]
 
 @dataclass(frozen=True, eq=False)
 class PushForces:
-    """The pushes that were fitted on, each at its full depth.
+    """Forces of the k fitted pushes, each at its full depth.
 
     Attributes:
-        place, normal: (k, 3) on the stated surface [m], and outwards.
+        place: (k, 3) on the stated surface [m].
+        normal: (k, 3) outwards.
         depth: (k,) [m].
-        measured, stated, extended: (k,) the force along the normal [N], measured and under both
-            models; NaN where a replay failed.
+        measured: (k,) force along the normal [N].
+        stated: (k,) the same of the stated model; NaN without an equilibrium.
+        extended: (k,) the same of the extended model; NaN without an equilibrium.
     """
 
     place: FloatArray
@@ -42,7 +44,7 @@ class PushForces:
     extended: FloatArray
 
     def to_json(self) -> list[dict[str, Any]]:
-        """Rows of the report, SI units."""
+        """Rows of the report, in SI units."""
         return [
             {
                 "place": np.round(place, 5).tolist(),
@@ -59,19 +61,19 @@ class PushForces:
 
 
 def push_forces(
-    bench: Bench, data: Sequence[Observations], baseline: Model, found: Model
+    evaluator: Evaluator, data: Sequence[Observations], baseline: Model, found: Model
 ) -> PushForces:
-    """Of all sequences without clouds, in their order."""
+    """Collect the pushes of all sequences without clouds, in their order."""
     rows: list[tuple[float, ...]] = []
-    place, normal = bench.pushed
+    place, normal = evaluator.problem.pushes
     for item, before, after in zip(data, baseline.predictions, found.predictions, strict=True):
         if not item.force_only or before.forces is None or after.forces is None:
             continue
-        centres = item.centres(bench.setup)
+        centres = item.centres(evaluator.problem.setup)
         for row in deepest_rows(item):
             out = normal[len(rows)]
-            depth = bench.setup.tool.radius - float(
-                bench.setup.geometry.facing(centres[row][None])[0][0]
+            depth = evaluator.problem.setup.tool.radius - float(
+                evaluator.problem.setup.geometry.facing(centres[row][None])[0][0]
             )
             stated, extended = (
                 side.forces.force[row] @ out for side in (before, after) if side.forces is not None
@@ -88,22 +90,24 @@ def push_forces(
 
 
 def with_palpation(
-    report: dict[str, Any], bench: Bench, data: Sequence[Observations], findings: Findings
+    report: dict[str, Any], evaluator: Evaluator, data: Sequence[Observations], findings: Findings
 ) -> tuple[dict[str, Any], PushForces, Footprint | None]:
-    """The report with `palpation`, and with `footprint`, `depth` and `cover` of a lump among its
-    causes; and what is drawn.
+    """Add `palpation` to a report, and `footprint`, `depth` and `cover` to an inclusion among its
+    causes.
+
+    Returns the report, and the pushes and the footprint for the figure.
     """
     model = findings.best.model if findings.best else findings.baseline
-    pushes = push_forces(bench, data, findings.baseline, model)
+    pushes = push_forces(evaluator, data, findings.baseline, model)
     causes, shown = list(report["causes"]), None
     for index, effect in enumerate(model.effects):
-        if not isinstance(effect, StiffInclusion):
+        if effect.inclusion is None:
             continue
-        bench.tell("where the lump is felt")
+        evaluator.report("where the lump is felt")
         shown = footprint_of(
-            bench, effect, _without(bench, model, index), float(np.median(pushes.depth))
+            evaluator, effect, _without(evaluator, model, index), float(np.median(pushes.depth))
         )
-        depth, cover = depth_of(bench, model, index)
+        depth, cover = depth_of(evaluator, model, index)
         added = {
             "depth": depth,
             "cover": cover,
@@ -114,26 +118,25 @@ def with_palpation(
         "pushes": len(pushes.depth),
         "depth": {"value": round(float(np.median(pushes.depth)), 5), "unit": "m"},
         "force": {"value": round(float(np.median(pushes.measured)), 5), "unit": "N"},
-        "young_modulus": _modulus(report),
-        "weighed": [kind.name for kind in bench.weighed],
+        "young_modulus": _modulus(evaluator, report),
+        "weighed": [kind.name for kind in evaluator.problem.applicable],
         "felt": pushes.to_json(),
     }
     return {**report, "causes": causes, "palpation": palpation}, pushes, shown
 
 
-def _without(bench: Bench, model: Model, index: int) -> Any:
+def _without(evaluator: Evaluator, model: Model, index: int) -> Any:
     others = [effect for number, effect in enumerate(model.effects) if number != index]
-    return with_effects(bench.setup, others)
+    return with_effects(evaluator.problem.setup, others)
 
 
-def _modulus(report: dict[str, Any]) -> dict[str, Any] | None:
-    """Young's modulus with its interval, as a cause or as identified; None where the forces do not
-    tell it.
-    """
-    for row in (*report["causes"], *report["identified"]):
-        if row["effect"] == "young_modulus":
-            entry: dict[str, Any] = row["parameters"]["E"]
-            return entry
+def _modulus(evaluator: Evaluator, report: dict[str, Any]) -> dict[str, Any] | None:
+    """Young's modulus with its interval, as a cause or as identified; None if it is neither."""
+    for kind in evaluator.problem.effects_sharing(NuisanceBlock.YOUNG_MODULUS):
+        for row in (*report["causes"], *report["identified"]):
+            if row["effect"] == kind.name:
+                entry: dict[str, Any] = row["parameters"][kind.numbers()[0].name]
+                return entry
     return None
 
 

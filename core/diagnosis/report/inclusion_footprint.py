@@ -1,11 +1,10 @@
-"""An inclusion as a hand would mark it: where on the surface it is felt, and how deep it lies.
+"""Footprint and depth of an inclusion in force measurements.
 
-The footprint is the outline, on the surface, of where a push meets at least half of the largest
-change that the lump makes to the force of such a push. Pushes as deep as those that were made are
-replayed with the lump and without, on rings around the place of the surface nearest to it. Depths
-are of the lump's centre and of its near side (`cover`), with intervals from the fit: parameters are
-drawn as they were fitted, together, since a lump that lies deeper must be larger or stiffer to be
-felt as much.
+The footprint is the outline, on the surface, of the area in which a push meets at least half of the
+largest change of its force by the inclusion. Pushes as deep as the measured ones are replayed with
+the inclusion and without it, on rings around the surface place nearest to it. Depths are those of
+the inclusion's centre and of its near side (`cover`). Their intervals come from joint draws of its
+fitted parameters, because a deeper inclusion must be larger or stiffer to have the same effect.
 """
 
 from __future__ import annotations
@@ -17,10 +16,10 @@ import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.credible_intervals import spread_of
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import fit
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
-from palpate.effects.elastic_material import StiffInclusion
+from palpate.effects import Effect
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.protocol import Meshing
 from palpate.mesh.push_meshes import PushMeshSpec
@@ -32,13 +31,14 @@ __all__ = ["Footprint", "depth_of", "footprint_of", "outline"]
 
 @dataclass(frozen=True, eq=False)
 class Footprint:
-    """Where a lump is felt.
+    """Area in which an inclusion changes the force of a push.
 
     Attributes:
-        middle, normal: (3,) place of the surface nearest to the lump [m], and outwards.
-        contour: (w, 3) around it [m].
-        strongest: largest change of the force of a push that the lump makes [1].
-        depth: of such a push [m].
+        middle: (3,) place of the surface nearest to the inclusion [m].
+        normal: (3,) outwards.
+        contour: (w, 3) outline on the surface [m].
+        strongest: largest relative change of the force [1].
+        depth: of the pushes [m].
     """
 
     middle: FloatArray
@@ -49,11 +49,11 @@ class Footprint:
 
     @property
     def area(self) -> float:
-        """Within the contour, on the plane that touches the surface in the middle [m^2]."""
+        """Area within the contour on the tangent plane in the middle [m^2]."""
         return _area(self.contour, self.normal)
 
     def to_json(self) -> dict[str, Any]:
-        """As the report has it, metres."""
+        """Plain values in metres, as in the report."""
         return {
             "unit": "m",
             "contour": np.round(self.contour, 5).tolist(),
@@ -66,22 +66,26 @@ class Footprint:
 
 
 def footprint_of(
-    bench: Bench, lump: StiffInclusion, without: Setup, depth: float
+    evaluator: Evaluator, effect: Effect, without: Setup, depth: float
 ) -> Footprint | None:
-    """Of a lump in an otherwise known body, under pushes so deep [m]; None where it is nowhere
-    felt.
+    """Compute the footprint of an inclusion; None if it changes no push.
 
     Args:
-        without: the setup without the lump.
+        evaluator: with the stated geometry and the coarse mesh.
+        lump: the inclusion.
+        without: the setup without it.
+        depth: of the pushes [m].
     """
-    geometry = bench.setup.geometry
+    lump, problem = effect.inclusion, evaluator.problem
+    assert lump is not None
+    geometry, grid = problem.setup.geometry, problem.coarse_grid
     centre = np.array([[lump.x, lump.y, lump.z]])
-    middle, normal = _on_surface(bench, centre)
-    places, normals = _rings(bench, middle[0], normal[0], lump.radius)
-    grid = bench.rough.at(places) if isinstance(bench.rough, PushMeshSpec) else bench.rough
-    with_lump = lump.apply(without)
+    middle, normal = _on_surface(evaluator, centre)
+    places, normals = _rings(evaluator, middle[0], normal[0], lump.radius)
+    grid = grid.at(places) if isinstance(grid, PushMeshSpec) else grid
+    with_lump = effect.apply(without)
     pending = [
-        bench.workers.run(_resisting, (without, with_lump), grid, place, out, depth)
+        evaluator.workers.run(_resisting, (without, with_lump), grid, place, out, depth)
         for place, out in zip(places, normals, strict=True)
     ]
     forces = np.array([future.result() for future in pending])
@@ -105,11 +109,15 @@ def footprint_of(
 
 
 def outline(middle: float, rings: FloatArray, level: float) -> FloatArray:
-    """How far from the middle (w,) [radii] the change falls to a level, along each way of rings (r,
-    w); linear in between.
+    """Distances (w,) [radii] from the middle at which the change falls to a level.
 
-    The first fall counts that is followed by no rise above the level; at most the last ring, at
-    least half of the first.
+    The change is interpolated linearly. The last fall below the level counts; the distance is at
+    most that of the last ring and at least half of that of the first.
+
+    Args:
+        middle: change in the middle [1].
+        rings: (r, w) change on each ring along each direction [1].
+        level: [1].
     """
     radii = np.array([0.0, *CRITERIA.footprint.rings])
     found = np.empty(rings.shape[1])
@@ -128,7 +136,7 @@ def outline(middle: float, rings: FloatArray, level: float) -> FloatArray:
 
 
 def _ways(normal: FloatArray) -> FloatArray:
-    """Unit vectors (w, 3) along the surface, evenly around the normal."""
+    """Unit vectors (w, 3) along the surface, at even angles around the normal."""
     first = np.cross(normal, [0.0, 1.0, 0.0] if abs(normal[1]) < 0.9 else [1.0, 0.0, 0.0])
     first /= np.linalg.norm(first)
     turn = 2 * np.pi * np.arange(CRITERIA.footprint.directions) / CRITERIA.footprint.directions
@@ -138,31 +146,27 @@ def _ways(normal: FloatArray) -> FloatArray:
 
 
 def _rings(
-    bench: Bench, middle: FloatArray, normal: FloatArray, radius: float
+    evaluator: Evaluator, middle: FloatArray, normal: FloatArray, radius: float
 ) -> tuple[FloatArray, FloatArray]:
-    """The middle and the rings around it, on the surface, and its normals there (1 + r w, 3)."""
+    """Places of middle and rings on the surface, and its normals there, (1 + r w, 3) each."""
     ways = _ways(normal)
     flat = np.concatenate(
         [middle[None], *(middle + ring * radius * ways for ring in CRITERIA.footprint.rings)]
     )
-    distance, out = bench.setup.geometry.facing(flat)
+    distance, out = evaluator.problem.setup.geometry.facing(flat)
     return flat - distance[:, None] * out, out
 
 
-def _on_surface(bench: Bench, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Places of the free surface (m, 3) [m] nearest to points within the body, and its normals
-    there.
-    """
-    distance, normals = bench.setup.geometry.facing(points)
+def _on_surface(evaluator: Evaluator, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Places of the free surface (m, 3) [m] nearest to points in the body, and its normals."""
+    distance, normals = evaluator.problem.setup.geometry.facing(points)
     return points - distance[:, None] * normals, normals
 
 
 def _resisting(
     setups: tuple[Setup, Setup], grid: Meshing, place: FloatArray, normal: FloatArray, depth: float
 ) -> tuple[float, float]:
-    """Force [N] against a push into a place (3,) [m] under each setup; NaN where there is no
-    equilibrium.
-    """
+    """Force [N] against a push into a place (3,) [m] under each setup; NaN without equilibrium."""
     found = []
     for setup in setups:
         block = Replay(setup, grid, CRITERIA.replay.footprint_tolerance)
@@ -173,34 +177,39 @@ def _resisting(
     return found[0], found[1]
 
 
-def depth_of(bench: Bench, model: Model, index: int) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Depth of the centre of a model's lump below the surface, and of its near side, each with a 95
-    % interval [m].
+def depth_of(
+    evaluator: Evaluator, model: Model, index: int
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Depths of an inclusion's centre and near side below the surface, with 95 % intervals [m].
 
     Args:
-        index: which of the model's effects the lump is.
+        evaluator: of the fitted sequences.
+        model: with the inclusion among its effects.
+        index: of the inclusion among them.
     """
-    lump = model.effects[index]
-    assert isinstance(lump, StiffInclusion)
+    effect = model.effects[index]
     at = sum(len(effect.numbers()) for effect in model.effects[:index])
-    own = slice(at, at + len(lump.numbers()))
-    drawn = [lump.at(row.tolist()) for row in _drawn(bench, model, own)]
-    depths = -bench.setup.geometry.facing(
-        np.array([[one.x, one.y, one.z] for one in (lump, *drawn)])
+    own = slice(at, at + len(effect.numbers()))
+    drawn = [effect.at(row.tolist()) for row in _drawn(evaluator, model, own)]
+    balls = [ball for one in (effect, *drawn) if (ball := one.inclusion) is not None]
+    depths = -evaluator.problem.setup.geometry.facing(
+        np.array([[ball.x, ball.y, ball.z] for ball in balls])
     )[0]
-    covers = depths - np.array([one.radius for one in (lump, *drawn)])
+    covers = depths - np.array([ball.radius for ball in balls])
     return _interval(depths), _interval(np.maximum(covers, 0.0))
 
 
-def _drawn(bench: Bench, model: Model, own: slice) -> FloatArray:
-    """Search coordinates (d, n) of one effect as the fit leaves them: Laplace's correlations,
-    deviations as in the intervals.
+def _drawn(evaluator: Evaluator, model: Model, own: slice) -> FloatArray:
+    """Draw search coordinates (d, n) of one effect.
+
+    Their correlations are those of the Laplace approximation, their deviations those of the
+    intervals.
     """
     columns = [*model.nuisance, *model.columns]
-    covariance = fit(bench.tempered(model), columns, bench.precision(model)).covariance
+    covariance = fit(evaluator.tempered(model), columns, evaluator.precision(model)).covariance
     shift = len(model.nuisance)
     part = covariance[shift + own.start : shift + own.stop, shift + own.start : shift + own.stop]
-    wider = spread_of(bench, model)[own] / np.sqrt(np.diag(part))
+    wider = spread_of(evaluator, model)[own] / np.sqrt(np.diag(part))
     draws = np.random.default_rng(0).multivariate_normal(
         np.zeros(len(part)), part * np.outer(wider, wider), size=CRITERIA.footprint.draws
     )
@@ -208,7 +217,7 @@ def _drawn(bench: Bench, model: Model, own: slice) -> FloatArray:
 
 
 def _interval(values: FloatArray) -> dict[str, Any]:
-    """The first is the value, the others are draws of it."""
+    """Value and interval of draws (1 + d,), of which the first is the value."""
     low, high = np.quantile(values[1:], [0.025, 0.975])
     value = float(values[0])
     return {
@@ -220,5 +229,6 @@ def _interval(values: FloatArray) -> dict[str, Any]:
 
 
 def _area(contour: FloatArray, normal: FloatArray) -> float:
+    """Area [m^2] of a polygon (w, 3) projected along a normal (3,)."""
     apart = contour - contour.mean(axis=0)
     return float(abs(normal @ np.cross(apart, np.roll(apart, -1, axis=0)).sum(axis=0)) / 2)

@@ -1,6 +1,4 @@
-"""The picture of a palpation: the pushes from above with the lump's footprint, and a cut through it
-with its depth.
-"""
+"""Figure of a palpation: the pushes from above with an inclusion's footprint, and a section."""
 
 from __future__ import annotations
 
@@ -32,7 +30,15 @@ def draw_palpation(
     shown: Footprint | None,
     cause: dict[str, Any] | None,
 ) -> None:
-    """As PNG; `cause` is the lump's row of the report, with its place, depth and cover."""
+    """Draw a palpation as PNG.
+
+    Args:
+        path: of the file.
+        body: the phantom.
+        pushes: with measured and simulated forces.
+        shown: footprint of the inclusion; None without one.
+        cause: the inclusion's row of the report, with place, depth and cover; None without one.
+    """
     wide = cause is not None
     figure = new_figure(12.0 if wide else 6.2, 5.2)
     axes = figure.subplots(1, 2 if wide else 1, squeeze=False)[0]
@@ -53,6 +59,7 @@ def _from_above(
     shown: Footprint | None,
     cause: dict[str, Any] | None,
 ) -> Any:
+    """Draw the pushes, coloured by the change of their force; return what the colours belong to."""
     _relief(axes, body)
     change = 100 * (pushes.measured / pushes.stated - 1)
     known = np.isfinite(change)
@@ -100,7 +107,7 @@ def _from_above(
 
 
 def _relief(axes: Axes, body: Box | Shape) -> None:
-    """What lies under the pushes: the rim of a block, or an organ's height."""
+    """Draw the phantom below the pushes: the rim of a block, or the height of an organ."""
     if isinstance(body, Box):
         x, y = 500 * body.size[0], 500 * body.size[1]
         axes.fill([-x, x, x, -x], [-y, -y, y, y], color="#f1f2f4", ec=FAINT, lw=1.2, zorder=0)
@@ -121,8 +128,9 @@ def _relief(axes: Axes, body: Box | Shape) -> None:
 
 
 def _cut(axes: Axes, body: Box | Shape, cause: dict[str, Any]) -> None:
-    """Through the lump's centre, the way the surface next to it leans most: the body, the lump, and
-    how deep it lies.
+    """Draw a section through the inclusion's centre: the phantom, the inclusion, and its depth.
+
+    The section lies along x or y, whichever the nearest surface is more inclined to.
     """
     from matplotlib.collections import LineCollection
 
@@ -162,8 +170,14 @@ def _cut(axes: Axes, body: Box | Shape, cause: dict[str, Any]) -> None:
 
 
 def section(body: Box | Shape, axis: int, at: float) -> FloatArray:
-    """Where the plane x or y (`axis` 0 or 1) = `at` [m] cuts the surface: segments (k, 2, 2) in the
-    other of the two, and z [m].
+    """Cut the surface by the plane x or y = `at` [m].
+
+    Args:
+        body: the phantom.
+        axis: 0 for x, 1 for y.
+        at: [m].
+
+    Returns segments (k, 2, 2) [m]: the other one of x and y, and z.
     """
     kept = [1 - axis, 2]
     if isinstance(body, Box):
@@ -183,7 +197,7 @@ def section(body: Box | Shape, axis: int, at: float) -> FloatArray:
 
 
 def _smooth(contour: FloatArray) -> FloatArray:
-    """A closed, smooth curve (n, 3) through the contour's points."""
+    """Closed smooth curve (n, 3) through the contour's points."""
     closed = np.concatenate([contour, contour[:1]])
     return np.asarray(
         CubicSpline(np.arange(len(closed)), closed, bc_type="periodic")(
@@ -193,10 +207,12 @@ def _smooth(contour: FloatArray) -> FloatArray:
 
 
 def _between(entry: dict[str, Any]) -> str:
+    """Value and interval in millimetres."""
     value, low, high = (1e3 * entry[name] for name in ("value", "low", "high"))
     return f"{value:.1f} mm ({low:.1f} to {high:.1f})"
 
 
 def _plain(axes: Axes) -> None:
+    """Remove the frame at top and right; small tick labels."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.tick_params(labelsize=9, colors=INK)

@@ -13,25 +13,28 @@ from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.gain.force_gain import ForceGain
 from palpate.diagnosis.gain.gain_ladder import SurfaceGain
 from palpate.diagnosis.inference.credible_intervals import intervals, modulus_interval
-from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.mesh_discrepancy import too_coarse
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.model_probabilities import probabilities
+from palpate.diagnosis.validation.checks import AllClearChecks
 from palpate.diagnosis.validation.worst_location import worst_patch_location, worst_push_location
-from palpate.effects.elastic_material import YoungModulus
-from palpate.effects.geometry import MeshResolution
+from palpate.effects import NuisanceBlock
 
 __all__ = ["report_of", "verdict_of"]
 
+_NO_CHECKS = AllClearChecks()
 _NOT_FITTED = ", on which nothing was fitted"
 
 
-def verdict_of(findings: Findings) -> str:
+def verdict_of(findings: Findings, checks: AllClearChecks = _NO_CHECKS) -> str:
     """Return the verdict: found, none, ambiguous or unexplained."""
     if findings.best is None:
         return (
             "unexplained"
-            if findings.structured or findings.misfit > CRITERIA.verdict.unexplained_misfit
+            if findings.structured
+            or checks.failed
+            or findings.misfit > CRITERIA.verdict.unexplained_misfit
             else "none"
         )
     if findings.rivals():
@@ -44,7 +47,7 @@ def _probabilities(findings: Findings) -> dict[tuple[str, ...], float]:
     surplus: dict[tuple[str, ...], float] = {}
     for trial in findings.trials:
         surplus[trial.model.names] = max(
-            trial.gain - trial.asked, surplus.get(trial.model.names, -np.inf)
+            trial.gain - trial.required_gain, surplus.get(trial.model.names, -np.inf)
         )
     return probabilities(surplus)
 
@@ -54,12 +57,14 @@ def _removed(findings: Findings, misfit: float) -> float:
     return float(np.clip((findings.misfit - misfit) / max(findings.misfit - 1.0, 1e-9), 0.0, 1.0))
 
 
-def _causes(bench: Bench, findings: Findings, trials: list[Trial]) -> list[dict[str, Any]]:
+def _causes(evaluator: Evaluator, findings: Findings, trials: list[Trial]) -> list[dict[str, Any]]:
     """Named causes with probability and parameters; a cause that rival sets share comes once."""
     chances = _probabilities(findings)
     found: list[dict[str, Any]] = []
     for trial in trials:
-        for effect, entry in zip(trial.model.effects, intervals(bench, trial.model), strict=True):
+        for effect, entry in zip(
+            trial.model.effects, intervals(evaluator, trial.model), strict=True
+        ):
             if any(row["effect"] == effect.name for row in found):
                 continue
             chance = sum(p for names, p in chances.items() if effect.name in names)
@@ -69,11 +74,11 @@ def _causes(bench: Bench, findings: Findings, trials: list[Trial]) -> list[dict[
     return found
 
 
-def _ranking(bench: Bench, findings: Findings, named: set[str]) -> list[dict[str, Any]]:
+def _ranking(evaluator: Evaluator, findings: Findings, named: set[str]) -> list[dict[str, Any]]:
     """Effects that are not named, by the gain as the only cause: fitted, or else linear."""
     chances = _probabilities(findings)
     rows = []
-    for kind in bench.weighed:
+    for kind in evaluator.problem.applicable:
         if kind.name in named:
             continue
         alone = [t for t in findings.trials if t.model.names == (kind.name,)]
@@ -101,7 +106,7 @@ def _model(trial: Trial) -> dict[str, Any]:
     ]
     effects = [effect.to_json() for effect in trial.model.effects]
     # A set that is refused although its gain is large enough has an infinite required gain.
-    asked = round(trial.asked, 2) if np.isfinite(trial.asked) else None
+    asked = round(trial.required_gain, 2) if np.isfinite(trial.required_gain) else None
     gain, misfit = round(trial.gain, 2), round(trial.misfit, 4)
     return {
         "effects": effects,
@@ -112,16 +117,15 @@ def _model(trial: Trial) -> dict[str, Any]:
     }
 
 
-def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
+def _unexplained(
+    evaluator: Evaluator, findings: Findings, checks: AllClearChecks
+) -> dict[str, Any]:
     """Structured error that is left: its share over chance, the place and the sequence."""
     model = findings.best.model if findings.best else findings.baseline
-    before, left, note = findings.structure, findings.left, ""
-    if findings.missed and findings.beyond is not None:
-        model, before, left = (
-            findings.beyond.model,
-            findings.beyond.structure,
-            findings.beyond.structure,
-        )
+    before, left, note = findings.structure, findings.remaining, ""
+    if checks.held_out_structure and checks.held_out is not None:
+        model, before = checks.held_out.model, checks.held_out.structure
+        left = before
         note = _NOT_FITTED
     worst = {
         block.name: block.gram[0, 0] / max(block.values, 1)
@@ -132,14 +136,14 @@ def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
     fraction = (
         max(left.ratio - 1.0, 0.0) / max(before.ratio, left.ratio, 1.0) if left.significant else 0.0
     )
-    if (one := findings.unusual) is not None and not left.significant:
-        note = note if one is findings.asked else _NOT_FITTED
+    if (one := checks.unusual) is not None and not left.significant:
+        note = note if one is checks.stiffness_error else _NOT_FITTED
         when, fraction, place = one.sequence, one.share, one.place
     else:
         place = (
-            worst_patch_location(model.predictions, bench)
-            if bench.seen
-            else worst_push_location(model.predictions, bench)
+            worst_patch_location(model.predictions, evaluator)
+            if evaluator.problem.clouds
+            else worst_push_location(model.predictions, evaluator)
         )
     where = str(place)
     when = f"most in {when}{note}"
@@ -153,46 +157,48 @@ def _unexplained(bench: Bench, findings: Findings) -> dict[str, Any]:
         "fraction": round(fraction, 4),
         "where": where,
         "when": when,
-        "misfit_per_value": round(bench.misfit(model), 4),
+        "misfit_per_value": round(evaluator.misfit(model), 4),
         "structure": round(left.ratio, 4),
         "structure_bound": round(left.bound / left.expected, 4),
     }
 
 
-def _all_clear(findings: Findings) -> dict[str, Any]:
+def _all_clear(checks: AllClearChecks) -> dict[str, Any]:
     """Results of the checks behind a verdict of none; empty for other verdicts."""
     found: dict[str, Any] = {}
-    if findings.beyond is not None:
-        beyond = findings.beyond.structure
+    if checks.held_out is not None:
+        beyond = checks.held_out.structure
         found["held_out_structure"] = round(beyond.ratio, 4)
         found["held_out_structure_bound"] = round(beyond.bound / beyond.expected, 4)
-    if findings.looked_at:
-        found["local_stiffness_error"] = [one.to_json() for one in findings.looked_at]
+    if checks.stiffness_errors:
+        found["local_stiffness_error"] = [one.to_json() for one in checks.stiffness_errors]
     return found
 
 
 def report_of(
     dataset: Dataset,
-    bench: Bench,
+    evaluator: Evaluator,
     findings: Findings,
     gain: SurfaceGain | ForceGain | None,
     split: str,
+    checks: AllClearChecks = _NO_CHECKS,
 ) -> dict[str, Any]:
     """Build the report as it is written to report.json.
 
     Args:
         dataset: that was diagnosed.
-        bench: the fitted sequences.
+        evaluator: the fitted sequences.
         findings: of the search.
         gain: on held-out sequences; None without them.
         split: their split.
+        checks: of an all-clear.
     """
-    verdict = verdict_of(findings)
+    verdict = verdict_of(findings, checks)
     best = [findings.best] if findings.best else []
     trials = [*best, *findings.rivals()] if verdict == "ambiguous" else best
-    causes = _causes(bench, findings, trials)
+    causes = _causes(evaluator, findings, trials)
     named = {cause["effect"] for cause in causes}
-    known, unknown = _modulus(bench, findings, named)
+    known, unknown = _modulus(evaluator, findings, named)
     return {
         "format": 1,
         "dataset": dataset.name,
@@ -200,19 +206,19 @@ def report_of(
         "causes": causes,
         "interval_level": CRITERIA.intervals.level,
         "criteria": CRITERIA.to_json(),
-        "ranking": _ranking(bench, findings, named),
+        "ranking": _ranking(evaluator, findings, named),
         "models": [_model(trial) for trial in findings.trials],
         "identified": known,
         "not_identifiable": unknown,
-        "unexplained": _unexplained(bench, findings),
+        "unexplained": _unexplained(evaluator, findings, checks),
         "gain": None if gain is None else gain.to_json(split),
-        "ambiguity_map": [one.to_json() for one in findings.told],
-        "evidence": _evidence(bench, findings),
-        "warnings": _warnings(bench, findings),
+        "ambiguity_map": [one.to_json() for one in findings.identifiability],
+        "evidence": _evidence(evaluator, findings, checks),
+        "warnings": _warnings(evaluator, findings, checks),
     }
 
 
-def _evidence(bench: Bench, findings: Findings) -> dict[str, Any]:
+def _evidence(evaluator: Evaluator, findings: Findings, checks: AllClearChecks) -> dict[str, Any]:
     """Figures behind the verdict."""
     structure = findings.structure
     return {
@@ -221,36 +227,38 @@ def _evidence(bench: Bench, findings: Findings) -> dict[str, Any]:
         "baseline_misfit": round(findings.misfit, 4),
         "structure": round(structure.ratio, 4),
         "structure_bound": round(structure.bound / structure.expected, 4),
-        "evaluations": bench.evaluations,
-        "fitted_on": list(bench.names),
-        **_all_clear(findings),
+        "evaluations": evaluator.state.evaluations,
+        "fitted_on": list(evaluator.problem.names),
+        **_all_clear(checks),
     }
 
 
-def _warnings(bench: Bench, findings: Findings) -> list[str]:
+def _warnings(evaluator: Evaluator, findings: Findings, checks: AllClearChecks) -> list[str]:
     """Sentences for people, those of the registration first."""
-    coarse = (
-        ""
-        if bench.on_own_grid
-        else too_coarse(findings.screened.get(MeshResolution.name, 0.0), findings.bound)
-    )
+    problem, coarse = evaluator.problem, ""
+    if not evaluator.state.on_diagnosis_grid:
+        kinds = problem.effects_sharing(NuisanceBlock.MESH_ERROR)
+        screened = max((findings.screened.get(kind.name, 0.0) for kind in kinds), default=0.0)
+        coarse = too_coarse(screened, findings.bound)
     texts = (
         findings.withdrawn,
         coarse,
         findings.ripple.warning,
-        findings.unusual.warning if findings.unusual else "",
+        checks.unusual.warning if checks.unusual else "",
     )
-    return [*bench.registration.warnings, *(text for text in texts if text)]
+    return [*problem.registration.warnings, *(text for text in texts if text)]
 
 
 def _modulus(
-    bench: Bench, findings: Findings, named: set[str]
+    evaluator: Evaluator, findings: Findings, named: set[str]
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Young's modulus where it is no cause: its entry of `identified`, or of `not_identifiable`."""
-    if YoungModulus.name in named:
+    kinds = evaluator.problem.effects_sharing(NuisanceBlock.YOUNG_MODULUS)
+    if not kinds or any(kind.name in named for kind in kinds):
         return [], []
+    name = kinds[0].name
     model = findings.best.model if findings.best else findings.baseline
-    interval = modulus_interval(bench, model)
+    interval = modulus_interval(evaluator, model)
     if interval is None:
         why = (
             "the tool is driven by position and no force was measured: "
@@ -258,7 +266,9 @@ def _modulus(
         )
         return [], [
             _unknown(
-                why, "the force on the tool (forces.csv), or a drop of known weight on the block"
+                name,
+                why,
+                "the force on the tool (forces.csv), or a drop of known weight on the block",
             )
         ]
     value, low, high = interval
@@ -267,18 +277,16 @@ def _modulus(
             f"the measured forces leave anything between {low:.3g} and {high:.3g} Pa open: "
             "they hardly stand out of their noise"
         )
-        return [], [_unknown(why, "deeper pushes, or with a sensor of less noise")]
-    stated = bench.setup.material.young_modulus
+        return [], [_unknown(name, why, "deeper pushes, or with a sensor of less noise")]
+    stated = evaluator.problem.setup.material.young_modulus
     why = (
         f"the measured forces fix it within {100 * (high / value - 1):.0f} %; "
         f"{stated:.4g} Pa were stated"
     )
     parameters = {"E": {"value": value, "unit": "Pa", "low": low, "high": high}}
-    return [
-        {"effect": YoungModulus.name, "why": why, "stated": stated, "parameters": parameters}
-    ], []
+    return [{"effect": name, "why": why, "stated": stated, "parameters": parameters}], []
 
 
-def _unknown(why: str, instead: str) -> dict[str, str]:
+def _unknown(name: str, why: str, instead: str) -> dict[str, str]:
     """Entry of `not_identifiable` for Young's modulus."""
-    return {"effect": YoungModulus.name, "why": why, "measure_instead": instead}
+    return {"effect": name, "why": why, "measure_instead": instead}

@@ -1,6 +1,4 @@
-"""What a report says beyond its verdict: controls, what of each cause the data determine, and which
-push to make next.
-"""
+"""Supplements to a report that change no verdict: controls, identifiability, and the next probe."""
 
 from __future__ import annotations
 
@@ -9,27 +7,21 @@ from typing import Any
 
 from palpate.diagnosis.design.next_probe import next_probe
 from palpate.diagnosis.design.profile_likelihood import profiles
-from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.search.findings import Findings
 from palpate.diagnosis.validation.force_controls import force_controls
 from palpate.diagnosis.validation.negative_controls import Control, controls, warnings_of
-from palpate.effects.tool import LandmarkMismatch
 
 __all__ = ["with_supplements"]
 
-_AGAIN = {
-    "kind": "measurement",
-    "separates": [LandmarkMismatch.name, "none"],
-    "text": "touch the landmarks once more, and name each as it is touched",
-}
+_TOUCH_AGAIN = "touch the landmarks once more, and name each as it is touched"
 
 
 def with_supplements(
-    report: dict[str, Any], bench: Bench, data: Sequence[Observations], findings: Findings
+    report: dict[str, Any], evaluator: Evaluator, data: Sequence[Observations], findings: Findings
 ) -> dict[str, Any]:
-    """The report with `controls` and `next_probe`, and `identifiability` of each parameter of the
-    best model's causes.
+    """Add `controls`, `next_probe` and the `identifiability` of the causes' parameters to a report.
 
     A control that a cause does not pass is a warning, and changes no verdict.
     """
@@ -40,11 +32,11 @@ def with_supplements(
         model = findings.best.model
         if not findings.known:  # without that nothing can be replayed, and so nothing falsified
             checked = (
-                controls(bench, data, model, findings.baseline)
-                if bench.seen
-                else force_controls(bench, model, findings.baseline)
+                controls(evaluator, data, model, findings.baseline)
+                if evaluator.problem.clouds
+                else force_controls(evaluator, model, findings.baseline)
             )
-        told, open_rows = profiles(bench, findings.best.model)
+        told, open_rows = profiles(evaluator, findings.best.model)
         names = dict(zip(findings.best.model.names, told, strict=True))
     return {
         **report,
@@ -53,17 +45,23 @@ def with_supplements(
         ],
         "not_identifiable": [*report["not_identifiable"], *open_rows],
         "controls": [one.to_json() for one in checked],
-        "next_probe": [_AGAIN]
+        "next_probe": [
+            {
+                "kind": "measurement",
+                "separates": [findings.known[0].name, "none"],
+                "text": _TOUCH_AGAIN,
+            }
+        ]
         if findings.known
-        else next_probe(bench, data, findings)
-        if bench.seen
+        else next_probe(evaluator, data, findings)
+        if evaluator.problem.clouds
         else [],
         "warnings": [*report["warnings"], *warnings_of(checked)],
     }
 
 
 def _identified(cause: dict[str, Any], told: dict[str, str]) -> dict[str, Any]:
-    """The cause whose parameters say how well they are determined, those that were looked at."""
+    """Add `identifiability` to the parameters of a cause that were profiled."""
     entries = {
         name: {**entry, "identifiability": told[name]} if name in told else entry
         for name, entry in cause["parameters"].items()

@@ -1,6 +1,4 @@
-"""What a search for causes found: every set of causes that was fitted, the one that is accepted,
-and what it was weighed by.
-"""
+"""Result of a search for causes: all sets that were fitted, and the one that is accepted."""
 
 from __future__ import annotations
 
@@ -10,9 +8,7 @@ from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.camera_error_model import CALM, Ripple
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.residual_structure import NOTHING, Structure
-from palpate.diagnosis.search.identifiability import Told
-from palpate.diagnosis.validation.held_out_test import HeldOutCheck
-from palpate.diagnosis.validation.stiffness_error_test import StiffnessErrorTest
+from palpate.diagnosis.search.identifiability import Identifiability
 from palpate.effects import Effect
 
 __all__ = ["Findings", "Trial"]
@@ -20,29 +16,32 @@ __all__ = ["Findings", "Trial"]
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A refitted model and its gain over the baseline [nats], with the misfit per value it leaves.
+    """A refitted model with its scores.
 
-    `parts` says where the gain comes from, once all trials are scored at one temperature: each
-    block of data, and last the stated accuracies. `asked` is the gain that so many causes must
-    bring [nats] before they are named; infinite for what was refused although it brings it.
+    Attributes:
+        model: as fitted.
+        gain: over the baseline [nats].
+        misfit: per value that it leaves.
+        parts: of the gain, once all trials are scored at one temperature: of each block of data,
+            and last of the stated accuracies.
+        required_gain: gain from which so many causes are named [nats]; infinite for a model that
+            was rejected although it has this gain.
     """
 
     model: Model
     gain: float
     misfit: float
     parts: tuple[float, ...] = ()
-    asked: float = 0.0
+    required_gain: float = 0.0
 
     def scored(self) -> Trial:
-        """Without the replays, which nobody asks for of a model that was not accepted: they take
-        most of the memory.
-        """
+        """Return the trial without its predictions, which take most of the memory."""
         return replace(self, model=replace(self.model, predictions=()))
 
 
 @dataclass(eq=False)
 class Findings:
-    """What the search found.
+    """Result of a search.
 
     Attributes:
         baseline: the stated setup.
@@ -50,16 +49,13 @@ class Findings:
         trials: every refitted model, best first.
         bound: least gain of a cause [nats].
         misfit: of the baseline, per value.
-        screened: linear gain by effect name.
+        screened: linear gain by effect name [nats].
         structure: error of the baseline that is smooth and grows with the push.
-        left: the same of the best model.
-        told: what this experiment tells of each effect, whatever the data say.
+        remaining: the same error of the best model.
+        identifiability: of each effect by this experiment, whatever the data are.
         ripple: of the camera's depth in the rest cloud, which no effect expresses.
-        asked: how much of the engine's own error some sequence asks for; only looked at before an
-            all-clear.
-        beyond: what the stated setup leaves on sequences that nothing was fitted on; likewise.
-        withdrawn: why what was found is not named after all; empty where nothing was withdrawn.
-        known: what no replay could do without: touches that were surely of other landmarks.
+        withdrawn: reason why the causes found are not named; empty for no reason.
+        known: effects without which nothing can be replayed: touches of other landmarks.
     """
 
     baseline: Model
@@ -69,52 +65,27 @@ class Findings:
     misfit: float = 1.0
     screened: dict[str, float] = field(default_factory=dict)
     structure: Structure = NOTHING
-    left: Structure = NOTHING
-    told: tuple[Told, ...] = ()
+    remaining: Structure = NOTHING
+    identifiability: tuple[Identifiability, ...] = ()
     ripple: Ripple = CALM
-    asked: StiffnessErrorTest | None = None
-    beyond: HeldOutCheck | None = None
     withdrawn: str = ""
     known: tuple[Effect, ...] = ()
 
     def withdraw(self, why: str) -> None:
-        """Name nothing after all, neither alone nor with a further cause."""
+        """Reject the best model and all that extend it, for this reason."""
         names = set(self.best.model.names if self.best else ())
         self.trials = [
             trial for trial in self.trials if not names or not names.issubset(trial.model.names)
         ]
-        self.best, self.left, self.withdrawn = None, self.structure, why
+        self.best, self.remaining, self.withdrawn = None, self.structure, why
 
     @property
     def structured(self) -> bool:
-        """Whether the stated setup leaves an error that noise does not make."""
-        return (
-            self.structure.significant
-            or self.ripple.significant
-            or self.missed
-            or self.unusual is not None
-        )
-
-    @property
-    def missed(self) -> bool:
-        """Whether it leaves one where nothing was fitted."""
-        return self.beyond is not None and self.beyond.structure.significant
-
-    @property
-    def looked_at(self) -> tuple[StiffnessErrorTest, ...]:
-        """What sequences ask for, of those fitted first; nothing where no all-clear was in
-        question.
-        """
-        both = (self.asked, self.beyond.asked if self.beyond else None)
-        return tuple(one for one in both if one is not None)
-
-    @property
-    def unusual(self) -> StiffnessErrorTest | None:
-        """The first that the engine's own error does not explain."""
-        return next((one for one in self.looked_at if one.significant), None)
+        """Whether the stated setup leaves an error on the fitted sequences that is no noise."""
+        return self.structure.significant or self.ripple.significant
 
     def rivals(self) -> list[Trial]:
-        """Other sets of as many causes that explain the data about as well as the best."""
+        """Return other sets of as many causes that explain the data about as well as the best."""
         if self.best is None:
             return []
         best = self.best

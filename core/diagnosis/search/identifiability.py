@@ -1,9 +1,8 @@
-"""What this experiment can tell, and what it cannot: the smallest cause that would be named, and
-which causes look alike.
+"""Identifiability of effects by an experiment: detection limits, and effects that look alike.
 
-Both follow from the columns of the screening alone, before any data is judged (Kennedy and O'Hagan
-2001 on why the discrepancy and the nuisances belong in it): the same motions, noise and stated
-accuracies, with an imagined cause as the only thing that is wrong.
+Both follow from the columns of the screening alone, before any data is judged: the same motions,
+noise and stated accuracies, with an imagined cause as the only error. Discrepancy and nuisances
+belong in it (Kennedy and O'Hagan 2001).
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from palpate.diagnosis.search.screening import Candidate, linear_gains
 from palpate.effects import Effect, Parameter
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["Limit", "Told", "ambiguity_map", "detection_limits", "mimicry"]
+__all__ = ["Identifiability", "Limit", "detection_limits", "identifiability_of", "mimicry"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,35 +27,34 @@ class Limit:
     """The smallest cause of one kind that would gain the bound.
 
     Attributes:
-        item: that is changed; None where it is a share of what a finite cause does.
-        size: change of its search coordinate, or share [1]; infinite where not even from one of the
-            parameter's bounds to the other, or to as stiff as a lump can be, would be seen.
+        item: number that is changed; None for a share of the change by a finite effect.
+        size: change of its search coordinate, or the share [1]; infinite where no change within
+            the parameter's bounds would be seen.
     """
 
     item: Parameter | None
     size: float
 
     def to_json(self) -> dict[str, Any]:
-        """`change`, `factor` or `share`; None where no size would be seen."""
+        """Return `change`, `factor` or `share` for the report; None where no size would be seen."""
         if self.item is None:
             return {"share": _rounded(self.size)}
         factor = self.item.factor(self.size)
-        told = {"change": _rounded(self.size)} if factor is None else {"factor": _rounded(factor)}
-        return {"parameter": self.item.name, "unit": self.item.unit, **told}
+        size = {"change": _rounded(self.size)} if factor is None else {"factor": _rounded(factor)}
+        return {"parameter": self.item.name, "unit": self.item.unit, **size}
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
-    """What the experiment tells of one effect.
+class Identifiability:
+    """Identifiability of one effect.
 
     Attributes:
-        candidate: of those of this effect the one that is seen best.
-        limits: of its parameters.
-        typical: size of the first limit that half of the effect's candidates reach (places of a
-            lump, edges of a base).
+        candidate: the candidate of the effect that is seen best.
+        limits: detection limits of its parameters.
+        typical: first limit that half of the effect's candidates reach (places of an inclusion,
+            edges of a base).
         each: every candidate's start with its first limit, where there are several.
-        alike: name of every other effect to the share of this one's pattern that it can imitate
-            [1].
+        alike: name of every other effect to the share of this one's change that it imitates [1].
     """
 
     candidate: Candidate
@@ -67,11 +65,11 @@ class Told:
 
     @property
     def effect(self) -> str:
-        """Its name."""
+        """Name of the effect."""
         return self.candidate.start.name
 
     def to_json(self) -> dict[str, Any]:
-        """As the report has it; what imitates it most comes first."""
+        """Return the entry of the report; the effect that imitates it most comes first."""
         rows = sorted(self.alike.items(), key=lambda row: -row[1])
         return {
             "effect": self.effect,
@@ -85,7 +83,7 @@ class Told:
         }
 
     def _fixed(self, start: Effect) -> dict[str, Any]:
-        """The parameters that no limit is stated of."""
+        """Return the parameters without a limit."""
         moved = {limit.item.name for limit in self.limits if limit.item is not None}
         return {
             item.name: {"value": getattr(start, item.name), "unit": item.unit}
@@ -98,17 +96,20 @@ def _rounded(size: float) -> float | None:
     return float(f"{size:.3g}") if math.isfinite(size) else None
 
 
-def ambiguity_map(
+def identifiability_of(
     blocks: Sequence[Block],
     nuisance: Sequence[int],
     known: FloatArray,
     candidates: Sequence[Candidate],
     bound: float,
-) -> tuple[Told, ...]:
-    """One entry for each effect among the candidates, in their order.
+) -> tuple[Identifiability, ...]:
+    """Return one entry for each effect among the candidates, in their order.
 
     Args:
+        blocks: of the screening.
+        nuisance: columns of the nuisances.
         known: prior precision (n, n) of the nuisance columns.
+        candidates: of the screening.
         bound: gain from which a cause is named [nats].
     """
     groups: dict[str, list[Candidate]] = {}
@@ -131,7 +132,7 @@ def ambiguity_map(
             for other, group in groups.items()
             if other != name
         }
-        found.append(Told(candidate, limits[order[0]], typical, each, alike))
+        found.append(Identifiability(candidate, limits[order[0]], typical, each, alike))
     return tuple(found)
 
 
@@ -142,8 +143,9 @@ def detection_limits(
     candidate: Candidate,
     bound: float,
 ) -> tuple[Limit, ...]:
-    """The size of each of a candidate's changes, alone, at which its gain is the bound: the gain
-    grows with the size's square.
+    """Return the size of each of a candidate's changes, alone, at which its gain is the bound.
+
+    The gain grows with the square of the size. Arguments as for `identifiability_of`.
     """
     found, numbers = [], {item.name: item for item in candidate.start.numbers()}
     own = [*candidate.widened, *candidate.columns]
@@ -173,11 +175,11 @@ def mimicry(
     candidate: Candidate,
     rival: Candidate,
 ) -> float:
-    """Share [1] of what a candidate does that a rival does as well: R squared, with all nuisances
-    free within their accuracy.
+    """Return the share [1] of a candidate's change that a rival imitates.
 
-    Of several changes each counts by what it does at its prior's deviation. What both are free to
-    move is no one's alone: then 1.
+    It is R squared with all nuisances free within their accuracy, and 1 for nuisances that both
+    widen. Each of several changes counts by its size at its prior's deviation. Arguments as for
+    `identifiability_of`.
     """
     own, other = [*candidate.widened, *candidate.columns], [*rival.widened, *rival.columns]
     total = np.sum([block.gram[1:, 1:] for block in blocks], axis=0)

@@ -1,31 +1,44 @@
-"""Places for a lump beneath pushes: where forces alone can tell of one."""
+"""Places of inclusions that are tried: a grid in the block, or below the pushes."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.inference.inference_problem import InferenceProblem
+from palpate.effects.elastic_material import inclusion_grid
 from palpate.foundation.arrays import FloatArray
 from palpate.setup.setup import Box, Inclusion, Shape
 
-__all__ = ["lumps_under"]
+__all__ = ["inclusion_places", "inclusions_under"]
 
 
-def lumps_under(
+def inclusion_places(problem: InferenceProblem) -> tuple[Inclusion, ...]:
+    """Return the coarse grid of inclusions in the block; without clouds those below the pushes."""
+    if problem.clouds:
+        return inclusion_grid(problem.setup)
+    return inclusions_under(*problem.pushes, problem.setup.geometry)
+
+
+def inclusions_under(
     places: FloatArray, normals: FloatArray, body: Box | Shape
 ) -> tuple[Inclusion, ...]:
-    """Lumps under places (k, 3) [m] of the surface with outward normals (k, 3), whose centres lie
-    within the body.
+    """Return inclusions below places of the surface whose centres are in the body.
+
+    Args:
+        places: (k, 3) [m].
+        normals: outwards there (k, 3).
+        body: in whose frame they are.
     """
-    kept: list[int] = []
+    used: list[int] = []
     for number, place in enumerate(places):
         if all(
             np.linalg.norm(place - places[other]) >= CRITERIA.inclusion_grid.spacing
-            for other in kept
+            for other in used
         ):
-            kept.append(number)
+            used.append(number)
     found = []
-    for number in kept:
+    for number in used:
         for depth in CRITERIA.inclusion_grid.depths:
             x, y, z = (float(value) for value in places[number] - depth * normals[number])
             if z > 0 and body.facing(np.array([[x, y, z]]))[0][0] < 0:

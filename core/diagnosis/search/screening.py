@@ -1,9 +1,9 @@
-"""Which causes deserve a refit, and how large a gain chance alone can give.
+"""Linear gains of all candidates, and the gain that chance alone can give.
 
 All effects of the catalogue are columns of one linear problem: those with a derivative by their
-sensitivities, the others by the difference that a finite size makes. The gain of each is the
-predictive score of left-out blocks against the model without it; the same gains on data drawn from
-the noise model alone give the bound that a cause must exceed.
+sensitivities, the others by the difference between two replays. The gain of a candidate is the
+predictive score of left-out blocks against that of the model without it. The same gains on data
+drawn from the noise model alone give the bound that a cause must exceed.
 """
 
 from __future__ import annotations
@@ -24,11 +24,16 @@ __all__ = ["Candidate", "linear_gains", "null_gains", "pair_gains", "right_sides
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Candidate:
-    """An effect as columns: `columns` with prior deviations `spread`; `widened` are nuisances with
-    a wider prior instead.
+    """An effect as columns of a model.
 
-    `of` names the parameter whose search coordinate each column changes by one; without it a column
-    is all that `start` does.
+    Attributes:
+        start: the effect that the columns change.
+        of: name of the number whose search coordinate each column changes by one; without names
+            the column is the whole change by `start`.
+        columns: of the effect.
+        spread: prior deviation of the factor of each column.
+        widened: column of a nuisance that the effect shares to the deviation that widens its prior.
+        refitted: whether a fit of the effect is possible.
     """
 
     start: Effect
@@ -36,9 +41,15 @@ class Candidate:
     columns: tuple[int, ...] = ()
     spread: tuple[float, ...] = ()
     widened: dict[int, float] = field(default_factory=dict)
+    refitted: bool = True
 
     def precision(self, nuisance: Sequence[int], known: FloatArray) -> tuple[list[int], FloatArray]:
-        """Columns to use and their prior precision, given those of the nuisances."""
+        """Return the columns to use and their prior precision.
+
+        Args:
+            nuisance: columns of the nuisances.
+            known: prior precision of the nuisances.
+        """
         covariance = np.linalg.inv(known)
         for column, spread in self.widened.items():
             covariance[nuisance.index(column), nuisance.index(column)] += spread**2
@@ -50,7 +61,7 @@ class Candidate:
         return [*nuisance, *self.columns], precision
 
     def beside(self, other: Candidate) -> Candidate:
-        """The same effect with the columns of another one fitted at once; its own come first."""
+        """Return the same effect with the columns of another one after its own."""
         columns, spread = (*self.columns, *other.columns), (*self.spread, *other.spread)
         return replace(
             self, columns=columns, spread=spread, widened={**self.widened, **other.widened}
@@ -58,7 +69,7 @@ class Candidate:
 
 
 def right_sides(blocks: Sequence[Block]) -> FloatArray:
-    """The data's own right sides (1, b, k)."""
+    """Return the right sides (1, b, k) of the data."""
     return np.array([[block.gram[1:, 0] for block in blocks]])
 
 
@@ -69,8 +80,9 @@ def _values(
     precision: FloatArray,
     known: FloatArray,
 ) -> FloatArray:
-    """Sum over blocks, and the stated accuracies, of the log predictive density (d,) less what no
-    column changes.
+    """Return the log predictive density (d,), summed over blocks and the stated accuracies.
+
+    Terms that no column changes are left out.
     """
     index = np.asarray(columns)
     grams = np.array([block.gram[1:, 1:][np.ix_(index, index)] for block in blocks])
@@ -100,7 +112,7 @@ def linear_gains(
     known: FloatArray,
     candidates: Sequence[Candidate],
 ) -> FloatArray:
-    """Gain (d, c) [nats] of each candidate for each set of right sides (d, b, k)."""
+    """Return the gain (d, c) [nats] of each candidate for each set of right sides (d, b, k)."""
     baseline = _values(blocks, rights, nuisance, known, known)
     return np.stack(
         [
@@ -119,8 +131,9 @@ def null_gains(
     draws: int,
     seed: int,
 ) -> FloatArray:
-    """Best-of-catalogue gains (d,) [nats] on draws from the noise model: white noise, discrepancy
-    and nuisances, no cause.
+    """Return the best gain of the catalogue (d,) [nats] on each draw from the noise model.
+
+    The draws hold white noise, discrepancy and nuisances, and no cause.
     """
     rights = draw_rights(blocks, nuisance, known, draws, np.random.default_rng(seed))
     return np.asarray(linear_gains(blocks, rights, nuisance, known, candidates).max(axis=1))
@@ -134,10 +147,15 @@ def pair_gains(
     candidates: Sequence[Candidate],
     more: float = -np.inf,
 ) -> list[tuple[float, Candidate, Candidate]]:
-    """Gain [nats] of every two effects together on one set of right sides (1, b, k), best first,
-    each by its best candidates.
+    """Return the gain [nats] of every two effects together, by their best candidates, best first.
 
-    Only those that gain so much `more` than the best candidate alone.
+    Args:
+        blocks: of the model.
+        rights: one set of right sides (1, b, k).
+        nuisance: columns of the nuisances.
+        known: their prior precision.
+        candidates: to be paired.
+        more: pairs must gain this much more than the best candidate alone.
     """
     least = linear_gains(blocks, rights, nuisance, known, candidates).max() + more
     pairs = [

@@ -1,4 +1,4 @@
-"""Which candidates of a screening are refitted."""
+"""The candidates of a screening that are refitted."""
 
 from __future__ import annotations
 
@@ -10,42 +10,37 @@ from scipy.stats import chi2, norm
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.evidence import fit
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.posterior import Posterior
 from palpate.diagnosis.search.screening import Candidate
 from palpate.effects import Effect
-from palpate.effects.elastic_material import StiffInclusion
-from palpate.effects.geometry import MeshResolution
-from palpate.effects.tool import ToolOffset, ToolRadius
 
 __all__ = ["beyond_first_order", "shortlist"]
 
-_FAR_FROM_LINEAR: tuple[type[Effect], ...] = (ToolOffset, ToolRadius)
-"""What moves where the tool meets the block."""
-
 
 def beyond_first_order(
-    bench: Bench, model: Model, candidates: Sequence[Candidate]
+    posterior: Posterior, model: Model, candidates: Sequence[Candidate]
 ) -> list[Candidate]:
-    """What to refit whatever its linear gain: the tool's offset and radius, and what breaks its
-    stated accuracy most.
+    """Return the candidates to refit whatever their linear gain.
 
-    A tangent knows little of what a tool that is elsewhere, or another one, does over millimetres:
-    of a shift of 2.4 mm it finds
-    0.4, and for a ball of 3.4 mm that is said to have 5 it promises under 14 nats, a tool that
-    gives way 282.
+    They are the strongly nonlinear effects, and the effect that breaks its stated accuracy most: to
+    first order a nuisance explains most of it.
+
+    Args:
+        posterior: of the inference problem.
+        model: with the columns.
+        candidates: of the screening.
     """
-    change = fit(bench.tempered(model), [*model.nuisance, *model.columns], bench.held(model)).change
-    covariance = np.linalg.inv(bench.nuisances.precision)
+    columns, precision = [*model.nuisance, *model.columns], posterior.bounded_precision(model)
+    change = fit(posterior.tempered(model), columns, precision).change
+    covariance = np.linalg.inv(posterior.problem.nuisances.precision)
     least, strained = 2 * float(norm.sf(CRITERIA.screening.strained)), []
     for candidate in candidates:
         own = [model.nuisance.index(column) for column in candidate.widened]
         pull = float(change[own] @ np.linalg.solve(covariance[np.ix_(own, own)], change[own]))
         chance = float(chi2.sf(pull, len(own))) if own else 1.0
-        if chance < least and not isinstance(candidate.start, (*_FAR_FROM_LINEAR, MeshResolution)):
+        if chance < least and candidate.refitted and not candidate.start.strongly_nonlinear:
             least, strained = chance, [candidate]
-    return [
-        candidate for candidate in candidates if isinstance(candidate.start, _FAR_FROM_LINEAR)
-    ] + strained
+    return [candidate for candidate in candidates if candidate.start.strongly_nonlinear] + strained
 
 
 def shortlist(
@@ -54,8 +49,13 @@ def shortlist(
     least: float,
     settled: Sequence[Candidate] = (),
 ) -> list[Candidate]:
-    """The settled ones, then the best start of each promising effect, best first; two places for a
-    lump.
+    """Return the best start of each promising effect, best first; of an inclusion two places.
+
+    Args:
+        gains: linear gain (c,) of each candidate [nats].
+        candidates: of the screening.
+        least: gain of a promising effect [nats].
+        settled: candidates that come first and take nobody's place.
     """
     chosen, names = list(settled), CRITERIA.screening.shortlist + len(settled)
     for number in np.argsort(-gains):
@@ -65,9 +65,8 @@ def shortlist(
             _distance(candidate.start, other.start) > CRITERIA.screening.inclusions_apart
             for other in taken
         )
-        nothing_finer = isinstance(candidate.start, MeshResolution) and candidate.widened
-        room = not (taken or nothing_finer) or (
-            isinstance(candidate.start, StiffInclusion) and len(taken) < 2 and apart
+        room = (not taken and candidate.refitted) or (
+            candidate.start.inclusion is not None and len(taken) < 2 and apart
         )
         if (
             gains[number] > least
@@ -79,6 +78,8 @@ def shortlist(
 
 
 def _distance(one: Effect, other: Effect) -> float:
-    if isinstance(one, StiffInclusion) and isinstance(other, StiffInclusion):
-        return float(np.linalg.norm([one.x - other.x, one.y - other.y, one.z - other.z]))
-    return 0.0
+    """Return the distance between the inclusions of two effects [m]; zero without."""
+    first, second = one.inclusion, other.inclusion
+    if first is None or second is None:
+        return 0.0
+    return float(np.linalg.norm([first.x - second.x, first.y - second.y, first.z - second.z]))

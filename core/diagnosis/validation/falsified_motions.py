@@ -1,9 +1,8 @@
-"""The same clouds with motions that were not made: what a cause explains of them, it does not owe
-to the pushes.
+"""Falsified recordings: the measured clouds with motions that were not made.
 
-Three ways to falsify a recording: its clock is turned on so far that the pushes come when nothing
-was pushed, its tool is mirrored to the other end of the block, and its tool goes the way of another
-sequence. Points, patches and their order stay as they are.
+A cause whose gain remains under them does not owe it to the pushes. The clock is shifted until the
+pushes come when nothing was pushed, the tool is mirrored to the other end of the block, or the tool
+follows the path of another sequence. Points, patches and their order stay as they are.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ from palpate.setup.setup import Setup
 __all__ = ["FALSIFIED", "mirrored", "shifted", "swapped"]
 
 MIRROR = np.array([-1.0, -1.0, 1.0])
-"""Both ends and both sides of the block change places: a push near one of its middle planes would
-meet its own mirror image."""
+"""Factors that exchange both ends and both sides of the block. Exchanging only one pair would map a
+push near a middle plane onto itself."""
 
 
 def _with_path(item: Observations, position: FloatArray) -> Observations:
-    """With another way (n, 3) [m] of the tool in the robot frame at the stream's own times.
+    """Replace the tool's path by another one (n, 3) [m], robot frame, at the stream's own times.
 
-    A group's frames no longer share one place, so the one in its middle stands for it.
+    A group's frames no longer share one place, so that its middle frame stands for it.
     """
     stream = item.kinematics
     groups = tuple(replace(g, frames=g.frames[len(g.frames) // 2 :][:1]) for g in item.groups)
@@ -40,6 +39,7 @@ def _with_path(item: Observations, position: FloatArray) -> Observations:
 
 
 def _turned(item: Observations, share: float) -> Observations:
+    """Shift the clock by a share of the recording, cyclically."""
     time = item.kinematics.time
     length = time[-1] - time[0]
     return _with_path(
@@ -48,16 +48,12 @@ def _turned(item: Observations, share: float) -> Observations:
 
 
 def _depths(item: Observations, setup: Setup) -> FloatArray:
-    """How far the tool reaches into the stated block (g,) [m] at each group; zero where it does
-    not.
-    """
+    """Depth of the tool in the stated block (g,) [m] at each group; zero outside."""
     return np.maximum(-box_gap(item.centres(setup), setup.box.size, setup.tool.radius), 0.0)
 
 
 def shifted(data: Sequence[Observations], setup: Setup) -> list[Observations]:
-    """Each clock turned on, round the end of the recording, to where its pushes agree least with
-    those that were made.
-    """
+    """Shift each clock, cyclically, to where its pushes agree least with those that were made."""
     found = []
     for item in data:
         true, best = _depths(item, setup), (np.inf, item)
@@ -77,8 +73,7 @@ def shifted(data: Sequence[Observations], setup: Setup) -> list[Observations]:
 
 
 def mirrored(data: Sequence[Observations], setup: Setup) -> list[Observations]:
-    """Each tool led through the mirror image of its way, x and y turned about in the phantom
-    frame."""
+    """Mirror each tool's path: x and y change sign in the phantom frame."""
     pose = setup.phantom_from_robot
     return [
         _with_path(item, pose.inverse().apply(pose.apply(item.kinematics.position) * MIRROR))
@@ -87,8 +82,9 @@ def mirrored(data: Sequence[Observations], setup: Setup) -> list[Observations]:
 
 
 def swapped(data: Sequence[Observations], setup: Setup) -> list[Observations]:
-    """Each tool led the way of another sequence, stretched to its own duration: the exchange that
-    brings them farthest away.
+    """Give each tool the path of another sequence, stretched to its own duration.
+
+    Of all cyclic exchanges the one is taken that brings the deepest places farthest apart.
     """
     deepest = np.array([item.centres(setup)[_depths(item, setup).argmax()] for item in data])
 
@@ -102,6 +98,7 @@ def swapped(data: Sequence[Observations], setup: Setup) -> list[Observations]:
 
 
 def _along(item: Observations, other: Observations) -> Observations:
+    """Replace the tool's path by that of another sequence, stretched in time."""
     here, there = item.kinematics.time, other.kinematics.time
     share = (here - here[0]) / max(here[-1] - here[0], 1e-9)
     return _with_path(item, other.kinematics.position_at(there[0] + share * (there[-1] - there[0])))

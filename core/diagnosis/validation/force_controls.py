@@ -1,10 +1,9 @@
-"""The control of a cause that only forces tell of: with the pushes' places exchanged it must lose
-its gain.
+"""Negative control of a cause in sequences without clouds: with exchanged pushes it loses its gain.
 
-As in `palpate.diagnosis.validation.negative_controls`, what the model without the cause leaves
-stays as it was measured, and the cause's pattern is put elsewhere. A pattern of forces is one
-number for each push, by which share the cause changes its force; these shares are handed on from
-push to push, half way round the sequence. No replay is needed.
+As in `palpate.diagnosis.validation.negative_controls`, the residual of the model without the cause
+stays as measured, and the cause's pattern is falsified. The pattern is the share by which the cause
+changes the force of each push. These shares are passed on to the push half way round the sequence.
+No replay is needed.
 """
 
 from __future__ import annotations
@@ -14,9 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from palpate.diagnosis.forward.prediction import Prediction
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.noise_model import rows_of
 from palpate.diagnosis.validation.negative_controls import Control, judge
 from palpate.foundation.arrays import FloatArray, IntArray
@@ -26,17 +25,19 @@ __all__ = ["EXCHANGED", "exchanged", "force_controls"]
 EXCHANGED = "pushes exchanged"
 
 
-def force_controls(bench: Bench, model: Model, baseline: Model) -> tuple[Control, ...]:
-    """Every cause of an accepted model, on sequences without clouds."""
+def force_controls(evaluator: Evaluator, model: Model, baseline: Model) -> tuple[Control, ...]:
+    """Compute the control of every cause of an accepted model, on sequences without clouds."""
     found = []
-    first = len(bench.nuisances.precision) - 1
+    first = evaluator.problem.blocks.replayed
     for index, left in enumerate(model.effects):
         others = [effect for number, effect in enumerate(model.effects) if number != index]
         origin: Sequence[Prediction] = baseline.predictions
         if others:
-            origin = [future.result() for future in bench.predict(others, None, model.predictions)]
+            origin = evaluator.replayed(others, model.predictions)
         blocks = []
-        for noise, before, after in zip(bench.noises, origin, model.predictions, strict=True):
+        for noise, before, after in zip(
+            evaluator.state.noises, origin, model.predictions, strict=True
+        ):
             pattern = np.nan_to_num(rows_of(after)[0] - rows_of(before)[0])
             pattern[list({*before.failed, *after.failed})] = 0.0
             assert after.forces is not None and after.forces.push is not None
@@ -47,17 +48,22 @@ def force_controls(bench: Bench, model: Model, baseline: Model) -> tuple[Control
                     np.concatenate([nuisances, np.stack([pattern, other], axis=2)], axis=2)
                 )
             )
-            blocks.append(Block(block.name, block.gram / bench.temperature, block.values))
-        found += judge(bench, blocks, left, (EXCHANGED,))
+            blocks.append(Block(block.name, block.gram / evaluator.state.temperature, block.values))
+        found += judge(evaluator, blocks, left, (EXCHANGED,))
     return tuple(found)
 
 
 def exchanged(pattern: FloatArray, force: FloatArray, push: IntArray) -> FloatArray:
-    """The pattern (g, 3) [N], as a share of each force (g, 3) [N], at the push half way round the
-    sequence.
+    """Exchange a pattern between pushes half way round the sequence, as shares of their forces.
 
-    A push's groups are taken in their order; where one has fewer, its last stands for those
-    missing.
+    Groups of a push are matched in their order; the last one stands for missing ones.
+
+    Args:
+        pattern: (g, 3) change of the force by the cause [N].
+        force: (g, 3) [N].
+        push: (g,) number of each group's push.
+
+    Returns the exchanged pattern (g, 3) [N].
     """
     size = np.maximum(np.linalg.norm(force, axis=1), 1e-12)
     share = np.einsum("gi,gi->g", pattern, force) / size**2

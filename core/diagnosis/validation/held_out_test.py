@@ -1,20 +1,21 @@
-"""An all-clear must hold on the sequences that nothing was fitted on, too (step 10 of the method).
+"""Checks a verdict of none on held-out sequences.
 
-What is wrong in one kind of push or at one place need not show in the sequences that causes are
-sought in. A cause is never chosen by what the others show; that nothing is wrong is not said
-against them.
+An error in one kind of push or at one place need not appear in the fitted sequences. Held-out
+sequences never choose a cause, but structured error in them rules out the verdict none.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.residual_structure import Structure, structure_of
 from palpate.diagnosis.observation.frame_groups import Observations
-from palpate.diagnosis.search.candidates import lump_places
+from palpate.diagnosis.search.inclusion_grid import inclusion_places
 from palpate.diagnosis.validation.stiffness_error_test import (
     StiffnessErrorTest,
     largest_stiffness_error,
@@ -25,25 +26,34 @@ __all__ = ["HeldOutCheck", "check_held_out"]
 
 @dataclass(frozen=True, eq=False)
 class HeldOutCheck:
-    """The stated setup on sequences that nothing was fitted on, the structured error it leaves
-    there, and what they ask for.
+    """The stated setup on held-out sequences.
+
+    Attributes:
+        model: the stated setup with their predictions.
+        structure: structured error that it leaves.
+        stiffness_error: test of the engine's error on them.
     """
 
     model: Model
     structure: Structure
-    asked: StiffnessErrorTest | None = None
+    stiffness_error: StiffnessErrorTest | None = None
 
 
 def check_held_out(
-    bench: Bench, held_out: Sequence[Observations], seed: int
+    evaluator: Evaluator, held_out: Sequence[Observations], seed: int
 ) -> HeldOutCheck | None:
-    """Of those with clouds; None where there are none. The workers of the bench must have them."""
+    """Check the sequences with clouds, which the workers must have; None without such sequences."""
     names = [item.name for item in held_out if not item.force_only]
     if not names:
         return None
-    stated, forces = (bench.setup, bench.registration, bench.workers), bench.nuisances.forces
-    other = Bench(*stated, names, bench.static, bench.grid, bench.fine, forces=forces)
-    model = other.baseline((), lump_places(other))
+    problem = replace(
+        evaluator.problem,
+        names=tuple(names),
+        clouds=True,
+        pushes=(np.empty((0, 3)), np.empty((0, 3))),
+    )
+    other = Evaluator(problem, evaluator.workers)
+    model = other.baseline((), inclusion_places(problem))
     return HeldOutCheck(
         model, structure_of(other, model, seed), largest_stiffness_error(other, model)
     )

@@ -1,12 +1,11 @@
-"""Controls of a named cause: with motions that were not made, it must lose its gain (step 13 of the
-method).
+"""Negative controls of a named cause: with motions that were not made, it must lose its gain.
 
-What the stated model leaves unexplained stays as it was measured, and so do weights, discrepancy
-and nuisances. Only the cause's pattern, what it changes from group to group and patch to patch, is
-replayed along falsified motions (`palpate.diagnosis.validation.falsified_motions`), and the gain of
-that pattern is taken as that of the true one is: by sequences left out. Were the clouds themselves
-compared with falsified replays, each dent would be missing here and too many there, and whatever
-makes dents shallower would seem to gain.
+The residual of the stated model stays as measured, and so do weights, discrepancy and nuisances.
+Only the cause's pattern, its change of each patch in each group, is replayed along falsified
+motions (`palpate.diagnosis.validation.falsified_motions`). The gain of that pattern is computed
+like that of the true one, by leaving sequences out. Comparing the clouds themselves with falsified
+replays would not work: dents would be missing in one place and superfluous in another, and any
+cause that makes dents shallower would gain.
 """
 
 from __future__ import annotations
@@ -20,9 +19,9 @@ import numpy as np
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction, predict
 from palpate.diagnosis.forward.ray_comparison import PointSample
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, fit
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.noise_model import Noise, rows_of
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.search.identifiability import mimicry
@@ -43,9 +42,9 @@ class Control:
 
     Attributes:
         control: name of the kind.
-        effect: the cause.
-        gain: of the falsified pattern, and true: of the cause's own [nats], both on the groups that
-            were falsified.
+        effect: name of the cause.
+        gain: of the falsified pattern, on the falsified groups [nats].
+        true: of the cause's own pattern, on the same groups [nats].
         alike: share of the cause's pattern that falsified motions imitate [1].
     """
 
@@ -57,7 +56,7 @@ class Control:
 
     @property
     def passed(self) -> bool | None:
-        """Whether the gain was lost; None where the control says nothing of this cause."""
+        """Whether the gain was lost; None if the control says nothing about this cause."""
         return (
             None
             if self.why
@@ -66,9 +65,12 @@ class Control:
 
     @property
     def why(self) -> str:
-        """Why the control says nothing; empty where it does."""
+        """Reason why the control says nothing about this cause; empty if it does."""
         if self.alike > CRITERIA.controls.alike:
-            return f"with these motions {self.effect} would look {100 * self.alike:.0f} % as it does with the true ones"
+            return (
+                f"with these motions {self.effect} would look {100 * self.alike:.0f} % "
+                "as it does with the true ones"
+            )
         return (
             f"{self.effect} gains too little on these frames to lose it"
             if self.true <= CRITERIA.controls.faint
@@ -76,7 +78,7 @@ class Control:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """As the report has it."""
+        """Plain values, as in the report."""
         kept = None if self.true <= CRITERIA.controls.faint else round(self.gain / self.true, 4)
         return {
             "control": self.control,
@@ -91,18 +93,20 @@ class Control:
 
 
 def controls(
-    bench: Bench, data: Sequence[Observations], model: Model, baseline: Model
+    evaluator: Evaluator, data: Sequence[Observations], model: Model, baseline: Model
 ) -> tuple[Control, ...]:
-    """Every cause of an accepted model under every kind of falsified motions.
+    """Control every cause of an accepted model under every kind of falsified motions.
 
     Args:
-        data: what the bench's sequences are, in its order.
-        baseline: the stated setup, which is the model without a single cause.
+        evaluator: of the fitted sequences.
+        data: their measurements, in the same order.
+        model: with the causes.
+        baseline: the stated setup, without a cause.
     """
-    bench.tell("trying the causes on motions that were not made")
-    chosen = _chosen(bench, data, model, baseline)
+    evaluator.report("trying the causes on motions that were not made")
+    chosen = _chosen(evaluator, data, model, baseline)
     others = [[effect for effect in model.effects if effect is not left] for left in model.effects]
-    setups = [model.setup, *(with_effects(bench.setup, rest) for rest in others)]
+    setups = [model.setup, *(with_effects(evaluator.problem.setup, rest) for rest in others)]
     thin = [
         replace(data[n], groups=tuple(data[n].groups[row] for row in rows))
         for n, rows in chosen.items()
@@ -112,32 +116,35 @@ def controls(
     ]
     pending = {
         name: [
-            bench.workers.run(_false_patterns, item, setups, bench.rough, points)
-            for item, points in zip(falsify(thin, bench.setup), samples, strict=True)
+            evaluator.workers.run(
+                _false_patterns, item, setups, evaluator.problem.coarse_grid, points
+            )
+            for item, points in zip(falsify(thin, evaluator.problem.setup), samples, strict=True)
         ]
         for name, falsify in FALSIFIED.items()
     }
     replayed = {name: [future.result() for future in futures] for name, futures in pending.items()}
     found = []
     for number, left in enumerate(model.effects):
-        origin = _origin(bench, others[number], model, baseline)
+        origin = _origin(evaluator, others[number], model, baseline)
         true = [_pattern(model.predictions[n], origin[n])[rows] for n, rows in chosen.items()]
         patterns = [true, *([own[number] for own in sequences] for sequences in replayed.values())]
-        blocks = _blocks(bench, origin, model, chosen, patterns, (setups[1 + number], left))
-        found += judge(bench, blocks, left, tuple(FALSIFIED))
+        blocks = _blocks(evaluator, origin, model, chosen, patterns, (setups[1 + number], left))
+        found += judge(evaluator, blocks, left, tuple(FALSIFIED))
     return tuple(found)
 
 
 def _chosen(
-    bench: Bench, data: Sequence[Observations], model: Model, baseline: Model
+    evaluator: Evaluator, data: Sequence[Observations], model: Model, baseline: Model
 ) -> dict[int, list[int]]:
-    """Number of each sequence that is falsified to its groups: all that are clear of the block, and
-    some near it.
+    """Numbers of the sequences that are falsified, each with the numbers of its groups.
+
+    The groups are all that are clear of the phantom, and the most changed ones near it.
     """
     shown = [
         (_pattern(there, here) ** 2 * noise.weights).sum(axis=1)
         for there, here, noise in zip(
-            model.predictions, baseline.predictions, bench.noises, strict=True
+            model.predictions, baseline.predictions, evaluator.state.noises, strict=True
         )
     ]
     chosen = {}
@@ -155,20 +162,18 @@ def _chosen(
 
 
 def _origin(
-    bench: Bench, effects: Sequence[Effect], model: Model, baseline: Model
+    evaluator: Evaluator, effects: Sequence[Effect], model: Model, baseline: Model
 ) -> Sequence[Prediction]:
-    """The true motions without one cause."""
+    """Predictions of the true motions without one cause."""
     if not effects:
         return baseline.predictions
-    return [future.result() for future in bench.predict(effects, None, model.predictions)]
+    return [future.result() for future in evaluator.predict(effects, None, model.predictions)]
 
 
 def _false_patterns(
     item: Observations, setups: Sequence[Setup], grid: Meshing, samples: Sequence[PointSample]
 ) -> list[FloatArray]:
-    """What tells the first setup from each of the others (g, r) along falsified motions, at points
-    that are settled.
-    """
+    """Changes (g, r) from each other setup to the first one along falsified motions."""
     whole = predict(
         item, setups[0], grid, tolerance=CRITERIA.replay.control_tolerance, samples=samples
     )
@@ -182,35 +187,34 @@ def _false_patterns(
 
 
 def _pattern(extended: Prediction, origin: Prediction) -> FloatArray:
-    """What a cause changes in each row of the noise (g, r); zero where a replay failed or a patch
-    was lost.
-    """
+    """Change (g, r) by a cause in each row of the noise; zero without an equilibrium or points."""
     change = np.nan_to_num(rows_of(extended)[0] - rows_of(origin)[0])
     change[list({*extended.failed, *origin.failed})] = 0.0
     return change
 
 
 def _blocks(
-    bench: Bench,
+    evaluator: Evaluator,
     origin: Sequence[Prediction],
     model: Model,
     chosen: dict[int, list[int]],
     patterns: Sequence[Sequence[FloatArray]],
     added: tuple[Setup, Effect],
 ) -> list[Block]:
-    """Quadratic forms of what the model without the cause leaves; columns are nuisances, patterns,
-    and the mesh's error.
+    """Quadratic forms of the residual without the cause; columns are nuisances, patterns, and the
+    mesh's error.
     """
-    blocks, first = [], len(bench.nuisances.precision) - 1
+    problem = evaluator.problem
+    blocks, first = [], problem.blocks.replayed
     for place, (number, index) in enumerate(chosen.items()):
         here = origin[number]
         nuisances = rows_of(model.predictions[number])[1][index][..., :first]
         own = np.stack([pattern[place] for pattern in patterns], axis=2)
         there = here.of_groups(index).replace_columns(np.concatenate([nuisances, own], axis=2))
-        block = _of_groups(bench.noises[number], index).block(there)
-        blocks.append(Block(block.name, block.gram / bench.temperature, block.values))
-    if bench.static:
-        # The rest cloud saw no motion at all: what a cause explains of it, it explains with any.
+        block = _of_groups(evaluator.state.noises[number], index).block(there)
+        blocks.append(Block(block.name, block.gram / evaluator.state.temperature, block.values))
+    if problem.at_rest:
+        # The rest cloud saw no motion, so that a cause explains it alike with any motion.
         before, effect = added
         varied = {
             first + place: (effect.apply(before), 1.0)
@@ -218,24 +222,33 @@ def _blocks(
             if effect.at_rest()
         }
         blocks.append(
-            bench.static.block(bench.setup, before, bench.grid, first + len(patterns) + 1, varied)
+            problem.at_rest.block(
+                problem.setup, before, problem.grid, first + len(patterns) + 1, varied
+            )
         )
     return blocks
 
 
 def _of_groups(noise: Noise, index: list[int]) -> Noise:
+    """The noise of these groups alone."""
     return Noise(
         noise.weights[index], noise.residual[index], noise.mesh[index], noise.discrepancy[index]
     )
 
 
 def judge(
-    bench: Bench, blocks: Sequence[Block], effect: Effect, names: Sequence[str]
+    evaluator: Evaluator, blocks: Sequence[Block], effect: Effect, names: Sequence[str]
 ) -> list[Control]:
-    """One control for each of the names; columns of the blocks are nuisances, the true pattern, one
-    for each name, mesh error.
+    """Compute one control for each name.
+
+    Args:
+        evaluator: with the priors of the nuisances.
+        blocks: quadratic forms; their columns are nuisances, the true pattern, one falsified
+            pattern for each name, and the mesh's error.
+        effect: the cause.
+        names: of the controls.
     """
-    known = bench.nuisances.precision
+    known = evaluator.problem.nuisances.precision
     first = len(known) - 1
     nuisance = (*range(first), first + 1 + len(names))
     own = [
@@ -245,7 +258,8 @@ def judge(
     gains = linear_gains(blocks, right_sides(blocks), nuisance, known, own)[0]
     for number, candidate in enumerate(own):
         if fit(blocks, *candidate.precision(list(nuisance), known)).change[-1] < 0:
-            gains[number] = min(gains[number], 0.0)  # the cause's opposite is not the cause
+            # A pattern with the opposite sign is not the cause.
+            gains[number] = min(gains[number], 0.0)
     return [
         Control(
             control=name,
@@ -259,7 +273,7 @@ def judge(
 
 
 def warnings_of(found: Sequence[Control]) -> list[str]:
-    """One sentence for each control that a cause did not pass."""
+    """Return one sentence for each control that a cause did not pass."""
     return [
         f"{one.effect} keeps {100 * one.gain / one.true:.0f} % of its gain with the {one.control}: "
         "it may owe it to something else than the pushes"

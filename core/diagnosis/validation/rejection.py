@@ -1,4 +1,4 @@
-"""When a cause that the fitted sequences ask for is not named after all (step 10 of the method)."""
+"""Rejection of causes that the fitted sequences support and the held-out ones contradict."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["leaves_structure", "rejection_reason"]
 
 
 def rejection_reason(findings: Findings, gain: SurfaceGain | ForceGain | None) -> str:
-    """Why the causes found are not named; empty where nothing speaks against them."""
+    """Return the reason why found causes are not named; empty if nothing contradicts them."""
     if findings.best is None:
         return ""
     names = " and ".join(findings.best.model.names)
@@ -20,21 +20,22 @@ def rejection_reason(findings: Findings, gain: SurfaceGain | ForceGain | None) -
 
 
 def _harm(names: str, gain: SurfaceGain | ForceGain | None) -> str:
-    """They do not carry over: the test sequences get worse."""
+    """Return the reason if the causes make the held-out sequences worse."""
     if gain is None or gain.removed[2] > -CRITERIA.rejection.added_error:
         return ""
     value, low, high = gain.removed
     return (
-        f"{names} would explain the sequences that were fitted on, but makes the test sequences worse: it adds "
-        f"{-100 * value:.0f} % ({-100 * high:.0f} to {-100 * low:.0f} %) of the reducible error there, and is not named"
+        f"{names} would explain the sequences that were fitted on, but makes the test sequences "
+        f"worse: it adds {-100 * value:.0f} % ({-100 * high:.0f} to {-100 * low:.0f} %) of the "
+        "reducible error there, and is not named"
     )
 
 
 def _no_explanation(names: str, findings: Findings, gain: SurfaceGain | ForceGain | None) -> str:
-    """They remove something, but what is wrong stays: the larger part of the smooth error that
-    grows with the push, and of what could be removed on test sequences.
+    """Return the reason if most of the structured error, and of the reducible error on held-out
+    sequences, is left.
     """
-    before, left = findings.structure, findings.left
+    before, left = findings.structure, findings.remaining
     if not leaves_structure(before, left, None if gain is None else gain.removed[0]):
         return ""
     tested = (
@@ -43,16 +44,23 @@ def _no_explanation(names: str, findings: Findings, gain: SurfaceGain | ForceGai
         else f", and of the reducible error on test sequences {_share(gain)} is removed"
     )
     return (
-        f"{names} would explain part of the sequences that were fitted on, but the error that is smooth over the surface and "
-        f"grows with the push stays: {left.ratio:.1f} times what chance gives, {before.ratio:.1f} times without it{tested}. "
-        "It is not named"
+        f"{names} would explain part of the sequences that were fitted on, but the error that is "
+        f"smooth over the surface and grows with the push stays: {left.ratio:.1f} times what "
+        f"chance gives, {before.ratio:.1f} times without it{tested}. It is not named"
     )
 
 
 def leaves_structure(before: Structure, left: Structure, removed: float | None) -> bool:
-    """Whether a cause leaves what is wrong: significant structure, the larger part of that without
-    it, and of the reducible error on test sequences no more than the smaller part is `removed` [1];
-    None without such sequences.
+    """Whether a cause leaves most of the error.
+
+    That is: the structure that is left is significant and at least `CRITERIA.rejection.left_share`
+    of that without the cause, and so is the reducible error on held-out sequences.
+
+    Args:
+        before: structure without the cause.
+        left: structure with it.
+        removed: share of the reducible error that it removes on held-out sequences [1]; None
+            without them.
     """
     stays = left.significant and left.ratio - 1.0 >= CRITERIA.rejection.left_share * max(
         before.ratio - 1.0, 0.0

@@ -1,13 +1,11 @@
-"""Is more wrong in some pushes than a replay's own error can be? What of that error a sequence asks
-for, against what is usual.
+"""Tests whether any sequence needs more engine error than is usual.
 
-Every model's noise allows for the engine's own error: displacements, and local stiffness, each
-smooth and of its own in every sequence (`palpate.diagnosis.inference.noise_model`). It is wide
-enough for what no catalogue should be blamed for, so that something outside the catalogue hides in
-it: a shaft that leans on the rim in pushes from the side looks like spots that are a sixth too
-soft. How much of the allowance a sequence asks for is told by the evidence (MacKay 1992, "Bayesian
-interpolation", eq. 4.2) of its data as a function of the local stiffness' deviation. In replays of
-data of two other solvers with nothing hidden it is at most half.
+The noise model of every sequence allows for the engine's own error: smooth errors of displacement
+and of local stiffness (`palpate.diagnosis.inference.noise_model`). They are so wide that a cause
+outside the catalogue can hide in them: a shaft that leans on the rim in pushes from the side looks
+like spots that are a sixth too soft. The needed deviation of local stiffness maximises the evidence
+of the sequence's data (MacKay 1992, "Bayesian interpolation", eq. 4.2). Measured: in replays of
+data of two other solvers with nothing hidden it is at most half of the allowed one.
 """
 
 from __future__ import annotations
@@ -20,9 +18,9 @@ import numpy as np
 from scipy.stats import chi2
 
 from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, fit, less_constants, log_evidence
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.noise_model import Noise
 from palpate.diagnosis.validation.worst_location import ErrorLocation, location_of
 from palpate.foundation.arrays import FloatArray
@@ -32,14 +30,14 @@ __all__ = ["StiffnessErrorTest", "chance_bound", "largest_stiffness_error", "sti
 
 @dataclass(frozen=True)
 class StiffnessErrorTest:
-    """Of the sequence that asks for most.
+    """The sequence that needs the largest deviation of local stiffness.
 
     Attributes:
         sequence: its name.
-        factor: deviation of local stiffness that explains it best, over the usual one [1].
-        gain: what that gains over the usual one [nats].
-        bound: what it would gain once in a thousand datasets where the usual one is true [nats].
-        place: where most of what such errors change is seen.
+        factor: most probable deviation, over the usual one [1].
+        gain: of that deviation over the usual one [nats].
+        bound: gain that one in a thousand datasets exceeds by chance [nats].
+        place: around which most of the change by such errors lies.
     """
 
     sequence: str
@@ -50,27 +48,28 @@ class StiffnessErrorTest:
 
     @property
     def significant(self) -> bool:
-        """Whether chance would rarely ask for so much."""
+        """Whether chance rarely gives so much."""
         return self.gain > self.bound
 
     @property
     def share(self) -> float:
-        """Of the variance that is asked for: what is beyond the usual [1]."""
+        """Share of the needed variance beyond the usual one [1]."""
         return 1.0 - self.factor**-2
 
     @property
     def warning(self) -> str:
-        """For people; empty where nothing unusual is asked for."""
+        """Sentence for people; empty if nothing unusual is needed."""
         if not self.significant:
             return ""
         usual = 100 * CRITERIA.stiffness_error.usual * CRITERIA.noise.stiffness_error
         return (
-            f"{self.sequence} would need local stiffness that is off by {usual * self.factor:.0f} %, in a pattern of its own; a "
-            f"replay's own error is like {usual:.0f} % at most: something acts there that is not modelled"
+            f"{self.sequence} would need local stiffness that is off by "
+            f"{usual * self.factor:.0f} %, in a pattern of its own; a replay's own error is like "
+            f"{usual:.0f} % at most: something acts there that is not modelled"
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """Plain values, as in the report."""
         deviation = CRITERIA.stiffness_error.usual * CRITERIA.noise.stiffness_error * self.factor
         return {
             "sequence": self.sequence,
@@ -81,11 +80,11 @@ class StiffnessErrorTest:
         }
 
 
-def largest_stiffness_error(bench: Bench, model: Model) -> StiffnessErrorTest | None:
-    """Of the sequences with clouds; None where there is none."""
-    precision = bench.held(model)
+def largest_stiffness_error(evaluator: Evaluator, model: Model) -> StiffnessErrorTest | None:
+    """Test the sequences with clouds; None without them."""
+    precision = evaluator.bounded_precision(model)
     found = []
-    for noise, item in zip(bench.noises, model.predictions, strict=True):
+    for noise, item in zip(evaluator.state.noises, model.predictions, strict=True):
         if not item.force_only:
             whole, own = Block(item.name, *noise.whole(item)), noise.discrepancy.shape[2]
             wanted = stiffness_error_of(
@@ -96,14 +95,15 @@ def largest_stiffness_error(bench: Bench, model: Model) -> StiffnessErrorTest | 
         return None
     name, wanted, noise = max(found, key=lambda row: row[1].gain)
     place = location_of(
-        bench.surface.patch_centres, _seen(noise, wanted.errors)[: bench.surface.patches]
+        evaluator.problem.surface.patch_centres,
+        _seen(noise, wanted.errors)[: evaluator.problem.surface.patches],
     )
     return StiffnessErrorTest(name, wanted.factor, wanted.gain, chance_bound(len(found)), place)
 
 
 def _seen(noise: Noise, errors: FloatArray) -> FloatArray:
-    """What errors (s,) of local stiffness, over the allowed deviation, change in each row of a
-    sequence: squared, over noise.
+    """Squared change over noise in each row of a sequence by errors (s,) of local stiffness, which
+    are over the allowed deviation.
     """
     pattern = noise.discrepancy[..., -noise.spots :] @ errors
     away = less_constants(pattern[..., None], noise.weights)[..., 0]
@@ -111,19 +111,23 @@ def _seen(noise: Noise, errors: FloatArray) -> FloatArray:
 
 
 def chance_bound(sequences: int) -> float:
-    """What one of so many sequences gains by chance once in 1 / FALSE datasets, where the usual
-    deviation is true [nats].
+    """Gain that one of so many sequences exceeds by chance in a share of datasets [nats].
 
-    Half of the time less than the usual fits best, which gains nothing, and else as chi squared of
-    one freedom does (Self and Liang 1987, case 5).
+    The share is `CRITERIA.stiffness_error.false_alarms`. Under the usual deviation the gain is zero
+    half of the time, and else distributed as half of chi squared with one degree of freedom (Self
+    and Liang 1987, case 5).
     """
     return 0.5 * float(chi2.isf(2 * CRITERIA.stiffness_error.false_alarms / sequences, 1))
 
 
 @dataclass(frozen=True, eq=False)
 class StiffnessError:
-    """Of one sequence: `factor` and `gain` as of `StiffnessErrorTest`, and the most probable `errors` (s,) of
-    local stiffness there, over the deviation that is allowed.
+    """Most probable error of local stiffness of one sequence.
+
+    Attributes:
+        factor: deviation over the usual one [1].
+        gain: over the usual one [nats].
+        errors: (s,) of each spot, over the allowed deviation [1].
     """
 
     factor: float
@@ -134,8 +138,14 @@ class StiffnessError:
 def stiffness_error_of(
     block: Block, fitted: list[int], precision: FloatArray, own: int, spots: int
 ) -> StiffnessError:
-    """Of a block whose last `own` columns are the engine's error, the last `spots` of them of local
-    stiffness.
+    """Maximise the evidence of one sequence over the deviations of the engine's error.
+
+    Args:
+        block: quadratic form of the sequence.
+        fitted: its columns of nuisances and causes.
+        precision: prior precision of these columns.
+        own: number of columns of the engine's error, which are the last ones.
+        spots: number of those of local stiffness, which are the last ones of these.
     """
     count = block.gram.shape[0] - 1
     columns = [*fitted, *range(count - own, count)]

@@ -1,4 +1,4 @@
-"""Where on the phantom most of an error sits."""
+"""Place on the phantom around which most of an error lies."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
-from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.foundation.arrays import FloatArray
 
 __all__ = ["ErrorLocation", "location_of", "worst_patch_location", "worst_push_location"]
@@ -17,18 +17,27 @@ __all__ = ["ErrorLocation", "location_of", "worst_patch_location", "worst_push_l
 
 @dataclass(frozen=True)
 class ErrorLocation:
-    """A place [m] and the share [1] of an error that is around it."""
+    """Place around which most of an error lies.
+
+    Attributes:
+        place: phantom frame [m].
+        share: of the error within `CRITERIA.verdict.location_radius` [1].
+    """
 
     place: tuple[float, float, float]
     share: float
 
     def __str__(self) -> str:
         x, y, z = (1e3 * part for part in self.place)
-        return f"{100 * self.share:.0f} % of it within {1e3 * CRITERIA.verdict.location_radius:.0f} mm of ({x:.0f}, {y:.0f}, {z:.0f}) mm"
+        radius = 1e3 * CRITERIA.verdict.location_radius
+        return (
+            f"{100 * self.share:.0f} % of it within {radius:.0f} mm of "
+            f"({x:.0f}, {y:.0f}, {z:.0f}) mm"
+        )
 
 
 def location_of(centres: FloatArray, total: FloatArray) -> ErrorLocation:
-    """Of places (p, 3) [m] that with the most of a total (p,) around it."""
+    """Find the place, of places (p, 3) [m], around which most of a total (p,) lies."""
     around = (
         np.linalg.norm(centres[:, None] - centres, axis=2) < CRITERIA.verdict.location_radius
     ) @ total
@@ -37,8 +46,8 @@ def location_of(centres: FloatArray, total: FloatArray) -> ErrorLocation:
     return ErrorLocation((x, y, z), float(around[worst] / max(total.sum(), 1e-300)))
 
 
-def worst_push_location(predictions: Sequence[Prediction], bench: Bench) -> ErrorLocation:
-    """Of the pushes that with the largest squared error of the force around it."""
+def worst_push_location(predictions: Sequence[Prediction], evaluator: Evaluator) -> ErrorLocation:
+    """Find the push around which most of the squared error of the force lies."""
     total: list[float] = []
     for item in predictions:
         assert item.forces is not None and item.forces.push is not None
@@ -46,14 +55,14 @@ def worst_push_location(predictions: Sequence[Prediction], bench: Bench) -> Erro
         total += [
             float(squares[item.forces.push == name].sum()) for name in np.unique(item.forces.push)
         ]
-    return location_of(bench.pushed[0], np.array(total))
+    return location_of(evaluator.problem.pushes[0], np.array(total))
 
 
-def worst_patch_location(predictions: Sequence[Prediction], bench: Bench) -> ErrorLocation:
-    """Of the patches that with the largest squared residual around it while something is touched,
-    less what is there at rest.
+def worst_patch_location(predictions: Sequence[Prediction], evaluator: Evaluator) -> ErrorLocation:
+    """Find the patch around which most of the squared residual in contact, without that at rest,
+    lies.
     """
-    total = np.zeros(bench.surface.patches)
+    total = np.zeros(evaluator.problem.surface.patches)
     for item in predictions:
         if item.force_only:
             continue
@@ -62,4 +71,4 @@ def worst_patch_location(predictions: Sequence[Prediction], bench: Bench) -> Err
         zero = np.where(still, item.gap, 0.0).sum(axis=0) / np.maximum(still.sum(axis=0), 1)
         away = np.where(still.any(axis=0), np.nan_to_num(item.gap - zero), 0.0)
         total += (away**2 * item.count * touched[:, None]).sum(axis=0)
-    return location_of(bench.surface.patch_centres, total)
+    return location_of(evaluator.problem.surface.patch_centres, total)

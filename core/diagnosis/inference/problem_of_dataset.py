@@ -1,0 +1,71 @@
+"""The inference problem of a dataset: its meshes, and its data at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from palpate.dataset import Dataset
+from palpate.diagnosis.inference.inference_problem import InferenceProblem
+from palpate.diagnosis.inference.rest_cloud import RestCloud
+from palpate.diagnosis.inference.rest_evidence import RestEvidence
+from palpate.diagnosis.observation.force_only import pushed_places
+from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.measurement.segmentation import cleaner_for
+from palpate.mesh.graded_mesh import FINE_GRID, REPLAY_GRID, SCREEN_GRID
+from palpate.mesh.protocol import Meshing
+from palpate.mesh.push_meshes import FINE_PUSHES, REPLAY_PUSHES, SCREEN_PUSHES
+from palpate.registration.registration import Registration
+from palpate.setup.setup import Setup, Shape
+
+__all__ = ["problem_of_dataset"]
+
+
+def problem_of_dataset(
+    dataset: Dataset,
+    registration: Registration,
+    setup: Setup,
+    fitted: Sequence[Observations],
+    held_out: Sequence[Observations],
+) -> InferenceProblem:
+    """Return the inference problem of a dataset.
+
+    Args:
+        dataset: with its rest cloud.
+        registration: of robot and camera.
+        setup: as stated.
+        fitted: sequences that causes are fitted on.
+        held_out: sequences of the test, whose pushes the meshes must resolve too.
+    """
+    grid, fine, coarse = _meshes(setup, [*fitted, *held_out])
+    clouds, at_rest = any(not item.force_only for item in fitted), None
+    if clouds:
+        cleaner = cleaner_for(dataset, registration)
+        at_rest = RestEvidence(RestCloud.of(dataset.rest_cloud(), cleaner, setup, grid))
+    return InferenceProblem(
+        setup=setup,
+        registration=registration,
+        names=tuple(item.name for item in fitted),
+        at_rest=at_rest,
+        grid=grid,
+        fine_grid=fine,
+        coarse_grid=coarse,
+        forces=any(item.forces for item in fitted),
+        clouds=clouds,
+        pushes=pushed_places(fitted, setup),
+    )
+
+
+def _meshes(setup: Setup, data: Sequence[Observations]) -> tuple[Meshing, Meshing, Meshing]:
+    """Return the mesh of the diagnosis, the fine one and the coarse one."""
+    radius = setup.tool.radius
+    if not isinstance(setup.geometry, Shape):
+        return (
+            REPLAY_GRID.for_tool(radius),
+            FINE_GRID.for_tool(radius),
+            SCREEN_GRID.for_tool(radius),
+        )
+    places = pushed_places(data, setup)[0]
+    default, fine, coarse = (
+        spec.for_tool(radius).at(places) for spec in (REPLAY_PUSHES, FINE_PUSHES, SCREEN_PUSHES)
+    )
+    return default, fine, coarse

@@ -1,0 +1,44 @@
+"""The checks of an all-clear, which is given only where nothing contradicts it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from palpate.diagnosis.validation.held_out_test import HeldOutCheck
+from palpate.diagnosis.validation.stiffness_error_test import StiffnessErrorTest
+
+__all__ = ["AllClearChecks"]
+
+
+@dataclass(frozen=True, eq=False)
+class AllClearChecks:
+    """Checks that are made before an all-clear; empty where none was in question.
+
+    Attributes:
+        stiffness_error: largest error of local stiffness in a fitted sequence.
+        held_out: the stated setup on sequences that nothing was fitted on.
+    """
+
+    stiffness_error: StiffnessErrorTest | None = None
+    held_out: HeldOutCheck | None = None
+
+    @property
+    def held_out_structure(self) -> bool:
+        """Whether the stated setup leaves structure where nothing was fitted."""
+        return self.held_out is not None and self.held_out.structure.significant
+
+    @property
+    def stiffness_errors(self) -> tuple[StiffnessErrorTest, ...]:
+        """Tests of local stiffness that were made, those of the fitted sequences first."""
+        both = (self.stiffness_error, self.held_out.stiffness_error if self.held_out else None)
+        return tuple(one for one in both if one is not None)
+
+    @property
+    def unusual(self) -> StiffnessErrorTest | None:
+        """The first test that the engine's own error does not explain."""
+        return next((one for one in self.stiffness_errors if one.significant), None)
+
+    @property
+    def failed(self) -> bool:
+        """Whether any check contradicts an all-clear."""
+        return self.held_out_structure or self.unusual is not None
