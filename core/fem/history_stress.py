@@ -33,7 +33,7 @@ it is not at them; there the stress stops growing."""
 
 @njit(cache=True)
 def _shear_stress(c: Any, stiffening: float, gamma: float, direction: Any) -> Any:
-    found, inverse = np.empty(c.shape), np.empty(6)
+    result, inverse = np.empty(c.shape), np.empty(6)
     a0, a1 = direction[0], direction[1]
     for m in range(c.shape[0]):
         trace = c[m, 0] + c[m, 1] + c[m, 2]
@@ -41,17 +41,17 @@ def _shear_stress(c: Any, stiffening: float, gamma: float, direction: Any) -> An
         left = 1.0 - stiffening * (trace / root - 3.0)
         scale = min(1.0 / left, _MOST_HARDENING) / root if left > 0.0 else _MOST_HARDENING / root
         for k in range(6):
-            found[m, k] = scale * ((1.0 if k < 3 else 0.0) - trace / 3.0 * inverse[k])
+            result[m, k] = scale * ((1.0 if k < 3 else 0.0) - trace / 3.0 * inverse[k])
         if gamma > 0.0:
             pull = (
                 2.0
                 * gamma
                 * (c[m, 0] * a0 * a0 + c[m, 1] * a1 * a1 + 2.0 * c[m, 5] * a0 * a1 - 1.0)
             )
-            found[m, 0] += pull * a0 * a0
-            found[m, 1] += pull * a1 * a1
-            found[m, 5] += pull * a0 * a1
-    return found
+            result[m, 0] += pull * a0 * a0
+            result[m, 1] += pull * a1 * a1
+            result[m, 5] += pull * a0 * a1
+    return result
 
 
 def shear_stress(law: Law, c: FloatArray) -> FloatArray:

@@ -108,12 +108,14 @@ class CellPoints:
     def read(self, mesh: Mesh, field: FloatArray) -> FloatArray:
         """See `MaterialPoints`."""
         assert isinstance(mesh, BoxMesh)
-        found = field.reshape(*self._counts[::-1], -1)
+        result = field.reshape(*self._counts[::-1], -1)
         for axis in range(3):
-            found = _along(_reading(self, mesh, axis), found, 2 - axis)
+            result = _along(_reading(self, mesh, axis), result, 2 - axis)
         (ex, ey, ez), points = _elements(mesh), _points_along(mesh)
-        found = found.reshape(ez, points, ey, points, ex, points, -1).transpose(0, 2, 4, 1, 3, 5, 6)
-        return np.ascontiguousarray(found).reshape(ez * ey * ex, points**3, -1)
+        result = result.reshape(ez, points, ey, points, ex, points, -1).transpose(
+            0, 2, 4, 1, 3, 5, 6
+        )
+        return np.ascontiguousarray(result).reshape(ez * ey * ex, points**3, -1)
 
     @property
     def _counts(self) -> list[int]:
@@ -158,12 +160,12 @@ def _reading(cells: CellPoints, mesh: BoxMesh, axis: int) -> FloatArray:
     middles = (corners[1:] + corners[:-1]) / 2
     apart = element_quadrature(mesh).places.reshape(*_elements(mesh)[::-1], *([points] * 3), 3)
     places = np.moveaxis(apart[..., axis], (2 - axis, 5 - axis), (0, 1))[:, :, 0, 0, 0, 0].ravel()
-    found = np.zeros((len(places), len(middles)))
+    result = np.zeros((len(places), len(middles)))
     index = np.clip(np.searchsorted(middles, places) - 1, 0, len(middles) - 2)
     share = (places - middles[index]) / (middles[1] - middles[0])
     rows = np.arange(len(places))
-    found[rows, index], found[rows, index + 1] = 1 - share, share
-    return found
+    result[rows, index], result[rows, index + 1] = 1 - share, share
+    return result
 
 
 def material_points(setup: Setup, grid: Meshing, mesh: Mesh) -> MaterialPoints:

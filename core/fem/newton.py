@@ -217,10 +217,10 @@ def _step(
 ) -> tuple[FloatArray, float, Outcome | None]:
     """One Newton step with a line search; an outcome if there is none."""
     state = model.assemble(positions, tool)
-    found = _direction(model, tool, positions, state)
-    if found is None:
+    direction = _direction(model, tool, positions, state)
+    if direction is None:
         return positions, energy, Outcome.INDEFINITE
-    step, exact = found
+    step, exact = direction
     trial, value = _search(
         model, tool, positions, step, float(state.residual @ step), energy, exact
     )

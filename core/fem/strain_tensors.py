@@ -32,12 +32,12 @@ def cauchy_green(tangents: Any) -> Any:
     Args:
         tangents: (m, 3, 3) derivatives of the positions along x, y, z, one row each [1].
     """
-    found = np.empty((tangents.shape[0], 6))
+    result = np.empty((tangents.shape[0], 6))
     for m in range(tangents.shape[0]):
         t = tangents[m]
         for k, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))):
-            found[m, k] = t[i, 0] * t[j, 0] + t[i, 1] * t[j, 1] + t[i, 2] * t[j, 2]
-    return found
+            result[m, k] = t[i, 0] * t[j, 0] + t[i, 1] * t[j, 1] + t[i, 2] * t[j, 2]
+    return result
 
 
 @njit(cache=True, inline="always")
@@ -89,14 +89,14 @@ def _eigen(a: Any, axes: Any) -> None:
 
 
 @njit(cache=True, inline="always")
-def _times(a: Any, b: Any, found: Any) -> None:
+def _times(a: Any, b: Any, result: Any) -> None:
     """Multiply two symmetric tensors (6,) with common axes."""
-    found[0] = a[0] * b[0] + a[5] * b[5] + a[4] * b[4]
-    found[1] = a[5] * b[5] + a[1] * b[1] + a[3] * b[3]
-    found[2] = a[4] * b[4] + a[3] * b[3] + a[2] * b[2]
-    found[3] = a[5] * b[4] + a[1] * b[3] + a[3] * b[2]
-    found[4] = a[0] * b[4] + a[5] * b[3] + a[4] * b[2]
-    found[5] = a[0] * b[5] + a[5] * b[1] + a[4] * b[3]
+    result[0] = a[0] * b[0] + a[5] * b[5] + a[4] * b[4]
+    result[1] = a[5] * b[5] + a[1] * b[1] + a[3] * b[3]
+    result[2] = a[4] * b[4] + a[3] * b[3] + a[2] * b[2]
+    result[3] = a[5] * b[4] + a[1] * b[3] + a[3] * b[2]
+    result[4] = a[0] * b[4] + a[5] * b[3] + a[4] * b[2]
+    result[5] = a[0] * b[5] + a[5] * b[1] + a[4] * b[3]
 
 
 @njit(cache=True, inline="always")
@@ -108,8 +108,8 @@ def _length(a: Any) -> float:
 
 
 @njit(cache=True, inline="always")
-def _near_one(a: Any, upper: Any, lower: Any, work: Any, found: Any) -> None:
-    """Quotient of two polynomials (4,) of a symmetric tensor (6,), written into `found`.
+def _near_one(a: Any, upper: Any, lower: Any, work: Any, result: Any) -> None:
+    """Quotient of two polynomials (4,) of a symmetric tensor (6,), written into `result`.
 
     The coefficients are in ascending order.
     """
@@ -121,21 +121,21 @@ def _near_one(a: Any, upper: Any, lower: Any, work: Any, found: Any) -> None:
         below[k] = lower[0] * one + lower[1] * a[k] + lower[2] * square[k] + lower[3] * cube[k]
         cube[k] = upper[0] * one + upper[1] * a[k] + upper[2] * square[k] + upper[3] * cube[k]
     invert(below, inverse)
-    _times(cube, inverse, found)
+    _times(cube, inverse, result)
 
 
 @njit(cache=True, inline="always")
-def _by_axes(t: Any, logarithm: bool, full: Any, axes: Any, found: Any) -> None:
+def _by_axes(t: Any, logarithm: bool, full: Any, axes: Any, result: Any) -> None:
     """Half the logarithm, or the exponential of twice a symmetric tensor (6,), by its eigenvalues.
 
-    The result is written into `found`.
+    The result is written into `result`.
     """
     full[0, 0], full[1, 1], full[2, 2] = t[0], t[1], t[2]
     full[1, 2], full[0, 2], full[0, 1] = t[3], t[4], t[5]
     full[2, 1], full[2, 0], full[1, 0] = t[3], t[4], t[5]
     _eigen(full, axes)
     for n in range(6):
-        found[n] = 0.0
+        result[n] = 0.0
     for k in range(3):
         value = (
             0.5 * np.log(max(full[k, k], _LEAST_DETERMINANT))
@@ -143,7 +143,7 @@ def _by_axes(t: Any, logarithm: bool, full: Any, axes: Any, found: Any) -> None:
             else np.exp(2.0 * full[k, k])
         )
         for n, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))):
-            found[n] += axes[i, k] * axes[j, k] * value
+            result[n] += axes[i, k] * axes[j, k] * value
 
 
 @njit(cache=True)
@@ -153,7 +153,7 @@ def _logarithms(c: Any, larger_than: Any, near: float) -> Any:
     It is zero where it is certainly no longer than `larger_than` (m,): |ln C| is at most that of C
     - 1 and C^-1 - 1 together, a bound that needs no eigenvalues.
     """
-    found, full, axes, work = (
+    result, full, axes, work = (
         np.zeros(c.shape),
         np.empty((3, 3)),
         np.empty((3, 3)),
@@ -176,19 +176,19 @@ def _logarithms(c: Any, larger_than: Any, near: float) -> Any:
             if 0.5 * np.sqrt(size**2 + _length(inverse) ** 2) < larger_than[m]:
                 continue
         if size < near:
-            _near_one(away, upper, lower, work, found[m])
+            _near_one(away, upper, lower, work, result[m])
         else:
-            _by_axes(c[m], True, full, axes, found[m])
-        mean = (found[m, 0] + found[m, 1] + found[m, 2]) / 3.0
+            _by_axes(c[m], True, full, axes, result[m])
+        mean = (result[m, 0] + result[m, 1] + result[m, 2]) / 3.0
         for k in range(3):
-            found[m, k] -= mean
-    return found
+            result[m, k] -= mean
+    return result
 
 
 @njit(cache=True)
 def _exponentials(strain: Any, near: float) -> Any:
     """Exponential of twice the tensors (m, 6)."""
-    found, full, axes, work = (
+    result, full, axes, work = (
         np.empty(strain.shape),
         np.empty((3, 3)),
         np.empty((3, 3)),
@@ -199,10 +199,10 @@ def _exponentials(strain: Any, near: float) -> Any:
         for k in range(6):
             twice[k] = 2.0 * strain[m, k]
         if _length(twice) < near:
-            _near_one(twice, upper, lower, work, found[m])
+            _near_one(twice, upper, lower, work, result[m])
         else:
-            _by_axes(strain[m], False, full, axes, found[m])
-    return found
+            _by_axes(strain[m], False, full, axes, result[m])
+    return result
 
 
 def log_strain(c: FloatArray, larger_than: FloatArray | None = None) -> FloatArray:

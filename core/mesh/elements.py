@@ -232,13 +232,13 @@ def _split(parts: int) -> list[FloatArray]:
     """Barycentric coordinates (3, 3) of the corners of each of parts^2 equal triangles that fill
     one.
     """
-    found = []
+    result = []
     for i in range(parts):
         for j in range(parts - i):
-            found.append([(i, j), (i + 1, j), (i, j + 1)])
+            result.append([(i, j), (i + 1, j), (i, j + 1)])
             if i + j < parts - 1:
-                found.append([(i + 1, j + 1), (i, j + 1), (i + 1, j)])
-    return [np.array([(parts - i - j, i, j) for i, j in corners]) / parts for corners in found]
+                result.append([(i + 1, j + 1), (i, j + 1), (i + 1, j)])
+    return [np.array([(parts - i - j, i, j) for i, j in corners]) / parts for corners in result]
 
 
 def _tetrahedron(face: Face, dense_face: Face) -> Element:
@@ -301,7 +301,7 @@ def _mapped_gradients(gradients: Any, jacobians: Any, wide: int) -> tuple[Any, A
         (e, q, 3, wide) [1/m], and (e, q) determinants.
     """
     elements, points, nodes = jacobians.shape[0], gradients.shape[0], gradients.shape[1]
-    found, volumes = np.zeros((elements, points, 3, wide)), np.empty((elements, points))
+    result, volumes = np.zeros((elements, points, 3, wide)), np.empty((elements, points))
     crossed = np.empty((3, 3))
     for e in range(elements):
         for q in range(points):
@@ -320,10 +320,10 @@ def _mapped_gradients(gradients: Any, jacobians: Any, wide: int) -> tuple[Any, A
                     gradients[q, a, 2] / volume,
                 )
                 for i in range(3):
-                    found[e, q, i, a] = (
+                    result[e, q, i, a] = (
                         along * crossed[0, i] + across * crossed[1, i] + up * crossed[2, i]
                     )
-    return found, volumes
+    return result, volumes
 
 
 def face_weights(face: Face, corners: FloatArray) -> FloatArray:

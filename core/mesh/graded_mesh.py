@@ -3,7 +3,7 @@
 A fixed number of nodes along an axis is too sparse for a tool amid a long face, and wasteful for
 one near an edge. Measured over seven pushes all over the block: 3.5 % error on average and 5.4 % at
 worst with 1700 to 2200 nodes graded by size; 7 to 9 % and 16 % with 13x9x9 quadratic nodes, and 8 %
-for a single poke in the middle of the top (`python -m benchmarks gradings`).
+for a single poke in the middle of the top (`python -m benchmarks mesh_grading`).
 
 Far from the tool the edges stop growing, at a third of the shortest side. Without that limit, the
 sag of a heavy block is off by a tenth and changes as much with the position of the focus, so that a

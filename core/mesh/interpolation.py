@@ -24,12 +24,12 @@ def weighted_nodes(nodes: Any, weights: Any, field: Any) -> FloatArray:
         weights: (m, a).
         field: (n, c).
     """
-    found = np.zeros((nodes.shape[0], field.shape[1]))
+    result = np.zeros((nodes.shape[0], field.shape[1]))
     for m in range(nodes.shape[0]):
         for a in range(nodes.shape[1]):
             for c in range(field.shape[1]):
-                found[m, c] += weights[m, a] * field[nodes[m, a], c]
-    return found
+                result[m, c] += weights[m, a] * field[nodes[m, a], c]
+    return result
 
 
 @njit(cache=True)
@@ -136,7 +136,7 @@ def _means(
     The points are sorted by cubic cells as wide as the reach, those of cell i from begins[i] to
     begins[i + 1].
     """
-    found, first, last = (
+    result, first, last = (
         np.full(len(places), np.nan),
         np.empty(3, dtype=np.int64),
         np.empty(3, dtype=np.int64),
@@ -159,5 +159,5 @@ def _means(
                         total += values[n]
                         count += 1
         if count >= least:
-            found[m] = total / count
-    return found
+            result[m] = total / count
+    return result

@@ -82,8 +82,8 @@ class InteractiveReplay:
 
         `within` requests the interior fields.
         """
-        start, wanted = time.perf_counter(), self.reachable(centre)
-        frame = self._replay.solve_from_any(wanted, (self._last,), time.monotonic() - self._begun)
+        start, place = time.perf_counter(), self.reachable(centre)
+        frame = self._replay.solve_from_any(place, (self._last,), time.monotonic() - self._begun)
         converged = frame.outcome is Outcome.CONVERGED
         if converged:
             self._last = frame

@@ -107,12 +107,12 @@ class FrameResolver:
 
     def beginnings(self) -> list[dict[str, Any]]:
         """One finite size of each effect of the catalogue, to start from by hand."""
-        found = []
+        result = []
         for effect in DIAGNOSED:
             starts = effect.starts(self.stated)
             if starts:
-                found.append(starts[len(starts) // 2].to_json())
-        return found
+                result.append(starts[len(starts) // 2].to_json())
+        return result
 
     def setup(self, effects: Sequence[Effect], tuned: bool = True) -> Setup:
         """The stated setup with these causes; `tuned` as in `solve`."""
@@ -164,11 +164,11 @@ class FrameResolver:
             if setup.has_history or self._last is None or self._last[0] != frame
             else [self._last[1]]
         )
-        found = replay(setup, centres, self._grid, times=times, starts=warm, tolerance=_TOLERANCE)[
+        result = replay(setup, centres, self._grid, times=times, starts=warm, tolerance=_TOLERANCE)[
             -1
         ]
-        self._last = (frame, found)
-        return found
+        self._last = (frame, result)
+        return result
 
     def _cloud(self, frame: int) -> FloatArray:
         if frame not in self._cleaned:

@@ -132,20 +132,20 @@ def predict_from_similar(
     Returns:
         positions (n, 3) [m].
     """
-    other, found = lesson
+    other, solved = lesson
     here = start.tool.centre - np.append(start.slip, 0.0)
     useful = (
         other.in_contact
-        and found.in_contact
+        and solved.in_contact
         and start.in_contact
         and np.linalg.norm(tool.centre - here) <= FREE_STEP
     )
-    if not useful or found.outcome is not Outcome.CONVERGED:
+    if not useful or solved.outcome is not Outcome.CONVERGED:
         return positions
     nodes, focus = model.mesh.nodes, model.mesh.focus
     moved = [
         one.mesh.interpolate(one.displacement, nodes - (focus - one.mesh.focus))
-        for one in (found, other)
+        for one in (solved, other)
     ]
     guess = np.where(model.topology.free, positions + moved[0] - moved[1], positions)
     return guess if model.energy(guess, tool) < model.energy(positions, tool) else positions

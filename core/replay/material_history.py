@@ -63,7 +63,7 @@ class HistoryVariables:
         delayed: (k, m, 6) h of each term.
         driving: (m, 6) S - T.
         largest: (m,) |L|.
-        kept: (m, 6) M.
+        stored_strain: (m, 6) M.
         free: (m, 6) T.
     """
 
@@ -72,7 +72,7 @@ class HistoryVariables:
     delayed: FloatArray
     driving: FloatArray
     largest: FloatArray
-    kept: FloatArray
+    stored_strain: FloatArray
     free: FloatArray
 
 
@@ -195,10 +195,10 @@ class MaterialHistory:
         """
         past, step, mesh = self.history, self.step, model.mesh
         fixed = np.einsum("k,kmc->mc", step.left, past.delayed) - step.taken.sum() * past.driving
-        kept = past
+        history = past
         if positions is not None and self.fraction:
-            kept = self._set(cauchy_green(self.points.tangents(mesh, positions)))
-        stress = self.points.read(mesh, fixed - step.factor * kept.free)
+            history = self._set(cauchy_green(self.points.tangents(mesh, positions)))
+        stress = self.points.read(mesh, fixed - step.factor * history.free)
         model.mu = step.factor * model.unrelaxed
         model.added_potential = ConstantStress.of(model, stress * model.unrelaxed[..., None])
 
@@ -210,10 +210,16 @@ class MaterialHistory:
         strain = log_strain(strained, past.largest)
         size = np.sqrt(np.einsum("mc,mc,c->m", strain, strain, [1, 1, 1, 2, 2, 2]))
         growing = size > past.largest
-        longer, kept, free = size[growing], past.kept.copy(), past.free.copy()
-        kept[growing] += ((longer - past.largest[growing]) / longer)[:, None] * strain[growing]
-        free[growing] = shear_stress(self.law, from_log_strain(self.fraction * kept[growing]))
-        return replace(past, largest=np.maximum(size, past.largest), kept=kept, free=free)
+        longer, stored_strain, free = size[growing], past.stored_strain.copy(), past.free.copy()
+        stored_strain[growing] += ((longer - past.largest[growing]) / longer)[:, None] * strain[
+            growing
+        ]
+        free[growing] = shear_stress(
+            self.law, from_log_strain(self.fraction * stored_strain[growing])
+        )
+        return replace(
+            past, largest=np.maximum(size, past.largest), stored_strain=stored_strain, free=free
+        )
 
     def after(self, frame: Equilibrium) -> HistoryVariables:
         """The history after a frame, at the end of the current step."""
@@ -221,13 +227,13 @@ class MaterialHistory:
         strained = cauchy_green(
             self.points.tangents(frame.mesh, frame.mesh.nodes + frame.displacement)
         )
-        found = self._set(strained)
-        driving = shear_stress(self.law, strained) - found.free
+        result = self._set(strained)
+        driving = shear_stress(self.law, strained) - result.free
         delayed = step.left[:, None, None] * past.delayed + step.taken[:, None, None] * (
             driving - past.driving
         )
         touched = past.touched or frame.in_contact
-        return replace(found, time=self._time, touched=touched, delayed=delayed, driving=driving)
+        return replace(result, time=self._time, touched=touched, delayed=delayed, driving=driving)
 
     def with_permanent_set(
         self,

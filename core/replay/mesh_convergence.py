@@ -47,18 +47,18 @@ def hardest_frames(frames: Sequence[Equilibrium]) -> list[int]:
     """Numbers of the equilibria with the strongest push of each touch; failed frames are
     skipped.
     """
-    found: list[int] = []
+    result: list[int] = []
     touching = False
     for number, frame in enumerate(frames):
         if frame.outcome is not Outcome.CONVERGED:
             continue
         if frame.in_contact and touching:
-            if np.linalg.norm(frame.force) > np.linalg.norm(frames[found[-1]].force):
-                found[-1] = number
+            if np.linalg.norm(frame.force) > np.linalg.norm(frames[result[-1]].force):
+                result[-1] = number
         elif frame.in_contact:
-            found.append(number)
+            result.append(number)
         touching = frame.in_contact
-    return found
+    return result
 
 
 def mesh_errors(
@@ -84,7 +84,7 @@ def mesh_errors(
         Replay(replace(setup, element_size=None), finer),
         setup.geometry.surface_points(),
     )
-    found = []
+    result = []
     keys = hardest_frames(frames)
     for done, number in enumerate(keys):
         report(done / len(keys), f"mesh error in touch {done + 1} of {len(keys)}")
@@ -98,8 +98,8 @@ def mesh_errors(
         force = float(np.linalg.norm(other.force - frame.force)) / max(
             float(np.linalg.norm(frame.force)), 1e-12
         )
-        found.append(MeshErrorEstimate(number, error, error / max(size, 1e-12), force))
-    return tuple(found)
+        result.append(MeshErrorEstimate(number, error, error / max(size, 1e-12), force))
+    return tuple(result)
 
 
 def _rms(field: FloatArray) -> float:

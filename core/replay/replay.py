@@ -79,10 +79,10 @@ class Replay(FixedBaseReplay):
 
     def _with_path(self, path: Sequence[Equilibrium], frame: Equilibrium) -> Equilibrium:
         """A frame with the equilibria on the path to it."""
-        found = replace(frame, path=tuple(path))
+        result = replace(frame, path=tuple(path))
         if self._before is not None and self._before[1] is frame:
-            self._before = (self._before[0], found)
-        return found
+            self._before = (self._before[0], result)
+        return result
 
     @on_one_thread
     def step(
@@ -121,8 +121,8 @@ class Replay(FixedBaseReplay):
     def solve_from_any(
         self, centre: FloatArray, starts: Iterable[Equilibrium | None], time: float | None = None
     ) -> Equilibrium:
-        """As `step`, from the first of these frames from which it finds an equilibrium, or from
-        rest.
+        """Solve as `step` does, from the first of these frames that leads to an equilibrium, or
+        from rest.
 
         If none does, the last attempt is returned. A long jump may lead through the block; from
         rest the tool comes in from outside. With friction a start from rest would lose its history,

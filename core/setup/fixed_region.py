@@ -115,13 +115,13 @@ class Painted:
 
 def _marked(name: str, what: str, numbers: tuple[int, ...], count: int) -> BoolArray:
     if not numbers or min(numbers) < 0 or max(numbers) >= count:
-        found = (
+        named = (
             f"{what} {max(numbers, key=lambda number: (number < 0, number))}"
             if numbers
             else f"no {what} at all"
         )
         raise MeshError(
-            f"{name}: the fixed region names {found}; expected numbers from 0 to {count - 1}",
+            f"{name}: the fixed region names {named}; expected numbers from 0 to {count - 1}",
             file=name,
             count=count,
         )

@@ -70,22 +70,22 @@ def _in_ball(places: Any, edges: Any, x: float, y: float, z: float, radius: floa
 
     A diagnosis computes this for hundreds of balls in every frame.
     """
-    found = np.empty(len(places))
+    result = np.empty(len(places))
     for m in range(len(places)):
         apart = math.sqrt(
             (places[m, 0] - x) ** 2 + (places[m, 1] - y) ** 2 + (places[m, 2] - z) ** 2
         )
-        found[m] = _inside(radius - apart, edges[m])
-    return found
+        result[m] = _inside(radius - apart, edges[m])
+    return result
 
 
 @njit(cache=True)
 def _above(heights: Any, edges: Any, least: float) -> Any:
     """Share (m,) of the volume of points at these heights (m,) above `least` [m]."""
-    found = np.empty(len(heights))
+    result = np.empty(len(heights))
     for m in range(len(heights)):
-        found[m] = _inside(heights[m] - least, edges[m])
-    return found
+        result[m] = _inside(heights[m] - least, edges[m])
+    return result
 
 
 def lump_share(lump: Inclusion, points: SamplePoints) -> FloatArray:

@@ -222,13 +222,13 @@ class Pardiso:
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve for one (n,) or several (n, m) right sides with the last factor."""
-        found = self.approximate(right)
+        solution = self.approximate(right)
         for _ in range(_MOST_ROUNDS if self._single else 0):
-            change = self.approximate(right - self._times(found))
-            found += change
-            if (np.abs(change).max(axis=0) <= _SETTLED * np.abs(found).max(axis=0)).all():
-                return found
-        return self._in_double(right) if self._single else found
+            change = self.approximate(right - self._times(solution))
+            solution += change
+            if (np.abs(change).max(axis=0) <= _SETTLED * np.abs(solution).max(axis=0)).all():
+                return solution
+        return self._in_double(right) if self._single else solution
 
     def _times(self, vectors: FloatArray) -> FloatArray:
         """Multiply the matrix by one (n,) or several (n, m) vectors."""
@@ -259,14 +259,14 @@ class Pardiso:
         unit = np.zeros((self._handle.size, len(unknowns)), dtype=self._handle.kind, order="F")
         unit[unknowns, np.arange(len(unknowns))] = 1.0
         if self._handle.requested[unknowns].all():
-            found = self._handle.run(_SOLVE, unit, unknowns)[unknowns]
-            if self._is_correct(found, unknowns):
-                return np.asarray(found, dtype=float)
+            solution = self._handle.run(_SOLVE, unit, unknowns)[unknowns]
+            if self._is_correct(solution, unknowns):
+                return np.asarray(solution, dtype=float)
         half = self._handle.run(_FORWARD, unit)
         filled = half[half.any(axis=1)]
         return np.asarray(filled.T @ filled, dtype=float)
 
-    def _is_correct(self, found: FloatArray, unknowns: IntArray) -> bool:
+    def _is_correct(self, solution: FloatArray, unknowns: IntArray) -> bool:
         """Whether fast inverse entries (m, m) agree with a full solution.
 
         One column is checked once after each analysis.
@@ -277,7 +277,8 @@ class Pardiso:
             whole = self.approximate(load)[unknowns]
             self._checked = True
             self._trusted = bool(
-                np.abs(found[:, 0] - whole).max() <= _SAME[self._handle.kind] * np.abs(whole).max()
+                np.abs(solution[:, 0] - whole).max()
+                <= _SAME[self._handle.kind] * np.abs(whole).max()
             )
             if not self._trusted:
                 log.warning(

@@ -67,7 +67,7 @@ class SuperLUFactor:
         return np.ascontiguousarray(self._lu.solve(np.asarray(right, dtype=float)))
 
     def approximate(self, right: FloatArray) -> FloatArray:
-        """As `solve`."""
+        """Solve like `solve`: the factor has double precision."""
         return self.solve(right)
 
     def inverse_entries(self, unknowns: IntArray) -> FloatArray:

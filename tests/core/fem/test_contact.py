@@ -21,8 +21,8 @@ def _model(setup: Setup = SETUP, nodes: tuple[int, int, int] = (9, 7, 4)) -> Blo
 
 
 def _dented(model: BlockModel, seed: int) -> tuple[np.ndarray, ToolSphere]:
-    """The top sunk in a little irregularly, and a ball that reaches 2 mm into where it was, so that
-    some points lie inside.
+    """A slightly irregular dent in the top, and a ball 2 mm below the original top, so that some
+    points lie inside it.
     """
     nodes = model.mesh.nodes
     distance = np.hypot(nodes[:, 0] - 1e-3, nodes[:, 1])
@@ -143,7 +143,7 @@ def test_a_surface_that_faces_away_from_the_centre_is_not_pushed():
     assert push[2] < 0
 
 
-def test_ball_on_a_large_block_presses_as_hertz_says():
+def test_ball_on_a_large_block_has_hertz_force():
     setup = Setup(
         geometry=Box(size=(0.08, 0.08, 0.06)),
         tool=Tool(radius=5e-3),
@@ -158,7 +158,7 @@ def test_ball_on_a_large_block_presses_as_hertz_says():
 
 
 @pytest.mark.parametrize("skin", [0.1, 30.0])
-def test_hard_or_soft_skin_lets_the_ball_in_as_little_as_the_plain_block(skin):
+def test_penetration_is_as_small_with_a_hard_or_soft_skin(skin):
     way = np.array([[0.0, 0.0, SIZE[2] + 5e-3 - depth] for depth in (1e-3, 2e-3, 3e-3)])
     coated = replace(SETUP, material=Material(layer=Layer(thickness=4e-3, stiffness_ratio=skin)))
     grid = GridSpec(nodes=(9, 7, 6), spacing=1.5e-3)

@@ -30,7 +30,7 @@ def bent(material: Material, order: int) -> tuple[BlockModel, np.ndarray]:
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", MATERIALS)
-def test_density_adds_up_to_the_energy_that_is_minimised(name, order):
+def test_density_integrates_to_the_minimised_energy(name, order):
     model, positions = bent(MATERIALS[name], order)
     whole = elastic_energy(
         model.law, model.rule, model.topology.elements, model.mu, model.bulk, positions

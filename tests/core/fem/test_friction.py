@@ -1,5 +1,5 @@
-"""Friction's energy, force and tangent under a fixed grip; what a hold carries from one grid to
-another.
+"""Friction's energy, force and tangent at a fixed normal pressure; transfer of its history between
+grids.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ SETUP = Setup(geometry=Box(size=(0.03, 0.03, 0.02)), tool=Tool(radius=5e-3))
 TOOL = ToolSphere(np.array([1e-3, -5e-4, 0.024]), 5e-3)
 
 
-def _gripped(order: int) -> tuple[BlockModel, np.ndarray]:
-    """A block whose top is held by points of which some stick and some slip, and places of its
-    nodes somewhat off rest.
+def _with_friction(order: int) -> tuple[BlockModel, np.ndarray]:
+    """A block with friction on its top, where some points stick and some slip, and nodes slightly
+    off rest.
     """
     random = np.random.default_rng(5)
     model = BlockModel(SETUP, box_mesh(SETUP.geometry.size, GridSpec(nodes=(7, 7, 5), order=order)))
@@ -42,8 +42,8 @@ def _gripped(order: int) -> tuple[BlockModel, np.ndarray]:
 
 
 @pytest.mark.parametrize("order", [1, 2])
-def test_force_is_the_slope_of_the_energy_and_tangent_that_of_the_force(order):
-    model, positions = _gripped(order)
+def test_force_and_tangent_are_derivatives_of_the_energy(order):
+    model, positions = _with_friction(order)
     free, grip = model.topology.free, model.friction_potential
     assert grip is not None
     drag = grip.stiffness * 1e-4
@@ -72,7 +72,7 @@ def test_force_is_the_slope_of_the_energy_and_tangent_that_of_the_force(order):
 
 
 def test_drag_on_the_body_is_within_the_limits_and_adds_to_the_push():
-    model, positions = _gripped(1)
+    model, positions = _with_friction(1)
     held = model.assemble(positions, TOOL)
     grip, model.friction_potential = model.friction_potential, None
     assert grip is not None
@@ -84,7 +84,7 @@ def test_drag_on_the_body_is_within_the_limits_and_adds_to_the_push():
     assert np.allclose(force.sum(axis=0), -drag, atol=1e-12)
 
 
-def test_a_hold_is_read_at_its_own_points_and_between_them():
+def test_friction_history_is_interpolated_at_and_between_its_points():
     random = np.random.default_rng(1)
     places = np.append(random.uniform(0, 1e-2, (400, 2)), np.zeros((400, 1)), axis=1)
     touched = places[:, 0] < 5e-3

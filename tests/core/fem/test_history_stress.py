@@ -1,4 +1,4 @@
-"""A material's memory at given deformations, against closed forms."""
+"""A material with history at prescribed deformations, against closed forms."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ SHEAR = np.array([[1.0, 0.0, 0.4], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 """Keeps the volume, so that all stress is shear stress."""
 
 
-class Held:
-    """A block whose nodes are put where the test says, at given times."""
+class PrescribedBlock:
+    """A block with prescribed node positions at given times."""
 
     def __init__(
         self,
@@ -95,7 +95,7 @@ class Held:
     def force(
         self, positions: FloatArray, time: float, outcome: Outcome = Outcome.CONVERGED
     ) -> FloatArray:
-        """Of the unknowns (u,) over E [m^2], and remember."""
+        """Force on the unknowns (u,) over E [m^2]; the state is stored."""
         self.material_history.begin(time)
         self.material_history.apply_to(self.model, positions)
         found = self.model.assemble(positions, None, tangent=False).residual
@@ -103,15 +103,15 @@ class Held:
         return found
 
 
-def _sheared(held: Held, amount: float) -> FloatArray:
+def _sheared(held: PrescribedBlock, amount: float) -> FloatArray:
     return np.asarray(held.mesh.nodes @ (np.eye(3) + amount * (SHEAR - np.eye(3))).T)
 
 
-def _elastic(held: Held, positions: FloatArray) -> FloatArray:
+def _elastic(held: PrescribedBlock, positions: FloatArray) -> FloatArray:
     return BlockModel(held.setup, held.mesh).assemble(positions, None, tangent=False).residual
 
 
-def _bent(held: Held, seed: int) -> FloatArray:
+def _bent(held: PrescribedBlock, seed: int) -> FloatArray:
     noise = np.array(4e-4 * np.random.default_rng(seed).standard_normal(held.mesh.nodes.shape))
     noise[held.mesh.base_nodes] = 0.0
     return np.asarray(_sheared(held, 0.5) + noise)
@@ -149,8 +149,8 @@ def test_shear_stress_is_the_derivative_of_the_energy(law):
 
 
 @ORDERS
-def test_force_is_the_gradient_of_the_energy_and_tangent_that_of_the_force(order):
-    held = Held(MADE_OF["lump and skin"], order)
+def test_force_and_tangent_are_derivatives_of_the_energy(order):
+    held = PrescribedBlock(MADE_OF["lump and skin"], order)
     model, free = held.model, held.model.topology.free
     positions = _bent(held, 1)
     way = np.array(np.random.default_rng(2).standard_normal(held.mesh.nodes.shape))
@@ -177,7 +177,7 @@ def test_force_is_the_gradient_of_the_energy_and_tangent_that_of_the_force(order
 @ORDERS
 def test_constant_stress_does_the_work_of_its_strain(order):
     """Energy of a uniform H under a uniform deformation: H : (C - I) / 2 times the volume."""
-    held = Held(MADE_OF["neo_hooke"], order)
+    held = PrescribedBlock(MADE_OF["neo_hooke"], order)
     h: FloatArray = np.array([0.3, -0.1, 0.2, 0.05, -0.15, 0.1])
     c: FloatArray = cauchy_green(SHEAR.T[None])[0]
     carried = ConstantStress.of(held.model, np.tile(h, (*held.model.mu.shape, 1)))
@@ -188,8 +188,8 @@ def test_constant_stress_does_the_work_of_its_strain(order):
 
 @ORDERS
 @MATERIALS
-def test_stress_at_constant_strain_relaxes_as_the_prony_series_says(material, order):
-    held = Held(material, order)
+def test_stress_at_constant_strain_follows_the_prony_series(material, order):
+    held = PrescribedBlock(material, order)
     positions = _sheared(held, 1.0)
     at_once = _elastic(held, positions)
     for time in (0.0, 0.1, 3.0, 3.5, 20.0, 1e4):
@@ -201,20 +201,20 @@ def test_stress_at_constant_strain_relaxes_as_the_prony_series_says(material, or
 
 
 def test_pressure_does_not_relax():
-    held = Held(MADE_OF["neo_hooke"])
+    held = PrescribedBlock(MADE_OF["neo_hooke"])
     swollen = 1.05 * held.mesh.nodes
     at_once = held.force(swollen, 0.0)
     assert held.force(swollen, 50.0) == pytest.approx(at_once, rel=1e-12, abs=1e-15)
 
 
 @pytest.mark.parametrize("rate", [1e-3, 0.3, 1e3])
-def test_strain_that_grows_evenly_is_resisted_as_the_convolution_says(rate):
+def test_stress_at_constant_strain_rate_is_the_convolution(rate):
     """Small shear at a constant rate, from 1 - g (slow) to 1 (fast): 1 - g + g (1 - e^-s) / s, s =
-    t / tau, in whatever steps.
+    t / tau, for any steps.
     """
     (term,) = ONE
     for steps in (1, 7):
-        held = Held(MADE_OF["neo_hooke"])
+        held = PrescribedBlock(MADE_OF["neo_hooke"])
         held.force(held.mesh.nodes, 0.0)
         for share in np.arange(1, steps + 1) / steps:
             positions = _sheared(held, 1e-5 * share)
@@ -225,8 +225,8 @@ def test_strain_that_grows_evenly_is_resisted_as_the_convolution_says(rate):
         assert found == pytest.approx(wanted * at_once, rel=1e-4, abs=1e-4 * np.abs(at_once).max())
 
 
-def test_history_knows_nothing_of_how_the_body_is_turned():
-    held, turned = Held(MADE_OF["fibres"]), Held(MADE_OF["fibres"])
+def test_history_is_invariant_under_rotation():
+    held, turned = PrescribedBlock(MADE_OF["fibres"]), PrescribedBlock(MADE_OF["fibres"])
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     for number in range(3):
         held.force(_bent(held, number), float(number))
@@ -238,9 +238,9 @@ def test_history_knows_nothing_of_how_the_body_is_turned():
 
 
 @ORDERS
-def test_cells_see_an_affine_strain_and_give_it_back_as_it_is(order):
-    """Read at the quadrature points, a field that is linear in space is that field, to the rim."""
-    held = Held(MADE_OF["neo_hooke"], order)
+def test_cells_reproduce_an_affine_strain(order):
+    """A field that is linear in space is exact at all quadrature points, up to the boundary."""
+    held = PrescribedBlock(MADE_OF["neo_hooke"], order)
     cells = CellPoints(SIZE, (8, 6, 4))
     tangents = cells.tangents(held.mesh, _sheared(held, 1.0))
     assert tangents == pytest.approx(np.broadcast_to(SHEAR.T, tangents.shape), abs=1e-12)
@@ -256,8 +256,11 @@ def test_cells_see_an_affine_strain_and_give_it_back_as_it_is(order):
     )
 
 
-def test_memory_in_cells_relaxes_as_at_the_quadrature_points_where_the_strain_is_even():
-    exact, cells = Held(MADE_OF["two terms"]), Held(MADE_OF["two terms"], cells=True)
+def test_history_in_cells_equals_that_at_quadrature_points_for_uniform_strain():
+    exact, cells = (
+        PrescribedBlock(MADE_OF["two terms"]),
+        PrescribedBlock(MADE_OF["two terms"], cells=True),
+    )
     for amount, time in ((0.5, 0.0), (1.0, 1.0), (0.2, 1.5)):
         wanted = exact.force(_sheared(exact, amount), time)
         assert cells.force(_sheared(cells, amount), time) == pytest.approx(
@@ -265,8 +268,8 @@ def test_memory_in_cells_relaxes_as_at_the_quadrature_points_where_the_strain_is
         )
 
 
-def test_frame_without_equilibrium_is_not_remembered():
-    held = Held(replace(MADE_OF["two terms"], retained_fraction=0.2))
+def test_frame_without_equilibrium_is_not_stored():
+    held = PrescribedBlock(replace(MADE_OF["two terms"], retained_fraction=0.2))
     held.force(_bent(held, 1), 0.0)
     before = held.material_history.history
     held.force(_bent(held, 2), 1.0, Outcome.ITERATIONS)
@@ -278,18 +281,16 @@ def test_frame_without_equilibrium_is_not_remembered():
 @ORDERS
 @pytest.mark.parametrize("share", [0.2, 0.6])
 @pytest.mark.parametrize("relaxation", [(), ONE], ids=["elastic", "relaxing"])
-def test_bar_that_was_stretched_stays_stretched_by_the_retained_share_of_the_logarithm(
-    order, share, relaxation
-):
-    """On springs so soft that they hold nothing, and pulled to l at once or in steps, with its
-    volume kept.
+def test_stretched_bar_keeps_the_retained_share_of_its_log_strain(order, share, relaxation):
+    """The bar stands on springs too soft to matter, and is stretched to l at constant volume, at
+    once or in steps.
     """
     material, loose = (
         Material(retained_fraction=share, relaxation=relaxation),
         Support(stiffness_over_E=1e-2),
     )
     for stretches in ([1.4], [1.1, 1.2, 1.4, 1.3]):
-        held = Held(material, order, support=loose)
+        held = PrescribedBlock(material, order, support=loose)
         for number, stretch in enumerate(stretches):
             positions = held.mesh.nodes * [stretch, stretch**-0.5, stretch**-0.5]
             held.force(positions, float(number))
@@ -301,8 +302,8 @@ def test_bar_that_was_stretched_stays_stretched_by_the_retained_share_of_the_log
         assert spans == pytest.approx(np.array([1.4, 1.4**-0.5, 1.4**-0.5]) ** share, rel=2e-3)
 
 
-def test_set_makes_the_first_push_softer_by_its_share_and_the_second_not():
-    held = Held(Material(retained_fraction=0.3))
+def test_permanent_set_softens_the_first_push_only():
+    held = PrescribedBlock(Material(retained_fraction=0.3))
     small = _sheared(held, 1e-4)
     whole = _elastic(held, small)
 
@@ -315,19 +316,22 @@ def test_set_makes_the_first_push_softer_by_its_share_and_the_second_not():
     assert resists(1e-4, 0.0) == pytest.approx(
         0.7 * whole, rel=1e-3, abs=1e-3 * np.abs(whole).max()
     )
-    kept = held.material_history.history.kept
+    kept = held.material_history.history.stored_strain
     assert resists(0.3e-4, 1.0) == pytest.approx(0.0 * whole, abs=1e-3 * np.abs(whole).max())
     assert resists(1e-4, 2.0) == pytest.approx(
         0.7 * whole, rel=1e-3, abs=1e-3 * np.abs(whole).max()
     )
-    assert np.array_equal(held.material_history.history.kept, kept)
+    assert np.array_equal(held.material_history.history.stored_strain, kept)
 
 
-def test_set_goes_on_smoothly_where_the_strain_turns_past_its_largest():
+def test_permanent_set_is_smooth_as_the_strain_turns_at_its_largest():
     """At the largest strain so far, in another direction, nothing jumps."""
-    held = Held(Material(retained_fraction=0.5))
+    held = PrescribedBlock(Material(retained_fraction=0.5))
     held.force(_sheared(held, 0.5), 0.0)
-    count, before = len(held.material_history.history.kept), held.material_history.history.free
+    count, before = (
+        len(held.material_history.history.stored_strain),
+        held.material_history.history.free,
+    )
     turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]) @ (SHEAR - np.eye(3))
     less, more = (
         held.material_history._set(
@@ -338,8 +342,8 @@ def test_set_goes_on_smoothly_where_the_strain_turns_past_its_largest():
     assert np.array_equal(less, before) and 1e-5 < np.abs(more - before).max() < 1e-3
 
 
-def test_grid_that_moves_cannot_hold_what_its_quadrature_points_remember():
-    held = Held(MADE_OF["neo_hooke"])
+def test_moving_grid_refuses_history_at_quadrature_points():
+    held = PrescribedBlock(MADE_OF["neo_hooke"])
     other = box_mesh(SIZE, GridSpec(nodes=(5, 5, 3), spacing=2e-3), np.array([0.01, 0.0, 0.02]))
     with pytest.raises(MeshError, match="moves"):
         held.material_history.apply_to(BlockModel(held.setup, other))

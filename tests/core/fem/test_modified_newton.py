@@ -32,7 +32,7 @@ def _pressed(order: int) -> tuple[BlockModel, FloatArray, ToolSphere]:
 @pytest.mark.parametrize(
     "motion", [(0, 0, -2e-4), (3e-4, 0, 0), (0, -2e-4, 4e-4)], ids=["deeper", "along", "back"]
 )
-def test_following_finds_what_newton_finds(order, motion):
+def test_modified_newton_finds_newtons_equilibrium(order, motion):
     model, positions, tool = _pressed(order)
     moved = ToolSphere(tool.centre + motion, tool.radius)
     found, wanted = (
@@ -47,7 +47,7 @@ def test_following_finds_what_newton_finds(order, motion):
 
 
 @ORDERS
-def test_one_step_takes_the_contact_to_its_balance(order):
+def test_one_step_balances_the_contact(order):
     model, positions, tool = _pressed(order)
     condensed = CondensedContact.at(model, positions, tool)
     assert condensed is not None
@@ -59,7 +59,7 @@ def test_one_step_takes_the_contact_to_its_balance(order):
     assert relative_residual(model, after) < 2e-3 * relative_residual(model, before)
 
 
-def test_body_in_balance_stays_where_it_is():
+def test_body_in_equilibrium_stays_where_it_is():
     model, positions, tool = _pressed(1)
     condensed = CondensedContact.at(model, positions, tool)
     assert condensed is not None
@@ -69,7 +69,7 @@ def test_body_in_balance_stays_where_it_is():
     assert np.abs(stepped - positions).max() < 1e-9
 
 
-def test_linearisation_is_given_up_with_its_factor():
+def test_linearisation_is_invalid_without_its_factor():
     model, positions, tool = _pressed(1)
     condensed = CondensedContact.at(model, positions, tool)
     assert condensed is not None and condensed.fits(model)
@@ -80,7 +80,7 @@ def test_linearisation_is_given_up_with_its_factor():
 @pytest.mark.parametrize(
     "place", [PLACE, np.array([SIZE[0] / 2 + 5e-3 - 2e-3, 4e-3, 0.02])], ids=["top", "side"]
 )
-def test_what_a_tool_presses_on_is_what_the_graded_mesh_says_is_near(place):
+def test_condensed_nodes_are_near_the_focus_of_the_graded_mesh(place):
     block = Replay(SETUP, REPLAY_GRID, 1e-6)
     frame = block.step(place)
     condensed = CondensedContact.at(
@@ -92,14 +92,14 @@ def test_what_a_tool_presses_on_is_what_the_graded_mesh_says_is_near(place):
     assert not len(GridSpec(nodes=(9, 9, 5), order=2).mesh(SETUP, place).near_focus)
 
 
-def test_tool_that_is_far_away_leaves_nothing_to_linearise():
+def test_distant_tool_has_no_linearisation():
     model, positions, _ = _pressed(1)
     far = ToolSphere(np.array([0.0, 0.0, 0.2]), 5e-3)
     assert CondensedContact.at(model, positions, far) is None
     assert ModifiedNewton().solve(model, far, positions, 1e-9) is None
 
 
-def test_many_small_steps_take_few_factors():
+def test_many_small_steps_need_few_factors():
     model, positions, tool = _pressed(1)
     quick_solver, before = ModifiedNewton(), model.topology.factor.generation
     for number in range(1, 21):

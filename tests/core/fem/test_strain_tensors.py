@@ -1,4 +1,4 @@
-"""The logarithm of a strain and its exponential, against eigenvalues."""
+"""Logarithm and exponential of strains, against eigenvalues."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from palpate.fem.strain_tensors import cauchy_green, from_log_strain, log_strain
 
 
-def test_logarithmic_strain_is_that_of_the_stretches_and_back():
+def test_log_strain_is_that_of_the_stretches_and_is_inverted():
     random = np.random.default_rng(3)
     turn = np.linalg.qr(random.standard_normal((3, 3)))[0]
     for stretches in ((1.3, 0.8, 1.1), (1.2, 1.2, 0.7), (1.5, 1.5, 1.5)):
@@ -21,7 +21,7 @@ def test_logarithmic_strain_is_that_of_the_stretches_and_back():
         assert from_log_strain(found) * volume == pytest.approx(c, abs=1e-12)
 
 
-def test_small_strains_have_the_logarithm_and_exponential_of_their_eigenvalues():
+def test_small_strains_agree_with_their_eigenvalues():
     random = np.random.default_rng(4)
     for size in (1e-6, 1e-3, 0.02, 0.0299, 0.0301):
         away = random.standard_normal((3, 3))
@@ -37,7 +37,7 @@ def test_small_strains_have_the_logarithm_and_exponential_of_their_eigenvalues()
         )
 
 
-def test_strain_that_is_surely_no_longer_than_asked_for_is_left_out_and_no_other():
+def test_only_strains_certainly_below_the_bound_are_left_out():
     c = cauchy_green(np.eye(3) + 0.1 * np.random.default_rng(5).standard_normal((500, 3, 3)))
     whole = log_strain(c)
     size = np.sqrt(np.einsum("mc,mc,c->m", whole, whole, [1, 1, 1, 2, 2, 2]))

@@ -1,4 +1,4 @@
-"""A replay takes one thread, whatever it was told it may take, and gives the others back."""
+"""A replay uses one thread, whatever the limit, and restores the limit."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SETUP = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3
 
 
 def _threads(pools: ThreadpoolController) -> set[int]:
-    """Of the libraries that a replay calls; others may have been loaded by other tests."""
+    """Numbers of threads of the libraries that a replay calls; other tests may have loaded more."""
     ours = [
         pool
         for pool in pools.info()
@@ -28,7 +28,7 @@ def _threads(pools: ThreadpoolController) -> set[int]:
     return {pool["num_threads"] for pool in ours}
 
 
-def test_replay_takes_one_thread_and_gives_the_others_back() -> None:
+def test_replay_uses_one_thread_and_restores_the_others() -> None:
     grid, push = GridSpec(nodes=(5, 3, 3)), np.array([[0, 0, 0.1], [0, 0, 0.0395]])
     replay(SETUP, push, grid)  # now all is loaded that a replay calls
     pools, seen = ThreadpoolController(), []
@@ -47,11 +47,12 @@ from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.recording.interactive import InteractiveReplay
 
 live = InteractiveReplay(SETUP, PAGE_GRID.for_tool(SETUP.tool.radius))
-print(all(live.at(np.array(poke(depth))).converged for depth in (-1e-3, 1e-3, 2e-3, 4e-3, 3e-3, 5e-3)))
+depths = (-1e-3, 1e-3, 2e-3, 4e-3, 3e-3, 5e-3)
+print(all(live.at(np.array(poke(depth))).converged for depth in depths))
 """
 
 
-def test_factors_hold_where_mkl_is_told_to_use_several_threads() -> None:
+def test_factors_are_valid_if_mkl_may_use_several_threads() -> None:
     here = Path(__file__).parents[3]
     known = {
         **os.environ,

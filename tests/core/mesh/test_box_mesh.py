@@ -70,7 +70,7 @@ def test_free_surface_is_everything_but_the_base():
     assert len(mesh.free_surface) == total - len(mesh.faces["-z"])
 
 
-def test_graded_axis_is_finest_at_its_focus_and_has_the_spacing_asked_for():
+def test_graded_axis_is_finest_at_its_focus_and_has_the_requested_spacing():
     axis = graded_axis(-0.034, 0.034, 25, 0.01, 8e-4)
     steps = np.diff(axis)
     nearest = np.abs((axis[1:] + axis[:-1]) / 2 - 0.01).argmin()
@@ -121,7 +121,7 @@ def test_weights_of_a_point_add_up_to_one():
     assert np.allclose(weights.sum(axis=1), 1) and (weights >= -1e-15).all()
 
 
-def test_grid_reads_from_text_and_says_what_it_expected():
+def test_grid_is_parsed_from_text_and_errors_name_the_format():
     assert GridSpec.parse("25X9x9") == GridSpec(nodes=(25, 9, 9))
     with pytest.raises(MeshError, match=r"reads like 13x5x5.*'13x5'"):
         GridSpec.parse("13x5")

@@ -26,15 +26,15 @@ PLACES = {
 
 
 @dataclass(frozen=True)
-class AsItIs:
-    """One mesh, wherever the tool is."""
+class ConstantMesh:
+    """The same mesh for every position of the tool."""
 
     made: BoxMesh
 
     def mesh(self, setup: Setup, centre: FloatArray) -> BoxMesh:
         return self.made
 
-    def finer(self) -> AsItIs:
+    def finer(self) -> ConstantMesh:
         return self
 
 
@@ -76,7 +76,7 @@ def test_a_longest_edge_that_is_never_reached_changes_nothing():
     )
 
 
-def test_an_edge_longer_than_the_longest_gives_way_to_it():
+def test_an_edge_longer_than_the_longest_is_shortened_to_it():
     assert np.diff(sized_axis(0.0, 0.03, 0.03, 8e-3, 0.5, 3e-3)) == pytest.approx(np.full(10, 3e-3))
 
 
@@ -113,7 +113,7 @@ def test_a_finer_grading_has_more_nodes_everywhere():
     )
 
 
-def test_a_larger_tool_wants_larger_elements():
+def test_a_larger_tool_gets_larger_elements():
     assert GRADING.for_tool(1e-2) == replace(GRADING, spacing=3e-3)
 
 
@@ -129,14 +129,14 @@ def test_a_larger_tool_wants_larger_elements():
     ],
     ids=str,
 )
-def test_what_makes_no_mesh_is_refused(wrong):
+def test_impossible_gradings_are_refused(wrong):
     with pytest.raises(MeshError):
         replace(GRADING, **wrong)
 
 
-def test_a_tool_is_led_over_meshes_of_different_shapes():
-    """From amid the top towards an edge, where the mesh has fewer elements: the force stays what it
-    was, to the mesh's error.
+def test_a_tool_moves_across_meshes_of_different_shapes():
+    """From amid the top towards an edge, where the mesh has fewer elements: the force stays the
+    same, up to the mesh's error.
     """
     way = [poke(3e-3) + np.array([x, 0, 0]) for x in np.linspace(0, 0.02, 11)]
     frames = replay(SETUP, np.array(way), GRADING)
@@ -146,9 +146,9 @@ def test_a_tool_is_led_over_meshes_of_different_shapes():
     assert np.abs(np.diff(force)).max() < 0.06 * force.max()
 
 
-def test_the_sag_does_not_hang_on_where_the_mesh_is_fine():
-    """Under 1.8 /m the block sags by 0.74 mm RMS; without a longest edge a tenth of that hangs on
-    where the mesh is fine.
+def test_the_sag_does_not_depend_on_the_focus_of_the_mesh():
+    """Under 1.8 /m the block sags by 0.74 mm RMS; without a longest edge a tenth of that depends on
+    the focus of the mesh.
     """
     heavy, points = (
         replace(SETUP, load=Load(specific_weight_over_stiffness=1.8)),
@@ -157,7 +157,7 @@ def test_the_sag_does_not_hang_on_where_the_mesh_is_fine():
 
     def sag(grading: Grading, place: tuple[float, float, float]) -> FloatArray:
         mesh = grading.mesh(heavy, np.array(place))
-        return rest(heavy, AsItIs(mesh)).move(points) - points
+        return rest(heavy, ConstantMesh(mesh)).move(points) - points
 
     for grading, least, most in (
         (REPLAY_GRID, 0.0, 15e-6),

@@ -15,7 +15,7 @@ NODES, WEIGHTS, NORMALS = (
 )
 
 
-def test_weighted_nodes_are_the_sums_that_they_say():
+def test_weighted_nodes_are_weighted_sums():
     field = RANDOM.normal(size=(40, 2))
     assert np.allclose(
         weighted_nodes(NODES, WEIGHTS, field),
@@ -25,7 +25,7 @@ def test_weighted_nodes_are_the_sums_that_they_say():
     assert weighted_nodes(NODES[:0], WEIGHTS[:0], field).shape == (0, 2)
 
 
-def test_patch_rows_add_up_each_patchs_points_also_where_a_patch_has_none():
+def test_patch_rows_sum_over_each_patchs_points_also_for_empty_patches():
     ends = np.array([0, 100, 100, 101, 300])
     entries, columns, rows = patch_rows(NODES, WEIGHTS, NORMALS, ends, 40)
     moved = RANDOM.normal(size=(40, 3))
@@ -37,7 +37,7 @@ def test_patch_rows_add_up_each_patchs_points_also_where_a_patch_has_none():
         assert len(np.unique(columns[a:b])) == b - a
 
 
-def test_medians_by_patch_are_numpys_and_not_a_number_where_nothing_is_seen():
+def test_medians_by_patch_equal_numpys_and_are_nan_for_empty_patches():
     patch, values = RANDOM.integers(0, 30, 400), RANDOM.normal(size=400)
     patch[patch == 7] = 8
     patch[:2], patch[patch == 5] = 5, 6
@@ -48,7 +48,7 @@ def test_medians_by_patch_are_numpys_and_not_a_number_where_nothing_is_seen():
     assert np.array_equal(patch_medians(values, patch, 31), expected, equal_nan=True)
 
 
-def test_means_around_places_are_those_of_the_points_within_reach():
+def test_neighbourhood_means_are_those_of_the_points_within_reach():
     rng = np.random.default_rng(4)
     points, values, places = (
         rng.uniform(-1, 1, (400, 3)),

@@ -17,7 +17,7 @@ DOME = Setup(geometry=dome(RADII), tool=Tool(radius=5e-3))
 PLACES = np.array([[0.0, 0.0, RADII[2]], [RADII[0] * np.cos(0.9), 0.0, RADII[2] * np.sin(0.9)]])
 
 
-def test_each_push_has_its_own_mesh_that_is_small_there() -> None:
+def test_each_push_has_its_own_mesh_that_is_fine_there() -> None:
     spec = SCREEN_PUSHES.at(PLACES)
     meshes = [spec.mesh(DOME, place + np.array([0.0, 0.0, 4e-3])) for place in PLACES]
     assert spec.mesh(DOME, PLACES[0]) is meshes[0] is not meshes[1]

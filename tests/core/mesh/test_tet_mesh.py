@@ -22,7 +22,7 @@ SETUP = Setup(geometry=Shape(*box_surface(SIZE)), tool=Tool(radius=5e-3))
 
 
 def _halved(surface):
-    """The same surface of smaller triangles."""
+    """The same surface with each triangle divided."""
     fine = trimesh.Trimesh(*surface).subdivide().subdivide()
     return np.array(fine.vertices), np.array(fine.faces)
 
@@ -38,7 +38,7 @@ def test_quadratic_field_is_interpolated_exactly():
     assert np.abs(mesh.interpolate(field(mesh.nodes), points) - field(points)).max() < 1e-14
 
 
-def test_point_outside_takes_the_value_of_the_nearest_place_of_the_surface():
+def test_point_outside_takes_the_value_of_the_nearest_surface_point():
     mesh = filled_box(SIZE, 6e-3)
     found = mesh.interpolate(
         mesh.nodes, np.array([[0.0, 0.0, 0.05], [0.05, 0.03, -0.01], [0.04, 0.0, 0.01]])
@@ -46,7 +46,7 @@ def test_point_outside_takes_the_value_of_the_nearest_place_of_the_surface():
     assert np.allclose(found, [[0.0, 0.0, 0.03], [0.03, 0.02, 0.0], [0.03, 0.0, 0.01]], atol=1e-12)
 
 
-def test_mesh_is_small_where_the_tool_goes_and_nowhere_else():
+def test_mesh_is_fine_only_near_the_tool():
     mesh = fill(SETUP.shape, TetSpec.along(TOUCH, 5e-3, spacing=1e-3, coarsest=5e-3))
     edges = mesh.corners[mesh.tetrahedra]
     longest = np.linalg.norm(edges[:, :, None] - edges[:, None], axis=3).max(axis=(1, 2))
@@ -68,7 +68,7 @@ def test_same_surface_and_motion_give_the_same_mesh():
     )
 
 
-def test_mesh_survives_the_way_to_another_process():
+def test_mesh_survives_pickling():
     mesh = filled_box(SIZE, 8e-3)
     copy = pickle.loads(pickle.dumps(mesh))
     assert np.array_equal(copy.nodes, mesh.nodes) and np.array_equal(
@@ -119,13 +119,13 @@ def test_gmsh_leaves_signal_handlers_alone_and_no_model_behind():
     assert not sys.modules["gmsh"].isInitialized()
 
 
-def test_missing_gmsh_is_told_with_what_to_install(monkeypatch):
+def test_missing_gmsh_is_reported_with_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "gmsh", None)
     with pytest.raises(SetupError, match=r'meshed by Gmsh.*pip install "palpate\[shapes\]"'):
         fill(SETUP.shape, TetSpec(path=(), radius=1e-3, spacing=7.7e-3, coarsest=7.7e-3))
 
 
-def test_gmsh_that_fails_is_told_with_the_file(monkeypatch):
+def test_failure_of_gmsh_is_reported_with_the_file(monkeypatch):
     def broken(*_):
         raise RuntimeError("no elements in volume 1")
 
@@ -137,17 +137,17 @@ def test_gmsh_that_fails_is_told_with_the_file(monkeypatch):
 
 
 @pytest.mark.parametrize(("spacing", "coarsest"), [(0.0, 1e-3), (2e-3, 1e-3), (1e-3, 2.0)])
-def test_spacings_out_of_order_are_told(spacing, coarsest):
+def test_spacings_out_of_order_are_refused(spacing, coarsest):
     with pytest.raises(MeshError, match="are not in this order"):
         TetSpec(path=(), radius=1e-3, spacing=spacing, coarsest=coarsest)
 
 
-def test_finer_mesh_has_its_nodes_closer():
+def test_finer_mesh_has_closer_nodes():
     spec = TetSpec.along(TOUCH, 5e-3, spacing=3e-3, coarsest=6e-3).finer()
     assert (spec.spacing, spec.coarsest) == pytest.approx((2e-3, 4e-3))
 
 
-def test_what_makes_sense_of_a_block_only_is_told_for_other_shapes():
+def test_properties_of_a_block_are_refused_for_other_shapes():
     with pytest.raises(SetupError, match="a layer lies on the flat top of a block"):
         replace(SETUP, material=Material(layer=Layer(thickness=1e-3, stiffness_ratio=2.0)))
     strip = Support(detached=(Detachment(edge="-x", extent=0.01),))
@@ -160,7 +160,7 @@ def test_what_makes_sense_of_a_block_only_is_told_for_other_shapes():
         TetSpec(path=(), radius=1e-3).mesh(replace(SETUP, geometry=Box(size=SIZE)), np.zeros(3))
 
 
-def test_description_of_the_body_is_plain():
+def test_body_as_dict_has_plain_values():
     assert SETUP.as_dict()["geometry"] == {
         "surface": "surface",
         "size": pytest.approx(list(SIZE)),

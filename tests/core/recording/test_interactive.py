@@ -1,4 +1,4 @@
-"""A tool led by hand: what the block answers is what a replay gives at the same place."""
+"""Interactive replay: the response equals that of a replay at the same position."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_answer_is_that_of_a_replay_and_no_point_lies_in_the_tool(live: Interact
     assert down == pytest.approx(-0.004, rel=0.02)
 
 
-def test_lifted_tool_feels_nothing(live: InteractiveReplay) -> None:
+def test_lifted_tool_has_no_force(live: InteractiveReplay) -> None:
     live.at(pushed(0.003))
     felt = live.at(ABOVE)
     assert felt.depth == 0.0 and not felt.force.any() and felt.inside is None
@@ -56,13 +56,13 @@ def test_lifted_tool_feels_nothing(live: InteractiveReplay) -> None:
         ((0.0, 0.0, 0.06), (0.0, 0.0, 0.06)),
     ],
 )
-def test_tool_is_led_no_further_than_it_may_go(
+def test_tool_stops_at_its_permitted_range(
     live: InteractiveReplay, wanted: tuple[float, ...], reached: tuple[float, ...]
 ) -> None:
     assert live.reachable(np.array(wanted)) == pytest.approx(reached, abs=1e-9)
 
 
-def test_frame_without_equilibrium_says_so_and_shows_the_last_one() -> None:
+def test_frame_without_equilibrium_is_reported_and_shows_the_last_one() -> None:
     """A tool whose tip is lower than stated runs into the held edge of the base."""
     live = InteractiveReplay(
         Setup(geometry=Box(size=SIZE), tool=Tool(radius=RADIUS, offset=(0.0, 0.0, -2e-3))),

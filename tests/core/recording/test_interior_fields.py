@@ -1,5 +1,5 @@
-"""The interior as a recording keeps it; against a real recording it is compared in
-tests/core/recording/test_resolve_frame.py.
+"""Interior fields of a recording; tests/core/recording/test_resolve_frame.py compares them with a
+real one.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def pushed() -> tuple[Setup, InteriorFields]:
     return longer, InteriorFields.of(longer, replay(longer, centres, PAGE_GRID))
 
 
-def test_another_size_counts_as_motion_from_the_stated_place(
+def test_another_size_counts_as_displacement_from_the_stated_position(
     pushed: tuple[Setup, InteriorFields],
 ) -> None:
     moved = pushed[1].displacement(0, np.array([[SIZE[0] / 2, 0.0, 0.01], [0.0, 0.0, 0.01]]))
@@ -44,7 +44,7 @@ def test_material_below_the_tool_moves_down_with_it_and_less_the_deeper(
     assert np.all(np.diff(down) < 0) and down[-1] == 0.0
 
 
-def test_it_outlives_a_file(pushed: tuple[Setup, InteriorFields], tmp_path) -> None:
+def test_fields_survive_a_file(pushed: tuple[Setup, InteriorFields], tmp_path) -> None:
     np.savez(tmp_path / "kept.npz", **pushed[1].arrays("raw"))
     with np.load(tmp_path / "kept.npz") as stored:
         found, missing = InteriorFields.read(stored, "raw"), InteriorFields.read(stored, "extended")
@@ -59,7 +59,7 @@ def test_it_outlives_a_file(pushed: tuple[Setup, InteriorFields], tmp_path) -> N
         )
 
 
-def test_linear_fields_are_met_exactly() -> None:
+def test_linear_fields_are_interpolated_exactly() -> None:
     rng = np.random.default_rng(0)
     axes = [np.sort(rng.uniform(0, 1, count)) for count in (5, 4, 3)]
     z, y, x = np.meshgrid(axes[2], axes[1], axes[0], indexing="ij")

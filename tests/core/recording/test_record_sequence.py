@@ -1,4 +1,4 @@
-"""What the page shows of a frame: looked at once where two setups cannot differ."""
+"""Comparison of frames with clouds, done once if two setups cannot differ."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _same(one: ModelRecording, other: ModelRecording) -> bool:
 
 
 def _looks(monkeypatch) -> list[int]:
-    """Grows by the number of points whenever a cloud is compared with a surface."""
+    """A list that grows by the number of points whenever a cloud is compared with a surface."""
     seen = list[int]()
 
     def counted(points, *rest, **known):
@@ -46,7 +46,7 @@ def _looks(monkeypatch) -> list[int]:
     return seen
 
 
-def test_frames_at_rest_are_as_the_other_setup_saw_them(monkeypatch):
+def test_frames_at_rest_are_copied_from_the_other_setup(monkeypatch):
     clouds, frames = _clouds(), replay(SOFTER, CENTRES, GRID)
     stated = compare_with_clouds(SETUP, replay(SETUP, CENTRES, GRID), clouds)
     alone, looks = compare_with_clouds(SOFTER, frames, clouds), _looks(monkeypatch)
@@ -56,7 +56,7 @@ def test_frames_at_rest_are_as_the_other_setup_saw_them(monkeypatch):
     assert not np.array_equal(after.error[2], stated.error[2], equal_nan=True)
 
 
-def test_frames_are_looked_at_anew_from_another_place(monkeypatch):
+def test_frames_are_compared_again_with_another_camera_pose(monkeypatch):
     clouds, frames = _clouds(), replay(ELSEWHERE, CENTRES, GRID)
     stated = compare_with_clouds(SETUP, replay(SETUP, CENTRES, GRID), clouds)
     alone, looks = compare_with_clouds(ELSEWHERE, frames, clouds), _looks(monkeypatch)
@@ -66,7 +66,7 @@ def test_frames_are_looked_at_anew_from_another_place(monkeypatch):
     assert np.nanmean(np.abs(after.error[0] - stated.error[0])) > 1e-4
 
 
-def test_frame_that_one_setup_has_at_rest_and_the_other_pressed_is_looked_at(monkeypatch):
+def test_frame_at_rest_in_one_setup_only_is_compared_again(monkeypatch):
     barely = np.array([[4e-3, -2e-3, TOP + 5.3e-3]])
     clouds = [seen_points(frame, 3000, 2e-4, 0) for frame in replay(SETUP, barely, GRID)]
     larger = replace(SETUP, tool=replace(SETUP.tool, radius=6.5e-3))

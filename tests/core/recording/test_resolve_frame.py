@@ -1,5 +1,5 @@
-"""Frames solved again: the same as the recording where the causes are the same, and nearer to the
-data with the true one.
+"""Frames solved again: equal to the recording with the same causes, and nearer to the data with the
+true one.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def deepest(replay: dict[str, Any]) -> int:
     return int(np.argmin(replay["tool_raw"][:, 2]))
 
 
-def test_no_cause_is_the_stated_model_and_the_models_causes_are_the_extended_one(
+def test_no_cause_gives_the_stated_model_and_the_models_causes_the_extended_one(
     what: FrameResolver, replay: dict[str, Any], deepest: int
 ) -> None:
     for name, rows in (("raw", []), ("extended", [LARGER])):
@@ -73,7 +73,7 @@ def test_true_cause_lies_nearest_to_what_was_measured(what: FrameResolver, deepe
     assert min(off, key=lambda radius: off[radius]) == RADIUS
 
 
-def test_answer_does_not_hang_on_what_was_asked_before(
+def test_result_does_not_depend_on_earlier_requests(
     run: Path, replay: dict[str, Any], what: FrameResolver, deepest: int
 ) -> None:
     for radius in (4e-3, 8e-3):
@@ -83,20 +83,20 @@ def test_answer_does_not_hang_on_what_was_asked_before(
     assert np.abs(warm.surface - cold.surface).max() < 2e-3 * push
 
 
-def test_what_remembers_is_led_along_all_frames_before(what: FrameResolver, deepest: int) -> None:
+def test_setup_with_history_replays_all_frames_before(what: FrameResolver, deepest: int) -> None:
     relaxing = {"effect": "permanent_set", "parameters": {"retained_fraction": 0.4}}
     after = len(what) - 1
     dent = what.solve(after, effects_from([relaxing])).surface - what.solve(after, []).surface
     assert np.abs(dent).max() > 1e-4
 
 
-def test_every_effect_has_a_beginning_that_can_be_asked_for(what: FrameResolver) -> None:
+def test_every_effect_has_a_usable_initial_value(what: FrameResolver) -> None:
     rows = what.beginnings()
     assert {"stiff_inclusion", "gravity", "time_offset"} <= {row["effect"] for row in rows}
     assert [effect.name for effect in effects_from(rows)] == [row["effect"] for row in rows]
 
 
-def test_frame_that_is_not_there_is_refused(what: FrameResolver) -> None:
+def test_missing_frame_is_refused(what: FrameResolver) -> None:
     with pytest.raises(RunError, match="no frame 999"):
         what.solve(999, [])
 
@@ -110,7 +110,7 @@ def test_frame_that_is_not_there_is_refused(what: FrameResolver) -> None:
         ({"effect": "tool_radius", "parameters": {"radius": 9.0}}, "outside"),
     ],
 )
-def test_what_is_no_effect_is_refused(row: dict[str, Any], message: str) -> None:
+def test_invalid_effects_are_refused(row: dict[str, Any], message: str) -> None:
     with pytest.raises(EffectError, match=message):
         effects_from([row])
 
@@ -120,7 +120,7 @@ def _radius(value: float) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("model", ["raw", "extended"])
-def test_recorded_inside_meets_the_recorded_surface(
+def test_recorded_interior_agrees_with_the_recorded_surface(
     replay: dict[str, Any], model: str, deepest: int
 ) -> None:
     inside = InteriorFields.read(replay, model)

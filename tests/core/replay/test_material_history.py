@@ -1,4 +1,4 @@
-"""Replays of a material that remembers, against what is known of them."""
+"""Replays of a material with history, against known properties."""
 
 from __future__ import annotations
 
@@ -47,7 +47,9 @@ def _way(*depths: float) -> FloatArray:
 
 
 def _relaxed(share: float = SHARE) -> Setup:
-    """The elastic material of which so much of the shear modulus is gone, its bulk modulus kept."""
+    """The elastic material with this share of the shear modulus removed and its bulk
+    modulus kept.
+    """
     mu, bulk = lame(Law(), SETUP.material.poisson_ratio)
     mu *= 1 - share
     young, nu = 9 * bulk * mu / (3 * bulk + mu), (3 * bulk - 2 * mu) / (2 * (3 * bulk + mu))
@@ -64,8 +66,8 @@ def _same(found: Equilibrium, wanted: Equilibrium, place: float, force: float) -
 
 
 @GRIDS
-def test_share_of_nothing_leaves_the_plain_replay(grid):
-    """Through all of the memory's parts, which a share of zero alone does not switch off."""
+def test_zero_share_equals_the_plain_replay(grid):
+    """All parts of the history code run; a share of zero alone does not switch them off."""
     way = _way(*DEPTHS, 2e-3, -6e-3)
     plain = replay(SETUP, way, grid, tolerance=1e-9)
     assert _relaxing(0.0).has_history
@@ -75,7 +77,7 @@ def test_share_of_nothing_leaves_the_plain_replay(grid):
 
 
 @GRIDS
-def test_fast_push_meets_the_whole_modulus_and_a_slow_one_the_relaxed_one(grid, monkeypatch):
+def test_fast_push_has_the_instantaneous_modulus_and_slow_push_the_relaxed_one(grid, monkeypatch):
     way, relaxed = _way(*DEPTHS), _relaxed()
     fast = replay(_relaxing(), way, grid, times=1e-4 * np.arange(len(way)))
     _same(fast[-1], replay(SETUP, way, grid)[-1], 1e-6, 1e-3)
@@ -92,8 +94,8 @@ def test_fast_push_meets_the_whole_modulus_and_a_slow_one_the_relaxed_one(grid, 
 
 
 def test_force_on_a_tool_that_stays_relaxes_with_the_time_constant():
-    """Of a nearly incompressible block; the pressure's share does not relax, and moves the figure a
-    little.
+    """For a nearly incompressible block; the pressure's share does not relax, and changes the value
+    slightly.
     """
     times = np.array([0.0, 1e-6, 2e-6, 3e-6, 0.5, 1.0, 2.0, 4.0, 40.0])
     frames = replay(_relaxing(poisson_ratio=0.49), _way(*DEPTHS, *[4e-3] * 5), EVEN, times=times)
@@ -121,7 +123,7 @@ def test_dent_recovers_with_the_retardation_time(grid):
 
 
 @pytest.mark.parametrize("period", [0.2, 4.0, 80.0])
-def test_tool_never_gets_work_out_of_a_cycle(period):
+def test_cycle_never_yields_work(period):
     down = np.linspace(0.0, 4e-3, 13)
     depths = np.concatenate([down, down[-2::-1], down[1:], down[-2::-1]])
     frames = replay(_relaxing(), _way(*depths), EVEN, times=period * np.arange(len(depths)) / 24)
@@ -130,9 +132,9 @@ def test_tool_never_gets_work_out_of_a_cycle(period):
     assert work[24] > 0.01 * work.max() and work[48] > work[24] and work.min() > -1e-9
 
 
-def test_block_stays_on_the_graded_grid_that_follows_the_tool_what_it_is_on_a_fine_even_one():
-    """A drag and a release; as far apart as the plain replays of the same drag are, and half of the
-    dent's size at most.
+def test_moving_graded_grid_agrees_with_a_fine_even_one():
+    """A drag and a release: the difference is at most that of the elastic replays of the same drag,
+    and half of the dent's size.
     """
     places = [
         (-4e-3, 1.5e-3),
@@ -160,7 +162,7 @@ def test_block_stays_on_the_graded_grid_that_follows_the_tool_what_it_is_on_a_fi
 
 
 @GRIDS
-def test_restart_from_a_saved_state_goes_on_as_if_there_were_no_break(grid):
+def test_replay_continues_from_a_saved_state_without_a_break(grid):
     way, times = _way(*DEPTHS, 4e-3, 2e-3, -6e-3, -6e-3), 0.5 * np.arange(8)
     setup = replace(_relaxing(), support=Support(friction_coefficient=0.4))
     whole = replay(setup, way, grid, times=times, tolerance=1e-9)
@@ -176,8 +178,10 @@ def test_restart_from_a_saved_state_goes_on_as_if_there_were_no_break(grid):
         assert found.slip == pytest.approx(whole[-1].slip, abs=1e-9)
 
 
-def test_frame_without_equilibrium_is_passed_over():
-    """The tool is put where nothing holds it; what follows is as if that frame had not been."""
+def test_frame_without_equilibrium_is_skipped():
+    """The tool is put where no equilibrium exists; later frames are as if that frame did
+    not exist.
+    """
     setup, inside = _relaxing(), np.array([0.0, 0.0, 0.4 * TOP])
     way, times = (
         np.array([_poke(2e-3), _poke(4e-3), inside, _poke(3e-3)]),
@@ -223,7 +227,7 @@ def test_stiffness_cancels_and_sides_mirror_each_other():
     assert other.move(points * [-1, 1, 1]) * [-1, 1, 1] == pytest.approx(here, abs=2e-6)
 
 
-def test_times_are_asked_for_and_must_grow():
+def test_times_are_required_and_must_increase():
     setup, way = _relaxing(), _way(1e-3, 2e-3)
     with pytest.raises(SetupError, match="time") as caught:
         replay(setup, way, EVEN)
@@ -236,7 +240,7 @@ def test_times_are_asked_for_and_must_grow():
         replay(SETUP, way, EVEN, times=[0.0, 1.0, 2.0])
 
 
-def test_what_knows_nothing_of_the_past_says_so():
+def test_functions_without_history_refuse_such_materials():
     setup = _relaxing()
     block = Replay(setup, EVEN)
     frame = block.step(_poke(2e-3), None, 0.0)
@@ -253,7 +257,7 @@ def test_what_knows_nothing_of_the_past_says_so():
         assert caught.value.where["key"] == "relaxation"
 
 
-def test_impossible_memories_are_turned_down():
+def test_impossible_histories_are_refused():
     with pytest.raises(SetupError, match="relaxed fractions"):
         Material(
             relaxation=(
@@ -293,7 +297,7 @@ def test_push_leaves_a_dent_and_a_second_one_just_like_it_changes_nothing(grid):
     assert frames[4].force[2] < frames[0].force[2]
 
 
-def test_set_hangs_little_on_how_many_frames_a_push_has():
+def test_permanent_set_depends_little_on_the_number_of_frames():
     few, many = (
         replay(KEEPS, _way(*np.linspace(0, 4e-3, count), -6e-3), EVEN, times=np.arange(count + 1))
         for count in (5, 17)
@@ -311,7 +315,7 @@ def test_deeper_push_leaves_more_and_a_weaker_one_nothing_more():
     assert np.linalg.norm(deeper) > 1.3 * np.linalg.norm(first)
 
 
-def test_block_that_keeps_and_relaxes_goes_on_from_a_saved_state():
+def test_set_and_relaxation_continue_from_a_saved_state():
     setup = replace(KEEPS, material=replace(_relaxing().material, retained_fraction=0.3))
     way, times = _way(2e-3, 4e-3, 4e-3, 1e-3, -6e-3, -6e-3), 0.5 * np.arange(6)
     whole = replay(setup, way, GRADED, times=times, tolerance=1e-9)
@@ -328,7 +332,7 @@ def test_block_that_keeps_and_relaxes_goes_on_from_a_saved_state():
         _same(found, wanted, 1e-8, 1e-6)
 
 
-def test_tool_that_drags_and_a_material_that_remembers_go_together():
+def test_tool_friction_and_material_history_work_together():
     """Sideways over the top: the drag turns the force, the set leaves a dent, and the relaxed share
     fades.
     """

@@ -62,7 +62,7 @@ def test_mesh_error_is_that_of_the_slid_block():
     assert slid.displacement == pytest.approx(stuck.displacement, rel=0.02)
 
 
-def test_finer_grid_keeps_its_kind():
+def test_finer_grid_has_the_same_kind():
     assert GridSpec(nodes=(13, 5, 5)).finer() == GridSpec(nodes=(19, 7, 7))
     assert GridSpec(nodes=(13, 9, 9), spacing=1.5e-3, order=2).finer() == GridSpec(
         nodes=(19, 13, 13), spacing=1e-3, order=2

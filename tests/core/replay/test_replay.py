@@ -85,14 +85,14 @@ def test_every_frame_finds_its_equilibrium(grid, motion):
     assert not frames[-1].displacement.any()
 
 
-def test_push_to_two_fifths_of_the_height_is_followed():
+def test_push_to_two_fifths_of_the_height_converges():
     frames = replay(SETUP, _poke(0.4 * TOP, 25), EVEN)
     require_converged(frames)
     pushes = [frame.force[2] for frame in frames]
     assert all(later > earlier for earlier, later in itertools.pairwise(pushes))
 
 
-def test_tool_that_jumps_between_frames_is_followed():
+def test_jumping_tool_converges():
     centres = np.array(
         [
             (0, 0, TOP + 6e-3),
@@ -188,7 +188,7 @@ def test_energy_stored_is_the_work_of_the_tool():
     assert stored == pytest.approx(work, rel=0.01)
 
 
-def test_way_to_a_place_does_not_change_what_is_found_there():
+def test_equilibrium_does_not_depend_on_the_path():
     straight = replay(SETUP, _poke(4e-3, 4), GRADED)[-1]
     aside = replay(
         SETUP,
@@ -206,7 +206,7 @@ def test_frames_start_as_well_from_those_of_a_similar_setup():
     assert _relative(led[-1].displacement, alone[-1].displacement) < 1e-4
 
 
-def test_what_one_frame_was_off_by_begins_the_next_where_the_base_comes_loose(monkeypatch):
+def test_prediction_from_a_similar_setup_helps_as_the_base_comes_loose(monkeypatch):
     loose = replace(SETUP, support=Support(detached=(Detachment(edge="-x", extent=0.02),)))
     centres = _way((-0.022, 0, TOP + 4e-3), (-0.016, 0, TOP + 2e-3), frames=7)
     factors, factorise = [0], BlockModel.factorise
@@ -236,7 +236,7 @@ def test_what_one_frame_was_off_by_begins_the_next_where_the_base_comes_loose(mo
     assert factors[1] < 0.8 * factors[2]
 
 
-def test_a_frame_that_is_far_from_its_start_is_begun_without_what_the_last_one_taught():
+def test_prediction_is_skipped_for_a_frame_far_from_its_start():
     way = _poke(4e-3, 5)
     first, near = replay(SETUP, way, GRADED)[-2:]
     model, positions = Replay(SETUP, GRADED).model(near.mesh), near.mesh.nodes + near.displacement
@@ -299,7 +299,7 @@ def test_rough_base_does_not_slide():
         assert np.array_equal(first.displacement, second.displacement)
 
 
-def test_slid_block_is_touched_where_it_is_now():
+def test_slipped_block_is_touched_at_its_new_position():
     block = Replay(replace(SETUP, support=Support(friction_coefficient=3.0)), EVEN)
     block.slip = np.array([3e-3, -1e-3])
     moved = block.step(np.array([3e-3, -1e-3, TOP + 2e-3]))

@@ -1,4 +1,4 @@
-"""Each check fires on a surface that is broken in one way, and says in numbers what was found."""
+"""Each check of a surface fails on a surface with one defect, and its message has the numbers."""
 
 from __future__ import annotations
 
@@ -29,17 +29,18 @@ def test_closed_surface_is_read_from_every_format(tmp_path, name):
     assert shape.size == pytest.approx(SIZE)
 
 
-def test_hole_is_told_with_its_open_edges_and_place(tmp_path):
+def test_hole_is_reported_with_its_open_edges_and_place(tmp_path):
     vertices, triangles = box_surface(SIZE)
     top = (vertices[triangles, 2] > 0.02).all(axis=1)
     with pytest.raises(
         MeshError,
-        match=r"^organ.ply: is open: 4 of 17 edges .* 1 hole.*largest of 4 edges at \(.*0\.0300\) m",
+        match=r"^organ.ply: is open: 4 of 17 edges .* 1 hole.*"
+        r"largest of 4 edges at \(.*0\.0300\) m",
     ):
         load_shape(_stored(tmp_path, vertices, triangles[~top]))
 
 
-def test_flipped_triangle_is_told_with_its_number():
+def test_flipped_triangle_is_reported_with_its_number():
     vertices, triangles = box_surface(SIZE)
     triangles[7] = triangles[7][::-1]
     with pytest.raises(
@@ -49,13 +50,13 @@ def test_flipped_triangle_is_told_with_its_number():
     assert error.value.where["triangle"] == 7
 
 
-def test_surface_inside_out_is_told():
+def test_surface_inside_out_is_reported():
     vertices, triangles = box_surface(SIZE)
     with pytest.raises(MeshError, match=r"all 12 triangles turn inwards \(volume -72 cm3\)"):
         Shape(vertices, triangles[:, ::-1])
 
 
-def test_crossing_triangles_are_told_with_their_place():
+def test_crossing_triangles_are_reported_with_their_place():
     sphere = trimesh.creation.icosphere(2, 0.02)
     vertices = np.array(sphere.vertices) + np.array([0, 0, 0.02])
     top = int(np.argmax(vertices[:, 2]))
@@ -67,22 +68,25 @@ def test_crossing_triangles_are_told_with_their_place():
     assert error.value.where["crossings"] >= 5
 
 
-def test_surface_in_millimetres_is_told_and_scaled_only_when_asked(tmp_path):
+def test_surface_in_millimetres_is_reported_and_scaled_only_on_request(tmp_path):
     vertices, triangles = box_surface(SIZE)
     path = _stored(tmp_path, 1e3 * vertices, triangles)
-    told = r"measures 60 x 40 x 30 m .* if it is in millimetres, say so with scale = 0.001, which makes it 0.06 x 0.04 x 0.03 m"
-    with pytest.raises(MeshError, match=told):
+    message = (
+        r"measures 60 x 40 x 30 m .* if it is in millimetres, say so with scale = 0.001, "
+        r"which makes it 0.06 x 0.04 x 0.03 m"
+    )
+    with pytest.raises(MeshError, match=message):
         load_shape(path)
     assert load_shape(path, scale=1e-3).size == pytest.approx(SIZE)
 
 
-def test_surface_scaled_from_millimetres_twice_is_told():
+def test_surface_scaled_from_millimetres_twice_is_reported():
     vertices, triangles = box_surface(SIZE)
     with pytest.raises(MeshError, match=r"scaled from millimetres twice, say so with scale = 1000"):
         Shape(1e-3 * vertices, triangles)
 
 
-def test_two_bodies_are_told_with_their_volumes():
+def test_two_bodies_are_reported_with_their_volumes():
     one, other = box_surface(SIZE), box_surface((0.01, 0.01, 0.01))
     vertices = np.concatenate([one[0], other[0] + np.array([0.1, 0.0, 0.0])])
     with pytest.raises(
@@ -91,19 +95,19 @@ def test_two_bodies_are_told_with_their_volumes():
         Shape(vertices, np.concatenate([one[1], other[1] + 8]))
 
 
-def test_vertex_that_is_not_finite_is_told_with_its_number():
+def test_vertex_that_is_not_finite_is_reported_with_its_number():
     vertices, triangles = box_surface(SIZE)
     vertices[3, 1] = np.nan
     with pytest.raises(MeshError, match="1 of 8 vertices are not finite, the first is number 3"):
         Shape(vertices, triangles)
 
 
-def test_empty_surface_is_told():
+def test_empty_surface_is_reported():
     with pytest.raises(MeshError, match=r"holds no triangle \(0 vertices\)"):
         Shape(np.empty((0, 3)), np.empty((0, 3), np.int64))
 
 
-def test_collapsed_triangle_is_told_with_its_number():
+def test_collapsed_triangle_is_reported_with_its_number():
     vertices, triangles = box_surface(SIZE)
     triangles = np.concatenate([triangles, [[1, 1, 2]]])
     with pytest.raises(
@@ -112,22 +116,22 @@ def test_collapsed_triangle_is_told_with_its_number():
         Shape(vertices, triangles)
 
 
-def test_doubled_wall_is_told_with_its_edges():
+def test_doubled_wall_is_reported_with_its_edges():
     vertices, triangles = box_surface(SIZE)
     with pytest.raises(MeshError, match="3 edges belong to more than two triangles"):
         Shape(vertices, np.concatenate([triangles, triangles[:1]]))
 
 
 @pytest.mark.parametrize(
-    ("name", "told"),
+    ("name", "message"),
     [("gone.stl", "there is no such file"), ("organ.step", "is read from .stl, .ply, .obj, not")],
 )
-def test_file_that_is_no_surface_is_told(tmp_path, name, told):
-    with pytest.raises(MeshError, match=told):
+def test_file_that_is_no_surface_is_reported(tmp_path, name, message):
+    with pytest.raises(MeshError, match=message):
         load_shape(tmp_path / name)
 
 
-def test_file_that_cannot_be_read_is_told(tmp_path):
+def test_file_that_cannot_be_read_is_reported(tmp_path):
     (tmp_path / "organ.ply").write_bytes(
         b"ply\nformat ascii 1.0\nelement vertex 3\nend_header\nnothing"
     )
@@ -135,7 +139,7 @@ def test_file_that_cannot_be_read_is_told(tmp_path):
         load_shape(tmp_path / "organ.ply")
 
 
-def test_fixed_region_is_a_plane_or_triangles_or_paint():
+def test_fixed_region_is_a_plane_or_triangles_or_painted_vertices():
     vertices, triangles = box_surface(SIZE)
     low = vertices[:, 2] < 1e-9
     by_plane = Shape(vertices, triangles).held
@@ -150,7 +154,7 @@ def test_fixed_region_is_a_plane_or_triangles_or_paint():
 
 
 @pytest.mark.parametrize(
-    ("fixed", "told"),
+    ("fixed", "message"),
     [
         (
             Plane(height=-0.01),
@@ -162,19 +166,19 @@ def test_fixed_region_is_a_plane_or_triangles_or_paint():
         (Plane(height=1.0), "all 12 triangles are held"),
     ],
 )
-def test_fixed_region_that_makes_no_sense_is_told(fixed, told):
-    with pytest.raises(MeshError, match=told):
+def test_impossible_fixed_region_is_reported(fixed, message):
+    with pytest.raises(MeshError, match=message):
         Shape(*box_surface(SIZE), fixed)
 
 
-def test_same_surface_held_the_same_way_is_the_same_body():
+def test_bodies_with_equal_surface_and_fixed_region_are_equal():
     vertices, triangles = box_surface(SIZE)
     assert Shape(vertices, triangles) == Shape(vertices.copy(), triangles, name="other")
     assert hash(Shape(vertices, triangles)) == hash(Shape(vertices.copy(), triangles))
     assert Shape(vertices, triangles) != Shape(vertices, triangles, Faces((0,)))
 
 
-def test_nearest_place_is_the_point_itself_inside_and_on_the_surface_outside():
+def test_nearest_point_is_the_point_itself_inside_and_on_the_surface_outside():
     shape = Shape(*box_surface(SIZE))
     points = np.array([[0.01, 0.0, 0.02], [0.05, 0.0, 0.01], [0.05, 0.05, 0.05], [0.0, 0.0, -0.02]])
     wanted = [[0.01, 0.0, 0.02], [0.03, 0.0, 0.01], [0.03, 0.02, 0.03], [0.0, 0.0, 0.0]]

@@ -23,7 +23,7 @@ NEO_HOOKE, COROTATIONAL, GENT, FIBRED = (
 
 
 def _laws(**laws: Law) -> pytest.MarkDecorator:
-    """A test for each of these laws and each order."""
+    """Parametrise a test by these laws and each order."""
     cases = [
         pytest.param(law, order, id=f"{name}-{order}")
         for (name, law), order in product(laws.items(), HEXAHEDRA)
@@ -44,8 +44,9 @@ def _uneven(spread: float, rule: Quadrature) -> np.ndarray:
 def _loose(
     law: Law, order: int, poisson_ratio: float = 0.45, seed: int = 0, spread: float = 0.5
 ) -> FreeBody:
-    """A small block of distorted elements whose stiffness varies from point to point, held
-    nowhere."""
+    """A small unsupported block of distorted elements whose stiffness varies from point to
+    point.
+    """
     mesh = grid((0.05, 0.03, 0.02), (5, 5, 3), order)
     nowhere = np.zeros((len(mesh.nodes), 3), dtype=bool)
     return FreeBody(
@@ -141,7 +142,7 @@ def test_rigid_motion_leaves_no_stress_and_no_energy(law, order):
 
 
 @EVERY
-def test_energy_does_not_see_a_rotation_of_the_strained_body(law, order):
+def test_energy_does_not_change_with_a_rotation_of_the_strained_body(law, order):
     body = _loose(law, order)
     positions = _bent(body, 7)
     turn = Rotation.from_rotvec([-0.4, 1.1, 2.0]).as_matrix()
@@ -168,7 +169,7 @@ def test_small_strain_of_each_law_is_that_of_hooke(law, order):
 @pytest.mark.parametrize("law", [NEO_HOOKE, GENT], ids=["neo_hooke", "gent"])
 @pytest.mark.parametrize("stretch", [0.7, 0.9, 1.3, 1.8])
 @pytest.mark.parametrize("poisson_ratio", [0.3, 0.45])
-def test_bar_pulls_as_the_closed_form(stretch, poisson_ratio, law, order):
+def test_bar_force_is_that_of_the_closed_form(stretch, poisson_ratio, law, order):
     mu, kappa = lame(law, poisson_ratio)
 
     def stress(across: float) -> tuple[float, float]:
@@ -197,7 +198,7 @@ def test_corotational_bar_is_linear_in_its_stretch(order):
 
 
 def _line_weights(at: np.ndarray, length: float, order: int) -> np.ndarray:
-    """Share of an even load that nodes at these places of a line take: by the trapezium rule, or
+    """Share of an even load on nodes at these coordinates of a line: by the trapezium rule, or
     Simpson's.
     """
     number = np.round((at + length / 2) / (length / 4)).astype(int)
@@ -232,7 +233,7 @@ def _tip_ratio(
 
 
 @EACH
-def test_cantilever_bends_as_timoshenko_says(law, order):
+def test_cantilever_deflection_is_timoshenkos(law, order):
     along, within = (48, 0.03) if order == 1 else (16, 0.005)
     assert _tip_ratio(law, 0.3, along, order=order) == pytest.approx(1.0, abs=within)
 
@@ -269,7 +270,7 @@ def _of(material: Material, height: float, rule: Quadrature) -> np.ndarray:
 
 @ORDERS
 @pytest.mark.parametrize("log_ratio", [0.0, 2.0])
-def test_column_of_uneven_stiffness_gives_way_as_springs_in_series(log_ratio, order):
+def test_column_of_uneven_stiffness_deforms_as_springs_in_series(log_ratio, order):
     height, layer = 0.02, Layer(thickness=0.005, stiffness_ratio=4.0)
     mesh = grid((6e-4, 6e-4, height), (3, 3, 65), order)
     sides, top = np.abs(mesh.nodes[:, 2]) < 1e-9, mesh.nodes[:, 2] > height - 1e-9

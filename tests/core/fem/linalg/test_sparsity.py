@@ -58,7 +58,7 @@ def test_indefinite_matrix_is_refused_and_the_next_good_one_taken(solver):
 
 
 def _grid(count: int) -> sp.csr_matrix:
-    """Upper triangle of springs along the lines of a cube, each point held a little."""
+    """Upper triangle of springs along the lines of a cube, each point weakly supported."""
     number = np.arange(count**3).reshape(count, count, count)
     pairs = [
         (number[:-1], number[1:]),
@@ -72,7 +72,7 @@ def _grid(count: int) -> sp.csr_matrix:
 
 
 @EACH
-def test_answers_are_the_inverses_entries_whether_they_were_asked_for_or_not(solver):
+def test_inverse_entries_are_correct_whether_requested_or_not(solver):
     upper = _grid(9)
     factor, inverse = factor_of(upper.copy(), solver), np.linalg.inv(_whole(upper))
     requested, others = np.arange(700, 729), np.array([5, 300, 720])
@@ -95,7 +95,7 @@ def test_answers_are_the_inverses_entries_whether_they_were_asked_for_or_not(sol
             assert np.allclose(scale * factor.solve(right), inverse @ right, atol=1e-11)
 
 
-def test_what_is_asked_for_is_eliminated_in_the_same_order_whatever_was_asked_before():
+def test_elimination_order_does_not_depend_on_earlier_requests():
     pardiso = pytest.importorskip("palpate.fem.linalg.pardiso")
     upper, right = _grid(9), np.random.default_rng(1).normal(size=729)
     requested, others = np.arange(700, 729), np.arange(50)
@@ -107,7 +107,7 @@ def test_what_is_asked_for_is_eliminated_in_the_same_order_whatever_was_asked_be
     assert np.array_equal(fresh.inverse_entries(requested), used.inverse_entries(requested))
 
 
-def test_wrong_answers_to_sparse_loads_are_told_and_done_without(monkeypatch, caplog):
+def test_wrong_sparse_solutions_are_logged_and_avoided(monkeypatch, caplog):
     pardiso = pytest.importorskip("palpate.fem.linalg.pardiso")
     upper, requested = _grid(7), np.arange(300, 343)
     factor, inverse = pardiso.Pardiso(upper.copy()), np.linalg.inv(_whole(upper))
@@ -126,7 +126,7 @@ def test_wrong_answers_to_sparse_loads_are_told_and_done_without(monkeypatch, ca
     assert caplog.text.count("wrong on this machine") == 1
 
 
-def test_factor_stays_while_the_entries_do_and_one_that_there_was_none_of_is_not_taken_for_one():
+def test_factor_is_kept_for_equal_entries_and_a_failed_one_is_not():
     pardiso = pytest.importorskip("palpate.fem.linalg.pardiso")
     upper, requested = _grid(7), np.arange(300, 343)
     factor, numbers, indefinite = pardiso.Pardiso(upper.copy()), [], -upper.data
@@ -147,7 +147,7 @@ def test_factor_stays_while_the_entries_do_and_one_that_there_was_none_of_is_not
             factor.factorise(indefinite)
 
 
-def test_factor_of_single_precision_answers_to_its_own_precision_and_solves_to_a_doubles():
+def test_single_precision_factor_solves_to_double_precision():
     pardiso = pytest.importorskip("palpate.fem.linalg.pardiso")
     upper, requested, right = (
         _grid(9),
@@ -175,7 +175,7 @@ def test_factor_of_single_precision_answers_to_its_own_precision_and_solves_to_a
         factor.factorise(-upper.data)
 
 
-def test_what_single_precision_is_not_enough_for_is_told_and_solved_in_double(caplog):
+def test_ill_conditioned_matrix_is_logged_and_solved_in_double(caplog):
     pardiso = pytest.importorskip("palpate.fem.linalg.pardiso")
     upper = _chain(20_000, 2.0)  # held at its ends alone: the condition number is 1.6e8
     places, factor = np.arange(1.0, 20_001), pardiso.Pardiso(upper.copy(), single=True)
@@ -209,7 +209,7 @@ def _without_mkl(pattern: sp.csr_matrix) -> None:
     raise ImportError("no MKL here")
 
 
-def test_machine_without_mkl_is_told_and_finds_the_same_equilibria(monkeypatch, caplog):
+def test_machine_without_mkl_logs_it_and_finds_the_same_equilibria(monkeypatch, caplog):
     setup = Setup(geometry=Box(size=(0.03, 0.02, 0.02)), tool=Tool(radius=4e-3), mass=0.02)
     centres, grid = (
         np.array([[0.0, 0.0, 0.024 - depth] for depth in (1e-3, 2e-3, 3e-3)]),

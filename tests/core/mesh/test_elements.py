@@ -31,14 +31,14 @@ def _uneven(rule) -> FloatArray:
 
 
 def _free(mesh: Mesh, law: Law, poisson_ratio: float = 0.45) -> FreeBody:
-    """Held nowhere, its stiffness different from point to point."""
+    """An unsupported body whose stiffness differs from point to point."""
     return FreeBody(
         mesh, mesh.nodes, law, poisson_ratio, np.zeros((len(mesh.nodes), 3), dtype=bool), _uneven
     )
 
 
 def _bent(mesh: Mesh, seed: int) -> FloatArray:
-    """Strained by some ten percent, differently at each node."""
+    """Positions strained by some ten percent, differently at each node."""
     return mesh.nodes @ AFFINE.T + 2e-4 * np.random.default_rng(seed).normal(0, 1, mesh.nodes.shape)
 
 
@@ -125,7 +125,7 @@ def test_tangent_is_the_derivative_of_the_force(mesh, law, poisson_ratio):
 
 
 @pytest.mark.parametrize("stretch", [0.7, 1.4])
-def test_stretched_bar_pulls_like_a_neo_hookean_bar_without_change_of_volume(stretch):
+def test_stretched_bar_has_the_force_of_an_incompressible_neo_hookean_bar(stretch):
     mesh = filled_box((0.04, 0.01, 0.01), 2.5e-3)
     nodes = mesh.nodes - mesh.nodes.min(axis=0)
     held = np.abs(nodes) < 1e-9
@@ -146,8 +146,8 @@ def test_stretched_bar_pulls_like_a_neo_hookean_bar_without_change_of_volume(str
 
 
 def _deflection(mesh: Mesh, poisson_ratio: float) -> float:
-    """How far the end of a beam along x sinks under a small load on it, over what Timoshenko's
-    theory says.
+    """Deflection of the end of a beam along x under a small load on it, over that of Timoshenko's
+    theory.
     """
     nodes = mesh.nodes - mesh.nodes.min(axis=0)
     length, width, height = nodes.max(axis=0)

@@ -1,4 +1,4 @@
-"""The engine against CalculiX, whose elements, contact, volumetric law and solver are others."""
+"""The engine against CalculiX, which has other elements, contact, volumetric law and solver."""
 
 from __future__ import annotations
 

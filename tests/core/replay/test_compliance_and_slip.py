@@ -1,4 +1,4 @@
-"""A tool whose shaft gives way under load."""
+"""A tool with a compliant shaft."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ POKE = np.array([[5e-3, 2e-3, SIZE[2] + 5e-3 - depth] for depth in (-2e-3, 1e-3,
 SIDE = np.array([[SIZE[0] / 2 + 5e-3 - depth, 1e-3, 0.022] for depth in (1e-3, 3e-3, 5e-3)])
 
 
-def _giving(compliance: float, setup: Setup = SETUP) -> Setup:
+def _compliant(compliance: float, setup: Setup = SETUP) -> Setup:
     return replace(setup, tool=replace(setup.tool, compliance_times_stiffness=compliance))
 
 
 @pytest.mark.parametrize("compliance", [1.0, 30.0, 400.0])
 @pytest.mark.parametrize("way", [POKE, SIDE], ids=["poke", "side"])
 def test_tool_is_where_its_spring_balances_the_block(way, compliance):
-    setup = _giving(compliance)
+    setup = _compliant(compliance)
     frames = replay(setup, way, GRID)
     require_converged(frames)
     for stated, frame in zip(way, frames, strict=True):
@@ -36,8 +36,8 @@ def test_tool_is_where_its_spring_balances_the_block(way, compliance):
     assert np.linalg.norm(frames[-1].tool.centre - way[-1]) > 1e-5
 
 
-def test_tool_pushes_as_one_stated_where_it_came_to_be():
-    frames = replay(_giving(60.0), POKE, GRID)
+def test_compliant_tool_pushes_like_a_stiff_one_at_its_true_position():
+    frames = replay(_compliant(60.0), POKE, GRID)
     stiff = replay(SETUP, np.array([frame.tool.centre for frame in frames]), GRID)
     for soft, hard in zip(frames, stiff, strict=True):
         assert soft.displacement == pytest.approx(hard.displacement, abs=1e-7)
@@ -45,21 +45,21 @@ def test_tool_pushes_as_one_stated_where_it_came_to_be():
 
 
 def test_tool_on_a_very_soft_spring_barely_dents_the_block():
-    frame = replay(_giving(1e3), POKE, GRID)[-1]
+    frame = replay(_compliant(1e3), POKE, GRID)[-1]
     assert frame.outcome is Outcome.CONVERGED
     assert 0 < -frame.displacement[:, 2].min() < 1.2e-3
 
 
-def test_place_that_is_not_found_is_said(monkeypatch):
+def test_missing_balance_is_reported(monkeypatch):
     monkeypatch.setattr("palpate.replay.compliance_and_slip._MOST_PLACES", 1)
-    frame = replay(_giving(60.0), POKE[:2], GRID)[-1]
+    frame = replay(_compliant(60.0), POKE[:2], GRID)[-1]
     assert frame.outcome is Outcome.TOOL_SWINGS and "spring" in frame.outcome.value
     with pytest.raises(SolveError, match="frame 0: the tool's mount is so compliant"):
         require_converged([frame])
 
 
-def test_gives_way_together_with_gravity_and_a_sliding_base():
-    setup = _giving(
+def test_compliance_works_with_gravity_and_a_slipping_base():
+    setup = _compliant(
         30.0,
         replace(
             SETUP,

@@ -1,5 +1,4 @@
-"""Replays of bodies that are no block, against hexahedra, and against what must hold for any
-body."""
+"""Replays of bodies other than blocks, against hexahedra and against general properties."""
 
 from __future__ import annotations
 
@@ -26,7 +25,7 @@ DOME = Setup(geometry=dome(RADII), tool=Tool(radius=5e-3), mass=0.05)
 
 
 def _down(x: float, top: float, *depths: float) -> FloatArray:
-    """Tool centres (f, 3) [m] above one place of a surface that is so high there."""
+    """Tool centres (f, 3) [m] above one point of a surface of this height."""
     return np.array([[x, 0.0, top + 5e-3 - depth] for depth in depths])
 
 
@@ -86,7 +85,7 @@ def test_organ_is_palpated_from_above_and_from_the_side():
 
 
 @pytest.mark.parametrize("poisson_ratio", [0.45, 0.49])
-def test_push_to_two_fifths_of_the_height_is_followed(poisson_ratio):
+def test_push_to_two_fifths_of_the_height_converges(poisson_ratio):
     centres = _down(0.0, RADII[2], *np.arange(1, 9) * 1e-3)
     frames = replay(
         replace(DOME, material=Material(poisson_ratio=poisson_ratio)), centres, _coarse(centres)
@@ -103,7 +102,7 @@ def test_push_to_two_fifths_of_the_height_is_followed(poisson_ratio):
         replace(DOME, support=Support(friction_coefficient=0.05)),
         replace(DOME, tool=Tool(radius=5e-3, compliance_times_stiffness=20.0)),
     ],
-    ids=["detached", "springs", "slides", "tool gives way"],
+    ids=["detached", "springs", "slides", "compliant tool"],
 )
 def test_organ_that_is_held_less_resists_less(softer):
     inwards = np.array([0.6, 0.0, -0.8])  # from the left and above
@@ -127,7 +126,7 @@ def test_shape_does_not_depend_on_the_modulus_but_the_force_does():
     assert np.allclose(4 * one.force, other.force, rtol=1e-9)
 
 
-def test_force_on_the_tool_is_the_slope_of_the_energy():
+def test_force_on_the_tool_is_the_derivative_of_the_energy():
     centres = _down(5e-3, 0.0195, 1e-3, 2e-3)
     block, spec = Replay(DOME, _coarse(centres), tolerance=1e-10), _coarse(centres)
     frame = block.step(centres[1], block.step(centres[0]))

@@ -1,4 +1,4 @@
-"""Pushes so deep that a coarse grid or a soft penalty would let the tool in."""
+"""Pushes so deep that a coarse grid or a soft penalty would let the tool penetrate."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def pressed() -> list[Equilibrium]:
     return replay(HARD_PRESS, PRESS, GRID)
 
 
-def test_contact_hardens_where_its_penalty_gives_way(pressed):
+def test_contact_hardens_if_penetration_is_too_large(pressed):
     require_converged(pressed)
     assert pressed[0].hardness == 1.0 and pressed[-1].hardness > 1.0
     assert max(frame.penetration for frame in pressed) <= 2e-4
@@ -65,13 +65,13 @@ def beside() -> list[Equilibrium]:
     return replay(setup, way, GridSpec(nodes=(9, 7, 5), spacing=2e-3, order=2))
 
 
-def test_ball_that_would_slip_between_the_points_of_a_surface_is_felt_at_more(beside):
+def test_small_ball_switches_to_dense_contact_points(beside):
     require_converged(beside)
     assert not beside[0].dense and beside[-1].dense
     assert beside[-1].force[1] > beside[-2].force[1] > 0
 
 
-def test_frame_felt_at_many_points_is_in_balance_in_their_model(beside):
+def test_dense_frame_is_in_equilibrium_in_the_dense_model(beside):
     frame = beside[-1]
     setup = Setup(
         geometry=Box(size=SIZE),
@@ -92,8 +92,8 @@ def test_frame_felt_at_many_points_is_in_balance_in_their_model(beside):
     assert residuals[0] < 1e-5 < residuals[1]
 
 
-def test_a_tool_that_reaches_into_the_held_base_is_told_and_the_next_frame_is_solved():
-    """Against a side so low down that the ball would have to move the bottom's edge."""
+def test_tool_in_the_fixed_base_is_reported_and_the_next_frame_solved():
+    """The ball pushes a side so low that it would have to move the bottom's edge."""
     aside = SIZE[0] / 2 + HARD_PRESS.tool.radius
     way = np.array(
         [[aside - 1e-3, 0.0, 8e-3], [aside - 4e-3, 0.0, 2e-3], [aside - 1e-3, 0.0, 8e-3]]
@@ -108,7 +108,7 @@ def test_a_tool_that_reaches_into_the_held_base_is_told_and_the_next_frame_is_so
     assert np.abs(frames[2].displacement - frames[0].displacement).max() < 1e-5
 
 
-def test_a_base_that_can_give_way_has_no_held_edge():
+def test_movable_base_has_no_fixed_edge():
     giving = replace(HARD_PRESS, support=Support(stiffness_over_E=1e2))
     frame = Replay(giving, GRID).step(np.array([SIZE[0] / 2 + 5.8e-3, 0.0, 1e-3]))
     assert frame.outcome is Outcome.CONVERGED

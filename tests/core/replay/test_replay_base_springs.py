@@ -27,13 +27,13 @@ def _on_springs(stiffness: float) -> Setup:
 
 
 def _pull(frame: Equilibrium, setup: Setup, grid: GridSpec) -> FloatArray:
-    """Of the block on its springs, over E (3,) [m^2]."""
+    """Force of the springs on the block over E (3,) [m^2]."""
     model = Replay(setup, grid).model(frame.mesh)
     return model._bond_gradient(frame.mesh.nodes + frame.displacement).sum(axis=(0, 1))
 
 
 @GRIDS
-def test_springs_under_a_heavy_block_settle_by_its_weight_over_their_stiffness(grid):
+def test_springs_settle_by_the_weight_over_their_stiffness(grid):
     setup = replace(_on_springs(100.0), load=Load(specific_weight_over_stiffness=1.5))
     frame = rest(setup, grid)
     places = [np.linspace(-size / 2, size / 2, 2 * 240 + 1)[1::2] for size in SIZE[:2]]
@@ -46,7 +46,7 @@ def test_springs_under_a_heavy_block_settle_by_its_weight_over_their_stiffness(g
 
 
 @GRIDS
-def test_springs_carry_what_the_tool_pushes(grid):
+def test_springs_carry_the_tools_push(grid):
     setup = _on_springs(60.0)
     frames = replay(setup, POKE, grid)
     require_converged(frames)
@@ -58,7 +58,7 @@ def test_springs_carry_what_the_tool_pushes(grid):
 
 
 @GRIDS
-def test_the_stiffer_the_springs_the_nearer_to_a_held_base(grid):
+def test_stiffer_springs_are_nearer_to_a_fixed_base(grid):
     held = replay(SETUP, POKE, grid)[-1].displacement
     frames = (replay(_on_springs(stiffness), POKE, grid)[-1] for stiffness in (30.0, 300.0, 3000.0))
     misses = [np.linalg.norm(frame.displacement - held) for frame in frames]

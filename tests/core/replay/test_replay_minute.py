@@ -1,6 +1,4 @@
-"""A minute of palpation at 30 Hz, as the benchmark replays it: no frame may be left without
-equilibrium.
-"""
+"""A minute of palpation at 30 Hz, as in the benchmark: every frame has an equilibrium."""
 
 from __future__ import annotations
 

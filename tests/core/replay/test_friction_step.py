@@ -1,6 +1,4 @@
-"""A tool that drags the surface along, against Cattaneo's and Mindlin's solution and the laws of
-friction.
-"""
+"""A tool with friction, against Cattaneo's and Mindlin's solution and the laws of friction."""
 
 from __future__ import annotations
 
@@ -28,15 +26,16 @@ def _rough(friction: float, setup: Setup = BLOCK) -> Setup:
 
 
 def _pushed(depth: float, ways: FloatArray, steps: int = 4) -> FloatArray:
-    """Centres (f, 3) [m]: down in so many steps, then sideways to each of the ways."""
+    """Centres (f, 3) [m]: down in some steps, then sideways to each displacement."""
     down = [[0.0, 0.0, TOP - depth * share] for share in np.arange(1, steps + 1) / steps]
     return np.array([*down, *([way, 0.0, TOP - depth] for way in ways)])
 
 
 @pytest.fixture(scope="module")
 def partly_slipping() -> tuple[list[Equilibrium], FloatArray, float]:
-    """A shallow dent in a large block, dragged sideways until it slips: frames, ways [m],
-    friction."""
+    """A shallow dent in a large block, dragged sideways until it slips: frames, displacements [m],
+    friction.
+    """
     size, friction, ways = (0.06, 0.06, 0.05), 0.3, np.linspace(2.5e-5, 2e-4, 8)
     setup = Setup(
         geometry=Box(size=size),
@@ -51,8 +50,10 @@ def partly_slipping() -> tuple[list[Equilibrium], FloatArray, float]:
 
 
 def test_sideways_force_is_cattaneos_and_mindlins(partly_slipping):
-    """T / (mu N) = 1 - (1 - x)^(3/2), x = 16 G a w / (3 (2 - nu) mu N) (Johnson 1985, eq. 7.42); a
-    grid that cannot hold the traction's peak at the edge of stick is some percent too soft.
+    """T / (mu N) = 1 - (1 - x)^(3/2), x = 16 G a w / (3 (2 - nu) mu N) (Johnson 1985, eq. 7.42).
+
+    A grid that cannot resolve the traction's peak at the edge of the stick zone is some percent too
+    soft.
     """
     frames, ways, friction = partly_slipping
     push, shear = frames[3].force[2], MODULUS / (2 * (1 + NU))
@@ -63,13 +64,13 @@ def test_sideways_force_is_cattaneos_and_mindlins(partly_slipping):
     assert found[-1] == pytest.approx(wanted[-1], rel=0.03)
 
 
-def test_a_dragged_ball_pulls_no_harder_than_friction_allows(partly_slipping):
+def test_drag_stays_below_the_friction_limit(partly_slipping):
     frames, _, friction = partly_slipping
     for frame in frames:
         assert np.hypot(frame.force[0], frame.force[1]) <= 1.001 * friction * frame.force[2]
 
 
-def test_where_friction_holds_the_surface_goes_with_the_tool():
+def test_sticking_surface_moves_with_the_tool():
     grid = GridSpec(nodes=(13, 9, 7), spacing=1.5e-3, order=2)
     sticking, smooth = (
         replay(_rough(mu), _pushed(4e-3, np.array([5e-4, 1e-3])), grid) for mu in (5.0, 0.0)
@@ -82,7 +83,7 @@ def test_where_friction_holds_the_surface_goes_with_the_tool():
     assert abs(slid[0, 0]) < 3e-4
 
 
-def test_no_friction_is_the_plain_replay_and_a_trace_of_it_hardly_differs():
+def test_zero_and_tiny_friction_agree_with_the_plain_replay():
     way = _pushed(4e-3, np.array([1e-3]))
     plain, traced = replay(BLOCK, way, GRID), replay(_rough(1e-6), way, GRID)
     for frame, other in zip(plain, traced, strict=True):
@@ -90,7 +91,7 @@ def test_no_friction_is_the_plain_replay_and_a_trace_of_it_hardly_differs():
         assert np.abs(frame.displacement - other.displacement).max() < 1e-7
 
 
-def test_a_push_out_and_back_costs_work():
+def test_drag_out_and_back_dissipates_work():
     way = _pushed(4e-3, np.array([1e-3, 2e-3, 1e-3, 0.0, -1e-3, -2e-3, -1e-3, 0.0]))
 
     def work(friction: float) -> float:
@@ -107,7 +108,7 @@ def test_a_push_out_and_back_costs_work():
     assert work(0.3) > 0.2 * force * 1e-3
 
 
-def test_it_matters_how_the_tool_came_and_not_in_how_many_frames():
+def test_result_depends_on_the_path_but_not_on_the_number_of_frames():
     aside = np.array([2e-3, 0.0, TOP - 4e-3])
     coarse = replay(_rough(0.5), np.array([[0.0, 0.0, TOP - 4e-3], aside]), GRID)
     fine = replay(_rough(0.5), _pushed(4e-3, np.linspace(0.25e-3, 2e-3, 8), steps=8), GRID)
@@ -117,14 +118,14 @@ def test_it_matters_how_the_tool_came_and_not_in_how_many_frames():
     assert np.linalg.norm(straight[-1].force - fine[-1].force) > 0.1 * fine[-1].force[2]
 
 
-def test_a_frame_is_a_state_to_go_on_from():
+def test_replay_continues_from_a_frame():
     way = _pushed(4e-3, np.array([1e-3, 2e-3]))
     whole = replay(_rough(0.5), way, GRID)
     rest = Replay(_rough(0.5), GRID).step(way[-1], whole[-2])
     assert np.allclose(rest.displacement, whole[-1].displacement, atol=2e-7)
 
 
-def test_a_failed_frame_leaves_the_hold_of_the_last_good_one():
+def test_failed_frame_keeps_the_last_friction_history():
     way = _pushed(4e-3, np.array([1e-3, 2e-3]))
     broken = np.insert(way, 5, [0.0, 0.0, 0.01], axis=0)  # the centre deep inside the block
     frames = replay(_rough(0.5), broken, GRID)
@@ -134,7 +135,7 @@ def test_a_failed_frame_leaves_the_hold_of_the_last_good_one():
     assert np.allclose(frames[6].displacement, wanted.displacement, atol=2e-6)
 
 
-def test_what_needs_every_frame_refuses_to_leave_some_out():
+def test_functions_of_single_frames_refuse_friction():
     frames = replay(_rough(0.5), _pushed(2e-3, np.array([])), GRID)
     with pytest.raises(SolveError, match="order of time"):
         replay(_rough(0.5), _pushed(2e-3, np.array([])), GRID, starts=frames)
@@ -142,7 +143,7 @@ def test_what_needs_every_frame_refuses_to_leave_some_out():
         displacement_changes(Replay(_rough(0.5), GRID), frames[-1], [(_rough(0.6), np.zeros(3))])
 
 
-def test_a_rough_ball_drags_a_loose_block_along():
+def test_rough_ball_drags_a_slipping_block_along():
     loose = replace(_rough(0.8), support=Support(friction_coefficient=0.05))
     frames = replay(loose, _pushed(3e-3, np.array([2e-3, 4e-3])), GRID)
     require_converged(frames)

@@ -12,7 +12,7 @@ from palpate.replay.replay import replay
 @pytest.mark.parametrize(
     "seed", [*range(16), 5758, 6100, 8884]
 )  # the last three once showed a fault
-def test_no_situation_ends_in_nonsense(seed):
+def test_every_situation_has_a_valid_outcome(seed):
     situation = draw_situation(seed)
     frames = replay(situation.setup, situation.centres, situation.grid, times=situation.times)
     assert len(frames) == len(situation.centres)
@@ -24,12 +24,12 @@ def test_no_situation_ends_in_nonsense(seed):
     ("seed", "grid"),
     [
         pytest.param(700053, GRIDS[0], id="the ball slips between the points that feel it"),
-        pytest.param(700012, GRIDS[2], id="the same in a material that remembers"),
+        pytest.param(700012, GRIDS[2], id="the same in a material with history"),
         pytest.param(720057, GRIDS[1], id="pressure and friction begin from none"),
         pytest.param(720248, GRIDS[1], id="a tool on a spring balances on neither of two grids"),
     ],
 )
-def test_situation_that_once_had_no_equilibrium_has_one(seed, grid):
+def test_difficult_situations_have_an_equilibrium(seed, grid):
     situation = replace(draw_situation(seed), grid=grid)
     frames = replay(situation.setup, situation.centres, situation.grid, times=situation.times)
     assert faults(situation, frames) == [] and {frame.outcome for frame in frames} == {
@@ -37,13 +37,13 @@ def test_situation_that_once_had_no_equilibrium_has_one(seed, grid):
     }
 
 
-def test_trial_tells_its_seed_effects_and_grid():
+def test_trial_reports_its_seed_effects_and_grid():
     trial = attempt(5)
     assert trial.faults == () and len(trial.outcomes) == len(draw_situation(5).centres)
     assert str(trial).startswith("seed 5 (") and "by size" in str(trial)
 
 
-def test_situations_are_told_apart_by_their_seed_and_jump():
+def test_situations_differ_by_seed_and_jump():
     first, second = draw_situation(1), draw_situation(2)
     assert first.setup != second.setup
     jump = first.centres[-1] - first.centres[-2]
