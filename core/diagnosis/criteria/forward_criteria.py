@@ -78,6 +78,24 @@ class DerivativeCriteria:
     )
     tool_span: float = threshold(4e-4, "m", "Half the tool's motion of that finite motion.")
     step: float = threshold(1e-3, "1", "Step of a finite difference, in the parameter's scale.")
+    radius_scale: float = threshold(
+        3e-4,
+        "m",
+        "Scale of the tool's radius as a nuisance, of which its derivative's step is a part.",
+    )
+    camera_scales: tuple[float, ...] = threshold(
+        (1e-3, 1e-3, 1e-3, 1e-2, 1e-2, 1e-2),
+        "m, rad",
+        "Scales of the camera's place and rotation as nuisances.",
+    )
+    poisson_step: float = threshold(
+        2e-4,
+        "1",
+        "Step of a finite difference by Poisson's ratio; backwards above `nearly_incompressible`.",
+    )
+    nearly_incompressible: float = threshold(
+        0.494, "1", "Largest Poisson's ratio with a step forwards."
+    )
     least_slip: float = threshold(1e-7, "m", "A base that moved by less has not slid.")
 
 

@@ -101,13 +101,6 @@ class ScreeningCriteria:
     inclusions_apart: float = threshold(
         0.015, "m", "Two starts of an inclusion are refitted if they are farther apart than this."
     )
-    strain_limit: float = threshold(
-        6.0,
-        "1",
-        "J_m of the Gent law whose whole effect is, to first order, the column of strain "
-        "stiffening.",
-        "measured: the column has a correlation of 0.99 with replays of J_m 1 and 3",
-    )
     least_share: float = threshold(
         0.2, "1", "Smallest share of a finite effect with which a refit starts."
     )
@@ -121,9 +114,6 @@ class ScreeningCriteria:
         0.7,
         "1",
         "Largest change of a stiffness contrast with which a refit starts: 6.8 times as stiff.",
-    )
-    inclusion_contrast: float = threshold(
-        0.8, "1", "Prior deviation of an inclusion's stiffness contrast."
     )
 
 
@@ -146,7 +136,6 @@ class InclusionGridCriteria:
 class TouchPairingCriteria:
     """Touches that were paired with other landmarks."""
 
-    most_pairings: int = threshold(3, "1", "Number of pairings that are weighed, best first.")
     scale_deviation: float = threshold(
         0.08,
         "1",
