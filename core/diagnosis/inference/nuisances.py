@@ -19,12 +19,6 @@ from palpate.setup.setup import Setup
 
 __all__ = ["Nuisances", "nuisance_setups", "poisson_change"]
 
-_RADIUS_SCALE, _CAMERA_SCALES = 3e-4, (1e-3, 1e-3, 1e-3, 1e-2, 1e-2, 1e-2)
-"""Steps that matter of the tool's radius [m], and of the camera's pose [m, rad]."""
-_POISSON_STEP = 2e-4
-"""Step of the derivative by Poisson's ratio [1]; backwards close to incompressibility."""
-_NEARLY_INCOMPRESSIBLE = 0.494
-
 
 @dataclass(frozen=True, eq=False)
 class Nuisances:
@@ -91,11 +85,11 @@ def nuisance_setups(setup: Setup, forces: bool) -> list[SetupChange]:
         forces: whether the modulus is one of the nuisances.
     """
     small, tool, material = CRITERIA.derivatives.step, setup.tool, setup.material
-    step = small * _RADIUS_SCALE
+    step = small * CRITERIA.derivatives.radius_scale
     found = [(replace(setup, tool=replace(tool, radius=tool.radius + step)), step)]
     found.append(poisson_change(setup))
-    for number, scale in enumerate(_CAMERA_SCALES):
-        motion = [0.0] * len(_CAMERA_SCALES)
+    for number, scale in enumerate(CRITERIA.derivatives.camera_scales):
+        motion = [0.0] * len(CRITERIA.derivatives.camera_scales)
         motion[number] = small * scale
         found.append((with_moved_camera(setup, motion), motion[number]))
     if forces:
@@ -107,5 +101,6 @@ def nuisance_setups(setup: Setup, forces: bool) -> list[SetupChange]:
 def poisson_change(setup: Setup) -> SetupChange:
     """Return the setup with another Poisson's ratio, and the step."""
     ratio = setup.material.poisson_ratio
-    step = -_POISSON_STEP if ratio > _NEARLY_INCOMPRESSIBLE else _POISSON_STEP
+    step = CRITERIA.derivatives.poisson_step
+    step = -step if ratio > CRITERIA.derivatives.nearly_incompressible else step
     return replace(setup, material=replace(setup.material, poisson_ratio=ratio + step)), step
