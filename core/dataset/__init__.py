@@ -1,4 +1,8 @@
-"""Measured data: a folder in, a checked and lazy Dataset out."""
+"""Measured data: a dataset folder is checked and read into a `Dataset`, clouds on demand.
+
+`folder` opens a dataset, `schema` and `sequence` read its files, `check` sums it up, and
+`dataset_problems` lists everything that is wrong with it.
+"""
 
 from palpate.dataset.folder import Dataset, Touches, open_dataset
 from palpate.dataset.schema import DatasetConfig

@@ -1,4 +1,4 @@
-"""A registration of the camera that a person accepted, to be used in place of the automatic one."""
+"""Accepted registrations of the camera, which replace the automatic one."""
 
 from __future__ import annotations
 
@@ -19,18 +19,17 @@ __all__ = ["AcceptedRegistration", "rest_digest"]
 
 @dataclass(frozen=True, eq=False)
 class AcceptedRegistration:
-    """Camera to phantom as it was accepted under a name.
+    """A registration of the camera to the phantom that a person accepted.
 
     Attributes:
-        name: under which it is kept.
+        name: of the registration.
         phantom_from_camera: the pose.
-        covariance: (6, 6) [m, rad] of a small motion about `pivot` (3,) [m], phantom frame (see
-            palpate.registration.pose).
-        weak_directions: of the pose, in words.
-        pairs: how many pairs of points a person clicked; 0 for one found automatically.
-        residual: RMS distance [m] of the rest cloud's points to block or table; None where it was
-            not said.
-        rest: digest of the rest cloud's file that it was made from; empty where it was not said.
+        covariance: (6, 6) [m, rad] of a small motion about `pivot` (see palpate.registration.pose).
+        pivot: (3,) [m], phantom frame.
+        weak_directions: sentences about poorly determined directions of the pose.
+        pairs: number of pairs of points that a person clicked; 0 for an automatic one.
+        residual: RMS distance of the rest cloud's points to block or table [m]; None if unknown.
+        rest: digest of the rest cloud's file; empty if unknown.
     """
 
     name: str
@@ -44,21 +43,21 @@ class AcceptedRegistration:
 
     @classmethod
     def from_json(cls, stored: Mapping[str, Any]) -> AcceptedRegistration:
-        """From what `to_json` gives, or a file of accepted registrations; RegistrationError where
-        that is not whole.
+        """Read the output of `to_json`, or a file of accepted registrations; RegistrationError
+        where it is incomplete.
         """
-        found = stored.get("registration", stored)
+        values = stored.get("registration", stored)
         try:
             return cls(
                 name=str(stored["name"]),
                 phantom_from_camera=Transform.from_matrix(
-                    np.array(found["phantom_from_camera"], dtype=float)
+                    np.array(values["phantom_from_camera"], dtype=float)
                 ),
-                covariance=_array(found["covariance"], (6, 6)),
-                pivot=_array(found["pivot"], (3,)),
-                weak_directions=tuple(map(str, found.get("weak_directions", ()))),
+                covariance=_array(values["covariance"], (6, 6)),
+                pivot=_array(values["pivot"], (3,)),
+                weak_directions=tuple(map(str, values.get("weak_directions", ()))),
                 pairs=int(stored["pairs"]) if "pairs" in stored else len(stored.get("points", ())),
-                residual=found.get("residual_after", found.get("residual")),
+                residual=values.get("residual_after", values.get("residual")),
                 rest=str(stored.get("rest", "")),
             )
         except (KeyError, TypeError, ValueError) as error:
@@ -70,9 +69,7 @@ class AcceptedRegistration:
             ) from error
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values, from which `from_json` makes it again: what reports and models keep of
-        where they come from.
-        """
+        """Plain values for reports and models, readable by `from_json`."""
         return {
             "name": self.name,
             "by": "hand" if self.pairs else "automatic",
@@ -86,19 +83,19 @@ class AcceptedRegistration:
         }
 
     def check(self, folder: Path) -> None:
-        """RegistrationError where the rest cloud is not the one that it was made from."""
-        if self.rest and (found := rest_digest(folder)) != self.rest:
+        """Raise RegistrationError where the dataset has another rest cloud."""
+        if self.rest and (digest := rest_digest(folder)) != self.rest:
             raise RegistrationError(
                 f"registration {self.name} was made from another rest.ply (digest {self.rest}) "
                 f"than the one in {folder.name} "
-                f"({found}): register this dataset anew",
+                f"({digest}): register this dataset anew",
                 file="rest.ply",
-                value=found,
+                value=digest,
             )
 
 
 def rest_digest(folder: Path) -> str:
-    """A digest of the rest cloud's file, by which it is known again; empty where there is none."""
+    """Digest of the rest cloud's file; empty without one."""
     file = folder / "rest.ply"
     return hashlib.sha256(file.read_bytes()).hexdigest()[:16] if file.is_file() else ""
 

@@ -1,6 +1,4 @@
-"""`palpate check`: what a dataset holds, how regular its clocks are, what is doubtful in it and
-what it lacks.
-"""
+"""Summary of a dataset for `palpate check`: contents, clocks, warnings and missing motions."""
 
 from __future__ import annotations
 
@@ -19,20 +17,22 @@ from palpate.foundation.progress import Report, part, silent
 
 __all__ = ["ClockSummary", "DatasetSummary", "SequenceSummary", "check_dataset"]
 
-DROPOUT = 1.8  # intervals longer than this times the median lost at least one
-HARMLESS_GAP = 0.02  # s; in the kinematics, the tool hardly moves in less
+DROPOUT = 1.8
+"""Interval over the median one from which a stamp is missing [1]."""
+HARMLESS_GAP = 0.02
+"""Interval of kinematics and forces in which the tool hardly moves [s]; never a drop-out."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ClockSummary:
-    """One column of stamps.
+    """Statistics of one column of time stamps.
 
     Attributes:
-        count: of stamps.
+        count: number of stamps.
         rate: one over the median interval [Hz]; 0 for fewer than two stamps.
         jitter: standard deviation of the intervals without drop-outs [s].
-        dropouts: intervals in which at least one stamp is missing.
-        longest: interval [s].
+        dropouts: number of intervals in which at least one stamp is missing.
+        longest: longest interval [s].
     """
 
     count: int
@@ -44,15 +44,19 @@ class ClockSummary:
 
 @dataclass(frozen=True, kw_only=True)
 class SequenceSummary:
-    """One sequence.
+    """Summary of one sequence.
 
     Attributes:
-        split: where dataset.toml puts it; "none" is nowhere.
+        name: of the sequence.
+        split: of dataset.toml; "none" without one.
         duration: of the kinematics [s].
-        clouds_outside: clouds stamped before or after the kinematics, where the tool's place is
-            unknown.
-        points: fewest, median and most per cloud; None without clouds.
-        motion: None where robot and phantom have not been related.
+        kinematics: stamps of the kinematics.
+        clouds: stamps of the clouds.
+        clouds_outside: number of clouds before or after the kinematics, where the tool's position
+            is unknown.
+        points: least, median and largest number of points of a cloud; None without clouds.
+        forces: stamps of the forces; None without.
+        motion: None without a registration of the robot.
     """
 
     name: str
@@ -68,8 +72,18 @@ class SequenceSummary:
 
 @dataclass(frozen=True, kw_only=True)
 class DatasetSummary:
-    """A whole dataset; `warnings` are sentences for a person, `lacks` say which cause could not be
-    told from it.
+    """Summary of a whole dataset.
+
+    Attributes:
+        name: of dataset.toml.
+        path: of the folder.
+        size: of the phantom [m].
+        tool_radius: stated [m].
+        touches: names of the touched landmarks.
+        rest_points: number of points of the rest cloud; None without one.
+        sequences: of each sequence.
+        lacks: missing motions and measurements, with the effects that they would show.
+        warnings: sentences for a person.
     """
 
     name: str
@@ -90,7 +104,7 @@ class DatasetSummary:
 def check_dataset(
     dataset: Dataset, phantom_from_robot: Transform | None = None, report: Report = silent
 ) -> DatasetSummary:
-    """Read all of it once and sum it up; with a registration also what the motions do and lack."""
+    """Read a whole dataset and sum it up, with a registration of the robot also its motions."""
     dataset.validate(part(report, 0.0, 0.9))
     summaries = []
     for index, name in enumerate(dataset.sequences):
@@ -182,7 +196,7 @@ def _doubts(dataset: Dataset) -> list[str]:
 
 
 def _sequence_doubts(dataset: Dataset, summary: SequenceSummary) -> list[str]:
-    """Sentences about one sequence."""
+    """Warnings about one sequence."""
     doubts = []
     if summary.split == "none":
         doubts.append(

@@ -1,8 +1,7 @@
-"""Point clouds as PLY: a strict reader, because the usual ones return an empty or shortened cloud
-where a file is broken.
+"""Strict reader for point clouds as PLY.
 
-Binary in either byte order and ascii; x, y, z are float or double among any other vertex
-properties.
+Usual readers return an empty or shortened cloud for a broken file. Files may be binary of either
+byte order or ascii; x, y, z are float or double among any other vertex properties.
 """
 
 from __future__ import annotations
@@ -48,13 +47,13 @@ _Order = Literal["<", ">", "="]
 
 @dataclass(frozen=True)
 class PlyHeader:
-    """Where the points of a PLY file are.
+    """Layout of the points in a PLY file.
 
     Attributes:
         count: number of points.
-        order: byte order of numpy, "=" stands for ascii.
+        order: byte order as in NumPy; "=" stands for ascii.
         fields: (name, type) of each vertex property.
-        start: first byte of the first point.
+        start: offset of the first point [bytes].
     """
 
     count: int
@@ -64,7 +63,7 @@ class PlyHeader:
 
     @property
     def layout(self) -> np.dtype[Any]:
-        """The packed record of one point."""
+        """NumPy type of the packed record of one point."""
         return np.dtype([(name, self.order + kind) for name, kind in self.fields])
 
 
@@ -81,7 +80,7 @@ class _Element:
 
 
 def read_header(root: Path, file: str, within: str = "") -> PlyHeader:
-    """The header of a cloud, checked against the size of the file without reading its points."""
+    """Read the header of a cloud and check it against the size of the file."""
     with open_inside(root, file, within) as stream:
         return _header(
             file, _read(file, stream, _LARGEST_HEADER), os.fstat(stream.fileno()).st_size
@@ -89,7 +88,9 @@ def read_header(root: Path, file: str, within: str = "") -> PlyHeader:
 
 
 def read_cloud(root: Path, file: str, within: str = "") -> FloatArray:
-    """The points (n, 3) [m], n >= 1, camera frame, all finite and within the reach of a bench."""
+    """Read the points (n, 3) [m], n >= 1, camera frame; DatasetError unless all are finite and
+    plausible.
+    """
     with open_inside(root, file, within) as stream:
         size = os.fstat(stream.fileno()).st_size
         header = _header(file, _read(file, stream, _LARGEST_HEADER), size)
@@ -237,7 +238,7 @@ def _check_vertex(file: str, element: _Element) -> None:
 
 
 def _check_size(file: str, header: PlyHeader, size: int, rest: list[_Element]) -> None:
-    # Two characters are the least that one number and its separator take in ascii.
+    # In ascii, a number and its separator take at least two characters.
     record = 2 * len(header.fields) if header.order == "=" else header.layout.itemsize
     present = size - header.start + (1 if header.order == "=" else 0)
     if present < header.count * record:
@@ -261,9 +262,7 @@ def _check_size(file: str, header: PlyHeader, size: int, rest: list[_Element]) -
 def _binary_points(file: str, header: PlyHeader, data: bytes) -> FloatArray:
     records = np.frombuffer(data, dtype=header.layout, count=header.count)
     points = np.empty((header.count, 3))
-    with np.errstate(
-        invalid="ignore"
-    ):  # a NaN may be of the signalling kind; it is found afterwards
+    with np.errstate(invalid="ignore"):  # a signalling NaN is rejected later
         if header.fields in _BARE:
             points[:] = records.view(header.layout["x"]).reshape(-1, 3)
         else:

@@ -1,6 +1,4 @@
-"""Where the tool touched the phantom, as a picture: the box in three views at one scale, the tool's
-paths coloured by depth.
-"""
+"""Figure of the tool's paths on the phantom: three views at one scale, coloured by depth."""
 
 from __future__ import annotations
 
@@ -24,14 +22,15 @@ __all__ = ["coverage_picture"]
 
 _INK, _FAINT, _BOX, _LANDMARK = "#30363d", "#c4c9cf", "#eef0f2", "#b3261e"
 _DEPTHS = ("#f2b134", "#d9602b", "#8f1d5c", "#1f0f3d")
-_MARGIN = 14.0  # mm shown around the box
+_MARGIN = 14.0
+"""Margin around the box [mm]."""
 _VIEWS = {"top": (0, 1), "front": (0, 2), "right": (1, 2)}
 _TITLES = {"top": "from above", "front": "from the front", "right": "from the right"}
 _MOST_LISTED = 14
 
 
 def coverage_picture(dataset: Dataset, phantom_from_robot: Transform, path: Path) -> None:
-    """Write a PNG to `path`; it appears whole or not at all."""
+    """Write the figure as PNG to `path`, atomically."""
     from matplotlib.colors import LinearSegmentedColormap, Normalize
 
     paths = {
@@ -66,8 +65,8 @@ def coverage_picture(dataset: Dataset, phantom_from_robot: Transform, path: Path
 
 
 def _figure(dataset: Dataset) -> tuple[Figure, dict[str, Axes]]:
-    """Axes placed by hand, so that all views have one scale and the upper one stands straight above
-    the lower one.
+    """Figure and axes, placed so that all views have one scale and the upper one is above the lower
+    one.
     """
     x, y, z = (1e3 * length for length in dataset.config.size)
     left, right, upper, lower = (
@@ -197,7 +196,7 @@ def _draw_path(
     axis.plot(points[:, 0], points[:, 1], color=_FAINT, linewidth=0.9, zorder=1)
     middle = (depth[1:] + depth[:-1]) / 2
     segments = np.stack([points[:-1], points[1:]], axis=1)
-    # The deepest last, or the way back up would hide it in a view along the push.
+    # The deepest part is drawn last; in a view along the push, the way back would hide it.
     order = np.argsort(middle)[(middle <= 0).sum() :]
     lines = LineCollection(
         list(segments[order]),
@@ -212,7 +211,7 @@ def _draw_path(
 
 
 def _number_places(axis: Axes, places: dict[int, FloatArray]) -> None:
-    """Number the first contacts (mm), each label where it is farthest from all the others."""
+    """Number the first contacts [mm], each label farthest from all others."""
     angles = np.arange(8) * np.pi / 4 + np.pi / 8
     taken = [place[:2] for place in places.values()]
     for index, place in places.items():

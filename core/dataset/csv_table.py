@@ -1,6 +1,6 @@
-"""Tables of numbers as csv: fast where all is well, exact about the row where it is not.
+"""Reader for tables of numbers as csv, with the row of every error.
 
-Rows are counted as an editor does: the header is row 1, the first numbers are row 2.
+Rows are counted as in an editor: the header is row 1, the first numbers are row 2.
 """
 
 from __future__ import annotations
@@ -27,15 +27,20 @@ __all__ = [
 ]
 
 FIRST_ROW = 2
-LARGEST_COORDINATE = 10.0  # m; a bench is a metre across, so more is another unit
-LATEST = 1e11  # s; since 1970 it is 1.8e9 s, so more is another unit
+"""Number of the first row of numbers."""
+LARGEST_COORDINATE = 10.0
+"""Largest plausible coordinate [m]; a larger one has another unit."""
+LATEST = 1e11
+"""Latest plausible time stamp [s]; since 1970 it is 1.8e9 s, so a larger one has another unit."""
 _LIMIT = 2**29
+"""Largest size of a table [bytes]."""
 _CHUNK = 20_000
+"""Number of rows that are parsed at once."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 def read_numbers(root: Path, file: str, header: str) -> FloatArray:
-    """All rows (n, columns), n >= 1, under exactly this header; every number finite."""
+    """Read all rows (n, columns), n >= 1, below exactly this header; every number is finite."""
     lines = _body(root, file, header)
     columns = header.count(",") + 1
     blocks = [
@@ -48,8 +53,10 @@ def read_numbers(root: Path, file: str, header: str) -> FloatArray:
 
 
 def read_labelled(root: Path, file: str, header: str, label: int) -> tuple[list[str], FloatArray]:
-    """A table with one column of words (index `label`): the words, and the numbers (n, columns -
-    1).
+    """Read a table with one column of words at index `label`.
+
+    Returns:
+        the words, and the numbers (n, columns - 1).
     """
     names = header.split(",")
     words: list[str] = []
@@ -77,10 +84,16 @@ def read_labelled(root: Path, file: str, header: str, label: int) -> tuple[list[
 def row_problems(
     root: Path, file: str, header: str, label: int | None = None, most: int = 20
 ) -> list[DatasetError]:
-    """What is wrong with the rows of a table by themselves, one problem a row, at most so many;
-    `label` is a column of words.
+    """Problems of single rows of a table, one for each row, at most `most`.
+
+    Args:
+        root: of the dataset.
+        file: relative to `root`.
+        header: expected.
+        label: index of a column of words; None without.
+        most: largest number of problems.
     """
-    found: list[DatasetError] = []
+    problems: list[DatasetError] = []
     names = header.split(",")
     try:
         lines = _body(root, file, header)
@@ -92,14 +105,14 @@ def row_problems(
                 if place != label:
                     _number(file, cell, row, names[place])
         except DatasetError as error:
-            found.append(error)
-        if len(found) == most:
+            problems.append(error)
+        if len(problems) == most:
             break
-    return found
+    return problems
 
 
 def check_increasing(file: str, time: FloatArray) -> None:
-    """Refuse a time column (n,) [s] that stands still or goes back, or is not in seconds."""
+    """Reject a time column (n,) [s] that does not increase, or is not in seconds."""
     if len(late := np.flatnonzero(np.abs(time) > LATEST)):
         value = f"{time[late[0]]:g}"
         text = (
@@ -119,9 +132,7 @@ def check_increasing(file: str, time: FloatArray) -> None:
 
 
 def check_coordinates(file: str, points: FloatArray, first_row: int = FIRST_ROW) -> None:
-    """Refuse positions (n, 3) [m] with a number that is not finite or lies further out than any
-    bench reaches.
-    """
+    """Reject positions (n, 3) [m] with a number that is not finite or implausibly large."""
     within = np.abs(points) <= LARGEST_COORDINATE
     if not within.all():
         at, axis = (int(number) for number in np.argwhere(~within)[0])

@@ -1,6 +1,4 @@
-"""Everything that is wrong with a dataset folder, not only the first: for whoever brings data and
-wants to mend it in one go.
-"""
+"""All problems of a dataset folder at once, so that they can be corrected together."""
 
 from __future__ import annotations
 
@@ -34,30 +32,32 @@ from palpate.foundation.progress import Report, silent
 __all__ = ["MOST", "find_problems", "refuse_problems"]
 
 MOST = 100
-"""Problems that are listed; of a folder with more the first ones."""
+"""Largest number of problems that are listed."""
 T = TypeVar("T")
 
 
 def refuse_problems(root: Path, report: Report = silent) -> None:
-    """DatasetError that lists every problem of a folder, a line each, its place that of the first;
-    nothing where there is none.
+    """Raise a DatasetError that lists all problems of a folder, one a line, if there are any.
+
+    Its place is that of the first problem.
     """
-    found = find_problems(root, report)
-    if not found:
+    problems = find_problems(root, report)
+    if not problems:
         return
-    if len(found) == 1:
-        raise DatasetError(found[0].message, **found[0].where)
-    many = f"at least {MOST}" if len(found) >= MOST else str(len(found))
-    lines = "\n".join(error.message for error in found)
+    if len(problems) == 1:
+        raise DatasetError(problems[0].message, **problems[0].where)
+    many = f"at least {MOST}" if len(problems) >= MOST else str(len(problems))
+    lines = "\n".join(error.message for error in problems)
     raise DatasetError(
         f"{many} problems were found, and nothing was taken:\n{lines}",
-        **{**found[0].where, "problems": len(found)},
+        **{**problems[0].where, "problems": len(problems)},
     )
 
 
 def find_problems(root: Path, report: Report = silent) -> list[PalpateError]:
-    """The problems of each file by itself, at most MOST; none where the dataset can be opened and
-    every cloud be read.
+    """Find the problems of each file by itself, at most MOST.
+
+    The list is empty where the dataset can be opened and every cloud can be read.
     """
     seen = _Found()
     seen.of(lambda: check_folder(root))
@@ -75,7 +75,7 @@ def find_problems(root: Path, report: Report = silent) -> list[PalpateError]:
     for number, name in enumerate(names):
         report(number / len(names), f"reading {name}")
         _sequence(root, name, config[0] if config else None, seen)
-    if not seen.errors:  # what only shows in the whole
+    if not seen.errors:  # problems between files
         seen.of(lambda: open_dataset(root))
     return seen.errors[:MOST]
 
@@ -94,7 +94,7 @@ def _sequence(root: Path, name: str, config: DatasetConfig | None, seen: _Found)
     try:
         files = read_labelled(root, clouds, CLOUDS, label=1)[0]
     except DatasetError:
-        files = []  # told above
+        files = []  # listed above
     for file in dict.fromkeys(files):
         if not seen.full and not file.startswith("/") and ".." not in Path(file).parts:
             _cloud(root, f"{home}/{file}", home, config, seen)
@@ -110,7 +110,7 @@ def _cloud(root: Path, file: str, within: str, config: DatasetConfig | None, see
 
 
 class _Found:
-    """Problems as they are found, each place once."""
+    """List of problems with each place once."""
 
     def __init__(self) -> None:
         self.errors: list[PalpateError] = []
@@ -118,11 +118,11 @@ class _Found:
 
     @property
     def full(self) -> bool:
-        """Whether enough are known."""
+        """Whether MOST problems are listed."""
         return len(self.errors) >= MOST
 
     def of(self, read: Callable[[], T]) -> T | None:
-        """What is read, or None where that fails for a reason that is noted."""
+        """Result of `read`; None where it fails, and the error is listed."""
         try:
             return read()
         except PalpateError as error:
@@ -130,7 +130,7 @@ class _Found:
             return None
 
     def all(self, errors: list[PalpateError] | list[DatasetError]) -> None:
-        """Note problems, one for each file and row."""
+        """List problems, one for each file and row."""
         for error in errors:
             place = (error.where.get("file"), error.where.get("row", error.where.get("key")))
             if place not in self._places or place == (None, None):

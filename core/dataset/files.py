@@ -1,6 +1,4 @@
-"""Safe reading inside a dataset folder: regular files only, never outside of it, never larger than
-a file of its kind can be.
-"""
+"""Safe reading of files in a dataset folder: only regular files inside of it, of limited size."""
 
 from __future__ import annotations
 
@@ -17,10 +15,14 @@ __all__ = ["open_inside", "problem", "read_text"]
 def problem(
     file: str, text: str, *, row: int | None = None, key: str | None = None, value: object = None
 ) -> DatasetError:
-    """The error for a place in a dataset; `file` is relative to the dataset, `row` is the line in
-    it (the header is row 1).
+    """Make the error for a place in a dataset.
 
-    The text names the key itself, where that reads best.
+    Args:
+        file: relative to the dataset.
+        text: the sentence; it names the key itself if needed.
+        row: line in the file; the header is row 1.
+        key: name of a key or of a column.
+        value: the wrong value.
     """
     shown = value if value is None or isinstance(value, int | str) else str(value)
     place = file + (f", row {row}" if row is not None else "")
@@ -28,7 +30,7 @@ def problem(
 
 
 def open_inside(root: Path, file: str, within: str = "") -> BinaryIO:
-    """Open `file` (relative to `root`) for reading; links may not lead out of `root/within`."""
+    """Open `file`, relative to `root`; links may not lead out of `root/within`."""
     path = root / file
     try:
         kind = path.stat().st_mode
@@ -60,8 +62,8 @@ def open_inside(root: Path, file: str, within: str = "") -> BinaryIO:
 
 
 def read_text(root: Path, file: str, limit: int) -> str:
-    """The text of a UTF-8 file of at most `limit` bytes, with plain line ends and without a byte
-    order mark.
+    """Read a UTF-8 file of at most `limit` bytes, with \\n line ends and without a byte order
+    mark.
     """
     with open_inside(root, file) as stream:
         try:

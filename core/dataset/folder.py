@@ -1,6 +1,4 @@
-"""A dataset folder: opened once and checked, clouds read one at a time. Nothing in it is ever
-written to.
-"""
+"""Dataset folders: opened once and checked, with clouds read on demand; never written to."""
 
 from __future__ import annotations
 
@@ -35,13 +33,18 @@ __all__ = [
 ]
 
 FEWEST_TOUCHES = 4
+"""Least number of touches; three leave no residual."""
 _BAGS = (".bag", ".db3", ".mcap")
 
 
 @dataclass(frozen=True, eq=False)
 class Touches:
-    """Tool centres (n, 3) [m], robot frame, while the tool touched the landmark of the same
-    index."""
+    """Touches of landmarks.
+
+    Attributes:
+        names: (n) of the landmarks.
+        positions: (n, 3) tool centres at the touches [m], robot frame.
+    """
 
     names: tuple[str, ...]
     positions: FloatArray
@@ -49,11 +52,16 @@ class Touches:
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
-    """One phantom in one setup with its sequences; `sequences` are their names, sorted. `geometry`
-    is as stated.
+    """One phantom in one setup, with its sequences.
 
-    `accepted` is a registration of the camera that is used in place of the automatic one; None for
-    that.
+    Attributes:
+        path: of the folder.
+        config: what dataset.toml states.
+        touches: of the landmarks.
+        has_rest: whether there is a rest cloud.
+        loaded: the sequences, sorted by name.
+        geometry: stated geometry of the phantom.
+        accepted: registration of the camera in place of the automatic one; None without.
     """
 
     path: Path
@@ -80,7 +88,7 @@ class Dataset:
         return any(len(sequence) for sequence in self.loaded)
 
     def sequence(self, name: str) -> Sequence:
-        """The sequence of this name."""
+        """The sequence of this name; DatasetError for an unknown one."""
         for sequence in self.loaded:
             if sequence.name == name:
                 return sequence
@@ -91,21 +99,21 @@ class Dataset:
         )
 
     def registered(self, accepted: AcceptedRegistration | None) -> Dataset:
-        """The same with an accepted registration of the camera; RegistrationError where it is of
-        another rest cloud.
+        """The dataset with an accepted registration of the camera; RegistrationError where that
+        belongs to another rest cloud.
         """
         if accepted is not None:
             accepted.check(self.path)
         return replace(self, accepted=accepted)
 
     def rest_cloud(self) -> FloatArray:
-        """The raw cloud (n, 3) [m] of the untouched phantom, camera frame."""
+        """Read the raw cloud (n, 3) [m], camera frame, of the untouched phantom."""
         points = read_cloud(self.path, "rest.ply")
         self._check_span("rest.ply", points)
         return points
 
     def validate(self, report: Report = silent) -> None:
-        """Read every cloud once, so that whatever is wrong in any of them is told now."""
+        """Read every cloud once; DatasetError for the first broken one."""
         if self.has_rest:
             self.rest_cloud()
         total = sum(len(sequence) for sequence in self.loaded)
@@ -124,8 +132,8 @@ class Dataset:
 
 
 def check_span(file: str, points: FloatArray, size: tuple[float, float, float]) -> None:
-    """Refuse a cloud (n, 3) [m] that is far smaller than the phantom of `size` [m]."""
-    # Axis by axis in a row each: seventeen times as fast as over rows of three.
+    """Reject a cloud (n, 3) [m] that is far smaller than a phantom of `size` [m]."""
+    # Measured: 17 times as fast along contiguous axes as over rows of three.
     span, edge = float(np.ptp(np.ascontiguousarray(points.T), axis=1).max()), max(size)
     if len(points) > 1 and span < 0.01 * edge:
         text = (
@@ -136,8 +144,9 @@ def check_span(file: str, points: FloatArray, size: tuple[float, float, float]) 
 
 
 def open_dataset(path: Path | str) -> Dataset:
-    """Open a dataset folder and check all but the points of its clouds; those are checked when
-    read, or by `validate`.
+    """Open a dataset folder and check everything but the points of its clouds.
+
+    The points are checked when they are read, or by `Dataset.validate`. Raises DatasetError.
     """
     root = Path(path)
     check_folder(root)
@@ -159,7 +168,7 @@ def open_dataset(path: Path | str) -> Dataset:
 
 
 def stated(root: Path) -> tuple[DatasetConfig, Box | Shape]:
-    """What dataset.toml states, and the phantom's geometry."""
+    """Read dataset.toml and the phantom's geometry."""
     config = read_config(root)
     if not config.surface:
         return config, Box(size=config.size)
@@ -168,21 +177,22 @@ def stated(root: Path) -> tuple[DatasetConfig, Box | Shape]:
 
 
 def check_folder(root: Path) -> None:
-    """Refuse what is no folder that can be looked into."""
+    """Reject a path that is no readable folder."""
     try:
         if root.is_dir():
             list(root.iterdir())
             return
-        found = "is a file" if root.exists() else "does not exist"
+        reason = "is a file" if root.exists() else "does not exist"
     except (OSError, ValueError) as error:
-        found = f"cannot be opened ({getattr(error, 'strerror', None) or error})"
+        reason = f"cannot be opened ({getattr(error, 'strerror', None) or error})"
     raise DatasetError(
-        f"{root} {found}; expected the folder of a dataset, with dataset.toml in it", file=str(root)
+        f"{root} {reason}; expected the folder of a dataset, with dataset.toml in it",
+        file=str(root),
     )
 
 
 def read_touches(root: Path, config: DatasetConfig) -> Touches:
-    """The touches of the landmarks, checked."""
+    """Read and check the touches of the landmarks."""
     file = "touches.csv"
     names, positions = read_labelled(root, file, "landmark,x,y,z", label=0)
     for row, name in enumerate(names, FIRST_ROW):
@@ -232,7 +242,7 @@ def _check_touch_scale(file: str, positions: FloatArray, landmarks: FloatArray) 
 
 
 def sequence_names(root: Path) -> list[str]:
-    """The names of the sequences' folders, sorted."""
+    """List the names of the sequences' folders, sorted."""
     try:
         entries = sorted(
             (entry.name, entry.is_dir())
@@ -266,7 +276,7 @@ def sequence_names(root: Path) -> list[str]:
 
 
 def check_splits(config: DatasetConfig, names: list[str]) -> None:
-    """Refuse splits that name what is no sequence."""
+    """Reject splits with an unknown sequence."""
     for split in ("train", "validation", "test"):
         for name in getattr(config, split):
             if name not in names:

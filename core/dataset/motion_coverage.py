@@ -1,6 +1,4 @@
-"""What a set of motions cannot show: for which causes a dataset lacks a motion, and which one to
-add.
-"""
+"""Missing motions and measurements of a dataset, with the effects that they would show."""
 
 from __future__ import annotations
 
@@ -14,19 +12,29 @@ from palpate.dataset.tool_motion import ContactKind, ToolMotion
 
 __all__ = ["CoverageGap", "coverage_gaps"]
 
-FEW_UNTOUCHED = 3  # clouds; fewer say nothing about the noise
-LONG_REST = 2.0  # s; several time constants of the quicker soft materials
-OTHER_DEPTH = 1.25  # ratio that makes two depths different
-OTHER_SPEED = 2.0  # ratio that makes two speeds different
-OTHER_PLACE = 0.010  # m, between two places
-FEW_PUSHES = 12  # without clouds; fewer leave most of a phantom untouched
-SHALLOW = 0.002  # m; half of what a hand presses
+FEW_UNTOUCHED = 3
+"""Least number of untouched clouds, which show the noise."""
+LONG_REST = 2.0
+"""Long rest after a release [s], several time constants of the quicker soft materials."""
+OTHER_DEPTH = 1.25
+"""Ratio from which two depths differ [1]."""
+OTHER_SPEED = 2.0
+"""Ratio from which two speeds differ [1]."""
+OTHER_PLACE = 0.010
+"""Distance from which two places differ [m]."""
+FEW_PUSHES = 12
+"""Least number of pushes without clouds; fewer leave most of a phantom untouched."""
+SHALLOW = 0.002
+"""Depth below which a push is shallow [m], half of what a hand presses."""
 
 
 @dataclass(frozen=True)
 class CoverageGap:
-    """A motion or measurement that is not there, the effects it would tell, and the sentence for a
-    person.
+    """A missing motion or measurement.
+
+    Attributes:
+        effects: names of the effects that it would show.
+        sentence: for a person.
     """
 
     effects: tuple[str, ...]
@@ -36,17 +44,23 @@ class CoverageGap:
 def coverage_gaps(
     motions: dict[str, ToolMotion], observed: bool, forces: bool
 ) -> tuple[CoverageGap, ...]:
-    """What these motions (by sequence), with or without any cloud and force, do not show."""
-    found = [*_of_measurements(observed, forces)]
+    """List what is missing.
+
+    Args:
+        motions: by sequence.
+        observed: whether there are clouds.
+        forces: whether there are forces.
+    """
+    gaps = [*_of_measurements(observed, forces)]
     if motions and observed:
-        found += [
+        gaps += [
             *_of_kinds(list(motions.values())),
             *_of_variety(list(motions.values())),
             *_of_rests(motions),
         ]
     elif motions:
-        found += _of_palpation(list(motions.values()))
-    return tuple(found)
+        gaps += _of_palpation(list(motions.values()))
+    return tuple(gaps)
 
 
 def _of_measurements(observed: bool, forces: bool) -> Iterable[CoverageGap]:
@@ -82,7 +96,7 @@ def _of_kinds(motions: list[ToolMotion]) -> Iterable[CoverageGap]:
 
 
 def _of_palpation(motions: list[ToolMotion]) -> Iterable[CoverageGap]:
-    """Of pushes that are felt and not seen."""
+    """Gaps of a palpation without clouds."""
     pushes = [contact for motion in motions for contact in motion.contacts]
     if len(pushes) < FEW_PUSHES:
         text = (

@@ -1,6 +1,4 @@
-"""The keys of dataset.toml, format 1: what the experimenter states about phantom, tool, landmarks,
-camera and splits.
-"""
+"""Keys of dataset.toml, format 1: statements about phantom, tool, landmarks, camera and splits."""
 
 from __future__ import annotations
 
@@ -26,22 +24,27 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class DatasetConfig:
-    """What dataset.toml states, SI units.
+    """Statements of dataset.toml, SI units.
 
     Attributes:
+        name: of the dataset.
         size: edge lengths of the box (x, y, z) [m]; of a mesh its extent, once its surface was
             read.
         surface: file of a mesh, phantom frame, metres; empty for a box.
         mass: of the phantom [kg].
-        fixed: what is believed to be held, always "base".
-        young_modulus, poisson_ratio: beliefs about the material [Pa], [1].
+        fixed: support of the phantom, always "base".
+        young_modulus: believed [Pa].
+        poisson_ratio: believed [1].
         tool_radius: believed radius of the spherical tip [m].
-        landmarks: name to position, phantom frame [m].
-        touch_offset: tool centre above the landmark at touch, along phantom z [m].
+        landmarks: name to position [m], phantom frame.
+        touch_offset: height of the tool centre over the landmark at a touch [m].
         has_camera: whether there is a [camera] table; without one the next three are defaults.
-        depth_sigma: the maker's stated accuracy [m].
-        to_phantom: first guess of phantom_from_camera.
-        train, validation, test: names of sequences.
+        camera_name: for reports.
+        depth_sigma: the maker's stated accuracy of depth [m].
+        to_phantom: first guess of phantom_from_camera; None without.
+        train: names of sequences for the fit.
+        validation: names of sequences for validation.
+        test: names of sequences for the test.
     """
 
     name: str
@@ -64,7 +67,9 @@ class DatasetConfig:
 
 
 def read_config(root: Path) -> DatasetConfig:
-    """Read and check dataset.toml; every mistake names its key, its value and what was expected."""
+    """Read and check dataset.toml; every DatasetError names the key, the value and what is
+    expected.
+    """
     top = _Keys("", _toml(root))
     top.only(("format", "name", "phantom", "tool", "landmarks", "camera", "splits", "topics"))
     if (version := top.take("format")) != 1 or isinstance(version, bool):
@@ -86,7 +91,7 @@ def read_config(root: Path) -> DatasetConfig:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """A sentence naming what may have been meant, and all that is known."""
+    """Words that name the nearest known name, if any is near, and all known names."""
     known = sorted(known)
     close = difflib.get_close_matches(name, known, n=1)
     return (
@@ -99,7 +104,7 @@ def _toml(root: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        # tomllib ends its sentence with "(at line 3, column 8)"
+        # tomllib ends its message with "(at line 3, column 8)".
         tail = str(error).rpartition("at line ")[2].partition(",")[0]
         row = int(tail) if tail.isdecimal() else None
         raise problem(
@@ -108,7 +113,7 @@ def _toml(root: Path) -> dict[str, Any]:
 
 
 class _Keys:
-    """One table of the file; hands out checked values and knows its place for messages."""
+    """One table of the file, which returns checked values; messages name its place."""
 
     def __init__(self, prefix: str, values: dict[str, Any]) -> None:
         self.prefix = prefix
@@ -211,7 +216,7 @@ def _shown(value: object) -> str:
 
 
 def _unit_hint(value: float, low: float, high: float, unit: str) -> str:
-    """Ask about the unit where a factor of 1000 would bring the value into its bounds."""
+    """Words that suggest another unit where a factor of 1000 brings the value into its bounds."""
     down, up = {"m": ("millimetres", ""), "kg": ("grams", ""), "Pa": ("", "kilopascals")}.get(
         unit, ("", "")
     )
@@ -233,7 +238,7 @@ def _phantom(keys: _Keys) -> dict[str, Any]:
 
 
 def _geometry(keys: _Keys) -> dict[str, Any]:
-    """Size of a box, or the surface of a mesh, whose size is that of its surface."""
+    """Keys `size` and `surface`: a box has the first, a mesh the second."""
     geometry = keys.take("geometry")
     if geometry not in ("box", "mesh"):
         raise keys.wrong(

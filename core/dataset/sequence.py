@@ -1,4 +1,4 @@
-"""One motion of the tool: its path, its clouds one at a time, its forces."""
+"""Sequences: kinematics, forces, and clouds on demand."""
 
 from __future__ import annotations
 
@@ -33,16 +33,22 @@ __all__ = [
 ]
 
 KINEMATICS, CLOUDS, FORCES = "t,x,y,z,qx,qy,qz,qw", "t,file", "t,fx,fy,fz"
-"""The headers of a sequence's tables."""
+"""Headers of a sequence's tables."""
 
-LARGEST_FORCE = 1000.0  # N; beyond any bench for soft tissue, so another unit
-SLOWEST_STEP = 0.5  # s between rows of the kinematics; slower is another unit
+LARGEST_FORCE = 1000.0
+"""Largest plausible force on soft tissue [N]; a larger one has another unit."""
+SLOWEST_STEP = 0.5
+"""Largest plausible step of the kinematics [s]; a larger one has another unit."""
 
 
 @dataclass(frozen=True, eq=False)
 class Kinematics:
-    """The tool's path: time (n,) [s], position (n, 3) [m] and quaternion (n, 4) (x, y, z, w), robot
-    frame.
+    """Path of the tool, robot frame.
+
+    Attributes:
+        time: (n,) [s].
+        position: (n, 3) tool centre [m].
+        quaternion: (n, 4) orientation (x, y, z, w).
     """
 
     time: FloatArray
@@ -50,8 +56,8 @@ class Kinematics:
     quaternion: FloatArray
 
     def position_at(self, times: FloatArray) -> FloatArray:
-        """Tool centres (m, 3) [m], robot frame, at these times (m,) [s]; linear between rows,
-        beyond the ends the end itself.
+        """Tool centres (m, 3) [m], robot frame, at times (m,) [s]; linear between rows, constant
+        beyond the ends.
         """
         return np.stack(
             [np.interp(times, self.time, self.position[:, axis]) for axis in range(3)], axis=-1
@@ -60,7 +66,12 @@ class Kinematics:
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """Force on the tool: time (n,) [s], force (n, 3) [N], robot frame."""
+    """Force on the tool, robot frame.
+
+    Attributes:
+        time: (n,) [s].
+        force: (n, 3) [N].
+    """
 
     time: FloatArray
     force: FloatArray
@@ -71,9 +82,13 @@ class Sequence:
     """One motion of the tool; its length is the number of clouds.
 
     Attributes:
-        cloud_times: (m,) [s], the clock of the kinematics as far as the experimenter knows.
+        root: of the dataset.
+        name: of the sequence.
+        kinematics: of the tool.
+        cloud_times: (m,) [s], stated to be on the clock of the kinematics.
         cloud_files: (m) paths relative to the dataset.
-        shift: (3,) by which clouds are moved on reading [m], camera frame.
+        forces: None without.
+        shift: (3,) by which clouds are moved on reading [m], camera frame; None without.
     """
 
     root: Path
@@ -94,13 +109,16 @@ class Sequence:
         ).count
 
     def cloud(self, index: int) -> FloatArray:
-        """The raw cloud (k, 3) [m], camera frame, read from disk at each call."""
+        """Read the raw cloud (k, 3) [m], camera frame, from disk."""
         points = read_cloud(self.root, self.cloud_files[index], within=f"sequences/{self.name}")
         return points if self.shift is None else points + self.shift
 
     def moved(self, camera: FloatArray, robot: FloatArray) -> Sequence:
-        """The same with clouds and tool moved by one vector, (3,) [m] in the camera's and in the
-        robot's frame.
+        """The sequence with clouds and tool moved by one vector.
+
+        Args:
+            camera: (3,) the vector in the camera frame [m].
+            robot: (3,) the vector in the robot frame [m].
         """
         path = replace(self.kinematics, position=self.kinematics.position + robot)
         return replace(
@@ -109,7 +127,7 @@ class Sequence:
 
 
 def read_sequence(root: Path, name: str) -> Sequence:
-    """The sequence `name`, all but the points of its clouds read and checked."""
+    """Read and check a sequence, without the points of its clouds."""
     home = f"sequences/{name}"
     kinematics = read_kinematics(root, f"{home}/kinematics.csv")
     times, files = np.empty(0), tuple[str, ...]()
@@ -128,7 +146,7 @@ def read_sequence(root: Path, name: str) -> Sequence:
 
 
 def read_kinematics(root: Path, file: str) -> Kinematics:
-    """The tool's path from a table below the dataset `root`."""
+    """Read and check the tool's path from `file`, relative to the dataset `root`."""
     table = read_numbers(root, file, KINEMATICS)
     if len(table) < 2:
         raise problem(
@@ -160,8 +178,16 @@ def read_kinematics(root: Path, file: str) -> Kinematics:
 def read_cloud_list(
     root: Path, home: str, file: str, clock: FloatArray
 ) -> tuple[FloatArray, tuple[str, ...]]:
-    """Stamps (m,) [s] and files of the clouds of the sequence at `home`; `clock` (n,) [s] is that
-    of its kinematics.
+    """Read and check the list of clouds of a sequence.
+
+    Args:
+        root: of the dataset.
+        home: folder of the sequence, relative to `root`.
+        file: the list, relative to `root`.
+        clock: (n,) time stamps of the kinematics [s].
+
+    Returns:
+        stamps (m,) [s] and files, relative to `root`.
     """
     names, numbers = read_labelled(root, file, CLOUDS, label=1)
     times = numbers[:, 0]
@@ -197,13 +223,13 @@ def _check_cloud(root: Path, home: str, file: str, row: int, name: str) -> None:
     try:
         read_header(root, f"{home}/{name}", within=home)
     except DatasetError as error:
-        # Both places matter: the broken cloud is the file, the row is the one that asks for it.
+        # The error names the broken cloud as file, and the row that refers to it.
         where = {"row": row, **error.where}
         raise DatasetError(f"{error.message} (asked for by {file}, row {row})", **where) from None
 
 
 def read_forces(root: Path, file: str) -> Forces:
-    """The forces from a table below the dataset `root`."""
+    """Read and check the forces from `file`, relative to the dataset `root`."""
     table = read_numbers(root, file, FORCES)
     time, force = table[:, 0], table[:, 1:]
     check_increasing(file, time)

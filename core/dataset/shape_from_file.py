@@ -1,4 +1,4 @@
-"""The surface of a phantom that is no box: read from its file, checked, and held at its base."""
+"""Phantoms of any shape: the surface from a file, checked, with its fixed base."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ from palpate.setup.surface_file import FORMATS, read_surface
 __all__ = ["read_shape"]
 
 _SMALLEST, _LARGEST = 1e-3, 2.0
-"""Extent [m] that a phantom may have along any axis: as for a box."""
+"""Least and largest extent of a phantom along any axis [m], as for a box."""
 _BASE_TOLERANCE = 0.02
-"""Triangles within this share of the height from the lowest point are the base [1]."""
+"""Height over the lowest point up to which triangles belong to the base, over the total height
+[1]."""
 _OFF_ORIGIN = 2e-3
-"""How far from z = 0 the base may lie [m]: the phantom frame begins there."""
+"""Largest height of the base from z = 0 [m]."""
 
 
 def read_shape(root: Path, file: str) -> Shape:
-    """The body within the surface `file` of a dataset, held at its base; DatasetError where it is
-    none that can be filled.
+    """Read the body within the surface `file` of a dataset, fixed at its base; DatasetError where
+    it cannot be meshed.
     """
     open_inside(root, file).close()
     if Path(file).suffix.lower() not in FORMATS:
@@ -61,7 +62,7 @@ def _check_units(file: str, vertices: FloatArray) -> None:
 
 
 def _base(vertices: FloatArray) -> Plane:
-    """The lowest plane, with what lies next to it: scanned bases are not quite flat."""
+    """The lowest plane with a tolerance, since scanned bases are not flat."""
     if not len(vertices):
         return Plane()
     low, height = float(vertices[:, 2].min()), float(np.ptp(vertices[:, 2]))

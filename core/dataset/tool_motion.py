@@ -1,7 +1,6 @@
-"""What a tool path does to the phantom as stated: pushes from above and from the side, drags; how
-deep, where, how fast.
+"""Contacts of a tool path with the stated phantom: pushes and drags with depth, place and speed.
 
-The stated phantom is rigid here, so that a depth is how far the sphere would overlap it.
+The stated phantom is rigid here, so a depth is the overlap of the sphere with the phantom at rest.
 """
 
 from __future__ import annotations
@@ -20,23 +19,28 @@ __all__ = ["Contact", "ContactKind", "ToolMotion", "box_gap", "describe_motion",
 
 ContactKind = Literal["top", "side", "drag"]
 
-TOUCHING = 0.0005  # m; about what touches are good for, so nearer counts as touching
-RELEASED = 0.001  # m; two contacts are one unless the tool leaves this far in between
-_LEVEL = 0.7  # cosine; a surface that is less level is a side
-_STEP = 0.05  # s; positions are averaged over it, or their noise would be taken for speed
+TOUCHING = 0.0005
+"""Gap below which the tool counts as touching [m], about the accuracy of touches."""
+RELEASED = 0.001
+"""Gap that separates two contacts [m]."""
+_LEVEL = 0.7
+"""Vertical part of a normal below which a surface is a side [1]."""
+_STEP = 0.05
+"""Time over which positions are averaged [s], so that noise does not count as speed."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Contact:
-    """One time from touch to release.
+    """One contact from touch to release.
 
     Attributes:
         kind: "top" and "side" are pushes into that face, "drag" travels along it.
-        start, end: on the robot's clock [s].
-        depth: deepest overlap of the sphere with the phantom at rest [m].
-        place: tool centre at first touch, phantom frame [m].
-        travel: how far it moves along the touched face [m].
-        speed: that three quarters of the time stay below [m/s].
+        start: on the robot's clock [s].
+        end: on the robot's clock [s].
+        depth: largest overlap of the sphere with the phantom at rest [m].
+        place: tool centre at first touch [m], phantom frame.
+        travel: distance along the touched face [m].
+        speed: upper quartile of the speed [m/s].
     """
 
     kind: ContactKind
@@ -50,13 +54,15 @@ class Contact:
 
 @dataclass(frozen=True, kw_only=True)
 class ToolMotion:
-    """One sequence in the phantom frame.
+    """Contacts of one sequence.
 
     Attributes:
-        nearest: smallest gap between sphere and phantom at rest [m]; negative is the depth reached.
-        untouched_before, untouched_after: clouds before the first and after the last contact.
-        rest_after: time from the last contact to the last cloud, or row where there are no clouds
-            [s].
+        contacts: in order of time.
+        nearest: smallest gap between sphere and phantom at rest [m]; negative where they overlap.
+        untouched_before: number of clouds before the first contact.
+        untouched_after: number of clouds after the last contact.
+        rest_after: time from the last contact to the last cloud, or to the last row of kinematics
+            without clouds [s].
     """
 
     contacts: tuple[Contact, ...]
@@ -83,7 +89,7 @@ def box_gap(points: FloatArray, size: tuple[float, float, float], radius: float)
 def describe_motion(
     dataset: Dataset, sequence: Sequence, phantom_from_robot: Transform
 ) -> ToolMotion:
-    """What this sequence does, by the stated size, radius and registration."""
+    """Find the contacts of a sequence by the stated geometry and radius and a registration."""
     time, path = smooth_path(sequence, phantom_from_robot)
     distance, normals = dataset.geometry.facing(path)
     gap = distance - dataset.config.tool_radius
@@ -103,7 +109,7 @@ def describe_motion(
 
 
 def smooth_path(sequence: Sequence, phantom_from_robot: Transform) -> tuple[FloatArray, FloatArray]:
-    """Time (n,) [s] and tool centre (n, 3) [m], phantom frame, averaged over short steps."""
+    """Times (n,) [s] and tool centres (n, 3) [m], phantom frame, averaged over short steps."""
     time, points = sequence.kinematics.time, phantom_from_robot.apply(sequence.kinematics.position)
     _, index, counts = np.unique(
         np.floor((time - time[0]) / _STEP), return_inverse=True, return_counts=True
@@ -113,21 +119,21 @@ def smooth_path(sequence: Sequence, phantom_from_robot: Transform) -> tuple[Floa
 
 
 def _beyond(points: FloatArray, size: tuple[float, float, float]) -> FloatArray:
-    # The base is no face to be touched: below the top, only the sides count.
+    # The base cannot be touched: below the top, only the sides count.
     across = np.abs(points[..., :2]) - np.array(size[:2]) / 2
     return np.concatenate([across, points[..., 2:] - size[2]], axis=-1)
 
 
 def _episodes(gap: FloatArray) -> list[slice]:
-    """From touch to release: runs of touching rows, joined unless the tool leaves in between."""
+    """Rows of each contact: runs of touching rows, joined unless the tool leaves in between."""
     touching = np.flatnonzero(gap < TOUCHING)
-    found: list[slice] = []
+    runs: list[slice] = []
     for at in map(int, touching):
-        if found and gap[found[-1].stop : at + 1].max() < RELEASED:
-            found[-1] = slice(found[-1].start, at + 1)
+        if runs and gap[runs[-1].stop : at + 1].max() < RELEASED:
+            runs[-1] = slice(runs[-1].start, at + 1)
         else:
-            found.append(slice(at, at + 1))
-    return found
+            runs.append(slice(at, at + 1))
+    return runs
 
 
 def _contact(time: FloatArray, path: FloatArray, gap: FloatArray, normal: FloatArray) -> Contact:
@@ -137,7 +143,7 @@ def _contact(time: FloatArray, path: FloatArray, gap: FloatArray, normal: FloatA
     kind: ContactKind = "top" if normal[2] > _LEVEL else "side"
     x, y, z = (float(value) for value in path[0])
     return Contact(
-        # A slanted push wanders by about its own depth; a drag goes on for several times that.
+        # A slanted push travels by about its own depth, a drag by several times that.
         kind="drag" if travel > max(2 * depth, 0.005) else kind,
         start=float(time[0]),
         end=float(time[-1]),

@@ -1,5 +1,4 @@
-"""A stream's average over a few hundredths of a second: where the tool was, and what it felt
-there."""
+"""Moving averages of streams, for the tool's position and force."""
 
 from __future__ import annotations
 
@@ -11,13 +10,16 @@ from palpate.foundation.arrays import FloatArray
 __all__ = ["SMOOTHING", "averaged", "smooth_centres"]
 
 SMOOTHING = 0.02
-"""Half the time [s] over which the robot's pose is averaged: streams carry noise of some hundredths
-of a millimetre."""
+"""Half the window of the average [s]; positions have noise of some hundredths of a millimetre."""
 
 
 def averaged(time: FloatArray, values: FloatArray, times: FloatArray) -> FloatArray:
-    """Means (m, d) of values (n, d) at stamps (n,) [s] over SMOOTHING to both sides of `times` (m,)
-    [s], linear between stamps.
+    """Means (m, d) of values (n, d) over windows of SMOOTHING to both sides of `times`.
+
+    Args:
+        time: (n,) stamps [s]; values are linear in between.
+        values: (n, d).
+        times: (m,) middles of the windows [s].
     """
     integral = np.concatenate(
         [
@@ -44,7 +46,5 @@ def averaged(time: FloatArray, values: FloatArray, times: FloatArray) -> FloatAr
 
 
 def smooth_centres(kinematics: Kinematics, times: FloatArray) -> FloatArray:
-    """Tool centres (m, 3) [m] in the robot frame at `times` (m,) [s], averaged over a few
-    hundredths of a second.
-    """
+    """Tool centres (m, 3) [m], robot frame, averaged about `times` (m,) [s]."""
     return averaged(kinematics.time, kinematics.position, times)

@@ -1,4 +1,4 @@
-"""Camera to phantom as a person accepted it, in the place of a fit."""
+"""Camera to phantom from an accepted registration in place of a fit."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from palpate.registration.camera_fit import CameraFit, refine_camera
 __all__ = ["accepted_camera_fit"]
 
 APART = 3.0e-3
-"""An accepted pose further than this [m] from where the cloud itself would draw it is told of: its
-directions may be open."""
+"""Distance between the accepted pose and the fit from there beyond which a warning is given [m]."""
 
 
 def accepted_camera_fit(
@@ -23,8 +22,13 @@ def accepted_camera_fit(
     depth_sigma: float,
     accepted: AcceptedRegistration,
 ) -> CameraFit:
-    """The accepted pose and its covariance, with the statistics of the rest cloud (n, 3) [m],
-    camera frame, about it.
+    """The accepted pose and its covariance, with statistics of the rest cloud.
+
+    Args:
+        cloud: (n, 3) rest cloud [m], camera frame.
+        size: of the block [m].
+        depth_sigma: stated accuracy of depth [m].
+        accepted: the registration.
     """
     fit = refine_camera(cloud, size, accepted.phantom_from_camera, depth_sigma)
     motion = fit.phantom_from_camera @ accepted.phantom_from_camera.inverse()

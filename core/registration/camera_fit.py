@@ -1,5 +1,5 @@
-"""Camera to phantom from the rest cloud: coarse ICP by Open3D, then robust point-to-plane
-Gauss-Newton on faces and table.
+"""Camera to phantom from the rest cloud: coarse ICP, then robust point-to-plane Gauss-Newton on
+faces and table.
 """
 
 from __future__ import annotations
@@ -20,8 +20,11 @@ from palpate.registration.uncertainty import PRIOR, estimate, make_patches, weak
 __all__ = ["CameraFit", "fit_camera", "refine_camera"]
 
 HUBER, TUKEY = 1.345, 4.685
+"""Tuning constants of the robust weights, in standard deviations; 95 % efficiency."""
 EXPLAINED_LEAST = 0.7
+"""Share of points on the stated surface below which a warning is given [1]."""
 LEAST_POINTS = 50
+"""Least number of points of a fit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,19 +35,18 @@ class CameraFit:
         phantom_from_camera: the fit.
         covariance: (6, 6) [m, rad] of a small motion about `pivot` (see palpate.registration.pose),
             smooth sensor bias included.
-        pivot: (3,) [m] centre of the block's top, phantom frame.
-        lever: half the block's diagonal [m], by which rotations are weighed against translations.
-        rms: of point-to-plane distances that count [m].
-        noise, bias: the sensor's white noise along the line of sight, and the size of its smooth
-            error [m].
-        face_counts: points on each face used.
+        pivot: (3,) centre of the block's top [m], phantom frame.
+        lever: half the block's diagonal [m], which converts rotations to distances.
+        rms: weighted RMS of point-to-plane distances [m].
+        noise: white noise of the sensor along the line of sight [m].
+        bias: size of the sensor's smooth error [m].
+        face_counts: number of points on each face.
         face_offsets: mean distance of each face's points from its plane [m], positive outside.
-        table_height: of the table's points over z = 0 [m]; NaN where no table is seen.
-        weak_directions: in words.
+        table_height: of the table's points over z = 0 [m]; NaN without a visible table.
+        weak_directions: sentences about poorly determined directions.
         explained: share of the points near the block that lie on its stated surface [1].
-        automatic: the first guess was found, not given. turned: the fit half a turn about z away,
-            which a plain block cannot tell from this one.
-        warnings: for people.
+        automatic: whether the first guess was found, not given.
+        warnings: for a person.
     """
 
     phantom_from_camera: Transform
@@ -64,7 +66,9 @@ class CameraFit:
 
     @property
     def turned(self) -> Transform:
-        """phantom_from_camera with the block half a turn about z."""
+        """phantom_from_camera with the block turned by half a turn about z, which fits a plain
+        block equally well.
+        """
         return half_turn() @ self.phantom_from_camera
 
 
@@ -74,11 +78,20 @@ def fit_camera(
     depth_sigma: float = 0.002,
     guess: Transform | None = None,
 ) -> CameraFit:
-    """Lay a raw rest cloud (n, 3) [m], camera frame, against a block of `size` [m] on its table.
+    """Register a raw rest cloud to a block on its table.
 
-    Starts from `guess` (phantom_from_camera) and from a search of its own, and keeps what explains
-    more of the cloud. Directions that the cloud leaves open stay at the first guess, get a wide
-    covariance, and are named.
+    The fit starts from `guess` and from an automatic guess, and the result that explains more of
+    the cloud is returned. Undetermined directions stay at the first guess, get a wide covariance,
+    and are named.
+
+    Args:
+        cloud: (n, 3) [m], camera frame.
+        size: of the block [m].
+        depth_sigma: stated accuracy of depth [m].
+        guess: phantom_from_camera; None without.
+
+    Raises:
+        RegistrationError: for too few points, or without any first guess.
     """
     if len(cloud) < LEAST_POINTS:
         raise RegistrationError(
@@ -91,8 +104,8 @@ def fit_camera(
     if guess is not None:
         poses.append(_refine(cloud, size, align_by_icp(cloud, size, guess), guess, gate))
     try:
-        found = automatic_guess(cloud, size, depth_sigma)
-        starts = sorted((found, half_turn() @ found), key=lambda pose: _preference(pose, guess))
+        start = automatic_guess(cloud, size, depth_sigma)
+        starts = sorted((start, half_turn() @ start), key=lambda pose: _preference(pose, guess))
         poses.append(_refine(cloud, size, starts[0], guess or starts[0], gate))
     except RegistrationError as error:
         failure = error
@@ -101,7 +114,7 @@ def fit_camera(
             "no first guess of camera to phantom: give [camera] to_phantom"
         )
     shares = [_explained(cloud, size, pose, depth_sigma) for pose in poses]
-    # The given guess decides between equals: it knows the heading and the directions that are open.
+    # The given guess wins ties: it holds the heading and the undetermined directions.
     best = 1 if len(poses) == 2 and shares[1] > shares[0] + 0.05 else 0
     return _conclude(
         cloud, size, poses[best], shares[best], gate, guess, automatic=guess is None or best == 1
@@ -114,8 +127,9 @@ def refine_camera(
     start: Transform,
     depth_sigma: float = 0.002,
 ) -> CameraFit:
-    """The same from `start` (phantom_from_camera) alone: a person's start is refined, never
-    replaced by a search.
+    """Register a raw rest cloud from `start` (phantom_from_camera) alone, without a search.
+
+    Args and errors are those of `fit_camera`.
     """
     if len(cloud) < LEAST_POINTS:
         raise RegistrationError(
@@ -130,8 +144,8 @@ def refine_camera(
 
 
 def _preference(pose: Transform, guess: Transform | None) -> float:
-    """Small for the heading nearest to the guess; without one, for the camera on the -y side, as a
-    person would stand.
+    """Sort key of headings: smallest for the one nearest to the guess; without a guess, for the
+    camera on the -y side.
     """
     if guess is None:
         return float(pose.translation[1])
@@ -154,11 +168,10 @@ def _refine(
     guess: Transform,
     gate: float,
 ) -> Transform:
-    """Gauss-Newton on signed distances to the planes, weighted by slant, Huber first and Tukey at
-    the end.
+    """Refine a pose by Gauss-Newton on signed distances to the planes.
 
-    The wide prior about `guess` acts in every direction and is felt only in those that no plane
-    determines.
+    Residuals are scaled by slant, with Huber weights first and Tukey weights at the end. A wide
+    prior about `guess` matters only in directions that no plane determines.
     """
     pivot = _pivot(size)
     for step in range(30):
@@ -203,7 +216,7 @@ def _weights(found: Assignment, sigma: float, *, tukey: bool) -> FloatArray:
 def _explained(
     cloud: FloatArray, size: tuple[float, float, float], pose: Transform, depth_sigma: float
 ) -> float:
-    """Share of the points over the table and near the block that lie on its surface [1]."""
+    """Share of points above the table and near the block that lie on its surface [1]."""
     points = pose.apply(cloud)
     distance = box_distance(points, np.array(size))
     near = (points[:, 2] > 3.0e-3) & (distance < 0.02)
@@ -224,18 +237,18 @@ def _conclude(
     *,
     automatic: bool,
 ) -> CameraFit:
-    """Last step with the correlated noise model, covariance, and everything worth saying."""
+    """Take a last step with the correlated noise model; compute covariance and warnings."""
     pivot = _pivot(size)
-    # Twice, since a block that sags has pulled the pose along, and with it which point counts.
+    # Twice: a sagging block shifts the first pose, and with it the choice of points.
     for _ in range(2):
         found, weights = _weighted(cloud, size, pose, gate)
         patches = make_patches(found, weights, pose.translation, pivot)
         last = estimate(patches)
         pose = small_motion(last.motion, pivot) @ pose
     found, weights = _weighted(cloud, size, pose, gate)
-    kept = found.only(weights > 0)
+    used = found.only(weights > 0)
     counts = {
-        name: int((kept.face == k).sum()) for k, name in enumerate(FACES) if (kept.face == k).any()
+        name: int((used.face == k).sum()) for k, name in enumerate(FACES) if (used.face == k).any()
     }
     offsets = {
         name: float(np.average(found.distance[found.face == k], weights=weights[found.face == k]))
@@ -264,8 +277,8 @@ def _conclude(
 def _weighted(
     cloud: FloatArray, size: tuple[float, float, float], pose: Transform, gate: float
 ) -> tuple[Assignment, FloatArray]:
-    """Points on planes with robust weights (k,) about each plane's own median: a face that lies off
-    as a whole is no outlier.
+    """Points on planes with robust weights (k,) about the median of each plane, so that a face with
+    an offset is no outlier.
     """
     found = assign(pose.apply(cloud), camera_planes(size, pose.translation), pose.translation, gate)
     medians = np.array(

@@ -1,6 +1,4 @@
-"""The planes that a rest cloud can be laid against: the block's top, the sides that the camera
-sees, and the table.
-"""
+"""Planes to which a rest cloud is registered: the block's top, visible sides, and the table."""
 
 from __future__ import annotations
 
@@ -27,20 +25,27 @@ __all__ = [
 ]
 
 FACES = ("top", "-x", "+x", "-y", "+y", "table")
+"""Names of the planes."""
 NORMALS = np.array(
     [[0, 0, 1], [-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, 1]], dtype=float
 )
 EDGE = 2.0e-3
-"""Points nearer to an edge than this [m] are left out: noise carries them over it, and a real edge
-is round."""
+"""Distance to an edge below which points are left out [m]: noise moves them across it, and a real
+edge is round."""
 TABLE_REACH = 0.08
+"""Distance from the block up to which points of the table are used [m]."""
 GRAZING = 0.2
+"""Least cosine between normal and line of sight that is used [1]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Planes:
-    """The six planes n.x = d of a block of `size` [m] on its table; `visible` (6,) tells which the
-    camera sees from its front.
+    """The six planes n.x = d of a block on its table.
+
+    Attributes:
+        size: (3,) of the block [m].
+        offsets: (6,) d [m]; the normals are NORMALS.
+        visible: (6,) bool, planes whose front the camera sees.
     """
 
     size: FloatArray
@@ -53,12 +58,12 @@ class Assignment:
     """Points that lie on a plane, phantom frame.
 
     Attributes:
-        rows: (k,) which points of the cloud.
+        rows: (k,) rows of the cloud.
         face: (k,) index into FACES.
         points: (k, 3) [m].
-        distance: (k,) [m] signed, positive outside.
-        slant: (k,) cosine between normal and line of sight, at least 0.2; depth noise shows times
-            this in `distance`.
+        distance: (k,) signed distance [m], positive outside.
+        slant: (k,) cosine between normal and line of sight [1], at least GRAZING; the part of depth
+            noise in `distance`.
     """
 
     rows: IndexArray
@@ -84,7 +89,7 @@ class Assignment:
 
 
 def camera_planes(size: tuple[float, float, float], camera: FloatArray) -> Planes:
-    """The planes as a camera at (3,) [m], phantom frame, sees them."""
+    """The planes of a block of `size` [m] for a camera at (3,) [m], phantom frame."""
     x, y, z = size
     offsets = np.array([z, x / 2, x / 2, y / 2, y / 2, 0.0])
     before = NORMALS @ camera - offsets
@@ -92,8 +97,8 @@ def camera_planes(size: tuple[float, float, float], camera: FloatArray) -> Plane
 
 
 def assign(points: FloatArray, planes: Planes, camera: FloatArray, gate: float) -> Assignment:
-    """Give points (n, 3) [m], phantom frame, the plane they lie on within `gate` [m], away from
-    edges; leave the others out.
+    """Assign points (n, 3) [m], phantom frame, to the nearest plane within `gate` [m]; points near
+    edges and others are left out.
     """
     half = planes.size[:2] / 2
     distance = points @ NORMALS.T - planes.offsets
@@ -109,15 +114,15 @@ def assign(points: FloatArray, planes: Planes, camera: FloatArray, gate: float) 
     far = np.where(inside & planes.visible, np.abs(distance), np.inf)
     face = far.argmin(axis=1)
     rows = np.flatnonzero(far[np.arange(len(points)), face] < gate)
-    face, kept = face[rows], points[rows]
-    sight = kept - camera
+    face, near = face[rows], points[rows]
+    sight = near - camera
     slant = np.abs((sight * NORMALS[face]).sum(axis=1)) / np.linalg.norm(sight, axis=1)
-    found = Assignment(rows, face, kept, distance[rows, face], np.maximum(slant, GRAZING))
+    found = Assignment(rows, face, near, distance[rows, face], np.maximum(slant, GRAZING))
     return found.only(_populated(found, planes)[found.face])
 
 
 def _populated(found: Assignment, planes: Planes) -> Mask:
-    """Which faces (6,) hold a believable number of points: a few strays do not make a side."""
+    """Mask (6,) of faces with a plausible number of points; a few stray points make no side."""
     x, y, z = planes.size
     areas = np.array([x * y, y * z, y * z, x * z, x * z, np.inf])
     seen = np.bincount(found.face, weights=1 / found.slant, minlength=6)

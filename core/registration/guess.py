@@ -1,6 +1,4 @@
-"""A first guess of camera to phantom without any help: table plane, the top at the block's height
-over it, its rectangle.
-"""
+"""Automatic first guess of camera to phantom: table plane, top at the block's height, rectangle."""
 
 from __future__ import annotations
 
@@ -9,11 +7,12 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
-from palpate.registration.table_plane import Table, find_table
+from palpate.registration.table_plane import TablePlane, find_table
 
 __all__ = ["automatic_guess", "half_turn"]
 
 HEADING_STEP = np.radians(0.5)
+"""Step of the search over headings [rad]."""
 
 
 def half_turn() -> Transform:
@@ -24,9 +23,11 @@ def half_turn() -> Transform:
 def automatic_guess(
     cloud: FloatArray, size: tuple[float, float, float], depth_sigma: float
 ) -> Transform:
-    """phantom_from_camera from a rest cloud (n, 3) [m], camera frame, and the block's size [m].
+    """Guess phantom_from_camera from a rest cloud (n, 3) [m], camera frame, and the block's size
+    [m].
 
-    One of two headings half a turn apart: a plain block looks the same from both.
+    The result is one of two headings half a turn apart, which a plain block cannot distinguish.
+    Raises RegistrationError where no table or no top is found.
     """
     thickness = max(depth_sigma, 1.0e-3)
     table = find_table(cloud, thickness)
@@ -39,8 +40,8 @@ def automatic_guess(
     return Transform(turn, -turn @ np.array([centre[0], centre[1], 0.0])) @ level
 
 
-def _level(table: Table) -> Transform:
-    """From the camera frame to one whose z is the table's normal and whose z = 0 is the table."""
+def _level(table: TablePlane) -> Transform:
+    """Transform from the camera frame to one whose plane z = 0 is the table, z upwards."""
     z = table.normal
     x = np.cross([0.0, 1.0, 0.0], z)
     x = np.cross([1.0, 0.0, 0.0], z) if np.linalg.norm(x) < 0.1 else x
@@ -87,7 +88,7 @@ def _rectangle(points: FloatArray, length: float, width: float) -> tuple[float, 
         points @ np.stack([-axes[1], axes[0]]), [1.0, 99.0], axis=0
     )
     misfit = (high - low - length) ** 2 + (high_across - low_across - width) ** 2
-    # The extents change slowest at the right heading: the smallest area breaks near ties.
+    # The extents are stationary at the right heading; the smallest area decides near ties.
     best = int(np.argmin(misfit + 0.05 * (high - low) * (high_across - low_across)))
     along, across = (low[best] + high[best]) / 2, (low_across[best] + high_across[best]) / 2
     axis = axes[:, best]

@@ -1,6 +1,4 @@
-"""Which way round a plain block lies: the tool, seen by the camera and known from the kinematics,
-tells.
-"""
+"""Heading of a plain block, decided by the tool's position by camera and by kinematics."""
 
 from __future__ import annotations
 
@@ -18,17 +16,20 @@ from palpate.registration.uncertainty import weak_directions
 __all__ = ["tool_misfit", "turned_fit"]
 
 ASIDE = 6.0e-3
+"""Distance from block and table beyond which points may be the tool's [m]."""
 FRAMES = 12
+"""Number of frames that are compared."""
 FARTHEST = 0.03
+"""Limit of the distance of one frame [m]."""
 
 
 def tool_misfit(
     dataset: Dataset, phantom_from_robot: Transform, headings: list[Transform]
 ) -> FloatArray:
-    """Mean distance [m] between where the kinematics put the tool and where the camera sees it, for
-    each phantom_from_camera.
+    """Mean distance (k,) [m] between the tool by the kinematics and by the camera, for each
+    phantom_from_camera.
 
-    NaN where no frame shows a tool. Distances beyond 30 mm count as 30 mm.
+    NaN where no frame shows a tool. Distances are limited to 30 mm.
     """
     distances = [
         _frame_misfits(cloud, centre, dataset.config.size, headings)
@@ -39,8 +40,8 @@ def tool_misfit(
 
 
 def _frames(dataset: Dataset, phantom_from_robot: Transform) -> list[tuple[FloatArray, FloatArray]]:
-    """Clouds (n, 3), camera frame, and tool centres (3,), phantom frame [m], of frames with the
-    tool far from the block's axis.
+    """Clouds (n, 3) [m], camera frame, and tool centres (3,) [m], phantom frame, of frames with the
+    tool near the block and far from its axis.
     """
     places: list[tuple[float, str, int, FloatArray]] = []
     for name in dataset.sequences:
@@ -71,16 +72,14 @@ def _frame_misfits(
         tool = points[(apart > ASIDE) & (apart < 0.15) & (points[:, 2] > ASIDE)]
         if len(tool) < 10:
             return np.full(len(headings), np.nan)
-        # The tenth nearest, since single strays lie anywhere.
+        # The tenth nearest point is robust against single stray points.
         nearest = np.partition(np.linalg.norm(tool - centre, axis=1), 9)[9]
         found.append(min(float(nearest), FARTHEST))
     return np.array(found)
 
 
 def turned_fit(fit: CameraFit) -> CameraFit:
-    """The same fit with the block half a turn about z away: every statement about x and y changes
-    sides.
-    """
+    """The fit with the block turned by half a turn about z; faces and covariance change sides."""
     half = np.diag([-1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
     swap = {"-x": "+x", "+x": "-x", "-y": "+y", "+y": "-y"}
     covariance = half @ fit.covariance @ half

@@ -1,5 +1,6 @@
-"""Touches paired with the wrong landmarks, or a touched polygon of another size: noticed and
-proposed, never applied.
+"""Detection of touches paired with wrong landmarks, and of a touched polygon of another size.
+
+A finding is proposed to the user, never applied.
 """
 
 from __future__ import annotations
@@ -21,25 +22,30 @@ __all__ = [
     "MUCH_BETTER",
     "TouchProposal",
     "blocked_share",
-    "propose",
+    "propose_pairing",
 ]
 
 MUCH_BETTER = 0.5
+"""RMS of another pairing over the stated one's, below which it may be proposed [1]."""
 CLEARLY_BETTER = 1.0e-3
+"""Least reduction of the RMS for a proposal [m]."""
 SCALE_SIGMAS, SCALE_LEAST = 3.0, 0.02
+"""Least deviation of the size from 1, in standard errors and absolute [1]."""
 IMPOSSIBLE = 0.15
+"""Share of impossible starts of the tool from which a pairing is rejected [1]."""
 
 
 @dataclass(frozen=True)
 class TouchProposal:
-    """What would fit the touches better than what was stated.
+    """A pairing or a size that fits the touches better than stated.
 
     Attributes:
         pairing: the landmark proposed for each row of touches.csv, in its order.
         scale: size of the touched polygon over that of the landmarks [1]; 1.0 where no other size
             is proposed.
-        rms_as_stated, rms_proposed: of the touches to their landmarks [m].
-        sentence: the finding with its numbers, for people.
+        rms_as_stated: RMS of the touches to their stated landmarks [m].
+        rms_proposed: the same with the proposal [m].
+        sentence: the finding with its numbers, for a person.
     """
 
     pairing: tuple[str, ...]
@@ -49,23 +55,26 @@ class TouchProposal:
     sentence: str
 
 
-def propose(
+def propose_pairing(
     names: Sequence[str],
     touches: FloatArray,
     expected: dict[str, FloatArray],
     size: tuple[float, float, float] | None = None,
     tool_starts: FloatArray | None = None,
 ) -> TouchProposal | None:
-    """Look for a much better pairing of the touches (n, 3) [m], robot frame, then for another size
-    of their polygon.
+    """Search for a much better pairing of the touches, then for another size of their polygon.
 
     Args:
         names: the landmark stated for each touch.
+        touches: (n, 3) [m], robot frame.
         expected: tool centre (3,) [m] at each landmark, phantom frame.
         size: of the phantom [m].
-        tool_starts: (k, 3) [m] where the tool was before it touched anything, robot frame. Corners
-            of one plane fit equally well upside down; starts that would then lie inside the block
-            or under the table tell the two apart.
+        tool_starts: (k, 3) positions of the tool before any touch [m], robot frame. Corners of one
+            plane fit equally well upside down; starts inside the block or under the table rule that
+            out.
+
+    Returns:
+        the proposal; None where the statement fits best.
     """
     landmarks = sorted(set(names))
     rows = np.array([landmarks.index(name) for name in names])
@@ -96,8 +105,8 @@ def propose(
 
 
 def _orders(count: int) -> Iterator[tuple[int, ...]]:
-    """Orders to try, the stated one first; beyond six landmarks swaps of two, cyclic shifts, and
-    shifts of the mirrored order.
+    """Orders of landmarks to try, the stated one first: all permutations up to six landmarks, then
+    swaps of two, cyclic shifts, and shifts of the mirrored order.
     """
     stated = tuple(range(count))
     if count <= 6:
@@ -119,7 +128,7 @@ def blocked_share(
     size: tuple[float, float, float] | None,
     phantom_from_robot: Transform,
 ) -> float:
-    """Share of the starts [1] where no tool can have been: inside the block, or under the table."""
+    """Share of the starts [1] that are impossible: inside the block, or under the table."""
     if tool_starts is None or size is None or len(tool_starts) == 0:
         return 0.0
     points = phantom_from_robot.apply(tool_starts)
@@ -132,11 +141,10 @@ def blocked_share(
 
 
 def _best(orders: FloatArray, rms: FloatArray, blocked: FloatArray) -> int:
-    """The order to propose: 0 unless another is much better, or the stated one would put the tool
-    where none can be.
+    """Row of the order to propose; 0 unless another is much better, or the stated one impossible.
 
-    Equal is not better: a rectangle turned by half a turn fits as well. Among equals the one that
-    changes fewest pairs wins.
+    An equal fit is no reason: a rectangle turned by half a turn fits as well. Among equal fits the
+    one with fewest changes wins.
     """
     candidates = blocked <= (blocked[0] if blocked[0] < IMPOSSIBLE else 0.5 * blocked[0])
     if not candidates.any():

@@ -1,9 +1,9 @@
 """Robot to phantom where the touches were surely paired with other landmarks than stated.
 
-Two corners taken for each other put the tool centimetres off and upside down. Nothing that looks at
-the tool in the clouds can work from there: which way round the block lies, which points are of the
-tool, which frames are untouched. So what reduces the measurement looks from the pairing that the
-touches themselves ask for. What was stated stays as it is: it is for the diagnosis to weigh it.
+Two swapped corners put the tool centimetres off and upside down. The heading of the block, the
+points of the tool and the untouched frames cannot be found from there. The reduction of the
+measurement therefore uses the pairing that fits the touches. The statement itself is not changed;
+the diagnosis judges it.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from palpate.registration.landmark_pairing import (
 from palpate.registration.robot_fit import RobotFit, fit_robot, similarity
 from palpate.setup.setup import PAIRINGS, Touching
 
-__all__ = ["Repair", "pairings_for", "repairs", "resized", "settled"]
+__all__ = ["LandmarkRepair", "choose_repair", "find_repairs", "pairings_for", "resized_repair"]
 
 _ALIKE = 5e-4
-"""RMS [m] by which a pairing may fit worse than the best and still be meant: a rectangle turned by
-half a turn fits as well."""
+"""Difference of the RMS up to which pairings fit equally well [m], as a rectangle turned by half a
+turn does."""
 
 
 @dataclass(frozen=True, eq=False)
-class Repair:
+class LandmarkRepair:
     """Another pairing of the touches.
 
     Attributes:
         pairing: one of `palpate.setup.setup.PAIRINGS`.
         scale: of the touched polygon over that of the landmarks [1].
-        fit: of the touches to the landmarks so paired and scaled.
-        rms_as_stated: the same as they are stated, with the size that then fits best [m].
+        fit: of the touches to the landmarks with this pairing and scale.
+        rms_as_stated: RMS of the stated pairing with its best scale [m].
     """
 
     pairing: str
@@ -51,8 +51,9 @@ class Repair:
 
 
 def pairings_for(count: int) -> tuple[str, ...]:
-    """Those of `palpate.setup.setup.PAIRINGS` that so many touches can have, the stated one
-    first."""
+    """Pairings of `palpate.setup.setup.PAIRINGS` that `count` touches can have, the stated one
+    first.
+    """
     rows = {
         pairing: [int(word) for word in pairing.split("-")[1:] if word.isdigit()]
         for pairing in PAIRINGS
@@ -64,19 +65,19 @@ def pairings_for(count: int) -> tuple[str, ...]:
     )
 
 
-def repairs(
+def find_repairs(
     touches: FloatArray,
     expected: FloatArray,
     size: tuple[float, float, float] | None = None,
     tool_starts: FloatArray | None = None,
-) -> tuple[Repair, ...]:
-    """Other pairings of touches (n, 3) [m], robot frame, that fit them much better than as stated,
-    best first.
+) -> tuple[LandmarkRepair, ...]:
+    """Find pairings that fit the touches much better than the stated one, best first.
 
     Args:
-        expected: (n, 3) tool centre [m] at each touch's stated landmark, phantom frame.
+        touches: (n, 3) [m], robot frame.
+        expected: (n, 3) tool centre at each touch's stated landmark [m], phantom frame.
         size: of the phantom [m].
-        tool_starts: (k, 3) [m] where the tool was before it touched anything, robot frame.
+        tool_starts: (k, 3) positions of the tool before any touch [m], robot frame.
     """
     found = []
     for pairing in pairings_for(len(touches)):
@@ -91,35 +92,34 @@ def repairs(
     upside_down = lies >= IMPOSSIBLE and best < stated + CLEARLY_BETTER
     if not (off or upside_down):
         return ()
-    kept = sorted(
+    ranked = sorted(
         (row for row in possible if row[3] < best + _ALIKE and row is not found[0]),
         key=lambda row: row[3],
     )
-    return tuple(Repair(pairing, scale, fit, stated) for pairing, scale, fit, _, _ in kept)
+    return tuple(
+        LandmarkRepair(pairing, scale, fit, stated) for pairing, scale, fit, _, _ in ranked
+    )
 
 
-def resized(touches: FloatArray, expected: FloatArray) -> Repair:
-    """The stated pairing with the polygon's best size: the pose stays, but touches that agree so
-    well say more of it.
-    """
+def resized_repair(touches: FloatArray, expected: FloatArray) -> LandmarkRepair:
+    """The stated pairing with the polygon's best size; the pose stays, its covariance shrinks."""
     scale, rms, fit = _fit(touches, expected)
-    return Repair(PAIRINGS[0], scale, fit, rms)
+    return LandmarkRepair(PAIRINGS[0], scale, fit, rms)
 
 
 def _fit(touches: FloatArray, places: FloatArray) -> tuple[float, float, RobotFit]:
-    """Size of the polygon [1], RMS that it leaves [m], and the fit to places (n, 3) [m] of that
-    size.
-    """
+    """Size of the polygon [1], RMS left [m], and the fit to places (n, 3) [m] of that size."""
     scale, _, rms = similarity(touches, places)
     middle = places.mean(axis=0)
     return scale, rms, fit_robot(touches, middle + scale * (places - middle))
 
 
-def settled(
-    dataset: Dataset, found: Sequence[Repair], phantom_from_camera: Transform | None
-) -> Repair | None:
-    """Of repairs that fit alike the one that puts the tool where the camera sees it; the best fit
-    where no frame shows a tool.
+def choose_repair(
+    dataset: Dataset, found: Sequence[LandmarkRepair], phantom_from_camera: Transform | None
+) -> LandmarkRepair | None:
+    """Choose among repairs that fit equally well the one whose tool agrees with the camera.
+
+    Without a frame that shows a tool it is the best fit; None without repairs.
     """
     if not found or phantom_from_camera is None or len(found) == 1:
         return found[0] if found else None

@@ -1,5 +1,6 @@
-"""A raw cloud set upright: its table flat at z = 0, seen from the camera's side. No registration,
-only easier to look at.
+"""Upright display of a raw cloud: the table at z = 0, seen from the camera's side.
+
+This is no registration; it only makes a cloud easier to look at.
 """
 
 from __future__ import annotations
@@ -12,14 +13,15 @@ from palpate.foundation.frames import Transform
 __all__ = ["as_seen", "levelled"]
 
 DRAWS, SUBSET = 400, 1500
+"""Number of RANSAC draws, and of points that are used."""
 INLIER, LEAST_SHARE, BEHIND = 3.0e-3, 0.08, 6.0e-3
-"""Distance of a point from its plane [m], share of the points that make a plane [1], and what
-counts as behind it [m]."""
+"""Largest distance of an inlier [m], least share of inliers [1], and distance behind the plane from
+which points count against it [m]."""
 
 
 def as_seen(cloud: FloatArray) -> Transform:
-    """The camera's axes turned so that its up is z and its view is y; the middle of the cloud (n,
-    3) [m] lies over the origin.
+    """The camera's axes turned so that its up is z and its view is y, with the middle of the cloud
+    (n, 3) [m] over the origin.
     """
     turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     points = cloud @ turn.T
@@ -29,11 +31,11 @@ def as_seen(cloud: FloatArray) -> Transform:
 
 
 def levelled(cloud: FloatArray, seed: int = 0) -> Transform:
-    """A pose of the camera in which the table of its cloud (n, 3) [m] is z = 0 and the camera
-    stands on the -y side.
+    """A camera pose in which the table of its cloud (n, 3) [m] is z = 0 and the camera is on the -y
+    side.
 
-    The table is the large plane with least behind it, by RANSAC (Fischler and Bolles 1981);
-    `as_seen` where there is none.
+    The table is the large plane with fewest points behind it, by RANSAC (Fischler and Bolles 1981);
+    `as_seen` without one.
     """
     rng = np.random.default_rng(seed)
     points = cloud[rng.permutation(len(cloud))[:SUBSET]]
@@ -45,9 +47,8 @@ def levelled(cloud: FloatArray, seed: int = 0) -> Transform:
         if length < 1e-6:
             continue
         normal = normal / length
-        normal = (
-            normal if normal @ corner[0] < 0 else -normal
-        )  # towards the camera, which is the origin
+        # Towards the camera, which is the origin.
+        normal = normal if normal @ corner[0] < 0 else -normal
         height = (points - corner[0]) @ normal
         share = float((np.abs(height) < INLIER).mean())
         score = share - 4.0 * float((height < -BEHIND).mean())
@@ -56,9 +57,8 @@ def levelled(cloud: FloatArray, seed: int = 0) -> Transform:
     if best is None:
         return as_seen(cloud)
     _, up, offset = best
-    away = -up * (up @ np.array([0.0, 0.0, 1.0])) + np.array(
-        [0.0, 0.0, 1.0]
-    )  # the line of sight, laid on the table
+    # The line of sight, projected on the table.
+    away = -up * (up @ np.array([0.0, 0.0, 1.0])) + np.array([0.0, 0.0, 1.0])
     away = away if np.linalg.norm(away) > 1e-3 else np.array([0.0, -1.0, 0.0]) + up * up[1]
     away = away / np.linalg.norm(away)
     turn = np.stack([np.cross(away, up), away, up])

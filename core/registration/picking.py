@@ -1,4 +1,4 @@
-"""Which point of a cloud or a mesh a ray from the eye means."""
+"""Picking of points of a cloud or a mesh by a ray from the eye."""
 
 from __future__ import annotations
 
@@ -10,22 +10,27 @@ from palpate.registration.faces import IndexArray
 __all__ = ["pick_cloud", "pick_mesh", "slide_on_cloud"]
 
 NEAR, WIDEST = 1.5, 6.0
-"""Points within so many pixels of the ray are candidates; the reach doubles up to the second where
-there are none."""
+"""Radius around the ray in which points are candidates [pixels]; it doubles up to the second value
+while there are none."""
 AROUND = 12
-"""Points that tell how the surface lies at one of them."""
+"""Number of points that determine the tangent plane."""
 GAP = 5.0e-3
-"""Candidates further apart along the ray than this [m] belong to different surfaces."""
+"""Distance along the ray that separates candidates of different surfaces [m]."""
 
 
 def pick_cloud(
     points: FloatArray, origin: FloatArray, direction: FloatArray, pixel: float
 ) -> int | None:
-    """Row of the point (n, 3) [m] that a ray (3,), (3,) means; `pixel` is the angle of one pixel
-    [rad]. None beside the cloud.
+    """Row of the picked point; None beside the cloud.
 
-    Of the points near the ray the front-most cluster counts, and of it the point nearest to the
-    ray. All in one frame. The ray is that through the pixel's centre, (u + 0.5, v + 0.5).
+    It is the point nearest to the ray in the front-most cluster near the ray. All arguments are in
+    one frame.
+
+    Args:
+        points: (n, 3) [m].
+        origin: (3,) of the ray [m].
+        direction: (3,) of the ray, through the pixel's centre (u + 0.5, v + 0.5).
+        pixel: angle of one pixel [rad].
     """
     direction = direction / np.linalg.norm(direction)
     arm = points - origin
@@ -47,8 +52,8 @@ def pick_cloud(
 def pick_mesh(
     vertices: FloatArray, faces: IndexArray, origin: FloatArray, direction: FloatArray
 ) -> FloatArray | None:
-    """Where a ray first meets the triangles (m, 3) over vertices (n, 3) [m]; (3,) [m], or None
-    (Moeller and Trumbore 1997).
+    """First intersection (3,) [m] of a ray with triangles (m, 3) over vertices (n, 3) [m]; None
+    without one (Moeller and Trumbore 1997).
     """
     corner = vertices[faces[:, 0]]
     first, second = vertices[faces[:, 1]] - corner, vertices[faces[:, 2]] - corner
@@ -73,10 +78,10 @@ def pick_mesh(
 def slide_on_cloud(
     points: FloatArray, start: FloatArray, origin: FloatArray, direction: FloatArray
 ) -> FloatArray | None:
-    """Where a ray meets the plane through the points (n, 3) [m] around `start` (3,): (3,) [m].
+    """Intersection (3,) [m] of a ray with the tangent plane of the points (n, 3) [m] at `start`.
 
-    So a pick is moved by less than the points are apart. None where the ray runs along that plane.
-    All in one frame.
+    A pick can thus be moved by less than the distance of points. None for a ray along the plane.
+    All arguments are in one frame.
     """
     apart = np.linalg.norm(points - start, axis=1)
     around = points[np.argsort(apart)[:AROUND]]

@@ -1,8 +1,8 @@
-"""Camera to phantom by hand: numbered pairs of points give a rigid fit, and ICP goes on from there.
+"""Camera to phantom by hand: numbered pairs of points give a rigid fit, from which ICP starts.
 
 The fit is the closed form of Kabsch (1976) with Umeyama's sign (1991), never a reflection. Pairs
-that cannot say where the phantom lies (too few, repeated, on one line, mirrored) are refused with
-their numbers.
+that do not determine the pose (too few, repeated, on one line, mirrored) are rejected with their
+numbers.
 """
 
 from __future__ import annotations
@@ -24,18 +24,16 @@ from palpate.registration.uncertainty import NAMES
 __all__ = ["PairFit", "PairRegistration", "fit_pairs", "register_pairs"]
 
 REPEATED = 1.0e-3
-"""Points of two pairs nearer than this [m] are the same point clicked twice."""
+"""Distance below which points of two pairs count as the same point [m]."""
 ON_LINE, NEARLY_ON_LINE = 0.05, 0.15
-"""Second over first singular value of the points about their mean [1]: refused, and warned of."""
+"""Second over first singular value of the points about their mean below which pairs are rejected,
+and below which a warning is given [1]."""
 DOUBTFUL = 5.0e-3
-"""A pair that misses by more than this [m] is pointed out: careful clicks miss by a millimetre or
-two."""
+"""Residual of a pair beyond which a warning is given [m]; careful clicks miss by 1 to 2 mm."""
 MIRRORED = 0.5
-"""A reflection that leaves less than this part of what the best motion leaves is what was clicked
-[1]."""
+"""RMS of a reflection over that of the best motion, below which pairs count as mirrored [1]."""
 COUNTED = 4.0e-3
-"""Points within this distance [m] of block or table after ICP are those whose residual is stated
-before and after."""
+"""Distance to block or table after ICP up to which points count in the stated residuals [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +43,7 @@ class PairFit:
     Attributes:
         phantom_from_camera: the fit.
         residuals: (n, 3) [m], phantom frame, cloud point moved by the fit minus its mesh point.
-        warnings: what to look at before going on.
+        warnings: for a person.
     """
 
     phantom_from_camera: Transform
@@ -74,14 +72,14 @@ class PairFit:
 
 @dataclass(frozen=True, eq=False)
 class PairRegistration:
-    """What pairs and the ICP from there give.
+    """A registration from pairs, refined by ICP.
 
     Attributes:
-        pairs: the rigid fit that ICP started from.
-        camera: the fit against block and table, with covariance and weak directions.
-        before, after: RMS distance [m] of the same points to block or table, at the start and at
-            the end.
-        points: how many points that is.
+        pairs: the rigid fit from which ICP starts.
+        camera: the fit to block and table, with covariance and weak directions.
+        before: RMS distance of points to block or table at the start [m].
+        after: the same of the same points at the end [m].
+        points: number of these points.
     """
 
     pairs: PairFit
@@ -92,7 +90,7 @@ class PairRegistration:
 
     @property
     def moved(self) -> tuple[float, float]:
-        """How far ICP carried the centre of the block's top [m], and how far it turned [rad]."""
+        """Motion by ICP: shift of the centre of the block's top [m], and rotation [rad]."""
         motion = self.camera.phantom_from_camera @ self.pairs.phantom_from_camera.inverse()
         pivot = self.camera.pivot
         return float(np.linalg.norm(motion.apply(pivot) - pivot)), float(
@@ -121,11 +119,15 @@ class PairRegistration:
 
 
 def fit_pairs(cloud: FloatArray, mesh: FloatArray) -> PairFit:
-    """Fit points on the cloud (n, 3) [m], camera frame, to their points on the mesh (n, 3) [m],
-    phantom frame; pair by pair.
+    """Fit points on the cloud to their points on the mesh, pair by pair.
 
-    RegistrationError, naming pairs by number from 1, for fewer than three, repeated, collinear and
-    mirrored ones.
+    Args:
+        cloud: (n, 3) [m], camera frame.
+        mesh: (n, 3) [m], phantom frame.
+
+    Raises:
+        RegistrationError: for fewer than three, repeated, collinear or mirrored pairs, which are
+            numbered from 1.
     """
     cloud, mesh = (
         np.asarray(cloud, dtype=float).reshape(-1, 3),
@@ -167,8 +169,14 @@ def register_pairs(
     mesh: FloatArray,
     depth_sigma: float = 0.002,
 ) -> PairRegistration:
-    """Fit the pairs (see fit_pairs), then lay the rest cloud (m, 3) [m], camera frame, against the
-    block from there.
+    """Fit the pairs (see `fit_pairs`), then register the rest cloud to the block from there.
+
+    Args:
+        rest: (m, 3) rest cloud [m], camera frame.
+        size: of the block [m].
+        cloud: (n, 3) points of the pairs [m], camera frame.
+        mesh: (n, 3) points of the pairs [m], phantom frame.
+        depth_sigma: stated accuracy of depth [m].
     """
     pairs = fit_pairs(cloud, mesh)
     camera = refine_camera(rest, size, pairs.phantom_from_camera, depth_sigma)
@@ -179,10 +187,9 @@ def register_pairs(
 
 
 def directions(covariance: FloatArray, lever: float) -> list[dict[str, Any]]:
-    """Eigenvectors of a covariance (6, 6) [m, rad], weakest first: what moves, by name, and by how
-    much it may be off [m].
+    """Eigenvectors of a covariance (6, 6) [m, rad], weakest first, with standard deviations [m].
 
-    Rotations count by what they do at `lever` [m].
+    Rotations are converted to distances at `lever` [m].
     """
     scale = np.array([1.0] * 3 + [lever] * 3)
     values, vectors = np.linalg.eigh(covariance * np.outer(scale, scale))
@@ -226,33 +233,37 @@ def _check_spread(points: FloatArray, name: str) -> list[str]:
 
 
 def _refuse_mirrored(cloud: FloatArray, mesh: FloatArray, pose: Transform, rms: float) -> None:
-    """Points in a plane fit a motion as well as a reflection, but mirrored ones put the camera
-    under the table.
+    """Reject mirrored pairs.
+
+    Points in a plane fit a motion as well as a reflection, but mirrored ones put the camera under
+    the table.
     """
     _, _, reflected = rigid_fits(cloud * np.array([1.0, 1.0, -1.0]), mesh[None])
     if rms > 2.0e-3 and reflected[0] < MIRRORED * rms:
-        told, swap = _exchanged(cloud, mesh)
+        hint, swap = _exchanged(cloud, mesh)
         raise RegistrationError(
             f"the pairs are mirrored: a reflection leaves {reflected[0] * 1e3:.1f} mm RMS, the "
             f"best motion {rms * 1e3:.1f} mm: "
-            f"left and right are exchanged between cloud and mesh{told}",
+            f"left and right are exchanged between cloud and mesh{hint}",
             rms=rms,
             pairs=swap,
         )
     if pose.translation[2] < 0.0:
-        told, swap = _exchanged(cloud, mesh)
+        hint, swap = _exchanged(cloud, mesh)
         raise RegistrationError(
             f"the pairs are mirrored: they put the camera {-pose.translation[2] * 1e3:.0f} mm "
             "under the table: the points go round "
-            f"the other way on cloud and mesh{told}",
+            f"the other way on cloud and mesh{hint}",
             height=float(pose.translation[2]),
             pairs=swap,
         )
 
 
 def _exchanged(cloud: FloatArray, mesh: FloatArray) -> tuple[str, str | None]:
-    """Which two mesh points, exchanged, make the pairs fit with the camera over the table: in
-    words, and by number.
+    """Find two mesh points whose exchange makes the pairs fit with the camera over the table.
+
+    Returns:
+        the end of a sentence and the numbers of the pairs; empty and None where there are none.
     """
     found: list[tuple[float, str]] = []
     for i, j in combinations(range(len(mesh)), 2):

@@ -1,4 +1,4 @@
-"""Small rigid motions about a pivot: the parameters that fits and covariances speak in.
+"""Small rigid motions about a pivot: the parameters of fits and covariances.
 
 A vector (tx, ty, tz, rx, ry, rz), translation [m] first, then rotation vector [rad], both along the
 axes of the phantom frame, moves x to pivot + R(r) (x - pivot) + t. A covariance (6, 6) of a
@@ -23,8 +23,7 @@ def small_motion(vector: FloatArray, pivot: FloatArray) -> Transform:
 
 
 def motion_jacobian(points: FloatArray, pivot: FloatArray) -> FloatArray:
-    """How points (n, 3) [m] move with the six parameters at rest, (n, 3, 6): [1, -[x -
-    pivot]_x]."""
+    """Derivative (n, 3, 6) of points (n, 3) [m] by the parameters at zero, [1, -[x - pivot]x]."""
     arm = points - pivot
     jacobian = np.zeros((len(points), 3, 6))
     jacobian[:, :, :3] = np.eye(3)

@@ -1,5 +1,5 @@
-"""Registration: robot to phantom from touches, camera to phantom from the rest cloud, each with
-what is doubtful about it.
+"""Registration of a dataset: robot to phantom from touches, and camera to phantom from the rest
+cloud, with warnings.
 """
 
 from __future__ import annotations
@@ -16,53 +16,46 @@ from palpate.foundation.progress import Report, silent
 from palpate.registration.accepted_camera import accepted_camera_fit
 from palpate.registration.camera_fit import CameraFit, fit_camera
 from palpate.registration.heading import tool_misfit, turned_fit
-from palpate.registration.landmark_pairing import TouchProposal, propose
-from palpate.registration.landmark_repair import Repair, repairs, resized, settled
-from palpate.registration.pose import motion_jacobian, small_motion
+from palpate.registration.landmark_pairing import TouchProposal, propose_pairing
+from palpate.registration.landmark_repair import (
+    LandmarkRepair,
+    choose_repair,
+    find_repairs,
+    resized_repair,
+)
 from palpate.registration.robot_fit import RobotFit, fit_robot
 from palpate.registration.uncertainty import PRIOR
 from palpate.setup.setup import Material, Sensor, Setup, Shape, Tool, Touching
 
-__all__ = [
-    "CameraFit",
-    "Registration",
-    "Repair",
-    "RobotFit",
-    "TouchProposal",
-    "fit_camera",
-    "fit_robot",
-    "motion_jacobian",
-    "propose",
-    "register",
-    "setup_from",
-    "small_motion",
-]
+__all__ = ["Registration", "register", "setup_from"]
 
 DOUBTFUL_TOUCHES = 2.0e-3
+"""RMS of the touches beyond which a warning is given [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Registration:
-    """How the frames of a dataset relate, and how surely.
+    """Poses between the frames of a dataset, with covariances.
 
     A covariance (6, 6) is that of (translation [m], rotation vector [rad]) along the phantom's
     axes, of the small motion about the pivot (3,) [m] that leads from the stated pose to the true
     one: `small_motion(vector, pivot) @ phantom_from_...`.
 
     Attributes:
-        phantom_from_robot, robot_covariance, robot_pivot: from the touches; the pivot is their
-            landmarks' centroid.
+        phantom_from_robot: from the touches.
+        robot_covariance: (6, 6) of `phantom_from_robot`.
+        robot_pivot: (3,) centroid of the touched landmarks [m].
         touch_residuals: (n, 3) [m], phantom frame, moved touch minus landmark.
         touch_rms: root mean square length of the residuals [m].
-        phantom_from_camera, camera_covariance, camera_pivot: from the rest cloud; the pivot is the
-            centre of the block's top.
-        weak_directions: of the camera's pose, in words.
-        warnings: what a person should look at.
-        proposal: another pairing or size of the touches that would fit better; never applied.
-        camera: the camera fit with its statistics; None without a rest cloud, or clouds that it
-            could serve.
-        repair: the pairing and the size of the touched polygon from which the measurement is looked
-            at; None where they stand.
+        phantom_from_camera: from the rest cloud.
+        camera_covariance: (6, 6) of `phantom_from_camera`.
+        camera_pivot: (3,) centre of the block's top [m].
+        weak_directions: sentences about poorly determined directions of the camera's pose.
+        warnings: for a person.
+        proposal: another pairing or size of the touches that fits better; never applied.
+        camera: the camera fit with its statistics; None without a rest cloud or without clouds.
+        repair: pairing and size of the touched polygon that the reduction of the measurement uses;
+            None where the stated ones are used.
     """
 
     phantom_from_robot: Transform
@@ -77,13 +70,11 @@ class Registration:
     warnings: tuple[str, ...]
     proposal: TouchProposal | None
     camera: CameraFit | None
-    repair: Repair | None = None
+    repair: LandmarkRepair | None = None
 
     @property
     def repaired(self) -> Registration:
-        """With the robot where the repaired touches put it: for whoever has to find the tool in the
-        clouds.
-        """
+        """The registration with the repaired robot pose, for finding the tool in the clouds."""
         if self.repair is None:
             return self
         fit = self.repair.fit
@@ -97,17 +88,16 @@ class Registration:
 
 
 def register(dataset: Dataset, report: Report = silent) -> Registration:
-    """Relate robot, camera and phantom; raises RegistrationError where that is impossible, warns
-    where it is doubtful.
+    """Register robot and camera to the phantom; RegistrationError where that is impossible.
 
-    Where the dataset has an accepted registration, camera to phantom is as that says.
+    Camera to phantom is that of the accepted registration, where the dataset has one.
     """
     report(0.0, "robot to phantom from touches")
     robot, proposal = _register_robot(dataset)
     warnings = _touch_warnings(robot, proposal)
     report(0.2, "camera to phantom from the rest cloud")
-    camera, found = None, _repairs(dataset, proposal)
-    repair = found[0] if found else None
+    camera, repairs = None, _repairs(dataset, proposal)
+    repair = repairs[0] if repairs else None
     if dataset.has_rest and dataset.observed:
         config = dataset.config
         if isinstance(dataset.geometry, Shape):
@@ -125,9 +115,9 @@ def register(dataset: Dataset, report: Report = silent) -> Registration:
                 dataset.rest_cloud(), config.size, config.depth_sigma, config.to_phantom
             )
         report(0.7, "which way round the block lies")
-        # A heading that was found by itself follows the tool; one that was given tells it which way
-        # round it came.
-        repair = repair if camera.automatic else settled(dataset, found, camera.phantom_from_camera)
+        # An automatic heading follows the tool; a given heading decides between repairs.
+        if not camera.automatic:
+            repair = choose_repair(dataset, repairs, camera.phantom_from_camera)
         camera = _settle_heading(
             dataset, (repair.fit if repair else robot).phantom_from_robot, camera
         )
@@ -151,9 +141,7 @@ def register(dataset: Dataset, report: Report = silent) -> Registration:
 
 
 def setup_from(dataset: Dataset, registration: Registration) -> Setup:
-    """What the experimenter believes, with the registrations found and the touches that they rest
-    on.
-    """
+    """The setup that the experimenter believes in, with the registrations and their touches."""
     config = dataset.config
     misses = tuple((float(x), float(y), float(z)) for x, y, z in registration.touch_residuals)
     return Setup(
@@ -174,24 +162,26 @@ def _register_robot(dataset: Dataset) -> tuple[RobotFit, TouchProposal | None]:
     lift = np.array([0.0, 0.0, config.touch_offset])
     expected = {name: np.asarray(place) + lift for name, place in config.landmarks.items()}
     robot = fit_robot(touches.positions, np.array([expected[name] for name in touches.names]))
-    # Starts beside a rounded body lie within the box around it, and would seem to be blocked.
+    # Starts beside a rounded body lie within its bounding box and would count as blocked.
     size = config.size if not isinstance(dataset.geometry, Shape) else None
-    return robot, propose(touches.names, touches.positions, expected, size, _tool_starts(dataset))
+    return robot, propose_pairing(
+        touches.names, touches.positions, expected, size, _tool_starts(dataset)
+    )
 
 
-def _repairs(dataset: Dataset, proposal: TouchProposal | None) -> tuple[Repair, ...]:
+def _repairs(dataset: Dataset, proposal: TouchProposal | None) -> tuple[LandmarkRepair, ...]:
     config, touches = dataset.config, dataset.touches
     lift = np.array([0.0, 0.0, config.touch_offset])
     expected = np.array([np.asarray(config.landmarks[name]) + lift for name in touches.names])
     size = config.size if not isinstance(dataset.geometry, Shape) else None
-    found = repairs(touches.positions, expected, size, _tool_starts(dataset))
-    if found or proposal is None or proposal.scale == 1.0:
-        return found
-    return (resized(touches.positions, expected),)
+    repairs = find_repairs(touches.positions, expected, size, _tool_starts(dataset))
+    if repairs or proposal is None or proposal.scale == 1.0:
+        return repairs
+    return (resized_repair(touches.positions, expected),)
 
 
 def _tool_starts(dataset: Dataset) -> FloatArray:
-    """Where each sequence begins (k, 3) [m], robot frame."""
+    """First tool position (k, 3) [m] of each sequence, robot frame."""
     return np.array([dataset.sequence(name).kinematics.position[0] for name in dataset.sequences])
 
 
@@ -224,8 +214,9 @@ def _doubt_tool(dataset: Dataset, camera: CameraFit, misfit: float) -> CameraFit
 def _settle_heading(
     dataset: Dataset, phantom_from_robot: Transform, camera: CameraFit
 ) -> CameraFit:
-    """Let the tool in the clouds decide between the two headings of a plain block; a given first
-    guess is only doubted.
+    """Choose between the two headings of a plain block by the tool in the clouds.
+
+    A given first guess is not changed; it gets a warning.
     """
     as_is, turned = tool_misfit(
         dataset, phantom_from_robot, [camera.phantom_from_camera, camera.turned]
@@ -243,7 +234,7 @@ def _settle_heading(
         return _doubt_tool(dataset, camera, as_is)
     if not decided:
         return camera
-    settled = tuple(text for text in camera.warnings if "half a turn" not in text)
+    warnings = tuple(text for text in camera.warnings if "half a turn" not in text)
     if as_is < turned:
-        return replace(camera, warnings=settled)
-    return replace(turned_fit(camera), warnings=settled)
+        return replace(camera, warnings=warnings)
+    return replace(turned_fit(camera), warnings=warnings)

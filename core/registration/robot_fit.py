@@ -1,4 +1,4 @@
-"""Robot to phantom from touched landmarks: the closed-form rigid fit of Kabsch (1976), proper by
+"""Robot to phantom from touched landmarks: the closed-form rigid fit of Kabsch (1976) with
 Umeyama's sign (1991).
 """
 
@@ -16,11 +16,11 @@ from palpate.registration.pose import motion_jacobian
 __all__ = ["FLOOR", "RobotFit", "fit_robot", "rigid_fits", "similarity"]
 
 FLOOR = 1.0e-4
-"""No touch is trusted better than this [m]."""
+"""Least standard error of a touch [m]."""
 USUAL, USUAL_WORTH = 3.0e-4, 2.0
-"""Four touches leave six degrees of freedom, and agree by luck now and then: the variance is
-estimated together with the usual error of a careful touch [m], which counts as this many residuals
-(posterior mean under an inverse gamma prior)."""
+"""Usual error of a careful touch [m] and its weight in residuals: the inverse gamma prior of the
+variance, whose posterior mean is used. Four touches leave six degrees of freedom and may agree by
+chance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class RobotFit:
 
     Attributes:
         phantom_from_robot: the fit.
-        residuals: (n, 3) [m], phantom frame, touch moved by the fit minus its landmark.
+        residuals: (n, 3) [m], phantom frame, touch moved by the fit minus its landmark's centre.
         rms: root mean square length of the residuals [m].
         sigma: error of one coordinate of one touch [m], from 3n - 6 degrees of freedom and the
             usual error of a touch.
@@ -48,8 +48,10 @@ class RobotFit:
 def rigid_fits(
     source: FloatArray, targets: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The best proper rotation (k, 3, 3), translation (k, 3) and RMS (k,) [m] from source (n, 3) to
-    each of targets (k, n, 3).
+    """Fit rigid motions from source (n, 3) [m] to each of targets (k, n, 3) [m].
+
+    Returns:
+        proper rotations (k, 3, 3), translations (k, 3) [m] and RMS (k,) [m].
     """
     a = source - source.mean(axis=0)
     b = targets - targets.mean(axis=1, keepdims=True)
@@ -63,10 +65,13 @@ def rigid_fits(
 
 
 def similarity(touches: FloatArray, landmarks: FloatArray) -> tuple[float, float, float]:
-    """Size of the touched polygon over that of its landmarks [1], its standard error [1], and the
-    RMS left [m].
+    """Fit the scale of touches (n, 3) [m] to landmarks (n, 3) [m], in any two frames.
 
-    Both are (n, 3) [m], in any two frames; Umeyama's fit touches = s R landmarks + t.
+    Umeyama's fit touches = s R landmarks + t.
+
+    Returns:
+        size of the touched polygon over that of its landmarks [1], its standard error [1], and the
+        RMS left [m].
     """
     rotation, _, _ = rigid_fits(landmarks, touches[None])
     a = (landmarks - landmarks.mean(axis=0)) @ rotation[0].T

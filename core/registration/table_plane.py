@@ -1,6 +1,4 @@
-"""The table in a raw cloud: the one large plane that has nearly nothing behind it, seen from the
-camera.
-"""
+"""The table in a raw cloud: the large plane with nearly no points behind it."""
 
 from __future__ import annotations
 
@@ -11,16 +9,23 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RegistrationError
 
-__all__ = ["Table", "find_planes", "find_table"]
+__all__ = ["TablePlane", "find_planes", "find_table"]
 
 BEHIND = 5.0e-3
+"""Distance behind a plane from which points count as behind it [m]."""
 LEAST_SHARE = 0.05
+"""Least share of the points that makes a large plane [1]."""
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
-    """A plane n.x = d in the camera frame: unit normal (3,) towards the camera, offset d [m],
-    points in it, share behind it [1].
+class TablePlane:
+    """A plane n.x = d in the camera frame.
+
+    Attributes:
+        normal: (3,) unit vector towards the camera.
+        offset: d [m].
+        count: number of points in the plane.
+        behind: share of points behind it [1].
     """
 
     normal: FloatArray
@@ -33,16 +38,15 @@ class Table:
         return np.asarray(points @ self.normal - self.offset)
 
 
-def find_planes(cloud: FloatArray, thickness: float, most: int = 4) -> list[Table]:
-    """The largest planes of a cloud (n, 3) [m], camera frame, by RANSAC one after another; points
-    within `thickness` [m] belong.
+def find_planes(cloud: FloatArray, thickness: float, most: int = 4) -> list[TablePlane]:
+    """Find the largest planes of a cloud (n, 3) [m], camera frame, by repeated RANSAC; points
+    within `thickness` [m] belong to a plane.
     """
     import open3d as o3d
 
-    planes: list[Table] = []
+    planes: list[TablePlane] = []
     left = cloud
-    # Open3D draws from its own generator: seeded, so that the same cloud gives the same
-    # registration.
+    # Open3D has a generator of its own; the seed makes the registration repeatable.
     o3d.utility.random.seed(0)
     while len(planes) < most and len(left) >= max(50, LEAST_SHARE * len(cloud)):
         points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(left))
@@ -54,7 +58,7 @@ def find_planes(cloud: FloatArray, thickness: float, most: int = 4) -> list[Tabl
         normal, offset = _least_squares_plane(left[inliers])
         heights = cloud @ normal - offset
         planes.append(
-            Table(
+            TablePlane(
                 normal,
                 offset,
                 int((np.abs(heights) < thickness).sum()),
@@ -65,10 +69,11 @@ def find_planes(cloud: FloatArray, thickness: float, most: int = 4) -> list[Tabl
     return planes
 
 
-def find_table(cloud: FloatArray, thickness: float) -> Table:
-    """The plane with least behind it among the large planes of a cloud (n, 3) [m], camera frame.
+def find_table(cloud: FloatArray, thickness: float) -> TablePlane:
+    """Find the large plane with fewest points behind it in a cloud (n, 3) [m], camera frame.
 
     The block's top has the table behind it and a side has the top; the table has only stray points.
+    RegistrationError without a large plane.
     """
     planes = find_planes(cloud, thickness)
     if not planes:

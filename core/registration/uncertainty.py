@@ -1,17 +1,16 @@
-"""How well a pose is determined by points on planes when the sensor's error is smooth, not only
-white.
+"""Uncertainty of a pose from points on planes, with a smooth error of the sensor.
 
-A depth camera's error is white noise plus a bias that changes smoothly over the picture.
-Neighbouring points share the bias, so counting them as independent gives a pose that is several
-times too sure. Here patch averages are fitted by generalised least squares with covariance sigma^2
-/ n + b^2 exp(-d^2 / 2 L^2) along the line of sight; the bias' size b and reach L are averaged over,
-weighted by how well each explains the averages (Rasmussen and Williams 2006, section 2.7: explicit
-basis functions, wide prior).
+The error of a depth camera is white noise plus a bias that changes smoothly over the image.
+Neighbouring points share the bias; treating them as independent underestimates the covariance
+several times. Patch averages are therefore fitted by generalised least squares with covariance
+sigma^2 / n + b^2 exp(-d^2 / 2 L^2) along the line of sight. Size b and length L of the bias are
+averaged over, weighted by their evidence (Rasmussen and Williams 2006, section 2.7: explicit basis
+functions, wide prior).
 
-A soft block sags and bulges, and a table does not. So the block's faces may as a whole lie off
-their stated planes: by nothing, a little or much, weighted in the same way. Where top and table
-agree this costs little; where they do not, the table holds the pose. Without a table the block
-itself is all there is to refer to.
+A soft block sags and bulges, and a table does not. The block's faces may therefore be offset from
+their stated planes as a whole: not, a little or much, weighted in the same way. Where top and table
+agree this changes little; where they do not, the table determines the pose. Without a table the
+block is the only reference.
 """
 
 from __future__ import annotations
@@ -28,16 +27,21 @@ from palpate.registration.pose import motion_jacobian
 __all__ = ["PRIOR", "Patches", "PoseEstimate", "estimate", "make_patches", "weak_directions"]
 
 CELL = 8.0e-3
+"""Edge length of a patch [m]."""
 PRIOR = np.array([0.01] * 3 + [np.radians(10.0)] * 3)
-"""What is known of a direction that the data do not touch: standard deviations [m, rad] about the
-first guess."""
+"""Prior standard deviations [m, rad] about the first guess."""
 BIAS_SIZES = np.array([0.02, 0.06, 0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.0]) * 1e-3
+"""Sizes b of the bias that are averaged over [m]."""
 BIAS_USUAL = 0.5e-3
+"""Scale of the half-normal prior of b [m]."""
 TOP_OFFSETS, OFFSET_ODDS = (0.0, 0.5e-3, 2.0e-3), 0.15
+"""Offsets of the top that are averaged over [m], and prior odds of one that is not zero [1]."""
 SIDE_OFFSET = 0.3
-"""Sides bulge by about this part of what the top sags (Poisson's ratio times width over height)."""
+"""Bulge of the sides over the sag of the top [1], about Poisson's ratio times width over height."""
 BIAS_REACHES = (0.008, 0.016, 0.03, 0.06)
+"""Lengths L of the bias that are averaged over [m]."""
 WEAK = 0.5e-3
+"""Standard deviation from which a direction is weak [m]."""
 NAMES = (
     "translation along x",
     "translation along y",
@@ -54,11 +58,11 @@ class Patches:
 
     Attributes:
         face: (p,) index into FACES.
-        distance: (p,) [m] from the plane, positive outside.
+        distance: (p,) from the plane [m], positive outside.
         jacobian: (p, 6) of the distance.
-        variance: (p,) [m^2] white noise of the distance.
-        slant: (p,) how much of an error along the line of sight the distance shows.
-        place: (p, 3) [m] across the line of sight at the mean range.
+        variance: (p,) white noise variance of the distance [m^2].
+        slant: (p,) distance per error along the line of sight [1].
+        place: (p, 3) position on a sphere of the mean range [m].
         noise: white noise along the line of sight [m].
     """
 
@@ -73,8 +77,12 @@ class Patches:
 
 @dataclass(frozen=True, eq=False)
 class PoseEstimate:
-    """Motion (6,) [m, rad] that remains, its covariance (6, 6), and the size of the sensor's smooth
-    bias [m].
+    """Correction of a pose.
+
+    Attributes:
+        motion: (6,) [m, rad] that remains.
+        covariance: (6, 6) of the motion.
+        bias: size of the sensor's smooth error [m].
     """
 
     motion: FloatArray
@@ -85,8 +93,13 @@ class PoseEstimate:
 def make_patches(
     found: Assignment, weights: FloatArray, camera: FloatArray, pivot: FloatArray
 ) -> Patches:
-    """Average points with robust `weights` (k,), seen from `camera` (3,) [m], phantom frame, for
-    motions about `pivot` (3,) [m].
+    """Average points over patches.
+
+    Args:
+        found: points on planes.
+        weights: (k,) robust weights.
+        camera: (3,) [m], phantom frame.
+        pivot: (3,) of the motions [m].
     """
     patch = _patch_of(found)
     total = np.maximum(np.bincount(patch, weights), 1e-9)
@@ -101,7 +114,7 @@ def make_patches(
 
     jacobian = np.einsum("ki,kij->kj", found.normals, motion_jacobian(found.points, pivot))
     slant, distance = mean(found.slant)[:, 0], mean(found.distance)[:, 0]
-    # The scatter within patches is free of bias and of faces that lie off their planes.
+    # The scatter within patches has no part from the bias or from offsets of faces.
     local = (
         (found.distance - distance[patch])
         / found.slant
@@ -124,7 +137,7 @@ def make_patches(
 
 
 def _patch_of(found: Assignment) -> IndexArray:
-    """Which patch (k,) each point belongs to."""
+    """Patch number (k,) of each point."""
     cells = np.column_stack(
         [found.face, np.floor((found.points + EDGE) / _cell_sizes(found.face)[:, None])]
     ).astype(int)
@@ -139,8 +152,8 @@ def _cell_sizes(face: IndexArray) -> FloatArray:
 
 
 def estimate(patches: Patches) -> PoseEstimate:
-    """The motion that remains after a fit, with a covariance that counts smooth sensor bias and a
-    block off its stated shape.
+    """Estimate the motion that remains after a fit, with a covariance that includes smooth sensor
+    bias and offsets of the block's faces.
     """
     distance = np.linalg.norm(patches.place[:, None] - patches.place[None], axis=2)
     has_table = bool((patches.face == FACES.index("table")).any())
@@ -173,9 +186,7 @@ def estimate(patches: Patches) -> PoseEstimate:
 
 
 def _shape_covariance(face: IndexArray, top_offset: float) -> FloatArray:
-    """Covariance (p, p) [m^2] of patches whose faces lie off their planes as a whole; the table
-    does not.
-    """
+    """Covariance (p, p) [m^2] of patches by offsets of whole faces; the table has none."""
     sizes = np.array([1.0, *[SIDE_OFFSET] * 4, 0.0])[face] * top_offset
     return np.where(face[:, None] == face[None], sizes[:, None] * sizes[None], 0.0)
 
@@ -183,7 +194,7 @@ def _shape_covariance(face: IndexArray, top_offset: float) -> FloatArray:
 def _fit_patches(
     patches: Patches, noise: FloatArray, bias: float
 ) -> tuple[float, FloatArray, FloatArray]:
-    """Log evidence of one model of the errors (p, p), the motion (6,) it gives, and its covariance
+    """Log evidence of a noise covariance (p, p) [m^2], the fitted motion (6,) and its covariance
     (6, 6).
     """
     a, r = patches.jacobian, patches.distance
@@ -200,11 +211,15 @@ def _fit_patches(
 def weak_directions(
     covariance: FloatArray, counts: dict[str, int], lever: float
 ) -> tuple[str, ...]:
-    """Say which directions of a pose are weak, from its covariance (6, 6) [m, rad]; rotations count
-    by what they do at `lever` [m].
+    """Sentences about weak directions of a pose.
 
-    Weak is a standard deviation over 0.5 mm; open is one that the data hardly improved on a first
-    guess.
+    A direction is weak with a standard deviation over 0.5 mm, and open where the data hardly
+    improve on the first guess.
+
+    Args:
+        covariance: (6, 6) [m, rad].
+        counts: points on each face.
+        lever: distance at which rotations are converted [m].
     """
     scale = np.array([1.0] * 3 + [lever] * 3)
     values, vectors = np.linalg.eigh(covariance * np.outer(scale, scale))
@@ -235,7 +250,7 @@ def _weak_sentence(
 
 
 def _reason(main: list[int], counts: dict[str, int]) -> str:
-    """Which faces would determine these parameters, and how many points they hold."""
+    """Words on the faces that would determine these parameters, and their numbers of points."""
     faces = {
         0: ("-x", "+x"),
         1: ("-y", "+y"),
@@ -244,6 +259,6 @@ def _reason(main: list[int], counts: dict[str, int]) -> str:
         4: ("top", "table"),
         5: ("-x", "+x", "-y", "+y"),
     }
-    wanted = sorted({face for k in main for face in faces[int(k)]}, key=FACES.index)
-    seen = [f"{counts[face]} points on {face}" for face in wanted if counts.get(face)]
-    return ", ".join(seen) + " alone" if seen else "no points on " + " or ".join(wanted)
+    needed = sorted({face for k in main for face in faces[int(k)]}, key=FACES.index)
+    seen = [f"{counts[face]} points on {face}" for face in needed if counts.get(face)]
+    return ", ".join(seen) + " alone" if seen else "no points on " + " or ".join(needed)

@@ -20,7 +20,9 @@ from palpate.measurement.phantom_drift import (
     shift_sequences,
 )
 from palpate.measurement.segmentation import cleaner_for
-from palpate.registration.registration import Repair, RobotFit, register, setup_from
+from palpate.registration.landmark_repair import LandmarkRepair
+from palpate.registration.registration import register, setup_from
+from palpate.registration.robot_fit import RobotFit
 from palpate.synthetic import HiddenEffect, Scenario, Truth, make_dataset
 
 SLIPPERY = HiddenEffect("base_slip", {"friction_coefficient": 0.16})
@@ -117,7 +119,7 @@ def test_the_tool_moves_with_the_block_where_its_touches_were_of_other_landmarks
         registration.robot_covariance,
     )
     paired = replace(
-        registration, phantom_from_robot=turned, repair=Repair("turn-1", 1.0, fit, 1e-2)
+        registration, phantom_from_robot=turned, repair=LandmarkRepair("turn-1", 1.0, fit, 1e-2)
     )
     moved = shift_sequences(dataset, paired, {"poke-side-02": np.array([1e-3, -2e-3])}).sequence(
         "poke-side-02"

@@ -10,7 +10,8 @@ from palpate.dataset import open_dataset
 from palpate.measurement.segmentation import CleanCloud, Cleaner, cleaner_for
 from palpate.measurement.tool_pose import ToolPose, find_shaft_axis, locate_tool, tool_poses
 from palpate.registration.faces import box_distance
-from palpate.registration.registration import register, small_motion
+from palpate.registration.pose import small_motion
+from palpate.registration.registration import register
 
 SIZE = (0.0687, 0.0393, 0.0358)
 TABLE, BLOCK, SPHERE, SHAFT, STRAY = range(5)

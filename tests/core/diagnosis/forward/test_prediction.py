@@ -19,7 +19,7 @@ from pushed_block import (
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward import jacobian as columns_module
-from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS, Wanted
+from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS, JacobianRequest
 from palpate.diagnosis.forward.prediction import Prediction, predict
 from palpate.diagnosis.inference.noise_model import Noise
 from palpate.diagnosis.observation.frame_groups import Group, Observations
@@ -31,7 +31,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.measurement.surface_gaps import Surface
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.box_mesh import GridSpec
-from palpate.registration.registration import small_motion
+from palpate.registration.pose import small_motion
 from palpate.replay.replay import rest
 from palpate.setup.setup import Inclusion, Load, Setup, Tool
 
@@ -54,7 +54,7 @@ def _camera_lifted(step: float) -> Setup:
 
 
 (RATIO,) = (item for item in StiffInclusion.parameters() if item.name == "stiffness_ratio")
-WANTED = Wanted(
+WANTED = JacobianRequest(
     setups=(_wider(RADIUS_STEP), _camera_lifted(CAMERA_STEP)),
     steps=(RADIUS_STEP, CAMERA_STEP),
     lumps=(LUMP,),
@@ -146,7 +146,7 @@ def test_column_is_the_difference_of_two_predictions(data, baseline, name):
 @pytest.fixture(scope="module")
 def of_touched(data) -> Prediction:
     """The stated setup on elements that grow with the block, with the columns of all in NEAR."""
-    wanted = Wanted(
+    wanted = JacobianRequest(
         setups=tuple(effect.apply(TOUCHED) for effect in NEAR.values()),
         steps=(1.0,) * len(NEAR),
         pivot=PIVOT,
@@ -201,7 +201,7 @@ def test_where_a_grid_is_about_to_give_way_the_column_is_the_difference_over_a_m
     ahead, behind = (
         replace(SETUP, tool=Tool(radius=5e-3, offset=(0.0, sign * half, 0.0))) for sign in (1, -1)
     )
-    wanted = Wanted(
+    wanted = JacobianRequest(
         setups=(replace(SETUP, tool=Tool(radius=5e-3, offset=(0.0, 1e-6, 0.0))),),
         steps=(1e-6,),
         pivot=PIVOT,
@@ -353,7 +353,7 @@ def test_points_of_a_tool_that_is_elsewhere_are_no_error_of_the_surface(with_bal
 
 def test_columns_count_the_points_of_the_tool(with_ball):
     near = replace(SETUP, tool=Tool(radius=5e-3, offset=(0.0, 0.0, -1.3e-3)))
-    wanted = Wanted(
+    wanted = JacobianRequest(
         setups=(replace(near, tool=replace(near.tool, radius=5e-3 + RADIUS_STEP)),),
         steps=(RADIUS_STEP,),
         pivot=PIVOT,

@@ -7,7 +7,7 @@ import pytest
 from pushed_block import GRID, POSE, SETUP, SIZE, TOP, seen_points
 
 from palpate.diagnosis.inference.evidence import Block, fit
-from palpate.diagnosis.inference.rest_cloud import StaticChannel
+from palpate.diagnosis.inference.rest_cloud import RestCloud
 from palpate.effects import Effect
 from palpate.effects.geometry import GeometryScale
 from palpate.effects.sensor import DepthBias
@@ -15,7 +15,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.segmentation import Cleaner
-from palpate.registration.registration import small_motion
+from palpate.registration.pose import small_motion
 from palpate.replay.replay import rest
 from palpate.setup.setup import Load, Setup
 
@@ -38,14 +38,14 @@ def _cloud(truth: Setup, seed: int) -> FloatArray:
     return np.concatenate([seen_points(rest(truth, GRID), 24000, NOISE, seed, truth), table])
 
 
-def _channel(truth: Setup, pose: Transform = POSE) -> StaticChannel:
+def _channel(truth: Setup, pose: Transform = POSE) -> RestCloud:
     cleaner = Cleaner(size=SIZE, phantom_from_camera=pose, tool_radius=5e-3, noise=NOISE)
-    return StaticChannel.of(
+    return RestCloud.of(
         _cloud(truth, seed=0), cleaner, replace(SETUP, phantom_from_camera=pose), GRID
     )
 
 
-def _block(channel: StaticChannel, setup: Setup, varied: bool = False) -> Block:
+def _block(channel: RestCloud, setup: Setup, varied: bool = False) -> Block:
     stated = replace(setup, load=Load())
     here = setup.load.specific_weight_over_stiffness
     return channel.block(
@@ -54,7 +54,7 @@ def _block(channel: StaticChannel, setup: Setup, varied: bool = False) -> Block:
 
 
 @pytest.fixture(scope="module")
-def sagged() -> StaticChannel:
+def sagged() -> RestCloud:
     """The rest cloud of a block that sags by some tenths of a millimetre."""
     return _channel(_sagging(SAG))
 

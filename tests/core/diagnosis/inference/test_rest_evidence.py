@@ -15,7 +15,7 @@ from palpate.effects.tool import LandmarkMismatch
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.touch_correction import touched_places
-from palpate.registration.registration import fit_robot
+from palpate.registration.robot_fit import fit_robot
 from palpate.setup.setup import Setup, Touching
 
 STATED = replace(SETUP, landmarks=CORNERS, touching=Touching(lift=5e-3))

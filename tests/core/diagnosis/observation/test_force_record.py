@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from evaluating import evaluator_of
 from pushed_block import GRID, POSE, SETUP, SIZE, TOP, dwelling, observed, poke, registration
 from small_dataset import write_valid_dataset
 from virtual_push import hide, simulate_push
@@ -17,6 +18,7 @@ from palpate.diagnosis.forward.prediction import predict
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.inference.credible_intervals import modulus_interval
 from palpate.diagnosis.inference.evaluate import Evaluator
+from palpate.diagnosis.inference.gauss_newton import refine, refit
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.observation.force_record import (
     ForceComparison,
@@ -260,7 +262,9 @@ def evaluator() -> Iterator[Evaluator]:
     data = [_sequence("poke-01", False, DEPTHS[1]), _sequence("side-01", True, DEPTHS[1])]
     with Workers(data, 1) as workers:
         names = [item.name for item in data]
-        yield Evaluator(SETUP, registration(), workers, names, None, QUICK, QUICK.finer(), forces=True)
+        yield evaluator_of(
+            SETUP, registration(), workers, names, None, QUICK, QUICK.finer(), forces=True
+        )
 
 
 @pytest.fixture(scope="module")
@@ -289,11 +293,11 @@ def test_report_says_the_modulus_that_the_forces_show(evaluator, baseline, tmp_p
 
 
 def test_another_modulus_gains_what_the_stated_one_costs(evaluator, baseline):
-    model = evaluator.refit([YoungModulus.neutral(SETUP)], baseline.predictions)
+    model = refit(evaluator, [YoungModulus.neutral(SETUP)], baseline.predictions)
     assert model.setup.material.young_modulus == pytest.approx(
         TRUE, rel=0.12
     )  # the rest lies within what was stated
-    refined = evaluator.refine(model)
+    refined = refine(evaluator, model)
     assert refined.setup.material.young_modulus == pytest.approx(TRUE, rel=0.1)
     gain = evaluator.score(model).sum() - evaluator.score(baseline).sum()
     assert gain > 25.0
@@ -301,6 +305,6 @@ def test_another_modulus_gains_what_the_stated_one_costs(evaluator, baseline):
 
 def test_without_forces_nothing_is_said_of_it(baseline):
     with Workers([], 1) as workers:
-        other = Evaluator(SETUP, registration(), workers, ["poke-01"], None, QUICK, QUICK)
+        other = evaluator_of(SETUP, registration(), workers, ["poke-01"], None, QUICK, QUICK)
     assert modulus_interval(other, baseline) is None
     assert len(other.nuisances.precision) == 15

@@ -12,7 +12,8 @@ from small_dataset import ply_bytes
 from palpate.dataset import Kinematics, Sequence
 from palpate.dataset.tool_smoothing import SMOOTHING, smooth_centres
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.observation.frame_groups import FAR, Observations, observe
+from palpate.diagnosis.observation.frame_groups import FAR, Observations
+from palpate.diagnosis.observation.observe_clouds import observe
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.segmentation import Cleaner
@@ -117,10 +118,10 @@ def test_groups_hold_frames_of_one_place_in_the_order_of_time(sequence):
 
 def test_pushes_are_numbered(sequence):
     groups = _observed(sequence).groups
-    touched = [group.probe for group in groups if not group.free]
+    touched = [group.push for group in groups if not group.free]
     assert touched == sorted(touched) and set(touched) == {1, 2}
     assert touched.count(1) == touched.count(2)
-    assert groups[0].free and groups[0].probe == 0
+    assert groups[0].free and groups[0].push == 0
 
 
 def test_thinning_keeps_untouched_groups_and_the_whole_range_of_touched_ones(sequence):
