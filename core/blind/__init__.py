@@ -1,9 +1,8 @@
-"""The blind suite: datasets with something hidden in them, or nothing, diagnosed by a process that
-is not told, and scored.
+"""The blind suite: datasets with hidden effects, or none, are diagnosed without them, and scored.
 
-`cases` draws what is hidden, `running` makes and diagnoses it in processes of its own, `results` is
-what one case gave, and `summary` sums the results up: rates, parameter errors, coverage and
-calibration, against the targets.
+`cases` draws what is hidden, `run_suite` makes and diagnoses each case in a process of its own,
+`case_results` holds the result of one case, and `summary` sums the results up: rates, parameter
+errors, coverage and calibration, against the targets.
 """
 
 from palpate.blind.case_results import RESULTS_FILE, CaseResult, read_results

@@ -1,6 +1,4 @@
-"""Whether the probabilities of a report are what they say: reliability curve, Brier score,
-calibration error.
-"""
+"""Calibration of a report's probabilities: reliability curve, Brier score, calibration error."""
 
 from __future__ import annotations
 
@@ -16,14 +14,16 @@ from palpate.foundation.arrays import FloatArray
 __all__ = ["brier", "calibration_error", "every_effect", "first_effect", "reliability"]
 
 BINS = 10
+"""Number of bins of the stated probability."""
 _DRAWS = 1000
+"""Number of bootstrap samples."""
 
 
 def first_effect(results: Sequence[CaseResult]) -> tuple[FloatArray, FloatArray]:
-    """Probability (n,) of the effect that a report thinks most probable, named or not, and whether
-    it is hidden (n,) (0 or 1).
+    """Probability (n,) [1] of the most probable effect of each report, named or not, and whether it
+    is hidden (n,) (0 or 1).
 
-    One pair for each case with a report. Nothing that is improbable and absent flatters it.
+    Effects that are improbable and absent do not count, so they cannot improve the score.
     """
     best = [
         (max(chances.items(), key=lambda row: row[1]), result.truth)
@@ -36,7 +36,9 @@ def first_effect(results: Sequence[CaseResult]) -> tuple[FloatArray, FloatArray]
 
 
 def every_effect(results: Sequence[CaseResult]) -> tuple[FloatArray, FloatArray]:
-    """The same of every effect that is weighed in every case: mostly zeros that are right."""
+    """Probability (n,) [1] of every effect in every case, and whether it is hidden (n,) (0 or 1);
+    most are correct zeros.
+    """
     pairs = [
         (chance, effect in result.truth)
         for result in results
@@ -48,8 +50,8 @@ def every_effect(results: Sequence[CaseResult]) -> tuple[FloatArray, FloatArray]
 
 
 def reliability(stated: FloatArray, true: FloatArray) -> list[dict[str, Any]]:
-    """By tenths of the stated probability: their mean, and the share that is true with its
-    interval; empty tenths are left out.
+    """Reliability curve: for each tenth of the stated probability its mean, and the share that is
+    true with an interval; empty tenths are left out.
     """
     which, rows = _bins(stated), []
     for number in np.unique(which):
@@ -67,15 +69,15 @@ def reliability(stated: FloatArray, true: FloatArray) -> list[dict[str, Any]]:
 
 
 def brier(stated: FloatArray, true: FloatArray) -> IntervalEstimate:
-    """Mean squared difference of stated probability and truth (Brier 1950), with a bootstrap
-    interval.
+    """Brier score: mean squared difference of stated probability and truth (Brier 1950), with a
+    bootstrap interval.
     """
     return _resampled(stated, true, lambda p, y: float(((p - y) ** 2).mean()))
 
 
 def calibration_error(stated: FloatArray, true: FloatArray) -> IntervalEstimate:
-    """Expected calibration error: |mean stated - share true| over tenths, weighted by how many are
-    in each; bootstrap interval.
+    """Expected calibration error: |mean stated - share true| over tenths, weighted by their counts,
+    with a bootstrap interval.
     """
     return _resampled(stated, true, _expected_error)
 

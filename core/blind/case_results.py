@@ -1,4 +1,4 @@
-"""What one case gave, what is right about it, and the file of results."""
+"""Results of blind cases, their scores, and the file of results."""
 
 from __future__ import annotations
 
@@ -16,25 +16,26 @@ __all__ = ["RESULTS_FILE", "STATED_LEVEL", "CaseResult", "add_result", "read_res
 
 RESULTS_FILE = "results.jsonl"
 STATED_LEVEL = 0.95
-"""Of the intervals in a report that does not state its own as `interval_level`."""
+"""Level of the intervals in a report without `interval_level` [1]."""
 
 MODULUS = "young_modulus"
 
 
 @dataclass(frozen=True)
 class CaseResult:
-    """What was hidden and what was said.
+    """Result of one case.
 
     Attributes:
+        case: that was run.
         hidden: effects with their parameters, as in a truth file.
-        outside: disturbances that no effect expresses, likewise.
-        report: as `palpate.diagnosis.pipeline` wrote it, its ambiguity map only for what is hidden;
-            empty where the case ended in an error.
-        size: of what is hidden over its detection limit [1], of two effects the fainter one's; None
-            where no map gives it.
-        seconds: of the diagnosis alone.
-        code: digest of the sources that made it.
-        error: what ended the case, if anything.
+        report: of the diagnosis, with the ambiguity map only of hidden effects; empty after an
+            error.
+        outside: disturbances with their parameters, as in a truth file.
+        size: of the hidden effect over its detection limit [1], of two effects the smaller one;
+            None without a limit.
+        seconds: duration of the diagnosis [s].
+        code: digest of the sources.
+        error: message that ended the case; empty without.
     """
 
     case: Case
@@ -48,22 +49,22 @@ class CaseResult:
 
     @property
     def name(self) -> str:
-        """Of the case."""
+        """Name of the case."""
         return self.case.name
 
     @property
     def verdict(self) -> str:
-        """That of the report, or `error`."""
+        """Verdict of the report, or `error`."""
         return "error" if self.error else str(self.report["verdict"])
 
     @property
     def causes(self) -> list[dict[str, Any]]:
-        """Named ones, the best first; of an ambiguous verdict all that explain the data."""
+        """Named causes, the best first; of an ambiguous verdict all that explain the data."""
         return list(self.report.get("causes", []))
 
     @property
     def named(self) -> tuple[str, ...]:
-        """Effects of the causes, the best first."""
+        """Names of the causes' effects, the best first."""
         return tuple(cause["effect"] for cause in self.causes)
 
     @property
@@ -73,11 +74,11 @@ class CaseResult:
 
     @property
     def right(self) -> bool:
-        """Whether the verdict is what the case's kind asks for.
+        """Whether the verdict is correct for the kind of the case.
 
-        Exactly what is hidden as found; of what lies outside the catalogue no single cause; of
-        look-alikes the truth first or in an ambiguous set; of a modulus alone that it cannot be
-        told, or where it could be, its name.
+        A hidden effect must be found exactly; outside of the catalogue no single cause may be
+        named; of look-alikes the truth must be first or in an ambiguous set; a modulus alone must
+        be reported as not identifiable, or named where it is.
         """
         if self.case.kind == "outside":
             return self.verdict in ("unexplained", "ambiguous")
@@ -91,23 +92,24 @@ class CaseResult:
 
     @property
     def exact(self) -> bool:
-        """Whether exactly what is hidden is named, and as found."""
+        """Whether the verdict is found, with exactly the hidden effects."""
         return self.verdict == "found" and set(self.named) == self.truth
 
     @property
     def first(self) -> bool:
-        """Whether the first that is named is hidden."""
+        """Whether the first named effect is hidden."""
         return bool(self.named) and self.named[0] in self.truth
 
     @property
     def inside(self) -> bool:
-        """Whether all that is hidden is among what is named."""
+        """Whether all hidden effects are named."""
         return bool(self.truth) and self.truth <= set(self.named)
 
     @property
     def false_name(self) -> bool:
-        """Whether something is named that is not there. Rivals of an ambiguous verdict are none, if
-        the truth is one of them.
+        """Whether an effect is named that is not hidden.
+
+        The others of an ambiguous verdict do not count, if the truth is among them.
         """
         if self.verdict == "ambiguous" and (self.inside or self.outside):
             return False
@@ -115,18 +117,18 @@ class CaseResult:
 
     @property
     def modulus_not_identifiable(self) -> bool:
-        """Whether the report says that Young's modulus cannot be told."""
+        """Whether the report says that Young's modulus is not identifiable."""
         return any(row["effect"] == MODULUS for row in self.report.get("not_identifiable", []))
 
     @property
     def removed(self) -> float | None:
-        """Share [1] of the reducible error that what is named removes on test sequences."""
+        """Share [1] of the reducible error on test sequences that the named causes remove."""
         value = ((self.report.get("gain") or {}).get("reducible_removed") or {}).get("value")
         return None if value is None else float(value)
 
     @property
     def gain(self) -> float:
-        """Of the named causes, or the largest of those not named [nats]."""
+        """Gain of the named causes, or the largest one of those not named [nats]."""
         gains = [row.get("gain_nats", 0.0) for row in self.report.get("ranking", [])]
         return (
             float(self.report["evidence"]["gain_nats"] if self.causes else max(gains, default=0.0))
@@ -136,24 +138,24 @@ class CaseResult:
 
     @property
     def bound(self) -> float:
-        """The least gain that is named [nats]."""
+        """Least gain of a named cause [nats]."""
         return float(self.report["evidence"]["bound_nats"]) if self.report else 0.0
 
     @property
     def level(self) -> float:
-        """Of the report's parameter intervals [1]."""
+        """Level of the report's parameter intervals [1]."""
         return float(self.report.get("interval_level", STATED_LEVEL))
 
     @property
     def probabilities(self) -> dict[str, float]:
-        """What the report gives each effect that it weighs [1]."""
+        """Probability of each effect in the report [1]."""
         return {
             row["effect"]: float(row["probability"])
             for row in (*self.causes, *self.report.get("ranking", []))
         }
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values: one row of the file."""
+        """Plain values of one row of the file."""
         return {
             "case": self.case.to_json(),
             "hidden": self.hidden,
@@ -167,15 +169,19 @@ class CaseResult:
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> CaseResult:
-        """The inverse."""
+        """Read the output of `to_json`."""
         return cls(**{**data, "case": Case.from_json(data["case"])})
 
 
 def read_results(file: Path, mend: bool = False) -> list[CaseResult]:
-    """All whole rows; a last one that is torn, as a kill while writing leaves it, does not count.
-    `mend` cuts it off the file.
+    """Read all whole rows; an incomplete last row, as a killed process leaves it, is ignored.
 
-    RunError for any other row that is not a result.
+    Args:
+        file: of results.
+        mend: whether an incomplete last row is removed from the file.
+
+    Raises:
+        RunError: for any other row that is no result.
     """
     if not file.is_file():
         return []
@@ -198,7 +204,7 @@ def read_results(file: Path, mend: bool = False) -> list[CaseResult]:
 
 
 def add_result(file: Path, result: CaseResult) -> None:
-    """One more row, on disk when this returns."""
+    """Append a row, on disk when this returns."""
     with file.open("a") as stream:
         stream.write(json.dumps(result.to_json()) + "\n")
         stream.flush()

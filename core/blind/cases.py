@@ -1,6 +1,4 @@
-"""What is hidden in which case: kinds of cases, their mix, and the scenario that follows from a
-case's seed.
-"""
+"""Blind cases: their kinds and mix, and the scenario that follows from a case's seed."""
 
 from __future__ import annotations
 
@@ -19,9 +17,9 @@ if TYPE_CHECKING:
 __all__ = ["ALIKE", "KINDS", "MIX", "Case", "all_cases", "draw_cases", "scenario_of"]
 
 KINDS = ("control", "clear", "subtle", "pair", "outside", "twins", "modulus")
-"""Nothing hidden; one effect at a clear size, or at a share of it; two effects; what no effect
-expresses; one effect of the family that looks alike; another Young's modulus alone, which without a
-measured force does not show."""
+"""Kinds of cases: nothing hidden; one effect of clear or of subtle size; two effects; a disturbance
+outside the catalogue; one effect of the family that looks alike; another Young's modulus alone,
+which does not show without a measured force."""
 
 MIX: Mapping[str, float] = {
     "control": 0.25,
@@ -32,8 +30,8 @@ MIX: Mapping[str, float] = {
     "twins": 0.05,
     "modulus": 0.05,
 }
-"""Shares of a drawn suite: of 200 scenarios 50 hide nothing, so that one false alarm in 50 can be
-seen."""
+"""Shares of a drawn suite [1]: of 200 scenarios 50 hide nothing, so that a rate of one false alarm
+in 50 shows."""
 
 ALIKE = (
     "tool_radius",
@@ -43,7 +41,7 @@ ALIKE = (
     "stiffness_gradient",
     "strain_stiffening",
 )
-"""Effects that all press deeper: each imitates most of the others' pattern on a push from above."""
+"""Effects that look alike: each reproduces most of the others' pattern in a push from above."""
 
 _KIND_SEEDS, _SUITE_SEEDS = 100_000, 1_000_000
 
@@ -53,11 +51,11 @@ class Case:
     """One dataset to be made.
 
     Attributes:
-        name: also says what is hidden.
-        seed: of everything random in it.
+        name: includes the names of what is hidden.
+        seed: of everything random.
         kind: one of KINDS.
         hidden: names of the effects, or of the disturbance.
-        short: whether only five sequences are recorded, not seven.
+        short: whether five sequences are recorded, not seven.
     """
 
     name: str
@@ -72,24 +70,30 @@ class Case:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Case:
-        """The inverse."""
+        """Read the output of `to_json`."""
         return cls(**{**data, "hidden": tuple(data["hidden"])})
 
 
 def all_cases(
     seed: int, controls: int = 10, effects: Sequence[str] | None = None, short: bool = False
 ) -> list[Case]:
-    """Each effect once, each disturbance once, and the controls; every case has a seed of its own.
+    """Make a case of each effect and of each disturbance, and controls, each with its own seed.
 
-    Effects are those of `palpate.synthetic.WEIGHED`, or the ones named, of which the virtual bench
-    can also hide Young's modulus; an unknown one is a RunError.
+    Args:
+        seed: of the suite.
+        controls: number of cases with nothing hidden.
+        effects: names; those of `palpate.synthetic.WEIGHED`, and the disturbances, without it.
+        short: whether five sequences are recorded, not seven.
+
+    Raises:
+        RunError: for an unknown effect.
     """
     from palpate.synthetic import DISTURBANCES, HIDDEN
 
-    wanted, known = _checked_effects(effects), list(HIDDEN)
+    chosen, known = _checked_effects(effects), list(HIDDEN)
     cases = [
         Case(f"{effect}-{seed}", 1000 * seed + 1 + known.index(effect), "clear", (effect,), short)
-        for effect in wanted
+        for effect in chosen
     ]
     if effects is None:
         cases += [
@@ -110,25 +114,26 @@ def draw_cases(
     controls: int | None = None,
     short: bool = False,
 ) -> list[Case]:
-    """A suite of `count` cases in the proportions of MIX; with more of them the first stay the
-    same.
+    """Draw a suite in the proportions of MIX; RunError for unknown names.
+
+    A longer suite begins with the cases of a shorter one. Within a kind each effect (pair,
+    disturbance) comes once before any comes again.
 
     Args:
-        seed: everything that is hidden follows from it.
-        kinds: those wanted, all without it.
-        effects: to be hidden, those of `palpate.synthetic.WEIGHED` without it.
-        controls: so many of the cases hide nothing; as MIX has it without.
-
-    Within a kind each effect (pair, disturbance) comes once before any comes again. Raises RunError
-    for unknown names.
+        seed: of everything that is hidden.
+        count: number of cases.
+        kinds: of KINDS; all without it.
+        effects: to be hidden; those of `palpate.synthetic.WEIGHED` without it.
+        controls: number of cases with nothing hidden; by MIX without it.
+        short: whether five sequences are recorded, not seven.
     """
-    wanted = _checked_kinds(kinds)
+    chosen = _checked_kinds(kinds)
     effects = _checked_effects(effects)
     if controls is not None and controls > count:
         raise RunError(
-            f"{controls} controls are more than the {count} scenarios asked for", controls=controls
+            f"{controls} controls are more than the {count} scenarios in all", controls=controls
         )
-    drawn = [kind for kind in wanted if kind != "control"] if controls is not None else wanted
+    drawn = [kind for kind in chosen if kind != "control"] if controls is not None else chosen
     order = [*_interleaved(drawn, count - (controls or 0)), *["control"] * (controls or 0)]
     met: dict[str, int] = {}
     cases = []
@@ -143,9 +148,7 @@ def draw_cases(
 
 
 def scenario_of(case: Case) -> Scenario:
-    """What the virtual bench is to make of a case: follows from its kind, its hidden names and its
-    seed alone.
-    """
+    """The scenario of a case, from its kind, its hidden names and its seed alone."""
     from palpate.synthetic import SHORT_PROTOCOL, Scenario, draw_disturbance, draw_scenario
 
     if case.kind == "control":
@@ -160,15 +163,13 @@ def scenario_of(case: Case) -> Scenario:
         )
     if case.kind == "twins":
         scenario = _pressing(scenario)
-    # Nobody sees that a block has slid by a millimetre, and it is pushed on where it lies.
+    # A slip of a millimetre is not noticed, and the block is not put back.
     scenario = replace(scenario, put_back=scenario.hidden("base_slip") is None)
     return replace(scenario, sequences=SHORT_PROTOCOL) if case.short else scenario
 
 
 def _pressing(scenario: Scenario) -> Scenario:
-    """An offset of the tool looks like the others of the family only along the vertical: all of its
-    length goes there.
-    """
+    """Turn a hidden offset of the tool into the vertical, where it looks like others of ALIKE."""
     from palpate.synthetic import HiddenEffect
 
     offset = scenario.hidden("tool_offset")
@@ -182,10 +183,10 @@ def _pressing(scenario: Scenario) -> Scenario:
 
 
 def _checked_kinds(kinds: Sequence[str] | None) -> list[str]:
-    if strange := [kind for kind in kinds or () if kind not in KINDS]:
+    if unknown := [kind for kind in kinds or () if kind not in KINDS]:
         raise RunError(
-            f"no kind of case is called {strange[0]!r}; known are {', '.join(KINDS)}",
-            kind=strange[0],
+            f"no kind of case is called {unknown[0]!r}; known are {', '.join(KINDS)}",
+            kind=unknown[0],
         )
     return [kind for kind in KINDS if kinds is None or kind in kinds]
 
@@ -193,27 +194,27 @@ def _checked_kinds(kinds: Sequence[str] | None) -> list[str]:
 def _checked_effects(effects: Sequence[str] | None) -> tuple[str, ...]:
     from palpate.synthetic import HIDDEN, WEIGHED
 
-    wanted = tuple(WEIGHED if effects is None else dict.fromkeys(effects))
-    if strange := [effect for effect in wanted if effect not in HIDDEN]:
+    chosen = tuple(WEIGHED if effects is None else dict.fromkeys(effects))
+    if unknown := [effect for effect in chosen if effect not in HIDDEN]:
         raise RunError(
-            f"the virtual bench cannot hide {', '.join(strange)}; it knows {', '.join(HIDDEN)}",
-            effect=strange[0],
+            f"the virtual bench cannot hide {', '.join(unknown)}; it knows {', '.join(HIDDEN)}",
+            effect=unknown[0],
         )
-    return wanted
+    return chosen
 
 
 def _interleaved(kinds: Sequence[str], count: int) -> list[str]:
-    """Kinds in their shares, one by one: next comes the kind that is furthest behind its share."""
+    """Order `count` kinds by their shares; next is always the kind furthest behind its share."""
     if count and not kinds:
         raise RunError("no kind of case is left to be drawn: name others, or fewer controls")
     total = sum(MIX[kind] for kind in kinds)
     met = dict.fromkeys(kinds, 0)
-    found: list[str] = []
+    order: list[str] = []
     for place in range(count):
         kind = max(kinds, key=lambda one: (place + 1) * MIX[one] / total - met[one])
         met[kind] += 1
-        found.append(kind)
-    return found
+        order.append(kind)
+    return order
 
 
 def _hidden(kind: str, seed: int, number: int, effects: Sequence[str]) -> tuple[str, ...]:

@@ -1,6 +1,4 @@
-"""How large a hidden effect is in units of what the experiment could just tell, by the report's own
-map.
-"""
+"""Size of a hidden effect over its detection limit, by the report's ambiguity map."""
 
 from __future__ import annotations
 
@@ -27,52 +25,52 @@ _PROPORTIONAL = (
     "relaxed_fraction",
     "retained_fraction",
 )
-"""Parameters in proportion to which the surface moves, so that a share of what one size does is
-that share of the size."""
+"""Parameters to which the surface's displacement is proportional."""
 _INVERSE = ("J_m", "stiffness_over_E")
-"""The same of their inverse: they are nothing where they are infinite."""
+"""Parameters to whose inverse the surface's displacement is proportional."""
 _POWERS = {"extent": 5 / 3}
-"""Of the size in which the surface moves where it is not one: replays of a block pushed at four
-places, with a strip of a tenth to nine twentieths of its length detached along one edge, follow
-this power (1.5 to 1.8)."""
+"""Exponents of other parameters in the surface's displacement [1]. Measured: replays of a block
+pushed at four places, with a strip of 1/10 to 9/20 of its length detached along one edge, follow
+exponents of 1.5 to 1.8."""
 _BESIDE = ("time_constant",)
-"""Parameters that say when something shows and not how strongly: a limit is stated at one of
-them."""
+"""Parameters that do not set the strength of an effect; a limit is stated at one value of them."""
 
 
 def size_over_limit(
     hidden: Sequence[HiddenEffect],
-    told: Sequence[Mapping[str, Any]],
+    ambiguity_map: Sequence[Mapping[str, Any]],
     scenario: Scenario,
     camera_shift: Transform,
 ) -> float | None:
-    """Size of what is hidden over its detection limit [1]; of two effects that of the fainter one.
+    """Size of the hidden effect over its detection limit [1], of two effects the smaller one.
 
-    Of several parameters the root of the squares' sum: each alone gains the bound at its limit, and
-    gains grow with the square. A lump's limit is that of the nearest place that was screened, for
-    the radius that was screened there, and a lump acts in proportion to its volume (Eshelby 1957);
-    a detached strip's is that of its edge; of other candidates the one that half of them reach.
+    Sizes of several parameters are added in squares: each alone gains the bound at its limit, and
+    gains grow with the square. The limit of a lump is that of the nearest screened place and its
+    radius, and a lump acts in proportion to its volume (Eshelby 1957). The limit of a detached
+    strip is that of its edge. The limit of other candidates is the one that half of them reach.
 
     Args:
-        told: the report's ambiguity map.
-        camera_shift: as the truth has it, phantom frame.
+        hidden: effects.
+        ambiguity_map: of the report.
+        scenario: with the beliefs.
+        camera_shift: true one, phantom frame.
 
     Returns:
-        None where nothing is hidden, where a word of it (a pairing) is not the believed one, which
-        has no size, or where the map gives no limit in terms of its parameters.
+        None where nothing is hidden, where a hidden word (a pairing) differs from the believed one
+        and has no size, or where the map has no limit for its parameters.
     """
-    sizes = [_size(one, told, scenario, camera_shift) for one in hidden]
+    sizes = [_size(one, ambiguity_map, scenario, camera_shift) for one in hidden]
     known = [size for size in sizes if size is not None]
     return min(known) if known and len(known) == len(sizes) else None
 
 
 def _size(
     hidden: HiddenEffect,
-    told: Sequence[Mapping[str, Any]],
+    ambiguity_map: Sequence[Mapping[str, Any]],
     scenario: Scenario,
     camera_shift: Transform,
 ) -> float | None:
-    row = next((row for row in told if row["effect"] == hidden.effect), None)
+    row = next((row for row in ambiguity_map if row["effect"] == hidden.effect), None)
     if row is None:
         return None
     try:
@@ -95,10 +93,10 @@ def _size(
 
 
 def camera_pose(shift: Transform, size: Sequence[float]) -> dict[str, float]:
-    """A camera's shift in the phantom frame as the motion about the middle of a block of this size
-    [m] that a diagnosis fits.
+    """Parameters of a camera's shift as a diagnosis fits them: translation [m] of the middle of a
+    block of this size [m], and rotation vector [rad].
 
-    A turn about the base's centre moves the middle, too: by half a millimetre where it is 0.03.
+    A rotation about the base's centre moves the middle, too: 0.03 rad by half a millimetre.
     """
     middle = np.array([0.0, 0.0, size[2] / 2])
     step = shift.apply(middle) - middle
@@ -114,9 +112,7 @@ def camera_pose(shift: Transform, size: Sequence[float]) -> dict[str, float]:
 def _nearest(
     row: Mapping[str, Any], hidden: HiddenEffect
 ) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
-    """The first limit of the place or edge that is nearest to what is hidden, and the fixed
-    parameters there.
-    """
+    """First limit of the place or edge nearest to the hidden one, and its fixed parameters."""
 
     def far(at: Mapping[str, Any]) -> float:
         if "edge" in at:
@@ -174,7 +170,7 @@ def _believed(scenario: Scenario) -> Setup:
 def _true_values(
     hidden: HiddenEffect, scenario: Scenario, camera_shift: Transform
 ) -> dict[str, float]:
-    """Numbers of the truth by the names of the parameters that are fitted."""
+    """True numbers by the names of the fitted parameters."""
     if hidden.effect == "camera_registration":
         return camera_pose(camera_shift, scenario.size)
     return {

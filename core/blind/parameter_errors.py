@@ -1,6 +1,4 @@
-"""How far off the parameters of rightly named causes are, and how often their intervals hold the
-truth.
-"""
+"""Errors of the parameters of correctly named causes, and coverage of their intervals."""
 
 from __future__ import annotations
 
@@ -27,20 +25,26 @@ __all__ = [
 ]
 
 SCORED_LEVEL = 0.9
-"""Of the intervals that are scored: those of a report are narrowed to it as a normal distribution's
-would be."""
+"""Level of the scored intervals [1]; those of a report are narrowed to it as for a normal
+distribution."""
 
 
 @dataclass(frozen=True)
 class ReportedParameter:
-    """One number of a rightly named cause.
+    """A numeric parameter of a correctly named cause, SI units.
 
     Attributes:
-        case, kind: where.
-        effect, name, unit: of the parameter.
-        true, value: hidden and said, SI.
-        low, high: as the report states them, at its `level` [1]; None without.
-        searched: how a search moves it; None where its effect is not known here.
+        case: name of the case.
+        kind: of the case.
+        effect: name.
+        name: of the parameter.
+        unit: of the parameter.
+        true: hidden value.
+        value: reported value.
+        low: end of the reported interval; None without.
+        high: end of the reported interval; None without.
+        level: of the interval [1].
+        searched: the parameter's coordinate; None for an unknown effect.
     """
 
     case: str
@@ -57,12 +61,12 @@ class ReportedParameter:
 
     @property
     def key(self) -> str:
-        """`effect.parameter`."""
+        """The name `effect.parameter`."""
         return f"{self.effect}.{self.name}"
 
     @property
     def nearest(self) -> float:
-        """The truth; of a direction, that of its turns which is next to what is said."""
+        """The true value; of a periodic parameter the one nearest to the reported value."""
         if self.searched is None or not self.searched.periodic:
             return self.true
         period = self.searched.high - self.searched.low
@@ -74,8 +78,9 @@ class ReportedParameter:
         return self.value - self.nearest
 
     def covers(self, level: float | None = None) -> bool | None:
-        """Whether the interval holds the truth; at another level as a normal distribution's would.
-        None without an interval.
+        """Whether the interval contains the truth; None without an interval.
+
+        At another `level` [1] the interval is scaled as for a normal distribution.
         """
         if self.low is None or self.high is None:
             return None
@@ -87,7 +92,7 @@ class ReportedParameter:
         low, value, high, true = (
             self._coordinate(one) for one in (self.low, self.value, self.high, self.nearest)
         )
-        # A rounded end must not decide.
+        # Rounding of the interval's ends must not matter.
         slack = 1e-9 * max(abs(high - low), abs(value))
         return bool(
             value + narrower * (low - value) - slack
@@ -102,7 +107,7 @@ class ReportedParameter:
 
 
 def reported_parameters(results: Iterable[CaseResult]) -> list[ReportedParameter]:
-    """Every number of every cause that is named and hidden."""
+    """List every number of every cause that is named and hidden."""
     found = []
     for result in results:
         causes = {cause["effect"]: cause["parameters"] for cause in result.causes}
@@ -141,14 +146,14 @@ def _parameter(effect: str, name: str) -> Parameter | None:
         return None
 
 
-def parameter_errors(said: Sequence[ReportedParameter]) -> dict[str, dict[str, Any]]:
-    """By `effect.parameter`: unit, median and largest absolute error, mean signed error, and the
-    share of intervals that hold.
+def parameter_errors(reported: Sequence[ReportedParameter]) -> dict[str, dict[str, Any]]:
+    """Table by `effect.parameter`: unit, median and largest absolute error, mean signed error, and
+    coverage of the intervals.
     """
-    keys = list(dict.fromkeys(one.key for one in said))
+    keys = list(dict.fromkeys(one.key for one in reported))
     table = {}
     for key in keys:
-        own = [one for one in said if one.key == key]
+        own = [one for one in reported if one.key == key]
         sizes = [abs(one.error) for one in own]
         table[key] = {
             "unit": own[0].unit,
@@ -160,15 +165,15 @@ def parameter_errors(said: Sequence[ReportedParameter]) -> dict[str, dict[str, A
     return table
 
 
-def coverage(said: Iterable[ReportedParameter], level: float | None = None) -> IntervalEstimate:
-    """Share of the intervals at this level, or as stated, that hold the truth."""
-    held = [one.covers(level) for one in said]
-    return rate(sum(one is True for one in held), sum(one is not None for one in held))
+def coverage(reported: Iterable[ReportedParameter], level: float | None = None) -> IntervalEstimate:
+    """Share of the intervals at this level, or as stated, that contain the truth."""
+    covered = [one.covers(level) for one in reported]
+    return rate(sum(one is True for one in covered), sum(one is not None for one in covered))
 
 
 def distances(results: Iterable[CaseResult], effect: str, names: Sequence[str]) -> list[float]:
-    """Length of the error vector of these parameters of one effect, in each case where it is
-    rightly named.
+    """Norms of the errors of these parameters of an effect, for each case where it is correctly
+    named.
     """
     found: dict[str, list[float]] = {}
     for one in reported_parameters(results):
@@ -178,9 +183,7 @@ def distances(results: Iterable[CaseResult], effect: str, names: Sequence[str]) 
 
 
 def words_right(results: Iterable[CaseResult]) -> dict[str, IntervalEstimate]:
-    """By `effect.parameter`: how often a word (an edge) is that of the truth, where the effect is
-    rightly named.
-    """
+    """Share of correct words (edges, pairings) by `effect.parameter`, for named hidden effects."""
     pairs: dict[str, list[bool]] = {}
     for result in results:
         causes = {cause["effect"]: cause["parameters"] for cause in result.causes}

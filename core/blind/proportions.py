@@ -1,4 +1,4 @@
-"""Shares and medians with their intervals."""
+"""Shares and medians with confidence intervals."""
 
 from __future__ import annotations
 
@@ -13,13 +13,19 @@ __all__ = ["CONFIDENCE", "IntervalEstimate", "median_of", "rate", "share_of"]
 
 T = TypeVar("T")
 CONFIDENCE = 0.95
-"""Of all intervals of the summary; those of parameters have the level that the report states."""
+"""Level of the intervals of a summary [1]; those of parameters have the level of the report."""
 
 
 @dataclass(frozen=True)
 class IntervalEstimate:
-    """A figure from n cases with its interval, which is None where there are too few; `hits` of a
-    share.
+    """An estimate with its interval.
+
+    Attributes:
+        value: None without cases.
+        low: end of the interval; None with too few cases.
+        high: end of the interval; None with too few cases.
+        n: number of cases.
+        hits: number of successes of a share; None for other figures.
     """
 
     value: float | None
@@ -49,15 +55,13 @@ def rate(hits: int, n: int) -> IntervalEstimate:
 
 
 def share_of(results: Iterable[T], holds: Callable[[T], bool]) -> IntervalEstimate:
-    """In how many of the results it holds."""
+    """Share of the results for which `holds` is true."""
     answers = [holds(result) for result in results]
     return rate(sum(answers), len(answers))
 
 
 def median_of(values: Sequence[float]) -> IntervalEstimate:
-    """A median with the interval between two order statistics (binomial, no assumption on the
-    distribution).
-    """
+    """A median with the interval between two order statistics, for any distribution."""
     if not values:
         return IntervalEstimate(None, None, None, 0)
     middle = float(np.median(values))

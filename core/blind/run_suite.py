@@ -1,5 +1,6 @@
-"""The suite at work: one process for each case, results on disk as they come, nothing left behind
-when it is stopped.
+"""Runs a suite: one process for each case, with results on disk as they come.
+
+A run that is stopped leaves no processes and no temporary files.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ __all__ = ["known_results", "run_case", "run_suite", "source_digest"]
 
 Run = Callable[[Case, Path], CaseResult]
 _PATIENCE = 5.0
-"""A process that was told to end gets this long [s] before it is killed."""
+"""Time that a terminated process gets before it is killed [s]."""
 
 
 def run_suite(
@@ -38,17 +39,23 @@ def run_suite(
     again: bool = False,
     run: Run | None = None,
 ) -> list[CaseResult]:
-    """The results of all cases, in their order; those in `folder`/results.jsonl are taken from
-    there, new ones are added to it.
+    """Run all cases that have no result in `folder`/results.jsonl, and add the results to it.
 
     Args:
-        workers: cases at the same time.
-        any_version: whether results of other versions of the code are taken, too; without it they
-            are a RunError.
-        again: whether cases that ended in an error are done again.
-        run: what does one case.
+        folder: of the suite.
+        cases: to be run.
+        workers: number of cases at the same time.
+        report: of the progress.
+        any_version: whether results of other versions of the code are accepted; without it they
+            raise a RunError.
+        again: whether cases that ended in an error are repeated.
+        run: runs one case; `run_case` without it.
 
-    Raises RunError where a result of the same name is of another case.
+    Returns:
+        the results of all cases in their order.
+
+    Raises:
+        RunError: where a result of the same name belongs to another case.
     """
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / RESULTS_FILE
@@ -58,12 +65,12 @@ def run_suite(
         for one in known_results(folder, cases, any_version)
         if not (again and one.error)
     }
-    wanted = [case for case in cases if case.name not in known]
-    done = len(cases) - len(wanted)
+    missing = [case for case in cases if case.name not in known]
+    done = len(cases) - len(missing)
     report(done / max(1, len(cases)), f"{done} of {len(cases)} were there already")
     place = Path(tempfile.mkdtemp(prefix=".making-", dir=folder))
     try:
-        for result in _outcomes(wanted, place, workers, run or run_case):
+        for result in _outcomes(missing, place, workers, run or run_case):
             known[result.name] = result
             add_result(file, result)
             done += 1
@@ -76,14 +83,15 @@ def run_suite(
 def known_results(
     folder: Path, cases: Sequence[Case], any_version: bool = False
 ) -> list[CaseResult]:
-    """Those of these cases that are done, in their order; of two of one name the later. RunError as
-    from `run_suite`.
+    """Read the results of these cases that are done, in their order; of two of one name the later.
+
+    Raises RunError as `run_suite` does.
     """
     file = folder / RESULTS_FILE
-    wanted, digest = {case.name: case for case in cases}, source_digest()
+    expected, digest = {case.name: case for case in cases}, source_digest()
     known: dict[str, CaseResult] = {}
     for result in read_results(file):
-        case = wanted.get(result.name)
+        case = expected.get(result.name)
         if case is None:
             continue
         if result.case != case:
@@ -104,13 +112,15 @@ def known_results(
 
 
 def run_case(case: Case, folder: Path, kept: Path | None = None) -> CaseResult:
-    """Make the dataset, diagnose it without a look at the truth, and compare; nothing but the
-    result is kept.
+    """Make the dataset of a case, diagnose it without the truth, and score it.
 
-    In `kept`, where it is given, datasets/CASE and runs/CASE stay instead, the run with replays and
-    controls as of any diagnosis.
+    An error on the way is a result, too, and counts as wrong.
 
-    Whatever goes wrong on the way is a result, too: with the error, and counted as wrong.
+    Args:
+        case: to be run.
+        folder: for temporary files.
+        kept: folder in which datasets/CASE and runs/CASE stay, the run with replays and controls;
+            None keeps only the result.
     """
     from palpate.dataset import open_dataset
     from palpate.diagnosis.pipeline import diagnose
@@ -136,7 +146,7 @@ def run_case(case: Case, folder: Path, kept: Path | None = None) -> CaseResult:
         made = make_dataset(dataset, scenario, case.seed)
         hidden, outside = _truth(made, scenario.size)
         doing, began = "diagnosing it", time.monotonic()
-        said = diagnose(open_dataset(dataset), run, workers=1, replays=whole, assurance=whole)
+        result = diagnose(open_dataset(dataset), run, workers=1, replays=whole, assurance=whole)
         seconds = round(time.monotonic() - began, 1)
     except Exception as error:  # any one: 200 cases must not end with it
         return CaseResult(
@@ -152,14 +162,14 @@ def run_case(case: Case, folder: Path, kept: Path | None = None) -> CaseResult:
             shutil.rmtree(place, ignore_errors=True)
     from palpate.blind.effect_sizes import size_over_limit
 
-    told = said.pop("ambiguity_map", [])
-    size = size_over_limit(made.effects, told, scenario, made.camera_shift)
-    said["ambiguity_map"] = [row for row in told if row["effect"] in case.hidden]
-    return CaseResult(case, hidden, said, outside, size, seconds, source_digest())
+    ambiguity_map = result.pop("ambiguity_map", [])
+    size = size_over_limit(made.effects, ambiguity_map, scenario, made.camera_shift)
+    result["ambiguity_map"] = [row for row in ambiguity_map if row["effect"] in case.hidden]
+    return CaseResult(case, hidden, result, outside, size, seconds, source_digest())
 
 
 def _truth(made: Any, size: Sequence[float]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Hidden effects and disturbances; a camera's pose in the terms of a report."""
+    """Hidden effects and disturbances, with a camera's pose in the parameters of a report."""
     from palpate.blind.effect_sizes import camera_pose
 
     described = made.as_dict()

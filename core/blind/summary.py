@@ -1,6 +1,4 @@
-"""The suite in one JSON: targets, rates by kind, parameters, calibration, what was named for what,
-and the gain.
-"""
+"""Summary of a suite: targets, rates by kind, parameters, calibration, confusion, and gain."""
 
 from __future__ import annotations
 
@@ -33,11 +31,12 @@ NOTHING, SEVERAL = "nothing", "several"
 
 
 def summary_of(results: Sequence[CaseResult], seed: int, missing: int = 0) -> dict[str, Any]:
-    """Everything that is scored, as plain values.
+    """All scores as plain values.
 
     Args:
+        results: of the suite.
         seed: from which the cases were drawn.
-        missing: cases without a result.
+        missing: number of cases without a result.
     """
     return {
         "format": 1,
@@ -71,12 +70,12 @@ def summary_of(results: Sequence[CaseResult], seed: int, missing: int = 0) -> di
 
 
 def _coverage(results: Sequence[CaseResult]) -> dict[str, Any]:
-    said = reported_parameters(results)
+    reported = reported_parameters(results)
     return {
         "level_stated": sorted({result.level for result in results if result.report}),
-        "at_stated_level": coverage(said).to_json(),
+        "at_stated_level": coverage(reported).to_json(),
         "level_scored": SCORED_LEVEL,
-        "at_scored_level": coverage(said, SCORED_LEVEL).to_json(),
+        "at_scored_level": coverage(reported, SCORED_LEVEL).to_json(),
     }
 
 
@@ -86,9 +85,7 @@ def _seconds(results: Sequence[CaseResult]) -> dict[str, Any]:
 
 
 def _kind(results: Sequence[CaseResult]) -> dict[str, Any]:
-    """What holds in how many cases of a kind; of those with something hidden also whether it is
-    first and among what is named.
-    """
+    """Rates of one kind of cases; with hidden effects also of naming them first and at all."""
     counted = {
         "right": share_of(results, lambda one: one.right),
         "false_name": share_of(results, lambda one: one.false_name),
@@ -118,7 +115,7 @@ def _calibration(stated: Any, true: Any) -> dict[str, Any]:
 
 
 def confusion(results: Sequence[CaseResult]) -> dict[str, dict[str, int]]:
-    """What is hidden (rows) by what is named (columns), of all cases but pairs.
+    """Confusion matrix of all cases but pairs: hidden effects (rows) by named ones (columns).
 
     Columns beside the effects: `several` for a found set of more than one, and the verdicts that
     name no single cause.
@@ -138,7 +135,7 @@ def _named(result: CaseResult) -> str:
 
 
 def _pairs(results: Sequence[CaseResult]) -> dict[str, int]:
-    """Of two hidden effects: how many are named, and whether anything else is."""
+    """Counts of pairs by the number of hidden effects that are named, and of others."""
     found: Counter[str] = Counter()
     for result in results:
         if result.case.kind == "pair":
@@ -149,8 +146,8 @@ def _pairs(results: Sequence[CaseResult]) -> dict[str, int]:
 
 
 def _gain(results: Sequence[CaseResult]) -> dict[str, Any]:
-    """Share of the reducible error removed, and the error that is left over the noise floor, by
-    kind (medians).
+    """Medians by kind of the share of reducible error removed, and of the error left over the noise
+    floor.
     """
     table: dict[str, Any] = {}
     for kind in ("clear", "subtle", "pair", "twins"):

@@ -1,4 +1,4 @@
-"""What the suite must show, and what it shows."""
+"""Targets of the blind suite, and their judgement."""
 
 from __future__ import annotations
 
@@ -21,15 +21,13 @@ from palpate.blind.proportions import IntervalEstimate, median_of, share_of
 __all__ = ["TARGETS", "Target", "grade", "judge_targets"]
 
 CLEAR, SUBTLE = 5.0, 2.0
-"""Sizes over the detection limit from which a cause counts as clear, and as subtle [1]."""
+"""Size over the detection limit from which an effect is clear, and from which it is subtle [1]."""
 
 Measure = Callable[[Sequence[CaseResult]], IntervalEstimate]
 
 
 def grade(result: CaseResult) -> str:
-    """`clear`, `subtle` or `faint` by the size over the detection limit where it is given, of two
-    the fainter's; else ``.
-    """
+    """Grade `clear`, `subtle` or `faint` by the size over the detection limit, empty without."""
     if result.size is None:
         return ""
     return "clear" if result.size >= CLEAR else "subtle" if result.size >= SUBTLE else "faint"
@@ -37,13 +35,14 @@ def grade(result: CaseResult) -> str:
 
 @dataclass(frozen=True)
 class Target:
-    """A figure that must lie within its bounds.
+    """A figure that must lie within bounds.
 
     Attributes:
-        key: for machines.
-        text: what is counted, for people.
-        measure: the figure from all results.
-        low, high: bounds, None where there is none.
+        key: identifier.
+        text: for a person.
+        measure: computes the figure from all results.
+        low: lower bound; None without.
+        high: upper bound; None without.
         unit: of the figure; `1` for a share.
     """
 
@@ -56,11 +55,11 @@ class Target:
 
     def judge(self, results: Sequence[CaseResult]) -> dict[str, Any]:
         """Plain values: bounds, figure, `met`, and `sure` where the whole interval lies on one
-        side; None without cases.
+        side; `met` and `sure` are None without cases.
         """
-        found = self.measure(results)
-        met = None if found.value is None else self._within(found.value)
-        ends = [end for end in (found.low, found.high) if end is not None]
+        estimate = self.measure(results)
+        met = None if estimate.value is None else self._within(estimate.value)
+        ends = [end for end in (estimate.low, estimate.high) if end is not None]
         agree = (
             len(ends) == 2
             and all(self._within(end) == met for end in ends)
@@ -72,7 +71,7 @@ class Target:
             "unit": self.unit,
             "at_least": self.low,
             "at_most": self.high,
-            "reached": found.to_json(),
+            "reached": estimate.to_json(),
             "met": met,
             "sure": None if met is None else agree,
         }
@@ -81,7 +80,7 @@ class Target:
         return (self.low is None or value >= self.low) and (self.high is None or value <= self.high)
 
     def _straddles(self, ends: Sequence[float]) -> bool:
-        """Both bounds between the ends: each end is out, and yet the figure may be within."""
+        """Whether both bounds lie between the ends, so that the figure may be within."""
         return (
             self.low is not None
             and self.high is not None
@@ -91,7 +90,7 @@ class Target:
 
 
 def judge_targets(results: Sequence[CaseResult]) -> list[dict[str, Any]]:
-    """Every target against these results."""
+    """Judge all targets by these results."""
     return [target.judge(results) for target in TARGETS]
 
 
@@ -99,15 +98,15 @@ def _of(kind: str) -> Callable[[Sequence[CaseResult]], list[CaseResult]]:
     return lambda results: [result for result in results if result.case.kind == kind]
 
 
-def _graded(wanted: str) -> Callable[[Sequence[CaseResult]], list[CaseResult]]:
-    """Single effects of this size over their limit, however they were drawn."""
+def _graded(expected: str) -> Callable[[Sequence[CaseResult]], list[CaseResult]]:
+    """Select single effects of this grade, of any kind of case."""
     return lambda results: [
-        result for result in results if len(result.truth) == 1 and grade(result) == wanted
+        result for result in results if len(result.truth) == 1 and grade(result) == expected
     ]
 
 
 def _told_pairs(results: Sequence[CaseResult]) -> list[CaseResult]:
-    """Two effects that each by itself the experiment could tell."""
+    """Select pairs of effects that are both above twice their detection limit."""
     return [
         result
         for result in results
@@ -206,7 +205,7 @@ TARGETS = (
     Target("twins.right", _FAMILY, _share(_of("twins"), lambda r: r.right), 0.95),
     Target(
         "modulus.right",
-        "Another modulus alone: said to be untold",
+        "Another modulus alone: reported as not identifiable",
         _share(_of("modulus"), lambda r: r.right),
         0.95,
     ),
@@ -278,6 +277,5 @@ TARGETS = (
         0.85,
     ),
 )
-"""Errors are medians over clear cases. Look-alikes and the modulus alone are asked for without a
-figure: they have 95 %. What is hidden only where it is asked for (depth, size, touches) has a step
-that matters of each parameter as its figure."""
+"""Targets. Errors are medians over clear cases. Chosen, not derived: 95 % for look-alikes and the
+modulus alone; for depth, size and touches the smallest step of each parameter that matters."""

@@ -15,9 +15,7 @@ def effects_of(cases: list[Case]) -> list[str]:
     return [case.hidden[0] for case in cases if case.kind == "clear"]
 
 
-def test_small_suite_hides_every_effect_that_is_weighed_and_every_disturbance_once_and_nothing_ten_times() -> (
-    None
-):
+def test_small_suite_has_each_effect_and_disturbance_once_and_ten_controls() -> None:
     cases = all_cases(seed=3)
     assert [case.hidden for case in cases if case.hidden] == [
         (name,) for name in (*WEIGHED, *DISTURBANCES)
@@ -26,9 +24,7 @@ def test_small_suite_hides_every_effect_that_is_weighed_and_every_disturbance_on
     assert len({case.name for case in cases}) == len({case.seed for case in cases}) == len(cases)
 
 
-def test_other_effects_are_hidden_where_they_are_asked_for_and_leave_the_cases_of_the_rest_alone() -> (
-    None
-):
+def test_requested_effects_are_hidden_and_do_not_change_other_cases() -> None:
     everything = all_cases(seed=3, effects=list(HIDDEN))
     assert effects_of(everything) == list(HIDDEN)
     assert {case for case in all_cases(seed=3) if case.kind != "outside"} <= set(everything)
@@ -65,7 +61,7 @@ def test_each_effect_comes_once_before_any_comes_again() -> None:
     assert len(set(pairs)) == 30 and all(len(set(pair)) == 2 for pair in pairs)
 
 
-def test_kinds_effects_and_controls_are_as_asked_for() -> None:
+def test_kinds_effects_and_controls_are_as_requested() -> None:
     cases = draw_cases(5, 20, kinds=["pair", "clear"], effects=["gravity", "tool_radius"])
     assert {case.kind for case in cases} == {"pair", "clear"}
     assert {name for case in cases for name in case.hidden} == {"gravity", "tool_radius"}
@@ -77,7 +73,7 @@ def test_kinds_effects_and_controls_are_as_asked_for() -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "says"),
+    ("request_", "message"),
     [
         ({"kinds": ["moon"]}, "no kind of case is called 'moon'; known are control, clear"),
         ({"effects": ["moon"]}, "cannot hide moon"),
@@ -87,9 +83,9 @@ def test_kinds_effects_and_controls_are_as_asked_for() -> None:
         ({"kinds": ["control"], "controls": 3}, "no kind of case is left"),
     ],
 )
-def test_what_cannot_be_drawn_is_said(asked: dict[str, list[str]], says: str) -> None:
-    with pytest.raises(RunError, match=says):
-        draw_cases(5, 20, **asked)  # type: ignore[arg-type]
+def test_impossible_request_is_an_error(request_: dict[str, list[str]], message: str) -> None:
+    with pytest.raises(RunError, match=message):
+        draw_cases(5, 20, **request_)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("effect", HIDDEN)

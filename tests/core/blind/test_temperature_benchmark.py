@@ -1,4 +1,4 @@
-"""The temperature of probabilities, from rows of which the right one is known."""
+"""The benchmark that chooses the temperature of probabilities, on rows with a known truth."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from blind_results import result
 
-from benchmarks.temperature_choice import first_at, loss, warmest
+from benchmarks.temperature_choice import best_temperature, loss, top_effect
 from palpate.blind.case_results import CaseResult
 from palpate.diagnosis.search.model_probabilities import probabilities
 
@@ -25,8 +25,8 @@ def _model(gain: float, *names: str) -> dict[str, object]:
 
 
 def _drawn(seed: int) -> CaseResult:
-    """Of gains that are over-sure by a factor of six: the truth is drawn from their softmax at that
-    temperature.
+    """Result with gains that are overconfident by a factor of six: the truth is drawn from their
+    softmax at that temperature.
     """
     random = np.random.default_rng(seed)
     surplus: dict[tuple[str, ...], float] = {
@@ -47,16 +47,16 @@ def _drawn(seed: int) -> CaseResult:
 
 def test_temperature_is_found_again() -> None:
     rows = [_drawn(seed) for seed in range(400)]
-    assert warmest(rows) == pytest.approx(TRUE, rel=0.25)
+    assert best_temperature(rows) == pytest.approx(TRUE, rel=0.25)
     assert loss(rows, TRUE) < min(loss(rows, 1.0), loss(rows, 40.0))
-    (stated, true), (bold, same) = first_at(rows, TRUE), first_at(rows, 1.0)
+    (stated, true), (bold, same) = top_effect(rows, TRUE), top_effect(rows, 1.0)
     assert abs(stated.mean() - true.mean()) < 0.04 < abs(bold.mean() - same.mean())
 
 
 def test_of_equal_temperatures_the_highest_claims_least() -> None:
     sure = result("clear", "gravity")
     rows = [replace(sure, report={**sure.report, "models": [_model(25.0 + 500.0, "gravity")]})]
-    assert 10.0 < warmest(rows) and loss(rows, warmest(rows)) < 1e-6
+    assert 10.0 < best_temperature(rows) and loss(rows, best_temperature(rows)) < 1e-6
 
 
 def test_modulus_alone_is_nothing_hidden() -> None:

@@ -1,6 +1,4 @@
-"""The rule that withholds a cause which leaves most of what is wrong, by rows of suites that were
-run and kept.
-"""
+"""The benchmark of the rule that rejects a cause which leaves most of the error, on stored rows."""
 
 from __future__ import annotations
 
