@@ -92,7 +92,7 @@ class Criteria:
         return f"{_REVISION}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
 
     def to_json(self) -> dict[str, str]:
-        """What a report and a model carry of the criteria that they were made by."""
+        """Plain values that a report and a model carry."""
         return {"version": self.version}
 
 

@@ -33,7 +33,7 @@ class ReplayCriteria:
 
 @dataclass(frozen=True, kw_only=True)
 class RayComparisonCriteria:
-    """Which points are compared with which part of a model."""
+    """Assignment of points to the surface or the tool of a model."""
 
     tool_reach: float = threshold(
         1.5e-3,
@@ -101,7 +101,7 @@ class DerivativeCriteria:
 
 @dataclass(frozen=True, kw_only=True)
 class HistoryCriteria:
-    """How finely a replay follows the tool's path where the material or friction has history."""
+    """Resolution of the tool's path in replays with history."""
 
     travel: float = threshold(
         1e-3, "m", "Longest motion between two places near the phantom, for a material's history."

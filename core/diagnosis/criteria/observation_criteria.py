@@ -11,7 +11,7 @@ __all__ = ["ForceErrorCriteria", "ForceOnlyCriteria", "GroupingCriteria", "Outli
 
 @dataclass(frozen=True, kw_only=True)
 class GroupingCriteria:
-    """How frames are gathered into groups that share one equilibrium."""
+    """Grouping of frames that share one equilibrium."""
 
     travel: float = threshold(7e-4, "m", "Frames whose tool moved less than this form one group.")
     most_points: int = threshold(
@@ -50,7 +50,7 @@ class GroupingCriteria:
 
 @dataclass(frozen=True, kw_only=True)
 class ForceOnlyCriteria:
-    """Which instants of a push are used where a sequence has forces and no clouds."""
+    """Instants of a push that are compared in sequences with forces and no clouds."""
 
     depth_shares: tuple[float, ...] = threshold(
         (0.55,), "1", "Depths on the way in that are compared, as shares of the push's depth."
@@ -67,7 +67,7 @@ class ForceOnlyCriteria:
 
 @dataclass(frozen=True, kw_only=True)
 class ForceErrorCriteria:
-    """How well a force is known: the engine's own error, and the sensor's bias."""
+    """Error of a force: the engine's own, and the sensor's bias."""
 
     push_error: float = threshold(
         0.03,
@@ -99,7 +99,7 @@ class ForceErrorCriteria:
 
 @dataclass(frozen=True, kw_only=True)
 class OutlierCriteria:
-    """Which surface patches are outliers among their neighbours."""
+    """Outliers among neighbouring surface patches."""
 
     hidden_share: float = threshold(
         0.35,

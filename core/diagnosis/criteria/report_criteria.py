@@ -13,7 +13,7 @@ __all__ = ["DesignCriteria", "FigureCriteria", "FootprintCriteria", "VerdictCrit
 
 @dataclass(frozen=True, kw_only=True)
 class VerdictCriteria:
-    """When something is unexplained, and which parameters are determined."""
+    """Bounds of the verdict, and of the identifiability of parameters."""
 
     unexplained_misfit: float = threshold(
         1.25,
@@ -64,7 +64,7 @@ class VerdictCriteria:
 
 @dataclass(frozen=True, kw_only=True)
 class FigureCriteria:
-    """What the report's figures show."""
+    """Contents of the report's figures."""
 
     pattern_smoothing: float = threshold(
         3.5e-3, "m", "Standard deviation of the smoothing of error patterns along a side."

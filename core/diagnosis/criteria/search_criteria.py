@@ -11,7 +11,7 @@ __all__ = ["InclusionGridCriteria", "NamingCriteria", "ScreeningCriteria", "Touc
 
 @dataclass(frozen=True, kw_only=True)
 class NamingCriteria:
-    """When a cause is named, and which rivals are named beside it."""
+    """Bounds for naming a cause, and rivals beside it."""
 
     least_gain: float = threshold(
         25.0,
@@ -119,7 +119,7 @@ class ScreeningCriteria:
 
 @dataclass(frozen=True, kw_only=True)
 class InclusionGridCriteria:
-    """Where and how large an inclusion is tried below the pushes."""
+    """Places and size of inclusions that are tried below the pushes."""
 
     radius: float = threshold(7e-3, "m", "Radius of the inclusions that are tried.")
     stiffness_ratio: float = threshold(5.0, "1", "Their stiffness over the body's.")

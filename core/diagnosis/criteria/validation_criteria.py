@@ -37,7 +37,7 @@ class GainCriteria:
 
 @dataclass(frozen=True, kw_only=True)
 class RejectionCriteria:
-    """When a cause that the fitted sequences support is not named after all."""
+    """Bounds for rejecting a cause that the fitted sequences support."""
 
     added_error: float = threshold(
         0.1,
