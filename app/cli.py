@@ -63,7 +63,7 @@ def main() -> NoReturn:
     except (Cancelled, KeyboardInterrupt):
         sys.exit(_cancelled())
     except Exception:
-        if not stop.asked:
+        if not stop.received:
             raise
         sys.exit(
             _cancelled()

@@ -38,14 +38,14 @@ PROBLEMS: dict[int | str, dict[str, Any]] = {
     for status, text in {
         400: "the body cannot be read",
         401: "not logged in: send Authorization: Bearer with the token",
-        403: "asked by a page of another site, or by a name that is not the server's",
+        403: "requested by a page of another site, or under a name that is not the server's",
         404: "nothing has this name",
         409: "does not fit the state of what it names",
         413: "the body is too large",
         422: "data or values that are off",
     }.items()
 }
-"""What any operation may answer besides its result."""
+"""Error answers of every operation."""
 
 
 Point = Annotated[

@@ -91,13 +91,13 @@ def _free(name: str, services: Services) -> None:
 
 def _queue(services: Services, name: str, source: dict[str, str], key: str | None) -> Job:
     settings = services.settings
-    said = {
+    job_request = {
         **source,
         "name": name,
         "datasets": str(settings.datasets),
         "most": settings.largest_dataset,
     }
-    return services.jobs.submit("import", said, f"import-{name}", key)
+    return services.jobs.submit("import", job_request, f"import-{name}", key)
 
 
 async def _received(request: Request, services: Services) -> Path:

@@ -75,11 +75,11 @@ def look(page: PageId, services: CurrentServices) -> None:
 
 
 @router.post("/nudge")
-def nudge(page: PageId, asked: Nudge, services: CurrentServices) -> dict[str, Any]:
+def nudge(page: PageId, shift: Nudge, services: CurrentServices) -> dict[str, Any]:
     """Move a point on its surface by an arrow key; 404 while no scene is open."""
     return {
         "point": services.manual_registrations.open(page).nudge(
-            asked.side, asked.point, asked.right, asked.up
+            shift.side, shift.point, shift.right, shift.up
         )
     }
 
@@ -98,10 +98,10 @@ async def clicks(websocket: WebSocket, page: PageId, services: CurrentServices) 
     await websocket.accept()
     loop, waiting = asyncio.get_running_loop(), asyncio.Queue[dict[str, Any]]()
 
-    def told(said: dict[str, Any]) -> None:
-        loop.call_soon_threadsafe(waiting.put_nowait, said)
+    def send_later(answer: dict[str, Any]) -> None:
+        loop.call_soon_threadsafe(waiting.put_nowait, answer)
 
-    stop = services.manual_registrations.open(page).listen(told)
+    stop = services.manual_registrations.open(page).listen(send_later)
 
     async def send() -> None:
         while True:

@@ -100,13 +100,13 @@ def automatic(
     folder, store = services.library.path(name), RegistrationStore(services.settings.runs, name)
     if request.accept is not None:
         store.check_name(request.accept)
-    said = {
+    job_request = {
         "dataset": str(folder),
         "name": name,
         "runs": str(services.settings.runs),
         "accept": request.accept,
     }
-    return job_out(services.jobs.submit("registration", said, f"register-{name}", key))
+    return job_out(services.jobs.submit("registration", job_request, f"register-{name}", key))
 
 
 @router.post("")

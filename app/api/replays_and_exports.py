@@ -82,7 +82,7 @@ def replay(request: ReplayRequest, services: CurrentServices, key: IdempotencyKe
     dataset, settings = services.library.open(request.dataset), services.settings
     for name in request.sequences:
         dataset.sequence(name)
-    said = {
+    job_request = {
         "dataset": str(dataset.path),
         "name": request.dataset,
         "runs": str(settings.runs),
@@ -91,7 +91,7 @@ def replay(request: ReplayRequest, services: CurrentServices, key: IdempotencyKe
         "effects": effects,
         **services.registered(request.dataset, request.registration),
     }
-    return job_out(services.jobs.submit("replay", said, f"replay-{request.dataset}", key))
+    return job_out(services.jobs.submit("replay", job_request, f"replay-{request.dataset}", key))
 
 
 @router.post("/exports", status_code=202)
@@ -104,7 +104,7 @@ def export(request: ExportRequest, services: CurrentServices, key: IdempotencyKe
     else:
         store = RegistrationStore(services.settings.runs, request.dataset or "")
         store.request(request.registration or "")
-    said = {
+    job_request = {
         "runs": str(services.settings.runs),
         "run": request.run,
         "what": list(request.what),
@@ -112,7 +112,7 @@ def export(request: ExportRequest, services: CurrentServices, key: IdempotencyKe
         "registration": request.registration,
     }
     return job_out(
-        services.jobs.submit("export", said, f"export-{request.run or request.dataset}", key)
+        services.jobs.submit("export", job_request, f"export-{request.run or request.dataset}", key)
     )
 
 

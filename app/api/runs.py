@@ -138,11 +138,11 @@ def sequence(name: str, sequence: str, services: CurrentServices) -> dict[str, A
     """
     renderer = services.sessions.renderer(name, sequence)
     replay = renderer.replay
-    told = timeline_series(services.runs.get(name), replay)
+    timeline = timeline_series(services.runs.get(name), replay)
     series = [
         f"{key}_{model}"
         for key in ("distance", "paper")
-        for model in told["models"]
+        for model in timeline["models"]
         if f"{key}_{model}" in replay.arrays
     ]
     return {
@@ -156,7 +156,7 @@ def sequence(name: str, sequence: str, services: CurrentServices) -> dict[str, A
         "lumps": renderer.lumps,
         "landmarks": renderer.landmarks,
         "box": [[round(float(x), 6) for x in corner] for corner in renderer.corners],
-        **told,
+        **timeline,
     }
 
 

@@ -48,7 +48,7 @@ def look(page: PageId, services: CurrentServices, where: Direction = "reset") ->
 def stand(page: PageId, camera: Camera, services: CurrentServices) -> None:
     """Look at a run from a chosen place, also in scenes of the page that open later."""
     place, target = np.array(camera.position), np.array(camera.target)
-    services.sessions.open(page).stand(
+    services.sessions.open(page).look_from(
         camera.run, Viewpoint(place, target, np.array([0.0, 0.0, 1.0]))
     )
 

@@ -59,21 +59,21 @@ class SweepRequest(BaseModel):
 @router.post("", status_code=202)
 def start(request: SweepRequest, services: CurrentServices, key: IdempotencyKey = None) -> JobOut:
     """Check the request, then queue it; the id of the answer names job and sweep."""
-    asked = SweepSpec.from_json(request.model_dump(exclude={"dataset", "registration"}))
+    spec = SweepSpec.from_json(request.model_dump(exclude={"dataset", "registration"}))
     dataset = services.library.open(request.dataset)
-    for name in asked.sequences:
+    for name in spec.sequences:
         dataset.sequence(name)
     settings = services.settings
-    said = {
+    job_request = {
         "dataset": str(dataset.path),
         "name": request.dataset,
         "runs": str(settings.runs),
         "workers": settings.workers,
         "scheduler": settings.scheduler,
-        "sweep": asked.to_json(),
+        "sweep": spec.to_json(),
         **services.registered(request.dataset, request.registration),
     }
-    return job_out(services.jobs.submit("sweep", said, f"sweep-{request.dataset}", key))
+    return job_out(services.jobs.submit("sweep", job_request, f"sweep-{request.dataset}", key))
 
 
 @router.get("")

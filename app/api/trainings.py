@@ -57,7 +57,7 @@ class TrainingRequest(BaseModel):
     every: int = Field(default=1, ge=1, le=10_000)
     seed: int = Field(default=0, ge=0, lt=2**31)
 
-    def asked(self) -> dict[str, Any]:
+    def plan(self) -> dict[str, Any]:
         """The request as `palpate.evaluation.train_network.TrainingPlan` reads it."""
         if any(not 1 <= width <= 4096 for width in self.features):
             raise CorrectionError(f"features = {self.features}; expected 1 to 4096", key="features")
@@ -83,15 +83,16 @@ def start(
     dataset, settings = services.library.open(request.dataset), services.settings
     if request.run is not None:
         services.runs.get(request.run)
-    said = {
+    job_request = {
         "dataset": str(dataset.path),
         "name": request.dataset,
         "runs": str(settings.runs),
         "workers": settings.workers,
         "run": request.run,
-        "training": request.asked(),
+        "training": request.plan(),
     }
-    return job_out(services.jobs.submit("training", said, f"training-{request.dataset}", key))
+    label = f"training-{request.dataset}"
+    return job_out(services.jobs.submit("training", job_request, label, key))
 
 
 @router.get("")

@@ -1,4 +1,4 @@
-"""What if: a frame solved again with causes of one's own choice."""
+"""What-if: frames solved again with chosen effects, and interactive replays."""
 
 from __future__ import annotations
 
@@ -27,10 +27,17 @@ __all__ = ["router"]
 router = APIRouter(tags=["what if"])
 
 
+class LiveMessage(LiveRequest):
+    """A message of the live websocket: a `LiveRequest` with its run and sequence."""
+
+    run: str
+    sequence: str
+
+
 @router.get("/runs/{name}/sequences/{sequence}/whatif")
 def beginnings(name: str, sequence: str, services: CurrentServices) -> dict[str, Any]:
-    """The model's effects, and a finite size of every effect of the catalogue, from which to go on
-    by hand.
+    """Starting points for changes: the effects of the model, and an instance of every effect of the
+    catalogue with a finite size.
     """
     run = services.runs.get(name)
     run.replay(sequence)
@@ -44,8 +51,9 @@ def beginnings(name: str, sequence: str, services: CurrentServices) -> dict[str,
 def solve(
     name: str, sequence: str, request: WhatIfRequest, services: CurrentServices
 ) -> dict[str, Any]:
-    """Solve one frame with these effects; errors [m] of it beside those of the run's models; drawn
-    in `page` where one is given.
+    """Solve one frame with these effects; its errors [m] and those of the run's models.
+
+    The solution is drawn in `page` if one is given.
     """
     run = services.runs.get(name)
     replay = run.replay(sequence)
@@ -56,67 +64,65 @@ def solve(
         )
     session = services.sessions.get(request.page) if request.page else None
     effects = [one.model_dump() for one in request.effects]
-    moment = services.frame_solver.solve(run, sequence, request.frame, effects, request.tuned)
+    solution = services.frame_solver.solve(run, sequence, request.frame, effects, request.tuned)
     if session is not None:
-        session.override_frame(FrameOverride(name, sequence, request.frame, moment))
+        session.override_frame(FrameOverride(name, sequence, request.frame, solution))
     return {
         "frame": request.frame,
-        "distance": finite(moment.distance),
+        "distance": finite(solution.distance),
         "distance_raw": finite(replay["distance_raw"][request.frame]),
         "distance_extended": finite(replay["distance_extended"][request.frame]),
         "noise_floor": finite(replay["noise_floor"]),
-        "converged": moment.converged,
-        "outcome": moment.outcome,
+        "converged": solution.converged,
+        "outcome": solution.outcome,
     }
 
 
+@router.delete("/sessions/{page}/whatif", status_code=204)
+def show_model(page: PageId, services: CurrentServices) -> None:
+    """Show the run's own extended model again."""
+    services.sessions.get(page).override_frame(None)
+
+
 @router.post("/runs/{name}/sequences/{sequence}/live")
-def lead(
+def solve_live(
     name: str, sequence: str, request: LiveRequest, services: CurrentServices
 ) -> dict[str, Any]:
-    """Lead the tool somewhere: push depth [m] and force [N] that it feels there, from wherever it
-    was; drawn in `page` if given.
+    """Move the tool to a place: push depth [m] and force [N] there.
+
+    The solution is drawn in `page` if one is given.
     """
     session = services.sessions.get(request.page) if request.page else None
-    effects = [one.model_dump() for one in request.effects]
-    hand = InteractiveSession.of(
-        request.page or "nobody", services.runs.get(name), sequence, effects, request.tuned
-    )
-    felt = services.interactive_solver.at(
-        hand, request.at, session is not None and session.wants_inside()
-    )
+    replay = _interactive(request.page or "nobody", name, sequence, request, services)
+    inside = session is not None and session.needs_inside()
+    solution = services.interactive_solver.at(replay, request.at, inside)
     if session is not None:
-        session.touch(InteractiveOverride(name, sequence, request.shown, felt))
-    return told(felt)
+        session.show_interactive(InteractiveOverride(name, sequence, request.shown, solution))
+    return _live_values(solution)
 
 
 @router.delete("/sessions/{page}/live", status_code=204)
-def let_go(page: PageId, services: CurrentServices) -> None:
+def end_live(page: PageId, services: CurrentServices) -> None:
     """Show the recording again."""
-    services.sessions.get(page).touch(None)
+    services.sessions.get(page).show_interactive(None)
 
 
 @router.websocket("/sessions/{page}/live")
-async def led(websocket: WebSocket, page: PageId, services: CurrentServices) -> None:
-    """Places in, answers out, drawn in the page: each message is a `LiveRequest` with `run` and
-    `sequence`.
+async def live(websocket: WebSocket, page: PageId, services: CurrentServices) -> None:
+    """Answer each `LiveMessage` and draw its solution in the page.
 
-    While one is being solved only the newest is kept. The recording is shown again when the
-    connection ends.
+    Messages that arrive while one is being solved replace each other. The recording is shown again
+    when the connection ends.
     """
-    hands: dict[str, InteractiveSession] = {}
+    replays: dict[str, InteractiveSession] = {}
 
     def answer(text: str) -> dict[str, Any]:
         try:
-            return _led(services, page, hands, LiveMessage.model_validate_json(text))
+            message = LiveMessage.model_validate_json(text)
+            return _solve_message(services, page, replays, message)
         except ValidationError as error:
-            return {
-                "problem": {
-                    "kind": "RequestError",
-                    "message": error.errors()[0]["msg"],
-                    "where": {},
-                }
-            }
+            problem = {"kind": "RequestError", "message": error.errors()[0]["msg"], "where": {}}
+            return {"problem": problem}
         except PalpateError as error:
             return {"problem": as_dict(error)}
 
@@ -124,52 +130,43 @@ async def led(websocket: WebSocket, page: PageId, services: CurrentServices) -> 
         await newest_wins(websocket, answer)
     finally:
         with contextlib.suppress(Missing):
-            await asyncio.to_thread(services.sessions.get(page).touch, None)
+            await asyncio.to_thread(services.sessions.get(page).show_interactive, None)
 
 
-class LiveMessage(LiveRequest):
-    """A `LiveRequest` that says of what."""
-
-    run: str
-    sequence: str
-
-
-def _led(
-    services: Services, page: str, hands: dict[str, InteractiveSession], request: LiveMessage
+def _solve_message(
+    services: Services, page: str, replays: dict[str, InteractiveSession], message: LiveMessage
 ) -> dict[str, Any]:
-    """Solve, draw and tell; `hands` keeps what was looked up for the connection's last request of
-    the same kind.
-    """
-    key = request.model_dump_json(exclude={"at"})
-    if key not in hands:
-        hands.clear()
-        effects = [one.model_dump() for one in request.effects]
-        hands[key] = InteractiveSession.of(
-            page, services.runs.get(request.run), request.sequence, effects, request.tuned
-        )
+    """Solve and draw; `replays` caches the replay of the connection's last message."""
+    key = message.model_dump_json(exclude={"at"})
+    if key not in replays:
+        replays.clear()
+        replays[key] = _interactive(page, message.run, message.sequence, message, services)
     session = services.sessions.open(page)
-    felt = services.interactive_solver.at(hands[key], request.at, session.wants_inside())
-    session.touch(InteractiveOverride(request.run, request.sequence, request.shown, felt))
+    solution = services.interactive_solver.at(replays[key], message.at, session.needs_inside())
+    session.show_interactive(
+        InteractiveOverride(message.run, message.sequence, message.shown, solution)
+    )
     return {
-        **told(felt),
-        "at": list(request.at),
+        **_live_values(solution),
+        "at": list(message.at),
         "drawn": None if session.picture is None else session.picture.scale(),
     }
 
 
-def told(felt: InteractiveFrame) -> dict[str, Any]:
-    """What was felt, plain values, SI."""
+def _interactive(
+    page: str, run: str, sequence: str, request: LiveRequest, services: Services
+) -> InteractiveSession:
+    effects = [one.model_dump() for one in request.effects]
+    return InteractiveSession.of(page, services.runs.get(run), sequence, effects, request.tuned)
+
+
+def _live_values(solution: InteractiveFrame) -> dict[str, Any]:
+    """Push depth, force and state of a solution as plain values, SI."""
     return {
-        "depth": finite(felt.depth),
-        "force": finite(felt.force, digits=6),
-        "tool": finite(felt.tool),
-        "converged": felt.converged,
-        "outcome": felt.outcome,
-        "seconds": round(felt.seconds, 5),
+        "depth": finite(solution.depth),
+        "force": finite(solution.force, digits=6),
+        "tool": finite(solution.tool),
+        "converged": solution.converged,
+        "outcome": solution.outcome,
+        "seconds": round(solution.seconds, 5),
     }
-
-
-@router.delete("/sessions/{page}/whatif", status_code=204)
-def back(page: PageId, services: CurrentServices) -> None:
-    """Show the run's own extended model again."""
-    services.sessions.get(page).override_frame(None)

@@ -98,13 +98,13 @@ def blind(
 
     Writes results.jsonl, summary.json and report.html into the folder. Can be stopped and resumed.
     """
-    wanted, kept = _parted(effects), folder / "kept"
+    wanted, kept = _split(effects), folder / "kept"
     if scenarios is None:
         if kinds is not None:
             raise typer.BadParameter("--kinds needs --scenarios, the number of cases to draw")
         cases = all_cases(seed, CONTROLS if controls is None else controls, wanted, short)
     else:
-        cases = draw_cases(seed, scenarios, _parted(kinds), wanted, controls, short)
+        cases = draw_cases(seed, scenarios, _split(kinds), wanted, controls, short)
     cases = [case for case in cases if only is None or only in case.name]
     if score:
         results = known_results(folder, cases, any_version)
@@ -144,7 +144,7 @@ def _nothing_of(folder: Path, wanted: int) -> str:
     )
 
 
-def _parted(text: str | None) -> list[str] | None:
+def _split(text: str | None) -> list[str] | None:
     return None if text is None else [part.strip() for part in text.split(",") if part.strip()]
 
 
@@ -169,12 +169,12 @@ def _cases(results: Sequence[CaseResult]) -> Table:
         table.add_column(column, justify="right")
     for result in results:
         removed = "–" if result.removed is None else f"{100 * result.removed:.0f} %"
-        told = Table.grid(padding=(0, 1))
-        told.add_row("[dim]hidden[/]", hidden_text(result))
-        told.add_row("[dim]named[/]", named_text(result))
+        effect_rows = Table.grid(padding=(0, 1))
+        effect_rows.add_row("[dim]hidden[/]", hidden_text(result))
+        effect_rows.add_row("[dim]named[/]", named_text(result))
         table.add_row(
             "[green]✓[/]" if result.right else "[red]✗[/]",
-            Group(result.name, told),
+            Group(result.name, effect_rows),
             result.verdict,
             f"{result.gain:.0f} ({result.bound:.0f}) nats",
             removed,

@@ -59,7 +59,7 @@ def progress(title: str) -> Iterator[Report]:
     with shown as show:
 
         def report(fraction: float, text: str) -> None:
-            if stop.asked:
+            if stop.received:
                 raise Cancelled
             show(min(1.0, fraction), text)
 

@@ -97,7 +97,7 @@ def evaluate(
 
 
 def _ladder(
-    dataset: Path, asked: dict[str, Any], truth: bool, workers: int, runs: Path
+    dataset: Path, choices: dict[str, Any], truth: bool, workers: int, runs: Path
 ) -> dict[str, Any]:
     from palpate.app.jobs.tasks import evaluate as climb
     from palpate.app.storage.evaluation_store import EvaluationStore
@@ -105,7 +105,7 @@ def _ladder(
     name = f"{dataset.resolve().name}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(2)}"
     hidden = true_effects(dataset) if truth else None
     request = {
-        **asked,
+        **choices,
         "dataset": str(dataset),
         "runs": str(runs),
         "workers": workers,
@@ -158,12 +158,12 @@ def _make(dataset: Path, size: str, workers: int) -> None:
     """Make the virtual dataset of the paper's protocol, unless it exists."""
     from palpate.synthetic import PAPER_SEED, PAPER_SIZES, make_dataset, paper_scenario
 
-    wanted = next((one for one in PAPER_SIZES if one == size), None)
-    if wanted is None:
+    known_size = next((one for one in PAPER_SIZES if one == size), None)
+    if known_size is None:
         raise typer.BadParameter(f"--size is one of {', '.join(PAPER_SIZES)}, not {size!r}")
     if not dataset.is_dir():
         with progress(f"make {dataset.name}") as report:
-            make_dataset(dataset, paper_scenario(wanted), PAPER_SEED, workers, report)
+            make_dataset(dataset, paper_scenario(known_size), PAPER_SEED, workers, report)
 
 
 def _paper(

@@ -62,7 +62,7 @@ def sweep(
     from palpate.sweep.run_sweep import run_sweep
     from palpate.sweep.sweep_spec import SweepSpec
 
-    asked = {
+    plan = {
         "parameters": [_axis(text) for text in parameter],
         "fixed": dict(_fixed(text) for text in fix or ()),
         "method": method,
@@ -74,11 +74,11 @@ def sweep(
         "measure": measure,
         "seed": seed,
     }
-    request = SweepSpec.from_json(asked)
+    request = SweepSpec.from_json(plan)
     accepted = accepted_for(dataset, registration, runs)
     opened, sweeps = open_dataset(dataset).registered(accepted), SweepStore(runs)
-    said = [str(dataset.resolve()), request.to_json(), *([accepted.to_json()] if accepted else [])]
-    folder = sweeps.folder / request_name(dataset.resolve().name, said)
+    parts = [str(dataset.resolve()), request.to_json(), *([accepted.to_json()] if accepted else [])]
+    folder = sweeps.folder / request_name(dataset.resolve().name, parts)
     with progress(f"sweep {dataset.name}") as report:
         found = run_sweep(
             opened,

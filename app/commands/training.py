@@ -37,7 +37,7 @@ def train(
         typer.Option(help="How far the simulation may be corrected along each axis, in voxels."),
     ] = 0.5,
     inputs: Annotated[
-        str, typer.Option(help="What the network is told of the tool: pose, velocity, force.")
+        str, typer.Option(help="Inputs of the network on the tool: pose, velocity, force.")
     ] = "pose",
     distance: Annotated[str, typer.Option(help="chamfer, symmetric or hausdorff.")] = "chamfer",
     hold: Annotated[
@@ -83,17 +83,17 @@ def train(
         "device": device,
         "seed": seed,
     }
-    asked = {"spec": spec, "every": every}
+    plan = {"spec": spec, "every": every}
     hidden = true_effects(dataset) if truth else None
     name = dataset.resolve().name
-    folder = request_name(f"{name}-{kind}", [str(dataset.resolve()), run, hidden, asked])
+    folder = request_name(f"{name}-{kind}", [str(dataset.resolve()), run, hidden, plan])
     request = {
         "dataset": str(dataset),
         "runs": str(runs),
         "workers": workers,
         "run": run,
         "truth": hidden,
-        "training": asked,
+        "training": plan,
         "folder": folder,
     }
     with progress(f"train {dataset.name}") as report:

@@ -167,7 +167,7 @@ class JobQueue:
         known = self._records.by_key(job.key or "")
         if known is None:
             raise Conflict(f"there is a job {job.id} already", job=job.id)
-        if (known.kind, _asked(known)) != (job.kind, _asked(job)):
+        if (known.kind, _request_of(known)) != (job.kind, _request_of(job)):
             raise Conflict(
                 f"the key {job.key} was another request's: job {known.id}",
                 key=job.key,
@@ -190,8 +190,8 @@ class JobQueue:
                 error={"kind": "Missing", "message": message, "where": {}},
             )
             return
-        if said := self._tidy():
-            self._records.note(identity, "info", said)
+        if text := self._tidy():
+            self._records.note(identity, "info", text)
         scratch = Path(job.request["scratch"])
         scratch.mkdir(parents=True, exist_ok=True)
         ending: tuple[Any, ...] | None = None
@@ -271,9 +271,9 @@ class JobQueue:
 
     def _finish(self, identity: str, state: JobState, **values: Any) -> None:
         if self._records.update(identity, state=state, finished=time.time(), **values):
-            told = values.get("error") or {}
+            error = values.get("error") or {}
             self._records.note(
-                identity, "error" if told else "info", told.get("message", state.value)
+                identity, "error" if error else "info", error.get("message", state.value)
             )
 
     def _stop(self, identity: str) -> None:
@@ -285,7 +285,7 @@ class JobQueue:
                 stop_group(process.pid)
 
 
-def _asked(job: Job) -> dict[str, Any]:
+def _request_of(job: Job) -> dict[str, Any]:
     return {name: value for name, value in job.request.items() if name != "scratch"}
 
 

@@ -13,9 +13,9 @@ __all__ = ["Stop", "stop"]
 
 
 class Stop:
-    """The handler of both signals; `asked` is True after one of them."""
+    """The handler of both signals; `received` is True after one of them."""
 
-    asked = False
+    received = False
 
     def listen(self) -> None:
         """Handle the signals from now on."""
@@ -23,7 +23,7 @@ class Stop:
             signal.signal(number, self)
 
     def __call__(self, number: int, frame: FrameType | None) -> NoReturn:
-        self.asked = True
+        self.received = True
         raise KeyboardInterrupt
 
 

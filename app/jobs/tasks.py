@@ -189,7 +189,7 @@ def evaluate(request: Mapping[str, Any], report: Report) -> dict[str, Any]:
         list(request.get("trainings", ())),
         request.get("truth") is not None,
     )
-    asked = EvaluationSpec(
+    spec = EvaluationSpec(
         model=None if run is None else run.model,
         truth=request.get("truth"),
         networks=networks,
@@ -198,7 +198,7 @@ def evaluate(request: Mapping[str, Any], report: Report) -> dict[str, Any]:
     out = EvaluationStore(runs).folder / name
     found = climb(
         open_dataset(dataset),
-        asked,
+        spec,
         out,
         workers=int(request["workers"]),
         seed=int(request["seed"]),

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 __all__ = ["FrameSolver", "InteractiveSession", "InteractiveSolver"]
 
-MOST_HANDS = 8
-"""Blocks under hands that a process keeps; the one longest untouched goes first, and begins anew
-when touched again."""
+MOST_REPLAYS = 8
+"""Interactive replays that the process stores; the least recently used one is dropped, and starts
+again when it is requested."""
 
 
 class FrameSolver(WarmProcess):
@@ -66,12 +66,12 @@ class InteractiveSolver(WarmProcess):
     """Solves interactive replays, all in one process of their own."""
 
     def at(
-        self, hand: InteractiveSession, centre: tuple[float, float, float], within: bool = False
+        self, session: InteractiveSession, centre: tuple[float, float, float], within: bool = False
     ) -> InteractiveFrame:
         """Solve with the tool's centre there [m]; raises RunError where this takes too long or the
         process ends.
         """
-        return self.ask(_felt, hand, centre, within)
+        return self.ask(_interactive_frame, session, centre, within)
 
 
 def _key(run: Run, sequence: str) -> tuple[str, str, tuple[int, ...], str]:
@@ -113,22 +113,22 @@ def _solve(
     return open_resolver(folder, sequence, clouds, model).solve(frame, effects_from(effects), tuned)
 
 
-_hands: OrderedDict[str, InteractiveReplay] = OrderedDict()
+_replays: OrderedDict[str, InteractiveReplay] = OrderedDict()
 
 
-def _felt(
-    hand: InteractiveSession, centre: tuple[float, float, float], within: bool
+def _interactive_frame(
+    session: InteractiveSession, centre: tuple[float, float, float], within: bool
 ) -> InteractiveFrame:
     import numpy as np
 
     from palpate.recording.resolve_frame import open_resolver
     from palpate.recording.saved_model import effects_from
 
-    key = json.dumps([hand.name, hand.key, hand.effects, hand.tuned])
-    live = _hands.pop(key, None)
+    key = json.dumps([session.name, session.key, session.effects, session.tuned])
+    live = _replays.pop(key, None)
     if live is None:
-        live = open_resolver(*hand.key).live(effects_from(hand.effects), hand.tuned)
-    _hands[key] = live
-    while len(_hands) > MOST_HANDS:
-        _hands.popitem(last=False)
+        live = open_resolver(*session.key).live(effects_from(session.effects), session.tuned)
+    _replays[key] = live
+    while len(_replays) > MOST_REPLAYS:
+        _replays.popitem(last=False)
     return live.at(np.array(centre), within=within)

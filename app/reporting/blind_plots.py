@@ -1,6 +1,4 @@
-"""The blind suite's plots as SVG whose colours are the page's own variables, so that they are
-legible in light and in dark.
-"""
+"""Plots of the blind suite."""
 
 from __future__ import annotations
 
@@ -19,8 +17,8 @@ _COLUMNS = 5
 
 
 def reliability_plot(curve: Sequence[dict[str, Any]]) -> str:
-    """Stated probability against the share that is true, with binomial intervals; the area of a
-    point grows with its cases.
+    """Stated probability against the true share, with binomial intervals; larger points have more
+    cases.
     """
     drawn = new_figure(4.6, 3.8)
     axes = drawn.subplots()
@@ -62,9 +60,7 @@ def reliability_plot(curve: Sequence[dict[str, Any]]) -> str:
 
 
 def gain_plot(removed: Sequence[float]) -> str:
-    """How many cases by the share of the reducible error that is removed; below zero counts as
-    zero.
-    """
+    """Histogram of the removed share of the reducible error; negative shares count as zero."""
     drawn = new_figure(4.6, 3.8)
     axes = drawn.subplots()
     shares = [100 * min(max(share, 0.0), 1.0) for share in removed]
@@ -87,8 +83,8 @@ def gain_plot(removed: Sequence[float]) -> str:
 
 
 def parameter_plot(groups: dict[str, list[ReportedParameter]]) -> str:
-    """One panel for each `effect.parameter`: what is said against what is true, with the report's
-    interval; no plot of none.
+    """One panel for each `effect.parameter`: reported against true value, with the reported
+    interval; empty without parameters.
     """
     if not groups:
         return ""

@@ -41,11 +41,11 @@ TITLES = {
 }
 VERDICTS = ("several", "ambiguous", "none", "unexplained", "error")
 POSE = re.compile(r"camera_registration\.[tr][xyz]$")
-"""Parameters that a person reads as two magnitudes."""
+"""Parameters that are shown as two magnitudes."""
 
 
 def hidden_text(result: CaseResult) -> str:
-    """What is hidden, with its parameters."""
+    """The hidden effects with their parameters."""
     effects = _listed(result.hidden)
     return (
         effects
@@ -56,12 +56,12 @@ def hidden_text(result: CaseResult) -> str:
 
 
 def named_text(result: CaseResult) -> str:
-    """What is named, with its parameters; of a case that ended in an error that."""
+    """The named effects with their parameters, or the error that ended the case."""
     return result.error or _listed(result.causes) or "–"
 
 
 def _listed(causes: Iterable[dict[str, Any]]) -> str:
-    """A camera's pose by its magnitudes alone."""
+    """Effects with their parameters; a camera pose by its magnitudes only."""
     texts = []
     for cause in causes:
         entries = {
@@ -82,7 +82,7 @@ def target_text(target: dict[str, Any]) -> str:
 
 
 def figure_text(measured: dict[str, Any], unit: str = "1") -> tuple[str, str]:
-    """A figure and its interval, each an empty dash where there is none."""
+    """A value with its number of cases, and its interval; dashes where there is none."""
     if measured["value"] is None:
         return "–", ""
     counted = (
@@ -243,7 +243,7 @@ def _counts(counts: dict[str, int], columns: Sequence[str], right: Collection[st
 
 
 def pair_table(pairs: dict[str, int]) -> Table:
-    """How many of two hidden effects are named."""
+    """Number of named effects in cases with two hidden ones."""
     rows = [(text, str(count)) for text, count in sorted(pairs.items(), key=lambda row: -row[1])]
     return Table(("two effects hidden", "cases"), rows, (1,))
 
@@ -272,7 +272,7 @@ def parameter_table(summary: dict[str, Any]) -> Table:
 
 
 def coverage_note(summary: dict[str, Any]) -> str:
-    """How the intervals of the reports are scored; empty where no report states a level."""
+    """Note on the scoring of the reports' intervals; empty where no report states a level."""
     levels = [f"{100 * one:.0f}{NARROW}%" for one in summary["coverage"]["level_stated"]]
     if not levels:
         return ""

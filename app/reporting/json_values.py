@@ -13,7 +13,7 @@ __all__ = ["dataset_summary", "finite"]
 
 
 def finite(values: Any, digits: int = 8) -> Any:
-    """Numbers as nested lists, rounded, None for what is not finite."""
+    """Numbers as nested lists, rounded; None for those that are not finite."""
     array = np.round(np.asarray(values, dtype=float), digits)
     if array.ndim == 0:
         return float(array) if np.isfinite(array) else None
@@ -23,7 +23,7 @@ def finite(values: Any, digits: int = 8) -> Any:
 
 
 def dataset_summary(dataset: Dataset) -> dict[str, Any]:
-    """What a dataset holds, SI units."""
+    """Content of a dataset, SI units."""
     config = dataset.config
     splits = {"train": config.train, "validation": config.validation, "test": config.test}
     return {

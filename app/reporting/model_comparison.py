@@ -1,6 +1,4 @@
-"""Models side by side over sequences: what each is off by, where it was fitted and where it was
-not.
-"""
+"""Errors of models by sequence, for one run or several."""
 
 from __future__ import annotations
 
@@ -17,21 +15,23 @@ from palpate.foundation.errors import RunError
 __all__ = ["SequenceErrors", "compared", "sequence_errors"]
 
 LEAST_REDUCIBLE = 0.02
-"""Of the noise floor [1]: of less error above it no share can be said, since the floor itself is
-known no better."""
+"""Least error above the noise floor, over the floor [1], for which a share is given; the floor is
+known with about this accuracy."""
 
 
 @dataclass(frozen=True)
 class SequenceErrors:
-    """RMS over the frames of one sequence of the RMS distance between cloud and surface [m]; None
-    where no frame was seen.
+    """RMS over the frames of one sequence of the RMS distance between cloud and surface [m].
+
+    Errors are None where no frame was seen.
 
     Attributes:
         sequence: name.
-        split: train, validation or test; None where the run does not say.
-        frames: how many were seen.
-        raw, extended: of the stated and the extended model.
-        noise_floor: what a perfect model would be off by.
+        split: train, validation or test; None where the run does not state it.
+        frames: number of frames that were seen.
+        raw: error of the raw model.
+        extended: error of the extended model.
+        noise_floor: error of a perfect model.
     """
 
     sequence: str
@@ -43,8 +43,9 @@ class SequenceErrors:
 
     @property
     def removed(self) -> float | None:
-        """Share of the error above the noise floor that the extended model removes [1], at most
-        all; None where hardly any is.
+        """Share of the error above the noise floor that the extended model removes [1], at most 1.
+
+        None where there is hardly any.
         """
         if self.raw is None or self.extended is None or self.noise_floor is None:
             return None
@@ -58,7 +59,7 @@ class SequenceErrors:
 
 
 def sequence_errors(run: Run) -> list[SequenceErrors]:
-    """One row for each replayed sequence of a run, those that were fitted on first."""
+    """One row for each replayed sequence of a run, fitted ones first."""
     splits = run.origin.get("splits", {})
     rows = [_row(run.replay(name), splits.get(name)) for name in run.sequences]
     order = ("train", "validation", "test", None)
@@ -72,11 +73,9 @@ def sequence_errors(run: Run) -> list[SequenceErrors]:
 
 
 def compared(runs: Sequence[Run]) -> dict[str, Any]:
-    """Runs on the same dataset beside each other: by sequence the stated model and the extended one
-    of each run [m].
+    """Errors [m] of the raw model and of each run's extended one, by sequence.
 
-    Raises RunError where there are none, or where they are of different datasets, whose errors say
-    nothing of each other.
+    Raises RunError for no runs, and for runs of different datasets.
     """
     if not runs:
         raise RunError("no run is named to compare; name one or more", key="run")
@@ -115,9 +114,8 @@ def _row(replay: RecordedReplay, split: str | None) -> SequenceErrors:
     raw, extended = (
         np.asarray(replay[f"distance_{model}"], float) for model in ("raw", "extended")
     )
-    seen = np.isfinite(raw) & np.isfinite(
-        extended
-    )  # frames that only one model solved would compare unlike things
+    # Only frames that both models solved are comparable.
+    seen = np.isfinite(raw) & np.isfinite(extended)
     floor = float(replay["noise_floor"])
     return SequenceErrors(
         replay.name,

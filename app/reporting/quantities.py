@@ -1,4 +1,4 @@
-"""Numbers as people read them: their unit, and no more digits than are known."""
+"""Numbers with units and a sensible number of digits."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SHOWN = {
 
 
 def quantity(value: Any, unit: str, digits: int = 2) -> str:
-    """A number in the unit people read, with sensible digits: 0.00043 m is 0.43 mm."""
+    """A number in a convenient unit with sensible digits: 0.00043 m is 0.43 mm."""
     if not isinstance(value, (int, float)):
         return str(value)
     factor, shown = SHOWN.get(unit, (1.0, unit))
@@ -46,11 +46,11 @@ def _with_unit(text: str, shown: str) -> str:
 
 
 def value_and_ends(entry: dict[str, Any]) -> tuple[str, str, str]:
-    """Value, low and high end of a report's parameter, with as many decimals as tell the ends
-    apart: 1.043, 1.038, 1.048.
+    """Value, low and high end of a report's parameter, with the decimals that distinguish the ends:
+    1.043, 1.038, 1.048.
 
-    Two digits of the interval's width and of the value at least; of a value that its interval
-    dwarfs, of the width alone. An end that is not known is an empty text.
+    At least two digits of the interval's width and of the value; only of the width for a value that
+    is small against it. An unknown end is an empty text.
     """
     value, unit = entry["value"], entry.get("unit", "1")
     if not isinstance(value, (int, float)):
@@ -67,19 +67,19 @@ def value_and_ends(entry: dict[str, Any]) -> tuple[str, str, str]:
         default=0,
     )
 
-    def told(number: float | None) -> str:
+    def shown_with_unit(number: float | None) -> str:
         return (
             ""
             if number is None
             else _with_unit(f"{number * factor:z.{min(4, max(0, places))}f}", shown)
         )
 
-    return told(value), told(low), told(high)
+    return shown_with_unit(value), shown_with_unit(low), shown_with_unit(high)
 
 
 def with_interval(entry: dict[str, Any]) -> str:
-    """A parameter of a report with its interval: 5.1 kPa (4.8 to 5.4); with the value alone where
-    there is none.
+    """A parameter of a report with its interval, as 5.1 kPa (4.8 to 5.4); only the value without
+    one.
     """
     value, low, high = value_and_ends(entry)
     return f"{value} ({low.split(NARROW)[0]} to {high.split(NARROW)[0]})" if low and high else value

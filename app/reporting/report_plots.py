@@ -1,4 +1,4 @@
-"""Plots of a report that is one file: the error of each frame, sequence by sequence."""
+"""Plots of a report: the error of each frame by sequence."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _COLUMNS, _HEADROOM = 3, 1.06
 
 
 def error_plots(replays: Sequence[RecordedReplay], splits: dict[str, str]) -> str:
-    """RMS distance [mm] over time [s], one panel for each sequence on a common scale: stated and
-    extended model, noise floor.
+    """RMS distance [mm] over time [s]: one panel for each sequence, on a common scale; empty
+    without replays.
     """
     return to_svg(drawn_errors(replays, splits)) if replays else ""
 
 
 def drawn_errors(replays: Sequence[RecordedReplay], splits: dict[str, str]) -> Any:
-    """The same as a figure; at least one replay."""
+    """The figure of `error_plots` for at least one replay."""
     columns = min(_COLUMNS, len(replays))
     rows = math.ceil(len(replays) / columns)
     drawn = new_figure(3.0 * columns, 1.9 * rows)
@@ -45,7 +45,7 @@ def drawn_errors(replays: Sequence[RecordedReplay], splits: dict[str, str]) -> A
             loc="left",
         )
         axes.locator_params(nbins=4)
-    # Once all are drawn: a limit that is set before holds for those that come after.
+    # After all curves are drawn: a limit that is set earlier is not extended by later ones.
     panels[0].set_ylim(0.0, _HEADROOM * 1e3 * max(_largest(replay) for replay in replays))
     for axes in panels[len(replays) :]:
         axes.set_visible(False)
@@ -55,6 +55,6 @@ def drawn_errors(replays: Sequence[RecordedReplay], splits: dict[str, str]) -> A
 
 
 def _largest(replay: RecordedReplay) -> float:
-    """Of errors and floor [m]; NaN is a frame without a comparison."""
+    """Largest error or noise floor [m]; NaN is a frame without a comparison."""
     curves = [np.asarray(replay[f"distance_{model}"]) for model in ("raw", "extended")]
     return float(np.nanmax(np.concatenate([*curves, [float(replay["noise_floor"]), 1e-6]])))

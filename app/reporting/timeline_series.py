@@ -1,6 +1,4 @@
-"""What happens in each frame of a replayed sequence beside its errors: how deep the tool is, when
-it touches, where it is worst.
-"""
+"""Series of each frame of a replayed sequence: push depth, contact, forces and worst frames."""
 
 from __future__ import annotations
 
@@ -29,15 +27,16 @@ log = logging.getLogger(__name__)
 MODELS = ("raw", "extended", "corrected")
 MOST_WORST = 3
 FLAT = 2.0e-4
-"""How far a vertex of a box may lie from its faces [m]."""
+"""Largest distance of a vertex of a box from its faces [m]."""
 
 
 def timeline_series(run: Run, replay: RecordedReplay) -> dict[str, Any]:
-    """All series of a sequence for the timeline; null where the data or the run do not hold them.
+    """All series of a sequence for the timeline; null where the data or the run do not contain
+    them.
 
-    `depth` [m], `force` as measured [N], and by model `forces` [N] and `iterations` have one number
-    for each frame; `touching` holds first and last frames, `worst` frames in the order of their raw
-    error, `failed` by model those that found no equilibrium.
+    `depth` [m], the measured `force` [N], and by model `forces` [N] and `iterations` have one
+    number for each frame; `touching` has first and last frames of the contact spells, `worst`
+    frames in the order of their raw error, `failed` by model the frames without equilibrium.
     """
     depth, force = push_depth(replay), contact_force(run, replay)
     iterations, forces = by_model(replay, "iterations"), by_model(replay, "force")
@@ -67,7 +66,7 @@ def by_model(replay: RecordedReplay, key: str) -> dict[str, Any]:
 
 
 def models_of(replay: RecordedReplay) -> tuple[str, ...]:
-    """The models whose surface and errors the run holds: `corrected` is in few of them."""
+    """Models whose surface and errors the run contains; few runs have `corrected`."""
     return tuple(
         name
         for name in MODELS
@@ -76,11 +75,10 @@ def models_of(replay: RecordedReplay) -> tuple[str, ...]:
 
 
 def push_depth(replay: RecordedReplay) -> FloatArray | None:
-    """How far the tool as the stated model has it reaches into the block at rest (f,) [m], 0 apart
-    from it; None if it is no box.
+    """Penetration of the raw model's tool into the block at rest (f,) [m], 0 apart from it.
 
-    The depth is radius minus the signed distance of the tool's centre to the box; the base lies on
-    the table and is no way out.
+    It is radius minus the signed distance of the tool's centre to the box; the base lies on the
+    table and is no way out. None if the phantom is no box.
     """
     rest = np.asarray(replay["rest"], dtype=float)
     low, high = rest.min(axis=0), rest.max(axis=0)
@@ -104,8 +102,8 @@ def touching(depth: FloatArray) -> list[list[int]]:
 
 
 def contact_force(run: Run, replay: RecordedReplay) -> FloatArray | None:
-    """Size of the measured force on the tool (f,) [N] at the frames, NaN where none was recorded;
-    None without any.
+    """Magnitude of the measured force on the tool (f,) [N] at the frames, NaN outside the
+    recording; None without forces.
     """
     from palpate.dataset import open_dataset
 
@@ -124,8 +122,8 @@ def contact_force(run: Run, replay: RecordedReplay) -> FloatArray | None:
 
 
 def worst_frames(errors: FloatArray, most: int = MOST_WORST) -> list[int]:
-    """The peaks of an error (f,), the highest first, none within a twelfth of the sequence of a
-    higher one.
+    """Peaks of an error (f,), the highest first; none within a twelfth of the sequence of a higher
+    one.
     """
     seen = np.where(np.isfinite(errors), errors, -np.inf)
     around = np.concatenate([[-np.inf], seen, [-np.inf]])

@@ -1,6 +1,4 @@
-"""What stands around the models: the touched landmarks, the fixed base, a lump that was found, the
-tool's path.
-"""
+"""Figures around the models: touched landmarks, fixed base, lumps, and the tool's path."""
 
 from __future__ import annotations
 
@@ -12,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from palpate.app.scene import colours
-from palpate.app.scene.figures import Figure, LinesFigure, SurfaceFigure
+from palpate.app.scene.figures import Figure, LinesFigure, SurfaceFigure, float32
 from palpate.app.scene.model_layer import ModelLayer
 from palpate.app.scene.surface_bands import IntArray, lattice
 from palpate.app.storage.run_store import Run
@@ -28,8 +26,7 @@ AHEAD = (196, 201, 208)
 
 @dataclass(frozen=True)
 class Lump:
-    """A stiff inclusion that was found: centre (x, y, z) and radius, each as low, value, high
-    [m]."""
+    """A stiff inclusion: centre (x, y, z) and radius, each as low, value, high [m]."""
 
     centre: tuple[tuple[float, float, float], ...]
     radius: tuple[float, float, float]
@@ -37,14 +34,14 @@ class Lump:
 
 @dataclass(frozen=True, eq=False)
 class Annotations:
-    """Of one run, phantom frame.
+    """Annotations of one run, phantom frame.
 
     Attributes:
         landmarks: (n, 3) stated places [m].
-        touches: (n, 3) where the tool was when it touched them [m].
-        loose: edge (as "-x") and extent [m] of each strip of the base that the extended model does
-            not hold.
-        lumps: that were found.
+        touches: (n, 3) places of the tool when it touched them [m].
+        loose: edge (as "-x") and extent [m] of each strip of the base that is detached in the
+            extended model.
+        lumps: inclusions of the causes.
     """
 
     landmarks: FloatArray
@@ -52,9 +49,8 @@ class Annotations:
     loose: tuple[tuple[str, float], ...] = ()
     lumps: tuple[Lump, ...] = ()
 
-    def touched(self) -> dict[str, Figure]:
-        """A cross at each landmark, a bead where it was touched, and a line for what lies
-        between."""
+    def landmark_figures(self) -> dict[str, Figure]:
+        """A cross at each landmark, a bead where it was touched, and a line between them."""
         if not len(self.landmarks):
             return {}
         arms = CROSS / 2 * np.stack([-np.eye(3), np.eye(3)], axis=1)
@@ -64,15 +60,13 @@ class Annotations:
         beads = (self.touches[:, None] + TOUCH * ball).reshape(-1, 3)
         turns = (faces + len(ball) * np.arange(len(self.touches))[:, None, None]).reshape(-1, 3)
         return {
-            "landmarks-crosses": LinesFigure(_single(crosses), colours.LANDMARK, 1.8),
-            "landmarks-misses": LinesFigure(_single(misses), colours.TOOL, 1.0),
-            "landmarks-touches": SurfaceFigure(_single(beads), turns, colours.TOOL),
+            "landmarks-crosses": LinesFigure(float32(crosses), colours.LANDMARK, 1.8),
+            "landmarks-misses": LinesFigure(float32(misses), colours.TOOL, 1.0),
+            "landmarks-touches": SurfaceFigure(float32(beads), turns, colours.TOOL),
         }
 
-    def base(self, low: FloatArray, high: FloatArray, extended: bool) -> dict[str, Figure]:
-        """The sign for a fixed support around the foot of a block between these corners (3,):
-        hatched where it is held.
-        """
+    def base_figures(self, low: FloatArray, high: FloatArray, extended: bool) -> dict[str, Figure]:
+        """Hatching around the fixed base of a block between these corners (3,)."""
         corners = np.array(
             [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]]
         )
@@ -88,7 +82,7 @@ class Annotations:
         flat = np.concatenate([outline, np.array(ticks).reshape(-1, 2, 2)])
         return {
             "base": LinesFigure(
-                _single(np.dstack([flat, np.full(flat.shape[:2], 2e-4)])), colours.SUPPORT, 1.6
+                float32(np.dstack([flat, np.full(flat.shape[:2], 2e-4)])), colours.SUPPORT, 1.6
             )
         }
 
@@ -100,10 +94,8 @@ class Annotations:
                 return True
         return False
 
-    def found(self, layer: ModelLayer, frame: int, opacity: float) -> dict[str, Figure]:
-        """Each lump as a ball, and around it the ellipsoid that holds it wherever it may lie within
-        its intervals.
-        """
+    def lump_figures(self, layer: ModelLayer, frame: int, opacity: float) -> dict[str, Figure]:
+        """Each lump as a ball, inside the ellipsoid of all its places within the intervals."""
         figures: dict[str, Figure] = {}
         ball, faces = sphere(28, 18)
         for number, lump in enumerate(self.lumps):
@@ -111,18 +103,18 @@ class Annotations:
             moved = layer.moved(frame, centre[None])
             at = centre if moved is None else moved[0]
             figures[f"lump-{number}"] = SurfaceFigure(
-                _single(at + lump.radius[1] * ball), faces, colours.EXTENDED, 0.55 * opacity
+                float32(at + lump.radius[1] * ball), faces, colours.EXTENDED, 0.55 * opacity
             )
             middle = at - centre + np.array([(low + high) / 2 for low, _, high in lump.centre])
             reach = lump.radius[2] + np.array([(high - low) / 2 for low, _, high in lump.centre])
             figures[f"lump-{number}-interval"] = SurfaceFigure(
-                _single(middle + reach * ball), faces, colours.EXTENDED, 0.2 * opacity
+                float32(middle + reach * ball), faces, colours.EXTENDED, 0.2 * opacity
             )
         return figures
 
 
 def annotations_of(run: Run) -> Annotations:
-    """From what the run says of its model and causes; what it does not say is not there."""
+    """Annotations from a run's model and causes; missing data give no figures."""
     try:
         setup = run.model.get("setup", {})
     except RunError:
@@ -143,7 +135,7 @@ def annotations_of(run: Run) -> Annotations:
 
 
 def _lumps(causes: Sequence[dict[str, Any]]) -> list[Lump]:
-    found = []
+    lumps = []
     for cause in causes:
         parameters = cause.get("parameters", {})
         if cause.get("effect") != "stiff_inclusion" or not {"x", "y", "z", "radius"} <= set(
@@ -151,8 +143,8 @@ def _lumps(causes: Sequence[dict[str, Any]]) -> list[Lump]:
         ):
             continue
         spans = {name: _span(parameters[name]) for name in ("x", "y", "z", "radius")}
-        found.append(Lump((spans["x"], spans["y"], spans["z"]), spans["radius"]))
-    return found
+        lumps.append(Lump((spans["x"], spans["y"], spans["z"]), spans["radius"]))
+    return lumps
 
 
 def _span(parameter: dict[str, Any]) -> tuple[float, float, float]:
@@ -164,8 +156,7 @@ def _span(parameter: dict[str, Any]) -> tuple[float, float, float]:
 
 
 def path_lines(layer: ModelLayer, frame: int) -> dict[str, Figure]:
-    """The way of the tool's centre through the sequence: dark until this frame, light from
-    there."""
+    """Path of the tool's centre through the sequence: dark until this frame, light after it."""
     places = layer.path
     if len(places) < 2:
         return {}
@@ -173,20 +164,16 @@ def path_lines(layer: ModelLayer, frame: int) -> dict[str, Figure]:
     shades = np.where((np.arange(len(segments)) < frame)[:, None, None], colours.TOOL, AHEAD)
     return {
         "path": LinesFigure(
-            _single(segments), np.broadcast_to(shades, segments.shape).astype(np.uint8), 1.8
+            float32(segments), np.broadcast_to(shades, segments.shape).astype(np.uint8), 1.8
         )
     }
 
 
 @lru_cache(maxsize=4)
 def sphere(around: int, down: int) -> tuple[FloatArray, IntArray]:
-    """Vertices (n, 3) and triangles of a ball of radius one."""
+    """Vertices (n, 3) and triangles of a unit sphere."""
     turn, fall = np.meshgrid(np.linspace(0, 2 * np.pi, around + 1), np.linspace(0, np.pi, down + 1))
     points = np.stack(
         [np.sin(fall) * np.cos(turn), np.sin(fall) * np.sin(turn), np.cos(fall)], axis=-1
     )
     return points.reshape(-1, 3), lattice(down + 1, around + 1)
-
-
-def _single(values: Any) -> Any:
-    return np.ascontiguousarray(values, dtype=np.float32)

@@ -1,6 +1,4 @@
-"""The one colour of each thing, and the map of signed errors; the page and the scene both read them
-from here.
-"""
+"""Colours of all things, and the colour maps; the page reads them from here."""
 
 from __future__ import annotations
 
@@ -81,8 +79,8 @@ SEQUENTIAL: tuple[Rgb, ...] = (
 
 
 def band_of(error: FloatArray, limit: float) -> IntArray:
-    """The band 0..BANDS-1 of each signed error [m] for a scale of -limit..limit [m]; BANDS where
-    the error is NaN (unseen).
+    """Band 0..BANDS-1 of each signed error [m] on a scale of -limit..limit [m]; BANDS for NaN
+    (unseen).
     """
     scaled = np.floor((error / limit + 1.0) * (BANDS / 2.0))
     bands = np.clip(np.nan_to_num(scaled, nan=0.0), 0, BANDS - 1).astype(np.int64)
@@ -90,9 +88,7 @@ def band_of(error: FloatArray, limit: float) -> IntArray:
 
 
 def step_of(values: FloatArray, limit: float) -> IntArray:
-    """The step 0..len(SEQUENTIAL)-1 of each value without sign for a scale of 0..limit;
-    len(SEQUENTIAL) where it is NaN.
-    """
+    """Step 0..len(SEQUENTIAL)-1 of each value on a scale of 0..limit; len(SEQUENTIAL) for NaN."""
     steps = np.clip(
         np.floor(np.nan_to_num(values, nan=0.0) / limit * len(SEQUENTIAL)), 0, len(SEQUENTIAL) - 1
     ).astype(np.int64)
@@ -100,21 +96,26 @@ def step_of(values: FloatArray, limit: float) -> IntArray:
 
 
 def nice_limit(errors: FloatArray) -> float:
-    """A round scale end [m] that holds 95 % of the absolute errors [m], at least 0.1 mm."""
+    """Round end of a scale [m] that contains 95 % of the absolute errors [m]; at least 0.1 mm."""
     return nice_end(errors, 0.95, 1e-4, 1e-3)
 
 
 def nice_end(values: FloatArray, share: float, least: float, otherwise: float) -> float:
-    """A round scale end, at least `least`, that holds this share of the absolute values;
-    `otherwise` where all are NaN.
+    """Round end of a scale.
+
+    Args:
+        values: to be shown.
+        share: of the absolute values that the scale contains [1].
+        least: smallest end.
+        otherwise: end where all values are NaN.
     """
     seen = np.abs(values[np.isfinite(values)])
     if seen.size == 0:
         return otherwise
-    wanted = max(float(np.quantile(seen, share)), least)
-    decade = 10.0 ** np.floor(np.log10(wanted))
+    least_end = max(float(np.quantile(seen, share)), least)
+    decade = 10.0 ** np.floor(np.log10(least_end))
     steps = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])
-    return float(round(decade * steps[np.searchsorted(steps, wanted / decade - 1e-9)], 9))
+    return float(round(decade * steps[np.searchsorted(steps, least_end / decade - 1e-9)], 9))
 
 
 def palette() -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""A cut through a block: what is left of its surface, and the face that the cut opens."""
+"""Sections through a block: the remaining surface, and the cut face."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from palpate.foundation.arrays import FloatArray
 __all__ = ["clipped", "cut_face", "depth_inside"]
 
 CAP_SPACING = 1.2e-3
-"""Of the points on a cut face, about [m]."""
+"""Approximate spacing of the points on a cut face [m]."""
 
 
 def depth_inside(section: Section, places: FloatArray) -> FloatArray:
-    """How far inside what is left these places (..., 3) [m] at rest lie [m]; negative where they
-    are cut away.
+    """Distance of places (..., 3) [m] at rest from the cutting plane [m]; negative where they are
+    cut away.
     """
     away = np.asarray(places, dtype=float)[..., "xyz".index(section.axis)] - section.at
     return np.asarray(away if section.flip else -away)
 
 
 def clipped(surface: FineSurface, rest: FloatArray, section: Section) -> FineSurface:
-    """The part of a surface that is left; triangles that the plane crosses are split along it.
+    """The remaining part of a surface; triangles across the plane are split along it.
 
     New points are weighted means of the same coarse vertices (v, 3) [m], so that they move with the
     material.
@@ -33,7 +33,7 @@ def clipped(surface: FineSurface, rest: FloatArray, section: Section) -> FineSur
     count = good[surface.faces].sum(axis=1)
     whole = surface.faces[count == 3]
     crossed = surface.faces[(count > 0) & (count < 3)]
-    # Turned so that the corner that is alone on its side comes first.
+    # Rotate each triangle so that the corner that is alone on its side comes first.
     alone = np.where(
         good[crossed].sum(axis=1) == 1, good[crossed].argmax(axis=1), good[crossed].argmin(axis=1)
     )
@@ -59,7 +59,7 @@ def clipped(surface: FineSurface, rest: FloatArray, section: Section) -> FineSur
 def _between(
     surface: FineSurface, inside: FloatArray, one: IntArray, other: IntArray
 ) -> tuple[IntArray, FloatArray]:
-    """Where the plane meets the edges between points, as means of the corners of both."""
+    """Intersections of edges with the plane, as weighted means of the edges' corners."""
     span = inside[one] - inside[other]
     share = (inside[one] / np.where(span == 0, 1.0, span))[:, None]
     weights = np.hstack([surface.weights[one] * (1 - share), surface.weights[other] * share])
@@ -69,8 +69,9 @@ def _between(
 def cut_face(
     low: FloatArray, high: FloatArray, section: Section
 ) -> tuple[FloatArray, IntArray] | None:
-    """Places (n, 3) [m] at rest and triangles (m, 3) of the face between the corners (3,) of a
-    block; None where it misses it.
+    """Places (n, 3) [m] at rest and triangles (m, 3) of the cut face of a block.
+
+    `low` and `high` are the corners (3,) of the block. None where the plane misses it.
     """
     axis = "xyz".index(section.axis)
     if not low[axis] < section.at < high[axis]:

@@ -1,6 +1,4 @@
-"""What a picture is made of: plain arrays with colours, in the phantom frame [m]; nothing here
-knows how it is drawn.
-"""
+"""Figures of a picture: plain arrays with colours, in the phantom frame [m]."""
 
 from __future__ import annotations
 
@@ -34,8 +32,9 @@ HERE: Place = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class SurfaceFigure:
-    """A surface of one colour: vertices (n, 3) [m], faces (m, 3); `at` is how far it is shifted
-    [m], as of all figures.
+    """A surface of one colour: vertices (n, 3) [m], faces (m, 3).
+
+    All figures have `at`, their shift [m].
     """
 
     vertices: PointArray
@@ -78,7 +77,7 @@ class ToolFigure:
 
 @dataclass(frozen=True, eq=False)
 class LabelFigure:
-    """Words at a place (3,) [m]."""
+    """Text at a place (3,) [m]."""
 
     text: str
     place: FloatArray
@@ -89,7 +88,7 @@ Figure = SurfaceFigure | CloudFigure | LinesFigure | ToolFigure | LabelFigure
 
 
 def checksum(frame: int, figures: Mapping[str, Figure]) -> str:
-    """A short digest of everything in a picture, for comparing what two places hold."""
+    """A short digest of all arrays of a picture."""
     digest = hashlib.sha256(str(frame).encode())
     for name in sorted(figures):
         digest.update(name.encode())
@@ -101,3 +100,8 @@ def checksum(frame: int, figures: Mapping[str, Figure]) -> str:
                 else repr(value).encode()
             )
     return digest.hexdigest()[:16]
+
+
+def float32(values: Any) -> PointArray:
+    """Values as a contiguous array of single precision, as figures store them."""
+    return np.ascontiguousarray(values, dtype=np.float32)

@@ -1,8 +1,6 @@
-"""Manual registration as it is clicked: what a page wants shown goes in, points under its clicks
-come out.
+"""Manual registration: draws pairs of points, and finds the points of clicks.
 
-The page keeps the pairs, with undo and over reloads; here is only what is drawn of them, and which
-point a ray means.
+The page stores the pairs, with undo and over reloads.
 """
 
 from __future__ import annotations
@@ -31,31 +29,31 @@ MOST_SESSIONS = 32
 APART = 0.03
 """Gap [m] between phantom and cloud side by side."""
 SNAP = 14.0
-"""A landmark within so many pixels of a click is meant by it."""
+"""Distance from a click within which a landmark is selected [pixel]."""
 ARROW = 0.022
 log = logging.getLogger(__name__)
 
 
 class ManualRegistration:
-    """One page: what it shows, and the browsers' scenes that show it."""
+    """Manual registration in one page: its view, and the scenes of its browsers."""
 
     def __init__(self, phantom_of: Callable[[str], Phantom]) -> None:
         self._phantom_of = phantom_of
         self._scenes: list[PairScene] = []
         self._lock = threading.RLock()
-        self._told: list[Callable[[dict[str, Any]], None]] = []
+        self._listeners: list[Callable[[dict[str, Any]], None]] = []
         self._shown: Shown | None = None
         self._phantom: tuple[str, Phantom] | None = None
         self._start: tuple[tuple[str, str], Transform] | None = None
         self._looked: tuple[str, str, bool] | None = None
 
-    def listen(self, told: Callable[[dict[str, Any]], None]) -> Callable[[], None]:
-        """Have `told` called with each pick, from any thread; returns what ends that."""
-        self._told.append(told)
-        return lambda: self._told.remove(told)
+    def listen(self, picked: Callable[[dict[str, Any]], None]) -> Callable[[], None]:
+        """Call `picked` with each pick, from any thread; returns a function that ends this."""
+        self._listeners.append(picked)
+        return lambda: self._listeners.remove(picked)
 
     def show(self, shown: Shown) -> dict[str, Any]:
-        """Draw this in all scenes of the page; says what is drawn."""
+        """Draw this in all scenes of the page; returns a summary."""
         with self._lock:
             phantom = self._open(shown.dataset)
             self._shown = shown
@@ -71,43 +69,41 @@ class ManualRegistration:
     def look(self) -> None:
         """Turn the cameras to cloud and phantom."""
         with self._lock:
-            phantom, shown = self._asked()
+            phantom, shown = self._current()
             self._look(self._picture(phantom, shown))
 
     def join(self, scene: PairScene) -> None:
-        """A browser's scene was opened."""
+        """Add a browser's scene."""
         with self._lock:
             self._scenes.append(scene)
             if self._shown is not None:
-                phantom, shown = self._asked()
+                phantom, shown = self._current()
                 picture = self._picture(phantom, shown)
                 scene.draw(picture)
                 scene.look(picture)
 
     def leave(self, scene: PairScene) -> None:
-        """A browser's scene was closed."""
+        """Remove a browser's scene."""
         with self._lock:
             self._scenes = [other for other in self._scenes if other is not scene]
 
     def click(self, ray: Ray) -> None:
-        """A click in a scene: tells the page which point it means, or why none."""
+        """Send the point of a click to the page, or the reason why there is none."""
         try:
             with self._lock:
-                said = self.pick(ray) if self._shown is not None else None
+                answer = self.pick(ray) if self._shown is not None else None
         except PalpateError as error:
-            said = {"problem": error.message}
+            answer = {"problem": error.message}
         except Exception:
             log.exception("a click came to nothing")
             return
-        for told in list(self._told) if said else []:
-            told(said or {})
+        for listener in list(self._listeners) if answer else []:
+            listener(answer or {})
 
     def pick(self, ray: Ray) -> dict[str, Any]:
-        """The point under a ray on the side that is picked on, or the end of a pair that is there
-        already.
-        """
+        """The point on the active side under a ray, or the mark under it."""
         with self._lock:
-            phantom, shown = self._asked()
+            phantom, shown = self._current()
             side = ray.mark[1] if ray.mark else shown.mode
             if (
                 ray.mark is None
@@ -137,11 +133,9 @@ class ManualRegistration:
             }
 
     def nudge(self, side: str, point: list[float], right: float, up: float) -> list[float]:
-        """The point moved on its surface by so much [m] to the right and upwards as the person sees
-        it; itself at an edge.
-        """
+        """The point moved on its surface by this much [m] on the screen; unchanged at an edge."""
         with self._lock:
-            phantom, shown = self._asked()
+            phantom, shown = self._current()
             if not self._scenes:
                 raise Missing("no scene is open for this page", session=shown.dataset)
             pose = self._pose(phantom, shown)
@@ -154,7 +148,7 @@ class ManualRegistration:
             moved = slide_on_cloud(pose.apply(phantom.cloud), start, eye, direction)
             return point if moved is None else [float(x) for x in pose.inverse().apply(moved)]
 
-    def _asked(self) -> tuple[Phantom, Shown]:
+    def _current(self) -> tuple[Phantom, Shown]:
         if self._shown is None:
             raise Missing("this page shows no registration yet")
         return self._open(self._shown.dataset), self._shown
@@ -165,9 +159,7 @@ class ManualRegistration:
         return self._phantom[1]
 
     def _pose(self, phantom: Phantom, shown: Shown) -> Transform:
-        """By which the cloud is drawn: the fit, else the start, and beside the phantom where that
-        is wanted.
-        """
+        """Pose of the drawn cloud: the fit, else the start, shifted aside unless `over` is set."""
         key = (shown.dataset, shown.start)
         if self._start is None or self._start[0] != key:
             self._start = (key, phantom.start(shown.start))
@@ -213,7 +205,7 @@ class ManualRegistration:
             scene.look(picture)
 
     def _mark_under(self, phantom: Phantom, shown: Shown, ray: Ray, side: str) -> int | None:
-        """Which pair's end on this side lies under the ray."""
+        """Number of the pair whose mark on this side is under the ray."""
         direction = ray.direction / np.linalg.norm(ray.direction)
         for mark in self._picture(phantom, shown).marks:
             arm = mark.place - ray.origin
@@ -234,7 +226,7 @@ class ManualRegistration:
         return phantom.cloud[row], None
 
     def _behind(self, phantom: Phantom, ray: Ray, place: FloatArray) -> bool:
-        """Whether the phantom, beside which the cloud is shown, hides a place."""
+        """Whether the phantom hides a place of the cloud that is shown beside it."""
         hit = pick_mesh(phantom.vertices, phantom.faces, ray.origin, ray.direction)
         return hit is not None and float(np.linalg.norm(hit - ray.origin)) < float(
             np.linalg.norm(place - ray.origin)
@@ -269,7 +261,7 @@ class ManualRegistration:
 
 
 def _arrow(weak: WeakDirection, pivot: FloatArray) -> Arrow:
-    """An arrow of its main part, as long as can be seen."""
+    """An arrow along the larger part of a weak direction, of visible length."""
     motion, turn = np.array(weak.translation), np.array(weak.rotation)
     turns = float(np.linalg.norm(turn)) > float(np.linalg.norm(motion))
     axis = turn if turns else motion
@@ -278,7 +270,7 @@ def _arrow(weak: WeakDirection, pivot: FloatArray) -> Arrow:
 
 
 class ManualRegistrations:
-    """The registrations that pages are clicking, the oldest forgotten beyond a few dozen."""
+    """The manual registrations of all pages; the least recently used are dropped."""
 
     def __init__(self, phantom_of: Callable[[str], Phantom]) -> None:
         self._phantom_of = phantom_of
@@ -286,7 +278,7 @@ class ManualRegistrations:
         self._lock = threading.Lock()
 
     def open(self, page: str) -> ManualRegistration:
-        """That of a page, made if need be."""
+        """The registration of a page; a new one if there is none."""
         with self._lock:
             found = self._sessions.pop(page, None) or ManualRegistration(self._phantom_of)
             self._sessions[page] = found
@@ -295,13 +287,13 @@ class ManualRegistrations:
             return found
 
     def join(self, page: str, scene: PairScene) -> None:
-        """A browser's scene belongs to this page."""
+        """Add a browser's scene to a page."""
         self.open(page).join(scene)
 
     def leave(self, page: str, scene: PairScene) -> None:
-        """A browser's scene is gone."""
+        """Remove a browser's scene from a page."""
         self.open(page).leave(scene)
 
     def click(self, page: str, ray: Ray) -> None:
-        """Somebody clicked in a scene of this page."""
+        """Handle a click in a scene of a page."""
         self.open(page).click(ray)

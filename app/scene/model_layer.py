@@ -1,6 +1,4 @@
-"""One model's side of a replayed sequence: where its surface, tool and inside are in a frame, and
-what can be shown on them.
-"""
+"""One model of a replayed sequence: surface, tool, interior and quantities in each frame."""
 
 from __future__ import annotations
 
@@ -19,15 +17,13 @@ from palpate.recording.interior_fields import InteriorFields
 __all__ = ["NO_INSIDE", "FrameSolution", "ModelLayer", "end_of_scale", "model_layers"]
 
 NO_INSIDE = "this diagnosis was made before the inside was recorded: make it again to see it"
-MOST_OF_ALL = {"error": 0.95, "displacement": 0.998, "energy": 0.9}
-"""Share of what occurs that a robust scale holds; errors are noise at most places, the others next
-to nothing."""
+ROBUST_SHARES = {"error": 0.95, "displacement": 0.998, "energy": 0.9}
+"""Share of all values within a robust scale [1]; errors are noise at most places, the other
+quantities almost zero."""
 
 
 class FrameSolution(Protocol):
-    """A frame solved again, in place of a recorded one: arrays as in
-    `palpate.recording.resolve_frame.ResolvedFrame`.
-    """
+    """A frame solved again, with arrays as in `palpate.recording.resolve_frame.ResolvedFrame`."""
 
     @property
     def surface(self) -> FloatArray: ...
@@ -50,7 +46,7 @@ class FrameSolution(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class ModelLayer:
-    """A model in a sequence; `found` stands in the place of the recorded frame `instead`."""
+    """A model in a sequence; `solution` replaces the recorded frame `instead`."""
 
     replay: RecordedReplay
     model: Model
@@ -59,7 +55,7 @@ class ModelLayer:
     solution: FrameSolution | None = None
 
     def surface(self, frame: int) -> FloatArray:
-        """(v, 3) moved vertices [m]."""
+        """Moved vertices (v, 3) [m]."""
         return np.asarray(
             self._solution(frame).surface
             if frame == self.instead
@@ -77,7 +73,7 @@ class ModelLayer:
 
     @property
     def path(self) -> FloatArray:
-        """(f, 3) the tool's centres in all frames [m]."""
+        """Centres of the tool in all frames (f, 3) [m]."""
         return np.asarray(self._own("tool"), dtype=float)
 
     def camera(self, frame: int) -> Transform:
@@ -89,7 +85,7 @@ class ModelLayer:
         )
 
     def values(self, quantity: Quantity, frame: int) -> FloatArray | None:
-        """The quantity at the vertices (v,), NaN where unknown; None where the run does not hold
+        """The quantity at the vertices (v,), NaN where unknown; None where the run does not contain
         it.
         """
         if quantity == "error":
@@ -103,8 +99,7 @@ class ModelLayer:
         return self.within(quantity, frame, self.replay["rest"])
 
     def within(self, quantity: Quantity, frame: int, places: FloatArray) -> FloatArray | None:
-        """The quantity (m,) at places (m, 3) [m] in the block at rest; None where that is
-        unknown."""
+        """The quantity (m,) at places (m, 3) [m] of the block at rest; None where it is unknown."""
         inside, at = self._inside(frame)
         if inside is None or quantity == "error":
             return None
@@ -113,8 +108,8 @@ class ModelLayer:
         return inside.energy_density(at, places)
 
     def moved(self, frame: int, places: FloatArray) -> FloatArray | None:
-        """Where the material from places (m, 3) [m] at rest is; None where the run does not hold
-        the inside.
+        """Current places of the material at (m, 3) [m] at rest; None where the run has
+        no interior.
         """
         inside, at = self._inside(frame)
         return None if inside is None else places + inside.displacement(at, places)
@@ -124,17 +119,17 @@ class ModelLayer:
 
     def _solution(self, frame: int) -> FrameSolution:
         if self.solution is None:
-            raise ValueError(f"nothing was found for frame {frame}")
+            raise ValueError(f"there is no solution for frame {frame}")
         return self.solution
 
     def _own(self, key: str) -> Any:
-        """What is this model's own, or, where a correction stands on another model, that one's."""
+        """Data of this model; a correction uses those of the model it is based on."""
         names = (f"{key}_{model}" for model in (self.model, "extended", "raw"))
         return next(self.replay[name] for name in names if name in self.replay.arrays)
 
 
 def model_layers(replay: RecordedReplay) -> dict[Model, ModelLayer]:
-    """The models that a run holds."""
+    """The layers of all models in a run."""
     held = [
         model for model in MODELS if model in replay.arrays and f"error_{model}" in replay.arrays
     ]
@@ -145,10 +140,8 @@ def model_layers(replay: RecordedReplay) -> dict[Model, ModelLayer]:
 
 
 def end_of_scale(replay: RecordedReplay, quantity: Quantity) -> float | None:
-    """A round end of the scale for a whole sequence, of the stated model; None where the run does
-    not hold the quantity.
-    """
-    share = MOST_OF_ALL[quantity]
+    """Round end of the scale for a whole sequence, by the raw model; None without the quantity."""
+    share = ROBUST_SHARES[quantity]
     if quantity == "error":
         return nice_limit(replay["error_raw"])
     if quantity == "displacement":

@@ -1,5 +1,4 @@
-"""What each open page shows: the wanted view in, a picture in the scene out; the newest wish
-wins."""
+"""The view of each open page, drawn in the scenes of its browsers."""
 
 from __future__ import annotations
 
@@ -16,10 +15,11 @@ import numpy as np
 from palpate.app.http_errors import Missing
 from palpate.app.scene.annotations import annotations_of
 from palpate.app.scene.model_layer import end_of_scale
-from palpate.app.scene.picture import Picture, SequenceRenderer
+from palpate.app.scene.picture import Picture
+from palpate.app.scene.sequence_renderer import SequenceRenderer
 from palpate.app.scene.view import MODELS, Model, Quantity, View
 from palpate.app.scene.viewer_scene import PageScene
-from palpate.app.scene.viewpoint import Direction, Viewpoint, lookout
+from palpate.app.scene.viewpoint import Direction, Viewpoint, viewpoint_for
 from palpate.app.storage.run_store import Run, RunStore
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import PalpateError
@@ -37,33 +37,29 @@ MOST_SESSIONS = 32
 
 @dataclass(frozen=True, eq=False)
 class FrameOverride:
-    """A frame solved again that a page shows in place of the extended model's."""
+    """A frame solved again that a page shows instead of the extended model's."""
 
     run: str
     sequence: str
     frame: int
-    moment: ResolvedFrame
+    solution: ResolvedFrame
 
     def fits(self, view: View, frame: int) -> bool:
-        """Whether it is of what this view shows."""
+        """Whether this is the frame that the view shows."""
         return (self.run, self.sequence, self.frame) == (view.run, view.sequence, frame)
 
 
 @dataclass(frozen=True, eq=False)
 class InteractiveOverride:
-    """What a page shows while a hand leads the tool: the model's answer, in place of one of the
-    run's models.
-    """
+    """An interactive replay that a page shows instead of one of the run's models."""
 
     run: str
     sequence: str
     model: Model
-    felt: InteractiveFrame
+    solution: InteractiveFrame
 
-    def seen(self, view: View) -> View:
-        """The view as it is shown: nobody measured this push, so that there is no cloud and no
-        error, and no other model.
-        """
+    def adapted(self, view: View) -> View:
+        """The view without cloud, error and other models, none of which exist for this push."""
         layers = (
             *(layer for layer in view.layers if layer not in ("measured", *MODELS)),
             self.model,
@@ -84,7 +80,7 @@ class InteractiveOverride:
 
 
 class Session:
-    """One page: its view, the picture of it, and the browsers' scenes that show it."""
+    """One page: its view, the picture of it, and the scenes of its browsers."""
 
     def __init__(
         self,
@@ -95,8 +91,8 @@ class Session:
         self.identity = identity
         self._shown: tuple[View, Picture] | None = None
         self._override: FrameOverride | None = None
-        self._touch: InteractiveOverride | None = None
-        self._stand: tuple[str, Viewpoint] | None = None
+        self._interactive: InteractiveOverride | None = None
+        self._viewpoint: tuple[str, Viewpoint] | None = None
         self._renderer_of, self._end_of = renderer_of, end_of
         self._scenes: list[PageScene] = []
         self._framed: tuple[str, tuple[tuple[float, float, float], ...]] | None = None
@@ -104,16 +100,16 @@ class Session:
 
     @property
     def view(self) -> View | None:
-        """What was asked for last and is drawn."""
+        """The view that is drawn."""
         return None if self._shown is None else self._shown[0]
 
     @property
     def picture(self) -> Picture | None:
-        """Of that view."""
+        """The picture of that view."""
         return None if self._shown is None else self._shown[1]
 
     def show(self, view: View) -> dict[str, Any]:
-        """Draw this view in all scenes of the page and return what is held now."""
+        """Draw this view in all scenes of the page and return its state."""
         self._draw(view)
         return self.state()
 
@@ -122,49 +118,45 @@ class Session:
             renderer = self._renderer_of(view.run, view.sequence)
             frame = min(view.frame, len(renderer.replay) - 1)
             if self._override is not None and self._override.fits(view, frame):
-                renderer = renderer.instead(frame, self._override.moment)
+                renderer = renderer.instead(frame, self._override.solution)
             shown = seen = view.model_copy(update={"frame": frame})
-            if self._touch is not None and (self._touch.run, self._touch.sequence) == (
-                view.run,
-                view.sequence,
-            ):
+            if self._interactive is not None and (
+                self._interactive.run,
+                self._interactive.sequence,
+            ) == (view.run, view.sequence):
                 renderer, seen = (
-                    renderer.instead(frame, self._touch.felt, self._touch.model),
-                    self._touch.seen(seen),
+                    renderer.instead(frame, self._interactive.solution, self._interactive.model),
+                    self._interactive.adapted(seen),
                 )
             picture = renderer.picture(
                 seen, self._end_of(seen.run, seen.quantity) if seen.scale == "fixed" else None
             )
-            self._shown = (
-                shown,
-                picture,
-            )  # at once: who asks meanwhile is told a view with its own picture
+            # In one assignment: other threads read a view together with its own picture.
+            self._shown = (shown, picture)
             for scene in self._scenes:
                 scene.draw(picture)
             if self._framed != (view.run, picture.columns):
                 if self._framed is not None:
-                    self._stand = None
+                    self._viewpoint = None
                 self._look()
             self._framed = (view.run, picture.columns)
 
     def override_frame(self, override: FrameOverride | None) -> None:
-        """Show this in place of the extended model, wherever the page shows that frame; None shows
-        the model again.
-        """
+        """Show this solution instead of the extended model's frame; None shows the model again."""
         with self._lock:
             self._override, view = override, self.view
         if view is not None:
             self._draw(view)
 
-    def touch(self, touch: InteractiveOverride | None) -> None:
-        """Show what a hand feels, until None lets go."""
+    def show_interactive(self, override: InteractiveOverride | None) -> None:
+        """Show an interactive replay; None shows the recording again."""
         with self._lock:
-            self._touch, view = touch, self.view
+            self._interactive, view = override, self.view
         if view is not None:
             self._draw(view)
 
-    def wants_inside(self) -> bool:
-        """Whether what is shown cannot be drawn without the inside of the block."""
+    def needs_inside(self) -> bool:
+        """Whether the view can only be drawn with the interior of the block."""
         view = self.view
         if view is None:
             return False
@@ -174,14 +166,13 @@ class Session:
     def look(self, where: Direction = "reset") -> None:
         """Turn the cameras of all scenes to the phantom."""
         with self._lock:
-            self._stand = None
+            self._viewpoint = None
             self._look(where)
 
-    def stand(self, run: str, lookout: Viewpoint) -> None:
-        """Look from there while this run is shown, as often as a scene opens, until told
-        otherwise."""
+    def look_from(self, run: str, viewpoint: Viewpoint) -> None:
+        """Use this viewpoint for a run, also in scenes that open later."""
         with self._lock:
-            self._stand = (run, lookout)
+            self._viewpoint = (run, viewpoint)
             if self.view is not None and self.view.run == run:
                 self._look()
 
@@ -189,27 +180,31 @@ class Session:
         if self.view is None or self.picture is None:
             return
         replay = self._renderer_of(self.view.run, self.view.sequence).replay
-        found = lookout(replay.size, replay.camera("raw").translation, self.picture.columns, where)
-        if self._stand is not None and self._stand[0] == self.view.run:
-            found = self._stand[1]
+        viewpoint = viewpoint_for(
+            replay.size, replay.camera("raw").translation, self.picture.columns, where
+        )
+        if self._viewpoint is not None and self._viewpoint[0] == self.view.run:
+            viewpoint = self._viewpoint[1]
         for scene in self._scenes:
-            scene.look(found)
+            scene.look(viewpoint)
 
     def still(self, width: int, height: int) -> np.ndarray[Any, Any]:
-        """What the page's scene shows (height, width, 4); Missing where no browser shows it."""
+        """Image of the page's scene (height, width, 4); raises Missing where no browser
+        shows it.
+        """
         with self._lock:
             scenes = list(self._scenes)
         for scene in reversed(scenes):
-            found = scene.still(width, height)
-            if found is not None:
-                return found
+            image = scene.still(width, height)
+            if image is not None:
+                return image
         raise Missing(
             "no browser shows this page, so that there is nothing to take a picture of",
             session=self.identity,
         )
 
     def join(self, scene: PageScene) -> None:
-        """A browser's scene was opened: show it what the page shows."""
+        """Add a browser's scene, and draw the page's view in it."""
         with self._lock:
             self._scenes.append(scene)
             if self.view is None or self.picture is None:
@@ -219,12 +214,12 @@ class Session:
             scene.draw(self.picture)
 
     def leave(self, scene: PageScene) -> None:
-        """A browser's scene was closed."""
+        """Remove a browser's scene."""
         with self._lock:
             self._scenes = [other for other in self._scenes if other is not scene]
 
     def state(self) -> dict[str, Any]:
-        """The view as held here and counts and a digest of the arrays drawn."""
+        """The view, and counts and a digest of the arrays drawn."""
         shown = self._shown
         if shown is None:
             return {"view": None, "drawn": None, "scenes": len(self._scenes)}
@@ -236,8 +231,8 @@ class Session:
 
 
 class Sessions:
-    """All open pages, the oldest forgotten beyond a few dozen, and the last few sequences looked
-    at.
+    """All open pages and the renderers of the latest sequences; the least recently used are
+    dropped.
     """
 
     def __init__(
@@ -255,14 +250,14 @@ class Sessions:
         self._lock = threading.Lock()
 
     def get(self, identity: str) -> Session:
-        """The session of a page that has shown something, or Missing."""
+        """The session of a page that has shown something; raises Missing for others."""
         with self._lock:
             if identity not in self._sessions:
                 raise Missing(f"no page with the id {identity} is open", session=identity)
             return self._sessions[identity]
 
     def open(self, identity: str) -> Session:
-        """The session of a page, made if need be."""
+        """The session of a page; a new one if there is none."""
         with self._lock:
             session = self._sessions.pop(identity, None) or Session(
                 identity, self.renderer, self.end
@@ -273,22 +268,24 @@ class Sessions:
             return session
 
     def join(self, identity: str, scene: PageScene) -> None:
-        """A browser's scene belongs to this page."""
+        """Add a browser's scene to a page."""
         self.open(identity).join(scene)
 
     def leave(self, identity: str, scene: PageScene) -> None:
-        """A browser's scene is gone."""
+        """Remove a browser's scene from a page."""
         self.open(identity).leave(scene)
 
     def renderer(self, run: str, sequence: str) -> SequenceRenderer:
-        """The sequence of a run, ready to be drawn."""
+        """The renderer of a sequence of a run."""
         with self._lock:
-            found = self._runs.get(run)
-            key = (run, sequence, found.stamp(sequence))
+            opened = self._runs.get(run)
+            key = (run, sequence, opened.stamp(sequence))
             renderer = self._renderers.pop(key, None)
             if renderer is None:
                 renderer = SequenceRenderer(
-                    found.replay(sequence), self._clouds_of(found, sequence), annotations_of(found)
+                    opened.replay(sequence),
+                    self._clouds_of(opened, sequence),
+                    annotations_of(opened),
                 )
             self._renderers[key] = renderer
             while len(self._renderers) > MOST_RENDERERS:
@@ -296,13 +293,13 @@ class Sessions:
             return renderer
 
     def end(self, run: str, quantity: Quantity) -> float | None:
-        """The end of a scale that serves all sequences of a run: the largest of their own; None
-        where none holds the quantity.
-        """
+        """Common end of the scale for all sequences of a run; None where none has the quantity."""
         key = (run, quantity)
         if key not in self._ends:
-            found = self._runs.get(run)
-            ends = [end_of_scale(found.replay(sequence), quantity) for sequence in found.sequences]
+            opened = self._runs.get(run)
+            ends = [
+                end_of_scale(opened.replay(sequence), quantity) for sequence in opened.sequences
+            ]
             self._ends[key] = max((end for end in ends if end is not None), default=None)
         return self._ends[key]
 

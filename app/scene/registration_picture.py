@@ -1,5 +1,5 @@
-"""What a person sees while registering by hand: cloud, phantom, landmarks, numbered pairs, weak
-directions; as arrays to draw.
+"""The picture of manual registration: cloud, phantom, landmarks, numbered pairs, weak
+directions.
 """
 
 from __future__ import annotations
@@ -19,8 +19,13 @@ Rgb = tuple[int, int, int]
 
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """One end of a pair in the scene: which pair (from 0), on which side (cloud or mesh), where
-    (3,) [m], whether it is chosen.
+    """One end of a pair.
+
+    Attributes:
+        pair: number of the pair, from 0.
+        side: cloud or mesh.
+        place: (3,) [m].
+        chosen: whether it is selected.
     """
 
     pair: int
@@ -34,9 +39,10 @@ class Arrow:
     """A direction that the cloud determines weakly.
 
     Attributes:
-        start, end: (3,) [m]; a motion goes along it, a turn goes round it.
-        turns: whether it is a turn.
-        text: what stands beside it.
+        start: (3,) [m].
+        end: (3,) [m]; a translation is along the arrow, a rotation about it.
+        turns: whether it is a rotation.
+        text: label.
     """
 
     start: FloatArray
@@ -47,14 +53,18 @@ class Arrow:
 
 @dataclass(frozen=True, eq=False)
 class PairPicture:
-    """All of it, in the frame of the scene [m], which is the phantom's.
+    """All arrays of the picture, in the phantom frame [m].
 
     Attributes:
         cloud: (n, 3).
-        vertices, faces: of the phantom.
-        landmarks: (k, 3), and their names.
-        marks: ends of pairs that are there.
+        vertices: of the phantom.
+        faces: of the phantom.
+        landmarks: (k, 3).
+        names: of the landmarks.
+        marks: ends of the existing pairs.
+        arrows: weak directions.
         over: whether the cloud lies on the phantom, or beside it.
+        lines: start, end and number of each complete pair.
     """
 
     cloud: FloatArray
@@ -69,7 +79,7 @@ class PairPicture:
 
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Corners (3,), (3,) [m] of the box around the phantom and the middle of the cloud."""
+        """Corners (3,), (3,) [m] of the box around the phantom and most of the cloud."""
         low, high = middle_of(self.cloud, float(np.ptp(self.vertices, axis=0).max()))
         return np.minimum(low, self.vertices.min(axis=0)), np.maximum(
             high, self.vertices.max(axis=0)
@@ -77,7 +87,7 @@ class PairPicture:
 
 
 def middle_of(points: FloatArray, reach: float) -> tuple[FloatArray, FloatArray]:
-    """Corners (3,), (3,) [m] of the box around nearly all points (n, 3) within `reach` [m] of their
+    """Corners (3,), (3,) [m] of the box around most points (n, 3) within `reach` [m] of their
     median.
     """
     centre = np.median(points, axis=0)
@@ -87,6 +97,6 @@ def middle_of(points: FloatArray, reach: float) -> tuple[FloatArray, FloatArray]
 
 
 def pair_colour(number: int) -> Rgb:
-    """The colour of a pair by its number from 0: neighbours differ most."""
+    """Colour of a pair by its number from 0; successive numbers differ strongly."""
     red, green, blue = colorsys.hls_to_rgb((0.58 + number * 0.381966) % 1.0, 0.45, 0.75)
     return int(255 * red), int(255 * green), int(255 * blue)

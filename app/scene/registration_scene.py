@@ -1,4 +1,4 @@
-"""The scene of manual registration in one browser: draws pair pictures, and hands on clicks and
+"""The scene of manual registration in one browser: draws pairs, reports clicks and
 drags as rays.
 """
 
@@ -28,10 +28,13 @@ BLOCK, EDGE, LANDMARK, WEAK = (176, 184, 196), (96, 106, 120), (110, 120, 134), 
 
 @dataclass(frozen=True, eq=False)
 class Ray:
-    """A click: origin and direction (3,), (3,) in the frame of the scene, the angle of a pixel
-    [rad].
+    """A ray of a click, in the frame of the scene.
 
-    `mark` is the end of a pair that was dragged there, as (number, side).
+    Attributes:
+        origin: (3,) [m].
+        direction: (3,).
+        pixel: angle of a pixel [rad].
+        mark: the mark that was dragged there, as (number, side).
     """
 
     origin: FloatArray
@@ -41,16 +44,16 @@ class Ray:
 
 
 class PairScene(Protocol):
-    """Draws pair pictures; `eye` is what the person sees it with."""
+    """Draws pictures of pairs."""
 
     def draw(self, picture: PairPicture) -> None:
         """Show this and nothing else."""
 
     def look(self, picture: PairPicture) -> None:
-        """Look at all of it."""
+        """Turn the camera to all of it."""
 
     def eye(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Position [m] of the eye, and its directions to the right and upwards, (3,) each."""
+        """Position of the camera [m], and its directions to the right and upwards, (3,) each."""
 
 
 class ViserPairScene:
@@ -65,21 +68,21 @@ class ViserPairScene:
             clicked(Ray(np.array(event.ray_origin), np.array(event.ray_direction), self._pixel()))
 
     def draw(self, picture: PairPicture) -> None:
-        """Show this picture: nodes that stay as they were are left alone."""
-        wanted = dict(self._nodes(picture))
+        """Show this picture; unchanged nodes stay."""
+        nodes = dict(self._nodes(picture))
         with self._client.atomic():
             for name in [
                 name
                 for name, (key, _) in self._drawn.items()
-                if name not in wanted or wanted[name][0] != key
+                if name not in nodes or nodes[name][0] != key
             ]:
                 self._drawn.pop(name)[1].remove()
-            for name, (key, make) in wanted.items():
+            for name, (key, make) in nodes.items():
                 if name not in self._drawn:
                     self._drawn[name] = (key, make())
 
     def _nodes(self, picture: PairPicture) -> Iterator[tuple[str, tuple[str, Callable[[], Any]]]]:
-        """Name, digest and maker of everything that is to be seen."""
+        """Name, digest and maker of every node."""
         yield "/cloud", (_key(picture.cloud), partial(self._cloud, picture.cloud))
         yield "/block", (_key(picture.vertices), partial(self._block, picture))
         yield "/edges", (_key(picture.vertices), partial(self._edges, picture.vertices))
@@ -238,7 +241,7 @@ def _key(array: Any) -> str:
 
 
 def _ring(centre: FloatArray, axis: FloatArray) -> FloatArray:
-    """(m, 2, 3) a circle round an axis."""
+    """(m, 2, 3) a circle around an axis."""
     along = axis / np.linalg.norm(axis)
     side = np.cross(along, [0.0, 0.0, 1.0] if abs(along[2]) < 0.9 else [1.0, 0.0, 0.0])
     side = side / np.linalg.norm(side)

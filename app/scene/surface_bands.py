@@ -1,4 +1,4 @@
-"""The phantom's surface made fine enough to be coloured in bands, and its grid lines."""
+"""Fine triangles of the phantom's surface, for bands of colours, and its grid lines."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ IntArray = np.ndarray[Any, np.dtype[np.int64]]
 
 @dataclass(frozen=True, eq=False)
 class FineSurface:
-    """A surface whose points are weighted means of the coarse vertices, split along the edges of
-    the box.
+    """A surface whose points are weighted means of coarse vertices, split along the edges of the
+    box.
 
     Attributes:
         corners: (n, k) coarse vertices of each fine point, three or more.
-        weights: (n, k) their weights, rows sum to one.
-        faces: (m, 3) fine triangles, turned as the coarse ones.
+        weights: (n, k) their weights; rows sum to one.
+        faces: (m, 3) fine triangles, oriented as the coarse ones.
     """
 
     corners: IntArray
@@ -30,8 +30,8 @@ class FineSurface:
     faces: IntArray
 
     def spread(self, values: Any) -> FloatArray:
-        """Values at the coarse vertices (V,) or (V, 3) carried to the fine points; NaN corners are
-        left out of a mean.
+        """Interpolate values at the coarse vertices (V,) or (V, 3) to the fine points; NaN corners
+        are left out.
         """
         picked = np.asarray(values, dtype=float)[self.corners]
         weights = self.weights if picked.ndim == 2 else self.weights[:, :, None]
@@ -44,8 +44,8 @@ class FineSurface:
 
 
 def refine(rest: Any, faces: Any, parts: int) -> FineSurface:
-    """Cut each triangle into parts^2; points on common edges are shared unless the rest faces look
-    along different axes.
+    """Cut each triangle into parts^2. Points on common edges are shared unless the faces have
+    normals along different axes.
     """
     rest, faces = np.asarray(rest, dtype=float), np.asarray(faces, dtype=np.int64)
     lattice = [(i, j) for i in range(parts + 1) for j in range(parts + 1 - i)]
@@ -72,7 +72,8 @@ def refine(rest: Any, faces: Any, parts: int) -> FineSurface:
 
 def grid_edges(rest: Any, faces: Any) -> IntArray:
     """(e, 2) edges of the grid: the triangles' edges without the diagonals of its
-    quadrilaterals."""
+    quadrilaterals.
+    """
     rest, faces = np.asarray(rest, dtype=float), np.asarray(faces, dtype=np.int64)
     sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1)
     lengths = np.linalg.norm(rest[sides[..., 0]] - rest[sides[..., 1]], axis=-1)
@@ -85,7 +86,7 @@ def grid_edges(rest: Any, faces: Any) -> IntArray:
 
 
 def lattice(rows: int, columns: int) -> IntArray:
-    """(m, 3) triangles between points that lie in rows, row after row."""
+    """(m, 3) triangles between points in rows, row after row."""
     index = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = (
         part.ravel() for part in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
@@ -94,7 +95,7 @@ def lattice(rows: int, columns: int) -> IntArray:
 
 
 def _side(rest: FloatArray, faces: IntArray) -> IntArray:
-    """Which of the six directions each rest triangle looks to most."""
+    """Main direction of each rest triangle's normal, 0 to 5."""
     a, b, c = (rest[faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     axis = np.abs(normal).argmax(axis=1)

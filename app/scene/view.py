@@ -1,4 +1,4 @@
-"""What a page wants to see, as it goes over the wire."""
+"""The view of a page, as it is sent to the server."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ MODELS: tuple[Model, ...] = ("raw", "extended", "corrected")
 
 
 class Look(BaseModel):
-    """How one layer is drawn; None leaves it to `View.colour`.
+    """Style of one layer; None leaves it to `View.colour`.
 
-    Of the measured cloud `opacity` is the share of its points that are drawn.
+    For the measured cloud `opacity` is the share of its points that are drawn.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -32,10 +32,9 @@ class Look(BaseModel):
 
 
 class Section(BaseModel):
-    """A cut through the block as it was at rest, across an axis at a coordinate [m], phantom frame;
-    what lies beyond is left out.
+    """A section through the block at rest, across an axis at a coordinate [m], phantom frame.
 
-    `flip` leaves out what lies before it instead.
+    The part beyond it is left out, with `flip` the part before it.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -46,7 +45,7 @@ class Section(BaseModel):
 
 
 class Camera(BaseModel):
-    """Where a person looks at a run from, and at what [m], phantom frame; z is upwards."""
+    """Position of the camera for a run, and its target [m], phantom frame; z is upwards."""
 
     model_config = ConfigDict(
         frozen=True,
@@ -64,13 +63,12 @@ class Camera(BaseModel):
 
 
 class View(BaseModel):
-    """What a page wants to see.
+    """The view of a page.
 
-    `colour` is the model drawn as a coloured surface while the others are lines; `looks` says
-    otherwise layer by layer. All coloured models show the same `quantity` on one scale. It ends at
-    `limit` (error and displacement in m, energy density in J/m^3); where that is None the scale is
-    `robust`: holds most of what occurs in the sequence; or `fixed`: the same for all sequences of
-    the run.
+    `colour` is the model drawn as a coloured surface while the others are lines; `looks` overrides
+    this for single layers. All coloured models show the same `quantity` on one scale. It ends at
+    `limit` (error and displacement in m, energy density in J/m^3); where that is None, `scale` is
+    `robust` (most values of the sequence) or `fixed` (the same for all sequences of the run).
     """
 
     model_config = ConfigDict(
@@ -97,22 +95,22 @@ class View(BaseModel):
     looks: dict[Layer, Look] = Field(default_factory=dict)
 
     def opacity(self, layer: Layer) -> float:
-        """Of a layer, 0 to 1."""
+        """Opacity of a layer, 0 to 1."""
         look = self.looks.get(layer)
         return 1.0 if look is None else look.opacity
 
     def models(self) -> tuple[Model, ...]:
-        """Those that are wanted, the most complete first."""
+        """The requested models, the most complete first."""
         return tuple(model for model in reversed(MODELS) if model in self.layers)
 
     def front(self, models: tuple[Model, ...]) -> Model | None:
-        """Of these, the one whose surface is drawn where they lie over each other."""
+        """The model whose surface is drawn where several overlap."""
         return next(
             (model for model in models if model == self.colour), models[0] if models else None
         )
 
     def coloured(self, model: Model, models: tuple[Model, ...]) -> bool:
-        """Whether its surface shows the quantity."""
+        """Whether a model's surface shows the quantity."""
         look = self.looks.get(model)
         if look is not None and look.coloured is not None:
             return look.coloured
@@ -121,7 +119,7 @@ class View(BaseModel):
         )
 
     def lines(self, model: Model, models: tuple[Model, ...]) -> bool:
-        """Whether it is drawn as grid lines."""
+        """Whether a model is drawn as grid lines."""
         look = self.looks.get(model)
         if look is not None and look.lines is not None:
             return look.lines

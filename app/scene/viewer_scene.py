@@ -1,6 +1,4 @@
-"""Where pictures are drawn: `Scene` is the vocabulary, ViserScene draws in one browser, NullScene
-keeps them for tests.
-"""
+"""Scenes in which pictures are drawn."""
 
 from __future__ import annotations
 
@@ -23,7 +21,7 @@ from palpate.app.scene.viewpoint import FIELD_OF_VIEW, Viewpoint
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-__all__ = ["PageScene", "RecordingScene", "ViserScene"]
+__all__ = ["PageScene", "ViserScene"]
 
 POINT_SIZE = 0.00026
 SHAFT = 0.022
@@ -37,42 +35,22 @@ PLACES = {
 
 
 class PageScene(Protocol):
-    """Draws pictures and looks at the phantom."""
+    """Draws pictures and turns the camera."""
 
     def draw(self, picture: Picture) -> None:
         """Show this picture and nothing else."""
 
-    def look(self, lookout: Viewpoint) -> None:
-        """Look from there."""
+    def look(self, viewpoint: Viewpoint) -> None:
+        """Turn the camera."""
 
     def still(self, width: int, height: int) -> np.ndarray[Any, Any] | None:
-        """What is seen now, (height, width, 4) with the background transparent; None where no
-        browser answers.
+        """The current image (height, width, 4) with a transparent background; None where no browser
+        answers.
         """
 
 
-class RecordingScene:
-    """Draws nothing and remembers all."""
-
-    def __init__(self) -> None:
-        self.pictures: list[Picture] = []
-        self.looked_from: list[Viewpoint] = []
-
-    def draw(self, picture: Picture) -> None:
-        """Keep the picture."""
-        self.pictures.append(picture)
-
-    def look(self, lookout: Viewpoint) -> None:
-        """Keep the place."""
-        self.looked_from.append(lookout)
-
-    def still(self, width: int, height: int) -> np.ndarray[Any, Any] | None:
-        """Nothing is to be seen."""
-        return np.zeros((height, width, 4), dtype=np.uint8)
-
-
 class ViserScene:
-    """The scene of one browser; nodes are made once and then only given new arrays."""
+    """The scene of one browser; nodes are made once and then get new arrays."""
 
     def __init__(self, client: ClientHandle) -> None:
         self._client = client
@@ -80,7 +58,7 @@ class ViserScene:
         self._made: dict[str, tuple[Any, ...]] = {}
 
     def draw(self, picture: Picture) -> None:
-        """Show this picture: all changes reach the browser at once."""
+        """Show this picture; all changes reach the browser together."""
         shown = {
             PLACES[type(figure)].format(name): figure for name, figure in picture.figures.items()
         }
@@ -90,19 +68,18 @@ class ViserScene:
             for name, node in self._nodes.items():
                 node.visible = name in shown
 
-    def look(self, lookout: Viewpoint) -> None:
+    def look(self, viewpoint: Viewpoint) -> None:
         """Turn the camera."""
         camera = self._client.camera
         with self._client.atomic():
             camera.fov = FIELD_OF_VIEW
             camera.near = 0.001
-            camera.up_direction = lookout.up
-            camera.position = lookout.position
-            camera.look_at = lookout.target
+            camera.up_direction = viewpoint.up
+            camera.position = viewpoint.position
+            camera.look_at = viewpoint.target
 
     def still(self, width: int, height: int) -> np.ndarray[Any, Any] | None:
-        """Rendered by the browser, which may take a second; None where it does not answer in
-        time."""
+        """Image rendered by the browser; None where it does not answer in time."""
         try:
             return np.asarray(
                 self._client.get_render(height, width, transport_format="png", timeout=20.0)
@@ -111,7 +88,7 @@ class ViserScene:
             return None
 
     def _put(self, name: str, figure: Figure) -> None:
-        """Make the node, or give it what is new; another kind or size of arrays takes a new one."""
+        """Update a node, or make it; a different kind or size of arrays needs a new one."""
         made = _node_key(figure)
         if self._made.get(name) != made:
             self._nodes[name] = self._make(name, figure)
@@ -190,7 +167,7 @@ class ViserScene:
 
 
 def _node_key(figure: Figure) -> tuple[Any, ...]:
-    """What cannot be changed in a node that is there: where it differs, the node is made anew."""
+    """Properties that cannot be changed in an existing node."""
     if isinstance(figure, CloudFigure):
         return (CloudFigure, figure.points.shape, figure.colour)
     if isinstance(figure, SurfaceFigure):

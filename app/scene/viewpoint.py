@@ -1,19 +1,18 @@
-"""From where the phantom is looked at."""
+"""Viewpoints from which the whole phantom is visible."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["FIELD_OF_VIEW", "LOOKS", "Direction", "Viewpoint", "lookout"]
+__all__ = ["FIELD_OF_VIEW", "Direction", "Viewpoint", "viewpoint_for"]
 
 Direction = Literal["reset", "top", "front", "side"]
-LOOKS: tuple[Direction, ...] = get_args(Direction)
 FIELD_OF_VIEW = 0.6
 RAISED = np.deg2rad(36.0)
 ROOM = 1.2
@@ -21,29 +20,32 @@ ROOM = 1.2
 
 @dataclass(frozen=True, eq=False)
 class Viewpoint:
-    """Where the camera is, what it looks at (3,) [m], and its upright (3,)."""
+    """Position of the camera and its target (3,) [m], and its upward direction (3,)."""
 
     position: FloatArray
     target: FloatArray
     up: FloatArray
 
 
-def lookout(
+def viewpoint_for(
     size: FloatArray,
     eye: FloatArray,
     columns: Sequence[tuple[float, float, float]],
     where: Direction,
 ) -> Viewpoint:
-    """A camera that sees the whole phantom of edge lengths (3,) [m], and all its columns where it
-    stands more than once.
+    """A viewpoint from which the phantom is visible, or all its copies.
 
-    `reset` is the depth camera's side, (3,) [m], raised to a comfortable height; from the `top` x
-    is to the right; the `front` is seen along +y, the `side` along -x.
+    Args:
+        size: edge lengths of the phantom (3,) [m].
+        eye: position of the depth camera (3,) [m].
+        columns: offset of each copy [m].
+        where: `reset` is the depth camera's side, raised; at the `top` x is to the right; the
+            `front` is seen along +y, the `side` along -x.
     """
     around = np.arctan2(eye[1], eye[0])
     directions = {
         "reset": (np.cos(RAISED) * np.cos(around), np.cos(RAISED) * np.sin(around), np.sin(RAISED)),
-        # A camera right above has no upright of its own: it leans by a hair.
+        # Slightly inclined: the upward direction of a vertical view is undefined.
         "top": (0.0, -1e-3, 1.0),
         "front": (0.0, -1.0, 0.0),
         "side": (1.0, 0.0, 0.0),

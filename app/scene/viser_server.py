@@ -1,6 +1,4 @@
-"""The inner viser server: listens on a free loopback port only, and tells which page each browser
-connection belongs to.
-"""
+"""The inner viser server, on a free loopback port; assigns each browser's scene to its page."""
 
 from __future__ import annotations
 
@@ -21,26 +19,32 @@ if TYPE_CHECKING:
 __all__ = ["BY_HAND", "SceneListener", "ViewerServer"]
 
 BY_HAND = "-register"
-"""Ends the name under which a page's scene of manual registration connects."""
+"""Suffix of the page's name in connections of manual registration."""
 S = TypeVar("S")
 
 
 @dataclass(frozen=True)
 class SceneListener(Generic[S]):
-    """Whom to tell of a scene of a page that opened, and that closed; from the viewer's threads."""
+    """Functions to call when a scene of a page opens and when it closes; from the
+    viewer's threads.
+    """
 
     joined: Callable[[str, S], None]
     gone: Callable[[str, S], None]
 
     def join(self, page: str, scene: S) -> Callable[[], None]:
-        """Tell of a scene; what is returned tells of its end."""
+        """Report a new scene; the returned function reports its end."""
         self.joined(page, scene)
         return lambda: self.gone(page, scene)
 
 
 class ViewerServer:
-    """Owns the viser server: tells `show` of scenes of a page's replays, and `pairs` of those in
-    which it registers by hand.
+    """Owns the viser server.
+
+    Args:
+        show: is called for scenes of a page's replays.
+        pairs: is called for scenes of manual registration.
+        clicked: is called with each click in the latter.
     """
 
     def __init__(
@@ -51,15 +55,14 @@ class ViewerServer:
     ) -> None:
         import viser
 
-        with contextlib.redirect_stdout(
-            io.StringIO()
-        ):  # it prints its inner address, which is of no use to anybody
+        # Viser prints its inner address.
+        with contextlib.redirect_stdout(io.StringIO()):
             self._server: ViserServer = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-        # A browser may close while its scene is drawn: nothing is lost, and nobody need read of it.
+        # A browser may close while its scene is drawn; this is harmless.
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
         self._server.request_share_url = lambda *_, **__: None  # type: ignore[method-assign]
         self._left: dict[int, Callable[[], None]] = {}
-        self._furnish()
+        self._set_up_scene()
 
         @self._server.on_client_connect
         def _(client: ClientHandle) -> None:
@@ -80,7 +83,7 @@ class ViewerServer:
 
     @property
     def port(self) -> int:
-        """The inner port; only the relay knows it."""
+        """The inner port; only the relay uses it."""
         return int(self._server.get_port())
 
     def close(self) -> None:
@@ -88,19 +91,19 @@ class ViewerServer:
         self._server.stop()
 
     def _page_of(self, client_id: int) -> str:
-        """The last part of the path the relay connected with (private attributes: pinned to viser
+        """The last part of the path of the relay's connection (private attributes: pinned to viser
         1.1.1).
         """
         connection = self._server._websock_server._live_connections[client_id]
         return connection.request.path.strip("/") if connection.request is not None else ""
 
-    def _furnish(self) -> None:
+    def _set_up_scene(self) -> None:
         server = self._server
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.scene.set_up_direction("+z")
         server.scene.configure_environment_map(hdri=None)
-        # Mostly ambient light, so that every side shows the colours of the legend; two soft lamps
-        # give the shape.
+        # Mostly ambient light, so that every side has the colours of the legend; two directional
+        # lamps show the shape.
         server.scene.configure_default_lights(False)
         server.scene.add_light_ambient("/lamps/around", intensity=1.9)
         server.scene.add_light_directional("/lamps/above", intensity=1.2, position=(0.1, -0.2, 1.0))

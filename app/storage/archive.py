@@ -1,6 +1,4 @@
-"""Archives that strangers send: unpacked whole or not at all, only plain files, none outside the
-folder, no more than agreed.
-"""
+"""Archives from outside: unpacked completely or not at all; plain files inside the folder only."""
 
 from __future__ import annotations
 
@@ -31,7 +29,9 @@ _MOST_TOLD = 20
 
 @dataclass(frozen=True)
 class _Entry:
-    """A plain file: its path inside, its size as the archive says, and what opens it."""
+    """A plain file: its path in the archive, its stated size [bytes], and a function
+    that opens it.
+    """
 
     path: PurePosixPath
     size: int
@@ -44,8 +44,8 @@ def is_archive(path: Path) -> bool:
 
 
 def unpack(archive: Path, target: Path, most: int, report: Report = silent) -> None:
-    """Unpack into `target`, at most `most` bytes; DatasetError that names every entry that may not
-    be.
+    """Unpack into `target`, at most `most` bytes; raises DatasetError that lists all refused
+    entries.
     """
     try:
         with _entries(archive) as entries:
@@ -65,7 +65,7 @@ def unpack(archive: Path, target: Path, most: int, report: Report = silent) -> N
 
 
 def copy_folder(source: Path, target: Path, most: int, report: Report = silent) -> None:
-    """Copy a folder of plain files in the same manner; links are refused, not followed."""
+    """Copy a folder of plain files by the same rules; links are refused."""
     entries: list[_Entry] = []
     bad: list[str] = []
     for path in sorted(source.rglob("*")):
@@ -82,8 +82,9 @@ def copy_folder(source: Path, target: Path, most: int, report: Report = silent) 
 
 
 def dataset_root(folder: Path) -> Path:
-    """Where dataset.toml lies in what was unpacked: at the top, or in the one folder that has
-    it."""
+    """The folder of dataset.toml among the unpacked files: at the top, or in the only folder with
+    one.
+    """
     found = [
         path.parent for depth in ("", "*/", "*/*/") for path in folder.glob(f"{depth}dataset.toml")
     ]
@@ -98,7 +99,7 @@ def dataset_root(folder: Path) -> Path:
 
 @contextmanager
 def _entries(archive: Path) -> Iterator[tuple[list[_Entry], list[str]]]:
-    """The plain files of an archive, and what is wrong with its other entries."""
+    """The plain files of an archive, and the problems of its other entries."""
     if zipfile.is_zipfile(archive):
         with zipfile.ZipFile(archive) as opened:
             yield _of_zip(opened)
@@ -173,8 +174,10 @@ def _take(
         entries.append(_Entry(PurePosixPath(*parts), size, opening))
 
 
-def _write(found: tuple[list[_Entry], list[str]], target: Path, most: int, report: Report) -> None:
-    entries, bad = found
+def _write(
+    checked: tuple[list[_Entry], list[str]], target: Path, most: int, report: Report
+) -> None:
+    entries, bad = checked
     seen: set[PurePosixPath] = set()
     for entry in entries:
         if entry.path in seen:
@@ -203,7 +206,7 @@ def _write(found: tuple[list[_Entry], list[str]], target: Path, most: int, repor
 
 
 def _fill(entries: list[_Entry], target: Path, most: int, total: int, report: Report) -> None:
-    """Write the files; what an archive says of its sizes is not believed."""
+    """Write the files; the stated sizes are not trusted."""
     written = 0
     for number, entry in enumerate(entries):
         place = target / entry.path

@@ -200,7 +200,7 @@ def test_stop_that_an_import_swallowed_is_remembered() -> None:
     stop = Stop()
     with contextlib.suppress(KeyboardInterrupt):
         stop(signal.SIGINT, None)
-    assert stop.asked
+    assert stop.received
     with (
         pytest.MonkeyPatch.context() as patch,
         pytest.raises(Cancelled),

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
+from palpate.app.reporting.cause_phrases import cause_phrase
 from palpate.app.reporting.sentences import (
     PHRASES,
-    cause_phrase,
     control_sentences,
     determined_sentences,
     left_sentences,

@@ -7,10 +7,27 @@ import pytest
 
 from palpate.app.http_errors import Missing
 from palpate.app.scene.page_session import Sessions
+from palpate.app.scene.picture import Picture
 from palpate.app.scene.view import View
-from palpate.app.scene.viewer_scene import RecordingScene
-from palpate.app.scene.viewpoint import Viewpoint, lookout
+from palpate.app.scene.viewpoint import Viewpoint, viewpoint_for
 from palpate.app.storage.run_store import RunStore
+
+
+class RecordingScene:
+    """Draws nothing and records all calls."""
+
+    def __init__(self) -> None:
+        self.pictures: list[Picture] = []
+        self.looked_from: list[Viewpoint] = []
+
+    def draw(self, picture: Picture) -> None:
+        self.pictures.append(picture)
+
+    def look(self, viewpoint: Viewpoint) -> None:
+        self.looked_from.append(viewpoint)
+
+    def still(self, width: int, height: int) -> np.ndarray[Any, Any] | None:
+        return np.zeros((height, width, 4), dtype=np.uint8)
 
 
 @pytest.fixture
@@ -61,7 +78,7 @@ def test_a_place_of_ones_own_is_looked_from_in_scenes_that_open_later(
     own = Viewpoint(
         np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.0, 0.02]), np.array([0.0, 0.0, 1.0])
     )
-    session.stand(run_name, own)
+    session.look_from(run_name, own)
     session.show(view(run_name))
     scene = RecordingScene()
     sessions.join("page-one", scene)
@@ -76,7 +93,7 @@ def test_a_place_of_ones_own_is_looked_from_in_scenes_that_open_later(
     ("where", "axis", "sign"), [("top", 2, 1), ("front", 1, -1), ("side", 0, 1)]
 )
 def test_standard_views_look_along_an_axis(where: Any, axis: int, sign: int) -> None:
-    found = lookout(
+    found = viewpoint_for(
         np.array([0.07, 0.04, 0.036]), np.array([0.2, -0.1, 0.2]), ((0.0, 0.0, 0.0),), where
     )
     away = found.position - found.target

@@ -17,7 +17,8 @@ from palpate.app.scene.figures import (
     ToolFigure,
 )
 from palpate.app.scene.page_session import Session
-from palpate.app.scene.picture import MOST_TRIANGLES, Picture, SequenceRenderer
+from palpate.app.scene.picture import Picture
+from palpate.app.scene.sequence_renderer import MOST_TRIANGLES, SequenceRenderer
 from palpate.app.scene.view import Layer, View
 from palpate.app.storage.run_store import Run
 
