@@ -26,6 +26,7 @@ from palpate.correction.training_spec import TrainingSpec
 from palpate.foundation.arrays import IntArray
 from palpate.foundation.errors import CorrectionError, RunError
 from palpate.foundation.progress import Report
+from palpate.foundation.rounding import rounded
 
 if TYPE_CHECKING:
     from torch.utils.tensorboard import SummaryWriter
@@ -280,9 +281,10 @@ class TrainingRun:
         state = checkpoint.load(self.folder / CHECKPOINT, self.device)
         try:
             identity, progress = state["asked"], _Progress(**state["place"])
-            if identity != self._identity():
+            expected = rounded(self._identity())
+            if (stored := rounded(identity)) != expected:
                 differs = ", ".join(
-                    key for key, value in self._identity().items() if identity.get(key) != value
+                    key for key, value in expected.items() if stored.get(key) != value
                 )
                 raise CorrectionError(
                     f"{self.folder} holds another training ({differs} differ); name another folder",

@@ -6,18 +6,15 @@ import hashlib
 import json
 import os
 from pathlib import Path
-from typing import Any
 from uuid import uuid4
 
+from palpate.foundation.rounding import rounded
 from palpate.foundation.source_digest import source_digest
 from palpate.mesh.protocol import Meshing
 from palpate.setup.setup import Setup
 from palpate.sweep.sweep_error import TOLERANCE, ReplayResult
 
 __all__ = ["ReplayCache", "replay_key"]
-
-_DIGITS = 9
-"""Decimals to which numbers enter the digest; lengths are in metres."""
 
 
 def replay_key(setup: Setup, digest: str, grid: Meshing) -> str:
@@ -30,21 +27,9 @@ def replay_key(setup: Setup, digest: str, grid: Meshing) -> str:
 
     Equal inputs under the same version of the code have equal keys.
     """
-    content = {"setup": _rounded(setup.as_dict()), "watched": digest, "grid": repr(grid)}
+    content = {"setup": rounded(setup.as_dict()), "watched": digest, "grid": repr(grid)}
     content |= {"tolerance": TOLERANCE, "code": source_digest()}
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=repr).encode()).hexdigest()
-
-
-def _rounded(value: Any) -> Any:
-    """Round all numbers in nested containers.
-
-    A registration differs in its last digits from run to run.
-    """
-    if isinstance(value, float):
-        return round(value, _DIGITS) + 0.0
-    if isinstance(value, dict):
-        return {key: _rounded(one) for key, one in value.items()}
-    return [_rounded(one) for one in value] if isinstance(value, (list, tuple)) else value
 
 
 class ReplayCache:

@@ -30,7 +30,7 @@ class ResultRows:
         """
         if not self._file.is_file():
             return []
-        lines = self._file.read_text().split("\n")
+        lines = self._file.read_text(errors="replace").split("\n")
         rows: list[dict[str, Any]] = []
         for number, line in enumerate(lines[:-1], 1):
             try:
