@@ -106,7 +106,8 @@ REPORT: dict[str, Any] = {
             "kept": 0.8889,
             "alike": 0.9,
             "passed": None,
-            "why": "with these motions stiff_inclusion would look 90 % as it does with the true ones",
+            "why": "with these motions stiff_inclusion would look 90 % as it does with the true "
+            "ones",
         },
     ],
     "next_probe": [

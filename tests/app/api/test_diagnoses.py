@@ -13,7 +13,7 @@ WORK = '''
 import os, pathlib, shutil, time
 
 def take(request, report):
-    """A run as it would come out, without the computing: the run of the fixture under another name."""
+    """Make a run without computing: the run of the fixture under another name."""
     runs, scratch = pathlib.Path(request["runs"]), pathlib.Path(request["scratch"])
     for step in range(request["seed"] or 3):
         report(step / 100, f"step {step}")

@@ -19,7 +19,9 @@ OVERFLOWING = """names => names.filter(name => {
 })"""
 POINTS = """() => {
   let count = 0;
-  window.__viserMutable.nodeRefFromName['/cloud'].traverse(node => { count += node.geometry?.attributes.position?.count ?? 0; });
+  window.__viserMutable.nodeRefFromName['/cloud'].traverse(node => {
+    count += node.geometry?.attributes.position?.count ?? 0;
+  });
   return count;
 }"""
 

@@ -57,7 +57,7 @@ def bench(browser: Any, serve: Any, home: tuple[Path, Transform]) -> Iterator[Be
         ] == []
 
 
-def test_three_clicked_pairs_lead_from_a_bad_start_to_half_a_millimetre_and_the_result_is_kept_and_offered(
+def test_three_clicked_pairs_correct_a_bad_start_to_half_a_millimetre_and_the_result_is_stored(
     bench: Bench,
 ) -> None:
     page = bench.page.page

@@ -139,14 +139,17 @@ def test_records_of_an_earlier_version_are_read_and_what_ran_then_is_interrupted
 ) -> None:
     with closing(sqlite3.connect(tmp_path / "jobs.sqlite")) as database, database:
         database.execute(
-            "create table jobs (id text primary key, kind text not null, request text not null, state text not null, "
-            "fraction real not null, text text not null, created real not null, started real, finished real, "
+            "create table jobs (id text primary key, kind text not null, request text not null, "
+            "state text not null, "
+            "fraction real not null, text text not null, created real not null, started real, "
+            "finished real, "
             "error text, result text)"
         )
         for identity, state in (("ran", "running"), ("ended", "done")):
             row = (identity, "count", "{}", state, 0.5, "half way", 1.0)
             database.execute(
-                "insert into jobs (id, kind, request, state, fraction, text, created) values (?, ?, ?, ?, ?, ?, ?)",
+                "insert into jobs (id, kind, request, state, fraction, text, created) "
+                "values (?, ?, ?, ?, ?, ?, ?)",
                 row,
             )
     (tmp_path / ".making" / "old").mkdir(parents=True)

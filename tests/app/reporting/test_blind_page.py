@@ -1,26 +1,18 @@
-"""The blind suite in terminal and page, from results made by hand."""
+"""The page of the blind suite, from results made by hand."""
 
 from __future__ import annotations
 
-import json
 import re
-import signal
-import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from html.parser import HTMLParser
-from pathlib import Path
 
-import pytest
 from blind_results import cause, result
 
-from palpate.app.cli import main
 from palpate.app.reporting.blind_page import blind_page
 from palpate.app.reporting.blind_tables import figure_text, hidden_text, named_text, target_text
-from palpate.blind import CaseResult, all_cases, draw_cases, summary_of
-from palpate.blind.case_results import add_result
+from palpate.blind import CaseResult, summary_of
 from palpate.blind.proportions import median_of, rate
-from palpate.foundation.source_digest import source_digest
 
 
 def lump(name: str, off: float) -> CaseResult:
@@ -136,136 +128,3 @@ def test_what_is_hidden_and_named_is_said_in_words() -> None:
     assert named_text(RESULTS[3]) == "–" and named_text(RESULTS[-1]).startswith(
         "diagnosing it: SolveError"
     )
-
-
-def run(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
-    before = signal.getsignal(signal.SIGTERM)
-    monkeypatch.setattr(sys, "argv", ["palpate", "blind", *arguments])
-    with pytest.raises(SystemExit) as end:
-        main()
-    signal.signal(signal.SIGTERM, before)
-    return int(end.value.code or 0)
-
-
-def test_suite_that_is_done_is_scored_and_printed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for case in [one for one in all_cases(4, controls=3) if one.kind == "control"]:
-        add_result(tmp_path / "results.jsonl", replace(RESULTS[3], case=case, code=source_digest()))
-    assert (
-        run(
-            monkeypatch,
-            "--folder",
-            str(tmp_path),
-            "--seed",
-            "4",
-            "--controls",
-            "3",
-            "--only",
-            "control",
-        )
-        == 0
-    )
-    assert "nothing hidden: 3 of 3 right, a cause falsely named in 0" in capsys.readouterr().out
-    summary = json.loads((tmp_path / "summary.json").read_text())
-    assert (summary["seed"], summary["cases"], summary["kinds"]["control"]["right"]["hits"]) == (
-        4,
-        3,
-        3,
-    )
-    assert "3 of 3 cases right" in (tmp_path / "report.html").read_text()
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "report.html",
-        "results.jsonl",
-        "summary.json",
-    ]
-
-
-def test_where_cases_are_kept_it_is_said_how_to_look_at_them(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    case = draw_cases(4, 3)[0]
-    add_result(tmp_path / "results.jsonl", replace(RESULTS[3], case=case, code=source_digest()))
-    score = ("--folder", str(tmp_path), "--seed", "4", "--scenarios", "3", "--score")
-    assert run(monkeypatch, *score) == 0 and "to look at it" not in capsys.readouterr().out
-    (tmp_path / "kept").mkdir()
-    assert run(monkeypatch, *score) == 0
-    assert (
-        f"serve --runs {tmp_path / 'kept' / 'runs'} --datasets {tmp_path / 'kept' / 'datasets'}"
-        in capsys.readouterr().out
-    )
-
-
-def test_suite_that_still_runs_is_scored_as_far_as_it_is(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    case = draw_cases(4, 3)[0]
-    add_result(tmp_path / "results.jsonl", replace(RESULTS[3], case=case, code=source_digest()))
-    torn = (tmp_path / "results.jsonl").read_text() + '{"case": '
-    (tmp_path / "results.jsonl").write_text(torn)
-    assert (
-        run(monkeypatch, "--folder", str(tmp_path), "--seed", "4", "--scenarios", "3", "--score")
-        == 0
-    )
-    summary = json.loads((tmp_path / "summary.json").read_text())
-    assert (summary["cases"], summary["missing"]) == (1, 2)
-    assert (tmp_path / "results.jsonl").read_text() == torn
-
-
-def test_results_of_other_cases_are_not_scored_as_none(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    asked = ("--folder", str(tmp_path), "--seed", "4", "--scenarios", "3", "--score")
-    assert run(monkeypatch, *asked) == 2
-    assert "holds no results.jsonl with results to score" in capsys.readouterr().err.replace(
-        "\n", " "
-    )
-    add_result(
-        tmp_path / "results.jsonl",
-        replace(RESULTS[3], case=draw_cases(5, 3)[0], code=source_digest()),
-    )
-    assert run(monkeypatch, *asked) == 2
-    assert "none of its 1 results is of these 3 cases" in capsys.readouterr().err.replace("\n", " ")
-    assert [path.name for path in tmp_path.iterdir()] == ["results.jsonl"]
-
-
-def test_drawn_suite_takes_kinds_and_effects(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for case in draw_cases(4, 4, kinds=["clear"], effects=["gravity"]):
-        add_result(
-            tmp_path / "results.jsonl",
-            replace(result("clear", "gravity", "found", [cause("gravity")]), case=case, code="abc"),
-        )
-    asked = [
-        "--folder",
-        str(tmp_path),
-        "--seed",
-        "4",
-        "--scenarios",
-        "4",
-        "--kinds",
-        "clear",
-        "--effects",
-        "gravity",
-    ]
-    assert run(monkeypatch, *asked) == 2
-    assert "was made by version abc of the code" in capsys.readouterr().err.replace("\n", " ")
-    assert run(monkeypatch, *asked, "--any-version") == 0
-    assert "one effect, clear: 4 of 4 right" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("--kinds", "clear"),
-        ("--scenarios", "5", "--kinds", "moon"),
-        ("--effects", "moon"),
-        ("--scenarios", "0"),
-    ],
-)
-def test_what_cannot_be_asked_for_is_exit_code_2(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...]
-) -> None:
-    assert run(monkeypatch, "--folder", str(tmp_path / "none"), *arguments) == 2
-    assert not (tmp_path / "none").exists()

@@ -9,13 +9,10 @@ from typing import Any
 
 import httpx
 import pytest
-from typer.testing import CliRunner
 
-from palpate.app.cli import app
 from palpate.app.reporting.report_page import report_page
 from palpate.app.reporting.report_tables import ladder_steps, removed_share
 from palpate.app.storage.run_store import Run
-from palpate.foundation.errors import RunError
 
 
 class Seen(HTMLParser):
@@ -127,26 +124,3 @@ def test_page_over_rest_is_a_download(client: httpx.Client, run_name: str) -> No
     assert answer.headers["content-disposition"] == f'attachment; filename="{run_name}.html"'
     assert answer.text.startswith("<!doctype html>")
     assert client.get("/api/runs/nothing/report.html").status_code == 404
-
-
-def test_export_writes_the_page(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(run.path.parent)
-    result = CliRunner().invoke(app, ["export", run.name])
-    assert result.exit_code == 0, result.output
-    assert (run.path.parent / f"{run.name}.html").read_text() == report_page(run)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["elsewhere"], "has no report.json"),
-        ([".", "--out", "x.pdf"], "name such a file"),
-        ([".", "--out", "no/x.html"], "cannot be"),
-    ],
-)
-def test_export_says_what_is_wrong(
-    run: Run, arguments: list[str], message: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(run.path)
-    with pytest.raises(RunError, match=message):
-        CliRunner().invoke(app, ["export", *arguments], catch_exceptions=False)

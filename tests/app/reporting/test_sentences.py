@@ -6,9 +6,8 @@ from typing import Any
 
 import pytest
 
-from palpate.app.reporting.cause_phrases import cause_phrase
+from palpate.app.reporting.cause_phrases import PHRASES, cause_phrase
 from palpate.app.reporting.sentences import (
-    PHRASES,
     control_sentences,
     determined_sentences,
     left_sentences,
@@ -215,7 +214,8 @@ def test_next_probe_says_what_to_do_and_what_it_tells(report: dict[str, Any]) ->
     pushed, measured = (plain(probe_sentence(row)) for row in report["next_probe"])
     assert (
         pushed
-        == "press 6 mm deep on the top at (12, -8) mm: tells stiff inclusion from tool radius, 94 % likely to decide"
+        == "press 6 mm deep on the top at (12, -8) mm: tells stiff inclusion from tool radius, "
+        "94 % likely to decide"
     )
     assert "more than 99 % likely" in plain(
         probe_sentence({**report["next_probe"][0], "probability": 0.999})
@@ -258,7 +258,8 @@ def test_lump_that_was_felt_is_said_with_its_depth_footprint_and_cover() -> None
     }
     report = {"verdict": "found", "causes": [cause], "palpation": palpation}
     assert plain(verdict_sentence(report)) == (
-        "The simulation misses a stiff lump, 15 mm across, its centre 11.3 mm (9.4 to 13.1) under the surface."
+        "The simulation misses a stiff lump, 15 mm across, "
+        "its centre 11.3 mm (9.4 to 13.1) under the surface."
     )
     pushed, felt, cover = (plain(said) for said in palpation_sentences(report))
     assert pushed == "15 pushes, about 4.0 mm deep, against about 0.12 N"
