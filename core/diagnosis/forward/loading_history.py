@@ -52,28 +52,31 @@ class LoadingHistory:
         Args:
             rates: (t,) [1/s].
         """
-        held, found = np.zeros(len(self.touched)), np.zeros((len(self.instants), len(self.touched)))
+        held, weights = (
+            np.zeros(len(self.touched)),
+            np.zeros((len(self.instants), len(self.touched))),
+        )
         steps = np.diff(self.times, append=2 * self.times[-1] - self.times[-2])
         upcoming = np.searchsorted(self.times, self.instants)  # NaN is past the end
         for number, (step, rate) in enumerate(zip(steps, rates, strict=True)):
-            found[upcoming == number] = held
+            weights[upcoming == number] = held
             held = held + (self.shares[number] - held) * -np.expm1(-rate * step)
-        found[(upcoming == len(self.times)) & np.isfinite(self.instants)] = held
-        return found
+        weights[(upcoming == len(self.times)) & np.isfinite(self.instants)] = held
+        return weights
 
     def peaks(self) -> list[tuple[float, FloatArray]]:
         """Times [s] of the groups in contact and of each push's deepest instant, in order, with
         their weights (k,).
         """
-        found = [
+        instants = [
             (float(self.instants[group]), np.eye(len(self.touched))[number])
             for number, group in enumerate(self.touched)
         ]
         for begin, end in _pushes(self.depths):
             deepest = begin + int(np.argmax(self.depths[begin:end]))
             if self.shares[deepest].any():
-                found.append((float(self.times[deepest]), self.shares[deepest]))
-        return sorted(found, key=lambda one: one[0])
+                instants.append((float(self.times[deepest]), self.shares[deepest]))
+        return sorted(instants, key=lambda one: one[0])
 
 
 def loading_history_of(

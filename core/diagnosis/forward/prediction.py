@@ -218,14 +218,15 @@ def predict(
                 force,
             )
         )
-    found = _collected(data, results, path)
+    prediction = _collected(data, results, path)
     if request is None or history is None:
-        return found
+        return prediction
     # A small change of a parameter changes the whole history, which is no first-order change of
     # one frame. The columns are those of the setup without history.
     plain = replace(request, setups=tuple(without_history(other) for other in request.setups))
     return _with_columns_of(
-        found, predict(data, without_history(setup), grid, plain, starts, tolerance, found.samples)
+        prediction,
+        predict(data, without_history(setup), grid, plain, starts, tolerance, prediction.samples),
     )
 
 
@@ -267,9 +268,9 @@ def _collected(data: Observations, results: Sequence[_GroupResult], path: ToolPa
     )
 
 
-def _with_columns_of(found: Prediction, other: Prediction) -> Prediction:
+def _with_columns_of(prediction: Prediction, other: Prediction) -> Prediction:
     """A prediction with the columns of another one."""
-    if found.forces is None or other.forces is None:
-        return replace(found, columns=other.columns)
-    forces = replace(found.forces, columns=other.forces.columns)
-    return replace(found, columns=other.columns, forces=forces)
+    if prediction.forces is None or other.forces is None:
+        return replace(prediction, columns=other.columns)
+    forces = replace(prediction.forces, columns=other.forces.columns)
+    return replace(prediction, columns=other.columns, forces=forces)

@@ -89,8 +89,8 @@ class PointComparison:
         that chose them [1].
         """
         other = self.seen.side != sample.side[self.seen.index]
-        found = np.bincount(self.seen.patch[other], minlength=len(self.means.count))
-        return np.asarray(found / np.maximum(self.means.count, 1))
+        count = np.bincount(self.seen.patch[other], minlength=len(self.means.count))
+        return np.asarray(count / np.maximum(self.means.count, 1))
 
     def along_sight(self, moved: FloatArray, scale: float = 1.0) -> FloatArray:
         """Change of the averages (p,) [m] if the camera sees `places` elsewhere.
@@ -136,16 +136,16 @@ def choose_points(group: Group, setup: Setup, frame: Equilibrium, surface: Surfa
     seen = gaps(
         sight.place(group.points), sight.pose.translation, frame, surface, lowest=group.lowest
     )
-    kept = within_spread(seen.gap, seen.patch, surface.patches)
-    kept[kept] = agrees_with_neighbours(seen.gap[kept], seen.patch[kept], surface)
-    index, patch = seen.index[kept].astype(np.int32), seen.patch[kept].astype(np.int32)
+    chosen = within_spread(seen.gap, seen.patch, surface.patches)
+    chosen[chosen] = agrees_with_neighbours(seen.gap[chosen], seen.patch[chosen], surface)
+    index, patch = seen.index[chosen].astype(np.int32), seen.patch[chosen].astype(np.int32)
     return PointSample(
         index,
         patch,
-        (sight.scale * seen.gap[kept]).astype(np.float32),
-        seen.facing[kept].astype(np.float32),
-        surface.on_stated(seen.foot[kept]).astype(np.float32),
-        seen.side[kept].astype(np.int8),
+        (sight.scale * seen.gap[chosen]).astype(np.float32),
+        seen.facing[chosen].astype(np.float32),
+        surface.on_stated(seen.foot[chosen]).astype(np.float32),
+        seen.side[chosen].astype(np.int8),
     )
 
 
@@ -188,9 +188,9 @@ def _met_or_beside(
     """Gaps of the sample's points to the model along their rays, or beside them.
 
     A ray that meets the model far from its material point in the baseline has passed over an edge
-    or the rim of a dent. Such a point is compared with the plane at that material point if it is much
-    nearer, so that its gap does not jump by millimetres. A ray that misses the model is treated
-    alike.
+    or the rim of a dent. Such a point is compared with the plane at that material point if it is
+    much nearer, so that its gap does not jump by millimetres. A ray that misses the model is
+    treated alike.
     """
     met = gaps(points, camera, frame, surface, everything=True)
     usual = surface.own(sample.foot.astype(float))
@@ -209,8 +209,8 @@ def _met_or_beside(
     nearer = np.abs(beside.gap) < by_ray[other_side] - CRITERIA.rays.jump_gain
     given_up = np.zeros(len(points), dtype=bool)
     given_up[other_side[nearer]] = True
-    kept = ~given_up[met.index]
-    parts = (_taken(met, np.flatnonzero(kept)), _taken(beside, np.flatnonzero(nearer)))
+    remaining = ~given_up[met.index]
+    parts = (_taken(met, np.flatnonzero(remaining)), _taken(beside, np.flatnonzero(nearer)))
     return Gaps(
         *(np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(Gaps))
     )
@@ -244,16 +244,16 @@ def compare(
         np.abs(off_tool) < np.abs(values) - CRITERIA.rays.tool_margin
     )
     values[on_tool] = off_tool[on_tool]
-    kept, tool = ~on_tool[seen.index], np.flatnonzero(on_tool)
-    index = seen.index[kept]
+    on_surface, tool = ~on_tool[seen.index], np.flatnonzero(on_tool)
+    index = seen.index[on_surface]
     seen = Gaps(
         index,
-        seen.gap[kept],
-        seen.foot[kept],
-        seen.normal[kept],
-        seen.facing[kept],
+        seen.gap[on_surface],
+        seen.foot[on_surface],
+        seen.normal[on_surface],
+        seen.facing[on_surface],
         sample.patch[index],
-        seen.side[kept],
+        seen.side[on_surface],
     )
     means = plain_means(values, sample.patch, surface.patches)
     places = _places(points, camera, met, sample)

@@ -85,8 +85,8 @@ def _task(
     data = _measured(file)
     if data.force_only:
         return predict_forces(data, setup, grid, request, starts, tolerance)
-    found = predict(data, setup, grid, request, starts, tolerance, samples)
-    return found if samples is None else replace(found, samples=())
+    prediction = predict(data, setup, grid, request, starts, tolerance, samples)
+    return prediction if samples is None else replace(prediction, samples=())
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,8 +103,8 @@ class Pending:
 
     def result(self) -> Prediction:
         """Wait for the prediction."""
-        found = self.future.result()
-        return found if self.samples is None else replace(found, samples=self.samples)
+        prediction = self.future.result()
+        return prediction if self.samples is None else replace(prediction, samples=self.samples)
 
 
 def _trace(

@@ -51,7 +51,7 @@ class SurfaceGain:
 
     def to_json(self, split: str) -> dict[str, Any]:
         """Plain values in millimetres and newtons, as in the report."""
-        found: dict[str, Any] = {
+        entry: dict[str, Any] = {
             "split": split,
             "unit": "mm",
             "baseline": round(self.baseline * 1e3, 4),
@@ -65,13 +65,13 @@ class SurfaceGain:
             "probes": self.probes,
         }
         if self.tuned is not None:
-            found["tuned"] = _interval(self.tuned)
+            entry["tuned"] = _interval(self.tuned)
         if self.force is not None:
             names = ("baseline", "extended", "noise_floor")
-            found["force"] = {"unit": "N"} | {
+            entry["force"] = {"unit": "N"} | {
                 name: round(value, 5) for name, value in zip(names, self.force, strict=True)
             }
-        return found
+        return entry
 
 
 def _interval(shares: tuple[float, float, float]) -> dict[str, float]:
@@ -83,8 +83,8 @@ def surface_gain(
     data: Sequence[Observations],
     baseline: Sequence[Prediction],
     extended: Sequence[Prediction],
-    stated: Setup,
-    found: Setup,
+    stated_setup: Setup,
+    extended_setup: Setup,
     seed: int,
 ) -> SurfaceGain:
     """Compare two models on held-out sequences; the bootstrap resamples whole pushes.
@@ -96,11 +96,11 @@ def surface_gain(
         data: the sequences.
         baseline: their predictions by the stated model.
         extended: their predictions by the extended model.
-        stated: the stated setup.
-        found: the extended setup.
+        stated_setup: the stated setup.
+        extended_setup: the extended setup.
         seed: of the bootstrap.
     """
-    sums = probe_sums(data, (baseline, extended), found.pushes_leave_traces)
+    sums = probe_sums(data, (baseline, extended), extended_setup.pushes_leave_traces)
     drawn, whole = sums.rms(sums.draws(seed)), sums.rms()[0]
     low, high = np.quantile(removed_share(*drawn.T), [0.025, 0.975])
     return SurfaceGain(
@@ -108,7 +108,7 @@ def surface_gain(
         extended=float(whole[1]),
         noise_floor=float(whole[2]),
         removed=(float(removed_share(*whole)), float(low), float(high)),
-        paper=(_paper(data, baseline, stated), _paper(data, extended, found)),
+        paper=(_paper(data, baseline, stated_setup), _paper(data, extended, extended_setup)),
         probes=len(sums.names),
         force=_force(baseline, extended),
     )
@@ -116,11 +116,9 @@ def surface_gain(
 
 def _paper(data: Sequence[Observations], predictions: Sequence[Prediction], setup: Setup) -> float:
     """Mean of the paper's metric over touched groups [m]."""
-    found = list(paper_sums(data, predictions, setup).values())
+    sums = list(paper_sums(data, predictions, setup).values())
     return (
-        sum(total for total, _ in found) / sum(count for _, count in found)
-        if found
-        else float("nan")
+        sum(total for total, _ in sums) / sum(count for _, count in sums) if sums else float("nan")
     )
 
 

@@ -138,17 +138,17 @@ def probe_sums(
     """
     seen = [row for row in zip(data, *models, strict=True) if not row[0].force_only]
     variance = patch_variance([row[1:][end] for row in seen for end in ends])
-    found: list[tuple[str, FloatArray]] = []
+    rows: list[tuple[str, FloatArray]] = []
     for item, *own in seen:
-        found += _rows(item, own, variance, lasting, ends)
-    if not found:
+        rows += _rows(item, own, variance, lasting, ends)
+    if not rows:
         raise DiagnosisError(
             "the test sequences have no frame in which the tool touches the phantom; "
             "name others in [splits] test"
         )
     names, table, count = (
-        np.array([row[0] for row in found]),
-        np.stack([row[1] for row in found]),
+        np.array([row[0] for row in rows]),
+        np.stack([row[1] for row in rows]),
         len(models),
     )
     probes = np.unique(names)
@@ -174,7 +174,7 @@ def _rows(
             f"{item.name} has no untouched frame, so its noise floor is unknown; "
             "name others in [splits] test"
         )
-    found = []
+    rows = []
     for number, group in enumerate(item.groups):
         left = lasting and group.push > 0
         if (group.free and not left) or any(number in model.failed for model in own):
@@ -193,8 +193,8 @@ def _rows(
             difference**2,
         ]
         sums = [(values[seen] * count).sum() for values in products]
-        found.append((f"{item.name}/{group.push}", np.array([*sums, floor, count.sum()])))
-    return found
+        rows.append((f"{item.name}/{group.push}", np.array([*sums, floor, count.sum()])))
+    return rows
 
 
 def paper_sums(
@@ -204,7 +204,7 @@ def paper_sums(
     ("sequence/number").
     """
     surface, sight = Surface.of(setup), camera_model_for(setup)
-    found: dict[str, tuple[float, int]] = {}
+    by_push: dict[str, tuple[float, int]] = {}
     for item, prediction in zip(data, predictions, strict=True):
         for number, group in enumerate(item.groups):
             if not item.force_only and not group.free and number not in prediction.failed:
@@ -214,6 +214,6 @@ def paper_sums(
                     prediction.equilibria[number],
                     surface,
                 )
-                total, count = found.get(name, (0.0, 0))
-                found[name] = (total + distance, count + 1)
-    return found
+                total, count = by_push.get(name, (0.0, 0))
+                by_push[name] = (total + distance, count + 1)
+    return by_push

@@ -88,8 +88,8 @@ def held_out_gain(
         alone: whether to add the gain of fitted nuisances without a cause.
     """
     names, stated = [item.name for item in held_out], evaluator.problem.setup
-    found = tuned_setup(evaluator, findings.best.model) if findings.best else stated
-    first, second = (found, stated) if findings.known else (stated, found)
+    extended_setup = tuned_setup(evaluator, findings.best.model) if findings.best else stated
+    first, second = (extended_setup, stated) if findings.known else (stated, extended_setup)
     forces = all(item.force_only for item in held_out)
     without = (
         tuned_setup(evaluator, findings.baseline)
@@ -110,7 +110,7 @@ def held_out_gain(
         return None
     if forces:
         return force_gain(held_out, baseline, extended, seed, _stiffer(evaluator, findings))
-    gain = surface_gain(held_out, baseline, extended, stated, found, seed)
+    gain = surface_gain(held_out, baseline, extended, stated, extended_setup, seed)
     if without is not None:
         gain = replace(
             gain,
@@ -151,10 +151,10 @@ def _stiffer(evaluator: Evaluator, findings: Findings) -> tuple[float, float]:
 
     Both are 1 if the modulus is a cause, or without forces.
     """
-    found = findings.best.model if findings.best else findings.baseline
-    if any(effect.nuisance is NuisanceBlock.YOUNG_MODULUS for effect in found.effects):
+    best = findings.best.model if findings.best else findings.baseline
+    if any(effect.nuisance is NuisanceBlock.YOUNG_MODULUS for effect in best.effects):
         return 1.0, 1.0
-    known = [modulus_interval(evaluator, model) for model in (findings.baseline, found)]
+    known = [modulus_interval(evaluator, model) for model in (findings.baseline, best)]
     first, second = (
         1.0 if one is None else one[0] / evaluator.problem.setup.material.young_modulus
         for one in known

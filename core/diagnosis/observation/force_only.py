@@ -97,7 +97,7 @@ def _instants(
     times: FloatArray, depth: FloatArray, pushes: list[slice]
 ) -> tuple[FloatArray, tuple[Group, ...]]:
     """Times (f,) [s] of the instants, and their groups: each push on the way in, and held."""
-    found, groups, count = [], [], 0
+    instants, groups, count = [], [], 0
     for push, run in enumerate(pushes, start=1):
         own, when = depth[run], times[run]
         full = int(own.argmax())
@@ -105,14 +105,14 @@ def _instants(
             # The last time at which it was shallower, because a tool may hover and come back.
             before = np.flatnonzero(own[: full + 1] < share * own[full])
             if len(before) and before[-1] + 1 < full:
-                found.append(when[before[-1] + 1])
+                instants.append(when[before[-1] + 1])
                 groups.append(Group((count,), _NO_POINTS, False, push=push))
                 count += 1
         held = _held(when, own, full)
-        found += held.tolist()
+        instants += held.tolist()
         groups.append(Group(tuple(range(count, count + len(held))), _NO_POINTS, False, push=push))
         count += len(held)
-    return np.array(found), tuple(groups)
+    return np.array(instants), tuple(groups)
 
 
 def _held(when: FloatArray, depth: FloatArray, full: int) -> FloatArray:

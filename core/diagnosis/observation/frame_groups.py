@@ -161,7 +161,7 @@ class Observations:
         """
         times, path = self.path(setup)
         depths = _depth(setup.box.size, path)
-        found: list[int | None] = []
+        places: list[int | None] = []
         last = np.inf
         for group, centre in zip(self.groups, self.centres(setup), strict=True):
             instant = self.instant(group, setup)
@@ -174,5 +174,5 @@ class Observations:
                 and depths[deepest]
                 > _depth(setup.box.size, centre[None])[0] + CRITERIA.grouping.deeper_by
             )
-            found.append(deepest if deeper else None)
-        return found
+            places.append(deepest if deeper else None)
+        return places

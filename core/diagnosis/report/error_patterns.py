@@ -51,7 +51,7 @@ class ErrorPatterns:
 
 
 def error_patterns(
-    evaluator: Evaluator, data: Sequence[Observations], baseline: Model, found: Model
+    evaluator: Evaluator, data: Sequence[Observations], baseline: Model, extended: Model
 ) -> ErrorPatterns:
     """Compute the error of one push and the causes' prediction of it, with the same smoothing.
 
@@ -63,10 +63,10 @@ def error_patterns(
     """
     pairs = [
         row
-        for row in zip(data, baseline.predictions, found.predictions, strict=True)
+        for row in zip(data, baseline.predictions, extended.predictions, strict=True)
         if not row[0].force_only
     ]
-    lasting = found.setup.pushes_leave_traces
+    lasting = extended.setup.pushes_leave_traces
     compared = [
         _compare(item, before, after, whole=False, lasting=lasting) for item, before, after in pairs
     ]
@@ -161,20 +161,20 @@ def _kernel(surface: Surface) -> FloatArray:
     )
 
 
-def draw_patterns(found: ErrorPatterns, surface: Surface, path: Path) -> None:
+def draw_patterns(patterns: ErrorPatterns, surface: Surface, path: Path) -> None:
     """Draw both patterns, or the error alone if no cause is named, on the unfolded block, as PNG.
 
     Both have one colour scale [mm].
     """
-    shown = [("measured error", found.measured), ("predicted by the cause", found.predicted)]
-    shown = shown if np.nan_to_num(found.predicted).any() else shown[:1]
+    shown = [("measured error", patterns.measured), ("predicted by the cause", patterns.predicted)]
+    shown = shown if np.nan_to_num(patterns.predicted).any() else shown[:1]
     figure = new_figure(1.4 + 4.3 * len(shown), 4.6)
-    sizes = np.abs(np.concatenate([found.measured, found.predicted]))
+    sizes = np.abs(np.concatenate([patterns.measured, patterns.predicted]))
     seen = sizes[np.isfinite(sizes)]
     limit = max(1e3 * float(np.quantile(seen, 0.98)), 0.05) if len(seen) else 1.0
     for number, (title, values) in enumerate(shown):
         axes = figure.add_subplot(1, len(shown), number + 1)
-        drawn = _unfold(axes, found, values * 1e3, surface, limit)
+        drawn = _unfold(axes, patterns, values * 1e3, surface, limit)
         axes.set_title(title)
         axes.set_aspect("equal")
         axes.axis("off")
@@ -188,11 +188,11 @@ def draw_patterns(found: ErrorPatterns, surface: Surface, path: Path) -> None:
 
 
 def _unfold(
-    axes: Any, found: ErrorPatterns, values: FloatArray, surface: Surface, limit: float
+    axes: Any, patterns: ErrorPatterns, values: FloatArray, surface: Surface, limit: float
 ) -> Any:
     """Scatter the patches of the top and, folded out around it, those of the four sides."""
     x, y, z = surface.geometry.size
-    centres, normals = found.centres, found.normals
+    centres, normals = patterns.centres, patterns.normals
     place = centres[:, :2].copy()
     for side in SIDES[1:]:
         axis, sign = "xy".index(side[1]), 1.0 if side[0] == "+" else -1.0

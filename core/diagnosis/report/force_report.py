@@ -61,12 +61,14 @@ class PushForces:
 
 
 def push_forces(
-    evaluator: Evaluator, data: Sequence[Observations], baseline: Model, found: Model
+    evaluator: Evaluator, data: Sequence[Observations], baseline: Model, extended_model: Model
 ) -> PushForces:
     """Collect the pushes of all sequences without clouds, in their order."""
     rows: list[tuple[float, ...]] = []
     place, normal = evaluator.problem.pushes
-    for item, before, after in zip(data, baseline.predictions, found.predictions, strict=True):
+    for item, before, after in zip(
+        data, baseline.predictions, extended_model.predictions, strict=True
+    ):
         if not item.force_only or before.forces is None or after.forces is None:
             continue
         centres = item.centres(evaluator.problem.setup)

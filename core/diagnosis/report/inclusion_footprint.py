@@ -101,7 +101,7 @@ def footprint_of(
         )
         * lump.radius
     )
-    flat = middle[0] + reach[:, None] * _ways(normal[0])
+    flat = middle[0] + reach[:, None] * _directions(normal[0])
     distance, out = geometry.facing(flat)
     return Footprint(
         middle[0], normal[0], flat - distance[:, None] * out, float(change.max()), depth
@@ -120,22 +120,22 @@ def outline(middle: float, rings: FloatArray, level: float) -> FloatArray:
         level: [1].
     """
     radii = np.array([0.0, *CRITERIA.footprint.rings])
-    found = np.empty(rings.shape[1])
-    for way, values in enumerate(rings.T):
+    distances = np.empty(rings.shape[1])
+    for direction, values in enumerate(rings.T):
         along = np.append(middle, values)
         above = np.flatnonzero(along >= level)
         last = int(above[-1]) if len(above) else 0
         if last == len(radii) - 1:
-            found[way] = radii[-1]
+            distances[direction] = radii[-1]
         elif not len(above):
-            found[way] = CRITERIA.footprint.rings[0] / 2
+            distances[direction] = CRITERIA.footprint.rings[0] / 2
         else:
             share = (along[last] - level) / max(along[last] - along[last + 1], 1e-12)
-            found[way] = radii[last] + share * (radii[last + 1] - radii[last])
-    return np.maximum(found, CRITERIA.footprint.rings[0] / 2)
+            distances[direction] = radii[last] + share * (radii[last + 1] - radii[last])
+    return np.maximum(distances, CRITERIA.footprint.rings[0] / 2)
 
 
-def _ways(normal: FloatArray) -> FloatArray:
+def _directions(normal: FloatArray) -> FloatArray:
     """Unit vectors (w, 3) along the surface, at even angles around the normal."""
     first = np.cross(normal, [0.0, 1.0, 0.0] if abs(normal[1]) < 0.9 else [1.0, 0.0, 0.0])
     first /= np.linalg.norm(first)
@@ -149,9 +149,9 @@ def _rings(
     evaluator: Evaluator, middle: FloatArray, normal: FloatArray, radius: float
 ) -> tuple[FloatArray, FloatArray]:
     """Places of middle and rings on the surface, and its normals there, (1 + r w, 3) each."""
-    ways = _ways(normal)
+    directions = _directions(normal)
     flat = np.concatenate(
-        [middle[None], *(middle + ring * radius * ways for ring in CRITERIA.footprint.rings)]
+        [middle[None], *(middle + ring * radius * directions for ring in CRITERIA.footprint.rings)]
     )
     distance, out = evaluator.problem.setup.geometry.facing(flat)
     return flat - distance[:, None] * out, out
@@ -167,14 +167,14 @@ def _resisting(
     setups: tuple[Setup, Setup], grid: Meshing, place: FloatArray, normal: FloatArray, depth: float
 ) -> tuple[float, float]:
     """Force [N] against a push into a place (3,) [m] under each setup; NaN without equilibrium."""
-    found = []
+    forces = []
     for setup in setups:
         block = Replay(setup, grid, CRITERIA.replay.footprint_tolerance)
         frame = block.solve_from_any(place + (setup.tool.radius - depth) * normal, (None,))
-        found.append(
+        forces.append(
             float(frame.force @ normal) if frame.outcome.name == "CONVERGED" else float("nan")
         )
-    return found[0], found[1]
+    return forces[0], forces[1]
 
 
 def depth_of(

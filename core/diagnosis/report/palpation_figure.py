@@ -152,9 +152,9 @@ def _cut(axes: Axes, body: Box | Shape, cause: dict[str, Any]) -> None:
         lw=1.5,
     )
     depth, cover = cause["depth"], cause["cover"]
-    way = [centre, centre - distance[0] * normal]
+    depth_line = [centre, centre - distance[0] * normal]
     span = [centre + (depth["value"] - depth[end]) * normal for end in ("low", "high")]
-    for ends, width in ((way, 1.2), (span, 5.0)):
+    for ends, width in ((depth_line, 1.2), (span, 5.0)):
         line = 1e3 * np.array(ends)[:, shown]
         axes.plot(line[:, 0], line[:, 1], color=FOUND, lw=width, alpha=0.8, solid_capstyle="butt")
     axes.plot(*middle, "o", color=FOUND, ms=4)
@@ -179,12 +179,12 @@ def section(body: Box | Shape, axis: int, at: float) -> FloatArray:
 
     Returns segments (k, 2, 2) [m]: the other one of x and y, and z.
     """
-    kept = [1 - axis, 2]
+    axes = [1 - axis, 2]
     if isinstance(body, Box):
         side, height = body.size[1 - axis] / 2, body.size[2]
         corners = np.array([[-side, 0.0], [side, 0.0], [side, height], [-side, height]])
         return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
-    found = []
+    segments = []
     for corners in body.corners:
         away, ends = corners[:, axis] - at, []
         for a, b in ((0, 1), (1, 2), (2, 0)):
@@ -192,8 +192,8 @@ def section(body: Box | Shape, axis: int, at: float) -> FloatArray:
                 share = away[a] / (away[a] - away[b])
                 ends.append(corners[a] + share * (corners[b] - corners[a]))
         if len(ends) == 2:
-            found.append([end[kept] for end in ends])
-    return np.array(found).reshape(-1, 2, 2)
+            segments.append([end[axes] for end in ends])
+    return np.array(segments).reshape(-1, 2, 2)
 
 
 def _smooth(contour: FloatArray) -> FloatArray:

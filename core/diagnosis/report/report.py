@@ -60,18 +60,18 @@ def _removed(findings: Findings, misfit: float) -> float:
 def _causes(evaluator: Evaluator, findings: Findings, trials: list[Trial]) -> list[dict[str, Any]]:
     """Named causes with probability and parameters; a cause that rival sets share comes once."""
     chances = _probabilities(findings)
-    found: list[dict[str, Any]] = []
+    rows: list[dict[str, Any]] = []
     for trial in trials:
         for effect, entry in zip(
             trial.model.effects, intervals(evaluator, trial.model), strict=True
         ):
-            if any(row["effect"] == effect.name for row in found):
+            if any(row["effect"] == effect.name for row in rows):
                 continue
             chance = sum(p for names, p in chances.items() if effect.name in names)
-            found.append(
+            rows.append(
                 {"effect": effect.name, "probability": round(chance, 4), "parameters": entry}
             )
-    return found
+    return rows
 
 
 def _ranking(evaluator: Evaluator, findings: Findings, named: set[str]) -> list[dict[str, Any]]:
@@ -106,12 +106,12 @@ def _model(trial: Trial) -> dict[str, Any]:
     ]
     effects = [effect.to_json() for effect in trial.model.effects]
     # A set that is refused although its gain is large enough has an infinite required gain.
-    asked = round(trial.required_gain, 2) if np.isfinite(trial.required_gain) else None
+    required = round(trial.required_gain, 2) if np.isfinite(trial.required_gain) else None
     gain, misfit = round(trial.gain, 2), round(trial.misfit, 4)
     return {
         "effects": effects,
         "gain_nats": gain,
-        "asked_nats": asked,
+        "asked_nats": required,
         "misfit": misfit,
         "parts": parts,
     }
@@ -165,14 +165,14 @@ def _unexplained(
 
 def _all_clear(checks: AllClearChecks) -> dict[str, Any]:
     """Results of the checks behind a verdict of none; empty for other verdicts."""
-    found: dict[str, Any] = {}
+    entries: dict[str, Any] = {}
     if checks.held_out is not None:
         beyond = checks.held_out.structure
-        found["held_out_structure"] = round(beyond.ratio, 4)
-        found["held_out_structure_bound"] = round(beyond.bound / beyond.expected, 4)
+        entries["held_out_structure"] = round(beyond.ratio, 4)
+        entries["held_out_structure_bound"] = round(beyond.bound / beyond.expected, 4)
     if checks.stiffness_errors:
-        found["local_stiffness_error"] = [one.to_json() for one in checks.stiffness_errors]
-    return found
+        entries["local_stiffness_error"] = [one.to_json() for one in checks.stiffness_errors]
+    return entries
 
 
 def report_of(

@@ -36,8 +36,8 @@ def with_supplements(
                 if evaluator.problem.clouds
                 else force_controls(evaluator, model, findings.baseline)
             )
-        told, open_rows = profiles(evaluator, findings.best.model)
-        names = dict(zip(findings.best.model.names, told, strict=True))
+        identifiability, open_rows = profiles(evaluator, findings.best.model)
+        names = dict(zip(findings.best.model.names, identifiability, strict=True))
     return {
         **report,
         "causes": [
@@ -60,10 +60,12 @@ def with_supplements(
     }
 
 
-def _identified(cause: dict[str, Any], told: dict[str, str]) -> dict[str, Any]:
+def _identified(cause: dict[str, Any], identifiability: dict[str, str]) -> dict[str, Any]:
     """Add `identifiability` to the parameters of a cause that were profiled."""
     entries = {
-        name: {**entry, "identifiability": told[name]} if name in told else entry
+        name: {**entry, "identifiability": identifiability[name]}
+        if name in identifiability
+        else entry
         for name, entry in cause["parameters"].items()
     }
     return {**cause, "parameters": entries}

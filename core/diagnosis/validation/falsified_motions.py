@@ -54,7 +54,7 @@ def _depths(item: Observations, setup: Setup) -> FloatArray:
 
 def shifted(data: Sequence[Observations], setup: Setup) -> list[Observations]:
     """Shift each clock, cyclically, to where its pushes agree least with those that were made."""
-    found = []
+    recordings = []
     for item in data:
         true, best = _depths(item, setup), (np.inf, item)
         for share in CRITERIA.controls.clock_shifts:
@@ -68,8 +68,8 @@ def shifted(data: Sequence[Observations], setup: Setup) -> list[Observations]:
             )
             if agreement < best[0]:
                 best = (agreement, other)
-        found.append(best[1])
-    return found
+        recordings.append(best[1])
+    return recordings
 
 
 def mirrored(data: Sequence[Observations], setup: Setup) -> list[Observations]:

@@ -27,7 +27,7 @@ EXCHANGED = "pushes exchanged"
 
 def force_controls(evaluator: Evaluator, model: Model, baseline: Model) -> tuple[Control, ...]:
     """Compute the control of every cause of an accepted model, on sequences without clouds."""
-    found = []
+    results = []
     first = evaluator.problem.blocks.replayed
     for index, left in enumerate(model.effects):
         others = [effect for number, effect in enumerate(model.effects) if number != index]
@@ -49,8 +49,8 @@ def force_controls(evaluator: Evaluator, model: Model, baseline: Model) -> tuple
                 )
             )
             blocks.append(Block(block.name, block.gram / evaluator.state.temperature, block.values))
-        found += judge(evaluator, blocks, left, (EXCHANGED,))
-    return tuple(found)
+        results += judge(evaluator, blocks, left, (EXCHANGED,))
+    return tuple(results)
 
 
 def exchanged(pattern: FloatArray, force: FloatArray, push: IntArray) -> FloatArray:
@@ -68,12 +68,12 @@ def exchanged(pattern: FloatArray, force: FloatArray, push: IntArray) -> FloatAr
     size = np.maximum(np.linalg.norm(force, axis=1), 1e-12)
     share = np.einsum("gi,gi->g", pattern, force) / size**2
     names = np.unique(push)
-    found = np.zeros_like(pattern)
+    moved = np.zeros_like(pattern)
     for place, name in enumerate(names):
         here, there = (
             np.flatnonzero(push == name),
             np.flatnonzero(push == names[(place + len(names) // 2) % len(names)]),
         )
         taken = there[np.minimum(np.arange(len(here)), len(there) - 1)]
-        found[here] = share[taken, None] * force[here]
-    return found
+        moved[here] = share[taken, None] * force[here]
+    return moved

@@ -79,13 +79,13 @@ class Control:
 
     def to_json(self) -> dict[str, Any]:
         """Plain values, as in the report."""
-        kept = None if self.true <= CRITERIA.controls.faint else round(self.gain / self.true, 4)
+        retained = None if self.true <= CRITERIA.controls.faint else round(self.gain / self.true, 4)
         return {
             "control": self.control,
             "effect": self.effect,
             "gain_nats": round(self.gain, 2),
             "true_nats": round(self.true, 2),
-            "kept": kept,
+            "kept": retained,
             "alike": round(self.alike, 4),
             "passed": self.passed,
             **({"why": self.why} if self.why else {}),
@@ -124,14 +124,14 @@ def controls(
         for name, falsify in FALSIFIED.items()
     }
     replayed = {name: [future.result() for future in futures] for name, futures in pending.items()}
-    found = []
+    results = []
     for number, left in enumerate(model.effects):
         origin = _origin(evaluator, others[number], model, baseline)
         true = [_pattern(model.predictions[n], origin[n])[rows] for n, rows in chosen.items()]
         patterns = [true, *([own[number] for own in sequences] for sequences in replayed.values())]
         blocks = _blocks(evaluator, origin, model, chosen, patterns, (setups[1 + number], left))
-        found += judge(evaluator, blocks, left, tuple(FALSIFIED))
-    return tuple(found)
+        results += judge(evaluator, blocks, left, tuple(FALSIFIED))
+    return tuple(results)
 
 
 def _chosen(
@@ -272,11 +272,11 @@ def judge(
     ]
 
 
-def warnings_of(found: Sequence[Control]) -> list[str]:
+def warnings_of(results: Sequence[Control]) -> list[str]:
     """Return one sentence for each control that a cause did not pass."""
     return [
         f"{one.effect} keeps {100 * one.gain / one.true:.0f} % of its gain with the {one.control}: "
         "it may owe it to something else than the pushes"
-        for one in found
+        for one in results
         if one.passed is False
     ]

@@ -83,22 +83,22 @@ class StiffnessErrorTest:
 def largest_stiffness_error(evaluator: Evaluator, model: Model) -> StiffnessErrorTest | None:
     """Test the sequences with clouds; None without them."""
     precision = evaluator.bounded_precision(model)
-    found = []
+    results = []
     for noise, item in zip(evaluator.state.noises, model.predictions, strict=True):
         if not item.force_only:
             whole, own = Block(item.name, *noise.whole(item)), noise.discrepancy.shape[2]
-            wanted = stiffness_error_of(
+            error = stiffness_error_of(
                 whole, [*model.nuisance, *model.columns], precision, own, noise.spots
             )
-            found.append((item.name, wanted, noise))
-    if not found:
+            results.append((item.name, error, noise))
+    if not results:
         return None
-    name, wanted, noise = max(found, key=lambda row: row[1].gain)
+    name, error, noise = max(results, key=lambda row: row[1].gain)
     place = location_of(
         evaluator.problem.surface.patch_centres,
-        _seen(noise, wanted.errors)[: evaluator.problem.surface.patches],
+        _seen(noise, error.errors)[: evaluator.problem.surface.patches],
     )
-    return StiffnessErrorTest(name, wanted.factor, wanted.gain, chance_bound(len(found)), place)
+    return StiffnessErrorTest(name, error.factor, error.gain, chance_bound(len(results)), place)
 
 
 def _seen(noise: Noise, errors: FloatArray) -> FloatArray:
@@ -152,11 +152,11 @@ def stiffness_error_of(
     fixed = len(fitted)
 
     def prior(move: float, spot: float) -> FloatArray:
-        found = np.zeros((len(columns), len(columns)))
-        found[:fixed, :fixed] = precision
+        matrix = np.zeros((len(columns), len(columns)))
+        matrix[:fixed, :fixed] = precision
         deviation = np.array([*[move] * (own - spots), *[spot] * spots])
-        found[fixed:, fixed:] = np.diag(deviation**-2)
-        return found
+        matrix[fixed:, fixed:] = np.diag(deviation**-2)
+        return matrix
 
     usual = max(
         log_evidence([block], columns, prior(*pair))
