@@ -1,4 +1,4 @@
-"""What a case of the blind suite may do in its process: picklable, and at once."""
+"""Fast, picklable replacements of `run_case`."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from palpate.blind import Case, CaseResult
 
-UNTOLD = [
+NOT_IDENTIFIABLE = [
     {"effect": "young_modulus", "why": "no force was measured", "measure_instead": "the force"}
 ]
 
@@ -32,7 +32,7 @@ def result(
     truth: dict[str, Any] | None = None,
     ranking: dict[str, float] | None = None,
     removed: float | None = None,
-    untold: bool = True,
+    not_identifiable: bool = True,
     size: float | None = None,
     error: str = "",
 ) -> CaseResult:
@@ -48,7 +48,7 @@ def result(
     report: dict[str, Any] = {
         "verdict": verdict,
         "causes": causes or [],
-        "not_identifiable": UNTOLD if untold else [],
+        "not_identifiable": NOT_IDENTIFIABLE if not_identifiable else [],
         "ranking": [
             {"effect": one, "probability": chance, "gain_nats": 3.0}
             for one, chance in (ranking or {}).items()

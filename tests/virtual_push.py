@@ -14,7 +14,7 @@ COARSE = 3.6e-3
 RADIUS = Scenario().tool_radius
 X, Y, Z = Scenario().size
 CLEAR = 4e-3
-"""How far from the block a push begins [m]."""
+"""Distance from the block at which a push begins [m]."""
 
 
 def way(depth: float, side: bool = False) -> FloatArray:
@@ -33,7 +33,7 @@ def hide(effect: str, **parameters: float | str) -> HiddenEffect:
 def simulate_push(
     *effects: HiddenEffect, depth: float = 4e-3, side: bool = False, fine: float = COARSE
 ) -> SolvedTrack:
-    """In one second, held for another, and back."""
+    """Push in one second, hold for another, and retract."""
     waypoints = way(depth, side)
     length = CLEAR + depth
     push = PlannedPush(

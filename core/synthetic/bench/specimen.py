@@ -27,7 +27,7 @@ __all__ = ["Specimen", "SpecimenSnapshot"]
 
 GRAVITY = 9.81
 _MOST_HALVED = 3
-"""How often a step of a tool with friction is halved before it counts as unstable."""
+"""Number of halvings of a step with tool friction before it counts as unstable."""
 _SET, _MOST_SETS = 2e-6, 12
 """Change of the displacement [m] at which equilibrium and permanent set have converged, and the
 largest number of iterations."""

@@ -1,4 +1,4 @@
-"""What counts as right, first, among what is named, and falsely named; and the file of results."""
+"""Scores of single results, and the file of results."""
 
 from __future__ import annotations
 
@@ -13,8 +13,16 @@ from palpate.blind.case_results import add_result
 from palpate.foundation.errors import RunError
 
 
-def said(kind: str, hidden: str, verdict: str, named: str, untold: bool = True) -> CaseResult:
-    return result(kind, hidden, verdict, [cause(one) for one in named.split()], untold=untold)
+def scored(
+    kind: str, hidden: str, verdict: str, named: str, not_identifiable: bool = True
+) -> CaseResult:
+    return result(
+        kind,
+        hidden,
+        verdict,
+        [cause(one) for one in named.split()],
+        not_identifiable=not_identifiable,
+    )
 
 
 @pytest.mark.parametrize(
@@ -40,14 +48,14 @@ def said(kind: str, hidden: str, verdict: str, named: str, untold: bool = True) 
         ("twins", "tool_radius", "found", "tool_offset tool_radius", False),
     ],
 )
-def test_right_is_what_the_kind_asks_for(
+def test_correct_verdict_depends_on_the_kind_of_case(
     kind: str, hidden: str, verdict: str, named: str, right: bool
 ) -> None:
-    assert said(kind, hidden, verdict, named).right is right
+    assert scored(kind, hidden, verdict, named).right is right
 
 
 @pytest.mark.parametrize(
-    ("verdict", "named", "untold", "right"),
+    ("verdict", "named", "not_identifiable", "right"),
     [
         ("none", "", True, True),
         ("none", "", False, False),
@@ -57,10 +65,10 @@ def test_right_is_what_the_kind_asks_for(
         ("found", "gravity", False, False),
     ],
 )
-def test_modulus_alone_is_untold_or_where_it_could_be_told_named(
-    verdict: str, named: str, untold: bool, right: bool
+def test_modulus_alone_is_not_identifiable_or_named(
+    verdict: str, named: str, not_identifiable: bool, right: bool
 ) -> None:
-    assert said("modulus", "young_modulus", verdict, named, untold).right is right
+    assert scored("modulus", "young_modulus", verdict, named, not_identifiable).right is right
 
 
 @pytest.mark.parametrize(
@@ -81,7 +89,7 @@ def test_modulus_alone_is_untold_or_where_it_could_be_told_named(
 def test_first_among_and_false_names(
     kind: str, hidden: str, verdict: str, named: str, first: bool, inside: bool, false_name: bool
 ) -> None:
-    one = said(kind, hidden, verdict, named)
+    one = scored(kind, hidden, verdict, named)
     assert (one.first, one.inside, one.false_name) == (first, inside, false_name)
 
 
@@ -119,9 +127,11 @@ def test_last_row_that_was_torn_is_cut_off(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("torn", ["{", "[]", json.dumps({"name": "poisson_ratio-7", "seed": 7})])
-def test_other_row_that_is_no_result_is_told_with_its_number(tmp_path: Path, torn: str) -> None:
+def test_other_row_that_is_no_result_is_an_error_with_its_number(
+    tmp_path: Path, broken: str
+) -> None:
     file = tmp_path / "results.jsonl"
     add_result(file, result("control", name="a"))
-    file.write_text(f"{torn}\n{file.read_text()}")
+    file.write_text(f"{broken}\n{file.read_text()}")
     with pytest.raises(RunError, match=r"results\.jsonl, row 1 is not a result"):
         read_results(file)

@@ -31,13 +31,15 @@ def row(
     }
 
 
-def size(hidden: HiddenEffect, told: Any, shift: Transform | None = None) -> float | None:
-    return size_over_limit([hidden], [told], Scenario(), shift or Transform())
+def size(hidden: HiddenEffect, ambiguity_map: Any, shift: Transform | None = None) -> float | None:
+    return size_over_limit([hidden], [ambiguity_map], Scenario(), shift or Transform())
 
 
 def test_change_is_counted_from_what_is_believed() -> None:
-    told = row("tool_radius", {"parameter": "radius", "unit": "m", "change": 0.5e-3})
-    assert size(HiddenEffect("tool_radius", {"radius": 3.5e-3}), told) == pytest.approx(3.0)
+    ambiguity_map = row("tool_radius", {"parameter": "radius", "unit": "m", "change": 0.5e-3})
+    assert size(HiddenEffect("tool_radius", {"radius": 3.5e-3}), ambiguity_map) == pytest.approx(
+        3.0
+    )
 
 
 def test_two_effects_are_as_clear_as_the_fainter_one() -> None:
@@ -45,14 +47,16 @@ def test_two_effects_are_as_clear_as_the_fainter_one() -> None:
         HiddenEffect("tool_radius", {"radius": 3.5e-3}),
         HiddenEffect("poisson_ratio", {"nu": 0.25}),
     )
-    told = [
+    ambiguity_map = [
         row("tool_radius", {"parameter": "radius", "unit": "m", "change": 0.5e-3}),
         row("poisson_ratio", {"parameter": "nu", "unit": "1", "change": 0.1}),
     ]
-    assert size_over_limit([radius, ratio], told, Scenario(), Transform()) == pytest.approx(2.0)
-    assert size_over_limit([radius, ratio], told[:1], Scenario(), Transform()) is None
-    assert size_over_limit([radius], told[1:], Scenario(), Transform()) is None
-    assert size_over_limit([], told, Scenario(), Transform()) is None
+    assert size_over_limit(
+        [radius, ratio], ambiguity_map, Scenario(), Transform()
+    ) == pytest.approx(2.0)
+    assert size_over_limit([radius, ratio], ambiguity_map[:1], Scenario(), Transform()) is None
+    assert size_over_limit([radius], ambiguity_map[1:], Scenario(), Transform()) is None
+    assert size_over_limit([], ambiguity_map, Scenario(), Transform()) is None
 
 
 def test_several_parameters_add_up_as_squares_and_what_is_never_seen_adds_nothing() -> None:
@@ -77,12 +81,12 @@ def test_lump_is_measured_by_the_limit_of_the_nearest_place() -> None:
     lump = HiddenEffect(
         "stiff_inclusion", {"x": 0.01, "y": 0.0, "z": 0.025, "radius": 7e-3, "stiffness_ratio": 8.0}
     )
-    told = row("stiff_inclusion", near) | {
+    ambiguity_map = row("stiff_inclusion", near) | {
         "each": [at(far, x=0.0, y=0.0, z=0.01), at(near, x=0.012, y=0.001, z=0.02)]
     }
-    assert size(lump, told) == pytest.approx((7 / 9.5) / (1 / 3.5), abs=1e-3)
-    told["each"].reverse()
-    assert size(lump, told) == pytest.approx((7 / 9.5) / (1 / 3.5), abs=1e-3)
+    assert size(lump, ambiguity_map) == pytest.approx((7 / 9.5) / (1 / 3.5), abs=1e-3)
+    ambiguity_map["each"].reverse()
+    assert size(lump, ambiguity_map) == pytest.approx((7 / 9.5) / (1 / 3.5), abs=1e-3)
 
 
 def test_lump_is_measured_by_the_limit_of_half_of_the_places_and_by_its_contrast() -> None:
@@ -99,14 +103,16 @@ def test_lump_is_measured_by_the_limit_of_half_of_the_places_and_by_its_contrast
 
 def test_lump_acts_in_proportion_to_its_volume() -> None:
     limit = {"parameter": "stiffness_ratio", "unit": "1", "factor": 2.0}
-    told = row("stiff_inclusion", limit, at={"x": 0.0, "y": 0.0, "z": 0.025, "radius": 7e-3})
+    ambiguity_map = row(
+        "stiff_inclusion", limit, at={"x": 0.0, "y": 0.0, "z": 0.025, "radius": 7e-3}
+    )
     small, large = (
         size(
             HiddenEffect(
                 "stiff_inclusion",
                 {"x": 0.0, "y": 0.0, "z": 0.025, "radius": radius, "stiffness_ratio": 8.0},
             ),
-            told,
+            ambiguity_map,
         )
         for radius in (7e-3, 8.4e-3)
     )
@@ -138,16 +144,19 @@ def test_detached_strip_is_measured_by_its_own_edge_and_by_the_power_that_replay
             "limit": {"share": share},
         }
 
-    told = row("base_detachment", {"share": 0.1}) | {
+    ambiguity_map = row("base_detachment", {"share": 0.1}) | {
         "each": [at("-x", 0.024, 0.1), at("+y", 0.014, 0.5), at("-y", 0.014, None)]
     }
     assert size(
-        HiddenEffect("base_detachment", {"edge": "+y", "extent": 0.014}), told
+        HiddenEffect("base_detachment", {"edge": "+y", "extent": 0.014}), ambiguity_map
     ) == pytest.approx(2.0)
     assert size(
-        HiddenEffect("base_detachment", {"edge": "+y", "extent": 0.007}), told
+        HiddenEffect("base_detachment", {"edge": "+y", "extent": 0.007}), ambiguity_map
     ) == pytest.approx(2 ** (-2 / 3), abs=1e-3)
-    assert size(HiddenEffect("base_detachment", {"edge": "-y", "extent": 0.014}), told) is None
+    assert (
+        size(HiddenEffect("base_detachment", {"edge": "-y", "extent": 0.014}), ambiguity_map)
+        is None
+    )
 
 
 def test_camera_pose_is_the_motion_that_a_diagnosis_fits() -> None:

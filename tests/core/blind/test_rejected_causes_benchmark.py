@@ -25,7 +25,7 @@ def _of(lines: list[str], case: str) -> str:
     return line
 
 
-def test_what_stood_for_a_second_body_is_withheld() -> None:
+def test_cause_in_place_of_a_second_body_is_rejected() -> None:
     line = _of(_printed("suite-1400-replaced.jsonl"), "outside-1400-004-second_body")
     cells = [cell.strip() for cell in line.split("│")]
     assert cells[3:9] == ["stiff_inclusion", "no", "2.21", "1.88", "29 %", "yes"]

@@ -33,15 +33,15 @@ def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
     cases = [control("a"), control("b")]
     first = run_suite(tmp_path, cases, workers=2, run=blind_processes.finish)
     assert [one.name for one in first] == ["a", "b"] and all(one.right for one in first)
-    told: list[Any] = []
+    reports: list[Any] = []
     again = run_suite(
         tmp_path,
         cases[::-1],
         workers=2,
-        report=lambda fraction, text: told.append((fraction, text)),
+        report=lambda fraction, text: reports.append((fraction, text)),
     )
     assert again == first[::-1]
-    assert told == [(1.0, "2 of 2 were there already")]
+    assert reports == [(1.0, "2 of 2 were there already")]
     assert [path.name for path in tmp_path.iterdir()] == ["results.jsonl"]
 
 

@@ -53,7 +53,7 @@ def test_temperature_is_found_again() -> None:
     assert abs(stated.mean() - true.mean()) < 0.04 < abs(bold.mean() - same.mean())
 
 
-def test_of_equal_temperatures_the_highest_claims_least() -> None:
+def test_of_equal_temperatures_the_highest_is_chosen() -> None:
     sure = result("clear", "gravity")
     rows = [replace(sure, report={**sure.report, "models": [_model(25.0 + 500.0, "gravity")]})]
     assert 10.0 < best_temperature(rows) and loss(rows, best_temperature(rows)) < 1e-6

@@ -1,6 +1,4 @@
-"""Broken datasets: each gives one error with its place and what was expected, and is left as it
-was.
-"""
+"""Broken datasets give one error with its place and the expectation, and are not changed."""
 
 from __future__ import annotations
 

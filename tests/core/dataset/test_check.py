@@ -1,4 +1,4 @@
-"""What `palpate check` tells about a dataset that can be read."""
+"""Summaries and warnings of `palpate check`."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_without_a_registration_no_motion_is_guessed(folder: Path) -> None:
     assert all("poke" not in lack.sentence for lack in summary.lacks)
 
 
-def test_missing_kinds_of_motion_are_told_with_the_effects_they_would_show(folder: Path) -> None:
+def test_missing_kinds_of_motion_are_listed_with_their_effects(folder: Path) -> None:
     found = {lack.sentence.partition(":")[0]: lack.effects for lack in check(folder).lacks}
     assert found["no push from the side"] == ("base_slip", "base_detachment")
     assert "no drag along the surface" in found
@@ -76,7 +76,7 @@ def test_missing_kinds_of_motion_are_told_with_the_effects_they_would_show(folde
     assert all("young_modulus" not in effects for effects in found.values())
 
 
-def test_without_forces_the_modulus_is_told_to_be_unseen(folder: Path) -> None:
+def test_without_forces_the_modulus_is_listed_as_missing(folder: Path) -> None:
     (folder / POKE / "forces.csv").unlink()
     assert [lack.effects for lack in check(folder).lacks if "forces" in lack.sentence] == [
         ("young_modulus",)
@@ -119,7 +119,7 @@ def test_a_blocked_view_is_noticed(folder: Path) -> None:
     )
 
 
-def test_sequences_outside_the_splits_and_an_empty_test_are_told(folder: Path) -> None:
+def test_sequences_outside_the_splits_and_an_empty_test_give_warnings(folder: Path) -> None:
     path = folder / "dataset.toml"
     path.write_text(path.read_text().replace('test = ["drag-01"]', "test = []"))
     text = "\n".join(check(folder).warnings)
@@ -127,7 +127,7 @@ def test_sequences_outside_the_splits_and_an_empty_test_are_told(folder: Path) -
     assert "drag-01: is in no split" in text
 
 
-def test_a_tool_that_never_touches_is_told_with_its_distance(folder: Path) -> None:
+def test_a_tool_that_never_touches_gives_a_warning_with_its_distance(folder: Path) -> None:
     raised = Transform(translation=np.array([0, 0, 0.02])) @ registration(folder)
     summary = check_dataset(open_dataset(folder), raised)
     assert any(
@@ -136,7 +136,7 @@ def test_a_tool_that_never_touches_is_told_with_its_distance(folder: Path) -> No
     )
 
 
-def test_a_tool_that_hardly_moves_is_told_with_its_path(folder: Path) -> None:
+def test_a_tool_that_hardly_moves_gives_a_warning_with_its_path(folder: Path) -> None:
     path = folder / POKE / "kinematics.csv"
     header, *rows = path.read_text().splitlines()
     path.write_text(

@@ -66,9 +66,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def read_with(folder: Path, file: str, change: Callable[[bytes], bytes]) -> DatasetError | None:
-    """What reading says of the folder while one of its files is changed; anything but a
-    DatasetError goes through.
-    """
+    """Error of the reader while one file of the folder is changed; other exceptions propagate."""
     path = folder / file
     whole = path.read_bytes()
     path.write_bytes(change(whole))

@@ -68,12 +68,12 @@ def test_force_only_mesh_is_registered_checked_and_set_up(tmp_path: Path) -> Non
     summary = check_dataset(dataset, Transform())
     (contact,) = summary.sequences[0].motion.contacts  # type: ignore[union-attr]
     assert contact.kind == "top" and contact.depth == pytest.approx(4e-3, abs=2e-4)
-    told = " ".join(lack.sentence for lack in summary.lacks)
+    sentences = " ".join(lack.sentence for lack in summary.lacks)
     assert (
-        "no clouds" in told
-        and "1 pushes in all" in told
-        and "drag" not in told
-        and "no forces" not in told
+        "no clouds" in sentences
+        and "1 pushes in all" in sentences
+        and "drag" not in sentences
+        and "no forces" not in sentences
     )
 
 

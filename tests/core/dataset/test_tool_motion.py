@@ -1,4 +1,4 @@
-"""Motions told apart by their path alone."""
+"""Contacts of tool paths: kinds, depths, speeds and times."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_two_pushes_from_above_are_two_contacts_with_their_depths(dataset: Datas
     assert 12 <= motion.untouched_before <= 15
 
 
-def test_a_push_from_the_side_and_a_drag_are_told_apart(dataset: Dataset) -> None:
+def test_a_push_from_the_side_and_a_drag_are_distinguished(dataset: Dataset) -> None:
     beside, into = (
         (SIZE[0] / 2 + RADIUS + 0.01, 0.0, 0.02),
         (SIZE[0] / 2 + RADIUS - 0.005, 0.0, 0.02),

@@ -1,6 +1,4 @@
-"""What a camera sees of a block, and what it was registered on: a misread depth, and a block of
-another size.
-"""
+"""The camera model with a misread depth and a block of another size."""
 
 from __future__ import annotations
 
@@ -35,9 +33,7 @@ def _side(name: str, count: int = 3000) -> FloatArray:
 
 
 def _as_stated(setup: Setup, name: str) -> FloatArray:
-    """How far the true side's points (m,) [m] lie outside the stated side, as the stated camera has
-    them.
-    """
+    """Distance (m,) [m] of the true side's points outside of the stated side."""
     axis, end = SIDES[name]
     placed = POSE.apply(camera_model_for(setup, reference=True).read(_side(name) * setup.scale))
     return (placed[:, axis] - end) * (1.0 if name == "top" else -1.0)
@@ -56,7 +52,7 @@ def test_a_depth_is_read_as_scale_times_it_and_offset_along_the_ray():
     assert np.allclose(read[0] / read[0, 2], true[0] / true[0, 2])
 
 
-def test_what_nothing_is_wrong_with_is_seen_as_stated():
+def test_camera_without_errors_sees_as_stated():
     assert np.array_equal(camera_model_for(SETUP).pose.matrix, POSE.matrix)
     moved = CameraRegistration(tx=1e-3, ty=0.0, tz=0.0, rx=0.0, ry=0.0, rz=0.02).apply(SETUP)
     assert np.array_equal(camera_model_for(moved, reference=True).pose.matrix, POSE.matrix)
@@ -65,7 +61,7 @@ def test_what_nothing_is_wrong_with_is_seen_as_stated():
     )
 
 
-def test_sides_that_were_laid_on_the_stated_ones_stay_there_and_the_top_shows_the_height():
+def test_registered_sides_lie_on_the_stated_ones_and_the_top_shows_the_height():
     setup = SMALLER.apply(SETUP)
     moved = camera_model_for(setup).pose @ POSE.inverse()
     assert np.allclose(moved.translation, [-0.02 * SIZE[0], 0.015 * SIZE[1], 0.0], atol=1e-9)
@@ -74,7 +70,7 @@ def test_sides_that_were_laid_on_the_stated_ones_stay_there_and_the_top_shows_th
         assert np.allclose(_as_stated(setup, side), off, atol=1e-9)
 
 
-def test_stretched_depth_is_a_block_of_another_size_to_who_laid_it_on_table_and_sides():
+def test_scaled_depth_looks_like_a_block_of_another_size():
     setup = STRETCHED.apply(SETUP)
     for side, off in (("-x", 0.0), ("-y", 0.0), ("top", 0.02 * TOP)):
         assert np.allclose(_as_stated(setup, side), off, atol=1e-8)
@@ -101,7 +97,7 @@ def _rest_cloud(setup: Setup, true: CameraModel) -> FloatArray:
 @pytest.mark.parametrize(
     ("effect", "tolerance"), [(SMALLER, 1e-4), (STRETCHED, 1e-4)], ids=["size", "stretched"]
 )
-def test_registration_of_what_is_truly_seen_is_undone(effect: Effect, tolerance: float):
+def test_registration_error_is_inverted(effect: Effect, tolerance: float):
     """Of an offset the registration itself takes a part for a smooth error of the camera; that is a
     motion of the camera again.
     """

@@ -1,6 +1,4 @@
-"""Where a block lies as a sequence begins, by the virtual bench whose block slides and is not put
-back.
-"""
+"""Drift of a block between sequences, on the virtual bench."""
 
 from __future__ import annotations
 
@@ -64,19 +62,19 @@ def test_a_block_that_slid_is_found_where_it_lies(slid: tuple[Dataset, Truth]) -
         assert way == pytest.approx(truth.begun[name], abs=1.2e-4)
 
 
-def test_what_is_displaced_is_told_and_then_stands_at_home(slid: tuple[Dataset, Truth]) -> None:
+def test_drift_is_reported_and_removed(slid: tuple[Dataset, Truth]) -> None:
     dataset, _ = slid
     registration = register(dataset)
-    moved, told = align_sequences(dataset, registration)
-    assert len(told.warnings) == len(registration.warnings) + 1
-    assert "rest.ply" in told.warnings[-1]
-    assert "poke-side-02" in told.warnings[-1]
+    moved, aligned = align_sequences(dataset, registration)
+    assert len(aligned.warnings) == len(registration.warnings) + 1
+    assert "rest.ply" in aligned.warnings[-1]
+    assert "poke-side-02" in aligned.warnings[-1]
     assert (
         f"{1e3 * np.hypot(*measure_drift(dataset, registration)['poke-side-02']):.1f} mm"
-        in told.warnings[-1]
+        in aligned.warnings[-1]
     )
-    assert measure_drift(moved, told) == {}
-    assert align_sequences(moved, told) == (moved, told)
+    assert measure_drift(moved, aligned) == {}
+    assert align_sequences(moved, aligned) == (moved, aligned)
 
 
 def test_clouds_and_tool_move_together_and_a_raw_cloud_can_be_put_beside_them(
@@ -103,9 +101,7 @@ def test_clouds_and_tool_move_together_and_a_raw_cloud_can_be_put_beside_them(
     assert len(cleaner_for(dataset, registration).clean(moved.cloud(0)).indices) > 300
 
 
-def test_the_tool_moves_with_the_block_where_its_touches_were_of_other_landmarks(
-    slid: tuple[Dataset, Truth],
-) -> None:
+def test_drift_uses_the_repaired_directions_of_the_robot(slid: tuple[Dataset, Truth]) -> None:
     dataset, _ = slid
     registration = register(dataset)
     right = registration.phantom_from_robot
@@ -136,9 +132,7 @@ def test_a_camera_that_was_moved_is_no_block_that_slid(bumped: Dataset) -> None:
     assert align_sequences(bumped, registration) == (bumped, registration)
 
 
-def test_of_blocks_of_another_solver_only_one_that_slid_lies_elsewhere(
-    measured_datasets: list[Path],
-) -> None:
+def test_only_the_slid_block_of_another_solver_has_drift(measured_datasets: list[Path]) -> None:
     for path in measured_datasets:
         hidden = {
             entry["effect"]

@@ -94,7 +94,7 @@ def test_inset_leaves_the_edges_and_scale_the_middle():
     )
 
 
-def test_as_stated_nothing_is_moved():
+def test_stated_touches_need_no_correction():
     setup, _ = _registered(STATED)
     assert np.array_equal(touch_correction(setup, GRID).matrix, np.eye(4))
     assert np.array_equal(

@@ -77,10 +77,10 @@ def test_a_flat_top_alone_leaves_sliding_and_turning_open_and_at_the_guess(scene
     moved = off.apply(TOP) - TOP
     assert np.abs(moved[:2]).max() < 5e-4 and abs(off.rotation_vector[2]) < 0.01
     assert abs(error(fit, view.pose)[2]) < 2e-4
-    told = " ".join(fit.weak_directions)
+    sentences = " ".join(fit.weak_directions)
     for direction in ("translation along x", "translation along y", "rotation about z"):
-        assert direction in told
-    assert "kept at the first guess" in told
+        assert direction in sentences
+    assert "kept at the first guess" in sentences
     assert np.sqrt(fit.covariance[0, 0]) > 5e-3 and np.sqrt(fit.covariance[2, 2]) < 1e-3
 
 

@@ -77,7 +77,7 @@ def test_a_polygon_of_another_size_is_measured_in_percent(scale: float, word: st
     assert found.rms_proposed < 0.2 * found.rms_as_stated
 
 
-def test_swapped_and_shrunken_touches_are_both_told():
+def test_swapped_and_shrunken_touches_are_both_reported():
     stated = ("corner_1", "corner_0", "corner_2", "corner_3")
     found = propose_pairing(stated, touches(scale=0.85, noise=8e-4), EXPECTED, SIZE)
     assert found is not None

@@ -30,7 +30,7 @@ def _touches(
 
 
 def _off(fit: Transform) -> float:
-    """How far corners lie from where the true pose puts them, at most [m]."""
+    """Largest distance of corners from their true places [m]."""
     return float(np.linalg.norm((fit @ POSE.inverse()).apply(CORNERS) - CORNERS, axis=1).max())
 
 

@@ -77,8 +77,8 @@ def test_sloppy_clicks_and_icp_arrive_at_the_pose(scene):
     assert np.linalg.norm(off.apply(TOP) - TOP) < 5e-4
     assert np.degrees(np.linalg.norm(off.rotation_vector)) < 0.5
     assert result.after < result.before and result.points > 1000
-    told = json.loads(json.dumps(result.to_json()))
-    assert Transform.from_matrix(told["phantom_from_camera"]).matrix == pytest.approx(
+    plain = json.loads(json.dumps(result.to_json()))
+    assert Transform.from_matrix(plain["phantom_from_camera"]).matrix == pytest.approx(
         result.camera.phantom_from_camera.matrix
     )
     shift, turn = result.moved

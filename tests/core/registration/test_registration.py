@@ -59,7 +59,7 @@ def test_both_poses_of_measured_datasets_are_found_within_their_uncertainty(
     assert np.mean(squares) < 2.0
 
 
-def test_corners_named_half_a_turn_off_are_told_by_the_tool_in_the_clouds(measured_datasets):
+def test_corners_named_half_a_turn_off_give_a_warning_by_the_tool_in_the_clouds(measured_datasets):
     found = register(relabelled(open_dataset(measured_datasets[0]), [2, 3, 0, 1]))
     assert found.proposal is None
     assert any("half a turn" in text for text in found.warnings)
@@ -98,6 +98,6 @@ def test_setup_holds_what_the_experimenter_believes_and_the_registrations(measur
 
 
 def test_progress_runs_from_nothing_to_all(measured_datasets):
-    told: list[float] = []
-    register(open_dataset(measured_datasets[0]), lambda fraction, text: told.append(fraction))
-    assert told[0] == 0.0 and told[-1] == 1.0 and told == sorted(told)
+    fractions: list[float] = []
+    register(open_dataset(measured_datasets[0]), lambda fraction, text: fractions.append(fraction))
+    assert fractions[0] == 0.0 and fractions[-1] == 1.0 and fractions == sorted(fractions)

@@ -50,7 +50,7 @@ def _known(dataset: Dataset, found: Registration) -> Setup:
 
 
 def _apart(one: Transform, other: Transform) -> float:
-    """How far two poses put the block's places apart at most [m]."""
+    """Largest distance of the block's corners between two poses [m]."""
     corners: FloatArray = np.array(
         [[x * X / 2, y * Y / 2, z * Z] for x in (-1, 1) for y in (-1, 1) for z in (0, 1)]
     )
@@ -91,7 +91,7 @@ def test_clouds_are_read_as_the_effect_says(made):
         assert np.median(cloud[over, 2]) == pytest.approx(height, abs=tolerance)
 
 
-def test_who_knows_the_causes_finds_robot_and_camera_where_they_are(made):
+def test_known_causes_give_the_true_poses_of_robot_and_camera(made):
     dataset, truth, found = made
     setup = _known(dataset, found)
     robot = touch_correction(setup, GridSpec()) @ setup.phantom_from_robot
@@ -104,10 +104,12 @@ def test_who_knows_the_causes_finds_robot_and_camera_where_they_are(made):
 
 def test_registration_says_that_two_corners_are_swapped_and_the_polygon_is_small(made):
     _, _, found = made
-    told = " ".join(found.warnings)
-    assert "paired with the wrong landmarks" in told and "smaller than the landmarks" in told
+    warnings = " ".join(found.warnings)
+    assert (
+        "paired with the wrong landmarks" in warnings and "smaller than the landmarks" in warnings
+    )
     assert found.proposal is not None and found.proposal.scale == pytest.approx(0.85, abs=0.04)
 
 
-def test_nothing_else_is_drawn_for_a_scenario_without_them():
+def test_scenario_without_effects_has_the_stated_size():
     assert replace(QUICK, effects=()).true_size == QUICK.size

@@ -1,4 +1,4 @@
-"""What the virtual block is made of and stands on, against columns and balances in closed form."""
+"""Material and supports of the virtual block against columns and balances in closed form."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _modulus(*effects: HiddenEffect) -> tuple[FloatArray, FloatArray]:
 
 
 def _sag(*effects: HiddenEffect) -> float:
-    """How far the top of a column that does not bulge sinks under its own weight [m]."""
+    """Sag of the top of a column without Poisson effect [m]."""
     gravity = hide("gravity", specific_weight_over_stiffness=WEIGHT)
     rest, settled, _ = rest_surface(Scenario(effects=(gravity, *effects), poisson_ratio=0.0))
     return -float(settled[rest[:, 2] > Z - 1e-9, 2].mean())
@@ -90,7 +90,7 @@ def test_column_on_springs_sinks_further_by_its_weight_over_their_stiffness() ->
 
 
 def _pull(solver: TetSolver, displacement: FloatArray) -> FloatArray:
-    """Of the springs on the block (3,) [N]."""
+    """Force (3,) [N] of the springs on the block."""
     return -np.einsum("fab,fbi->i", solver.body.springs, displacement[solver.body.sole])
 
 
@@ -155,7 +155,7 @@ def test_skin_as_stiff_as_the_rest_changes_no_more_than_another_grid_does() -> N
 
 def test_fibres_lie_along_the_stated_direction() -> None:
     def spread(direction: float) -> FloatArray:
-        """How far the sides bulge along x and y under a push from above [m]."""
+        """Bulge of the sides along x and y under a push from above [m]."""
         solved = simulate_push(
             hide("anisotropy", direction=direction, stiffness_ratio=4.0)
         ).solved_pushes[0]

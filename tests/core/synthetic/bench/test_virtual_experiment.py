@@ -93,7 +93,7 @@ def test_keys_are_dense_enough_to_interpolate(monkeypatch: pytest.MonkeyPatch) -
         assert np.sqrt(np.mean(np.sum(error**2, axis=1))) < 0.03e-3
 
 
-def test_push_onto_a_hard_lump_stops_short_of_where_the_block_gives_way() -> None:
+def test_push_onto_a_hard_lump_stops_before_the_block_is_unstable() -> None:
     lump = {"x": -0.0025, "y": 0.0009, "z": 0.0243, "radius": 0.0086, "stiffness_ratio": 9.1}
     top = np.array([-0.00303, 0.00161, 0.0473])
     planned = PlannedPush(
@@ -112,7 +112,7 @@ def test_push_onto_a_hard_lump_stops_short_of_where_the_block_gives_way() -> Non
     assert max(-key_frame.tool_force[2] for key_frame in track.key_frames) > 0.3
 
 
-def test_solver_that_fails_where_the_block_stands_firm_is_not_taken_for_that(
+def test_solver_failure_of_a_stable_block_is_no_instability(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(

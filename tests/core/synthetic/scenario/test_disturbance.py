@@ -1,4 +1,4 @@
-"""What lies outside the catalogue: its size, and that the files show it."""
+"""Disturbances outside the catalogue: sizes, and their traces in the files."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_drawn_ones_are_clear_and_repeat_themselves(name: str) -> None:
         ("depth_ripple", {"period": 0.1}, "needs the parameters"),
     ],
 )
-def test_unknown_ones_and_missing_numbers_are_told(
+def test_unknown_disturbances_and_missing_numbers_are_errors(
     name: str, parameters: dict[str, float], words: str
 ) -> None:
     with pytest.raises(EffectError, match=words):
@@ -94,8 +94,8 @@ def _performed(sequence: str, *disturbances: Disturbance) -> tuple[MotionPlan, S
 
 
 def _top_rim(track: SolvedTrack, axis: int) -> FloatArray:
-    """How far (k, 3) [m] the rim of the top on the positive side of an axis has moved when the
-    first push is deepest.
+    """Displacement (k, 3) [m] of the rim of the top on the positive side of an axis when the first
+    push is deepest.
     """
     solved = track.solved_pushes[0]
     size = Scenario().size
@@ -186,7 +186,9 @@ def _table(pose: Transform, cloud: FloatArray) -> FloatArray:
 
 
 @pytest.mark.parametrize("one", [DRIFT, RIPPLE], ids=lambda one: one.name)
-def test_files_show_it_and_the_truth_says_unexplained(one: Disturbance, tmp_path: Path) -> None:
+def test_files_show_a_disturbance_and_the_truth_says_unexplained(
+    one: Disturbance, tmp_path: Path
+) -> None:
     quick = {
         "sequences": ("poke-top-01",),
         "fine": 4.5e-3,

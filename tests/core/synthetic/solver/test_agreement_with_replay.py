@@ -1,4 +1,4 @@
-"""What the virtual bench hides is what the engine calls by that name: both push one block with it,
+"""Effects of the virtual bench mean the same as the engine's of that name: both push one block
 and agree.
 """
 

@@ -1,5 +1,5 @@
-"""What hangs on the past means on the bench what the engine calls by that name: both do the same
-with one block, and agree.
+"""Effects with a history mean the same on the virtual bench and in the engine: both push one
+block and agree.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def test_bench_and_replay_agree_on_a_drag() -> None:
     assert np.allclose(solved.displacement(END), 0.0, atol=1e-6)
 
 
-def test_what_was_done_before_a_probe_is_there_in_the_next() -> None:
+def test_history_of_a_push_lasts_to_the_next() -> None:
     way = _poke().pushes[0]
     later = PlannedPush(way.waypoints, way.times + 3.5, way.arcs)
     motion = MotionPlan("poke-top-01", AWAY, (way, later), 8.5)
@@ -172,7 +172,7 @@ def test_forces_and_stiffness_of_a_metric_are_slopes_of_its_energy(block) -> Non
     assert product == pytest.approx(bent, rel=1e-5, abs=1e-6 * float(np.abs(bent).max()))
 
 
-def test_chains_that_did_not_flow_yet_are_the_share_that_the_law_gave_away(block) -> None:
+def test_unrelaxed_chains_carry_the_share_that_the_law_lacks(block) -> None:
     """Without the second invariant, that of a motion faster than all that relaxes is the law
     without a memory.
     """

@@ -1,4 +1,4 @@
-"""A tool that gives way on the virtual bench."""
+"""A tool with a compliant shaft on the virtual bench."""
 
 from __future__ import annotations
 

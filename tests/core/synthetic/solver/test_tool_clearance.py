@@ -1,4 +1,4 @@
-"""Where the virtual block's tool touches, told before anything is solved."""
+"""Distance between tool and virtual block."""
 
 from __future__ import annotations
 
