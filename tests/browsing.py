@@ -1,4 +1,4 @@
-"""A page in a real Chromium with what a person does on it, for tests."""
+"""A page in a real Chromium, operated as by a person, for tests."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ NEEDS_CHROMIUM = [
 
 
 class Page:
-    """The page with what a person does on it, and the server's side of it."""
+    """The page in a browser, and the server's state of it."""
 
     def __init__(self, page: Any, client: httpx.Client) -> None:
         self.page, self.client = page, client
@@ -76,7 +76,7 @@ class Page:
 
     @property
     def held(self) -> dict[str, Any]:
-        """What the server holds for this page."""
+        """The server's state of this page."""
         identity = self.page.evaluate("sessionStorage.getItem('palpate.page')")
         answer = self.client.get(f"/api/sessions/{identity}/state")
         return answer.json() if answer.status_code == 200 else {"view": {}, "drawn": {}}
@@ -86,7 +86,7 @@ class Page:
         return int(self.page.input_value("#scrub"))
 
     def settled(self) -> dict[str, Any]:
-        """Wait until the server holds the frame that the page shows."""
+        """Wait until the server has the frame that the page shows."""
         found: dict[str, Any] = {}
 
         def there() -> bool:

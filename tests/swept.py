@@ -1,5 +1,5 @@
-"""A small virtual phantom whose tool is larger than stated, to sweep over: quickly made, and
-quickly replayed.
+"""A small virtual phantom with a larger tool than stated, for sweeps: fast to make and
+to replay.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ __all__ = ["write_swept_phantom"]
 
 
 def write_swept_phantom(folder: Path) -> Path:
-    """Pushes from above by a ball of 6 mm that is stated to have 5 mm; returns the dataset's
+    """Write a dataset of pushes from above by a tool of 6 mm that is stated as 5 mm; returns its
     folder.
     """
     hidden = HiddenEffect("tool_radius", {"radius": 6e-3})

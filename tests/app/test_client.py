@@ -9,7 +9,7 @@ import pytest
 
 from palpate.app.client import ApiError, Client, JobError
 
-TARGETS = {"diagnosis": "job_working:refuse", "sweep": "job_working:warn"}
+TARGETS = {"diagnosis": "job_functions:refuse", "sweep": "job_functions:warn"}
 
 
 @pytest.fixture(scope="module")

@@ -39,7 +39,7 @@ def api(serve: Any, shared_place: Any) -> Iterator[tuple[Any, httpx.Client]]:
     """The description as the server gives it; jobs do nothing, since this is about asking for
     them."""
     with serve(
-        shared_place.settings, dict.fromkeys(("diagnosis", "sweep"), "job_working:warn")
+        shared_place.settings, dict.fromkeys(("diagnosis", "sweep"), "job_functions:warn")
     ) as client:
         yield schemathesis.openapi.from_url(f"{client.base_url}/openapi.json"), client
 

@@ -12,7 +12,7 @@ pytestmark = NEEDS_CHROMIUM
 def test_a_job_is_watched_cancelled_and_retried_with_the_mouse(
     browser: Any, serve: Any, place: Any
 ) -> None:
-    with serve(place.settings, {"diagnosis": "job_working:linger"}) as client:
+    with serve(place.settings, {"diagnosis": "job_functions:linger"}) as client:
         page = Page(browser.new_context(viewport={"width": 1440, "height": 900}).new_page(), client)
         at = page.page
         at.set_default_timeout(120_000)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browsing import NEEDS_CHROMIUM, Page
-from registering import CORNERS, NODES, Bench, X, Y, Z, off
+from register_panel import CORNERS, NODES, RegisterPanel, X, Y, Z, pose_errors
 from scipy.spatial.transform import Rotation
 from small_dataset import SIZE, ply_bytes, write_valid_dataset
 
@@ -38,13 +38,13 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Transform]:
 
 
 @pytest.fixture
-def bench(browser: Any, serve: Any, home: tuple[Path, Transform]) -> Iterator[Bench]:
+def bench(browser: Any, serve: Any, home: tuple[Path, Transform]) -> Iterator[RegisterPanel]:
     settings = Settings(runs=home[0] / "runs", datasets=home[0] / "datasets", preload=())
     with (
         serve(settings) as client,
         browser.new_context(viewport={"width": 1440, "height": 900}) as context,
     ):
-        found = Bench(Page(context.new_page(), client), home[1])
+        found = RegisterPanel(Page(context.new_page(), client), home[1])
         found.open()
         yield found
         expected = (
@@ -58,12 +58,12 @@ def bench(browser: Any, serve: Any, home: tuple[Path, Transform]) -> Iterator[Be
 
 
 def test_three_clicked_pairs_correct_a_bad_start_to_half_a_millimetre_and_the_result_is_stored(
-    bench: Bench,
+    bench: RegisterPanel,
 ) -> None:
     page = bench.page.page
     page.select_option(".register-bar select", "camera")
     bench.page.until(lambda: bench.values["start"] == "camera")
-    shift, turn = off(bench.shown().matrix, bench.true)
+    shift, turn = pose_errors(bench.shown().matrix, bench.true)
     assert shift > 0.05 and turn > 30.0
     page.wait_for_timeout(800)  # the camera turns
     for corner in CORNERS:
@@ -82,14 +82,18 @@ def test_three_clicked_pairs_correct_a_bad_start_to_half_a_millimetre_and_the_re
         for name in ("before", "after")
     )
     assert after < before
-    shift, turn = off(bench.values["found"]["registration"]["phantom_from_camera"], bench.true)
+    shift, turn = pose_errors(
+        bench.values["found"]["registration"]["phantom_from_camera"], bench.true
+    )
     assert shift < 0.5e-3 and turn < 0.5
     page.fill("#register-name", "clicked")
     page.get_by_role("button", name="Accept", exact=True).click()
     page.wait_for_selector(".note-card.good", timeout=120_000)
     kept = bench.page.client.get("/api/datasets/small/registrations/clicked").json()
     assert np.allclose(
-        off(kept["registration"]["phantom_from_camera"], bench.true), (shift, turn), atol=1e-5
+        pose_errors(kept["registration"]["phantom_from_camera"], bench.true),
+        (shift, turn),
+        atol=1e-5,
     )
     page.click("text=Open the dataset")
     page.select_option("#panel [name=registration]", "clicked")
@@ -98,7 +102,9 @@ def test_three_clicked_pairs_correct_a_bad_start_to_half_a_millimetre_and_the_re
     bench.page.until(lambda: "Refine by ICP" in bench.text)
 
 
-def test_pairs_are_moved_by_keys_undone_left_out_and_there_after_a_reload(bench: Bench) -> None:
+def test_pairs_are_moved_by_keys_undone_left_out_and_there_after_a_reload(
+    bench: RegisterPanel,
+) -> None:
     page = bench.page.page
     bench.pair(CORNERS[0])
     bench.pair(CORNERS[1], np.array([-X + 0.012, Y - 0.01, Z]))
@@ -129,7 +135,9 @@ def test_pairs_are_moved_by_keys_undone_left_out_and_there_after_a_reload(bench:
     assert bench.values["pairs"] == []
 
 
-def test_what_is_wrong_with_pairs_is_said_at_the_pair_and_mended_there(bench: Bench) -> None:
+def test_what_is_wrong_with_pairs_is_said_at_the_pair_and_mended_there(
+    bench: RegisterPanel,
+) -> None:
     page = bench.page.page
     for corner, mesh in zip(CORNERS, (CORNERS[1], CORNERS[0], CORNERS[2]), strict=True):
         bench.pair(corner, mesh)
@@ -160,7 +168,7 @@ def test_directions_that_the_cloud_leaves_open_are_told_in_words_and_by_arrows(p
         for one, other in zip(clicked, CORNERS, strict=True)
     ]
     kept = {"dataset": "small", "of": {"small": {"pairs": pairs}}}
-    bench = Bench(page, true)
+    bench = RegisterPanel(page, true)
     page.page.goto(str(page.client.base_url))
     page.page.evaluate(
         "kept => localStorage.setItem('palpate.register', JSON.stringify(kept))", kept

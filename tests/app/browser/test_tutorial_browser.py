@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browsing import NEEDS_CHROMIUM, Page
-from registering import CORNERS, Bench, off
+from register_panel import CORNERS, RegisterPanel, pose_errors
 
 from palpate.app.settings import Settings
 from palpate.foundation.frames import Transform
@@ -43,7 +43,7 @@ def test_the_help_leads_from_an_archive_to_a_registration_and_a_sweep(
         walk.help()
         walk.import_dataset(archive)
         walk.register(
-            Bench(
+            RegisterPanel(
                 page,
                 Transform.from_matrix(np.array(truth["registration"]["phantom_from_camera"])),
                 "bench-07",
@@ -87,7 +87,7 @@ class Walk:
         page.wait_for_selector("text=Every file was read")
         self.picture("dataset")
 
-    def register(self, bench: Bench) -> None:
+    def register(self, bench: RegisterPanel) -> None:
         page = self.page.page
         page.click("text=Register by hand")
         self.page.until(bench.is_ready)
@@ -103,7 +103,9 @@ class Walk:
         page.fill("#register-name", "clicked")
         page.get_by_role("button", name="Accept", exact=True).click()
         page.wait_for_selector(".note-card.good", timeout=120_000)
-        shift, turn = off(bench.values["found"]["registration"]["phantom_from_camera"], bench.true)
+        shift, turn = pose_errors(
+            bench.values["found"]["registration"]["phantom_from_camera"], bench.true
+        )
         assert shift < 0.5e-3 and turn < 0.5
 
     def sweep(self) -> None:

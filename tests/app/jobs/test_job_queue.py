@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from job_working import TARGETS, alive, ended, reached, scratch_is_clean
+from job_functions import TARGETS, alive, ended, reached, scratch_is_clean
 
 from palpate.app.http_errors import Conflict, Missing
 from palpate.app.jobs.job_queue import JobQueue

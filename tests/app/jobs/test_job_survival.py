@@ -15,9 +15,9 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-import job_working
+import job_functions
 import pytest
-from job_working import TARGETS, ended, gone, reached, scratch_is_clean
+from job_functions import TARGETS, ended, gone, reached, scratch_is_clean
 
 from palpate.app.http_errors import Conflict
 from palpate.app.jobs.job_queue import JobQueue
@@ -27,7 +27,7 @@ from palpate.foundation.errors import SetupError
 SERVER = """
 import pathlib, sys, time
 from palpate.app.jobs.job_queue import Jobs
-from job_working import TARGETS
+from job_functions import TARGETS
 if __name__ == "__main__":
     folder, kept = map(pathlib.Path, sys.argv[1:])
     jobs = Jobs(folder, TARGETS)
@@ -43,7 +43,7 @@ if __name__ == "__main__":
 @contextmanager
 def server(tmp_path: Path) -> Iterator[subprocess.Popen[bytes]]:
     (tmp_path / "serving.py").write_text(SERVER)
-    tests = Path(job_working.__file__).parent
+    tests = Path(job_functions.__file__).parent
     searched = os.pathsep.join(str(path) for path in (tests.parent, tests))
     command = [sys.executable, str(tmp_path / "serving.py"), str(tmp_path / "runs"), str(tmp_path)]
     with subprocess.Popen(command, env=os.environ | {"PYTHONPATH": searched}) as process:

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from job_working import family, gone
+from job_functions import family, gone
 from swept import write_swept_phantom
 
 from palpate.app.client import Client

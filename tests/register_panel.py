@@ -1,4 +1,4 @@
-"""The panel of manual registration in a real Chromium, with what a person does there, for tests."""
+"""The panel of manual registration in a real Chromium, for tests."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from small_dataset import SIZE
 
 from palpate.foundation.frames import Transform
 
-__all__ = ["CORNERS", "NODES", "Bench", "X", "Y", "Z", "off"]
+__all__ = ["CORNERS", "NODES", "RegisterPanel", "X", "Y", "Z", "pose_errors"]
 
 X, Y, Z = SIZE[0] / 2, SIZE[1] / 2, SIZE[2]
 CORNERS = [np.array([X, Y, Z]), np.array([-X, Y, Z]), np.array([-X, -Y, Z])]
 READY = "() => ['/cloud', '/block'].every(name => window.__viserMutable?.nodeRefFromName?.[name])"
 PIXEL = """([x, y, z]) => {
-  const { nodeRefFromName, camera, canvas } = window.__viserMutable, block = nodeRefFromName['/block'];
+  const { nodeRefFromName, camera, canvas } = window.__viserMutable;
+  const block = nodeRefFromName['/block'];
   const place = block.localToWorld(new block.position.constructor(x, y, z)).project(camera);
   return [(place.x + 1) / 2 * canvas.clientWidth, (1 - place.y) / 2 * canvas.clientHeight];
 }"""
@@ -25,8 +26,8 @@ NODES = "() => Object.keys(window.__viserMutable.nodeRefFromName)"
 
 
 @dataclass
-class Bench:
-    """The panel of one page, with what a person does there; `true` is phantom_from_camera."""
+class RegisterPanel:
+    """The panel of one page, operated as by a person; `true` is phantom_from_camera."""
 
     page: Page
     true: Transform
@@ -34,9 +35,10 @@ class Bench:
 
     @property
     def values(self) -> dict[str, Any]:
-        """What the page keeps."""
+        """Values that the page stores."""
         found = self.page.page.evaluate(
-            "() => { const k = JSON.parse(localStorage.getItem('palpate.register')); return k.of[k.dataset]; }"
+            "() => { const k = JSON.parse(localStorage.getItem('palpate.register'));"
+            " return k.of[k.dataset]; }"
         )
         return dict(found)
 
@@ -60,30 +62,26 @@ class Bench:
         )
 
     def shown(self) -> Transform:
-        """By which pose the cloud is drawn, as the server says it."""
+        """Pose of the drawn cloud, by the server."""
         values = self.values
-        asked = {
+        view = {
             "dataset": self.dataset,
             "mode": values["mode"],
             "start": values["start"],
             "over": values["over"],
         }
-        asked["pairs"] = [
-            {"cloud": pair["cloud"], "mesh": pair["mesh"]} for pair in values["pairs"]
-        ]
+        view["pairs"] = [{"cloud": pair["cloud"], "mesh": pair["mesh"]} for pair in values["pairs"]]
         identity = self.page.page.evaluate("sessionStorage.getItem('palpate.page')")
         return Transform.from_matrix(
-            self.page.client.post(f"/api/sessions/{identity}/registering", json=asked).json()[
-                "pose"
-            ]
+            self.page.client.post(f"/api/sessions/{identity}/registering", json=view).json()["pose"]
         )
 
     def click(self, place: Any) -> None:
-        """A real click on a place [m] of the scene, once the camera stands still."""
+        """Click a place [m] of the scene, once the camera is at rest."""
         self.page.page.mouse.click(*self.pixel(place))
 
     def drag(self, start: Any, end: Any) -> None:
-        """A real drag from a place [m] of the scene to another."""
+        """Drag from one place [m] of the scene to another."""
         mouse = self.page.page.mouse
         (x, y), (to_x, to_y) = self.pixel(start), self.pixel(end)
         mouse.move(x, y)
@@ -95,7 +93,7 @@ class Bench:
         mouse.up()
 
     def pixel(self, place: Any) -> tuple[float, float]:
-        """Where on the page a place [m] of the scene is seen, once the camera stands still."""
+        """Position of a place [m] of the scene on the page, once the camera is at rest."""
         seen: list[tuple[float, float]] = []
         while len(seen) < 3 or np.ptp(seen[-3:], axis=0).max() > 0.2:
             seen.append(self.frame.evaluate(PIXEL, [float(x) for x in place]))
@@ -105,7 +103,7 @@ class Bench:
         return float(box["x"] + left), float(box["y"] + top)
 
     def pair(self, corner: Any, mesh: Any = None) -> None:
-        """Click a corner on the cloud, a little inside of it, and then on the phantom."""
+        """Click a corner on the cloud, slightly inside of it, and then on the phantom."""
         count = len(self.values["pairs"])
         self.click(
             self.shown().apply(self.true.inverse().apply(corner * np.array([0.97, 0.97, 1.0])))
@@ -117,10 +115,8 @@ class Bench:
         self.page.until(lambda: self.values["pairs"][-1]["mesh"] is not None)
 
 
-def off(found: Any, true: Transform) -> tuple[float, float]:
-    """How far a pose puts the middle of the top from where it is [m], and by how much it is turned
-    [degrees].
-    """
+def pose_errors(found: Any, true: Transform) -> tuple[float, float]:
+    """Errors of a pose: of the middle of the top [m], and of the rotation [degrees]."""
     motion = true @ Transform.from_matrix(found).inverse()
     top = np.array([0.0, 0.0, Z])
     return float(np.linalg.norm(motion.apply(top) - top)), float(

@@ -1,6 +1,4 @@
-"""Work for the job queue that ends, waits, warns, fails or dies as a test wants, and what to wait
-for.
-"""
+"""Functions of test jobs that end, wait, warn, fail or die, and functions that wait for them."""
 
 from __future__ import annotations
 
@@ -25,7 +23,9 @@ Request = dict[str, Any]
 
 
 def count(request: Request, report: Report) -> Request:
-    """So many steps; tells its process in RESULT.pid, and makes a folder in one go at the end."""
+    """Run for a number of steps; write the process id to RESULT.pid, and rename the finished
+    folder.
+    """
     pathlib.Path(request["result"] + ".pid").write_text(str(os.getpid()))
     for step in range(request["steps"]):
         report(step / request["steps"], f"step {step}")
@@ -36,7 +36,7 @@ def count(request: Request, report: Report) -> Request:
 
 
 def sleep_with_child(request: Request, report: Report) -> Request:
-    """A minute with a process of its own."""
+    """Sleep for a minute with a child process."""
     with subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"]) as child:
         pathlib.Path(request["result"]).write_text(f"{os.getpid()} {child.pid}")
         report(0.5, "sleeping")
@@ -45,22 +45,22 @@ def sleep_with_child(request: Request, report: Report) -> Request:
 
 
 def refuse(request: Request, report: Report) -> Request:
-    """Data that are off."""
+    """Raise an error of the data."""
     raise DatasetError("touches.csv, row 3: nan", file="touches.csv", row=3)
 
 
 def stumble(request: Request, report: Report) -> Request:
-    """A fault of ours."""
+    """Raise an internal error."""
     raise ZeroDivisionError("a bug")
 
 
 def give_up(request: Request, report: Report) -> Request:
-    """Work that notices that it was stopped."""
+    """Raise Cancelled."""
     raise Cancelled
 
 
 def warn(request: Request, report: Report) -> Request:
-    """Frames, a warning, and a stage of another name."""
+    """Report frames, a warning, and another stage."""
     for step in range(30):
         report(step / 30, f"frame {step} of 30")
     warnings.warn("cloud 7 is dark", stacklevel=1)
@@ -69,7 +69,7 @@ def warn(request: Request, report: Report) -> Request:
 
 
 def linger(request: Request, report: Report) -> Request:
-    """Until the runs folder has a file called go."""
+    """Run until the runs folder has a file called go."""
     warnings.warn("cloud 7 is dark", stacklevel=1)
     for step in range(10_000):
         report(min(0.05 + step / 1000, 0.9), f"frame {step}")
@@ -80,7 +80,7 @@ def linger(request: Request, report: Report) -> Request:
 
 
 def litter(request: Request, report: Report) -> Request:
-    """A folder beside the others, and an end from outside the first time."""
+    """Make a folder beside the others, and die the first time."""
     place = pathlib.Path(request["beside"], pathlib.Path(request["scratch"]).name)
     place.mkdir(parents=True)
     (place / "half").write_text("half")
@@ -91,12 +91,12 @@ def litter(request: Request, report: Report) -> Request:
 
 
 def die(request: Request, report: Report) -> Request:
-    """An end without a word."""
+    """Exit without a last message."""
     os._exit(7)
 
 
 TARGETS = {
-    work.__name__: f"job_working:{work.__name__}"
+    work.__name__: f"job_functions:{work.__name__}"
     for work in (count, sleep_with_child, refuse, stumble, give_up, warn, litter, die)
 }
 
@@ -107,7 +107,7 @@ def ended(jobs: JobQueue, job: Job) -> Job:
 
 
 def reached(jobs: JobQueue, job: Job, true: Callable[[Job], bool]) -> Job:
-    """The job once something holds of it."""
+    """The job once a condition holds."""
     end = time.monotonic() + 120
     while not true(now := jobs.get(job.id)):
         assert time.monotonic() < end, f"still {now}"
@@ -125,7 +125,7 @@ def alive(pid: int) -> bool:
 
 
 def family(pid: int) -> list[int]:
-    """The processes that a process has started, and those that they have."""
+    """Ids of all descendants of a process."""
     found: list[int] = []
     for task in pathlib.Path(f"/proc/{pid}/task").glob("*/children"):
         for child in map(int, task.read_text().split()):
@@ -142,5 +142,5 @@ def gone(pids: list[int], seconds: float = 30.0) -> bool:
 
 
 def scratch_is_clean(folder: pathlib.Path) -> bool:
-    """Whether no job has left anything half made."""
+    """Whether no job has left a scratch folder."""
     return not any((folder / ".making").glob("*"))
