@@ -79,7 +79,7 @@ def held_out_gain(
     in contact.
 
     Args:
-        bench: the fitted sequences.
+        evaluator: of the fitted sequences.
         findings: of the search.
         held_out: the sequences.
         pool: processes that hold their measurements.
@@ -100,7 +100,7 @@ def held_out_gain(
         setup for setup in (None if first is second else second, without) if setup is not None
     ]
     one, rest = _begun(pool, names, [first, *further], grid)
-    other = one if first is second else _found(rest[0])
+    other = one if first is second else _results(rest[0])
     baseline, extended = (other, one) if findings.known else (one, other)
     touched = [{n for n, group in enumerate(item.groups) if not group.free} for item in held_out]
     rows = zip(touched, baseline, extended, strict=True)
@@ -114,7 +114,9 @@ def held_out_gain(
     if without is not None:
         gain = replace(
             gain,
-            tuned=surface_gain(held_out, baseline, _found(rest[-1]), stated, without, seed).removed,
+            tuned=surface_gain(
+                held_out, baseline, _results(rest[-1]), stated, without, seed
+            ).removed,
         )
     return gain
 
@@ -138,10 +140,10 @@ def _begun(
         further[names[place]] = [
             pool.submit([names[place]], setup, grid, None, start)[0] for setup in others
         ]
-    return _found(plain), [[further[name][row] for name in names] for row in range(len(others))]
+    return _results(plain), [[further[name][row] for name in names] for row in range(len(others))]
 
 
-def _found(begun: Sequence[Pending]) -> list[Prediction]:
+def _results(begun: Sequence[Pending]) -> list[Prediction]:
     """Wait for predictions."""
     return [pending.result() for pending in begun]
 

@@ -72,20 +72,20 @@ def footprint_of(
 
     Args:
         evaluator: with the stated geometry and the coarse mesh.
-        lump: the inclusion.
+        effect: the cause with the inclusion.
         without: the setup without it.
         depth: of the pushes [m].
     """
-    lump, problem = effect.inclusion, evaluator.problem
-    assert lump is not None
+    inclusion, problem = effect.inclusion, evaluator.problem
+    assert inclusion is not None
     geometry, grid = problem.setup.geometry, problem.coarse_grid
-    centre = np.array([[lump.x, lump.y, lump.z]])
+    centre = np.array([[inclusion.x, inclusion.y, inclusion.z]])
     middle, normal = _on_surface(evaluator, centre)
-    places, normals = _rings(evaluator, middle[0], normal[0], lump.radius)
+    places, normals = _rings(evaluator, middle[0], normal[0], inclusion.radius)
     grid = grid.at(places) if isinstance(grid, PushMeshSpec) else grid
-    with_lump = effect.apply(without)
+    with_effect = effect.apply(without)
     pending = [
-        evaluator.workers.run(_resisting, (without, with_lump), grid, place, out, depth)
+        evaluator.workers.run(_resisting, (without, with_effect), grid, place, out, depth)
         for place, out in zip(places, normals, strict=True)
     ]
     forces = np.array([future.result() for future in pending])
@@ -99,7 +99,7 @@ def footprint_of(
             change[1:].reshape(len(CRITERIA.footprint.rings), CRITERIA.footprint.directions),
             CRITERIA.footprint.level * float(change.max()),
         )
-        * lump.radius
+        * inclusion.radius
     )
     flat = middle[0] + reach[:, None] * _directions(normal[0])
     distance, out = geometry.facing(flat)
