@@ -201,10 +201,10 @@ class Client:
 
     def points(self, identity: str) -> list[dict[str, Any]]:
         """The finished points of a sweep, in the order of their ends."""
-        found: list[dict[str, Any]] = []
-        while more := self._get(f"/sweeps/{identity}/points", after=len(found))["points"]:
-            found += more
-        return found
+        points: list[dict[str, Any]] = []
+        while more := self._get(f"/sweeps/{identity}/points", after=len(points))["points"]:
+            points += more
+        return points
 
     def train(
         self, dataset: str, run: str | None = None, key: str | None = None, **further: Any

@@ -33,9 +33,9 @@ def check(name: str, services: CurrentServices) -> dict[str, Any]:
     error and the expected value.
     """
     dataset = services.library.open(name)
-    found = check_dataset(dataset)
+    summary = check_dataset(dataset)
     return {
         **dataset_summary(dataset),
-        "warnings": list(found.warnings),
-        "lacks": [lack.sentence for lack in found.lacks],
+        "warnings": list(summary.warnings),
+        "lacks": [lack.sentence for lack in summary.lacks],
     }

@@ -37,8 +37,8 @@ def listed(services: CurrentServices, response: Response, page: RequestedPage) -
     """Diagnoses that were requested here, the newest first; the header X-Total-Count has their
     number.
     """
-    found = [job for job in services.jobs.all() if job.kind == "diagnosis"]
-    return [job_out(job) for job in paginate(found, page, response)]
+    diagnoses = [job for job in services.jobs.all() if job.kind == "diagnosis"]
+    return [job_out(job) for job in paginate(diagnoses, page, response)]
 
 
 @router.get("/{identity}")

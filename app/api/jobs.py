@@ -65,11 +65,11 @@ def notes(
     identity: str, services: CurrentServices, after: Annotated[int, Query(ge=0, le=10**9)] = 0
 ) -> Notes:
     """Lines of a job's log from the `after`-th on: at most 1000."""
-    found = [
+    lines = [
         NoteOut(at=note.at, level=note.level, text=note.text)
         for note in services.jobs.notes(identity, after)
     ]
-    return Notes(notes=found, next=after + len(found))
+    return Notes(notes=lines, next=after + len(lines))
 
 
 async def _changes(request: Request, services: Services) -> AsyncIterator[str]:

@@ -117,7 +117,7 @@ def made(name: str, request: RegistrationRequest, services: CurrentServices) -> 
     folder, store = services.library.path(name), RegistrationStore(services.settings.runs, name)
     if request.accept is not None:
         store.check_name(request.accept)
-    found = register(
+    result = register(
         folder, [pair.cloud for pair in request.pairs], [pair.mesh for pair in request.pairs]
     )
-    return found if request.accept is None else store.save(request.accept, found)
+    return result if request.accept is None else store.save(request.accept, result)

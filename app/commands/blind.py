@@ -98,13 +98,13 @@ def blind(
 
     Writes results.jsonl, summary.json and report.html into the folder. Can be stopped and resumed.
     """
-    wanted, kept = _split(effects), folder / "kept"
+    hidden, kept = _split(effects), folder / "kept"
     if scenarios is None:
         if kinds is not None:
             raise typer.BadParameter("--kinds needs --scenarios, the number of cases to draw")
-        cases = all_cases(seed, CONTROLS if controls is None else controls, wanted, short)
+        cases = all_cases(seed, CONTROLS if controls is None else controls, hidden, short)
     else:
-        cases = draw_cases(seed, scenarios, _split(kinds), wanted, controls, short)
+        cases = draw_cases(seed, scenarios, _split(kinds), hidden, controls, short)
     cases = [case for case in cases if only is None or only in case.name]
     if score:
         results = known_results(folder, cases, any_version)
@@ -133,13 +133,13 @@ def blind(
         print_serve_command(kept)
 
 
-def _nothing_of(folder: Path, wanted: int) -> str:
+def _nothing_of(folder: Path, cases: int) -> str:
     """The message for a folder that has no results of the requested cases."""
     others = len(read_results(folder / RESULTS_FILE))
     if not others:
         return f"{folder} holds no {RESULTS_FILE} with results to score"
     return (
-        f"{folder / RESULTS_FILE}: none of its {others} results is of these {wanted} cases; "
+        f"{folder / RESULTS_FILE}: none of its {others} results is of these {cases} cases; "
         "give the options that it was made with"
     )
 

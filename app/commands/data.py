@@ -68,19 +68,25 @@ def register(dataset: Folder) -> None:
     from palpate.registration.registration import register as relate
 
     with progress("register") as report:
-        found = relate(open_dataset(dataset), report)
+        registration = relate(open_dataset(dataset), report)
     table = Table(title=f"{dataset.name}: registration", header_style="bold")
     for column in ("", "translation", "rotation", "standard deviations"):
         table.add_column(column)
-    table.add_row("phantom from robot", *_pose(found.phantom_from_robot, found.robot_covariance))
-    table.add_row("phantom from camera", *_pose(found.phantom_from_camera, found.camera_covariance))
+    table.add_row(
+        "phantom from robot", *_pose(registration.phantom_from_robot, registration.robot_covariance)
+    )
+    table.add_row(
+        "phantom from camera",
+        *_pose(registration.phantom_from_camera, registration.camera_covariance),
+    )
     out.print(table)
     out.print(
-        f"touches miss their landmarks by {1e3 * found.touch_rms:.2f} mm RMS", highlight=False
+        f"touches miss their landmarks by {1e3 * registration.touch_rms:.2f} mm RMS",
+        highlight=False,
     )
-    if found.weak_directions:
-        out.print(f"weakly determined: {', '.join(found.weak_directions)}", highlight=False)
-    print_warnings(found.warnings)
+    if registration.weak_directions:
+        out.print(f"weakly determined: {', '.join(registration.weak_directions)}", highlight=False)
+    print_warnings(registration.warnings)
 
 
 def replay(
@@ -204,27 +210,31 @@ def _check_one(path: Path, picture: Path | None) -> None:
     from palpate.registration.registration import register as relate
 
     dataset = open_dataset(path)
-    found: Registration | None = None
+    registration: Registration | None = None
     with progress(f"check {path.name}") as report:
         dataset.validate(part(report, 0.0, 0.4))
         try:
-            found = relate(dataset, part(report, 0.4, 0.6))
-            warnings = align_sequences(dataset, found)[1].warnings
+            registration = relate(dataset, part(report, 0.4, 0.6))
+            warnings = align_sequences(dataset, registration)[1].warnings
         except RegistrationError as error:
             warnings = (error.message,)
         summary = check_dataset(
-            dataset, found.phantom_from_robot if found else None, part(report, 0.6, 1.0)
+            dataset,
+            registration.phantom_from_robot if registration else None,
+            part(report, 0.6, 1.0),
         )
-    _print_summary(dataset, summary, found)
+    _print_summary(dataset, summary, registration)
     print_warnings((*summary.warnings, *warnings))
-    if picture is not None and found is not None:
+    if picture is not None and registration is not None:
         from palpate.dataset.coverage_figure import coverage_picture
 
-        coverage_picture(dataset, found.phantom_from_robot, picture)
+        coverage_picture(dataset, registration.phantom_from_robot, picture)
         out.print(f"coverage: {picture}", highlight=False)
 
 
-def _print_summary(dataset: Dataset, summary: DatasetSummary, found: Registration | None) -> None:
+def _print_summary(
+    dataset: Dataset, summary: DatasetSummary, registration: Registration | None
+) -> None:
     title = f"{dataset.path.name} · {summary.name}"
     table = Table(
         title=title, header_style="bold", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False
@@ -248,7 +258,9 @@ def _print_summary(dataset: Dataset, summary: DatasetSummary, found: Registratio
         )
     out.print(table)
     size = " × ".join(f"{1e3 * edge:.1f}" for edge in summary.size)
-    touches = f", missing their landmarks by {1e3 * found.touch_rms:.2f} mm RMS" if found else ""
+    touches = ""
+    if registration:
+        touches = f", missing their landmarks by {1e3 * registration.touch_rms:.2f} mm RMS"
     tool = f"tool radius {1e3 * summary.tool_radius:.1f} mm"
     out.print(
         f"phantom {size} mm, {tool}, {len(summary.touches)} touches{touches}", highlight=False
@@ -257,9 +269,9 @@ def _print_summary(dataset: Dataset, summary: DatasetSummary, found: Registratio
     if felt:
         fitted = any(one.split in ("train", "validation") for one in felt)
         use = (
-            "so that Young's modulus can be told"
+            "so that Young's modulus can be found"
             if fitted
-            else "but in none to fit on, so that Young's modulus cannot be told"
+            else "but in none to fit on, so that Young's modulus cannot be found"
         )
         out.print(
             f"forces in {len(felt)} of {len(summary.sequences)} sequences, {use}", highlight=False

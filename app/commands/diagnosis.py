@@ -164,13 +164,15 @@ def print_report(report: dict[str, Any]) -> None:
         )
     for one in report.get("not_identifiable", []):
         lines.append(Text(f"not identifiable: {one['effect']}: {one.get('why', '')}", style="dim"))
-    lines += [Text(" ".join(said)) for said in [left_sentences(report)] if said]
-    lines += [Text(said, style="dim") for said in registration_sentences(report)]
-    lines += [Text(said) for said in palpation_sentences(report)]
-    lines += [Text(said, style="dim") for said in determined_sentences(report.get("causes", []))]
+    lines += [Text(" ".join(sentence)) for sentence in [left_sentences(report)] if sentence]
+    lines += [Text(sentence, style="dim") for sentence in registration_sentences(report)]
+    lines += [Text(sentence) for sentence in palpation_sentences(report)]
     lines += [
-        Text(f"control: {said}", style="dim")
-        for said in control_sentences(report.get("controls") or [])
+        Text(sentence, style="dim") for sentence in determined_sentences(report.get("causes", []))
+    ]
+    lines += [
+        Text(f"control: {sentence}", style="dim")
+        for sentence in control_sentences(report.get("controls") or [])
     ]
     lines += [
         Text(f"next probe: {probe_sentence(row)}") for row in (report.get("next_probe") or [])[:1]

@@ -81,11 +81,11 @@ def evaluate(
         raise typer.BadParameter(f"--feedback is none or follow, not {feedback!r}")
     if paper:
         _make(dataset, size, workers)
-        found = _paper(
+        result = _paper(
             dataset, [int(one) for one in features.split(",")], epochs, every, seed, workers, runs
         )
     else:
-        found = _ladder(
+        result = _ladder(
             dataset,
             {"run": run, "trainings": training or [], "feedback": feedback, "seed": seed},
             truth,
@@ -93,7 +93,7 @@ def evaluate(
             runs,
         )
     if file is not None:
-        write_json(file, found)
+        write_json(file, result)
 
 
 def _ladder(
@@ -115,13 +115,13 @@ def _ladder(
     with progress(f"evaluate {dataset.name}") as report:
         climb(request, report)
     evaluations = EvaluationStore(runs)
-    found = evaluations.result(name) or {}
-    out.print(f"[bold]{found['sentence']}[/]", highlight=False)
-    for one in found["parts"]:
+    result = evaluations.result(name) or {}
+    out.print(f"[bold]{result['sentence']}[/]", highlight=False)
+    for one in result["parts"]:
         if one["part"] != "kind":
-            out.print(_rungs(found["rungs"], one))
+            out.print(_rungs(result["rungs"], one))
     out.print(f"{evaluations.folder / name}", highlight=False, soft_wrap=True)
-    return found
+    return result
 
 
 def _rungs(rungs: list[dict[str, Any]], one: dict[str, Any]) -> Table:
@@ -180,7 +180,7 @@ def _paper(
     )
     folder = runs / "paper" / dataset.resolve().name
     with progress(f"the paper's tables on {dataset.name}") as report:
-        found = run_paper(
+        result = run_paper(
             open_dataset(dataset),
             folder,
             store=SweepStore(runs).replay_cache,
@@ -191,11 +191,11 @@ def _paper(
             report=report,
         )
     for title, key in (("Table 1: coarse search", "coarse"), ("Table 2: fine search", "fine")):
-        out.print(_moduli(title, found[key]))
-    out.print(found["what_the_search_shows"], highlight=False)
-    out.print(_corrections(found["correction"]))
+        out.print(_moduli(title, result[key]))
+    out.print(result["what_the_search_shows"], highlight=False)
+    out.print(_corrections(result["correction"]))
     out.print(f"{folder / 'paper.json'}", highlight=False, soft_wrap=True)
-    return found
+    return result
 
 
 def _moduli(title: str, rows: list[dict[str, Any]]) -> Table:

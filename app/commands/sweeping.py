@@ -80,7 +80,7 @@ def sweep(
     parts = [str(dataset.resolve()), request.to_json(), *([accepted.to_json()] if accepted else [])]
     folder = sweeps.folder / request_name(dataset.resolve().name, parts)
     with progress(f"sweep {dataset.name}") as report:
-        found = run_sweep(
+        result = run_sweep(
             opened,
             request,
             folder,
@@ -90,7 +90,7 @@ def sweep(
             report=report,
         )
     _print(
-        found,
+        result,
         sweeps.points(folder.name),
         {axis.name: axis.parameter.unit for axis in request.space.axes},
     )
@@ -119,7 +119,7 @@ def _fixed(text: str) -> tuple[str, float | str]:
         return name, value
 
 
-def _print(found: dict[str, Any], rows: list[dict[str, Any]], units: dict[str, str]) -> None:
+def _print(result: dict[str, Any], rows: list[dict[str, Any]], units: dict[str, str]) -> None:
     table = Table(title="best points", header_style="bold")
     for name in units:
         table.add_column(name, justify="right")
@@ -133,13 +133,13 @@ def _print(found: dict[str, Any], rows: list[dict[str, Any]], units: dict[str, s
         values = (quantity(row["values"][name], unit) for name, unit in units.items())
         table.add_row(*values, *(f"{1e3 * row[key]:.4f} mm" for key in ("error", "paper")))
     out.print(table)
-    if found["stated"] is not None:
+    if result["stated"] is not None:
         out.print(
-            f"as stated: {1e3 * found['stated']:.4f} mm; {found['points']} points, "
-            f"{found['failed']} failed",
+            f"as stated: {1e3 * result['stated']:.4f} mm; {result['points']} points, "
+            f"{result['failed']} failed",
             highlight=False,
         )
-    for one in found["directions"]:
+    for one in result["directions"]:
         change = f"{1e3 * one['change']:.4f} mm ({1e3 * one['low']:.4f} to {1e3 * one['high']:.4f})"
         verdict = {
             True: "flat: the clouds say nothing of it",

@@ -97,14 +97,14 @@ def train(
         "folder": folder,
     }
     with progress(f"train {dataset.name}") as report:
-        found = learn(request, report)
-    gain = 100 * (1 - found["error"] / found["without"])
+        result = learn(request, report)
+    gain = 100 * (1 - result["error"] / result["without"])
     out.print(
-        f"mean distance in validation: {found['error']:.3f} mm, "
-        f"{found['without']:.3f} mm without the network ({gain:.0f} % less)",
+        f"mean distance in validation: {result['error']:.3f} mm, "
+        f"{result['without']:.3f} mm without the network ({gain:.0f} % less)",
         highlight=False,
     )
-    out.print(f"{runs / 'trainings' / found['training']}", highlight=False, soft_wrap=True)
+    out.print(f"{runs / 'trainings' / result['training']}", highlight=False, soft_wrap=True)
 
 
 def _numbers(text: str) -> list[int]:

@@ -33,8 +33,8 @@ def register(request: dict[str, Any], report: Report) -> dict[str, Any]:
     from palpate.registration.registration import register as relate
 
     dataset = open_dataset(Path(request["dataset"]))
-    found = relate(dataset, report)
-    camera = found.camera
+    registration = relate(dataset, report)
+    camera = registration.camera
     if camera is None:
         raise RegistrationError(
             "the dataset has no clouds, so that there is no camera to register", file="rest.ply"
@@ -45,9 +45,9 @@ def register(request: dict[str, Any], report: Report) -> dict[str, Any]:
         "pivot": camera.pivot.tolist(),
         "residual_after": camera.rms,
         "weak_directions": list(camera.weak_directions),
-        "warnings": list(found.warnings),
-        "phantom_from_robot": found.phantom_from_robot.matrix.tolist(),
-        "touch_rms": found.touch_rms,
+        "warnings": list(registration.warnings),
+        "phantom_from_robot": registration.phantom_from_robot.matrix.tolist(),
+        "touch_rms": registration.touch_rms,
     }
     stored = {"points": [], "registration": pose, "rest": rest_digest(dataset.path)}
     name = str(request["name"])

@@ -110,7 +110,7 @@ def sweep(request: dict[str, Any], report: Report) -> dict[str, Any]:
         AcceptedRegistration.from_json(registered) if registered else None
     )
     sweeps, name = SweepStore(Path(request["runs"])), Path(request["scratch"]).name
-    found = run_sweep(
+    summary = run_sweep(
         dataset,
         SweepSpec.from_json(request["sweep"]),
         sweeps.folder / name,
@@ -119,7 +119,7 @@ def sweep(request: dict[str, Any], report: Report) -> dict[str, Any]:
         scheduler=request["scheduler"],
         report=report,
     )
-    return {"sweep": name, "points": found["points"], "failed": found["failed"]}
+    return {"sweep": name, "points": summary["points"], "failed": summary["failed"]}
 
 
 def train(request: dict[str, Any], report: Report) -> dict[str, Any]:
@@ -196,7 +196,7 @@ def evaluate(request: Mapping[str, Any], report: Report) -> dict[str, Any]:
         feedback=request.get("feedback", "none"),
     )
     out = EvaluationStore(runs).folder / name
-    found = climb(
+    summary = climb(
         open_dataset(dataset),
         spec,
         out,
@@ -204,7 +204,7 @@ def evaluate(request: Mapping[str, Any], report: Report) -> dict[str, Any]:
         seed=int(request["seed"]),
         report=report,
     )
-    return {"evaluation": name, "sentence": found["sentence"]}
+    return {"evaluation": name, "sentence": summary["sentence"]}
 
 
 def import_dataset(request: dict[str, Any], report: Report) -> dict[str, Any]:

@@ -91,9 +91,9 @@ def parameter_plot(groups: dict[str, list[ReportedParameter]]) -> str:
     rows = math.ceil(len(groups) / _COLUMNS)
     drawn = new_figure(2.5 * _COLUMNS, 2.5 * rows)
     panels = drawn.subplots(rows, _COLUMNS, squeeze=False).ravel()
-    for axes, (key, said) in zip(panels, groups.items(), strict=False):
-        factor, unit = SHOWN.get(said[0].unit, (1.0, said[0].unit))
-        _panel(axes, said, factor)
+    for axes, (key, reported) in zip(panels, groups.items(), strict=False):
+        factor, unit = SHOWN.get(reported[0].unit, (1.0, reported[0].unit))
+        _panel(axes, reported, factor)
         effect, _, name = key.partition(".")
         axes.set_title(
             f"{effect}\n{name}{f' [{unit}]' if unit else ''}".replace("_", " "),
@@ -107,13 +107,13 @@ def parameter_plot(groups: dict[str, list[ReportedParameter]]) -> str:
     return to_svg(drawn)
 
 
-def _panel(axes: Any, said: Sequence[ReportedParameter], factor: float) -> None:
-    ends = [factor * end for one in said for end in (one.nearest, one.value)]
+def _panel(axes: Any, reported: Sequence[ReportedParameter], factor: float) -> None:
+    ends = [factor * end for one in reported for end in (one.nearest, one.value)]
     low, high = min(ends), max(ends)
     room = 0.12 * (high - low) or 0.1 * abs(high) or 1.0
     span = (low - room, high + room)
     axes.plot(span, span, color=INK["text-3"], linewidth=1, linestyle=(0, (4, 3)))
-    for one in said:
+    for one in reported:
         colour = INK["measured"] if one.covers() is False else INK["extended"]
         if one.low is not None and one.high is not None:
             axes.plot(

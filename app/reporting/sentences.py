@@ -201,14 +201,16 @@ def palpation_sentences(report: dict[str, Any]) -> list[str]:
 
 def registration_sentences(report: dict[str, Any]) -> list[str]:
     """Origin of the camera's registration, if it is not the automatic one."""
-    found = report.get("registration")
-    if not found:
+    registration = report.get("registration")
+    if not registration:
         return []
-    how = f"by hand from {found['pairs']} pairs of points" if found["pairs"] else "automatically"
+    pairs = registration["pairs"]
+    how = f"by hand from {pairs} pairs of points" if pairs else "automatically"
     left = (
-        f", {1e3 * found['residual']:.2f} mm RMS left"
-        if isinstance(found.get("residual"), (int, float))
+        f", {1e3 * registration['residual']:.2f} mm RMS left"
+        if isinstance(registration.get("residual"), (int, float))
         else ""
     )
-    weak = f"; weak: {', '.join(found['weak_directions'])}" if found["weak_directions"] else ""
-    return [f"Camera registered as {found['name']}, {how}{left}{weak}."]
+    directions = registration["weak_directions"]
+    weak = f"; weak: {', '.join(directions)}" if directions else ""
+    return [f"Camera registered as {registration['name']}, {how}{left}{weak}."]

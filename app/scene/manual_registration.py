@@ -110,18 +110,18 @@ class ManualRegistration:
                 and (chosen := self._mark_under(phantom, shown, ray, side)) is not None
             ):
                 return {"chosen": {"pair": chosen, "side": side}}
-            found = (
+            hit = (
                 self._on_cloud(phantom, shown, ray)
                 if side == "cloud"
                 else self._on_mesh(phantom, ray)
             )
-            if found is None:
+            if hit is None:
                 other = "the phantom" if side == "mesh" else "the cloud"
                 return {
                     "problem": f"There is nothing of {other} under this click, "
                     f"and clicks are for {other} now."
                 }
-            point, landmark = found
+            point, landmark = hit
             pair = None if ray.mark is None else ray.mark[0]
             return {
                 "picked": {
@@ -143,8 +143,8 @@ class ManualRegistration:
             eye, rightwards, upwards = self._scenes[-1].eye()
             direction = start + right * rightwards + up * upwards - eye
             if side == "mesh":
-                found = pick_mesh(phantom.vertices, phantom.faces, eye, direction)
-                return point if found is None else [float(x) for x in found]
+                hit = pick_mesh(phantom.vertices, phantom.faces, eye, direction)
+                return point if hit is None else [float(x) for x in hit]
             moved = slide_on_cloud(pose.apply(phantom.cloud), start, eye, direction)
             return point if moved is None else [float(x) for x in pose.inverse().apply(moved)]
 
@@ -280,11 +280,11 @@ class ManualRegistrations:
     def open(self, page: str) -> ManualRegistration:
         """The registration of a page; a new one if there is none."""
         with self._lock:
-            found = self._sessions.pop(page, None) or ManualRegistration(self._phantom_of)
-            self._sessions[page] = found
+            session = self._sessions.pop(page, None) or ManualRegistration(self._phantom_of)
+            self._sessions[page] = session
             while len(self._sessions) > MOST_SESSIONS:
                 self._sessions.popitem(last=False)
-            return found
+            return session
 
     def join(self, page: str, scene: PairScene) -> None:
         """Add a browser's scene to a page."""

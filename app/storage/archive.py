@@ -85,12 +85,12 @@ def dataset_root(folder: Path) -> Path:
     """The folder of dataset.toml among the unpacked files: at the top, or in the only folder with
     one.
     """
-    found = [
+    folders = [
         path.parent for depth in ("", "*/", "*/*/") for path in folder.glob(f"{depth}dataset.toml")
     ]
-    if len(found) == 1:
-        return found[0]
-    what = "no dataset.toml" if not found else f"{len(found)} datasets"
+    if len(folders) == 1:
+        return folders[0]
+    what = "no dataset.toml" if not folders else f"{len(folders)} datasets"
     raise DatasetError(
         f"there is {what} in what was brought; expected the folder of one dataset",
         file="dataset.toml",

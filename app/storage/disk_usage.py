@@ -75,11 +75,11 @@ class Disk:
 
 def _files(folder: Path) -> list[tuple[Path, int, float]]:
     """Files below a folder with size [bytes] and time of the last use [s since 1970]."""
-    found = []
+    files = []
     for place, _, names in os.walk(folder):
         for name in names:
             path = Path(place) / name
             with contextlib.suppress(OSError):
                 known = path.lstat()
-                found.append((path, known.st_size, max(known.st_mtime, known.st_atime)))
-    return found
+                files.append((path, known.st_size, max(known.st_mtime, known.st_atime)))
+    return files

@@ -95,7 +95,7 @@ def test_check_goes_on_after_a_broken_dataset_and_says_so_in_the_end(
     assert "nothing does not exist" in err
     assert "small-block" in out
     assert "poke-01" in out
-    assert "forces in 1 of 2 sequences, so that Young's modulus can be told" in out
+    assert "forces in 1 of 2 sequences, so that Young's modulus can be found" in out
 
 
 def test_two_datasets_of_one_name_are_refused_before_any_computing(
