@@ -25,10 +25,10 @@ FLOOR = 1e-3
 
 
 def _observations(probes: list[int], name: str = "poke-01") -> Observations:
-    """Groups of these probes; 0 stands for an untouched one."""
+    """Groups of these pushes; 0 stands for an untouched group."""
     times, stream = dwelling(np.array([poke(2e-3)] * len(probes)))
     groups = [
-        Group((number,), CLOUD, probe == 0, probe=probe) for number, probe in enumerate(probes)
+        Group((number,), CLOUD, probe == 0, push=probe) for number, probe in enumerate(probes)
     ]
     return Observations(name, times, stream, tuple(groups))
 
@@ -44,8 +44,7 @@ def _model(
 def _ladder(
     probes: list[int], before: list[float], after: list[float], failed: tuple[int, ...] = ()
 ) -> SurfaceGain:
-    """The ladder of these errors, with single points scattered such that the noise floor is
-    FLOOR."""
+    """The gain by these errors; the scatter of single points makes the noise floor FLOOR."""
     known = POINTS * sum(probe == 0 for probe in probes)
     scatter = np.full((len(probes), PATCHES), FLOOR / np.sqrt(1 / POINTS + 1 / known))
     still = [0.0 if probe == 0 else 1.0 for probe in probes]
@@ -89,7 +88,7 @@ def test_pattern_as_large_in_both_models_gains_nothing():
     assert found.removed == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
 
 
-def test_part_of_a_sag_that_was_not_named_stays_an_error():
+def test_unnamed_part_of_a_sag_counts_as_error():
     item = _observations([0, 1])
     stated, named = _model([3e-3, 3e-3]), _model([1e-3, 1e-3])  # two thirds of it
     found = surface_gain([item], [stated], [named], SETUP, SETUP, seed=0)
@@ -115,8 +114,7 @@ def test_groups_are_weighed_by_their_points():
 
 
 def _many(seed: int, probes: int) -> SurfaceGain:
-    """Probes whose errors vary by chance; half of the reducible error is removed in the long
-    run."""
+    """Pushes with random errors; half of the reducible error is removed on average."""
     before, after = _varied(seed, probes)
     return _ladder([0, *range(1, probes + 1)], [FLOOR, *before], [FLOOR, *after])
 
@@ -127,7 +125,7 @@ def _varied(seed: int, probes: int) -> tuple[FloatArray, FloatArray]:
     return before, random.uniform(0.3, 0.9, probes) * before
 
 
-def test_interval_brackets_the_share_of_endless_data():
+def test_interval_holds_the_share_of_infinite_data():
     before, after = _varied(0, 200000)
     wanted = (np.sqrt(np.mean(before**2)) - np.sqrt(np.mean(after**2))) / (
         np.sqrt(np.mean(before**2)) - FLOOR
@@ -138,22 +136,22 @@ def test_interval_brackets_the_share_of_endless_data():
     assert all(low < value < high for value, low, high in found)
 
 
-def test_more_probes_make_the_interval_narrower():
+def test_more_pushes_make_the_interval_narrower():
     (_, low, high), (_, low_4, high_4) = _many(1, 10).removed, _many(1, 90).removed
     assert high_4 - low_4 < 0.6 * (high - low)
 
 
-def test_probes_are_resampled_whole():
+def test_pushes_are_resampled_whole():
     before, after = _varied(3, 8)
     whole = _ladder([0, *range(1, 9)], [FLOOR, *before], [FLOOR, *after])
-    # Each probe seen in six groups instead of one tells no more.
+    # Six groups of each push instead of one add no information.
     probes = [0, *np.repeat(np.arange(1, 9), 6)]
     parts = _ladder(probes, [FLOOR, *np.repeat(before, 6)], [FLOOR, *np.repeat(after, 6)])
     assert parts.probes == whole.probes == 8
     assert parts.removed == pytest.approx(whole.removed)
 
 
-def test_pushes_of_different_sequences_are_different_probes():
+def test_pushes_of_different_sequences_are_different():
     items = [_observations([0, 1], name) for name in ("a", "b")]
     models = [_model([FLOOR, size], name) for name, size in (("a", 3e-3), ("b", 4e-3))]
     assert surface_gain(items, models, models, SETUP, SETUP, seed=0).probes == 2
@@ -196,7 +194,7 @@ def test_papers_metric_is_the_mean_over_touched_groups():
 @pytest.mark.parametrize(
     "effect", [PermanentSet(retained_fraction=0.2), BaseSlip(friction_coefficient=0.1)]
 )
-def test_what_a_push_leaves_counts_where_the_material_remembers_or_the_base_slides(effect):
+def test_groups_after_a_push_count_if_the_material_has_history_or_the_base_slides(effect):
     item = _observations([0, 1, 1, 2])
     item = replace(
         item, groups=tuple(replace(g, free=n in (0, 2)) for n, g in enumerate(item.groups))

@@ -1,4 +1,4 @@
-"""Which instants of a felt sequence count, and where it pushed."""
+"""Instants and places of the pushes in sequences with forces and no clouds."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import pytest
 
 from palpate.dataset import Forces, Kinematics, Sequence
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.inference.applicable_effects import FELT, weighed
+from palpate.diagnosis.inference.applicable_effects import applicable_effects
 from palpate.diagnosis.observation.force_only import deepest_rows, observe_forces, pushed_places
-from palpate.diagnosis.search.inclusion_grid import lumps_under
+from palpate.diagnosis.search.inclusion_grid import inclusions_under
 from palpate.effects import DIAGNOSED
 from palpate.effects.elastic_material import StiffInclusion, YoungModulus
 from palpate.effects.heterogeneity import SurfaceLayer
@@ -50,9 +50,9 @@ def _sequence(places: list[tuple[float, float]], depths: list[float]) -> Sequenc
     return Sequence(Path("."), "felt", stream, np.empty(0), (), Forces(time, force))
 
 
-def test_each_push_is_looked_at_on_its_way_in_and_while_it_is_held() -> None:
+def test_each_push_has_a_group_on_the_way_in_and_one_of_its_hold() -> None:
     item = observe_forces(_sequence([(0.0, 0.0), (0.01, 0.0)], [4e-3, 3e-3]), SETUP, most=20)
-    assert item.force_only and [group.probe for group in item.groups] == [1, 1, 2, 2]
+    assert item.force_only and [group.push for group in item.groups] == [1, 1, 2, 2]
     depth = SIZE[2] + 5e-3 - item.centres(SETUP)[:, 2]
     assert depth == pytest.approx([0.55 * 4e-3, 4e-3, 0.55 * 3e-3, 3e-3], abs=4e-4)
     assert deepest_rows(item) == [1, 3]
@@ -62,7 +62,7 @@ def test_each_push_is_looked_at_on_its_way_in_and_while_it_is_held() -> None:
     assert forces is not None and forces[0][[1, 3], 2] == pytest.approx(0.2, abs=2e-3)
 
 
-def test_no_more_pushes_are_kept_than_asked_for_and_those_evenly() -> None:
+def test_pushes_are_thinned_evenly() -> None:
     item = observe_forces(
         _sequence([(0.005 * n, 0.0) for n in range(5)], [4e-3] * 5), SETUP, most=6
     )
@@ -81,7 +81,7 @@ def test_places_lie_on_the_surface_below_the_tool() -> None:
     ]
 
 
-def test_sequence_that_presses_nothing_is_refused_with_how_near_it_came() -> None:
+def test_sequence_without_pushes_is_refused_with_its_largest_depth() -> None:
     with pytest.raises(
         DiagnosisError, match=r"nothing is pressed by 0.5 mm or more \(at most 0.20 mm"
     ):
@@ -100,25 +100,26 @@ def test_sensor_that_is_never_clear_is_refused() -> None:
 
 def test_lumps_are_looked_for_below_the_pushes_and_within_the_body() -> None:
     places = np.array([[0.0, 0.0, 0.03], [0.002, 0.0, 0.03], [0.02, 0.0, 0.03]])
-    found = lumps_under(places, np.tile([0.0, 0.0, 1.0], (3, 1)), SETUP.box)
+    found = inclusions_under(places, np.tile([0.0, 0.0, 1.0], (3, 1)), SETUP.box)
     assert [(lump.x, round(0.03 - lump.z, 6)) for lump in found] == [
         (x, depth) for x in (0.0, 0.02) for depth in CRITERIA.inclusion_grid.depths
     ]
-    flat = lumps_under(
+    flat = inclusions_under(
         np.array([[0.0, 0.0, 0.01]]), np.array([[0.0, 0.0, 1.0]]), Box(size=(0.06, 0.04, 0.01))
     )
     assert len(flat) == 1
 
 
 def test_forces_alone_weigh_what_they_can_tell_and_clouds_all() -> None:
-    forces = weighed(SETUP, seen=False, forces=True)
+    forces = applicable_effects(SETUP, clouds=False, forces=True)
     assert {StiffInclusion, YoungModulus, SurfaceLayer} <= set(forces) and not {
         CameraRegistration,
         TimeOffset,
     } & set(forces)
     organ = Setup(geometry=Shape(*organ_surface(4e-3)), tool=SETUP.tool)
-    assert set(weighed(organ, seen=False, forces=True)) == {*FELT, YoungModulus}
-    assert weighed(SETUP, seen=True, forces=False) == DIAGNOSED
+    on_an_organ = applicable_effects(organ, clouds=False, forces=True)
+    assert set(on_an_organ) == set(forces) - {SurfaceLayer} and len(on_an_organ) == 10
+    assert applicable_effects(SETUP, clouds=True, forces=False) == DIAGNOSED
 
 
 def _bumps() -> FloatArray:

@@ -63,7 +63,7 @@ def _pushes(
     )
 
 
-def test_bias_that_wanders_is_taken_off_and_what_is_left_of_it_is_stated():
+def test_wandering_bias_is_removed_and_its_variance_is_stated():
     misses, stated = [], []
     for seed in range(30):
         forces, truth, untouched = _pushes(seed)
@@ -85,7 +85,7 @@ def test_noise_of_an_average_is_that_of_the_samples_in_it():
     assert record.bias_variance.max() < (1.5 * NOISE / np.sqrt(RATE)) ** 2
 
 
-def test_sensor_that_is_never_clear_of_the_block_says_nothing():
+def test_sensor_that_is_never_clear_of_the_block_gives_no_record():
     forces, _, untouched = _pushes(0)
     assert ForceRecord.of(forces, np.zeros_like(untouched)) is None
 
@@ -175,12 +175,12 @@ def test_column_of_the_force_is_the_difference_of_two_predictions(item, name):
     assert np.linalg.norm(found - wanted) < 0.02 * np.linalg.norm(wanted)
 
 
-def test_wrong_clock_leaves_force_and_place_together(item):
+def test_wrong_clock_shifts_force_and_place_alike(item):
     forces = predict(item, SETUP, GRID, WANTED).forces
     assert forces is not None and not forces.columns[..., TOOL_COLUMNS + 2].any()
 
 
-def test_measured_force_is_turned_into_the_phantoms_frame(item):
+def test_measured_force_is_rotated_into_the_phantom_frame(item):
     turned = replace(
         SETUP,
         phantom_from_robot=Transform.from_vector(np.zeros(3), np.array([0.0, 0.0, 0.5 * np.pi])),
@@ -192,7 +192,7 @@ def test_measured_force_is_turned_into_the_phantoms_frame(item):
     assert np.allclose(deviation, 1e-3)
 
 
-def test_engines_own_error_is_one_factor_for_each_push():
+def test_engine_error_is_one_factor_for_each_push():
     force = np.array([[0, 0, 0], [0, 0, 0.2], [0, 0.1, 0.3], [0, 0, 0], [0.4, 0, 0]], dtype=float)
     forces = ForceComparison(0 * force, np.full(5, 1e-3), force, np.zeros((5, 3, 0)))
     still, pressed = (replay(SETUP, centre[None], GRID)[0] for centre in (poke(-8e-3), poke(2e-3)))
@@ -272,7 +272,7 @@ def baseline(evaluator) -> Model:
     return evaluator.baseline((), LUMPS)
 
 
-def test_modulus_is_told_from_forces_whatever_was_stated(evaluator, baseline):
+def test_forces_identify_the_modulus_whatever_was_stated(evaluator, baseline):
     interval = modulus_interval(evaluator, baseline)
     assert interval is not None
     value, low, high = interval
@@ -280,7 +280,7 @@ def test_modulus_is_told_from_forces_whatever_was_stated(evaluator, baseline):
     assert low < TRUE < high < 1.5 * low
 
 
-def test_report_says_the_modulus_that_the_forces_show(evaluator, baseline, tmp_path):
+def test_report_has_the_modulus_that_the_forces_identify(evaluator, baseline, tmp_path):
     dataset = open_dataset(write_valid_dataset(tmp_path / "small-block"))
     report = report_of(dataset, evaluator, Findings(baseline), None, "test")
     assert report["not_identifiable"] == []
@@ -303,7 +303,7 @@ def test_another_modulus_gains_what_the_stated_one_costs(evaluator, baseline):
     assert gain > 25.0
 
 
-def test_without_forces_nothing_is_said_of_it(baseline):
+def test_without_forces_the_modulus_is_not_reported(baseline):
     with Workers([], 1) as workers:
         other = evaluator_of(SETUP, registration(), workers, ["poke-01"], None, QUICK, QUICK)
     assert modulus_interval(other, baseline) is None

@@ -162,7 +162,7 @@ def test_time_offset_moves_the_centres_back_along_the_path(sequence):
     assert np.abs(late - item.centres(SETUP)).max() > 1e-3
 
 
-def test_frames_near_one_another_by_one_clock_are_not_by_another(sequence):
+def test_grouping_holds_only_under_its_own_clock(sequence):
     late = replace(SETUP, sensor=Sensor(time_offset=0.12))
     stated, found = _observed(sequence), observe(sequence, late, CLEANER, None, 100)
     assert stated.grouping_holds(SETUP) and not stated.grouping_holds(late)
@@ -181,7 +181,7 @@ def test_centres_follow_the_robots_registration(sequence):
     assert np.allclose(moved, motion.apply(item.centres(SETUP)))
 
 
-def test_turns_are_the_deepest_places_that_no_group_has(sequence):
+def test_deepest_places_are_those_between_groups(sequence):
     observed = _observed(sequence, most=4)
     way, centres = observed.path(SETUP)[1], observed.centres(SETUP)
     turns = [None if number is None else way[number] for number in observed.deepest_places(SETUP)]

@@ -26,30 +26,30 @@ def _cloud(stray: float, points: int, slope: float = 0.0):
 
 
 @pytest.mark.parametrize("stray", [4e-3, -2e-3])
-def test_lone_points_far_from_all_around_are_set_aside(stray):
+def test_nearly_hidden_patch_far_from_its_neighbours_is_an_outlier(stray):
     gap, patch, hidden = _cloud(stray, 2)
     kept = agrees_with_neighbours(gap, patch, SURFACE)
     assert not kept[patch == hidden].any()
     assert kept[patch != hidden].all()
 
 
-def test_a_patch_with_its_usual_points_speaks_for_itself():
+def test_well_covered_patch_may_differ_from_its_neighbours():
     gap, patch, _ = _cloud(4e-3, 20)
     assert agrees_with_neighbours(gap, patch, SURFACE).all()
 
 
-def test_a_patch_that_floats_where_no_dent_could_bring_it_is_set_aside_however_well_it_is_seen():
+def test_well_covered_patch_that_no_dent_explains_is_an_outlier():
     gap, patch, hidden = _cloud(1.1e-2, 20)
     kept = agrees_with_neighbours(gap, patch, SURFACE)
     assert not kept[patch == hidden].any()
     assert kept[patch != hidden].all()
 
 
-def test_what_lies_where_its_neighbours_lie_is_kept_however_wrong_the_model():
+def test_patch_near_its_neighbours_is_no_outlier_however_wrong_the_model():
     gap, patch, _ = _cloud(0.0, 2, slope=0.1)
     assert np.abs(gap).max() > 2e-3
     assert agrees_with_neighbours(gap, patch, SURFACE).all()
 
 
-def test_no_point_at_all():
+def test_cloud_without_points_has_no_outliers():
     assert len(agrees_with_neighbours(np.zeros(0), np.zeros(0, dtype=int), SURFACE)) == 0

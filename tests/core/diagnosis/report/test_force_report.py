@@ -1,5 +1,6 @@
-"""Force-only palpation from folder to report: a lump is found below the pushes, marked on the
-surface, and the modulus told.
+"""Palpation with forces and no clouds, from folder to report.
+
+An inclusion is found below the pushes, its footprint is drawn, and the modulus is identified.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ def _felt_dataset(root: Path, lumps: tuple[Inclusion, ...]) -> Path:
 
 
 @pytest.mark.slow
-def test_lump_is_felt_placed_and_marked(tmp_path: Path) -> None:
+def test_inclusion_is_found_with_place_depth_and_footprint(tmp_path: Path) -> None:
     root = tmp_path / "felt"
     root.mkdir()
     report = diagnose(open_dataset(_felt_dataset(root, (LUMP,))), tmp_path / "run", workers=1)
@@ -148,8 +149,8 @@ def _prediction(gap: FloatArray) -> Prediction:
     )
 
 
-def test_gain_is_the_share_of_what_stands_above_the_sensors_noise() -> None:
-    groups = tuple(Group((n,), np.empty((0, 3)), False, probe=1 + n // 2) for n in range(4))
+def test_gain_is_the_share_of_the_error_above_the_sensor_noise() -> None:
+    groups = tuple(Group((n,), np.empty((0, 3)), False, push=1 + n // 2) for n in range(4))
     item = Observations("felt", np.arange(4.0), None, groups, force_only=True)  # type: ignore[arg-type]
     before = _prediction(np.tile([0.0, 0.0, 10e-3], (4, 1)))
     after = _prediction(np.tile([0.0, 0.0, 4e-3], (4, 1)))

@@ -6,17 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from noisy_model import LUMP, RADIUS, noisy_model, stated_bench
+from noisy_model import LUMP, RADIUS, noisy_model, stated_evaluator
 from small_dataset import write_valid_dataset
 
 from palpate.dataset import Dataset, open_dataset
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.gain.gain_ladder import SurfaceGain
 from palpate.diagnosis.inference.camera_error_model import Ripple
-from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.residual_structure import Structure
 from palpate.diagnosis.report.report import report_of, verdict_of
 from palpate.diagnosis.search.findings import Findings, Trial
+from palpate.diagnosis.validation.checks import AllClearChecks
 from palpate.diagnosis.validation.held_out_test import HeldOutCheck
 from palpate.diagnosis.validation.rejection import rejection_reason
 from palpate.diagnosis.validation.stiffness_error_test import StiffnessErrorTest
@@ -43,79 +44,88 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
 
 
 @pytest.fixture(scope="module")
-def bench() -> Iterator[Bench]:
-    with stated_bench() as found:
+def evaluator() -> Iterator[Evaluator]:
+    with stated_evaluator() as found:
         yield found
 
 
 Tried = tuple[tuple[Effect, ...], float, float]
 
 
-def _findings(bench: Bench, *trials: Tried, accepted: bool = True, misfit: float = 2.0) -> Findings:
+def _findings(
+    evaluator: Evaluator, *trials: Tried, accepted: bool = True, misfit: float = 2.0
+) -> Findings:
     """Trials as (effects, gain, misfit left), best first; the first is accepted or not."""
     made = [
-        Trial(noisy_model(bench, *effects), gain, left, asked=12.0 * len(effects))
+        Trial(noisy_model(evaluator, *effects), gain, left, required_gain=12.0 * len(effects))
         for effects, gain, left in trials
     ]
     screened = {kind.name: 0.5 * number for number, kind in enumerate(DIAGNOSED)}
     return Findings(
-        noisy_model(bench), made[0] if accepted and made else None, made, 12.0, misfit, screened
+        noisy_model(evaluator), made[0] if accepted and made else None, made, 12.0, misfit, screened
     )
 
 
-def test_one_cause_far_ahead_is_found(bench):
+def test_one_cause_far_ahead_is_found(evaluator):
     assert (
         verdict_of(
             _findings(
-                bench, ((LUMP,), 90.0, 1.05), ((RADIUS,), 90.0 - 1.1 * CRITERIA.naming.rival, 1.4)
+                evaluator,
+                ((LUMP,), 90.0, 1.05),
+                ((RADIUS,), 90.0 - 1.1 * CRITERIA.naming.rival, 1.4),
             )
         )
         == "found"
     )
 
 
-def test_two_causes_about_as_good_are_ambiguous(bench):
+def test_two_causes_about_as_good_are_ambiguous(evaluator):
     assert (
         verdict_of(
             _findings(
-                bench, ((LUMP,), 90.0, 1.05), ((RADIUS,), 90.0 - 0.9 * CRITERIA.naming.rival, 1.1)
+                evaluator,
+                ((LUMP,), 90.0, 1.05),
+                ((RADIUS,), 90.0 - 0.9 * CRITERIA.naming.rival, 1.1),
             )
         )
         == "ambiguous"
     )
 
 
-def test_same_cause_from_another_start_is_no_rival(bench):
-    assert verdict_of(_findings(bench, ((LUMP,), 90.0, 1.05), ((LUMP,), 89.0, 1.1))) == "found"
+def test_same_cause_from_another_start_is_no_rival(evaluator):
+    assert verdict_of(_findings(evaluator, ((LUMP,), 90.0, 1.05), ((LUMP,), 89.0, 1.1))) == "found"
 
 
-def test_part_of_a_pair_is_no_rival(bench):
+def test_part_of_a_pair_is_no_rival(evaluator):
     assert (
-        verdict_of(_findings(bench, ((LUMP, RADIUS), 90.0, 1.05), ((LUMP,), 89.0, 1.1))) == "found"
+        verdict_of(_findings(evaluator, ((LUMP, RADIUS), 90.0, 1.05), ((LUMP,), 89.0, 1.1)))
+        == "found"
     )
 
 
 @pytest.mark.parametrize(
     ("left", "wanted"), [(1.02, "none"), (CRITERIA.verdict.unexplained_misfit + 0.2, "unexplained")]
 )
-def test_without_a_cause_it_depends_on_what_is_left(bench, left, wanted):
-    assert verdict_of(_findings(bench, ((LUMP,), 3.0, 1.0), accepted=False, misfit=left)) == wanted
-    assert verdict_of(_findings(bench, accepted=False, misfit=left)) == wanted
+def test_without_a_cause_it_depends_on_what_is_left(evaluator, left, wanted):
+    assert (
+        verdict_of(_findings(evaluator, ((LUMP,), 3.0, 1.0), accepted=False, misfit=left)) == wanted
+    )
+    assert verdict_of(_findings(evaluator, accepted=False, misfit=left)) == wanted
 
 
-def test_structured_error_without_a_cause_is_unexplained(bench):
-    findings = _findings(bench, accepted=False, misfit=1.02)
-    findings.structure = findings.left = Structure(50.0, 20.0, 30.0)
+def test_structured_error_without_a_cause_is_unexplained(evaluator):
+    findings = _findings(evaluator, accepted=False, misfit=1.02)
+    findings.structure = findings.remaining = Structure(50.0, 20.0, 30.0)
     assert verdict_of(findings) == "unexplained"
-    findings.structure = findings.left = Structure(29.0, 20.0, 30.0)
+    findings.structure = findings.remaining = Structure(29.0, 20.0, 30.0)
     assert verdict_of(findings) == "none"
 
 
-def test_depth_that_waves_is_told_and_is_no_noise(bench, dataset):
-    findings = _findings(bench, misfit=1.0)
+def test_rippled_depth_is_reported_and_is_no_noise(evaluator, dataset):
+    findings = _findings(evaluator, misfit=1.0)
     assert verdict_of(findings) == "none"
     findings.ripple = Ripple(size=2e-4, reach=4e-3, gain=80.0, share=0.3)
-    report = report_of(dataset, bench, findings, LADDER, "test")
+    report = report_of(dataset, evaluator, findings, LADDER, "test")
     assert (report["verdict"], report["causes"], report["unexplained"]["fraction"]) == (
         "unexplained",
         [],
@@ -128,17 +138,19 @@ def test_depth_that_waves_is_told_and_is_no_noise(bench, dataset):
     )
 
 
-def test_error_that_only_the_test_sequences_show_is_no_all_clear(bench, dataset):
-    findings = _findings(bench, misfit=1.0)
-    findings.beyond = HeldOutCheck(noisy_model(bench), Structure(20.0, 20.0, 30.0))
-    clear = report_of(dataset, bench, findings, LADDER, "test")
+def test_error_in_held_out_sequences_alone_is_unexplained(evaluator, dataset):
+    findings = _findings(evaluator, misfit=1.0)
+    held_out = HeldOutCheck(noisy_model(evaluator), Structure(20.0, 20.0, 30.0))
+    checks = AllClearChecks(held_out=held_out)
+    clear = report_of(dataset, evaluator, findings, LADDER, "test", checks)
     assert (clear["verdict"], clear["unexplained"]["fraction"]) == ("none", 0.0)
     assert (
         clear["evidence"]["held_out_structure"],
         clear["evidence"]["held_out_structure_bound"],
     ) == (1.0, 1.5)
-    findings.beyond = HeldOutCheck(noisy_model(bench), Structure(50.0, 20.0, 30.0))
-    report = report_of(dataset, bench, findings, LADDER, "test")
+    held_out = HeldOutCheck(noisy_model(evaluator), Structure(50.0, 20.0, 30.0))
+    checks = AllClearChecks(held_out=held_out)
+    report = report_of(dataset, evaluator, findings, LADDER, "test", checks)
     assert (report["verdict"], report["causes"], report["unexplained"]["fraction"]) == (
         "unexplained",
         [],
@@ -147,17 +159,17 @@ def test_error_that_only_the_test_sequences_show_is_no_all_clear(bench, dataset)
     assert report["unexplained"]["when"] == "most in poke-02, on which nothing was fitted"
 
 
-def test_sequence_that_asks_for_more_than_a_replay_errs_is_no_all_clear(bench, dataset):
-    findings = _findings(bench, misfit=1.0)
+def test_sequence_with_unusual_engine_error_is_unexplained(evaluator, dataset):
+    findings = _findings(evaluator, misfit=1.0)
     name = findings.baseline.predictions[-1].name
-    findings.asked = StiffnessErrorTest(name, 1.2, 0.5, 6.0, RIM)
-    clear = report_of(dataset, bench, findings, LADDER, "test")
+    checks = AllClearChecks(StiffnessErrorTest(name, 1.2, 0.5, 6.0, RIM))
+    clear = report_of(dataset, evaluator, findings, LADDER, "test", checks)
     assert (
         clear["verdict"] == "none"
         and clear["evidence"]["local_stiffness_error"][0]["sequence"] == name
     )
-    findings.asked = StiffnessErrorTest(name, 4.0, 13.2, 6.0, RIM)
-    report = report_of(dataset, bench, findings, LADDER, "test")
+    checks = AllClearChecks(StiffnessErrorTest(name, 4.0, 13.2, 6.0, RIM))
+    report = report_of(dataset, evaluator, findings, LADDER, "test", checks)
     assert (report["verdict"], report["causes"], report["unexplained"]["fraction"]) == (
         "unexplained",
         [],
@@ -170,16 +182,16 @@ def test_sequence_that_asks_for_more_than_a_replay_errs_is_no_all_clear(bench, d
     )
 
 
-def test_test_sequence_that_asks_for_more_is_no_all_clear_either(bench, dataset):
-    findings = _findings(bench, misfit=1.0)
-    other = noisy_model(bench)
-    findings.asked = StiffnessErrorTest("poke-01", 1.0, 0.0, 6.0, RIM)
-    findings.beyond = HeldOutCheck(
+def test_held_out_sequence_with_unusual_engine_error_is_unexplained(evaluator, dataset):
+    findings = _findings(evaluator, misfit=1.0)
+    other = noisy_model(evaluator)
+    held_out = HeldOutCheck(
         other,
         Structure(20.0, 20.0, 30.0),
         StiffnessErrorTest(other.predictions[-1].name, 4.0, 13.2, 6.0, RIM),
     )
-    report = report_of(dataset, bench, findings, LADDER, "test")
+    checks = AllClearChecks(StiffnessErrorTest("poke-01", 1.0, 0.0, 6.0, RIM), held_out)
+    report = report_of(dataset, evaluator, findings, LADDER, "test", checks)
     assert report["verdict"] == "unexplained"
     assert (
         report["unexplained"]["when"]
@@ -187,19 +199,20 @@ def test_test_sequence_that_asks_for_more_is_no_all_clear_either(bench, dataset)
     )
 
 
-def test_named_cause_stands_beside_waves_of_depth(bench, dataset):
-    findings = _findings(bench, ((RADIUS,), 60.0, 1.0))
+def test_cause_is_named_beside_rippled_depth(evaluator, dataset):
+    findings = _findings(evaluator, ((RADIUS,), 60.0, 1.0))
     findings.ripple = Ripple(size=2e-4, reach=4e-3, gain=80.0, share=0.3)
-    report = report_of(dataset, bench, findings, LADDER, "test")
+    report = report_of(dataset, evaluator, findings, LADDER, "test")
     assert report["verdict"] == "found"
     assert any("waves with the distance" in text for text in report["warnings"])
 
 
-def test_report_keeps_the_contract(bench, dataset):
-    findings = _findings(bench, ((LUMP,), 90.0, 1.05), ((RADIUS,), 40.0, 1.5))
-    report = report_of(dataset, bench, findings, LADDER, "test")
+def test_report_keeps_the_contract(evaluator, dataset):
+    findings = _findings(evaluator, ((LUMP,), 90.0, 1.05), ((RADIUS,), 40.0, 1.5))
+    report = report_of(dataset, evaluator, findings, LADDER, "test")
     assert json.loads(json.dumps(report)) == report
     assert (report["format"], report["dataset"], report["verdict"]) == (1, "small-block", "found")
+    assert report["criteria"] == {"version": CRITERIA.version}
     (cause,) = report["causes"]
     assert cause["effect"] == "stiff_inclusion" and cause["probability"] > 0.99
     assert set(cause["parameters"]) == {"x", "y", "z", "radius", "stiffness_ratio"}
@@ -227,19 +240,21 @@ def test_report_keeps_the_contract(bench, dataset):
     }
 
 
-def test_stiffness_is_not_identifiable_without_forces(bench, dataset):
-    report = report_of(dataset, bench, _findings(bench, accepted=False, misfit=1.0), None, "test")
+def test_stiffness_is_not_identifiable_without_forces(evaluator, dataset):
+    report = report_of(
+        dataset, evaluator, _findings(evaluator, accepted=False, misfit=1.0), None, "test"
+    )
     (entry,) = report["not_identifiable"]
     assert report["identified"] == []
     assert entry["effect"] == "young_modulus"
     assert "force" in entry["measure_instead"] and entry["why"]
 
 
-def test_report_without_a_cause_names_none(bench, dataset):
+def test_report_without_a_cause_names_none(evaluator, dataset):
     report = report_of(
         dataset,
-        bench,
-        _findings(bench, ((LUMP,), 2.0, 1.0), accepted=False, misfit=1.0),
+        evaluator,
+        _findings(evaluator, ((LUMP,), 2.0, 1.0), accepted=False, misfit=1.0),
         None,
         "test",
     )
@@ -247,12 +262,12 @@ def test_report_without_a_cause_names_none(bench, dataset):
     assert len(report["ranking"]) == len(DIAGNOSED)
 
 
-def test_cause_that_makes_the_test_sequences_worse_is_withdrawn(bench, dataset):
-    findings = _findings(bench, ((RADIUS,), 106.0, 1.02), ((LUMP,), 8.0, 1.03), misfit=1.03)
+def test_cause_that_makes_held_out_sequences_worse_is_rejected(evaluator, dataset):
+    findings = _findings(evaluator, ((RADIUS,), 106.0, 1.02), ((LUMP,), 8.0, 1.03), misfit=1.03)
     worse = replace(LADDER, removed=(-0.75, -1.4, -0.31))
     why = rejection_reason(findings, worse)
     findings.withdraw(why)
-    report = report_of(dataset, bench, findings, LADDER, "test")
+    report = report_of(dataset, evaluator, findings, LADDER, "test")
     assert report["verdict"] == "none" and report["causes"] == []
     assert report["warnings"] == ["the touches disagree", why]
     assert why.startswith("tool_radius would explain") and "adds 75 % (31 to 140 %)" in why
@@ -260,47 +275,51 @@ def test_cause_that_makes_the_test_sequences_worse_is_withdrawn(bench, dataset):
     assert chances["tool_radius"] == 0.0 < chances["stiff_inclusion"]
 
 
-def test_ambiguous_report_names_every_rival(bench, dataset):
-    findings = _findings(bench, ((LUMP,), 90.0, 1.05), ((RADIUS,), 88.0, 1.1), ((NU,), 20.0, 1.9))
-    report = report_of(dataset, bench, findings, None, "test")
+def test_ambiguous_report_names_every_rival(evaluator, dataset):
+    findings = _findings(
+        evaluator, ((LUMP,), 90.0, 1.05), ((RADIUS,), 88.0, 1.1), ((NU,), 20.0, 1.9)
+    )
+    report = report_of(dataset, evaluator, findings, None, "test")
     assert [cause["effect"] for cause in report["causes"]] == ["stiff_inclusion", "tool_radius"]
     first, second = (cause["probability"] for cause in report["causes"])
     assert 0.5 < first < 0.75 and second == pytest.approx(1 - first, abs=1e-3)
 
 
 @pytest.mark.parametrize("accepted", [True, False])
-def test_probabilities_of_exclusive_causes_add_up_to_at_most_one(bench, dataset, accepted):
+def test_probabilities_of_exclusive_causes_add_up_to_at_most_one(evaluator, dataset, accepted):
     trials = (
         ((LUMP,), 20.0, 1.1),
         ((RADIUS,), 16.0, 1.2),
         ((NU,), 13.0, 1.2),
         ((LUMP,), 18.0, 1.2),
     )
-    report = report_of(dataset, bench, _findings(bench, *trials, accepted=accepted), None, "test")
+    report = report_of(
+        dataset, evaluator, _findings(evaluator, *trials, accepted=accepted), None, "test"
+    )
     chances = [row["probability"] for row in (*report["causes"], *report["ranking"])]
     assert all(0 <= chance <= 1 for chance in chances)
     assert sum(chances) <= 1 + 1e-3
     assert sum(chances) < 0.99  # that there is no cause has a probability, too
 
 
-def test_a_further_cause_that_was_refused_is_less_probable_than_not(bench, dataset):
+def test_a_further_cause_that_was_refused_is_less_probable_than_not(evaluator, dataset):
     """It gains 10 nats where the search asks 12 of it: the odds against it are what is lacking."""
-    findings = _findings(bench, ((LUMP,), 90.0, 1.05), ((LUMP, RADIUS), 100.0, 1.02))
+    findings = _findings(evaluator, ((LUMP,), 90.0, 1.05), ((LUMP, RADIUS), 100.0, 1.02))
     chances = {
         row["effect"]: row["probability"]
-        for row in report_of(dataset, bench, findings, None, "test")["ranking"]
+        for row in report_of(dataset, evaluator, findings, None, "test")["ranking"]
     }
     assert 0.2 < chances["tool_radius"] < 0.5
     findings.trials[1] = replace(
-        findings.trials[1], gain=1000.0, asked=np.inf
+        findings.trials[1], gain=1000.0, required_gain=np.inf
     )  # of one sequence alone
-    report = report_of(dataset, bench, findings, None, "test")
+    report = report_of(dataset, evaluator, findings, None, "test")
     assert {row["effect"]: row["probability"] for row in report["ranking"]}["tool_radius"] == 0.0
     assert report["causes"][0]["probability"] == pytest.approx(1.0, abs=1e-3)
 
 
-def test_what_is_left_is_told_by_place_and_sequence(bench, dataset):
-    findings = _findings(bench, accepted=False, misfit=3.0)
-    left = report_of(dataset, bench, findings, None, "test")["unexplained"]
+def test_remaining_error_has_place_and_sequence(evaluator, dataset):
+    findings = _findings(evaluator, accepted=False, misfit=3.0)
+    left = report_of(dataset, evaluator, findings, None, "test")["unexplained"]
     assert left["when"] == "most in poke-02"
     assert 0 <= left["fraction"] <= 1 and "mm" in left["where"]

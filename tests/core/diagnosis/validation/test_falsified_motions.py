@@ -26,7 +26,7 @@ def _depths(item: Observations) -> np.ndarray:
     return np.maximum(TOP + SETUP.tool.radius - item.centres(SETUP)[:, 2], 0.0)
 
 
-def test_shifted_clock_pushes_when_nothing_was_pushed(data):
+def test_shifted_clock_moves_pushes_to_where_there_were_none(data):
     for true, false in zip(data, shifted(data, SETUP), strict=True):
         assert _depths(false).max() > 0.5 * _depths(true).max()
         assert _depths(false) @ _depths(true) < 0.05 * np.linalg.norm(
@@ -41,7 +41,7 @@ def test_mirrored_tool_goes_as_deep_at_the_other_end(data):
         )
 
 
-def test_mirror_stands_in_the_phantom_whatever_the_robots_frame(data):
+def test_mirror_is_in_the_phantom_frame_whatever_the_robot_frame(data):
     turned = Transform.from_vector([0.1, -0.2, 0.05], [0.3, 0.2, -0.5])
     setup = replace(SETUP, phantom_from_robot=turned)
     stream = data[0].kinematics
@@ -53,7 +53,7 @@ def test_mirror_stands_in_the_phantom_whatever_the_robots_frame(data):
     )
 
 
-def test_swapped_tools_go_one_anothers_way(data):
+def test_swapped_tools_follow_one_anothers_path(data):
     ways = swapped(data, SETUP)
     for true, false in zip(data, ways, strict=True):
         gone = [

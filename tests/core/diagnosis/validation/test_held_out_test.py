@@ -1,4 +1,4 @@
-"""An all-clear is looked at on the sequences that nothing was fitted on."""
+"""A verdict of none is checked on held-out sequences."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from evaluating import evaluator_of
 from pushed_block import CORNERS, SETUP, observed, poke, registration
 
 from palpate.diagnosis.forward.worker_pool import Workers
-from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.validation.held_out_test import check_held_out
 from palpate.mesh.box_mesh import GridSpec
@@ -39,22 +40,24 @@ DATA = {
 
 
 @pytest.fixture(scope="module")
-def bench() -> Iterator[Bench]:
+def evaluator() -> Iterator[Evaluator]:
     with Workers(list(DATA.values()), 1) as workers:
-        yield Bench(STATED, registration(), workers, ["fitted"], None, GRID, FINE)
+        yield evaluator_of(STATED, registration(), workers, ["fitted"], None, GRID, FINE)
 
 
-def test_what_holds_for_them_too_is_clear(bench: Bench) -> None:
-    found = check_held_out(bench, [DATA["alike"]], seed=0)
+def test_held_out_sequences_without_error_are_clear(evaluator: Evaluator) -> None:
+    found = check_held_out(evaluator, [DATA["alike"]], seed=0)
     assert found is not None and [item.name for item in found.model.predictions] == ["alike"]
     assert not found.structure.significant
 
 
-def test_error_that_only_they_show_is_seen(bench: Bench) -> None:
-    found = check_held_out(bench, [DATA["alike"], DATA["other"]], seed=0)
+def test_error_in_held_out_sequences_alone_is_found(evaluator: Evaluator) -> None:
+    found = check_held_out(evaluator, [DATA["alike"], DATA["other"]], seed=0)
     assert found is not None and found.structure.significant
-    assert bench.noises == [] and bench.names == ("fitted",)  # nothing of it reaches what is fitted
+    assert evaluator.state.noises == [] and evaluator.problem.names == (
+        "fitted",
+    )  # nothing of it reaches what is fitted
 
 
-def test_without_test_sequences_there_is_nothing_to_look_at(bench: Bench) -> None:
-    assert check_held_out(bench, [], seed=0) is None
+def test_without_held_out_sequences_there_is_no_check(evaluator: Evaluator) -> None:
+    assert check_held_out(evaluator, [], seed=0) is None

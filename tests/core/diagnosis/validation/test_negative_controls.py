@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from evaluating import evaluator_of
 from pushed_block import GRID, SETUP, observed, poke, registration
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS
 from palpate.diagnosis.forward.worker_pool import Workers
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, gram
-from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.noise_model import Noise
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.validation.falsified_motions import FALSIFIED
@@ -26,17 +27,19 @@ PLACES = [(0.02, 3e-3), (-0.014, -6e-3)]
 
 
 @pytest.fixture(scope="module")
-def bench() -> Iterator[Bench]:
+def evaluator() -> Iterator[Evaluator]:
     """The stated setup with its priors; nothing is replayed here."""
     with Workers([], 1) as workers:
-        yield Bench(SETUP, registration(), workers, ["poke-01"], None, GridSpec(), GridSpec())
+        yield evaluator_of(
+            SETUP, registration(), workers, ["poke-01"], None, GridSpec(), GridSpec()
+        )
 
 
-def _judged(bench: Bench, true: float, false: float, alike: float = 0.0) -> Control:
+def _judged(evaluator: Evaluator, true: float, false: float, alike: float = 0.0) -> Control:
     """Data that hold so much of a cause's pattern, and of another that falsified motions give it
     and that is partly like it.
     """
-    random, shape = np.random.default_rng(1), (GROUPS, bench.surface.patches)
+    random, shape = np.random.default_rng(1), (GROUPS, evaluator.problem.surface.patches)
     blocks = []
     for number in range(SEQUENCES):
         own, apart = 1e-4 * random.standard_normal((2, *shape))
@@ -46,36 +49,36 @@ def _judged(bench: Bench, true: float, false: float, alike: float = 0.0) -> Cont
         )
         residual = 2e-4 * random.standard_normal(shape) - true * own - false * other
         blocks.append(Block(f"poke-{number:02d}", *gram(residual, columns, np.full(shape, 0.25e8))))
-    return judge(bench, blocks, RADIUS, ("geometry mirrored",))[0]
+    return judge(evaluator, blocks, RADIUS, ("geometry mirrored",))[0]
 
 
-def test_cause_whose_pattern_the_data_hold_loses_its_gain(bench):
-    control = _judged(bench, 1.0, 0.0)
+def test_true_cause_loses_its_gain(evaluator):
+    control = _judged(evaluator, 1.0, 0.0)
     assert control.true > 20 and control.gain < CRITERIA.controls.faint and control.passed
     assert control.to_json()["kept"] < 0.1 and warnings_of([control]) == []
 
 
-def test_cause_that_falsified_motions_explain_as_well_does_not_pass(bench):
-    control = _judged(bench, 1.0, 0.9)
+def test_cause_that_falsified_motions_explain_as_well_does_not_pass(evaluator):
+    control = _judged(evaluator, 1.0, 0.9)
     assert control.passed is False and control.to_json()["kept"] > 0.5
     (warning,) = warnings_of([control])
     assert "tool_radius" in warning and "geometry mirrored" in warning
 
 
-def test_opposite_of_the_cause_gains_nothing(bench):
-    control = _judged(bench, 1.0, -0.9)
+def test_opposite_of_a_cause_gains_nothing(evaluator):
+    control = _judged(evaluator, 1.0, -0.9)
     assert control.gain <= 0 and control.passed
 
 
-def test_motions_that_look_the_same_say_nothing(bench):
-    control = _judged(bench, 1.0, 0.0, alike=0.8)
+def test_motions_that_look_the_same_say_nothing(evaluator):
+    control = _judged(evaluator, 1.0, 0.0, alike=0.8)
     assert (
         control.alike > CRITERIA.controls.alike and control.passed is None and "80 %" in control.why
     )
 
 
-def test_cause_without_a_gain_has_none_to_lose(bench):
-    control = _judged(bench, 0.0, 0.0)
+def test_control_says_nothing_about_a_cause_without_gain(evaluator):
+    control = _judged(evaluator, 0.0, 0.0)
     assert (
         control.passed is None and control.to_json()["kept"] is None and "too little" in control.why
     )
@@ -93,14 +96,14 @@ def data() -> list[Observations]:
 
 
 @pytest.mark.slow
-def test_tool_that_is_too_small_passes_every_control_on_replays(data):
+def test_wrong_tool_radius_passes_every_control_on_replays(data):
     with Workers(data, 1) as workers:
-        bench = Bench(
+        evaluator = evaluator_of(
             SETUP, registration(), workers, [item.name for item in data], None, GRID, GRID
         )
-        baseline = bench.evaluate(())
+        baseline = evaluator.evaluate(())
         shape = baseline.predictions[0].gap.shape
-        bench.noises = [
+        evaluator.state.noises = [
             Noise(
                 np.where(np.isfinite(p.gap), p.count / 1e-8, 0.0),
                 np.nan_to_num(p.gap),
@@ -109,8 +112,11 @@ def test_tool_that_is_too_small_passes_every_control_on_replays(data):
             )
             for p in baseline.predictions
         ]
-        baseline, model = bench.evaluate(()), bench.evaluate((RADIUS,), baseline.predictions)
-        found = controls(bench, data, model, baseline)
+        baseline, model = (
+            evaluator.evaluate(()),
+            evaluator.evaluate((RADIUS,), baseline.predictions),
+        )
+        found = controls(evaluator, data, model, baseline)
     assert [control.control for control in found] == list(FALSIFIED)
     assert all(
         control.true > 50 and control.gain < 0.3 * control.true and control.passed

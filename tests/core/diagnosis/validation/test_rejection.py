@@ -7,6 +7,7 @@ from pushed_block import SETUP
 
 from palpate.diagnosis.gain.gain_ladder import SurfaceGain
 from palpate.diagnosis.inference.hypothesis import Model
+from palpate.diagnosis.inference.parameter_blocks import ModelColumns
 from palpate.diagnosis.inference.residual_structure import Structure
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.validation.rejection import rejection_reason
@@ -30,23 +31,23 @@ def _structure(ratio: float) -> Structure:
 
 def _found(before: float, left: float) -> Findings:
     cause = ToolCompliance(compliance_times_stiffness=59.0)
-    models = [Model(effects, SETUP, (), (), (), {}, ()) for effects in ((), (cause,))]
+    models = [Model(effects, SETUP, (), (), ModelColumns(())) for effects in ((), (cause,))]
     return Findings(
         models[0],
         best=Trial(models[1], 564.0, 1.4),
         structure=_structure(before),
-        left=_structure(left),
+        remaining=_structure(left),
     )
 
 
 @pytest.mark.parametrize(
     "removed", [(0.9, 0.8, 0.95), (0.0, 0.0, 0.0), (-0.3, -0.9, 0.1), (-0.05, -0.08, -0.02)]
 )
-def test_cause_that_leaves_no_structure_and_may_carry_over_is_kept(removed):
+def test_cause_that_leaves_no_structure_is_not_rejected(removed):
     assert rejection_reason(_found(3.0, 1.2), replace(LADDER, removed=removed)) == ""
 
 
-def test_cause_that_leaves_the_structure_and_helps_no_test_sequence_is_not_named():
+def test_cause_that_leaves_structure_and_has_no_gain_is_rejected():
     why = rejection_reason(_found(5.0, 5.4), IDLE)
     assert why.startswith("tool_compliance would explain part")
     assert (
@@ -55,16 +56,16 @@ def test_cause_that_leaves_the_structure_and_helps_no_test_sequence_is_not_named
     )
 
 
-def test_cause_that_leaves_the_structure_where_nothing_was_tested_is_not_named():
+def test_cause_that_leaves_structure_is_rejected_without_held_out_sequences():
     assert "stays" in rejection_reason(_found(5.0, 5.4), None)
 
 
-def test_cause_that_removes_most_of_the_structure_or_of_what_test_sequences_show_is_kept():
+def test_cause_that_removes_most_of_structure_or_error_is_not_rejected():
     assert rejection_reason(_found(20.0, 3.0), IDLE) == ""
     assert rejection_reason(_found(5.0, 4.6), replace(LADDER, removed=(0.6, 0.5, 0.7))) == ""
 
 
-def test_cause_that_leaves_the_larger_part_of_either_is_not_named_though_it_surely_removes_some():
+def test_cause_that_leaves_most_of_structure_and_error_is_rejected():
     why = rejection_reason(_found(2.2, 1.9), replace(LADDER, removed=(0.29, 0.23, 0.47)))
     assert (
         "1.9 times what chance gives, 2.2 times without it" in why
@@ -72,5 +73,5 @@ def test_cause_that_leaves_the_larger_part_of_either_is_not_named_though_it_sure
     )
 
 
-def test_nothing_found_needs_no_objection():
+def test_no_cause_needs_no_rejection():
     assert rejection_reason(Findings(_found(1.0, 1.0).baseline), LADDER) == ""

@@ -1,4 +1,4 @@
-"""How much of the engine's own error a sequence asks for."""
+"""Tests of the engine error that a sequence needs."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from evaluating import evaluator_of
 from pushed_block import CORNERS, SETUP, TOP, observed, poke, registration
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.inference.evidence import Block, gram
-from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.observation.frame_groups import Observations
-from palpate.diagnosis.search.candidates import lump_places
+from palpate.diagnosis.search.inclusion_grid import inclusion_places
 from palpate.diagnosis.validation.stiffness_error_test import (
     StiffnessError,
     StiffnessErrorTest,
@@ -55,18 +55,20 @@ def workers() -> Iterator[Workers]:
 
 
 def _looked_at(workers: Workers, *names: str) -> StiffnessErrorTest:
-    bench = Bench(STATED, registration(), workers, names, None, GRID, FINE)
-    found = largest_stiffness_error(bench, bench.baseline((), lump_places(bench)))
+    evaluator = evaluator_of(STATED, registration(), workers, names, None, GRID, FINE)
+    found = largest_stiffness_error(
+        evaluator, evaluator.baseline((), inclusion_places(evaluator.problem))
+    )
     assert found is not None
     return found
 
 
-def test_what_is_as_stated_asks_for_nothing_unusual(workers: Workers) -> None:
+def test_stated_setup_needs_no_unusual_error(workers: Workers) -> None:
     found = _looked_at(workers, "clear", "alike")
     assert not found.significant and found.warning == "" and found.gain < 0.3 * found.bound
 
 
-def test_what_acts_in_one_sequence_alone_is_told_with_its_name(workers: Workers) -> None:
+def test_sequence_with_an_error_of_its_own_is_named(workers: Workers) -> None:
     found = _looked_at(workers, "clear", "alike", "lumpy")
     assert found.significant and found.sequence == "lumpy" and found.factor > 2
     x, y, z = found.place.place
@@ -97,22 +99,22 @@ def _asked(deviation: float, seed: int) -> StiffnessError:
 
 
 @pytest.mark.parametrize("deviation", [0.05, CRITERIA.stiffness_error.usual])
-def test_what_is_usual_is_rarely_too_much(deviation: float) -> None:
+def test_usual_error_is_rarely_significant(deviation: float) -> None:
     gains = np.array([_asked(deviation, seed).gain for seed in range(200)])
     assert (gains > chance_bound(1)).sum() <= 2 and np.median(gains) < 0.5
 
 
-def test_more_than_usual_is_measured() -> None:
+def test_larger_error_is_estimated() -> None:
     found = [_asked(4 * CRITERIA.stiffness_error.usual, seed) for seed in range(20)]
     assert all(one.gain > chance_bound(4) for one in found)
     assert np.median([one.factor for one in found]) == pytest.approx(4.0, rel=0.5)
 
 
-def test_more_sequences_ask_for_more_by_chance() -> None:
+def test_bound_grows_with_the_number_of_sequences() -> None:
     assert 4.5 < chance_bound(1) < chance_bound(4) < chance_bound(20) < 8.0
 
 
-def test_factor_is_said_in_percent_of_stiffness() -> None:
+def test_warning_states_the_deviation_of_stiffness() -> None:
     found = StiffnessErrorTest("poke-side-01", 4.0, 13.2, 6.1, ErrorLocation((0.0, 0.0, 0.0), 1.0))
     assert (
         f"off by {100 * 4 * CRITERIA.stiffness_error.usual * CRITERIA.noise.stiffness_error:.0f} %"
