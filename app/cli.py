@@ -65,9 +65,8 @@ def main() -> NoReturn:
     except Exception:
         if not stop.received:
             raise
-        sys.exit(
-            _cancelled()
-        )  # a stop in the middle of an import comes out as whatever that import makes of it
+        # A signal during an import may appear as any exception of that import.
+        sys.exit(_cancelled())
     except SystemExit as end:
         if end.code == CANCELLED:
             _cancelled()

@@ -41,29 +41,28 @@ CONTROLS = 10
 
 def blind(
     folder: Annotated[
-        Path, typer.Option(help="Where the results go; what stands there is not done again.")
+        Path, typer.Option(help="Folder of the results; existing ones are not computed again.")
     ] = Path("runs/blind"),
     scenarios: Annotated[
         int | None,
-        typer.Option(
-            min=1, help="Draw so many cases of all kinds; without it each effect is hidden once."
-        ),
+        typer.Option(min=1, help="Number of cases to draw; without it each effect is hidden once."),
     ] = None,
     kinds: Annotated[
         str | None,
         typer.Option(
-            help="Of --scenarios only these: control, clear, subtle, pair, outside, twins, modulus."
+            help="Kinds for --scenarios: control, clear, subtle, pair, outside, twins, modulus."
         ),
     ] = None,
     effects: Annotated[
         str | None,
-        typer.Option(help="Hide only these, parted by commas; all that are weighed without."),
+        typer.Option(help="Effects to hide, separated by commas; all diagnosed ones if omitted."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="All hidden parameters follow from it.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all hidden parameters.")] = 0,
     controls: Annotated[
         int | None,
         typer.Option(
-            min=0, help="Cases in which nothing is hidden; 10, or a quarter of --scenarios without."
+            min=0,
+            help="Cases without a hidden effect; 10, or a quarter of --scenarios, if omitted.",
         ),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Cases at the same time.")] = 2,
@@ -71,25 +70,25 @@ def blind(
     short: Annotated[
         bool,
         typer.Option(
-            "--short", help="Five sequences instead of seven: sooner done, and tells less."
+            "--short", help="Five sequences instead of seven: faster and less informative."
         ),
     ] = False,
     any_version: Annotated[
-        bool, typer.Option("--any-version", help="Take results of other versions of the code, too.")
+        bool, typer.Option("--any-version", help="Also use results of other versions of the code.")
     ] = False,
     score: Annotated[
         bool,
         typer.Option(
-            "--score", help="Run nothing: score what is there, also of a suite that still runs."
+            "--score", help="Run nothing: score the existing results, also of a running suite."
         ),
     ] = False,
     again: Annotated[
-        bool, typer.Option("--again", help="Do those again that ended in an error.")
+        bool, typer.Option("--again", help="Repeat the cases that ended in an error.")
     ] = False,
     keep: Annotated[
         bool,
         typer.Option(
-            "--keep", help="Keep dataset and run of each case in FOLDER/kept, to be looked at."
+            "--keep", help="Store dataset and run of each case in FOLDER/kept, for the page."
         ),
     ] = False,
 ) -> None:

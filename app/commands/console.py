@@ -40,7 +40,7 @@ RegistrationOption = Annotated[
     str | None,
     typer.Option(
         help="Accepted registration of the camera: a name stored for this dataset, or a file; "
-        "automatic without."
+        "automatic if omitted."
     ),
 ]
 """The option by which verbs take an accepted registration."""

@@ -42,8 +42,7 @@ _NODES = (25, 9, 9)
 def check(
     datasets: Annotated[list[Path], typer.Argument(help="Dataset folders.", show_default=False)],
     picture: Annotated[
-        Path | None,
-        typer.Option(help="Write a picture of where the tool touched (one dataset only)."),
+        Path | None, typer.Option(help="Write a picture of the touched places (one dataset only).")
     ] = None,
 ) -> None:
     """Read everything in a dataset and print its content, warnings, and what it cannot show."""
@@ -91,20 +90,20 @@ def register(dataset: Folder) -> None:
 
 def replay(
     dataset: Folder,
-    sequence: Annotated[str, typer.Option(help="Which sequence.", show_default=False)],
+    sequence: Annotated[str, typer.Option(help="Name of the sequence.", show_default=False)],
     file: Annotated[
         Path,
         typer.Option(
-            "--out", dir_okay=False, help="Where the frames go (.npz).", show_default=False
+            "--out", dir_okay=False, help="File of the frames (.npz).", show_default=False
         ),
     ],
     grid: Annotated[
         str, typer.Option(help="Even nodes along x, y, z, as in 13x5x5; or finest at the tool.")
     ] = "graded",
     registration: RegistrationOption = None,
-    runs: Annotated[
-        Path, typer.Option(help="Accepted registrations are looked for below this folder.")
-    ] = Path("runs"),
+    runs: Annotated[Path, typer.Option(help="Folder of the accepted registrations.")] = Path(
+        "runs"
+    ),
 ) -> None:
     """Simulate one sequence with the stated setup: one equilibrium per cloud, written to an .npz
     file.

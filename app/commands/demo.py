@@ -26,10 +26,9 @@ __all__ = ["demo"]
 
 def demo(
     seed: Annotated[
-        int | None,
-        typer.Option(min=0, help="What is hidden follows from it; drawn at random if not given."),
+        int | None, typer.Option(min=0, help="Seed of the hidden effects; random if omitted.")
     ] = None,
-    effects: Annotated[int, typer.Option(min=0, max=2, help="How many effects to hide.")] = 1,
+    effects: Annotated[int, typer.Option(min=0, max=2, help="Number of effects to hide.")] = 1,
     palpation: Annotated[
         str | None,
         typer.Option(
@@ -40,7 +39,7 @@ def demo(
     show: Annotated[
         bool, typer.Option("--serve/--no-serve", help="Open the page afterwards.")
     ] = True,
-    folder: Annotated[Path, typer.Option(help="Where dataset and run go.")] = Path("runs/demo"),
+    folder: Annotated[Path, typer.Option(help="Folder of dataset and run.")] = Path("runs/demo"),
     port: Annotated[int, typer.Option(min=0, max=65535)] = 8321,
     workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
 ) -> None:

@@ -52,19 +52,18 @@ same value."""
 def diagnose(
     datasets: Annotated[list[Path], typer.Argument(help="Dataset folders.", show_default=False)],
     file: Annotated[
-        Path | None,
-        typer.Option("--out", help="The report (JSON); of several datasets a folder of them."),
+        Path | None, typer.Option("--out", help="The report (JSON); for several datasets a folder.")
     ] = None,
     run: Annotated[
         Path | None,
-        typer.Option(help="Keep the run folder here; of several datasets a folder of them."),
+        typer.Option(help="Store the run folder here; for several datasets a folder of them."),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
     seed: Annotated[int, typer.Option(min=0, help="Seed of all random draws.")] = 0,
     registration: RegistrationOption = None,
-    runs: Annotated[
-        Path, typer.Option(help="Accepted registrations are looked for below this folder.")
-    ] = Path("runs"),
+    runs: Annotated[Path, typer.Option(help="Folder of the accepted registrations.")] = Path(
+        "runs"
+    ),
 ) -> None:
     """Find the causes of the simulation's error in each dataset, and what they gain on sequences
     that nothing was fitted on.

@@ -25,21 +25,21 @@ def evaluate(
     dataset: Annotated[
         Path,
         typer.Argument(
-            help="A dataset folder; --paper makes it if it is not there.", show_default=False
+            help="A dataset folder; --paper makes it if it does not exist.", show_default=False
         ),
     ],
     run: Annotated[
         str | None,
-        typer.Option(help="A diagnosis below RUNS whose extended model stands on the ladder."),
+        typer.Option(help="A diagnosis below RUNS whose extended model is evaluated too."),
     ] = None,
     training: Annotated[
         list[str] | None,
-        typer.Option(help="Trainings below RUNS/trainings; the newest ones without."),
+        typer.Option(help="Trainings below RUNS/trainings; the newest ones if omitted."),
     ] = None,
     feedback: Annotated[
         str,
         typer.Option(
-            help="none, or follow: the simulation answers for what a network does not see."
+            help="none, or follow: the simulation moves the points that a network does not see."
         ),
     ] = "none",
     truth: Annotated[
@@ -57,18 +57,20 @@ def evaluate(
     size: Annotated[
         str,
         typer.Option(
-            help="Of the virtual dataset that --paper makes: short, medium or full (14 minutes)."
+            help="Size of the dataset that --paper makes: short, medium or full (14 minutes)."
         ),
     ] = "full",
-    epochs: Annotated[int, typer.Option(help="At most, of each network that --paper trains.")] = 40,
-    features: Annotated[str, typer.Option(help="Of the blocks of these networks.")] = "64,128,256",
-    every: Annotated[
-        int, typer.Option(help="Each how many clouds these networks learn from one.")
-    ] = 1,
+    epochs: Annotated[
+        int, typer.Option(help="Most epochs of each network that --paper trains.")
+    ] = 40,
+    features: Annotated[
+        str, typer.Option(help="Features of these networks' blocks.")
+    ] = "64,128,256",
+    every: Annotated[int, typer.Option(help="These networks use one of this many clouds.")] = 1,
     file: Annotated[
         Path | None, typer.Option("--out", dir_okay=False, help="The result (JSON).")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of all draws.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all random draws.")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
     runs: Annotated[Path, typer.Option(help="Results go to RUNS/evaluations.")] = Path("runs"),
 ) -> None:

@@ -17,12 +17,14 @@ def export(
     run: Annotated[
         Path,
         typer.Argument(
-            help="Folder of a run, as `palpate diagnose --run` keeps it.", show_default=False
+            help="Folder of a run, as made by `palpate diagnose --run`.", show_default=False
         ),
     ],
     file: Annotated[
         Path | None,
-        typer.Option("--out", dir_okay=False, help="The page; RUN.html where you are without it."),
+        typer.Option(
+            "--out", dir_okay=False, help="The page; RUN.html in the current folder if omitted."
+        ),
     ] = None,
 ) -> None:
     """Write the report of a run as one self-contained HTML page: to keep, print or send."""

@@ -16,17 +16,15 @@ __all__ = ["serve"]
 
 def serve(
     host: Annotated[
-        str, typer.Option(help="Address to listen on; any but a loopback one asks for a token.")
+        str, typer.Option(help="Address to listen on; all but loopback addresses need a token.")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 takes a free one.")] = 8321,
     runs: Annotated[Path, typer.Option(help="Folder of finished diagnoses.")] = Path("runs"),
-    datasets: Annotated[Path, typer.Option(help="Folder below which the datasets lie.")] = Path(
-        "datasets"
-    ),
+    datasets: Annotated[Path, typer.Option(help="Folder of the datasets.")] = Path("datasets"),
     workers: Annotated[int, typer.Option(min=1, help="Processes one diagnosis may use.")] = 2,
     allow_host: Annotated[
         list[str] | None,
-        typer.Option(help="Another name by which browsers call this server; asks for a token."),
+        typer.Option(help="Another name of this server for browsers; needs a token."),
     ] = None,
     import_from: Annotated[
         list[Path] | None,
@@ -36,13 +34,10 @@ def serve(
         ),
     ] = None,
     disk_limit: Annotated[
-        float, typer.Option(min=0.1, help="GiB of RUNS beyond which the oldest caches are dropped.")
+        float, typer.Option(min=0.1, help="GiB of RUNS beyond which the oldest caches are deleted.")
     ] = 20.0,
     new_token: Annotated[
-        bool,
-        typer.Option(
-            "--new-token", help="Make a new token; the one before opens nothing any more."
-        ),
+        bool, typer.Option("--new-token", help="Make a new token; the old one becomes invalid.")
     ] = False,
 ) -> None:
     """Serve the page and the REST service on one port."""

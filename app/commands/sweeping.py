@@ -30,24 +30,26 @@ def sweep(
         list[str] | None, typer.Option(help="EFFECT.PARAMETER=VALUE that all points have.")
     ] = None,
     method: Annotated[str, typer.Option(help="grid, random, tpe or cmaes.")] = "grid",
-    steps: Annotated[int, typer.Option(help="Of a grid along each parameter.")] = 7,
-    levels: Annotated[int, typer.Option(help="Of a grid from coarse to fine.")] = 1,
-    points: Annotated[int, typer.Option(help="Of the other methods.")] = 40,
-    sequence: Annotated[list[str] | None, typer.Option(help="Which; all without.")] = None,
+    steps: Annotated[int, typer.Option(help="Steps of a grid along each parameter.")] = 7,
+    levels: Annotated[int, typer.Option(help="Levels of a grid from coarse to fine.")] = 1,
+    points: Annotated[int, typer.Option(help="Number of points of the other methods.")] = 40,
+    sequence: Annotated[
+        list[str] | None, typer.Option(help="Sequences to replay; all if omitted.")
+    ] = None,
     frames: Annotated[
         int, typer.Option(help="Touched clouds of each sequence, evenly spread.")
     ] = 8,
     measure: Annotated[
         str, typer.Option(help="distance (RMS of patch averages) or paper (mean distance).")
     ] = "distance",
-    seed: Annotated[int, typer.Option(min=0, help="Of all draws.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all random draws.")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="Processes to use.")] = 2,
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a dask scheduler whose workers replay instead.")
     ] = None,
     registration: RegistrationOption = None,
     runs: Annotated[
-        Path, typer.Option(help="Points go to RUNS/sweeps; what is known there is not done again.")
+        Path, typer.Option(help="Points go to RUNS/sweeps; known ones are not computed again.")
     ] = Path("runs"),
 ) -> None:
     """Replay a dataset over a range of parameters; print where the error is smallest and which

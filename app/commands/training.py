@@ -20,7 +20,7 @@ def train(
     run: Annotated[
         str | None,
         typer.Option(
-            help="Train on the extended model of this run below RUNS, not on the stated one."
+            help="Train on the extended model of this run below RUNS, not on the raw one."
         ),
     ] = None,
     truth: Annotated[
@@ -30,11 +30,10 @@ def train(
         str, typer.Option(help="unet2d (top layer), unet3d (volume) or graph (any mesh).")
     ] = "unet2d",
     features: Annotated[
-        str, typer.Option(help="Of the blocks, from fine to coarse.")
+        str, typer.Option(help="Features of the blocks, from fine to coarse.")
     ] = "64,128,256",
     trust: Annotated[
-        float,
-        typer.Option(help="How far the simulation may be corrected along each axis, in voxels."),
+        float, typer.Option(help="Largest correction along each axis, in voxels.")
     ] = 0.5,
     inputs: Annotated[
         str, typer.Option(help="Inputs of the network on the tool: pose, velocity, force.")
@@ -43,17 +42,20 @@ def train(
     hold: Annotated[
         float, typer.Option(help="Weight that keeps hidden vertices near the simulation, 1/mm.")
     ] = 1.0,
-    epochs: Annotated[int, typer.Option(help="At most.")] = 40,
+    epochs: Annotated[int, typer.Option(help="Most epochs.")] = 40,
     patience: Annotated[
-        int, typer.Option(help="Epochs without a better validation error after which it ends.")
+        int,
+        typer.Option(help="Epochs without a smaller validation error before the training ends."),
     ] = 6,
     batch: Annotated[int, typer.Option(help="Samples in a step.")] = 64,
-    rate: Annotated[float, typer.Option(help="Of learning.")] = 5e-4,
-    every: Annotated[int, typer.Option(help="Each how many clouds one is learned from.")] = 1,
+    rate: Annotated[float, typer.Option(help="Learning rate.")] = 5e-4,
+    every: Annotated[int, typer.Option(help="Use one of this many clouds.")] = 1,
     device: Annotated[str, typer.Option(help="auto, cpu or cuda.")] = "auto",
     seed: Annotated[
         int,
-        typer.Option(min=0, help="Of first weights and order; the same gives the same weights."),
+        typer.Option(
+            min=0, help="Seed of initial weights and order; the same seed gives the same weights."
+        ),
     ] = 0,
     workers: Annotated[int, typer.Option(min=1, help="Processes that replay.")] = 2,
     runs: Annotated[Path, typer.Option(help="The training goes to RUNS/trainings.")] = Path("runs"),

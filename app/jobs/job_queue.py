@@ -136,7 +136,7 @@ class JobQueue:
             )
         end = time.monotonic() + _ENDING
         while identity in self._running and job.state.is_finished and time.monotonic() < end:
-            time.sleep(0.02)  # its processes are still ending
+            time.sleep(0.02)
         if identity in self._running or not self._records.reopen(identity):
             state = job.state.value
             raise Conflict(

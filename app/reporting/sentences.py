@@ -53,7 +53,7 @@ def limit_phrase(row: dict[str, Any]) -> str:
         f"{name.replace('_', ' ')} {quantity(one['value'], one['unit'])}"
         for name, one in row["at"].items()
     )
-    if factors and "x" not in row["at"]:  # has no place
+    if factors and "x" not in row["at"]:
         return f"{quantity(factors[0], '1')} times" + (f" at {at}" if at else "")
     if factors:
         typical = row["typical"]["factor"]
@@ -155,9 +155,9 @@ def _gain(report: dict[str, Any]) -> str:
         return ""
     naming = "naming it" if len(report.get("causes", [])) == 1 else "naming them"
     force = report["gain"].get("force") or {}
-    if [cause["effect"] for cause in report["causes"]] == [
-        "young_modulus"
-    ] and force:  # no shape tells of it
+    names = [cause["effect"] for cause in report["causes"]]
+    # The shape does not depend on the modulus, only the force does.
+    if names == ["young_modulus"] and force:
         before, after = (quantity(force[name], "N") for name in ("baseline", "extended"))
         return (
             f"; {naming} brings the error of the force on the test sequences "

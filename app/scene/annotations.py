@@ -20,8 +20,11 @@ from palpate.foundation.errors import RunError
 __all__ = ["Annotations", "Lump", "annotations_of", "path_lines"]
 
 CROSS, TOUCH = 2.5e-3, 7e-4
+"""Size of a landmark's cross and radius of a touch's bead [m]."""
 TICK, TICKS_APART = 2.6e-3, 3.2e-3
+"""Length and spacing of the hatching [m]."""
 AHEAD = (196, 201, 208)
+"""Colour of the tool's path after the current frame."""
 
 
 @dataclass(frozen=True)

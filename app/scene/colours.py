@@ -61,7 +61,7 @@ SIGNED: tuple[Rgb, ...] = (
 BANDS = len(SIGNED)
 
 # "viridis" of matplotlib at the centres of 12 equal steps: perceptually uniform and colour-blind
-# safe, for what has no sign.
+# safe, for quantities without sign.
 SEQUENTIAL: tuple[Rgb, ...] = (
     (71, 16, 99),
     (71, 45, 123),

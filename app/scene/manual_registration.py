@@ -26,11 +26,13 @@ from palpate.registration.picking import pick_cloud, pick_mesh, slide_on_cloud
 __all__ = ["ManualRegistration", "ManualRegistrations"]
 
 MOST_SESSIONS = 32
+"""Number of pages whose registration is stored."""
 APART = 0.03
 """Gap [m] between phantom and cloud side by side."""
 SNAP = 14.0
 """Distance from a click within which a landmark is selected [pixel]."""
 ARROW = 0.022
+"""Half the length of an arrow [m]."""
 log = logging.getLogger(__name__)
 
 

@@ -32,7 +32,9 @@ __all__ = ["FrameOverride", "InteractiveOverride", "Session", "Sessions"]
 
 log = logging.getLogger(__name__)
 MOST_RENDERERS = 6
+"""Number of sequences whose renderers are cached."""
 MOST_SESSIONS = 32
+"""Number of pages whose view is stored."""
 
 
 @dataclass(frozen=True, eq=False)

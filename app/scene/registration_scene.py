@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 __all__ = ["PairScene", "Ray", "ViserPairScene"]
 
 POINT_SIZE = 0.0007
+"""Size of a point of the cloud [m]."""
 BALL, CHOSEN = 0.0011, 0.0016
+"""Radius of a mark, and of the selected one [m]."""
 BLOCK, EDGE, LANDMARK, WEAK = (176, 184, 196), (96, 106, 120), (110, 120, 134), (205, 60, 60)
 
 

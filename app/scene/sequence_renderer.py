@@ -35,9 +35,13 @@ __all__ = ["SequenceRenderer"]
 
 NAMES = {"raw": "Raw model", "extended": "Extended model", "corrected": "Corrected model"}
 MARGIN, APART = 0.008, 0.016
+"""Margin around the block within which points are drawn, and gap between models [m]."""
 MOST_POINTS = 50_000
+"""Points of a cloud that a browser draws."""
 MOST_TRIANGLES = 25_000
+"""Approximate number of triangles of a coloured surface."""
 WIRE = 1.2
+"""Width of grid lines [pixel]."""
 
 
 class SequenceRenderer:

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 __all__ = ["PageScene", "ViserScene"]
 
 POINT_SIZE = 0.00026
+"""Size of a point of the cloud [m]."""
 SHAFT = 0.022
+"""Length of the drawn part of the tool's shaft [m]."""
 PLACES = {
     CloudFigure: "/{}",
     SurfaceFigure: "/mesh/{}",

@@ -14,8 +14,11 @@ __all__ = ["FIELD_OF_VIEW", "Direction", "Viewpoint", "viewpoint_for"]
 
 Direction = Literal["reset", "top", "front", "side"]
 FIELD_OF_VIEW = 0.6
+"""Vertical field of view [rad]."""
 RAISED = np.deg2rad(36.0)
+"""Elevation of the camera above the table [rad]."""
 ROOM = 1.2
+"""Distance of the camera over the one at which the phantom fills the view [1]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,7 +34,7 @@ def networks_for(
         Missing: a named training does not exist, is not finished, or has another dataset or run.
     """
     if not named:
-        models = [("baseline", None)]
+        models: list[tuple[str, str | None]] = [("baseline", None)]
         if run:
             models.append(("extended", run))
         if truth:
