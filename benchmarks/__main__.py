@@ -1,4 +1,4 @@
-"""`python -m benchmarks [NAME ...]` runs all benchmarks, or those named."""
+"""Command line: `python -m benchmarks [NAME ...]` runs all benchmarks, or those named."""
 
 from __future__ import annotations
 
@@ -50,10 +50,11 @@ WIDTH = 140
 
 
 def main(names: list[str]) -> int:
-    """Run benchmarks by name, print their tables; 1 when a result is wrong, 2 when a name is
-    unknown.
+    """Run benchmarks by name and print their tables.
+
+    Returns 0, 1 where a result is wrong, or 2 for an unknown name.
     """
-    console, outcome = Console(width=None if sys.stdout.isatty() else WIDTH), 0
+    console, status = Console(width=None if sys.stdout.isatty() else WIDTH), 0
     unknown = [name for name in names if name not in ALL]
     if unknown:
         console.print(f"no benchmark is called {', '.join(unknown)}; known are {', '.join(ALL)}")
@@ -63,8 +64,8 @@ def main(names: list[str]) -> int:
             console.print(*ALL[name](), sep="\n")
         except RuntimeError as error:
             console.print(f"[bold red]{name}[/]: {error}")
-            outcome = 1
-    return outcome
+            status = 1
+    return status
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
-"""How the error falls and the time grows with the grid, for both elements; also drawn, to
-runs/convergence.png.
+"""Order of convergence: error and time over the grid size, for linear and quadratic elements.
+
+Also plotted, to runs/convergence.png.
 """
 
 from __future__ import annotations
@@ -21,15 +22,20 @@ __all__ = ["run"]
 PICTURE = Path("runs/convergence.png")
 NODES = ((9, 7, 5), (13, 9, 9), (17, 13, 9), (25, 17, 13))
 SPACING = (2.4e-3, 1.6e-3, 1.2e-3, 0.8e-3)
-"""Between nodes at the tool [m], in step with the nodes' number: each grid is the one before it,
-refined."""
+"""Distance of nodes at the tool [m]; each grid is a refinement of the one before."""
 FRAMES = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """One grid: unknowns, spacing [m], errors of displacement and force (2,) at 4 and 8 mm [1], CPU
-    time of a frame [s].
+    """The result of one grid.
+
+    Attributes:
+        unknowns: number of unknowns.
+        spacing: distance of nodes at the tool [m].
+        displacement: (2,) relative errors of the displacement at 4 and 8 mm [1].
+        force: (2,) relative errors of the force at 4 and 8 mm [1].
+        seconds: CPU time of a frame [s].
     """
 
     unknowns: int
@@ -41,7 +47,7 @@ class Point:
 
 def _point(order: int, nodes: tuple[int, int, int], spacing: float) -> Point:
     grid = GridSpec(nodes=nodes, spacing=spacing, order=order)
-    poke_frames(grid)  # warms up: compilation and symbolic factorisation
+    poke_frames(grid)  # warm-up: compilation and symbolic factorisation
     frames, seconds = timed(lambda: poke_frames(grid))
     displacement, force = reference().error(compared(frames))
     x, y, z = nodes
@@ -53,8 +59,9 @@ def _slope(x: list[float], y: list[float]) -> float:
 
 
 def run() -> list[Table]:
-    """Solve the pokes of the reference on finer and finer grids; the finest must be nearer to it
-    than the coarsest.
+    """Solve the reference pokes on refined grids.
+
+    Raises RuntimeError unless the finest grid halves the error of the coarsest.
     """
     table = Table(
         "elements",
@@ -75,9 +82,8 @@ def run() -> list[Table]:
         ]
         series[name] = points
         if not points[-1].displacement[1] < 0.5 * points[0].displacement[1]:
-            raise RuntimeError(
-                f"{name} elements do not converge: {[float(point.displacement[1]) for point in points]}"
-            )
+            errors = [float(point.displacement[1]) for point in points]
+            raise RuntimeError(f"{name} elements do not converge: {errors}")
         for point in points:
             (near, deep), (light, heavy) = point.displacement, point.force
             table.add_row(

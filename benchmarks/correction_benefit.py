@@ -1,8 +1,8 @@
-"""What a correction is worth on the virtual bench: the volume beside the top, fed back or not, and
-learning on the way.
+"""Benefit of correction networks on a virtual experiment.
 
-A block that sags, and is pushed by a ball larger than stated, by another solver on another mesh.
-Errors are the paper's metric.
+Networks over the top layer and over the volume are compared, with and without feedback, and with
+online learning. The block sags and the ball is larger than stated; the data come from another
+solver on another mesh. Errors are in the paper's metric.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def _trained(folder: Path, samples: Samples, kind: str, hold: float) -> TrainedN
 
 @torch.no_grad()
 def _kinds(samples: Samples, networks: dict[tuple[str, float], TrainedNetwork]) -> Table:
-    """Of the top alone and of all that was measured, and how far what is hidden was moved."""
+    """Return errors on the top and on all points, and the correction of hidden points."""
     table = Table(
         "network",
         "hold, 1/mm",
@@ -89,23 +89,23 @@ def _kinds(samples: Samples, networks: dict[tuple[str, float], TrainedNetwork]) 
     batch, hidden = samples.batch(rows), samples.seen == 0
     losses = (SurfaceLoss(top, samples.seen[top.index]), SurfaceLoss(samples.body, samples.seen))
 
-    def told(vertices: torch.Tensor) -> list[str]:
-        found = []
+    def cells(vertices: torch.Tensor) -> list[str]:
+        means = []
         for loss, index in zip(losses, (top.index, samples.body.index), strict=True):
             apart, valid = loss.distances(vertices[:, index], batch)
-            found.append(f"{float(apart[valid].mean()) * 1e3:.3f}")
+            means.append(f"{float(apart[valid].mean()) * 1e3:.3f}")
         return [
-            *found,
+            *means,
             f"{float((vertices - batch.positions)[:, hidden].norm(dim=2).mean()) * 1e3:.3f}",
         ]
 
-    table.add_row("none", "", *told(batch.positions))
+    table.add_row("none", "", *cells(batch.positions))
     for (kind, hold), trained in networks.items():
         vertices = batch.positions.clone()
         vertices[:, trained.body.index] = trained.network(
             batch.positions[:, trained.body.index], batch.tool
         )
-        table.add_row(kind, f"{hold:g}", *told(vertices))
+        table.add_row(kind, f"{hold:g}", *cells(vertices))
     return table
 
 
@@ -133,7 +133,8 @@ def _feedbacks(
             )
             if not moved < 5e-5:
                 raise RuntimeError(
-                    f"{kind}, {feedback}: an equilibrium hangs on where it was solved from, by {moved * 1e3:.2g} mm"
+                    f"{kind}, {feedback}: an equilibrium depends on where its solution starts, "
+                    f"by {moved * 1e3:.2g} mm"
                 )
             error = np.mean(_errors(recorder, samples, frames)) * 1e3
             steps = sum(frame.raw.iterations for frame in frames)
@@ -164,17 +165,17 @@ def _replayed(recorder: Recorder, corrector: Corrector) -> tuple[np.ndarray, lis
 
 def _errors(recorder: Recorder, samples: Samples, frames: list[CorrectedFrame]) -> list[float]:
     surface, rows = Surface.of(recorder.setup), samples.rows([TESTED])
-    batch, found = samples.batch(rows), []
+    batch, errors = samples.batch(rows), []
     for row, frame in enumerate(samples.column("frame", rows)):
         points = batch.points[row, : int(batch.count[row, 1])].numpy().astype(float)
-        found.append(paper_distance(points, frames[int(frame)].corrected, surface))
-    return found
+        errors.append(paper_distance(points, frames[int(frame)].corrected, surface))
+    return errors
 
 
 def _online(
     samples: Samples, other: Samples, networks: dict[tuple[str, float], TrainedNetwork]
 ) -> Table:
-    """Frames of the material that was trained on, then of one four times as stiff."""
+    """Return errors on frames of the trained material, then of one four times as stiff."""
     first, second = len(samples.rows([TESTED])), (TESTED,)
     table = Table(
         "network",
@@ -201,23 +202,23 @@ def _online(
 
 
 def run() -> list[Table]:
-    """RuntimeError where a network is no better than none."""
+    """Train and compare the networks; RuntimeError where one does not reduce the error."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         recorder, samples = _samples(folder / "soft", WEIGHT, SEQUENCES)
         _, other = _samples(folder / "stiff", LIGHTER, (TESTED,))
-        asked = [("unet2d", 0.1), *(("unet3d", hold) for hold in HOLDS), ("graph", 0.1)]
-        networks = {(kind, hold): _trained(folder, samples, kind, hold) for kind, hold in asked}
+        kinds = [("unet2d", 0.1), *(("unet3d", hold) for hold in HOLDS), ("graph", 0.1)]
+        networks = {(kind, hold): _trained(folder, samples, kind, hold) for kind, hold in kinds}
         for (kind, _), trained in networks.items():
             loss = SurfaceLoss(trained.body, samples.seen[trained.body.index])
-            raw, found = (
+            raw, corrected = (
                 float(
                     sample_errors(net, loss, trained.body, samples, samples.rows([TESTED])).mean()
                 )
                 for net in (None, trained.network)
             )
-            if not found < raw:
-                raise RuntimeError(f"{kind}: {found:.3f} mm with the network, {raw:.3f} mm without")
+            if not corrected < raw:
+                raise RuntimeError(f"{kind}: {corrected:.3f} mm with, {raw:.3f} mm without")
         usual = {key: networks[key] for key in (("unet2d", 0.1), ("unet3d", 0.1))}
         held = {key: networks[key] for key in (("unet2d", 0.1), ("unet3d", 0.1), ("graph", 0.1))}
         return [

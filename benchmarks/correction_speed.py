@@ -1,9 +1,9 @@
-"""Training samples per second and milliseconds per corrected frame, beside the same networks and
-loss in plain torch.
+"""Speed of correction networks: training samples per second and milliseconds per frame.
 
-The plain network is made of `nn.Conv2d` and `nn.Conv3d` with the very same weights, the plain loss
-takes all distances between points and vertices and lets autograd find its way back through the
-smallest. Both must agree before any time is told.
+They are compared with the same networks and loss in plain torch. The plain network consists of
+`nn.Conv2d` or `nn.Conv3d` with the same weights. The plain loss computes all distances between
+points and vertices and differentiates through the smallest. Both must agree before times are
+reported.
 """
 
 from __future__ import annotations
@@ -29,13 +29,14 @@ __all__ = ["plain_loss", "plain_network", "run", "samples_of"]
 SIZE, NODES = (0.0687, 0.0393, 0.0358), (13, 5, 5)
 BATCH, POINTS, STEPS, FRAMES, CORES = 64, 1024, 4, 30, 2
 _AGREE = 2e-3
-"""Relative, between gradients in single precision; where two vertices are equally near either may
-be taken."""
+"""Largest relative difference of gradients in single precision [1]; of two equally near vertices
+either may be taken."""
 
 
 def samples_of(body: Body, count: int, points: int = POINTS, seed: int = 0) -> Batch:
-    """Dented shapes and noisy points on a surface a millimetre lower, nothing of which was
-    simulated.
+    """Return a batch of dented shapes, and noisy points on a surface that is 1 mm lower.
+
+    The shapes are made up, not simulated.
     """
     rng = np.random.default_rng(seed)
     places = np.column_stack(
@@ -59,7 +60,7 @@ def samples_of(body: Body, count: int, points: int = POINTS, seed: int = 0) -> B
 
 
 class _Plain(nn.Module):
-    """A U-Net as it is commonly written, with the weights of another."""
+    """A U-Net of standard torch layers with the weights of another network."""
 
     def __init__(self, network: CorrectionNetwork) -> None:
         super().__init__()
@@ -105,7 +106,7 @@ class _Plain(nn.Module):
 
 
 def plain_network(network: CorrectionNetwork) -> Callable[[Tensor, Tensor], Tensor]:
-    """The same function of vertices and tool, by `_Plain`."""
+    """Return the same function of vertices and tool, computed by `_Plain`."""
     plain = _Plain(network)
 
     def corrected(vertices: Tensor, tool: Tensor) -> Tensor:
@@ -119,7 +120,7 @@ def plain_network(network: CorrectionNetwork) -> Callable[[Tensor, Tensor], Tens
 
 
 def plain_loss(loss: SurfaceLoss, vertices: Tensor, batch: Batch) -> Tensor:
-    """One-directional Chamfer distance [mm] by all distances."""
+    """Return the one-directional Chamfer distance [mm] by all distances."""
     return torch.cdist(batch.points, loss.surface(vertices)).amin(dim=2).mean() * 1e3
 
 
@@ -148,13 +149,14 @@ def _row(kind: str) -> tuple[str, ...]:
     apart = float((here - there).norm() / there.norm())
     if not apart < _AGREE:
         raise RuntimeError(
-            f"{kind}: gradients of both implementations differ by {apart:.2g}, under {_AGREE:g} is wanted"
+            f"{kind}: gradients of both implementations differ by {apart:.2g}; "
+            f"expected less than {_AGREE:g}"
         )
     fused, slow = (
-        torch.optim.Adam(network.parameters(), 1e-6, fused=kept) for kept in (True, None)
+        torch.optim.Adam(network.parameters(), 1e-6, fused=setting) for setting in (True, None)
     )
     fast = _rate(fused, lambda: ours().total)
-    # Neighbours of the surface as it is: the tree does not know whether it was corrected.
+    # The time of the search does not depend on the correction.
     searched = (
         min(timed(lambda: loss.distances(raw, batch))[1] for _ in range(STEPS)) * fast / BATCH
     )
@@ -170,9 +172,7 @@ def _row(kind: str) -> tuple[str, ...]:
 
 
 def _rate(optimizer: torch.optim.Optimizer, total: Callable[[], Tensor]) -> float:
-    """Samples per CPU second, the fastest of several steps: other work on the machine only ever
-    takes time.
-    """
+    """Return samples per CPU second of the fastest of several steps."""
 
     def step() -> None:
         optimizer.zero_grad(set_to_none=True)
@@ -186,22 +186,25 @@ def _rate(optimizer: torch.optim.Optimizer, total: Callable[[], Tensor]) -> floa
 def _frame(
     network: CorrectionNetwork, plain: Callable[[Tensor, Tensor], Tensor], batch: Batch, kind: str
 ) -> tuple[str, ...]:
-    """Milliseconds of one frame: by all cores (median, wall), and by one in bfloat16 if there is
-    any, single precision, plain.
+    """Return the time of one frame [ms].
+
+    On all cores (median, wall time), and on one core (CPU time) in bfloat16 if the CPU has it, in
+    single precision, and in plain torch.
     """
     vertices, tool = batch.positions[:1], batch.tool[:1]
     with torch.inference_mode():
-        wanted = plain(vertices, tool)[0]
-        found = UNetInference(network, half=False)(vertices[0], tool[0])
-        apart = float((found - wanted).abs().max())
+        expected = plain(vertices, tool)[0]
+        result = UNetInference(network, half=False)(vertices[0], tool[0])
+        apart = float((result - expected).abs().max())
         if not apart < 1e-7:
             raise RuntimeError(
-                f"{kind}: the compact network is {apart * 1e3:.2g} mm off, under 1e-4 mm is wanted"
+                f"{kind}: the fast inference differs by {apart * 1e3:.2g} mm; "
+                "expected less than 1e-4 mm"
             )
         kinds: list[Callable[[], object]] = [lambda: plain(vertices, tool)]
         for half in (False, True):
-            compact = UNetInference(network, half=half)
-            kinds.append(lambda compact=compact: compact(vertices[0], tool[0]))  # type: ignore[misc]
+            fast = UNetInference(network, half=half)
+            kinds.append(lambda fast=fast: fast(vertices[0], tool[0]))  # type: ignore[misc]
         times = [min(timed(work)[1] for _ in range(FRAMES)) * 1e3 for work in kinds]
         fastest = UNetInference(network)
         with _threads(CORES):
@@ -235,8 +238,8 @@ def _threads(count: int) -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def _on_card() -> list[Table]:
-    """The same step on CUDA beside the processor's gradient; nothing where there is no card."""
+def _on_cuda() -> list[Table]:
+    """Return a table of the same step on CUDA; none without a CUDA device."""
     if not torch.cuda.is_available():
         return []
     table = Table(
@@ -249,11 +252,11 @@ def _on_card() -> list[Table]:
     )
     for kind in ("unet2d", "unet3d"):
         for count in (BATCH, 8 * BATCH):
-            table.add_row(*_card_row(kind, count))
+            table.add_row(*_cuda_row(kind, count))
     return [table]
 
 
-def _card_row(kind: str, count: int) -> tuple[str, ...]:
+def _cuda_row(kind: str, count: int) -> tuple[str, ...]:
     body = Body.top(SIZE, NODES) if kind == "unet2d" else Body.block(SIZE, NODES)
     batch, gradients = samples_of(body, count), []
     for place in ("cpu", "cuda"):
@@ -275,7 +278,8 @@ def _card_row(kind: str, count: int) -> tuple[str, ...]:
     apart = float((gradients[1] - gradients[0]).norm() / gradients[0].norm())
     if not apart < _AGREE:
         raise RuntimeError(
-            f"{kind}: gradients of card and processor differ by {apart:.2g}, under {_AGREE:g} is wanted"
+            f"{kind}: gradients of CUDA and CPU differ by {apart:.2g}; "
+            f"expected less than {_AGREE:g}"
         )
     optimizer, rates = torch.optim.Adam(network.parameters(), 1e-6, fused=True), []
     for mixed in (False, True):
@@ -285,7 +289,7 @@ def _card_row(kind: str, count: int) -> tuple[str, ...]:
                 corrected = network(here.positions, here.tool)
             return loss(corrected.float(), here, here.positions).total
 
-        rates.append(_card_rate(optimizer, total, count))
+        rates.append(_cuda_rate(optimizer, total, count))
     return (kind, str(count), f"{apart:.1e}", *(f"{rate:.0f}" for rate in rates))
 
 
@@ -293,8 +297,8 @@ def _drawn() -> torch.Generator:
     return torch.Generator().manual_seed(0)
 
 
-def _card_rate(optimizer: torch.optim.Optimizer, total: Callable[[], Tensor], count: int) -> float:
-    """Samples per second on the wall: the work has ended when the card says so."""
+def _cuda_rate(optimizer: torch.optim.Optimizer, total: Callable[[], Tensor], count: int) -> float:
+    """Return samples per second of wall time, with the device synchronised."""
     for steps in (STEPS, 5 * STEPS):
         torch.cuda.synchronize()
         began = time.perf_counter()
@@ -307,7 +311,7 @@ def _card_rate(optimizer: torch.optim.Optimizer, total: Callable[[], Tensor], co
 
 
 def run() -> list[Table]:
-    """One thread, and frames on two as well; RuntimeError where a result is wrong."""
+    """Measure on one thread, and frames on two; RuntimeError where a result is wrong."""
     with _threads(1):
         table = Table(
             "network",
@@ -319,8 +323,8 @@ def run() -> list[Table]:
             "ms a frame, bfloat16",
             "ms a frame",
             "plain",
-            title=f"correction, {'x'.join(map(str, NODES))}, {POINTS} points, one thread, CPU seconds",
+            title=f"correction, {'x'.join(map(str, NODES))}, {POINTS} points, one thread, CPU time",
         )
         for kind in ("unet2d", "unet3d"):
             table.add_row(*_row(kind))
-        return [table, *_on_card()]
+        return [table, *_on_cuda()]

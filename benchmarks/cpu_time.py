@@ -1,6 +1,4 @@
-"""CPU seconds of this process, which other work on the machine disturbs less than the clock on the
-wall.
-"""
+"""Measurement of CPU time, which other work on the machine disturbs less than wall time."""
 
 from __future__ import annotations
 
@@ -14,7 +12,7 @@ Result = TypeVar("Result")
 
 
 def timed(work: Callable[[], Result]) -> tuple[Result, float]:
-    """What the work returns, and the CPU seconds it took."""
+    """Run a function; return its result and its CPU time [s]."""
     begin = time.process_time()
     result = work()
     return result, time.process_time() - begin

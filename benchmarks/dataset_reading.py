@@ -1,4 +1,4 @@
-"""Reading a recording of many large clouds, one at a time."""
+"""Time and memory of reading a recording of many large clouds, one at a time."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def _ply(points: np.ndarray) -> bytes:
 
 
 def write_recording(folder: Path, clouds: int, points: int) -> Path:
-    """Write a dataset with one sequence of random clouds; returns the folder."""
+    """Write a dataset with one sequence of random clouds; return its folder."""
     rng = np.random.default_rng(0)
     home = folder / "sequences" / "long"
     (home / "clouds").mkdir(parents=True)
@@ -78,7 +78,7 @@ def write_recording(folder: Path, clouds: int, points: int) -> Path:
 
 
 def run() -> list[Table]:
-    """Open the recording, read every cloud, check what came, and tabulate times and memory."""
+    """Open the recording and read every cloud; RuntimeError where points or memory are wrong."""
     with tempfile.TemporaryDirectory() as folder:
         path = write_recording(Path(folder) / "recording", CLOUDS, POINTS)
         dataset, opening = timed(lambda: open_dataset(path))
@@ -90,11 +90,12 @@ def run() -> list[Table]:
         grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
     if counts != [POINTS] * CLOUDS:
         raise RuntimeError(
-            f"{CLOUDS} clouds of {POINTS} points were written, {len(counts)} of {set(counts)} points were read"
+            f"{CLOUDS} clouds of {POINTS} points were written, "
+            f"{len(counts)} of {set(counts)} points were read"
         )
     if grown > 200:
         raise RuntimeError(
-            f"reading cloud by cloud took {grown:.0f} MB more memory: clouds are kept"
+            f"reading cloud by cloud took {grown:.0f} MB more memory: clouds are not released"
         )
     table = Table("step", "amount", "time", title=f"Dataset of {CLOUDS} clouds of {POINTS} points")
     table.add_row("open and validate", f"{CLOUDS} headers", f"{opening * 1e3:.0f} ms")

@@ -1,14 +1,16 @@
-"""How much each effect moves the visible surface at one 8 mm poke into the middle of the top,
-beside figures measured earlier.
+"""Change of the visible surface by each effect, at an 8 mm poke into the middle of the top.
 
-The reference figures come from another engine on the same block (quadratic hexahedra, E 5 kPa, nu
-0.44). What they took for the visible surface was found by trying: the height of the top at fixed
-places, as a camera sees it, from 6 mm off the tool's axis on. So read, the undisturbed fields agree
-within 3 %, seven effects within 0.02 mm. Where they can differ: "the base slides" meant a base free
-to spread, while `base_slip` moves the block as a whole, and only when it is pushed sideways; the
-lump's place aside is not stated; what changes close to the tool (its radius, its place) hangs on
-where the visible surface begins. Friction under the tool was regularised there and moves a third of
-what stick and slip do; CalculiX has the force found here within 1 %.
+The reference figures are from an independent engine on the same block (quadratic hexahedra, E
+5 kPa, nu 0.44). Its definition of the visible surface is not stated. With the height of the top at
+fixed places, from 6 mm off the tool's axis on, the undisturbed fields agree within 3 % and seven
+effects within 0.02 mm. Known differences:
+
+- the base is free to spread there, while `base_slip` moves the block as a whole, and only when it
+  is pushed sideways;
+- the lateral position of the lump is not stated;
+- changes close to the tool depend on where the visible surface begins;
+- the regularised friction there moves a third of what stick and slip do (CalculiX agrees with the
+  force found here within 1 %).
 """
 
 from __future__ import annotations
@@ -38,15 +40,21 @@ __all__ = ["run"]
 DEPTH = 8e-3
 GRID = GridSpec(nodes=(17, 13, 9), spacing=1.2e-3, order=2)
 UNDISTURBED, WITHIN = 0.76e-3, 0.1
-"""RMS displacement of the visible surface [m], and how near to it this engine must come [1]."""
-HIDDEN, RIM = 6e-3, 1e-3
-"""Around the tool's axis, and at the top's edge [m], nothing is compared."""
+"""RMS displacement of the visible surface [m], and the allowed relative difference [1]."""
+AROUND_TOOL, RIM = 6e-3, 1e-3
+"""Radius around the tool's axis, and width of the rim, that are not compared [m]."""
 STATED = replace(SETUP, material=replace(SETUP.material, poisson_ratio=0.44))
 
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One effect, and the RMS and largest change [mm] that the other engine found."""
+    """One effect.
+
+    Attributes:
+        name: name for readers.
+        setup: the setup with the effect.
+        reference: RMS and largest change by the other engine [mm].
+    """
 
     name: str
     setup: Setup
@@ -95,8 +103,9 @@ ROWS = (
 
 
 def _heights(setup: Setup, points: FloatArray) -> FloatArray:
-    """Height (m,) [m] of the surface over places (m, 3) of the top at the poke's end, led there in
-    steps of 1 mm.
+    """Return the height (m,) [m] of the surface over places (m, 3) of the top, after the poke.
+
+    The poke is replayed in steps of 1 mm.
     """
     top = setup.geometry.size[2] + SETUP.tool.radius
     frames = replay(
@@ -110,16 +119,14 @@ def _heights(setup: Setup, points: FloatArray) -> FloatArray:
 
 
 def _top() -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Places (m, 3) [m] spread evenly over the top, and which (m,) of them are compared: clear of
-    the tool and of the rim.
-    """
+    """Return places (m, 3) [m] on a grid over the top, and which (m,) of them are compared."""
     x, y, z = STATED.geometry.size
     across = np.meshgrid(
         np.linspace(-x / 2, x / 2, 139), np.linspace(-y / 2, y / 2, 81), indexing="ij"
     )
     points = np.stack([across[0].ravel(), across[1].ravel(), np.full(across[0].size, z)], axis=1)
     inside = (np.abs(points[:, 0]) < x / 2 - RIM) & (np.abs(points[:, 1]) < y / 2 - RIM)
-    return points, inside & (np.hypot(points[:, 0], points[:, 1]) > HIDDEN)
+    return points, inside & (np.hypot(points[:, 0], points[:, 1]) > AROUND_TOOL)
 
 
 def _rms(change: FloatArray) -> float:
@@ -127,7 +134,7 @@ def _rms(change: FloatArray) -> float:
 
 
 def run() -> list[Table]:
-    """Replay the poke with each effect, and tabulate what it changes."""
+    """Replay the poke with each effect; RuntimeError where the undisturbed field is wrong."""
     points, seen = _top()
     plain, seconds = timed(lambda: _heights(STATED, points)[seen])
     size = _rms(plain - STATED.geometry.size[2])
@@ -135,7 +142,10 @@ def run() -> list[Table]:
         raise RuntimeError(
             f"the undisturbed field is {1e3 * size:.3f} mm RMS, not {1e3 * UNDISTURBED:.2f} mm"
         )
-    title = f"Change of the visible surface at an 8 mm poke; the undisturbed field: {1e3 * size:.2f} mm RMS, other engine 0.76"
+    title = (
+        "Change of the visible surface at an 8 mm poke; the undisturbed field: "
+        f"{1e3 * size:.2f} mm RMS, other engine 0.76"
+    )
     table = Table(
         "effect", "RMS, mm", "other engine", "largest, mm", "other engine", "CPU s", title=title
     )

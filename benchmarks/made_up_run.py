@@ -1,6 +1,4 @@
-"""A dataset of large clouds and a run over it, as a server would show them; made up, for nothing is
-solved to make it.
-"""
+"""A made-up dataset of large clouds with a run, for a server to show; nothing is solved."""
 
 from __future__ import annotations
 
@@ -12,12 +10,12 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.box_mesh import GridSpec, box_mesh
 
-__all__ = ["CAMERA", "RUN", "SEQUENCE", "cloud", "write_place"]
+__all__ = ["CAMERA", "RUN", "SEQUENCE", "cloud", "write_run"]
 
 RUN, SEQUENCE = "large-1", "poke-top-01"
 SIZE = (0.0687, 0.0393, 0.0358)
 CAMERA = np.array([[1.0, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 0.3], [0, 0, 0, 1]])
-"""phantom_from_camera: from above."""
+"""phantom_from_camera of a camera above the block, looking down."""
 RADIUS = 5e-3
 CORNERS = {
     f"corner_{number}": (x * SIZE[0] / 2, y * SIZE[1] / 2, SIZE[2])
@@ -48,9 +46,7 @@ test = []
 
 
 def cloud(frame: int, points: int) -> FloatArray:
-    """Points (n, 3) [m], camera frame, that differ from frame to frame: the top of the block, and
-    the table around it.
-    """
+    """Return points (n, 3) [m] of top and table, camera frame, which differ between frames."""
     rng = np.random.default_rng(frame)
     x, y = rng.uniform(-0.06, 0.06, (2, points))
     on = (np.abs(x) < SIZE[0] / 2) & (np.abs(y) < SIZE[1] / 2)
@@ -58,9 +54,14 @@ def cloud(frame: int, points: int) -> FloatArray:
     return np.asarray(np.column_stack([x, y, z]), dtype=np.float32)
 
 
-def write_place(folder: Path, frames: int, points: int, nodes: tuple[int, int, int]) -> None:
-    """Write `folder`/datasets/large and `folder`/runs/large-1: so many frames, points in each
-    cloud, and nodes of the mesh.
+def write_run(folder: Path, frames: int, points: int, nodes: tuple[int, int, int]) -> None:
+    """Write the dataset `folder`/datasets/large and the run `folder`/runs/large-1.
+
+    Args:
+        folder: folder of datasets and runs.
+        frames: number of frames.
+        points: number of points of a cloud.
+        nodes: nodes of the mesh along x, y, z.
     """
     data, run = folder / "datasets" / "large", folder / "runs" / RUN
     sequence = data / "sequences" / SEQUENCE

@@ -1,8 +1,7 @@
-"""What a mesh's grading is worth where the tool may be, not only amid the top: seven pushes, each
-on every way to spend the nodes.
+"""Accuracy of mesh gradings for pushes at seven places, not only in the middle of the top.
 
-`python -m benchmarks.mesh_grading` solves them once more on a grid of 10 353 nodes, far finer than
-those compared, and stores that.
+`python -m benchmarks.mesh_grading` makes the reference anew, on a grid of 10 353 nodes, and stores
+it.
 """
 
 from __future__ import annotations
@@ -27,11 +26,10 @@ __all__ = ["run"]
 
 FINEST = GridSpec(nodes=(29, 21, 17), spacing=0.7e-3, order=2)
 TARGET = (0.06, 0.06)
-"""That the mesh of `palpate replay` may be off at half the way and at its end, the worst place
-counted [1]."""
+"""Largest errors of the mesh of `palpate replay` at any place, half way and at the end [1]."""
 HEAVY = replace(SETUP, load=Load(specific_weight_over_stiffness=1.8))
 SMOOTH, MOST_SAG = GridSpec(nodes=(33, 21, 19), spacing=1.5e-3, order=2), 30e-6
-"""A mesh that knows the sag to a few um, and by how much that of a replay may be off [m]."""
+"""A mesh with the sag to a few um, and the largest error of the sag on a replay's mesh [m]."""
 _FILE = Path(__file__).with_name("mesh_grading.npz")
 GRIDS: dict[str, Meshing] = {
     "graded by size": REPLAY_GRID,
@@ -46,15 +44,18 @@ GRIDS: dict[str, Meshing] = {
 
 @dataclass(frozen=True, eq=False)
 class Pushes:
-    """Displacement (7, 2, m, 3) [m] over the free surface half way and at the end of each push, and
-    force (7, 2, 3) [N].
+    """The solution of all pushes, half way and at the end of each.
+
+    Attributes:
+        displacement: (7, 2, m, 3) displacement over the free surface [m].
+        force: (7, 2, 3) force [N].
     """
 
     displacement: FloatArray
     force: FloatArray
 
-    def off(self, truth: Pushes) -> tuple[FloatArray, FloatArray]:
-        """Relative errors (7, 2) of displacement and of force."""
+    def errors(self, truth: Pushes) -> tuple[FloatArray, FloatArray]:
+        """Return relative errors (7, 2) of displacement and of force."""
         miss = np.linalg.norm(self.displacement - truth.displacement, axis=(2, 3))
         force = np.linalg.norm(self.force - truth.force, axis=2)
         return miss / np.linalg.norm(truth.displacement, axis=(2, 3)), force / np.linalg.norm(
@@ -62,9 +63,10 @@ class Pushes:
         )
 
 
-def _ways() -> list[FloatArray]:
-    """Tool centres (f, 3) [m]: four places on the top to 8 mm, two on the sides to 6 mm, and a
-    slanted push to 6 mm.
+def _tool_paths() -> list[FloatArray]:
+    """Return the tool centres (f, 3) [m] of each push.
+
+    Four go into the top by 8 mm, two into the sides by 6 mm, and one is slanted, 6 mm long.
     """
     x, y, z = SETUP.box.size
     radius, deep, aside = (
@@ -81,7 +83,7 @@ def _ways() -> list[FloatArray]:
 
 def _pushed(grid: Meshing) -> Pushes:
     points, displacement, force = SETUP.geometry.surface_points(), [], []
-    for way in _ways():
+    for way in _tool_paths():
         frames = replay(SETUP, way, grid, tolerance=1e-4)
         require_converged(frames)
         keys = [frames[len(frames) // 2 - 1], frames[-1]]
@@ -96,8 +98,13 @@ def _truth() -> Pushes:
 
 
 @dataclass(frozen=True)
-class _Still:
-    """A grid whose mesh stays where it was made for a tool at `place` (3,) [m]."""
+class _FixedRefinement:
+    """A mesh protocol whose mesh is refined at a fixed place, wherever the tool is.
+
+    Attributes:
+        grid: the mesh protocol.
+        place: (3,) place of the tool that the mesh is made for [m].
+    """
 
     grid: Meshing
     place: FloatArray
@@ -105,13 +112,14 @@ class _Still:
     def mesh(self, setup: Setup, centre: FloatArray) -> Mesh:
         return self.grid.mesh(setup, self.place)
 
-    def finer(self) -> _Still:
+    def finer(self) -> _FixedRefinement:
         return replace(self, grid=self.grid.finer())
 
 
 def _sags() -> Table:
-    """How far the sag of a heavy block is off, and how much it hangs on where the mesh is fine."""
-    title = f"Sag under {HEAVY.load.specific_weight_over_stiffness:g} /m, RMS; the mesh is fine at each of those places in turn"
+    """Return the error of a heavy block's sag, and its change with the place of refinement."""
+    weight = HEAVY.load.specific_weight_over_stiffness
+    title = f"Sag under {weight:g} /m, RMS; the mesh is refined at each of the places in turn"
     table = Table("mesh", "off by at most, um", "meshes apart by, um", title=title)
     points = HEAVY.geometry.surface_points()
     truth = rest(HEAVY, SMOOTH).move(points)
@@ -119,13 +127,14 @@ def _sags() -> Table:
         "graded by size, without a longest edge": replace(REPLAY_GRID, longest=1.0),
         **GRIDS,
     }.items():
-        sags = [rest(HEAVY, _Still(grid, way[-1])).move(points) for way in _ways()]
+        sags = [rest(HEAVY, _FixedRefinement(grid, way[-1])).move(points) for way in _tool_paths()]
         off = max(_rms(sag - truth) for sag in sags)
         apart = max(_rms(one - other) for one in sags for other in sags)
         table.add_row(name, f"{1e6 * off:.0f}", f"{1e6 * apart:.0f}")
         if grid is REPLAY_GRID and max(off, apart) > MOST_SAG:
             raise RuntimeError(
-                f"the sag of a replay's mesh is {1e6 * off:.0f} um off and hangs by {1e6 * apart:.0f} um on its place"
+                f"the sag on a replay's mesh has an error of {1e6 * off:.0f} um and changes by "
+                f"{1e6 * apart:.0f} um with the place of refinement"
             )
     table.caption = f"the sag itself: {1e3 * _rms(truth - points):.2f} mm"
     return table
@@ -136,8 +145,9 @@ def _rms(vectors: FloatArray) -> float:
 
 
 def run() -> list[Table]:
-    """Errors and time of each way; the mesh of `palpate replay` must keep what is promised of it at
-    every place.
+    """Measure errors and time of each mesh.
+
+    Raises RuntimeError where the mesh of `palpate replay` misses its target at any place.
     """
     title = "Seven pushes (top, sides, slanted), error over the free surface half way / at the end"
     table = Table(
@@ -150,12 +160,12 @@ def run() -> list[Table]:
         "ms a frame",
         title=title,
     )
-    truth, count = _truth(), sum(len(way) for way in _ways())
+    truth, count = _truth(), sum(len(way) for way in _tool_paths())
     for name, grid in GRIDS.items():
-        _pushed(grid)  # warms up
-        found, seconds = timed(partial(_pushed, grid))
-        displacement, force = found.off(truth)
-        nodes = len(grid.mesh(SETUP, _ways()[0][-1]).nodes)
+        _pushed(grid)  # warm-up
+        solution, seconds = timed(partial(_pushed, grid))
+        displacement, force = solution.errors(truth)
+        nodes = len(grid.mesh(SETUP, _tool_paths()[0][-1]).nodes)
         both = [
             f"{a:.1%} / {b:.1%}"
             for error in (displacement, force)
@@ -163,7 +173,7 @@ def run() -> list[Table]:
         ]
         table.add_row(name, str(nodes), *both, f"{1e3 * seconds / count:.0f}")
         if grid is REPLAY_GRID and (displacement.max(axis=0) > TARGET).any():
-            raise RuntimeError(f"the mesh of a replay is off by {both[0]}")
+            raise RuntimeError(f"the mesh of a replay has errors of {both[0]}")
     return [table, _sags()]
 
 

@@ -1,6 +1,4 @@
-"""A Newton step's two dear parts: the stiffness of a diagnosis' mesh under the tool, and its
-factor.
-"""
+"""Time of the two expensive parts of a Newton step: the stiffness matrix and its factorisation."""
 
 from __future__ import annotations
 
@@ -26,16 +24,13 @@ __all__ = ["run"]
 
 ROUNDS, DEPTHS = 10, (1.5e-3, 3e-3, 4.5e-3)
 STEP = 1e-8
-"""Of the nodes [m], for the differences of forces that the tangent is compared with."""
+"""Step of the nodes [m] for the finite differences that check the tangent."""
 OFF, DIGITS = 1e-5, {True: 1e-4, False: 1e-10}
-"""Largest error of the tangent, and of a solution by a factor of single or double precision, as
-shares."""
+"""Largest relative error of the tangent, and of a solution in single (True) or double precision."""
 
 
 def _pressed() -> tuple[BlockModel, FloatArray, sp.csr_matrix, FloatArray]:
-    """The block under a push: its model, the nodes' positions (n, 3) [m], tangent there, and a load
-    (u,).
-    """
+    """Return model, node positions (n, 3) [m], tangent and a load (u,) of the pushed block."""
     top = SETUP.geometry.height + SETUP.tool.radius
     frame = replay(SETUP, np.array([[0.0, 0.0, top - depth] for depth in DEPTHS]), REPLAY_GRID)[-1]
     model, positions = BlockModel(SETUP, frame.mesh), frame.mesh.nodes + frame.displacement
@@ -43,42 +38,40 @@ def _pressed() -> tuple[BlockModel, FloatArray, sp.csr_matrix, FloatArray]:
     upper = sp.csr_matrix((state.data, pattern.indices, pattern.indptr), shape=pattern.shape)
     along = np.random.default_rng(0).standard_normal(pattern.shape[0])
     ways = [_moved(model, positions, sign * STEP * along) for sign in (1, -1)]
-    ahead, behind = (
-        model.assemble(way, local_tool(frame), tangent=False).residual for way in ways
-    )
+    ahead, behind = (model.assemble(way, local_tool(frame), tangent=False).residual for way in ways)
     expected, diagonal = (ahead - behind) / (2 * STEP), sp.diags_array(upper.diagonal())
     wrong = float(
         np.linalg.norm((upper + upper.T - diagonal) @ along - expected) / np.linalg.norm(expected)
     )
     if wrong > OFF:
         raise RuntimeError(
-            f"the tangent is {wrong:.1g} off the differences of forces, at most {OFF:g} is allowed"
+            f"the tangent differs from differences of forces by {wrong:.1g}; expected {OFF:g}"
         )
     return model, positions, upper, expected
 
 
 def _moved(model: BlockModel, positions: FloatArray, step: FloatArray) -> FloatArray:
-    found = positions.copy()
-    found[model.topology.free] += step
-    return found
+    moved = positions.copy()
+    moved[model.topology.free] += step
+    return moved
 
 
 def _each(work: Callable[[], object]) -> float:
-    """CPU milliseconds of one round."""
+    """Return the CPU time of one call [ms]."""
     work()
     return 1e3 * timed(lambda: [work() for _ in range(ROUNDS)])[1] / ROUNDS
 
 
 def _anew(factor: Factor, scale: Iterator[int], entries: FloatArray) -> None:
-    """Factorise, each time other entries: those that there is a factor of would not be again."""
+    """Factorise scaled entries: the factor of equal entries would be reused."""
     factor.factorise(next(scale) * entries)
 
 
 def run() -> list[Table]:
-    """Check tangent and factors, and tabulate the time of each."""
+    """Measure assembly and factorisations; RuntimeError where one is wrong."""
     model, positions, upper, right = _pressed()
     size = f"{upper.shape[0]} unknowns, {len(model.topology.elements)} elements of 27 nodes"
-    table = Table("part", "ms", "wrong by", title=f"A Newton step of {size}, one thread")
+    table = Table("part", "ms", "error", title=f"A Newton step of {size}, one thread")
     table.add_row(
         "stiffness of the elements", f"{_each(lambda: model.assemble(positions, None)):.1f}", ""
     )
@@ -97,14 +90,15 @@ def run() -> list[Table]:
                 single=single,
             )
             factor.factorise(entries)
-            found = factor.approximate(right)
-            wrong = float(np.linalg.norm(found - factor.solve(right)) / np.linalg.norm(found))
+            step = factor.approximate(right)
+            wrong = float(np.linalg.norm(step - factor.solve(right)) / np.linalg.norm(step))
             left = float(
                 np.linalg.norm(whole @ factor.solve(right) - right) / np.linalg.norm(right)
             )
             if wrong > DIGITS[single] or left > DIGITS[False]:
                 raise RuntimeError(
-                    f"{name}: a step is {wrong:.1g} off, and a solution leaves {left:.1g} of the load"
+                    f"{name}: the error of a step is {wrong:.1g}, and a solution leaves "
+                    f"{left:.1g} of the load"
                 )
             kind = f"{name}, {'single' if single else 'double'} precision"
             table.add_row(

@@ -1,10 +1,9 @@
-"""Engines that one can install, on the pokes of the reference and in the same run: MuJoCo's flex
-and Newton's VBD.
+"""Comparison with other engines on the reference pokes: MuJoCo's flex and Newton's VBD.
 
-Both are dynamic, so the ball sinks by 10 mm/s and rests for a third of a second before it is looked
-at. Material, block, ball and grid are those of the reference, without friction and gravity; what
-else they need is as their own examples have it. They come with the extra `peers`: pip install -e
-".[peers]" -c constraints.txt, which `make bench` does.
+Both are dynamic, so the ball sinks at 10 mm/s and rests for a third of a second before
+displacements are read. Material, block, ball and grid are those of the reference, without friction
+and gravity; other settings are those of the engines' own examples. The engines are installed by the
+extra `peers`: pip install -e ".[peers]" -c constraints.txt, which `make bench` does.
 """
 
 from __future__ import annotations
@@ -31,29 +30,34 @@ Nodes = tuple[int, int, int]
 GRIDS: tuple[Nodes, ...] = ((13, 5, 5), (25, 9, 9))
 RATE = 30.0
 SPEED, REST = 10e-3, 1 / 3
-"""Of the ball [m/s], and how long it stands still at each depth [s]."""
+"""Speed of the ball [m/s], and the time it rests at each depth [s]."""
 SIZE, RADIUS = np.array(SETUP.geometry.size), SETUP.tool.radius
 MODULUS, NU = SETUP.material.young_modulus, SETUP.material.poisson_ratio
 
 
-class Peer(Protocol):
-    """A running engine; `steps` are those that it takes in a frame of 1 / 30 s."""
+class Engine(Protocol):
+    """A running engine.
+
+    Attributes:
+        steps: time steps in a frame of 1 / 30 s.
+    """
 
     steps: int
 
     def step(self, depth: float) -> None:
-        """Move the ball to this depth [m] and go one step on."""
+        """Move the ball to a depth [m] and take one time step."""
 
     def positions(self) -> FloatArray:
-        """Of all nodes (n, 3) [m]."""
+        """Return the positions (n, 3) [m] of all nodes."""
 
     def warnings(self) -> str:
-        """How often its solver gave a warning; a dash for one that gives none."""
+        """Return the number of solver warnings; a dash for an engine without them."""
 
 
 class MuJoCo:
-    """Saint Venant-Kirchhoff tetrahedra; 16 steps a frame, half as many bring warnings of a
-    singular matrix on the coarse grid.
+    """MuJoCo's flex: Saint Venant-Kirchhoff tetrahedra.
+
+    Measured: with 8 steps a frame instead of 16 the coarse grid warns of a singular matrix.
     """
 
     steps = 16
@@ -63,20 +67,22 @@ class MuJoCo:
 
         x, y, z = SIZE / (np.array(nodes) - 1)
         self.engine = mujoco
-        mujoco.set_mju_user_warning(
-            lambda _: None
-        )  # counted below; otherwise they go to a file in the working directory
+        # Warnings are counted below; by default MuJoCo writes them to the working directory.
+        mujoco.set_mju_user_warning(lambda _: None)
         self.model = mujoco.MjModel.from_xml_string(f"""
             <mujoco>
               <option timestep="{1 / RATE / self.steps}" gravity="0 0 0" integrator="discrete"/>
               <worldbody>
-                <flexcomp name="block" type="grid" dim="3" count="{nodes[0]} {nodes[1]} {nodes[2]}" spacing="{x} {y} {z}"
+                <flexcomp name="block" type="grid" dim="3"
+                          count="{nodes[0]} {nodes[1]} {nodes[2]}" spacing="{x} {y} {z}"
                           pos="0 0 {SIZE[2] / 2}" radius="1e-5" mass="{SETUP.mass}">
                   <contact selfcollide="none" condim="1"/>
                   <elasticity young="{MODULUS}" poisson="{NU}" damping="0.01"/>
                   <pin gridrange="0 0 0 {nodes[0] - 1} {nodes[1] - 1} 0"/>
                 </flexcomp>
-                <body mocap="true" pos="0 0 {SIZE[2] + RADIUS}"><geom type="sphere" size="{RADIUS}" condim="1"/></body>
+                <body mocap="true" pos="0 0 {SIZE[2] + RADIUS}">
+                  <geom type="sphere" size="{RADIUS}" condim="1"/>
+                </body>
               </worldbody>
             </mujoco>""")
         self.data = mujoco.MjData(self.model)
@@ -94,11 +100,11 @@ class MuJoCo:
 
 
 class Newton:
-    """Neo-Hookean tetrahedra by vertex block descent, one step of 20 iterations a frame."""
+    """Newton's VBD: neo-Hookean tetrahedra by vertex block descent, 20 iterations a frame."""
 
     steps = 1
     skin = 1e-4
-    """By which the nodes are thick [m], and the ball thinner."""
+    """Contact radius of the nodes [m], by which the ball is made smaller."""
 
     def __init__(self, nodes: Nodes) -> None:
         import warp
@@ -166,15 +172,16 @@ OWN: tuple[tuple[str, GridSpec | Grading], ...] = (
     ("Palpate, graded by size", REPLAY_GRID),
 )
 
-PEERS: tuple[tuple[str, str, Callable[[Nodes], Peer]], ...] = (
+ENGINES: tuple[tuple[str, str, Callable[[Nodes], Engine]], ...] = (
     ("MuJoCo flex, tetrahedra", "mujoco", MuJoCo),
     ("Newton VBD, tetrahedra", "newton", Newton),
 )
 
 
 def _over_top(rest: FloatArray, moved: FloatArray, nodes: Nodes) -> FloatArray:
-    """Displacement (m, 3) [m] of the reference's points on the top, linear between the nodes (n, 3)
-    there.
+    """Return the displacement (m, 3) [m] of the reference points on the top.
+
+    It is interpolated linearly between the nodes (n, 3) of the top.
     """
     top = np.flatnonzero(rest[:, 2] > SIZE[2] - 1e-6)
     rows = top[np.lexsort((rest[top, 1].round(7), rest[top, 0].round(7)))]
@@ -184,9 +191,7 @@ def _over_top(rest: FloatArray, moved: FloatArray, nodes: Nodes) -> FloatArray:
 
 
 def _depths(step: float) -> tuple[FloatArray, list[int]]:
-    """The ball's depth (n,) [m] every `step` seconds, and at which of them each of the two depths
-    has been held.
-    """
+    """Return the ball's depth (n,) [m] every `step` seconds, and the last index at each depth."""
     depths, held, before = np.zeros(0), [], 0.0
     for depth in DEPTHS:
         count = round((depth - before) / SPEED / step)
@@ -197,14 +202,14 @@ def _depths(step: float) -> tuple[FloatArray, list[int]]:
     return depths, held
 
 
-def _poke(peer: Peer, nodes: Nodes) -> FloatArray:
-    """Displacement (2, m, 3) [m] of the reference's points at the two depths."""
-    rest, shown = peer.positions(), []
-    depths, held = _depths(1 / RATE / peer.steps)
+def _poke(engine: Engine, nodes: Nodes) -> FloatArray:
+    """Return the displacement (2, m, 3) [m] of the reference points at the two depths."""
+    rest, shown = engine.positions(), []
+    depths, held = _depths(1 / RATE / engine.steps)
     for number, depth in enumerate(depths):
-        peer.step(float(depth))
+        engine.step(float(depth))
         if number in held:
-            shown.append(_over_top(rest, peer.positions(), nodes))
+            shown.append(_over_top(rest, engine.positions(), nodes))
     return np.stack(shown)
 
 
@@ -224,9 +229,9 @@ def _row(
     if not np.isfinite(displacement).all():
         table.add_row(name, grid, ratio, "not finite", "-", warnings)
         return
-    wanted = reference().displacement
-    errors = np.linalg.norm(displacement - wanted, axis=(1, 2)) / np.linalg.norm(
-        wanted, axis=(1, 2)
+    expected = reference().displacement
+    errors = np.linalg.norm(displacement - expected, axis=(1, 2)) / np.linalg.norm(
+        expected, axis=(1, 2)
     )
     deepest = -1e3 * displacement[..., 2].min(axis=1)
     table.add_row(
@@ -240,9 +245,7 @@ def _row(
 
 
 def run() -> list[Table]:
-    """Poke with every engine that is there, and tabulate errors and CPU seconds per simulated
-    second.
-    """
+    """Poke with every installed engine; report errors and CPU time per simulated second."""
     heads = (
         "engine",
         "nodes",
@@ -251,11 +254,9 @@ def run() -> list[Table]:
         "top sunk by, mm",
         "solver warnings",
     )
-    table = Table(
-        *heads, title="Engines that one can install, one thread, the same pokes by 4 and 8 mm"
-    )
+    table = Table(*heads, title="Installed engines, one thread, the same pokes by 4 and 8 mm")
     for name, grid in OWN:
-        _own(grid)  # warms up
+        _own(grid)  # warm-up
         displacement, seconds = timed(lambda grid=grid: _own(grid))  # type: ignore[misc]
         _row(
             table,
@@ -265,14 +266,14 @@ def run() -> list[Table]:
             seconds,
             "0",
         )
-    for name, package, start in PEERS:
+    for name, package, start in ENGINES:
         if find_spec(package) is None:
             table.add_row(
                 name, "-", "not installed", 'pip install -e ".[peers]" -c constraints.txt', "-", "-"
             )
             continue
         for nodes in GRIDS:
-            peer = start(nodes)
-            displacement, seconds = timed(lambda peer=peer, nodes=nodes: _poke(peer, nodes))  # type: ignore[misc]
-            _row(table, name, nodes, displacement, seconds, peer.warnings())
+            engine = start(nodes)
+            displacement, seconds = timed(lambda engine=engine, nodes=nodes: _poke(engine, nodes))  # type: ignore[misc]
+            _row(table, name, nodes, displacement, seconds, engine.warnings())
     return [table]

@@ -1,4 +1,4 @@
-"""Pictures beside the tables."""
+"""Plots of benchmark results, written to a file."""
 
 from __future__ import annotations
 

@@ -1,9 +1,10 @@
-"""The converged pokes that grids are judged by: `python -m benchmarks.reference_pokes` solves them once
-more and writes them anew.
+"""Converged reference solution of two pokes, by which meshes are judged.
 
-Straight down in the middle of the top by 4 and 8 mm, on quadratic hexahedra with 0.6 mm between
-nodes at the tool. Trilinear elements with 0.5 mm between nodes differ from them by 1.5 and 2.1 % of
-the displacement and 0.9 % of the force: no claim is finer.
+The pokes go straight down in the middle of the top by 4 and 8 mm, on quadratic hexahedra with
+0.6 mm between nodes at the tool. Trilinear elements with 0.5 mm between nodes differ by 1.5 and
+2.1 % of the displacement and 0.9 % of the force, which limits every comparison.
+
+`python -m benchmarks.reference_pokes` solves and stores the reference anew.
 """
 
 from __future__ import annotations
@@ -40,36 +41,36 @@ _FILE = Path(__file__).with_name("reference_pokes.npz")
 
 @dataclass(frozen=True, eq=False)
 class Pokes:
-    """Displacement (2, m, 3) [m] of points spread evenly over the top, and force (2,) [N], at the
-    two depths.
+    """The solution at the two depths.
+
+    Attributes:
+        displacement: (2, m, 3) displacement of points on a grid over the top [m].
+        force: (2,) vertical force [N].
     """
 
     displacement: FloatArray
     force: FloatArray
 
     def error(self, other: Pokes) -> tuple[FloatArray, FloatArray]:
-        """Relative RMS displacement error (2,) and relative force error (2,) of another
-        solution."""
+        """Return relative errors (2,) of displacement (RMS) and force of another solution."""
         miss = np.linalg.norm(other.displacement - self.displacement, axis=(1, 2))
         return miss / np.linalg.norm(self.displacement, axis=(1, 2)), other.force / self.force - 1
 
 
 def poke_centres() -> FloatArray:
-    """Tool centres (8, 3) [m] from 1 to 8 mm deep."""
+    """Return the tool centres (8, 3) [m], from 1 to 8 mm deep."""
     return np.array([[0.0, 0.0, SETUP.box.size[2] + SETUP.tool.radius - depth] for depth in _WAY])
 
 
 def poke_frames(grid: Meshing, setup: Setup = SETUP) -> list[Equilibrium]:
-    """Equilibria at the two depths, led there in steps of 1 mm."""
+    """Return the equilibria at the two depths, reached in steps of 1 mm."""
     frames = replay(setup, poke_centres(), grid, tolerance=1e-5)
     require_converged(frames)
     return [frames[int(np.argmin(np.abs(_WAY - depth)))] for depth in DEPTHS]
 
 
 def top_points() -> FloatArray:
-    """Rest positions (m, 3) [m] of the points spread over the top, at which displacements are
-    compared.
-    """
+    """Return rest positions (m, 3) [m] of the points at which displacements are compared."""
     x, y, z = SETUP.box.size
     across = np.meshgrid(
         np.linspace(-x / 2, x / 2, 49), np.linspace(-y / 2, y / 2, 29), indexing="ij"
@@ -78,7 +79,7 @@ def top_points() -> FloatArray:
 
 
 def compared(frames: Sequence[Equilibrium]) -> Pokes:
-    """What grids are compared by in the two equilibria."""
+    """Return displacement and force of the two equilibria."""
     points = top_points()
     return Pokes(
         np.stack([frame.move(points) - points for frame in frames]),
@@ -87,13 +88,13 @@ def compared(frames: Sequence[Equilibrium]) -> Pokes:
 
 
 def reference() -> Pokes:
-    """The converged pokes."""
+    """Return the stored reference."""
     with np.load(_FILE) as stored:
         return Pokes(stored["displacement"].astype(float), stored["force"])
 
 
 if __name__ == "__main__":
-    found = compared(poke_frames(FINEST))
+    solution = compared(poke_frames(FINEST))
     np.savez_compressed(
-        _FILE, displacement=found.displacement.astype(np.float32), force=found.force
+        _FILE, displacement=solution.displacement.astype(np.float32), force=solution.force
     )

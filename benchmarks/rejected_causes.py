@@ -1,9 +1,10 @@
-"""Which causes of kept blind suites are withheld because they leave most of what is wrong, by the
-figures in their rows.
+"""Causes in stored blind suites that leave significant structured error.
 
-`python -m benchmarks.rejected_causes FILE ...`: of every row whose report names a cause that leaves
-significant structure, how much of it, what share of the reducible error it removes on test
-sequences, and whether `palpate.diagnosis.validation.rejection` withholds it today.
+    python -m benchmarks.rejected_causes FILE ...
+
+For every row with such a cause the table has the structured error with and without it, the share of
+the reducible error that it removes on test sequences, and whether
+`palpate.diagnosis.validation.rejection` rejects it today.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ __all__ = ["run", "structures"]
 
 
 def structures(result: CaseResult) -> tuple[Structure, Structure]:
-    """Structure over what chance gives, of the stated setup and of what is named."""
+    """Return the structured error over its chance level, without and with the named causes."""
     stated, left = result.report["evidence"], result.report["unexplained"]
     before, after = (
         Structure(one["structure"], 1.0, one["structure_bound"]) for one in (stated, left)
@@ -32,12 +33,12 @@ def structures(result: CaseResult) -> tuple[Structure, Structure]:
 
 
 def run(console: Console, files: Sequence[Path]) -> None:
-    """Print one table of all files."""
+    """Print a table of all files."""
     rows = [(file, one) for file in files for one in read_results(file) if one.causes]
     table = Table(
-        title=f"{len(rows)} rows that name a cause; those of them that leave significant structure"
+        title=f"{len(rows)} rows that name a cause; those that leave significant structure"
     )
-    for name in ("file", "case", "named", "right", "without", "with", "removed", "withheld"):
+    for name in ("file", "case", "named", "right", "without", "with", "removed", "rejected"):
         table.add_column(name)
     for file, one in rows:
         before, left = structures(one)

@@ -1,4 +1,4 @@
-"""Replays of a minute of palpation, beside what other engines took for the same block.
+"""Speed and accuracy of replays of a minute of palpation, with figures of other engines.
 
 The problem: 68.7 x 39.3 x 35.8 mm, base held, E 5 kPa, nu 0.45, a frictionless ball of 5 mm driven
 by position; four pokes into the top by 4 to 10 mm, a push from the side and a drag, at 30 Hz.
@@ -36,15 +36,21 @@ OTHERS = {
     "Newton 1.8 VBD": ("2.8", "11", "20 / 13 %", "tool slips in"),
     "linear tetrahedra, full Newton": ("0.19", "2.5", "72 / 44 %", "76 / 47 %"),
 }
-"""CPU seconds per simulated second on 13x5x5 and 25x9x9 nodes, one thread, and the error of the
-top's displacement at 4 and 8 mm on both, measured once on the same problem; ratios of times below
-1.5 mean nothing."""
+"""Other engines on the same problem, measured once: CPU seconds per simulated second on 13x5x5 and
+25x9x9 nodes, one thread, and the error of the top's displacement at 4 and 8 mm on both. Ratios of
+times below 1.5 are not significant."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """One grid, the seconds of the motion it replays, and the errors that it may have at 4 and 8 mm
-    [1].
+    """One mesh.
+
+    Attributes:
+        name: name for readers.
+        grid: the mesh protocol.
+        start: start of the replayed part of the motion [s].
+        stop: end of the replayed part of the motion [s].
+        errors: largest errors of the displacement at 4 and 8 mm [1].
     """
 
     name: str
@@ -54,11 +60,11 @@ class Case:
     errors: tuple[float, float]
 
 
-REMEMBERING = {
+WITH_HISTORY = {
     "13x5x5, relaxes": Material(relaxation=(Relaxation(fraction=0.5, time_constant=2.0),)),
-    "13x5x5, keeps a set": Material(retained_fraction=0.2),
+    "13x5x5, permanent set": Material(retained_fraction=0.2),
 }
-"""The first grid again, with a material that remembers."""
+"""Materials with history, replayed on the first grid."""
 
 
 CASES = (
@@ -84,8 +90,9 @@ CASES = (
 
 
 def motion() -> FloatArray:
-    """Tool centres (1800, 3) [m] of a minute: four pokes, a side push and a drag, ten seconds each,
-    eight in touch.
+    """Return tool centres (1800, 3) [m] of a minute: four pokes, a side push and a drag.
+
+    Each takes ten seconds, eight of them in contact.
     """
     top, reach = (
         SETUP.geometry.size[2] + SETUP.tool.radius,
@@ -125,28 +132,30 @@ def motion() -> FloatArray:
 
 
 def _errors(case: Case) -> tuple[FloatArray, FloatArray, float]:
-    """Errors of displacement and force (2,) each at 4 and 8 mm, and what a finer grid says of the
-    former at 8 mm; warms up, too.
+    """Return errors of displacement and force (2,) at 4 and 8 mm, and the estimated one at 8 mm.
+
+    Serves as a warm-up as well.
     """
     frames = poke_frames(case.grid)
     displacement, force = reference().error(compared(frames))
     if (displacement > case.errors).any():
         raise RuntimeError(
-            f"{case.name}: off by {displacement[0]:.1%} and {displacement[1]:.1%} at 4 and 8 mm"
+            f"{case.name}: errors of {displacement[0]:.1%} and {displacement[1]:.1%} at 4 and 8 mm"
         )
     (estimate,) = mesh_errors(SETUP, frames[1:], case.grid)
     return displacement, force, estimate.relative
 
 
-def _measure(case: Case) -> tuple[list[Equilibrium], float]:
+def _replay_case(case: Case) -> tuple[list[Equilibrium], float]:
+    """Return the frames of a case and their CPU time [s]."""
     centres = motion()[round(case.start * RATE) : round(case.stop * RATE)]
     frames, seconds = timed(lambda: replay(SETUP, centres, case.grid))
     require_converged(frames)
     return frames, seconds
 
 
-def _remembered(material: Material) -> tuple[list[Equilibrium], float]:
-    """The first 20 s of the motion on the first grid, with this material."""
+def _replay_material(material: Material) -> tuple[list[Equilibrium], float]:
+    """Return frames and CPU time [s] of the motion's first 20 s on the first grid."""
     centres, setup = motion()[: round(20 * RATE)], replace(SETUP, material=material)
     frames, seconds = timed(
         lambda: replay(setup, centres, CASES[0].grid, times=np.arange(len(centres)) / RATE)
@@ -155,9 +164,26 @@ def _remembered(material: Material) -> tuple[list[Equilibrium], float]:
     return frames, seconds
 
 
+def _speed(name: str, frames: list[Equilibrium], seconds: float) -> list[str]:
+    """Return the cells of a row that say how fast frames were solved."""
+    touched = sum(frame.in_contact for frame in frames)
+    steps = sum(frame.iterations for frame in frames) / max(touched, 1)
+    each, ratio = 1e3 * seconds / len(frames), seconds / (len(frames) / RATE)
+    return [name, str(len(frames)), str(touched), f"{steps:.1f}", f"{each:.1f}", f"{ratio:.3f}"]
+
+
+def _others() -> Table:
+    """Return the table of other engines."""
+    title = "Other engines, measured earlier on 13x5x5 / 25x9x9 nodes"
+    heads = ("engine", "CPU s per s, 13x5x5", "25x9x9", "top off at 4 mm", "at 8 mm")
+    table = Table(*heads, title=title)
+    for name, figures in OTHERS.items():
+        table.add_row(name, *figures)
+    return table
+
+
 def run() -> list[Table]:
-    """Replay each case, check it, and tabulate errors and CPU seconds per simulated second."""
-    title = "Replay, one thread; errors against a converged solution at 4 / 8 mm"
+    """Replay each case; RuntimeError where its error is larger than allowed."""
     heads = (
         "grid",
         "frames",
@@ -169,47 +195,16 @@ def run() -> list[Table]:
         "estimated",
         "force off by",
     )
+    title = "Replay, one thread; errors against a converged solution at 4 / 8 mm"
     table = Table(*heads, title=title)
     for case in CASES:
         displacement, force, estimate = _errors(case)
-        frames, seconds = _measure(case)
-        touched = sum(frame.in_contact for frame in frames)
-        steps = sum(frame.iterations for frame in frames) / max(touched, 1)
-        each, ratio = 1e3 * seconds / len(frames), seconds / (len(frames) / RATE)
         table.add_row(
-            case.name,
-            str(len(frames)),
-            str(touched),
-            f"{steps:.1f}",
-            f"{each:.1f}",
-            f"{ratio:.3f}",
+            *_speed(case.name, *_replay_case(case)),
             f"{displacement[0]:.1%} / {displacement[1]:.1%}",
             f"{estimate:.1%}",
             f"{force[0]:.1%} / {force[1]:.1%}",
         )
-    for name, material in REMEMBERING.items():
-        frames, seconds = _remembered(material)
-        touched = sum(frame.in_contact for frame in frames)
-        steps, each = (
-            sum(frame.iterations for frame in frames) / touched,
-            1e3 * seconds / len(frames),
-        )
-        ratio = seconds / (len(frames) / RATE)
-        table.add_row(
-            name,
-            str(len(frames)),
-            str(touched),
-            f"{steps:.1f}",
-            f"{each:.1f}",
-            f"{ratio:.3f}",
-            "-",
-            "-",
-            "-",
-        )
-    title = "Other engines, measured earlier on 13x5x5 / 25x9x9 nodes"
-    others = Table(
-        "engine", "CPU s per s, 13x5x5", "25x9x9", "top off at 4 mm", "at 8 mm", title=title
-    )
-    for name, figures in OTHERS.items():
-        others.add_row(name, *figures)
-    return [table, others]
+    for name, material in WITH_HISTORY.items():
+        table.add_row(*_speed(name, *_replay_material(material)), "-", "-", "-")
+    return [table, _others()]

@@ -1,7 +1,6 @@
-"""Scrubbing: from a position sent by a page until the arrays of that frame have arrived where its
-browser is.
+"""Latency of scrubbing: from a position that a page sends to the arrival of that frame's arrays.
 
-A server of its own is asked over its one port, by clients that speak as page and viewer do, but
+A server is started, and clients connect to its port with the protocols of page and viewer; they
 draw nothing.
 """
 
@@ -23,14 +22,14 @@ import numpy as np
 import websockets
 from rich.table import Table
 
-from benchmarks.made_up_run import CAMERA, RUN, SEQUENCE, cloud, write_place
+from benchmarks.made_up_run import CAMERA, RUN, SEQUENCE, cloud, write_run
 
 __all__ = ["run"]
 
 POINTS, NODES, FRAMES = 45_000, (25, 9, 9), 48
 POSITIONS, CLIENTS, EACH, THINKING = 150, 10, 25, 0.1
 FEW, MANY, GROWN = 500, 5000, 1.05
-"""Frames after which the server's memory is compared, and how much more it may hold [1]."""
+"""Frames after which the server's memory is compared, and the largest ratio [1]."""
 VIEWER = "viser-v1.1.1"
 VIEW = {
     "run": RUN,
@@ -42,11 +41,12 @@ VIEW = {
 
 
 def run() -> list[Table]:
-    """Latency of one client and of ten, and memory; RuntimeError where an array is not its frame's,
-    or memory grows.
+    """Measure the latency of one client and of ten, and the server's memory.
+
+    Raises RuntimeError where an array is not that of its frame, or memory grows.
     """
     with tempfile.TemporaryDirectory() as folder:
-        write_place(Path(folder), FRAMES, POINTS, NODES)
+        write_run(Path(folder), FRAMES, POINTS, NODES)
         with _server(Path(folder)) as (address, process):
             one = asyncio.run(_one(address, POSITIONS))
             ten = asyncio.run(_together(address))
@@ -60,7 +60,7 @@ def run() -> list[Table]:
         "median, ms",
         "95 %, ms",
         "most, ms",
-        title=f"scrubbing: {POINTS} points and {'x'.join(map(str, NODES))} nodes, from event to arrays",
+        title=f"scrubbing: {POINTS} points and {'x'.join(map(str, NODES))} nodes, event to arrays",
     )
     for name, took in (("1 client", one), (f"{CLIENTS} clients at once", ten)):
         spans = [
@@ -79,7 +79,7 @@ def run() -> list[Table]:
 
 @contextmanager
 def _server(folder: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
-    """A server on a free port, and where it is."""
+    """Start a server on a free port; yield its address and process."""
     folders = ["--runs", str(folder / "runs"), "--datasets", str(folder / "datasets")]
     process = subprocess.Popen(
         [sys.executable, "-m", "palpate.app.cli", "serve", "--port", "0", *folders],
@@ -89,17 +89,17 @@ def _server(folder: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     )
     try:
         assert process.stdout is not None
-        said = process.stdout.readline()
-        if "http://" not in said:
-            raise RuntimeError(f"the server did not start: {said}")
-        yield said.split("http://")[1].split("/")[0], process
+        line = process.stdout.readline()
+        if "http://" not in line:
+            raise RuntimeError(f"the server did not start: {line}")
+        yield line.split("http://")[1].split("/")[0], process
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(timeout=20)
 
 
 class _Client:
-    """A page and its viewer."""
+    """The connections of a page and of its viewer."""
 
     def __init__(
         self, page: websockets.ClientConnection, viewer: websockets.ClientConnection
@@ -107,26 +107,32 @@ class _Client:
         self._page, self._viewer = page, viewer
 
     async def show(self, frame: int, check: bool = True) -> float:
-        """Seconds from the event until the arrays of this frame are there; all points of its cloud
-        are looked for.
+        """Show a frame; return the time [s] from the event to the arrival of its points.
+
+        With `check` all points of the cloud are compared, otherwise the first 30.
         """
-        wanted = _drawn(frame) if check else _drawn(frame)[:30]
+        expected = _drawn(frame) if check else _drawn(frame)[:30]
         begin = time.perf_counter()
         await self._page.send(json.dumps({**VIEW, "frame": frame}))
         while True:
             payload = await asyncio.wait_for(self._viewer.recv(), 60)
-            if isinstance(payload, bytes) and wanted.tobytes() in payload:
+            if isinstance(payload, bytes) and expected.tobytes() in payload:
                 took = time.perf_counter() - begin
                 break
-        held = json.loads(await asyncio.wait_for(self._page.recv(), 60))
-        if "problem" in held or held["view"]["frame"] != frame or held["drawn"]["points"] != POINTS:
-            raise RuntimeError(f"frame {frame} was asked for, the server holds {held}")
+        state = json.loads(await asyncio.wait_for(self._page.recv(), 60))
+        if (
+            "problem" in state
+            or state["view"]["frame"] != frame
+            or state["drawn"]["points"] != POINTS
+        ):
+            raise RuntimeError(f"frame {frame} was requested, the server shows {state}")
         return took
 
 
 def _drawn(frame: int) -> np.ndarray[tuple[int, int], np.dtype[np.float32]]:
-    """The points of a frame as the viewer is to get them (n, 3) [m], phantom frame; the same
-    arithmetic as the server's.
+    """Return the points (n, 3) [m] that the viewer receives, phantom frame.
+
+    The arithmetic is that of the server.
     """
     if frame not in _KNOWN:
         _KNOWN[frame] = (
@@ -164,7 +170,7 @@ async def _client(address: str, name: str) -> AsyncIterator[_Client]:
 async def _one(
     address: str, positions: int, check: bool = True
 ) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """One position after the other, never the same twice in a row."""
+    """Show random frames one by one, never the same twice in a row; return the latencies [s]."""
     order = np.cumsum(np.random.default_rng(positions).integers(1, FRAMES, positions + 1)) % FRAMES
     async with _client(address, "page-alone") as client:
         await client.show(int(order[0]))
@@ -172,7 +178,7 @@ async def _one(
 
 
 async def _together(address: str) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Ten people, each of whom moves on a tenth of a second after a frame has come."""
+    """Return the latencies [s] of ten clients, which pause 0.1 s after each frame."""
 
     async def person(number: int) -> list[float]:
         order = np.cumsum(np.random.default_rng(number).integers(1, FRAMES, EACH + 1)) % FRAMES
@@ -188,6 +194,6 @@ async def _together(address: str) -> np.ndarray[tuple[int], np.dtype[np.float64]
 
 
 def _memory(process: int) -> float:
-    """Resident memory [MB] of a process."""
+    """Return the resident memory [MB] of a process."""
     status = Path(f"/proc/{process}/status").read_text()
     return int(status.split("VmRSS:")[1].split()[0]) / 1e3

@@ -1,10 +1,11 @@
-"""Random situations that a replay must survive: `python -m benchmarks.situations [COUNT] [SEED]
-[--workers N] [--by-size SHARE]`.
+"""Robustness of replays in random situations.
+
+    python -m benchmarks.situations [COUNT] [SEED] [--workers N] [--by-size SHARE]
 
 Materials up to nu = 0.49, neo-Hooke and Gent, two effects at a time, pokes into the top and the
 sides and over the rim by up to 40 % of the height, jumps of up to 5 mm between frames. No frame may
-end with an exception, a NaN, an inverted element that is called converged, or a surface point
-inside the tool; frames without equilibrium are counted by what they say.
+end with an exception, a NaN, a converged result with an inverted element, or a surface point inside
+the tool. Frames without equilibrium are counted by their outcome.
 """
 
 from __future__ import annotations
@@ -44,19 +45,23 @@ GRIDS = (
 DEEPEST = 0.4 * SIZE[2]
 LONGEST_JUMP = 5e-3
 BY_SIZE, SIZED = 0.1, Grading(spacing=1.3e-3, along=0.8, inward=1.0, longest=0.35)
-"""Share of the situations whose mesh goes by sizes [1], and those: a little coarser than a
-diagnosis takes them."""
+"""Share of situations on a graded mesh [1], and that mesh, slightly coarser than a diagnosis's."""
 DRAWN = ("geometry_scale", "landmark_mismatch", "young_modulus", "mesh_resolution")
-"""Effects that change what a situation draws anyway: stiffness, the tool's place against the block,
-and the grid."""
+"""Effects that change what a situation draws itself: stiffness, tool position and mesh."""
 INSIDE = 5e-4
-"""Surface points deeper inside the tool than this [m] are a fault."""
+"""Depth [m] of a surface point inside the tool above which it is a fault."""
 
 
 @dataclass(frozen=True, eq=False)
 class Situation:
-    """A setup, stated tool centres (f, 3) [m] in the phantom frame and their times (f,) [s], and a
-    grid.
+    """One random situation.
+
+    Attributes:
+        setup: the setup, with the effects.
+        centres: (f, 3) stated tool centres [m], phantom frame.
+        times: (f,) times of the frames [s].
+        grid: the mesh protocol.
+        effects: the effects.
     """
 
     setup: Setup
@@ -67,7 +72,7 @@ class Situation:
 
 
 def _effect(random: np.random.Generator, kind: type[Effect], setup: Setup) -> Effect:
-    """One of the effect's starts, or where it has none a random step away from neutral."""
+    """Return one of the effect's starts, or a random step away from neutral."""
     starts = kind.starts(setup)
     if starts and random.random() < 0.8:
         return starts[int(random.integers(len(starts)))]
@@ -81,9 +86,7 @@ def _effect(random: np.random.Generator, kind: type[Effect], setup: Setup) -> Ef
 
 
 def _way(random: np.random.Generator, radius: float) -> FloatArray:
-    """Into the top or a side at a random place and slant, deeper at each frame, then away by a jump
-    along the surface.
-    """
+    """Return a random path: into the top or a side at a slant, then a jump along the surface."""
     half = np.array([SIZE[0] / 2, SIZE[1] / 2])
     axis, sign = int(random.integers(3)), 1.0 if random.random() < 0.5 else -1.0
     outward = np.zeros(3)
@@ -105,9 +108,7 @@ def _way(random: np.random.Generator, radius: float) -> FloatArray:
 
 
 def draw_situation(seed: int, by_size: float = BY_SIZE) -> Situation:
-    """The situation of this seed, where the share `by_size` [1] of all take a mesh whose edges go
-    by size.
-    """
+    """Return the situation of a seed; a share `by_size` [1] of all has a graded mesh."""
     random = np.random.default_rng(seed)
     radius = float(random.uniform(3.5e-3, 8e-3))
     limit = float(random.uniform(3.0, 50.0)) if random.random() < 0.3 else None
@@ -131,43 +132,44 @@ def draw_situation(seed: int, by_size: float = BY_SIZE) -> Situation:
 
 
 def faults(situation: Situation, frames: list[Equilibrium]) -> list[str]:
-    """What no frame may show, in words; empty when all is well."""
-    found, block = [], Replay(situation.setup, situation.grid)
+    """Return descriptions of the faults in these frames."""
+    faulty, block = [], Replay(situation.setup, situation.grid)
     for number, frame in enumerate(frames):
         if not (np.isfinite(frame.displacement).all() and np.isfinite(frame.force).all()):
-            found.append(f"frame {number}: not a number")
+            faulty.append(f"frame {number}: not a number")
         elif frame.outcome is Outcome.CONVERGED:
             model, positions = block.model(frame.mesh), frame.mesh.nodes + frame.displacement
             probe = ToolSphere(frame.tool.centre - np.append(frame.slip, 0.0), frame.tool.radius)
             if not np.isfinite(model.energy(positions, probe)):
-                found.append(f"frame {number}: converged with an inverted element")
+                faulty.append(f"frame {number}: converged with an inverted element")
             points = np.einsum(
                 "qa,fai->fqi", model.face.shapes, positions[model.topology.surface]
             ).reshape(-1, 3)
             depth = probe.radius - np.linalg.norm(points - probe.centre, axis=1).min()
             if depth > INSIDE or model.encloses(positions, probe):
-                found.append(
-                    f"frame {number}: converged with a surface point {1e3 * depth:.2f} mm inside the tool"
+                faulty.append(
+                    f"frame {number}: converged with a surface point {1e3 * depth:.2f} mm inside "
+                    "the tool"
                 )
-    return found
+    return faulty
 
 
 @dataclass(frozen=True)
 class Trial:
-    """How one situation ended.
+    """The result of one situation.
 
     Attributes:
-        seed: of the situation.
-        label: its effects and grid.
-        outcomes: of its frames.
-        found: faults, in words.
-        cpu: seconds.
+        seed: seed of the situation.
+        label: its effects and mesh.
+        outcomes: outcomes of its frames.
+        faults: descriptions of the faults.
+        cpu: CPU time [s].
     """
 
     seed: int
     label: str
     outcomes: tuple[Outcome, ...]
-    found: tuple[str, ...]
+    faults: tuple[str, ...]
     cpu: float
 
     def __str__(self) -> str:
@@ -176,7 +178,8 @@ class Trial:
             for i, outcome in enumerate(self.outcomes)
             if outcome is not Outcome.CONVERGED
         ]
-        return f"seed {self.seed} ({self.label}, {self.cpu:.1f} CPU s): {'; '.join([*self.found, *unsolved]) or 'fine'}"
+        remarks = "; ".join([*self.faults, *unsolved]) or "fine"
+        return f"seed {self.seed} ({self.label}, {self.cpu:.1f} CPU s): {remarks}"
 
 
 def _name(grid: Meshing) -> str:
@@ -184,25 +187,25 @@ def _name(grid: Meshing) -> str:
 
 
 def attempt(seed: int, by_size: float = BY_SIZE) -> Trial:
-    """Replay the situation of this seed, whatever happens."""
+    """Replay the situation of a seed; an exception counts as a fault."""
     begin, situation = time.process_time(), draw_situation(seed, by_size)
     label = f"{' and '.join(effect.name for effect in situation.effects)}, {_name(situation.grid)}"
     try:
         frames = replay(situation.setup, situation.centres, situation.grid, times=situation.times)
-        found = faults(situation, frames)
+        remarks = faults(situation, frames)
     except Exception as error:
-        frames, found = [], [f"{type(error).__name__}: {error}"]
+        frames, remarks = [], [f"{type(error).__name__}: {error}"]
     return Trial(
         seed,
         label,
         tuple(frame.outcome for frame in frames),
-        tuple(found),
+        tuple(remarks),
         time.process_time() - begin,
     )
 
 
 def _attempts(seeds: range, workers: int, by_size: float) -> Iterator[Trial]:
-    """The trials in the order of their seeds, each as soon as it and those before it are done."""
+    """Yield the trials in the order of their seeds."""
     trial = partial(attempt, by_size=by_size)
     if workers == 1:
         yield from map(trial, seeds)
@@ -212,14 +215,13 @@ def _attempts(seeds: range, workers: int, by_size: float) -> Iterator[Trial]:
 
 
 def main(count: int, seed: int, workers: int = 1, by_size: float = BY_SIZE) -> int:
-    """Try `count` situations from `seed` on in so many processes; 1 when one of them shows a
-    fault."""
+    """Try `count` situations from `seed` on; return 1 where one of them has a fault."""
     console, outcomes, wrong, cpu = Console(), Counter[Outcome](), 0, 0.0
     for trial in _attempts(range(seed, seed + count), workers, by_size):
-        if trial.found or set(trial.outcomes) - {Outcome.CONVERGED}:
+        if trial.faults or set(trial.outcomes) - {Outcome.CONVERGED}:
             console.print(str(trial), highlight=False, soft_wrap=True)
         outcomes.update(trial.outcomes)
-        wrong, cpu = wrong + bool(trial.found), cpu + trial.cpu
+        wrong, cpu = wrong + bool(trial.faults), cpu + trial.cpu
     table = Table(
         "outcome",
         "frames",
@@ -230,19 +232,18 @@ def main(count: int, seed: int, workers: int = 1, by_size: float = BY_SIZE) -> i
     unsolved = outcomes.total() - outcomes[Outcome.CONVERGED]
     console.print(
         table,
-        f"{wrong} with a fault; {1000 * unsolved / max(outcomes.total(), 1):.2f} of 1000 frames without equilibrium",
+        f"{wrong} with a fault; {1000 * unsolved / max(outcomes.total(), 1):.2f} of 1000 frames "
+        "without equilibrium",
     )
     return int(wrong > 0)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description="Random situations that a replay must survive.")
-    parser.add_argument("count", nargs="?", type=int, default=100, help="how many")
+    parser.add_argument("count", nargs="?", type=int, default=100, help="number of situations")
+    parser.add_argument("seed", nargs="?", type=int, default=0, help="seed of the first situation")
+    parser.add_argument("--workers", type=int, default=1, help="number of processes")
     parser.add_argument(
-        "seed", nargs="?", type=int, default=0, help="of the first; the others follow"
-    )
-    parser.add_argument("--workers", type=int, default=1, help="processes that share them")
-    parser.add_argument(
-        "--by-size", type=float, default=BY_SIZE, help="share of them whose mesh's edges go by size"
+        "--by-size", type=float, default=BY_SIZE, help="share of situations on a graded mesh"
     )
     sys.exit(main(**vars(parser.parse_args())))

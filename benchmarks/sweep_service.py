@@ -1,7 +1,8 @@
-"""Points of a sweep over REST, by two processes and by a dask cluster of two workers, against a
-plain loop in one process.
+"""Speed of a sweep over REST, by two processes and by a dask cluster of two workers.
 
-python -m benchmarks.sweep_service [POINTS]
+Both are compared with a plain loop in one process:
+
+    python -m benchmarks.sweep_service [POINTS]
 """
 
 from __future__ import annotations
@@ -42,17 +43,13 @@ QUIET = {
     "distributed.admin.system-monitor.interval": "5s",
     "distributed.worker.memory.monitor-interval": "2s",
 }
-"""What a worker does beside its work, seldom: by default it looks at itself 160 times a second, and
-the solve waits each time."""
+"""Settings of dask workers' self-monitoring, which by default interrupts 160 times a second."""
 SAME = 1e-9
-"""Errors [m] that differ by less are the same: a registration's last digits differ from process to
-process."""
+"""Errors [m] that differ by less count as equal: registrations differ in their last digits."""
 
 
 def run(points: int = POINTS) -> list[Table]:
-    """Seconds and points a minute of all three; RuntimeError where an error of a point differs
-    between them.
-    """
+    """Measure all three; RuntimeError where the errors of a point differ between them."""
     with tempfile.TemporaryDirectory() as place:
         home = Path(place)
         hidden = HiddenEffect("tool_radius", {"radius": 6e-3})
@@ -62,8 +59,7 @@ def run(points: int = POINTS) -> list[Table]:
             3,
         )
         load = os.getloadavg()[0]
-        # As patient as a job's processes are, so that other work on the machine takes as much from
-        # both.
+        # The priority of a job's processes, so that other work on the machine slows both equally.
         with ProcessPoolExecutor(1, get_context("spawn"), os.nice, (5,)) as pool:
             pool.submit(os.getpid).result()
             alone, plain = pool.submit(_loop, home, points).result()
@@ -105,16 +101,16 @@ def _loop(home: Path, points: int) -> tuple[float, FloatArray]:
 
 
 def _swept(palpate: Client, points: int) -> tuple[float, FloatArray]:
-    """From the request to the end of the job, all that starts on the way counted."""
+    """Return the time [s] from the request to the end of the job, and the errors (p,) [m]."""
     began = time.monotonic()
     job = palpate.sweep("phantom", {"tool_radius.radius": (LOW, HIGH)}, steps=points, frames=FRAMES)
     palpate.wait(job["id"])
     seconds = time.monotonic() - began
-    found = sorted(
+    rows = sorted(
         (row for row in palpate.points(job["id"]) if row["kind"] == "search"),
         key=lambda row: int(row["number"]),
     )
-    return seconds, np.array([row["error"] for row in found], dtype=float)
+    return seconds, np.array([row["error"] for row in rows], dtype=float)
 
 
 @contextmanager
@@ -139,7 +135,7 @@ def _served(runs: Path, home: Path, further: dict[str, str]) -> Iterator[Client]
         address = re.search(r"http://[\d.:]+", server.stdout.readline())
         try:
             if address is None:
-                raise RuntimeError("the server did not say where it is")
+                raise RuntimeError("the server did not print its address")
             with Client(address[0]) as client:
                 yield client
         finally:

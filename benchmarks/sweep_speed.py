@@ -1,5 +1,4 @@
-"""Points of a sweep: two processes against a plain loop in one; how many a minute, and whether both
-say the same.
+"""Speed of a sweep by two processes, compared with a plain loop in one process.
 
 python -m benchmarks.sweep_speed [POINTS]
 """
@@ -27,8 +26,9 @@ POINTS, WORKERS = 200, 2
 
 
 def run(points: int) -> tuple[float, float, float]:
-    """Seconds of the loop and of the processes, those that start them counted, and the largest
-    difference of any sum.
+    """Return the time of the loop and of the processes [s], and the largest difference of a sum.
+
+    The time of the processes includes their start.
     """
     space = ParameterSpace(
         (Axis("tool_radius.radius", 4e-3, 8e-3), Axis("poisson_ratio.nu", 0.3, 0.49))
@@ -40,14 +40,14 @@ def run(points: int) -> tuple[float, float, float]:
         )
         stated, data = read_sweep_data(open_dataset(Path(folder) / "phantom"), (), 4)
     grid = SCREEN_GRID.for_tool(stated.tool.radius)
-    asked = next(point_batches(SweepSpec(space=space, method="random", points=points)))
-    tasks = [(space.setup(stated, values), 0) for values in asked]
+    points_of_sweep = next(point_batches(SweepSpec(space=space, method="random", points=points)))
+    tasks = [(space.setup(stated, values), 0) for values in points_of_sweep]
     began = time.monotonic()
     plain = [replay_errors(setup, data[0], grid) for setup, _ in tasks]
     middle = time.monotonic()
     executor = ProcessExecutor(WORKERS, data, grid)
     try:
-        spread = dict(told for told in run_tasks(executor, tasks) if told is not None)
+        spread = dict(one for one in run_tasks(executor, tasks) if one is not None)
     finally:
         executor.close()
     end = time.monotonic()
@@ -61,6 +61,6 @@ if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else POINTS
     alone, together, apart = run(count)
     Console().print(
-        f"{count} points: {alone:.1f} s in one process, {together:.1f} s by {WORKERS}: {alone / together:.2f} times as fast; "
-        f"largest difference {apart:g}"
+        f"{count} points: {alone:.1f} s in one process, {together:.1f} s by {WORKERS}: "
+        f"{alone / together:.2f} times as fast; largest difference {apart:g}"
     )

@@ -1,10 +1,10 @@
-"""The temperature of a diagnosis' probabilities, chosen on one half of a blind suite and judged on
-the other.
+"""Choice of the temperature of a diagnosis' probabilities by cross-validation on a blind suite.
 
-`python -m benchmarks.temperature_choice results.jsonl`: cases by turns into either half; on each half the
-temperature under which the sets of causes that were hidden are most probable, and on the other half
-the calibration error and the Brier score with it, beside those with the temperature that is in use.
-Cases outside the catalogue have no set that is right, and are left out.
+    python -m benchmarks.temperature_choice results.jsonl
+
+Cases go to two halves in turn. On each half the temperature is chosen under which the hidden sets
+of causes are most probable. Calibration error and Brier score with it, and with the temperature in
+use, are measured on the other half. Cases outside the catalogue have no right set and are left out.
 """
 
 from __future__ import annotations
@@ -25,51 +25,49 @@ from palpate.diagnosis.search.model_probabilities import probabilities
 from palpate.effects.elastic_material import YoungModulus
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["first_at", "loss", "run", "warmest"]
+__all__ = ["best_temperature", "loss", "run", "top_effect"]
 
 TEMPERATURES = tuple(float(one) for one in np.geomspace(0.25, 64.0, 33))
 MODULUS = YoungModulus.name
-"""Without forces nothing is what is right where it alone is hidden."""
-LEAST = 1e-12
-"""Probability of a set that was not tried, or was refused."""
+"""Without forces the right set is empty where only the modulus is hidden."""
+LEAST_PROBABILITY = 1e-12
+"""Probability of a set that was not tried or was rejected [1]."""
 
 
-def _chances(result: CaseResult, temperature: float) -> dict[frozenset[str], float]:
-    """Of each set of causes, whatever the order they were found in."""
+def _probabilities(result: CaseResult, temperature: float) -> dict[frozenset[str], float]:
+    """Return the probability of each set of causes, in whatever order they were found."""
     surplus: dict[tuple[str, ...], float] = {}
     for model in result.report["models"]:
         names = tuple(effect["effect"] for effect in model["effects"])
-        refused = model["asked_nats"] is None
+        rejected = model["asked_nats"] is None
         surplus[names] = max(
-            -np.inf if refused else model["gain_nats"] - model["asked_nats"],
+            -np.inf if rejected else model["gain_nats"] - model["asked_nats"],
             surplus.get(names, -np.inf),
         )
-    found: dict[frozenset[str], float] = {}
+    merged: dict[frozenset[str], float] = {}
     for names, chance in probabilities(surplus, temperature).items():
-        found[frozenset(names)] = found.get(frozenset(names), 0.0) + chance
-    return found
+        merged[frozenset(names)] = merged.get(frozenset(names), 0.0) + chance
+    return merged
 
 
 def loss(results: Sequence[CaseResult], temperature: float) -> float:
-    """Mean of minus the logarithm of the probability that the hidden set has [nats]."""
-    chances = [_chances(one, temperature).get(one.truth - {MODULUS}, 0.0) for one in results]
-    return float(-np.log(np.maximum(chances, LEAST)).mean())
+    """Return the mean negative log probability of the hidden set [nats]."""
+    chances = [_probabilities(one, temperature).get(one.truth - {MODULUS}, 0.0) for one in results]
+    return float(-np.log(np.maximum(chances, LEAST_PROBABILITY)).mean())
 
 
-def warmest(results: Sequence[CaseResult]) -> float:
-    """The temperature of least loss; of several the highest, which claims least."""
+def best_temperature(results: Sequence[CaseResult]) -> float:
+    """Return the temperature of least loss; of several the highest, which is the most cautious."""
     losses = np.array([loss(results, one) for one in TEMPERATURES])
     return TEMPERATURES[int(np.flatnonzero(losses <= losses.min() + 1e-6)[-1])]
 
 
-def first_at(results: Sequence[CaseResult], temperature: float) -> tuple[FloatArray, FloatArray]:
-    """Probability (n,) of the most probable effect at this temperature, and whether it is hidden
-    (n,).
-    """
+def top_effect(results: Sequence[CaseResult], temperature: float) -> tuple[FloatArray, FloatArray]:
+    """Return the probability (n,) of the most probable effect, and whether it is hidden (n,)."""
     stated, true = [], []
     for one in results:
         of_effect: dict[str, float] = {}
-        for names, chance in _chances(one, temperature).items():
+        for names, chance in _probabilities(one, temperature).items():
             for name in names:
                 of_effect[name] = of_effect.get(name, 0.0) + chance
         if of_effect:
@@ -79,7 +77,7 @@ def first_at(results: Sequence[CaseResult], temperature: float) -> tuple[FloatAr
     return np.array(stated), np.array(true)
 
 
-def _in_words(measured: IntervalEstimate) -> str:
+def _text(measured: IntervalEstimate) -> str:
     ends = (measured.value, measured.low, measured.high)
     return (
         "–"
@@ -88,15 +86,17 @@ def _in_words(measured: IntervalEstimate) -> str:
     )
 
 
-def _weighed(result: CaseResult) -> bool:
-    """Whether its report says what was asked of each set; before November 2026 none did."""
+def _has_required_gains(result: CaseResult) -> bool:
+    """Return whether the report has the required gain of each set; early reports do not."""
     return all("asked_nats" in model for model in result.report["models"])
 
 
 def run(console: Console, file: Path) -> bool:
-    """Print the table; whether there is a case in each half."""
+    """Print the table; return whether both halves have a case."""
     results = [
-        one for one in read_results(file) if one.report and not one.outside and _weighed(one)
+        one
+        for one in read_results(file)
+        if one.report and not one.outside and _has_required_gains(one)
     ]
     halves = (results[::2], results[1::2])
     table = Table(title=f"{file.name}: temperature chosen on one half, judged on the other")
@@ -116,16 +116,16 @@ def run(console: Console, file: Path) -> bool:
             return False
         for source, temperature in (
             ("in use", CRITERIA.naming.probability_temperature),
-            (f"{len(chosen)} cases", warmest(chosen)),
+            (f"{len(chosen)} cases", best_temperature(chosen)),
         ):
-            pairs = first_at(judged, temperature)
+            pairs = top_effect(judged, temperature)
             table.add_row(
                 source,
                 f"{temperature:.2f}",
                 f"{len(judged)} cases",
                 f"{loss(judged, temperature):.4f}",
-                _in_words(calibration_error(*pairs)),
-                _in_words(brier(*pairs)),
+                _text(calibration_error(*pairs)),
+                _text(brier(*pairs)),
             )
     console.print(table)
     return True

@@ -1,5 +1,6 @@
-"""The block of the reference given as a closed surface: quadratic tetrahedra beside quadratic
-hexahedra, error and time.
+"""Error and time of quadratic tetrahedra, compared with quadratic hexahedra.
+
+The tetrahedra fill the reference block given as a closed surface.
 """
 
 from __future__ import annotations
@@ -22,12 +23,11 @@ from palpate.setup.setup import Setup, Shape
 __all__ = ["run"]
 
 START, STOP = 2.0, 6.0
-"""Seconds of the minute's motion that are replayed, in steps of a thirtieth: most of a poke by 4
-mm."""
+"""Start and end of the replayed part of the motion [s]: most of a 4 mm poke, at 30 Hz."""
 
 
 def surface() -> Shape:
-    """The block's twelve triangles."""
+    """Return the block as a surface of twelve triangles."""
     low, high = SETUP.box.low, SETUP.box.high
     vertices = np.array(
         [np.where(np.array(list(f"{number:03b}")) == "1", high, low) for number in range(8)]
@@ -50,8 +50,14 @@ def _tets(spacing: float, coarsest: float) -> TetSpec:
 
 @dataclass(frozen=True)
 class Case:
-    """One mesh and the errors that it may have at 4 and 8 mm: of the top's displacement and of the
-    force [1].
+    """One mesh.
+
+    Attributes:
+        name: name for readers.
+        setup: the setup, whose geometry is the block or its surface.
+        mesh: the mesh protocol.
+        top: largest errors of the top's displacement at 4 and 8 mm [1].
+        force: largest errors of the force at 4 and 8 mm [1].
     """
 
     name: str
@@ -84,8 +90,9 @@ CASES = (
 
 
 def run() -> list[Table]:
-    """Solve the reference's pokes and replay four seconds on each mesh; errors beyond a case's own
-    are wrong.
+    """Solve the reference pokes and replay four seconds on each mesh.
+
+    Raises RuntimeError where an error is larger than allowed.
     """
     heads = (
         "elements, spacing at the tool",
@@ -97,16 +104,16 @@ def run() -> list[Table]:
     )
     table = Table(
         *heads,
-        title="A block given as a surface, one thread; errors against a converged solution at 4 / 8 mm",
+        title="Block given as a surface, one thread; errors against a converged solution, 4 / 8 mm",
     )
     centres = motion()[round(START * RATE) : round(STOP * RATE)]
     for case in CASES:
         frames = poke_frames(case.mesh, case.setup)
         displacement, force = reference().error(compared(frames))
         if (displacement > case.top).any() or (np.abs(force) > case.force).any():
-            found = ", ".join(f"{value:.1%}" for value in (*displacement, *force))
+            errors = ", ".join(f"{value:.1%}" for value in (*displacement, *force))
             raise RuntimeError(
-                f"{case.name}: displacement at 4 and 8 mm and force are off by {found}"
+                f"{case.name}: errors of displacement and force at 4 and 8 mm: {errors}"
             )
         followed, seconds = timed(partial(replay, case.setup, centres, case.mesh))
         require_converged(followed)

@@ -1,11 +1,12 @@
-"""`python -m benchmarks.training_time FOLDER` trains the 2D network on 15 872 samples, as many as the
-paper's, and times it.
+"""Time of training a network on 15 872 samples, as many as in the paper.
 
-Twelve sequences at 30 frames a second: eight to learn from, two that stop the training, two to test
-on. What is simulated is the stated block; what is measured is a block whose tool is larger and that
-sags, replayed by the same engine on another mesh (the virtual bench makes another engine's data,
-but not 20 000 frames of it in minutes). FOLDER keeps the samples, and a training that was stopped
-goes on. `--device cuda` trains on a card.
+    python -m benchmarks.training_time FOLDER
+
+Twelve sequences at 30 frames a second: eight for training, two for validation, two for test. The
+simulation is of the stated block. The measurements are of a block that sags, under a larger tool,
+replayed by the same engine on another mesh: the virtual experiment, which uses another engine, is
+too slow for 20 000 frames. FOLDER keeps the samples, and an interrupted training resumes.
+`--device cuda` trains on a CUDA device.
 """
 
 from __future__ import annotations
@@ -53,8 +54,10 @@ EYE = np.array([0.15, -0.18, 0.30])
 
 
 def _names() -> dict[str, int]:
-    """Frames of each sequence: eight that add up to TRAINING, then two of HELD_OUT for validation
-    and for test.
+    """Return the number of frames by sequence.
+
+    The first eight sequences have TRAINING frames together; two for validation and two for test
+    have HELD_OUT each.
     """
     counts, names = dict.fromkeys(KINDS, 0), []
     for number in range(12):
@@ -64,9 +67,9 @@ def _names() -> dict[str, int]:
     return {name: TRAINING // 8 if number < 8 else HELD_OUT for number, name in enumerate(names)}
 
 
-def _way(name: str, frames: int) -> FloatArray:
-    """Tool centres (frames, 3) [m] of as many motions of this kind as it takes."""
-    found: list[FloatArray] = []
+def _tool_path(name: str, frames: int) -> FloatArray:
+    """Return tool centres (frames, 3) [m] of consecutive motions of the sequence's kind."""
+    paths: list[FloatArray] = []
     for seed in range(1000):
         kind, _, number = name.rpartition("-")
         motion = draw_motion(
@@ -77,14 +80,14 @@ def _way(name: str, frames: int) -> FloatArray:
             np.array([1.0, -1.0]),
             17 * int(number) + seed,
         )
-        found.append(motion.centre(np.arange(0.0, motion.duration, 1 / RATE)))
-        if sum(map(len, found)) >= frames:
-            return np.concatenate(found)[:frames]
+        paths.append(motion.centre(np.arange(0.0, motion.duration, 1 / RATE)))
+        if sum(map(len, paths)) >= frames:
+            return np.concatenate(paths)[:frames]
     raise RuntimeError(f"no motion of kind {kind} is long enough")
 
 
 def _cloud(frame: Equilibrium, rng: np.random.Generator) -> tuple[FloatArray, int]:
-    """Noisy points (p, 3) [m] of the top first, then of two sides, and how many are of the top."""
+    """Return noisy points (p, 3) [m], those of the top first, and the number of these."""
     x, y, z = SIZE
     areas = np.array([x * y, y * z, x * z])
     upper, right, _ = rng.multinomial(POINTS, areas / areas.sum())
@@ -98,7 +101,7 @@ def _cloud(frame: Equilibrium, rng: np.random.Generator) -> tuple[FloatArray, in
 
 
 def _sequence(folder: Path, body: Body, named: tuple[str, int]) -> int:
-    """Write one sequence; returns how many frames of it have an equilibrium in both blocks."""
+    """Write one sequence; return the number of frames with an equilibrium in both blocks."""
     name, frames = named
     (folder / name).mkdir(parents=True)
     arrays, row, rng = (
@@ -111,8 +114,11 @@ def _sequence(folder: Path, body: Body, named: tuple[str, int]) -> int:
         Replay(TRUE, GridSpec(nodes=(13, 7, 7), spacing=2.5e-3), 1e-3),
     ]
     before: list[Equilibrium | None] = [None, None]
-    for number, centre in enumerate(_way(name, frames)):
-        now = [block.solve_from_any(centre, (last,)) for block, last in zip(blocks, before, strict=True)]
+    for number, centre in enumerate(_tool_path(name, frames)):
+        now = [
+            block.solve_from_any(centre, (last,))
+            for block, last in zip(blocks, before, strict=True)
+        ]
         before = [frame if frame.outcome is Outcome.CONVERGED else None for frame in now]
         if None in before:
             continue
@@ -134,17 +140,21 @@ def _sequence(folder: Path, body: Body, named: tuple[str, int]) -> int:
 
 
 def _made(folder: Path, console: Console) -> Samples:
-    """The samples, made where they are not there yet."""
+    """Return the samples in a folder, made if they are missing."""
     if (folder / "samples.json").exists():
         return open_samples(folder)
-    body, wanted = Body.block(SIZE, NODES), _names()
+    body, frames_of = Body.block(SIZE, NODES), _names()
     with ProcessPoolExecutor(
-        min(len(wanted), os.cpu_count() or 1), mp_context=get_context("spawn")
+        min(len(frames_of), os.cpu_count() or 1), mp_context=get_context("spawn")
     ) as pool:
         made = dict(
-            zip(wanted, pool.map(partial(_sequence, folder, body), wanted.items()), strict=True)
+            zip(
+                frames_of,
+                pool.map(partial(_sequence, folder, body), frames_of.items()),
+                strict=True,
+            )
         )
-    for name, frames in wanted.items():
+    for name, frames in frames_of.items():
         console.print(f"{name}: {made[name]} of {frames} frames")
     names = list(made)
     about = {
@@ -170,48 +180,52 @@ def _made(folder: Path, console: Console) -> Samples:
 
 
 def main() -> None:
-    """Make, train, tell."""
+    """Make the samples, train, and print times and errors."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--kind", default="unet2d", choices=["unet2d", "unet3d", "graph"])
     parser.add_argument("--epochs", type=int, default=40)
     parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--device", default="cpu", help="of torch, such as cuda")
-    asked, console = parser.parse_args(), Console()
-    samples = _made(asked.folder / "samples", console)
+    parser.add_argument("--device", default="cpu", help="torch device, such as cuda")
+    options, console = parser.parse_args(), Console()
+    samples = _made(options.folder / "samples", console)
     split = Split.of(samples)
-    network = NetworkSpec(kind=asked.kind)
+    network = NetworkSpec(kind=options.kind)
     spec = TrainingSpec(
-        network=network, hold=0.0, epochs=asked.epochs, device=asked.device, threads=asked.threads
+        network=network,
+        hold=0.0,
+        epochs=options.epochs,
+        device=options.device,
+        threads=options.threads,
     )
-    wall, cpu, told = time.monotonic(), time.process_time(), -1
+    wall, cpu, printed = time.monotonic(), time.process_time(), -1
 
     def report(fraction: float, text: str) -> None:
-        nonlocal told
+        nonlocal printed
         epoch = (
             int(text.split(",", maxsplit=1)[0].removeprefix("epoch "))
             if text.startswith("epoch ")
-            else told
+            else printed
         )
-        if epoch != told:
-            told = epoch
+        if epoch != printed:
+            printed = epoch
             console.print(
                 f"{time.monotonic() - wall:6.0f} s, {time.process_time() - cpu:6.0f} CPU s: {text}"
             )
 
-    trained = train(samples, split, spec, asked.folder / asked.kind, report)
+    trained = train(samples, split, spec, options.folder / options.kind, report)
     console.print(
         f"trained on {len(samples.rows(split.train))} samples in {time.monotonic() - wall:.0f} s, "
         f"{time.process_time() - cpu:.0f} CPU s; best after epoch {trained.about['epoch']}"
     )
-    loss = SurfaceLoss(trained.body, samples.seen[trained.body.index], device=asked.device)
+    loss = SurfaceLoss(trained.body, samples.seen[trained.body.index], device=options.device)
     for name in split.test:
         rows = samples.rows([name])
-        raw, found = (
-            sample_errors(net, loss, trained.body, samples, rows, asked.device).mean()
+        raw, corrected = (
+            sample_errors(net, loss, trained.body, samples, rows, options.device).mean()
             for net in (None, trained.network)
         )
-        console.print(f"{name}: {raw:.3f} mm without, {found:.3f} mm with the network")
+        console.print(f"{name}: {raw:.3f} mm without, {corrected:.3f} mm with the network")
 
 
 if __name__ == "__main__":
