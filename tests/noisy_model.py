@@ -6,13 +6,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
+from evaluating import evaluator_of
 from pushed_block import SETUP, prediction, registration
 
 from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS
 from palpate.diagnosis.forward.worker_pool import Workers
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, gram
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.parameter_blocks import ModelColumns
 from palpate.effects import Effect
 from palpate.effects.elastic_material import StiffInclusion
 from palpate.effects.tool import ToolRadius
@@ -25,18 +27,20 @@ RADIUS = ToolRadius(radius=4.4e-3)
 
 
 @contextmanager
-def stated_bench() -> Iterator[Bench]:
+def stated_evaluator() -> Iterator[Evaluator]:
     """The stated setup with its priors; nothing is replayed."""
     with Workers([], 1) as workers:
-        yield Bench(SETUP, registration(), workers, ["poke-01"], None, GridSpec(), GridSpec())
+        yield evaluator_of(
+            SETUP, registration(), workers, ["poke-01"], None, GridSpec(), GridSpec()
+        )
 
 
-def noisy_model(bench: Bench, *effects: Effect, seed: int = 0) -> Model:
+def noisy_model(evaluator: Evaluator, *effects: Effect, seed: int = 0) -> Model:
     """A model whose blocks are noise with sizeable columns."""
     random = np.random.default_rng(seed)
     own = sum(len(effect.numbers()) for effect in effects)
     scales = np.array([item.scale for effect in effects for item in effect.numbers()])
-    shape = (GROUPS, bench.surface.patches)
+    shape = (GROUPS, evaluator.problem.surface.patches)
     size = np.concatenate([np.full(NUISANCES - 1, 1e-4), 1e-5 / scales, [1e-5]])
     columns = size * random.standard_normal((*shape, NUISANCES + own))
     gap = 1e-4 * random.standard_normal(shape)
@@ -55,7 +59,5 @@ def noisy_model(bench: Bench, *effects: Effect, seed: int = 0) -> Model:
         setup,
         (prediction(gap),),
         tuple(blocks),
-        tuple(range(at, at + own)),
-        {},
-        (*range(at), at + own),
+        ModelColumns((*range(at), at + own), tuple(range(at, at + own))),
     )

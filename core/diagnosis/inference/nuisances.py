@@ -45,7 +45,7 @@ class Nuisances:
         robot[:3, :3] += priors.tool_tip**2 * np.eye(3)
         accuracy = np.array([priors.camera_translation] * 3 + [priors.camera_rotation] * 3)
         camera = registration.camera_covariance + np.diag(accuracy**2)
-        parts = {
+        parts: dict[tuple[NuisanceBlock, ...], FloatArray | float] = {
             (NuisanceBlock.TOOL_POSITION, NuisanceBlock.TOOL_ROTATION): np.linalg.inv(robot),
             (NuisanceBlock.TOOL_RADIUS,): priors.tool_radius**-2,
             (NuisanceBlock.POISSON_RATIO,): priors.poisson_ratio**-2,

@@ -5,22 +5,30 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from evaluating import evaluator_of
 from pushed_block import EYE, GRID, SETUP, TOP, prediction, registration
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.design.candidate_pushes import Push, pushes
-from palpate.diagnosis.design.next_probe import Pair, _advice, _choices, _instead, pairs_of
+from palpate.diagnosis.design.next_probe import (
+    Pair,
+    _advice,
+    _choices,
+    _other_measurements,
+    pairs_of,
+)
 from palpate.diagnosis.design.predictive_distance import Scene, Survivor, _divergence, nats_of
 from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS
 from palpate.diagnosis.forward.worker_pool import Workers
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, gram
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.parameter_blocks import ModelColumns
 from palpate.diagnosis.inference.residual_structure import Structure
 from palpate.diagnosis.search.findings import Findings, Trial
-from palpate.diagnosis.search.identifiability import Limit, Told
+from palpate.diagnosis.search.identifiability import Identifiability, Limit
 from palpate.diagnosis.search.screening import Candidate
-from palpate.effects import Effect
+from palpate.effects import CATALOGUE, Effect
 from palpate.effects.base import with_effects
 from palpate.effects.elastic_material import StiffInclusion
 from palpate.effects.sensor import TimeOffset
@@ -130,16 +138,18 @@ def test_best_push_is_the_one_over_the_lump(scene):
 
 
 @pytest.fixture(scope="module")
-def bench() -> Iterator[Bench]:
+def evaluator() -> Iterator[Evaluator]:
     """The stated setup with its priors; nothing is replayed here."""
     with Workers([], 1) as workers:
-        yield Bench(SETUP, registration(), workers, ["poke-01"], None, GridSpec(), GridSpec())
+        yield evaluator_of(
+            SETUP, registration(), workers, ["poke-01"], None, GridSpec(), GridSpec()
+        )
 
 
-def _trial(bench: Bench, gain: float, *effects: Effect) -> Trial:
+def _trial(evaluator: Evaluator, gain: float, *effects: Effect) -> Trial:
     """A refit whose data know nothing but noise."""
     own = sum(len(effect.numbers()) for effect in effects)
-    first, shape = TOOL_COLUMNS + 8, (4, bench.surface.patches)
+    first, shape = TOOL_COLUMNS + 8, (4, evaluator.problem.surface.patches)
     columns = 1e-5 * np.random.default_rng(0).standard_normal((*shape, first + own + 1))
     gap = np.zeros(shape)
     block = Block("poke-01", *gram(gap, columns, np.full(shape, 1e8)))
@@ -149,28 +159,26 @@ def _trial(bench: Bench, gain: float, *effects: Effect) -> Trial:
         with_effects(SETUP, effects),
         (prediction(gap),),
         (block,),
-        tuple(range(first, first + own)),
-        {},
-        nuisance,
+        ModelColumns(nuisance, tuple(range(first, first + own))),
     )
     return Trial(model, gain, 1.0)
 
 
-def _findings(bench: Bench, *trials: Trial) -> Findings:
-    return Findings(_trial(bench, 0.0).model, trials[0] if trials else None, list(trials))
+def _findings(evaluator: Evaluator, *trials: Trial) -> Findings:
+    return Findings(_trial(evaluator, 0.0).model, trials[0] if trials else None, list(trials))
 
 
 RADIUS = ToolRadius(radius=4.2e-3)
 HARD = StiffInclusion(x=0.0, y=0.0, z=0.02, radius=7e-3, stiffness_ratio=4.0)
 
 
-def test_rivals_are_told_apart_and_the_best_needs_less_to_win(bench):
+def test_rivals_are_told_apart_and_the_best_needs_less_to_win(evaluator):
     trials = [
-        _trial(bench, 90.0, RADIUS),
-        _trial(bench, 85.0, HARD),
-        _trial(bench, 20.0, TimeOffset(offset=0.1)),
+        _trial(evaluator, 90.0, RADIUS),
+        _trial(evaluator, 85.0, HARD),
+        _trial(evaluator, 20.0, TimeOffset(offset=0.1)),
     ]
-    (pair,) = pairs_of(bench, _findings(bench, *trials))
+    (pair,) = pairs_of(evaluator, _findings(evaluator, *trials))
     assert pair.names == ("tool_radius", "stiff_inclusion") and pair.needed == (
         CRITERIA.naming.rival - 5,
         CRITERIA.naming.rival + 5,
@@ -179,33 +187,33 @@ def test_rivals_are_told_apart_and_the_best_needs_less_to_win(bench):
     assert known is not None and known.shape == (9, 9) and len(open_numbers) == 5
 
 
-def test_cause_found_alone_is_weighed_against_what_came_next_or_against_nothing(bench):
-    trials = [_trial(bench, 90.0, RADIUS), _trial(bench, 20.0, HARD)]
-    assert [pair.names for pair in pairs_of(bench, _findings(bench, *trials))] == [
+def test_cause_found_alone_is_weighed_against_what_came_next_or_against_nothing(evaluator):
+    trials = [_trial(evaluator, 90.0, RADIUS), _trial(evaluator, 20.0, HARD)]
+    assert [pair.names for pair in pairs_of(evaluator, _findings(evaluator, *trials))] == [
         ("tool_radius", "stiff_inclusion")
     ]
-    assert [pair.names for pair in pairs_of(bench, _findings(bench, trials[0]))] == [
+    assert [pair.names for pair in pairs_of(evaluator, _findings(evaluator, trials[0]))] == [
         ("tool_radius", "none")
     ]
 
 
-def test_where_nothing_was_found_what_hides_best_is_asked_for_at_its_limit(bench):
-    findings, neutral = _findings(bench), replace(HARD, stiffness_ratio=1.0)
+def test_where_nothing_was_found_what_hides_best_is_asked_for_at_its_limit(evaluator):
+    findings, neutral = _findings(evaluator), replace(HARD, stiffness_ratio=1.0)
     faint = Limit(item=RADIUS.numbers()[0], size=4e-4)
     clear = Limit(item=HARD.numbers()[4], size=0.08)
-    findings.told = (
-        Told(
+    findings.identifiability = (
+        Identifiability(
             Candidate(start=neutral, of=("stiffness_ratio",), columns=(15,), spread=(2.0,)),
             (clear,),
             clear,
         ),
-        Told(
+        Identifiability(
             Candidate(start=ToolRadius(radius=5e-3), of=("radius",), widened={6: 1.2e-3}),
             (faint,),
             faint,
         ),
     )
-    first, second = pairs_of(bench, findings)
+    first, second = pairs_of(evaluator, findings)
     assert first.names == ("none", "tool_radius") and first.models[
         1
     ].setup.tool.radius == pytest.approx(5.4e-3)
@@ -213,14 +221,16 @@ def test_where_nothing_was_found_what_hides_best_is_asked_for_at_its_limit(bench
         HARD.numbers()[4].value(0.08)
     )
     findings.structure = Structure(50.0, 20.0, 30.0)
-    assert pairs_of(bench, findings) == []
+    assert pairs_of(evaluator, findings) == []
 
 
-def test_families_that_no_push_tells_apart_get_another_measurement(bench):
+def test_families_that_no_push_tells_apart_get_another_measurement(evaluator):
     rest = Pair(
         (NOTHING, NOTHING),
         ("viscoelasticity + tool_radius", "permanent_set + tool_radius"),
         (8.0, 8.0),
     )
-    (row,) = _instead([rest, Pair((NOTHING, LUMP), ("none", "stiff_inclusion"), (8.0, 8.0))])
+    (row,) = _other_measurements(
+        CATALOGUE, [rest, Pair((NOTHING, LUMP), ("none", "stiff_inclusion"), (8.0, 8.0))]
+    )
     assert "several time constants" in row["text"] and row["kind"] == "measurement"

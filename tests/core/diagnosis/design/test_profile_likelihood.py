@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.diagnosis.design.profile_likelihood import combination, profile, vague
-from palpate.effects.base import Parameter
+from palpate.effects import Parameter
 from palpate.foundation.arrays import FloatArray
 
 RATIO = Parameter(name="stiffness_ratio", unit="1", low=0.02, high=50.0, scale=0.5, log=True)

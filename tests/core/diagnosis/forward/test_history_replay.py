@@ -7,8 +7,8 @@ import pytest
 from pushed_block import GRID, POSE, SETUP, TOP, seen_points
 
 from palpate.dataset import Kinematics
-from palpate.diagnosis.forward.history_replay import Past, forgetful
-from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS, Wanted
+from palpate.diagnosis.forward.history_replay import HistoryReplay, without_history
+from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS, JacobianRequest
 from palpate.diagnosis.forward.prediction import predict
 from palpate.diagnosis.observation.frame_groups import Group, Observations
 from palpate.effects import Effect
@@ -100,7 +100,7 @@ def test_columns_are_those_without_memory(data, effect):
     pivot = np.array([0.0, 0.0, TOP])
 
     def wanted(base):
-        return Wanted(
+        return JacobianRequest(
             setups=(ToolRadius(radius=5e-3 + step).apply(base),), steps=(step,), pivot=pivot
         )
 
@@ -113,7 +113,7 @@ def test_columns_are_those_without_memory(data, effect):
 
 def test_no_step_is_longer_than_a_drag_or_a_hold_can_be(data):
     block = Replay(EFFECTS["viscoelasticity"].apply(SETUP), GRID)
-    past, visited = Past(data, block, Transform()), []
+    past, visited = HistoryReplay(data, block, Transform()), []
     step = block.step
 
     def watched(centre, start=None, time=None):
@@ -133,9 +133,9 @@ def test_no_step_is_longer_than_a_drag_or_a_hold_can_be(data):
     assert moved.max() < 1.6e-3
 
 
-def test_forgetful_setup_keeps_everything_else():
+def test_setup_without_history_keeps_everything_else():
     setup = replace(SETUP, phantom_from_camera=POSE)
     for effect in EFFECTS.values():
         setup = effect.apply(setup)
-    assert setup.has_history and not forgetful(setup).has_history
-    assert forgetful(setup) == forgetful(replace(SETUP, phantom_from_camera=POSE))
+    assert setup.has_history and not without_history(setup).has_history
+    assert without_history(setup) == without_history(replace(SETUP, phantom_from_camera=POSE))

@@ -142,7 +142,9 @@ def test_column_of_a_turn_does_not_turn_the_noise():
     group = _top(8e-4)
     sample = choose_points(group, SETUP, BLOCK, SURFACE)
     here, there = (compare(group, setup, BLOCK, SURFACE, sample) for setup in (SETUP, turn))
-    column = here.along_sight(camera_model_for(turn).place(camera_model_for(SETUP).read(here.places)))
+    column = here.along_sight(
+        camera_model_for(turn).place(camera_model_for(SETUP).read(here.places))
+    )
     seen = here.means.count > 20
     change = (there.means.mean - here.means.mean)[seen]
     # Each patch's share of its own residual that a change of two milliradians makes: to first order

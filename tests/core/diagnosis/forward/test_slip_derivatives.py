@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pushed_block import GRID, SETUP, SIZE, TOP, observed
 
-from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS, Wanted
+from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS, JacobianRequest
 from palpate.diagnosis.forward.prediction import Prediction, predict
 from palpate.diagnosis.observation.frame_groups import FAR, Observations
 from palpate.fem.newton import Outcome
@@ -62,7 +62,11 @@ def here(data) -> Prediction:
     small = [1e-3 * step for step in STEPS.values()]
     setups = tuple(CHANGED[name](step) for name, step in zip(STEPS, small, strict=True))
     return predict(
-        data, SLIDING, GRID, Wanted(setups=setups, steps=tuple(small), pivot=PIVOT), tolerance=TIGHT
+        data,
+        SLIDING,
+        GRID,
+        JacobianRequest(setups=setups, steps=tuple(small), pivot=PIVOT),
+        tolerance=TIGHT,
     )
 
 
@@ -122,7 +126,7 @@ def _free(setup: Setup) -> Setup:
 
 
 def test_base_that_is_held_has_the_columns_it_had(data):
-    wanted = Wanted(setups=(_free(CHANGED["radius"](1e-7)),), steps=(1e-7,), pivot=PIVOT)
+    wanted = JacobianRequest(setups=(_free(CHANGED["radius"](1e-7)),), steps=(1e-7,), pivot=PIVOT)
     found = predict(data, _free(SLIDING), GRID, wanted, tolerance=TIGHT)
     assert not found.columns[-1, :, :3].any()
 

@@ -7,14 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from noisy_model import GROUPS, LUMP, NUISANCES, RADIUS, noisy_model, stated_bench
+from noisy_model import GROUPS, LUMP, NUISANCES, RADIUS, noisy_model, stated_evaluator
 from pushed_block import SETUP, prediction
 
-from palpate.diagnosis.inference.credible_intervals import intervals, stands
+from palpate.diagnosis.inference.credible_intervals import intervals, is_supported_by_all_sequences
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, gram
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
 from palpate.diagnosis.inference.noise_model import Noise
+from palpate.diagnosis.inference.parameter_blocks import ModelColumns
 from palpate.effects.elastic_material import PoissonRatio
 from palpate.effects.heterogeneity import Anisotropy
 from palpate.effects.load import Gravity
@@ -29,8 +30,8 @@ NU, CAMERA = (
 
 
 @pytest.fixture(scope="module")
-def bench() -> Iterator[Bench]:
-    with stated_bench() as found:
+def evaluator() -> Iterator[Evaluator]:
+    with stated_evaluator() as found:
         yield found
 
 
@@ -39,9 +40,9 @@ def bench() -> Iterator[Bench]:
     [LUMP, RADIUS, NU, CAMERA, Gravity(specific_weight_over_stiffness=1.2)],
     ids=lambda e: e.name,
 )
-def test_interval_holds_the_value_within_the_bounds(bench, effect):
-    entry = intervals(bench, noisy_model(bench, effect))[0]
-    assert set(entry) == set(effect.reported(bench.setup))
+def test_interval_holds_the_value_within_the_bounds(evaluator, effect):
+    entry = intervals(evaluator, noisy_model(evaluator, effect))[0]
+    assert set(entry) == set(effect.reported(evaluator.problem.setup))
     for item in effect.numbers():
         stated = entry[item.name]
         assert item.low <= stated["low"] < stated["value"] < stated["high"] <= item.high
@@ -51,11 +52,11 @@ def test_interval_holds_the_value_within_the_bounds(bench, effect):
         )
 
 
-def test_interval_of_a_direction_reaches_to_either_side_of_the_axis(bench):
+def test_interval_of_a_direction_reaches_to_either_side_of_the_axis(evaluator):
     for direction in (0.0, 0.01, np.pi - 0.01):
-        model = noisy_model(bench, Anisotropy(direction=direction, stiffness_ratio=3.0))
+        model = noisy_model(evaluator, Anisotropy(direction=direction, stiffness_ratio=3.0))
         assert model.ends[0] == 0
-        stated = intervals(bench, model)[0]["direction"]
+        stated = intervals(evaluator, model)[0]["direction"]
         assert stated["value"] == pytest.approx(direction)
         assert (
             stated["high"] - stated["value"] == pytest.approx(stated["value"] - stated["low"])
@@ -63,10 +64,10 @@ def test_interval_of_a_direction_reaches_to_either_side_of_the_axis(bench):
         )
 
 
-def _measured_by(bench: Bench, sizes: FloatArray) -> Model:
+def _measured_by(evaluator: Evaluator, sizes: FloatArray) -> Model:
     """A tool's radius that is off by these sizes [search scales] in as many sequences."""
-    model, random = noisy_model(bench, RADIUS), np.random.default_rng(4)
-    shape, column = (GROUPS, bench.surface.patches), model.columns[0]
+    model, random = noisy_model(evaluator, RADIUS), np.random.default_rng(4)
+    shape, column = (GROUPS, evaluator.problem.surface.patches), model.columns[0]
     blocks = []
     for number, size in enumerate(sizes):
         columns = np.zeros((*shape, NUISANCES + 1))
@@ -79,11 +80,11 @@ def _measured_by(bench: Bench, sizes: FloatArray) -> Model:
     return replace(model, blocks=tuple(blocks))
 
 
-def test_interval_is_the_fits_deviation_where_sequences_agree(bench):
-    model = _measured_by(bench, np.zeros(20))
+def test_interval_is_the_fits_deviation_where_sequences_agree(evaluator):
+    model = _measured_by(evaluator, np.zeros(20))
     (radius,) = RADIUS.numbers()
     deviation = radius.scale / np.sqrt(0.1**2 * sum(block.values for block in model.blocks))
-    entry = intervals(bench, model)[0]["radius"]
+    entry = intervals(evaluator, model)[0]["radius"]
     assert (
         0.95
         < (entry["high"] - entry["low"]) / (2 * 1.96 * np.hypot(deviation, radius.accuracy))
@@ -91,19 +92,19 @@ def test_interval_is_the_fits_deviation_where_sequences_agree(bench):
     )
 
 
-def test_interval_holds_what_sequences_disagree_about(bench):
+def test_interval_holds_what_sequences_disagree_about(evaluator):
     sizes = np.array([-0.6, 0.5, 0.8, -0.7])
-    entry = intervals(bench, _measured_by(bench, sizes))[0]["radius"]
+    entry = intervals(evaluator, _measured_by(evaluator, sizes))[0]["radius"]
     scale = RADIUS.numbers()[0].scale
     wanted = 3.18 * scale * sizes.std(ddof=1) / np.sqrt(len(sizes))
     assert (entry["high"] - entry["low"]) / 2 == pytest.approx(wanted, rel=0.2)
 
 
-def _seen_by(bench: Bench, shares: FloatArray) -> tuple[Model, Model]:
+def _seen_by(evaluator: Evaluator, shares: FloatArray) -> tuple[Model, Model]:
     """A model with a lump, and the one without it: as many sequences, each of which sees this share
     of what the lump does.
     """
-    random, shape = np.random.default_rng(4), (GROUPS, bench.surface.patches)
+    random, shape = np.random.default_rng(4), (GROUPS, evaluator.problem.surface.patches)
     with_lump, without = [], []
     for number, share in enumerate(shares):
         does, columns = (
@@ -113,37 +114,39 @@ def _seen_by(bench: Bench, shares: FloatArray) -> tuple[Model, Model]:
         gap = share * does + 1e-4 * random.standard_normal(shape)
         without.append(prediction(gap, name=f"poke-{number:02d}", columns=columns))
         with_lump.append(prediction(gap - does, name=f"poke-{number:02d}", columns=columns))
-    bench.noises = [
+    evaluator.state.noises = [
         Noise(np.full(shape, 1e8), one.gap, np.zeros(shape), np.zeros((*shape, 0)))
         for one in without
     ]
     nuisance = tuple(range(NUISANCES))
     return (
-        Model((LUMP,), LUMP.apply(SETUP), tuple(with_lump), (), (), {}, nuisance),
-        Model((), SETUP, tuple(without), (), (), {}, nuisance),
+        Model((LUMP,), LUMP.apply(SETUP), tuple(with_lump), (), ModelColumns(nuisance)),
+        Model((), SETUP, tuple(without), (), ModelColumns(nuisance)),
     )
 
 
-def test_cause_stands_where_sequences_see_as_much_of_it(bench):
-    assert stands(bench, *_seen_by(bench, np.array([1.0, 0.8, 1.1, 0.9])))
+def test_cause_stands_where_sequences_see_as_much_of_it(evaluator):
+    assert is_supported_by_all_sequences(
+        evaluator, *_seen_by(evaluator, np.array([1.0, 0.8, 1.1, 0.9]))
+    )
 
 
 @pytest.mark.parametrize(
     "shares",
     [[1.5, -1.5, 1.0, -1.0], [2.0, 0.0, 0.0, 0.1], [0.0, 0.0, 0.0, 0.0], [-1.0, -0.9, -1.1, -1.0]],
 )
-def test_cause_that_only_some_sequences_see_or_that_is_not_there_does_not_stand(bench, shares):
-    assert not stands(bench, *_seen_by(bench, np.array(shares)))
+def test_cause_that_only_some_sequences_see_or_that_is_not_there_does_not_stand(evaluator, shares):
+    assert not is_supported_by_all_sequences(evaluator, *_seen_by(evaluator, np.array(shares)))
 
 
-def test_place_of_a_detached_edge_is_stated_without_interval(bench):
-    entry = intervals(bench, noisy_model(bench, BaseDetachment(edge="+x", extent=0.02)))[0]
+def test_place_of_a_detached_edge_is_stated_without_interval(evaluator):
+    entry = intervals(evaluator, noisy_model(evaluator, BaseDetachment(edge="+x", extent=0.02)))[0]
     assert entry["edge"] == {"value": "+x", "unit": ""}
     assert entry["extent"]["low"] < 0.02 < entry["extent"]["high"]
 
 
-def test_camera_is_reported_by_its_magnitudes(bench):
-    entry = intervals(bench, noisy_model(bench, CAMERA))[0]
+def test_camera_is_reported_by_its_magnitudes(evaluator):
+    entry = intervals(evaluator, noisy_model(evaluator, CAMERA))[0]
     # In the phantom frame, whose origin lies under the block's middle: the turn moves it, too.
     assert entry["translation"]["value"] == pytest.approx(
         np.linalg.norm(CAMERA.shift(SETUP).translation)
@@ -155,14 +158,14 @@ def test_camera_is_reported_by_its_magnitudes(bench):
     )
 
 
-def test_magnitude_near_zero_lies_in_its_interval(bench):
-    entry = intervals(bench, noisy_model(bench, CAMERA.moved([2e-3, 0.0, 0.0, 1e-6, 0.0, 0.0])))[0][
-        "rotation"
-    ]
+def test_magnitude_near_zero_lies_in_its_interval(evaluator):
+    entry = intervals(
+        evaluator, noisy_model(evaluator, CAMERA.moved([2e-3, 0.0, 0.0, 1e-6, 0.0, 0.0]))
+    )[0]["rotation"]
     assert entry["low"] <= entry["value"] < entry["high"]
 
 
-def test_intervals_of_several_causes_keep_to_their_columns(bench):
-    lump, radius = intervals(bench, noisy_model(bench, LUMP, RADIUS))
+def test_intervals_of_several_causes_keep_to_their_columns(evaluator):
+    lump, radius = intervals(evaluator, noisy_model(evaluator, LUMP, RADIUS))
     assert lump["stiffness_ratio"]["value"] == pytest.approx(4.0)
     assert radius["radius"]["value"] == pytest.approx(4.4e-3)

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from palpate.diagnosis.inference.evidence import Block, log_evidence
-from palpate.diagnosis.inference.gauss_newton import fitted
+from palpate.diagnosis.inference.gauss_newton import best_fit
 from palpate.diagnosis.inference.hypothesis import Model
+from palpate.diagnosis.inference.parameter_blocks import ModelColumns
 from palpate.effects import Effect
 from palpate.effects.support import BaseCompliance, BaseSlip
 from palpate.foundation.arrays import FloatArray
@@ -27,20 +28,22 @@ class Slope:
     """Residuals (2,) that are linear in one coordinate and vanish at `best`; below a `kink` others
     do not quite vanish at `REST`.
 
-    Keeps where it was asked.
+    It keeps the coordinates at which it was evaluated.
     """
 
     best: float = BEST
     kink: float = KINK
-    asked: list[float] = field(default_factory=list)
+    evaluated: list[float] = field(default_factory=list)
 
     def evaluate(self, effects: Sequence[Effect], starts: Any) -> Model:
         (at,) = effects[0].coordinates
-        self.asked.append(at)
+        self.evaluated.append(at)
         rows = np.array([[0.0, 300.0 * (at - self.best)], [0.0, 300.0]])
         if at < self.kink:
             rows = np.array([[10.0, 200.0 * (at - REST)], [0.0, 200.0]])
-        return Model(tuple(effects), SETUP, (), (Block("one", rows @ rows.T, 1.0),), (0,), {}, ())
+        return Model(
+            tuple(effects), SETUP, (), (Block("one", rows @ rows.T, 1.0),), ModelColumns((), (0,))
+        )
 
     def objective(self, model: Model, nuisances: FloatArray) -> float:
         return log_evidence(model.blocks, (), np.zeros((0, 0)))
@@ -48,12 +51,12 @@ class Slope:
     def tempered(self, model: Model) -> list[Block]:
         return list(model.blocks)
 
-    def held(self, model: Model, nuisances: FloatArray) -> FloatArray:
+    def bounded_precision(self, model: Model, nuisances: FloatArray) -> FloatArray:
         return PRIOR
 
 
-def _fit(bench: Slope, effect: Effect, hopeless: float = -np.inf) -> Model:
-    return fitted(bench, bench.evaluate([effect], None), np.zeros((0, 0)), hopeless)  # type: ignore[arg-type]
+def _fit(slope: Slope, effect: Effect, hopeless: float = -np.inf) -> Model:
+    return best_fit(slope, slope.evaluate([effect], None), np.zeros((0, 0)), hopeless)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("start", [0.12, 0.139, 0.145, 0.22])
@@ -66,10 +69,10 @@ def test_without_a_kink_nothing_is_asked_beside_the_optimum() -> None:
     smooth = Slope(best=np.log(30.0), kink=-np.inf)
     found = _fit(smooth, BaseCompliance(stiffness_over_E=50.0))
     assert found.effects[0].coordinates[0] == pytest.approx(np.log(30.0), abs=2e-3)
-    assert len(smooth.asked) <= 3
+    assert len(smooth.evaluated) <= 3
 
 
 def test_a_fit_that_is_given_up_is_not_asked_again() -> None:
-    bench = Slope()
-    _fit(bench, BaseSlip(friction_coefficient=0.139), hopeless=1e6)
-    assert len(bench.asked) == 1
+    slope = Slope()
+    _fit(slope, BaseSlip(friction_coefficient=0.139), hopeless=1e6)
+    assert len(slope.evaluated) == 1

@@ -5,7 +5,7 @@ import pytest
 from pushed_block import SETUP, registration
 
 from palpate.diagnosis.inference.evidence import Block, fit, gram, log_evidence
-from palpate.diagnosis.inference.hypothesis import TWINS, Nuisances
+from palpate.diagnosis.inference.nuisances import Nuisances
 from palpate.effects.load import Gravity
 from palpate.effects.sensor import CameraRegistration
 from palpate.effects.tool import ToolOffset
@@ -27,10 +27,11 @@ def _seen(own: int, share: float) -> Block:
 
 @pytest.mark.parametrize("effect", [CameraRegistration.neutral(SETUP), ToolOffset.neutral(SETUP)])
 def test_effect_takes_all_that_it_and_its_twin_do(effect):
-    nuisances, own = Nuisances.of(registration()), TWINS[type(effect)][0]
+    nuisances = Nuisances.of(registration())
+    own = nuisances.blocks.places(effect.nuisance)[0]
     precision = np.zeros((16, 16))
     precision[15, 15] = 4e-3**-2
-    for kept, there in ((nuisances.beside([effect]), SHIFT), (nuisances.precision, None)):
+    for kept, there in ((nuisances.with_effects([effect]), SHIFT), (nuisances.precision, None)):
         precision[:15, :15] = kept
         change = fit([_seen(own, 0.0)], list(range(16)), precision).change
         if there:
@@ -40,7 +41,7 @@ def test_effect_takes_all_that_it_and_its_twin_do(effect):
 
 def test_evidence_asks_for_the_whole_shift_where_the_twin_takes_none():
     nuisances = Nuisances.of(registration())
-    own = TWINS[CameraRegistration][0]
+    own = nuisances.blocks.places(CameraRegistration.nuisance)[0]
     less, all_of_it = (_seen(own, share) for share in (0.7, 1.0))
 
     def price(precision: np.ndarray) -> float:
@@ -49,7 +50,7 @@ def test_evidence_asks_for_the_whole_shift_where_the_twin_takes_none():
         )
 
     assert (
-        price(nuisances.beside([CameraRegistration.neutral(SETUP)]))
+        price(nuisances.with_effects([CameraRegistration.neutral(SETUP)]))
         > 50 * price(nuisances.precision)
         > 0
     )
@@ -58,7 +59,7 @@ def test_evidence_asks_for_the_whole_shift_where_the_twin_takes_none():
 def test_other_nuisances_stay_as_stated():
     nuisances = Nuisances.of(registration())
     assert np.array_equal(
-        nuisances.beside([Gravity(specific_weight_over_stiffness=2.0)]), nuisances.precision
+        nuisances.with_effects([Gravity(specific_weight_over_stiffness=2.0)]), nuisances.precision
     )
-    pinned = nuisances.beside([ToolOffset.neutral(SETUP)]) != nuisances.precision
+    pinned = nuisances.with_effects([ToolOffset.neutral(SETUP)]) != nuisances.precision
     assert np.array_equal(np.argwhere(pinned), [[0, 0], [1, 1], [2, 2]])

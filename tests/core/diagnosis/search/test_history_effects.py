@@ -1,4 +1,4 @@
-"""Hypotheses in which something is remembered, on the bench that fits them."""
+"""Fits of hypotheses with history."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from dragged_block import dragged
+from evaluating import evaluator_of
 from pushed_block import GRID, SETUP, registration
 
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.forward.worker_pool import Workers
-from palpate.diagnosis.gain.gain_ladder import ladder
+from palpate.diagnosis.gain.gain_ladder import surface_gain
 from palpate.diagnosis.inference.credible_intervals import intervals
-from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.evaluate import Evaluator
+from palpate.diagnosis.inference.gauss_newton import refit
 from palpate.diagnosis.inference.noise_model import Noise
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.validation.falsified_motions import FALSIFIED
@@ -50,9 +52,11 @@ def data(name: str) -> list[Observations]:
 
 
 @pytest.fixture(scope="module")
-def bench(data: list[Observations]) -> Iterator[Bench]:
+def evaluator(data: list[Observations]) -> Iterator[Evaluator]:
     with Workers(data, 1) as workers:
-        made = Bench(SETUP, registration(), workers, [item.name for item in data], None, GRID, GRID)
+        made = evaluator_of(
+            SETUP, registration(), workers, [item.name for item in data], None, GRID, GRID
+        )
         shape = made.evaluate(()).predictions[0].gap.shape
         made.noises = [_noise(item, shape) for item in made.evaluate(()).predictions]
         yield made
@@ -69,34 +73,35 @@ def _change(there: list[Prediction], here: list[Prediction]) -> FloatArray:
     )
 
 
-def test_columns_are_nearly_what_another_size_changes(bench, name):
-    baseline, effect = bench.evaluate(()), BEGIN[name]
-    model = bench.evaluate((effect,), baseline.predictions)
+def test_columns_are_nearly_what_another_size_changes(evaluator, name):
+    baseline, effect = evaluator.evaluate(()), BEGIN[name]
+    model = evaluator.evaluate((effect,), baseline.predictions)
     for number, (item, column) in enumerate(zip(effect.numbers(), model.columns, strict=True)):
         coordinates = effect.coordinates
         coordinates[number] += item.scale
         there = [
-            f.result() for f in bench.predict([effect.at(coordinates)], None, baseline.predictions)
+            f.result()
+            for f in evaluator.predict([effect.at(coordinates)], None, baseline.predictions)
         ]
         true = _change(there, list(model.predictions)) / item.scale
         stated = np.concatenate([one.columns[..., column].ravel() for one in model.predictions])
         assert true @ stated / np.linalg.norm(true) / np.linalg.norm(stated) > 0.85
 
 
-def test_columns_of_what_is_not_remembered_stay_in_their_places(bench, name):
-    radius, baseline = ToolRadius(radius=4.6e-3), bench.evaluate(())
+def test_columns_of_what_is_not_remembered_stay_in_their_places(evaluator, name):
+    radius, baseline = ToolRadius(radius=4.6e-3), evaluator.evaluate(())
     both, alone = (
-        bench.evaluate((BEGIN[name], radius), baseline.predictions),
-        bench.evaluate((radius,), baseline.predictions),
+        evaluator.evaluate((BEGIN[name], radius), baseline.predictions),
+        evaluator.evaluate((radius,), baseline.predictions),
     )
     own, place = (model.predictions[0].columns[..., model.columns[-1]] for model in (both, alone))
     assert len(both.columns) == 1 + len(BEGIN[name].numbers())
     assert np.array_equal(own, place) and np.abs(own).max() > 0.1
 
 
-def test_fit_finds_what_is_remembered_and_its_gain_and_controls_know_it(bench, data, name):
-    baseline = bench.evaluate(())
-    model = bench.refit([BEGIN[name]], baseline.predictions)
+def test_fit_finds_what_is_remembered_and_its_gain_and_controls_know_it(evaluator, data, name):
+    baseline = evaluator.evaluate(())
+    model = refit(evaluator, [BEGIN[name]], baseline.predictions)
     for item, value, true in zip(
         model.effects[0].numbers(),
         model.effects[0].coordinates,
@@ -104,10 +109,10 @@ def test_fit_finds_what_is_remembered_and_its_gain_and_controls_know_it(bench, d
         strict=True,
     ):
         assert value == pytest.approx(true, abs=0.6 * item.scale)
-    (entry,) = intervals(bench, model)
+    (entry,) = intervals(evaluator, model)
     assert all(one["low"] < one["value"] < one["high"] for one in entry.values())
-    gain = ladder(data, baseline.predictions, model.predictions, SETUP, model.setup, 0)
+    gain = surface_gain(data, baseline.predictions, model.predictions, SETUP, model.setup, 0)
     assert gain.removed[0] > 0.8
-    found = controls(bench, data, model, baseline)
+    found = controls(evaluator, data, model, baseline)
     assert [control.control for control in found] == list(FALSIFIED)
     assert all(control.true > 30 and control.passed is not False for control in found)

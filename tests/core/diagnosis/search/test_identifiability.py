@@ -8,7 +8,7 @@ from linear_blocks import linear_blocks
 from pushed_block import SETUP
 
 from palpate.diagnosis.inference.evidence import Block
-from palpate.diagnosis.search.identifiability import ambiguity_map, detection_limits, mimicry
+from palpate.diagnosis.search.identifiability import detection_limits, identifiability_of, mimicry
 from palpate.diagnosis.search.screening import Candidate, linear_gains, right_sides
 from palpate.effects.elastic_material import StiffInclusion
 from palpate.effects.load import Gravity
@@ -149,7 +149,7 @@ def test_more_than_the_parameter_can_be_is_no_size(blocks):
 def test_map_takes_the_place_that_is_seen_best_and_says_what_half_of_them_reach(blocks):
     told = {
         one.effect: one
-        for one in ambiguity_map(
+        for one in identifiability_of(
             blocks, NUISANCE, KNOWN, [TIME, FAR_LUMP, LUMP, WEIGHT, OFFSET], BOUND
         )
     }
@@ -166,7 +166,8 @@ def test_map_takes_the_place_that_is_seen_best_and_says_what_half_of_them_reach(
 
 def test_report_states_a_change_a_factor_or_a_share(blocks):
     rows = [
-        one.to_json() for one in ambiguity_map(blocks, NUISANCE, KNOWN, [TIME, LUMP, WEIGHT], BOUND)
+        one.to_json()
+        for one in identifiability_of(blocks, NUISANCE, KNOWN, [TIME, LUMP, WEIGHT], BOUND)
     ]
     assert json.loads(json.dumps(rows)) == rows
     time, lump, weight = rows

@@ -8,23 +8,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from evaluating import evaluator_of
 from pushed_block import CORNERS, GRID, POSE, SETUP, SIZE, observed, poke
 from pushed_block import registration as stated_registration
 
 from palpate.diagnosis.forward.worker_pool import Workers
-from palpate.diagnosis.inference.inference_problem import Bench
-from palpate.diagnosis.inference.rest_cloud import StaticChannel
-from palpate.diagnosis.inference.rest_evidence import Still
+from palpate.diagnosis.inference.rest_cloud import RestCloud
+from palpate.diagnosis.inference.rest_evidence import RestEvidence
 from palpate.diagnosis.report.report import verdict_of
-from palpate.diagnosis.search import candidates
 from palpate.diagnosis.search.forward_selection import search as find_causes
+from palpate.effects import CATALOGUE, Linearisation
 from palpate.effects.tool import LandmarkMismatch
 from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.segmentation import Cleaner
 from palpate.measurement.touch_correction import touched_places
 from palpate.mesh.box_mesh import GridSpec
-from palpate.registration.landmark_repair import repairs
-from palpate.registration.registration import Registration, fit_robot
+from palpate.registration.landmark_repair import find_repairs
+from palpate.registration.registration import Registration
+from palpate.registration.robot_fit import fit_robot
 from palpate.setup.setup import Setup, Touching
 
 STATED = replace(SETUP, landmarks=CORNERS, touching=Touching(lift=5e-3))
@@ -49,13 +50,13 @@ def _touched() -> tuple[Setup, Registration]:
         phantom_from_robot=found.phantom_from_robot,
         touching=Touching(misses=misses, lift=LIFT[2]),
     )
-    (repair,) = repairs(touches, expected, SIZE, STARTS)
+    (repair,) = find_repairs(touches, expected, SIZE, STARTS)
     return setup, replace(
         stated_registration(), phantom_from_robot=found.phantom_from_robot, repair=repair
     )
 
 
-def _still(setup: Setup) -> Still:
+def _at_rest(setup: Setup) -> RestEvidence:
     random = np.random.default_rng(0)
     low, high = (
         np.array([-SIZE[0] / 2, -SIZE[1] / 2, 0.0]),
@@ -75,16 +76,15 @@ def _still(setup: Setup) -> Still:
         / np.linalg.norm(cloud, axis=1)[:, None]
     )
     cleaner = Cleaner(size=SIZE, phantom_from_camera=POSE, tool_radius=5e-3, noise=NOISE)
-    return Still(StaticChannel.of(cloud, cleaner, setup, GRID))
+    return RestEvidence(RestCloud.of(cloud, cleaner, setup, GRID))
 
 
 @pytest.mark.slow
-def test_swapped_corners_are_named_with_the_size_of_the_touched_polygon_and_nothing_else(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(
-        candidates, "FINITE", ()
-    )  # what replays of a finite size would show is no matter here
+def test_swapped_corners_are_named_with_the_size_of_the_touched_polygon_and_nothing_else() -> None:
+    # Effects that are screened by replays of a finite size do not matter here.
+    catalogue = [
+        kind for kind in CATALOGUE if kind.linearisation is not Linearisation.FINITE_DIFFERENCE
+    ]
     setup, registration = _touched()
     assert (
         np.arccos(setup.phantom_from_robot.rotation[2, 2]) > 0.5
@@ -97,15 +97,22 @@ def test_swapped_corners_are_named_with_the_size_of_the_touched_polygon_and_noth
         )
     with Workers(data, 1) as workers:
         fine = GridSpec(nodes=(11, 9, 7), spacing=1.7e-3)
-        bench = Bench(
-            setup, registration, workers, [item.name for item in data], _still(setup), GRID, fine
+        evaluator = evaluator_of(
+            setup,
+            registration,
+            workers,
+            [item.name for item in data],
+            _at_rest(setup),
+            GRID,
+            fine,
+            catalogue=catalogue,
         )
-        found = find_causes(bench, seed=0)
+        found = find_causes(evaluator, seed=0)
     assert verdict_of(found) == "found" and found.best is not None and found.best.gain > 1000
     (effect,) = found.best.model.effects
     assert isinstance(effect, LandmarkMismatch) and effect.pairing == "swap-1-2"
     assert effect.scale == pytest.approx(0.87, abs=0.03) and effect.inset == pytest.approx(
         1e-3, abs=6e-4
     )
-    assert bench.misfit(found.best.model) < 1.2 < found.misfit
+    assert evaluator.misfit(found.best.model) < 1.2 < found.misfit
     assert found.known and not found.left.significant

@@ -6,22 +6,23 @@ from pushed_block import SETUP
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.hypothesis import Model
+from palpate.diagnosis.inference.parameter_blocks import ModelColumns
 from palpate.diagnosis.inference.residual_structure import Structure
 from palpate.diagnosis.search.findings import Findings, Trial
-from palpate.diagnosis.search.forward_selection import _asks_for_more, _needed
+from palpate.diagnosis.search.forward_selection import _refits_nonlinear, required_gain
 from palpate.effects.support import BaseCompliance
 
-STATED = Model((), SETUP, (), (), (), {}, ())
-SOFT = Model((BaseCompliance(stiffness_over_E=41.0),), SETUP, (), (), (), {}, ())
+STATED = Model((), SETUP, (), (), ModelColumns(()))
+SOFT = Model((BaseCompliance(stiffness_over_E=41.0),), SETUP, (), (), ModelColumns(()))
 QUIET, LOUD = Structure(75.0, 100.0, 140.0), Structure(300.0, 100.0, 140.0)
 
 
 def test_first_cause_must_gain_what_chance_alone_does_not():
-    assert _needed(Findings(STATED, bound=31.0), Trial(STATED, 0.0, 1.2)) == 31.0
+    assert required_gain(Findings(STATED, bound=31.0), Trial(STATED, 0.0, 1.2)) == 31.0
 
 
 def _second(first: float, left: Structure = QUIET) -> float:
-    return _needed(Findings(STATED, left=left), Trial(SOFT, first, 1.06))
+    return required_gain(Findings(STATED, remaining=left), Trial(SOFT, first, 1.06))
 
 
 def test_second_cause_may_show_a_fifth_of_what_the_first_does():
@@ -50,9 +51,9 @@ def test_what_tangents_know_little_of_is_refitted_beside_a_cause_only_where_anot
         np.array([3.0, 0.9 * CRITERIA.naming.promising * needed]),
         np.array([3.0, 1.1 * CRITERIA.naming.promising * needed]),
     )
-    assert _asks_for_more(Findings(STATED), Trial(STATED, 0.0, 1.2), quiet)
+    assert _refits_nonlinear(Findings(STATED), Trial(STATED, 0.0, 1.2), quiet)
     soft = Trial(SOFT, 994.0, 1.06)
-    assert not _asks_for_more(Findings(STATED, left=QUIET), soft, quiet)
-    assert _asks_for_more(Findings(STATED, left=QUIET), soft, promising)
-    assert _asks_for_more(Findings(STATED, left=LOUD), soft, quiet)
-    assert not _asks_for_more(Findings(STATED, left=QUIET), soft, np.empty(0))
+    assert not _refits_nonlinear(Findings(STATED, remaining=QUIET), soft, quiet)
+    assert _refits_nonlinear(Findings(STATED, remaining=QUIET), soft, promising)
+    assert _refits_nonlinear(Findings(STATED, remaining=LOUD), soft, quiet)
+    assert not _refits_nonlinear(Findings(STATED, remaining=QUIET), soft, np.empty(0))

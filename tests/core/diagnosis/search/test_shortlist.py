@@ -4,14 +4,16 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from evaluating import evaluator_of
 from pushed_block import SETUP, prediction, registration
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS
 from palpate.diagnosis.forward.worker_pool import Workers
+from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, gram
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.inference_problem import Bench
+from palpate.diagnosis.inference.parameter_blocks import ModelColumns
 from palpate.diagnosis.search.screening import Candidate
 from palpate.diagnosis.search.shortlist import beyond_first_order, shortlist
 from palpate.effects.elastic_material import PoissonRatio, StiffInclusion
@@ -42,42 +44,43 @@ def lump(x: float, y: float = 0.0) -> Candidate:
 
 
 @pytest.fixture(scope="module")
-def bench() -> Iterator[Bench]:
+def evaluator() -> Iterator[Evaluator]:
     """The stated setup with its priors; nothing is replayed here."""
     with Workers([], 1) as workers:
-        yield Bench(SETUP, registration(), workers, ["poke-01"], None, GridSpec(), GridSpec())
+        yield evaluator_of(
+            SETUP, registration(), workers, ["poke-01"], None, GridSpec(), GridSpec()
+        )
 
 
-def _pulled(bench: Bench, pulls: dict[int, float]) -> Model:
+def _pulled(evaluator: Evaluator, pulls: dict[int, float]) -> Model:
     """Data that know every nuisance well, and pull some of them this many of its stated deviations
     away.
     """
-    deviations = np.sqrt(np.diag(np.linalg.inv(bench.nuisances.precision)))
-    shape = (GROUPS, bench.surface.patches)
+    deviations = np.sqrt(np.diag(np.linalg.inv(evaluator.problem.nuisances.precision)))
+    shape = (GROUPS, evaluator.problem.surface.patches)
     columns = 1e-3 / deviations * np.random.default_rng(0).standard_normal((*shape, NUISANCES))
     size = np.zeros(NUISANCES)
     for column, pull in pulls.items():
         size[column] = pull * deviations[column]
     gap = -(columns @ size)
     block = Block("poke-01", *gram(gap, columns, np.full(shape, 1e8)))
-    return Model((), SETUP, (prediction(gap),), (block,), (), {}, tuple(range(NUISANCES)))
+    return Model((), SETUP, (prediction(gap),), (block,), ModelColumns(tuple(range(NUISANCES))))
 
 
-def test_tools_offset_and_radius_are_always_refitted(bench):
-    assert beyond_first_order(bench, _pulled(bench, {}), [SAG, RADIUS, OFFSET, NU, CLOCK]) == [
-        RADIUS,
-        OFFSET,
-    ]
+def test_tools_offset_and_radius_are_always_refitted(evaluator):
+    assert beyond_first_order(
+        evaluator, _pulled(evaluator, {}), [SAG, RADIUS, OFFSET, NU, CLOCK]
+    ) == [RADIUS, OFFSET]
 
 
-def test_the_worst_of_the_accuracies_that_the_data_break_is_refitted_too(bench):
-    model = _pulled(bench, {TOOL_COLUMNS + 2: 6.0, TOOL_COLUMNS + 1: 20.0})
-    assert beyond_first_order(bench, model, [OFFSET, CAMERA, NU]) == [OFFSET, NU]
+def test_the_worst_of_the_accuracies_that_the_data_break_is_refitted_too(evaluator):
+    model = _pulled(evaluator, {TOOL_COLUMNS + 2: 6.0, TOOL_COLUMNS + 1: 20.0})
+    assert beyond_first_order(evaluator, model, [OFFSET, CAMERA, NU]) == [OFFSET, NU]
 
 
-def test_what_lies_within_the_stated_accuracy_is_not_refitted_for_it(bench):
-    model = _pulled(bench, {0: 2.0, TOOL_COLUMNS + 2: 3.0, TOOL_COLUMNS + 1: -2.5})
-    assert beyond_first_order(bench, model, [SAG, CAMERA, NU, CLOCK]) == []
+def test_what_lies_within_the_stated_accuracy_is_not_refitted_for_it(evaluator):
+    model = _pulled(evaluator, {0: 2.0, TOOL_COLUMNS + 2: 3.0, TOOL_COLUMNS + 1: -2.5})
+    assert beyond_first_order(evaluator, model, [SAG, CAMERA, NU, CLOCK]) == []
 
 
 def test_settled_one_comes_first_and_takes_nobodys_place():
