@@ -133,28 +133,28 @@ def test_it_is_drawn_in_the_page_that_asked_and_taken_back(there: httpx.Client, 
 
 
 def test_solver_that_dies_is_started_again(run: Path) -> None:
-    asked, found = FrameSolver(), Run(run)
+    solver, recorded = FrameSolver(), Run(run)
     try:
-        asked.solve(found, SEQUENCE, 0, [], True)
-        assert asked._pool is not None
-        (process,) = asked._pool._processes
+        solver.solve(recorded, SEQUENCE, 0, [], True)
+        assert solver._pool is not None
+        (process,) = solver._pool._processes
         os.kill(process, signal.SIGKILL)
         end = time.monotonic() + 30
         while time.monotonic() < end:
             try:
-                assert asked.solve(found, SEQUENCE, 0, [], True).converged
+                assert solver.solve(recorded, SEQUENCE, 0, [], True).converged
                 break
             except RunError as error:
                 assert "ended" in error.message
     finally:
-        asked.close()
+        solver.close()
 
 
 def test_solve_that_takes_too_long_is_given_up(run: Path) -> None:
-    asked = FrameSolver(patience=0.01)
-    with pytest.raises(RunError, match="given up"):
-        asked.solve(Run(run), SEQUENCE, 0, [], True)
-    asked.close()
+    solver = FrameSolver(patience=0.01)
+    with pytest.raises(RunError, match="was not solved within"):
+        solver.solve(Run(run), SEQUENCE, 0, [], True)
+    solver.close()
 
 
 def test_run_that_does_not_say_where_its_data_are_is_told(run: Path, tmp_path: Path) -> None:
