@@ -5,6 +5,7 @@ An inclusion is found below the pushes, its footprint is drawn, and the modulus 
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +90,8 @@ def test_inclusion_is_found_with_place_depth_and_footprint(tmp_path: Path) -> No
         "controls"
     ][0]["passed"]
     assert (tmp_path / "run" / "pictures" / "palpation.png").stat().st_size > 20_000
+    model = json.loads((tmp_path / "run" / "model.json").read_text())
+    assert model["criteria"] == report["criteria"] == {"version": CRITERIA.version}
 
 
 def test_outline_is_where_the_change_falls_to_the_level() -> None:
