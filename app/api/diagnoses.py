@@ -6,9 +6,9 @@ from typing import Any
 
 from fastapi import APIRouter, Response
 
-from palpate.app.api.job_results import job_out
 from palpate.app.http_errors import Conflict
 from palpate.app.jobs.job_records import JobState
+from palpate.app.jobs.job_results import job_out
 from palpate.app.schemas import DiagnosisRequest, JobOut
 from palpate.app.server.pagination import RequestedPage, paginate
 from palpate.app.services import CurrentServices, IdempotencyKey

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.config import JsonDict
 
-from palpate.app.api.job_results import (
+from palpate.app.jobs.job_results import (
     cancel_job,
     job_of,
     job_out,
@@ -75,7 +75,7 @@ def listed(
     The header X-Total-Count has their number.
     """
     store = EvaluationStore(services.settings.runs)
-    rows = paginate(names_and_jobs(store, services), page, response)
+    rows = paginate(names_and_jobs(store, services.jobs), page, response)
     return [listed_result(store, name, job) for name, job in rows]
 
 
@@ -83,10 +83,10 @@ def listed(
 def one(identity: str, services: CurrentServices) -> dict[str, Any]:
     """One evaluation: its job, and the errors once it has ended."""
     store = EvaluationStore(services.settings.runs)
-    return result_and_job(store, identity, job_of(store, identity, services))
+    return result_and_job(store, identity, job_of(store, identity, services.jobs))
 
 
 @router.post("/{identity}/cancel")
 def cancel(identity: str, services: CurrentServices) -> JobOut:
     """Stop it. 409 if it has ended already."""
-    return cancel_job(EvaluationStore(services.settings.runs), identity, services)
+    return cancel_job(EvaluationStore(services.settings.runs), identity, services.jobs)

@@ -12,9 +12,9 @@ from uuid import uuid4
 from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
 
-from palpate.app.api.job_results import job_out
 from palpate.app.http_errors import Conflict
 from palpate.app.jobs.job_records import Job
+from palpate.app.jobs.job_results import job_out
 from palpate.app.schemas import JobOut
 from palpate.app.services import CurrentServices, IdempotencyKey, Services
 from palpate.app.storage.archive import is_archive

@@ -10,7 +10,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
-from palpate.app.api.job_results import job_out
+from palpate.app.jobs.job_results import job_out
 from palpate.app.schemas import JobOut, NoteOut, Notes
 from palpate.app.server.pagination import TOTAL, RequestedPage
 from palpate.app.services import CurrentServices, Services

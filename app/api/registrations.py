@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.config import JsonValue
 
-from palpate.app.api.job_results import job_out
+from palpate.app.jobs.job_results import job_out
 from palpate.app.schemas import JobOut, Point
 from palpate.app.services import CurrentServices, IdempotencyKey
 from palpate.app.storage.registration_store import RegistrationStore, register

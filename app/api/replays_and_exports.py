@@ -10,8 +10,8 @@ from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.config import JsonDict
 
-from palpate.app.api.job_results import job_out
 from palpate.app.http_errors import Missing
+from palpate.app.jobs.job_results import job_out
 from palpate.app.jobs.short_tasks import EXPORTS
 from palpate.app.schemas import EffectIn, JobOut
 from palpate.app.services import CurrentServices, IdempotencyKey

@@ -9,13 +9,13 @@ import numpy as np
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse, HTMLResponse
 
+from palpate.app.drawing.colours import nice_limit
+from palpate.app.drawing.view import Quantity
 from palpate.app.reporting.json_values import finite
 from palpate.app.reporting.model_comparison import compared
 from palpate.app.reporting.sentences import registration_sentences, verdict_sentence
 from palpate.app.reporting.timeline_series import timeline_series
-from palpate.app.scene.colours import nice_limit
 from palpate.app.scene.model_layer import NO_INSIDE
-from palpate.app.scene.view import Quantity
 from palpate.app.server.pagination import RequestedPage, paginate
 from palpate.app.services import CurrentServices
 from palpate.app.storage.run_store import RecordedReplay, Run

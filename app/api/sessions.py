@@ -9,9 +9,9 @@ import numpy as np
 from fastapi import APIRouter, Query, Response, WebSocket
 from pydantic import ValidationError
 
+from palpate.app.drawing.colours import palette
+from palpate.app.drawing.view import Camera, View
 from palpate.app.http_errors import as_dict
-from palpate.app.scene.colours import palette
-from palpate.app.scene.view import Camera, View
 from palpate.app.scene.viewpoint import Direction, Viewpoint
 from palpate.app.server.newest_wins import newest_wins
 from palpate.app.server.viser_proxy import PageId

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 from pydantic.config import JsonDict
 
-from palpate.app.api.job_results import cancel_job, job_of, job_out, names_and_jobs, result_and_job
+from palpate.app.jobs.job_results import cancel_job, job_of, job_out, names_and_jobs, result_and_job
 from palpate.app.schemas import JobOut
 from palpate.app.server.pagination import RequestedPage, paginate
 from palpate.app.services import CurrentServices, IdempotencyKey
@@ -85,7 +85,7 @@ def listed(
     The header X-Total-Count has their number.
     """
     store = SweepStore(services.settings.runs)
-    rows = paginate(names_and_jobs(store, services), page, response)
+    rows = paginate(names_and_jobs(store, services.jobs), page, response)
     return [{"id": name, "job": job, "begun": store.has_begun(name)} for name, job in rows]
 
 
@@ -93,7 +93,7 @@ def listed(
 def one(identity: str, services: CurrentServices) -> dict[str, Any]:
     """One sweep: its job, the request, and the summary once it has ended."""
     store = SweepStore(services.settings.runs)
-    return result_and_job(store, identity, job_of(store, identity, services))
+    return result_and_job(store, identity, job_of(store, identity, services.jobs))
 
 
 @router.get("/{identity}/points")
@@ -108,7 +108,7 @@ def points(
     `next` is the value of `after` for the next request.
     """
     store = SweepStore(services.settings.runs)
-    job = job_of(store, identity, services)
+    job = job_of(store, identity, services.jobs)
     if job is None and not store.has_begun(identity):
         raise store.missing(identity)
     begun = store.has_begun(identity)
@@ -119,4 +119,4 @@ def points(
 @router.post("/{identity}/cancel")
 def cancel(identity: str, services: CurrentServices) -> JobOut:
     """Stop it; its finished points stay. 409 if it has ended already."""
-    return cancel_job(SweepStore(services.settings.runs), identity, services)
+    return cancel_job(SweepStore(services.settings.runs), identity, services.jobs)

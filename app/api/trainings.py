@@ -8,7 +8,7 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.config import JsonDict
 
-from palpate.app.api.job_results import (
+from palpate.app.jobs.job_results import (
     cancel_job,
     job_of,
     job_out,
@@ -104,7 +104,7 @@ def listed(
     The header X-Total-Count has their number.
     """
     store = TrainingStore(services.settings.runs)
-    rows = paginate(names_and_jobs(store, services), page, response)
+    rows = paginate(names_and_jobs(store, services.jobs), page, response)
     return [listed_result(store, name, job) for name, job in rows]
 
 
@@ -115,11 +115,11 @@ def one(identity: str, services: CurrentServices) -> dict[str, Any]:
     The history has loss, validation error [mm] and learning rate of each finished epoch.
     """
     store = TrainingStore(services.settings.runs)
-    result = result_and_job(store, identity, job_of(store, identity, services))
+    result = result_and_job(store, identity, job_of(store, identity, services.jobs))
     return {**result, "history": store.history(identity)}
 
 
 @router.post("/{identity}/cancel")
 def cancel(identity: str, services: CurrentServices) -> JobOut:
     """Stop it; a retry resumes it. 409 if it has ended already."""
-    return cancel_job(TrainingStore(services.settings.runs), identity, services)
+    return cancel_job(TrainingStore(services.settings.runs), identity, services.jobs)

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from palpate.app.scene import colours
-from palpate.app.scene.figures import Figure, LinesFigure, SurfaceFigure, float32
+from palpate.app.drawing import colours
+from palpate.app.drawing.figures import Figure, LinesFigure, SurfaceFigure, float32
+from palpate.app.drawing.surface_bands import IntArray, lattice
 from palpate.app.scene.model_layer import ModelLayer
-from palpate.app.scene.surface_bands import IntArray, lattice
 from palpate.app.storage.run_store import Run
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RunError

@@ -7,8 +7,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from palpate.app.scene.colours import nice_end, nice_limit
-from palpate.app.scene.view import MODELS, Model, Quantity
+from palpate.app.drawing.colours import nice_end, nice_limit
+from palpate.app.drawing.view import MODELS, Model, Quantity
 from palpate.app.storage.run_store import RecordedReplay
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.app.drawing.view import MODELS, Model, Quantity, View
 from palpate.app.http_errors import Missing
 from palpate.app.scene.annotations import annotations_of
 from palpate.app.scene.model_layer import end_of_scale
 from palpate.app.scene.picture import Picture
 from palpate.app.scene.sequence_renderer import SequenceRenderer
-from palpate.app.scene.view import MODELS, Model, Quantity, View
 from palpate.app.scene.viewer_scene import PageScene
 from palpate.app.scene.viewpoint import Direction, Viewpoint, viewpoint_for
 from palpate.app.storage.run_store import Run, RunStore

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from palpate.app.scene.figures import Figure, LinesFigure, SurfaceFigure, ToolFigure, checksum
-from palpate.app.scene.view import Quantity
+from palpate.app.drawing.figures import Figure, LinesFigure, SurfaceFigure, ToolFigure, checksum
+from palpate.app.drawing.view import Quantity
 
 __all__ = ["Picture"]
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from palpate.app.scene import colours
+from palpate.app.drawing import colours
 from palpate.app.scene.registration_picture import Arrow, Mark, PairPicture, pair_colour
 from palpate.app.scene.viewpoint import FIELD_OF_VIEW
 from palpate.foundation.arrays import FloatArray

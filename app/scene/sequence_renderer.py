@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from palpate.app.scene import colours
-from palpate.app.scene.annotations import Annotations, path_lines
-from palpate.app.scene.coloured_surface import banded_surface, light_surface
-from palpate.app.scene.cut_section import clipped, cut_face, depth_inside
-from palpate.app.scene.figures import (
+from palpate.app.drawing import colours
+from palpate.app.drawing.coloured_surface import banded_surface, light_surface
+from palpate.app.drawing.cut_section import clipped, cut_face, depth_inside
+from palpate.app.drawing.figures import (
     CloudFigure,
     Figure,
     LabelFigure,
@@ -24,10 +23,11 @@ from palpate.app.scene.figures import (
     ToolFigure,
     float32,
 )
+from palpate.app.drawing.surface_bands import FineSurface, IntArray, grid_edges, refine
+from palpate.app.drawing.view import Model, Quantity, Section, View
+from palpate.app.scene.annotations import Annotations, path_lines
 from palpate.app.scene.model_layer import FrameSolution, ModelLayer, end_of_scale, model_layers
 from palpate.app.scene.picture import Picture
-from palpate.app.scene.surface_bands import FineSurface, IntArray, grid_edges, refine
-from palpate.app.scene.view import Model, Quantity, Section, View
 from palpate.app.storage.run_store import RecordedReplay
 from palpate.foundation.arrays import FloatArray
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from palpate.app.scene import colours
-from palpate.app.scene.figures import (
+from palpate.app.drawing import colours
+from palpate.app.drawing.figures import (
     CloudFigure,
     Figure,
     LabelFigure,

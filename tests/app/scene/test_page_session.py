@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from palpate.app.drawing.view import View
 from palpate.app.http_errors import Missing
 from palpate.app.scene.page_session import Sessions
 from palpate.app.scene.picture import Picture
-from palpate.app.scene.view import View
 from palpate.app.scene.viewpoint import Viewpoint, viewpoint_for
 from palpate.app.storage.run_store import RunStore
 

@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 from small_dataset import SIZE, small_cloud
 
-from palpate.app.scene.annotations import annotations_of
-from palpate.app.scene.colours import BANDS, EXTENDED, RAW, SEQUENTIAL, SIGNED, band_of
-from palpate.app.scene.figures import (
+from palpate.app.drawing.colours import BANDS, EXTENDED, RAW, SEQUENTIAL, SIGNED, band_of
+from palpate.app.drawing.figures import (
     CloudFigure,
     LabelFigure,
     LinesFigure,
     SurfaceFigure,
     ToolFigure,
 )
+from palpate.app.drawing.view import Layer, View
+from palpate.app.scene.annotations import annotations_of
 from palpate.app.scene.page_session import Session
 from palpate.app.scene.picture import Picture
 from palpate.app.scene.sequence_renderer import MOST_TRIANGLES, SequenceRenderer
-from palpate.app.scene.view import Layer, View
 from palpate.app.storage.run_store import Run
 
 ALL: tuple[Layer, ...] = ("measured", "raw", "extended", "tool")

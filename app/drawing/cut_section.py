@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from palpate.app.scene.surface_bands import FineSurface, IntArray, lattice
-from palpate.app.scene.view import Section
+from palpate.app.drawing.surface_bands import FineSurface, IntArray, lattice
+from palpate.app.drawing.view import Section
 from palpate.foundation.arrays import FloatArray
 
 __all__ = ["clipped", "cut_face", "depth_inside"]

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.app.scene.surface_bands import grid_edges, refine
+from palpate.app.drawing.surface_bands import grid_edges, refine
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.mesh.box_mesh import GridSpec, box_mesh
 

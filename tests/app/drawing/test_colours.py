@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.app.scene.colours import BANDS, SIGNED, band_of, nice_limit
+from palpate.app.drawing.colours import BANDS, SIGNED, band_of, nice_limit
 
 
 def test_zero_lies_in_the_middle_band_and_the_bands_are_symmetric() -> None:

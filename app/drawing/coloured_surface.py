@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from palpate.app.scene import colours
-from palpate.app.scene.figures import Figure, SurfaceFigure, float32
-from palpate.app.scene.surface_bands import IntArray
-from palpate.app.scene.view import Quantity
+from palpate.app.drawing import colours
+from palpate.app.drawing.figures import Figure, SurfaceFigure, float32
+from palpate.app.drawing.surface_bands import IntArray
+from palpate.app.drawing.view import Quantity
 from palpate.foundation.arrays import FloatArray
 
 __all__ = ["banded_surface", "light_surface"]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from palpate.app.http_errors import Missing
+from palpate.app.jobs.job_queue import JobQueue
 from palpate.app.jobs.job_records import Job
 from palpate.app.schemas import JobOut
-from palpate.app.services import Services
 from palpate.app.storage.result_store import ResultStore
 from palpate.foundation.errors import RunError
 
@@ -24,17 +24,15 @@ def job_out(job: Job) -> JobOut:
     )
 
 
-def names_and_jobs(
-    store: ResultStore, services: Services
-) -> list[tuple[str, dict[str, Any] | None]]:
+def names_and_jobs(store: ResultStore, jobs: JobQueue) -> list[tuple[str, dict[str, Any] | None]]:
     """Names of all results, the newest first, with their jobs where these are still recorded.
 
     Results whose jobs have not begun to write come first.
     """
-    jobs = {job.id: job_out(job) for job in services.jobs.all() if job.kind == store.kind}
+    public = {job.id: job_out(job) for job in jobs.all() if job.kind == store.kind}
     begun = store.names()
-    names = [*(name for name in jobs if name not in begun), *begun]
-    return [(name, jobs[name].model_dump() if name in jobs else None) for name in names]
+    names = [*(name for name in public if name not in begun), *begun]
+    return [(name, public[name].model_dump() if name in public else None) for name in names]
 
 
 def result_and_job(store: ResultStore, name: str, job: dict[str, Any] | None) -> dict[str, Any]:
@@ -62,17 +60,17 @@ def listed_result(store: ResultStore, name: str, job: dict[str, Any] | None) -> 
         return {"id": name, "job": job, "request": None, "summary": None}
 
 
-def job_of(store: ResultStore, name: str, services: Services) -> dict[str, Any] | None:
+def job_of(store: ResultStore, name: str, jobs: JobQueue) -> dict[str, Any] | None:
     """The job of a result; None where it is not recorded."""
     try:
-        job = services.jobs.get(name)
+        job = jobs.get(name)
     except Missing:
         return None
     return job_out(job).model_dump() if job.kind == store.kind else None
 
 
-def cancel_job(store: ResultStore, name: str, services: Services) -> JobOut:
+def cancel_job(store: ResultStore, name: str, jobs: JobQueue) -> JobOut:
     """Stop the job of a result."""
-    if job_of(store, name, services) is None:
+    if job_of(store, name, jobs) is None:
         raise Missing(f"there is no {store.kind} {name} to stop", **{store.kind: name})
-    return job_out(services.jobs.cancel(name))
+    return job_out(jobs.cancel(name))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.app.scene.cut_section import clipped, cut_face, depth_inside
-from palpate.app.scene.surface_bands import FineSurface, refine
-from palpate.app.scene.view import Section
+from palpate.app.drawing.cut_section import clipped, cut_face, depth_inside
+from palpate.app.drawing.surface_bands import FineSurface, refine
+from palpate.app.drawing.view import Section
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.box_mesh import GridSpec, box_mesh
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.app.scene.surface_bands import IntArray
+from palpate.app.drawing.surface_bands import IntArray
 from palpate.foundation.arrays import FloatArray
 
 __all__ = [
