@@ -1,6 +1,6 @@
 // The panel of the correction network: trains it on a model, shows the training, and compares
 // models with and without networks on the test sequences (the ladder).
-import { errorCard, get, post } from "./api.js";
+import { errorCard, get, post, toast } from "./api.js";
 import { validationCurve, ladderChart } from "./correction-plots.js";
 import { element, fill } from "./dom.js";
 import { capitalise } from "./format.js";
@@ -35,6 +35,8 @@ let box;
 let settings = { dataset: "", run: "", kind: "unet2d", trust: 0.5, hold: 1, epochs: 40, every: 1 };
 /** @type {{ kind: JobKind, id: string } | null} */
 let followed = null; // the job that is shown; null while the form is
+/** @type {{ attempt: string, node: HTMLElement } | null} */
+let stopButton = null; // of the shown job's attempt
 let generation = 0; // increases whenever the panel starts to show something else
 
 /**
@@ -361,8 +363,24 @@ async function drawOne(mine) {
     (path) =>
     async ({ currentTarget: button }) => {
       button.disabled = true;
-      await post(path).catch((problem) => box.append(errorCard(problem)));
+      try {
+        await post(path);
+      } catch (problem) {
+        toast(problem);
+        button.disabled = false;
+      }
       followPanel();
+    };
+  // The same button each time, because one that is replaced while it is pressed does not act.
+  const attempt = `${id} ${job?.attempt}`;
+  if (stopButton?.attempt !== attempt)
+    stopButton = {
+      attempt,
+      node: element(
+        "button",
+        { class: "button", type: "button", onclick: request(`/${kind}/${id}/cancel`) },
+        "Stop",
+      ),
     };
   fill(
     box,
@@ -416,13 +434,7 @@ async function drawOne(mine) {
     element(
       "div",
       { class: "actions" },
-      isOpen(job)
-        ? element(
-            "button",
-            { class: "button", type: "button", onclick: request(`/${kind}/${id}/cancel`) },
-            "Stop",
-          )
-        : null,
+      isOpen(job) ? stopButton.node : null,
       job?.can_retry
         ? element(
             "button",

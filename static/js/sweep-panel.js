@@ -1,6 +1,6 @@
 // The panel of sweeps: the form, the points as they arrive, and what they say about each
 // parameter.
-import { errorCard, errorTitle, get, post } from "./api.js";
+import { errorCard, errorTitle, get, post, toast } from "./api.js";
 import { element, fill, icon } from "./dom.js";
 import { capitalise, readableName, UNITS } from "./format.js";
 import { addResultOpener } from "./jobs.js";
@@ -364,6 +364,7 @@ async function followSweep(id) {
   /** @type {SweepPoint[]} */
   let points = [];
   let next = 0;
+  const stop = stopButton(id);
   while (followedId === id) {
     try {
       /** @type {[Sweep, { points: SweepPoint[], next: number }, void]} */
@@ -376,7 +377,7 @@ async function followSweep(id) {
       points = points.concat(more.points);
       next = more.next;
       const byNumber = new Map(points.map((point) => [point.number, point]));
-      draw(sweep, [...byNumber.values()]);
+      draw(sweep, [...byNumber.values()], stop);
       const ended = !sweep.job || !["queued", "running"].includes(sweep.job.state);
       if (ended && !more.points.length) return;
     } catch (problem) {
@@ -406,23 +407,36 @@ const backButton = () =>
   );
 
 /**
- * @param {Sweep} sweep
- * @param {SweepPoint[]} points
+ * Create the button that stops a sweep.
+ * @param {string} id
+ * @returns {HTMLElement}
  */
-function draw({ id, job, request, summary }, points) {
-  const running = job && ["queued", "running"].includes(job.state) ? job : null;
-  const stop = element(
+function stopButton(id) {
+  const button = element(
     "button",
     {
       class: "button",
       type: "button",
       onclick: async () => {
-        stop.disabled = true;
-        await post(`/sweeps/${id}/cancel`).catch(() => {});
+        button.disabled = true;
+        await post(`/sweeps/${id}/cancel`).catch((problem) => {
+          toast(problem);
+          button.disabled = false;
+        });
       },
     },
     "Stop",
   );
+  return button;
+}
+
+/**
+ * @param {Sweep} sweep
+ * @param {SweepPoint[]} points
+ * @param {HTMLElement} stop button that stays the same from call to call, so that it can be pressed
+ */
+function draw({ id, job, request, summary }, points, stop) {
+  const running = job && ["queued", "running"].includes(job.state) ? job : null;
   const swept = points.filter(({ kind }) => kind !== "stated");
   const stated = points.find(({ kind }) => kind === "stated")?.error ?? null;
   const best = swept.reduce(
