@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -241,10 +242,10 @@ def _group_columns(
     """Changes of a group's patch averages (p, k) and force gap (3, k), in single precision."""
     moves = path.moves[:, number]
     changed = columns.of_group(frame, moves)
-    own = columns.project(frame, changed, moves, compared, reference).astype(np.float32)
+    own: Any = columns.project(frame, changed, moves, compared, reference).astype(np.float32)
     if path.measured is None:
         return own, None
-    force = columns.of_force(changed, path.measured[0][number], path.rotations)
+    force: Any = columns.of_force(changed, path.measured[0][number], path.rotations)
     return own, force.astype(np.float32)
 
 
