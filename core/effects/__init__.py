@@ -1,9 +1,8 @@
-"""The catalogue of causes. A new one is one class in a file of this folder and one entry here.
+"""The catalogue of effects. A new one is one class in a module of this package and one entry here.
 
-The engine replays all of them. A diagnosis weighs those in `DIAGNOSED`: those that the virtual
-bench can hide and whose signature it can screen, relaxation, permanent set and friction of the tool
-among them by traces (`palpate.diagnosis.forward.history_columns`), and what other packages bring
-(`OUTSIDE`; how is in the README beside this file).
+The engine replays all of them. A diagnosis weighs those of `DIAGNOSED` that the data can show, and
+the modulus where forces were measured. `OUTSIDE` are the effects of other packages (see the README
+beside this file).
 """
 
 from __future__ import annotations
@@ -82,7 +81,7 @@ CATALOGUE = (*DIAGNOSED, *_REPLAYED)
 
 
 def effect_named(name: str) -> type[Effect]:
-    """The class of this name; an unknown one is an error that lists the known."""
+    """Return the class of this name; raise EffectError that lists the known names otherwise."""
     for effect in CATALOGUE:
         if effect.name == name:
             return effect
@@ -93,5 +92,5 @@ def effect_named(name: str) -> type[Effect]:
 
 
 def from_json(data: dict[str, Any]) -> Effect:
-    """The inverse of `Effect.to_json`."""
+    """Return the effect that `Effect.to_json` described."""
     return effect_named(data["effect"])(**data["parameters"])

@@ -1,6 +1,4 @@
-"""Effects that others wrote: found by the entry point `palpate.effects`, checked, and weighed like
-those of the catalogue.
-"""
+"""Effects of other packages: found by the entry point `palpate.effects`, and checked."""
 
 from __future__ import annotations
 
@@ -12,6 +10,7 @@ from dataclasses import is_dataclass
 from importlib.metadata import EntryPoint, entry_points
 
 from palpate.effects.base import Effect, Slot
+from palpate.effects.linearisation import Linearisation
 from palpate.effects.parameter import Parameter
 from palpate.foundation.errors import EffectError
 
@@ -25,14 +24,14 @@ _OLD_NAMES = ("core", "app")
 def outside_effects(
     known: Iterable[str], points: Iterable[EntryPoint] | None = None
 ) -> tuple[type[Effect], ...]:
-    """The effects of installed packages, in the order of their entry points' names.
+    """Return the effects of installed packages, in the order of their entry points' names.
 
-    What cannot be loaded or breaks the contract is left out with a warning that says which and why:
-    one broken package must not take the catalogue away.
+    An effect that cannot be loaded or breaks the contract is left out with a warning that says
+    which and why, so that one broken package does not take the catalogue away.
 
     Args:
         known: names that are taken.
-        points: entry points; those installed, without it.
+        points: entry points; those of the installed packages without it.
     """
     taken, found = set(known), list[type[Effect]]()
     for point in sorted(
@@ -40,7 +39,7 @@ def outside_effects(
     ):
         try:
             effect = checked(point.load(), taken)
-        except Exception as error:  # whatever a stranger's module does on import
+        except Exception as error:  # a module of another package may raise anything on import
             reason = _reason(error)
             warnings.warn(
                 f"the effect {point.name} = {point.value} is left out: {reason}", stacklevel=2
@@ -65,7 +64,7 @@ def _reason(error: Exception) -> str:
 
 
 def checked(effect: object, taken: Iterable[str]) -> type[Effect]:
-    """The same class if it keeps what every effect must keep; EffectError otherwise."""
+    """Return the same class if it keeps the contract of effects; raise EffectError otherwise."""
     if not (isinstance(effect, type) and issubclass(effect, Effect)):
         raise EffectError(f"{effect!r} is no subclass of palpate.effects.Effect")
     if inspect.isabstract(effect):
@@ -87,7 +86,26 @@ def checked(effect: object, taken: Iterable[str]) -> type[Effect]:
         raise EffectError(f"{effect.name} has no parameter that is a number")
     for item in effect.numbers():
         _check_number(effect.name, item)
+    _check_linearisation(effect)
     return effect
+
+
+def _check_linearisation(effect: type[Effect]) -> None:
+    """Raise EffectError where what a diagnosis reads of an effect contradicts itself."""
+    if not isinstance(effect.linearisation, Linearisation):
+        raise EffectError(f"{effect.name} has no linearisation (Linearisation)")
+    if effect.amplitude and effect.amplitude not in {item.name for item in effect.numbers()}:
+        raise EffectError(f"{effect.name}: the amplitude {effect.amplitude!r} is no number of it")
+    shares = effect.linearisation is Linearisation.NUISANCE
+    if shares != (effect.nuisance is not None):
+        raise EffectError(f"{effect.name}: the linearisation NUISANCE and a nuisance go together")
+    if effect.nuisance is not None and len(effect.numbers()) != effect.nuisance.size:
+        raise EffectError(
+            f"{effect.name} has {len(effect.numbers())} numbers, and the nuisance "
+            f"{effect.nuisance.value} has {effect.nuisance.size}"
+        )
+    if effect.linearisation is Linearisation.LOCAL_STIFFNESS and not effect.amplitude:
+        raise EffectError(f"{effect.name} has no amplitude, which LOCAL_STIFFNESS needs")
 
 
 def _check_number(name: str, item: Parameter) -> None:

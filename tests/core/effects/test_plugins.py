@@ -17,7 +17,16 @@ from typing import Self
 import pytest
 
 import palpate.effects
-from palpate.effects import CATALOGUE, DIAGNOSED, OUTSIDE, Effect, Slot, parameter
+from palpate.effects import (
+    CATALOGUE,
+    DIAGNOSED,
+    OUTSIDE,
+    Effect,
+    Linearisation,
+    NuisanceBlock,
+    Slot,
+    parameter,
+)
 from palpate.effects.plugins import GROUP, checked, outside_effects
 from palpate.foundation.errors import EffectError
 from palpate.setup.setup import Setup
@@ -27,20 +36,23 @@ USE = """
 import json, warnings
 warnings.simplefilter("error")
 import numpy as np
-from palpate.diagnosis.search.candidates import FINITE
-from palpate.effects import CATALOGUE, DIAGNOSED, OUTSIDE, effect_named, from_json
+from palpate.effects import (
+    CATALOGUE, DIAGNOSED, OUTSIDE, Linearisation, effect_named, from_json
+)
 from palpate.mesh.box_mesh import GridSpec
 from palpate.replay.replay import replay
 from palpate.setup.setup import Box, Setup, Tool
 
 setup = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3))
 vessel = effect_named("vessel")
-assert OUTSIDE == (vessel,) and vessel in CATALOGUE and vessel in DIAGNOSED and vessel in FINITE
+assert OUTSIDE == (vessel,) and vessel in CATALOGUE and vessel in DIAGNOSED
+assert vessel.linearisation is Linearisation.TANGENT and len(vessel.tangents(setup)) == 2
 start = vessel.starts(setup)[0]
 assert from_json(json.loads(json.dumps(start.to_json()))) == start
 grid, way = GridSpec(nodes=(9, 7, 6), spacing=2e-3), np.array([[0.0, -4e-3, 0.0358 + 5e-3 - 4e-3]])
 plain, neutral, found = (
-    replay(one, way, grid)[0].displacement for one in (setup, vessel.neutral(setup).apply(setup), start.apply(setup))
+    replay(one, way, grid)[0].displacement
+    for one in (setup, vessel.neutral(setup).apply(setup), start.apply(setup))
 )
 print(json.dumps([float(np.abs(neutral - plain).max()), float(np.abs(found - plain).max())]))
 """
@@ -140,6 +152,20 @@ WRONG = {
         "contrast by its logarithm, too",
     ),
     "logarithm that comes round": (_sized(periodic=True, log=True, low=0.5), "comes round"),
+    "no linearisation": (_with(linearisation="tangent"), "no linearisation"),
+    "strange amplitude": (_with(amplitude="weight"), "'weight' is no number of it"),
+    "nuisance of a tangent": (
+        _with(linearisation=Linearisation.TANGENT, nuisance=NuisanceBlock.TOOL_RADIUS),
+        "go together",
+    ),
+    "nuisance of other numbers": (
+        _with(linearisation=Linearisation.NUISANCE, nuisance=NuisanceBlock.CAMERA_POSE),
+        "has 1 numbers, and the nuisance camera pose has 6",
+    ),
+    "local stiffness of nothing": (
+        _with(linearisation=Linearisation.LOCAL_STIFFNESS),
+        "no amplitude, which LOCAL_STIFFNESS needs",
+    ),
     "no scale": (_sized(scale=0.0), "scale of size is 0"),
 }
 

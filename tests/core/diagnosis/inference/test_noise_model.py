@@ -186,7 +186,7 @@ def test_patch_of_which_a_settled_model_shows_another_side_loses_its_weight():
     noise = Noise(np.ones((3, 4)), gap, np.zeros((3, 4)), np.zeros((3, 4, 1)))
     turned = np.zeros((3, 4))
     turned[1, 2], turned[2, 3] = 0.9, 0.1
-    here = replace(prediction(gap), elsewhere=turned)
+    here = replace(prediction(gap), other_side=turned)
     settled = noise.remeshed(here, here)
     assert settled.weights[1, 2] == 0.0 and settled.weights.sum() == 11.0
     assert noise.weights.all()

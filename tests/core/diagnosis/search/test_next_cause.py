@@ -45,7 +45,7 @@ def test_where_structure_is_left_a_fainter_second_cause_is_let_in():
     assert _second(2508.0, LOUD) == 2 * CRITERIA.naming.least_gain < _second(2508.0)
 
 
-def test_what_tangents_know_little_of_is_refitted_beside_a_cause_only_where_another_might_be_named():
+def test_nonlinear_effects_are_refitted_beside_a_cause_only_where_another_might_be_named():
     needed = _second(994.0)
     quiet, promising = (
         np.array([3.0, 0.9 * CRITERIA.naming.promising * needed]),
