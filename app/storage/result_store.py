@@ -67,7 +67,11 @@ class ResultStore:
 
     def _newest_first(self, pattern: str) -> list[Path]:
         """Files below the folder by the pattern, whose parents have a valid name."""
-        paths = [path for path in self.folder.glob(pattern) if NAME.fullmatch(path.parent.name)]
+        paths = [
+            path
+            for path in self.folder.glob(pattern)
+            if NAME.fullmatch(path.parent.name) and path.is_file()
+        ]
         return sorted(paths, key=lambda path: path.stat().st_mtime, reverse=True)
 
     def _object(self, name: str, file: str) -> dict[str, Any]:
