@@ -225,7 +225,7 @@ def _check_cloud(root: Path, home: str, file: str, row: int, name: str) -> None:
     except DatasetError as error:
         # The error names the broken cloud as file, and the row that refers to it.
         where = {"row": row, **error.where}
-        raise DatasetError(f"{error.message} (asked for by {file}, row {row})", **where) from None
+        raise DatasetError(f"{error.message} (listed in {file}, row {row})", **where) from None
 
 
 def read_forces(root: Path, file: str) -> Forces:

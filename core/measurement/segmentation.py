@@ -103,8 +103,8 @@ class Cleaner:
             )
             reason[near[is_tool]] = REASONS.index("tool")
             reason[near[is_shaft & ~is_tool]] = REASONS.index("shaft")
-        kept = np.flatnonzero(reason == 0)
-        reason[kept[_lonely(points[kept])]] = REASONS.index("stray")
+        phantom = np.flatnonzero(reason == 0)
+        reason[phantom[_lonely(points[phantom])]] = REASONS.index("stray")
         indices = np.flatnonzero(reason == 0)
         counts = np.bincount(reason, minlength=len(REASONS))
         return CleanCloud(

@@ -24,8 +24,8 @@ class TetSystem:
         low = np.minimum(local[:, :, None], local[:, None, :])
         high = np.maximum(local[:, :, None], local[:, None, :])
         upper = np.triu(np.ones((10, 10), dtype=bool))
-        wanted = (low >= 0) & upper
-        keys, blocks = np.unique(low[wanted] * count + high[wanted], return_inverse=True)
+        used = (low >= 0) & upper
+        keys, blocks = np.unique(low[used] * count + high[used], return_inverse=True)
         rows, columns = keys // count, keys % count
         per_row = np.bincount(rows, minlength=count)
         first = np.concatenate([[0], np.cumsum(per_row)])
@@ -41,11 +41,11 @@ class TetSystem:
         indices[target[valid]] = np.broadcast_to(3 * columns[:, None, None] + k, target.shape)[
             valid
         ]
-        swapped = np.broadcast_to((local[:, :, None] > local[:, None, :]), wanted.shape)[wanted]
+        swapped = np.broadcast_to((local[:, :, None] > local[:, None, :]), used.shape)[used]
         scatter = np.where(
             swapped[:, None, None], np.swapaxes(target[blocks], 1, 2), target[blocks]
         )
-        self._wanted = np.nonzero(wanted.ravel())[0]
+        self._used = np.nonzero(used.ravel())[0]
         self._scatter = np.where(scatter < 0, pointers[-1], scatter).ravel()
         self._matrix = sparse.csr_matrix(
             (np.zeros(pointers[-1]), indices, pointers.astype(np.int32)),
@@ -56,7 +56,7 @@ class TetSystem:
 
     def factorise(self, stiffness: FloatArray) -> None:
         """Assemble and factor element stiffness (e, 10, 10, 3, 3) [N/m]."""
-        blocks = stiffness.reshape(-1, 9)[self._wanted].ravel()
+        blocks = stiffness.reshape(-1, 9)[self._used].ravel()
         size = len(self._matrix.data)
         self._matrix.data[:] = np.bincount(self._scatter, weights=blocks, minlength=size + 1)[:size]
         right = np.zeros((self._matrix.shape[0], 1))
