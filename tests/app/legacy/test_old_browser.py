@@ -34,7 +34,7 @@ def test_the_page_opens_as_the_old_one_was_left(home: OldHome, browser: Any, ser
     ):
         fill = "values => { for (const key in values) localStorage.setItem(key, values[key]); }"
         first = context.new_page()
-        first.goto(f"{client.base_url}static/login.html")
+        first.goto(f"{client.base_url}/static/login.html")
         first.evaluate(fill, local)
         first.close()
         page = Page(context.new_page(), client)
