@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import tempfile
+from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -14,9 +15,12 @@ from typing import Any
 from palpate.dataset import Dataset
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.worker_pool import Workers
+from palpate.diagnosis.gain.force_gain import ForceGain
+from palpate.diagnosis.gain.gain_ladder import SurfaceGain
 from palpate.diagnosis.gain.test_gain import held_out_gain, tuned_setup
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.problem_of_dataset import problem_of_dataset
+from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.observation.observe_splits import (
     SplitObservations,
     check_splits,
@@ -156,27 +160,8 @@ def _run(
         dataset, registration, setup, data, pool, part(report, 0.05, 0.75), seed
     )
     problem = evaluator.problem
-    fine, names = problem.fine_grid, list(problem.names)
+    gain, checks = _validated(evaluator, findings, held_out, report, seed, assurance)
     model = findings.best.model if findings.best else findings.baseline
-    report(0.75, "measuring the gain on test sequences")
-    gain = (
-        held_out_gain(evaluator, findings, held_out, pool, fine, seed, assurance)
-        if held_out
-        else None
-    )
-    if why := rejection_reason(findings, gain):
-        findings.withdraw(why)
-        model, gain = (
-            findings.baseline,
-            held_out_gain(evaluator, findings, held_out, pool, fine, seed) if held_out else None,
-        )
-    checks = AllClearChecks()
-    if verdict_of(findings) == "none":
-        report(0.77, "looking whether every sequence, also of the test, is as clear")
-        checks = AllClearChecks(
-            largest_stiffness_error(evaluator, findings.baseline),
-            check_held_out(evaluator, held_out, seed),
-        )
     found = tuned_setup(evaluator, model) if findings.best else setup
     (making / "replays").mkdir()
     (making / "pictures").mkdir()
@@ -191,21 +176,62 @@ def _run(
         result["registration"] = dataset.accepted.to_json()
     if assurance:
         result = with_supplements(result, evaluator, fitted, findings)
-    if problem.clouds:
-        pictured = error_patterns(evaluator, fitted, findings.baseline, model)
-        pictured.save(making / "patterns.npz")
-        draw_patterns(pictured, problem.surface, making / "pictures" / "patterns.png")
-    else:
-        result, pushes, shown = with_palpation(result, evaluator, fitted, findings)
-        lump = next((cause for cause in result["causes"] if "cover" in cause), None)
-        draw_palpation(making / "pictures" / "palpation.png", setup.geometry, pushes, shown, lump)
+    result = _with_pictures(result, evaluator, fitted, findings, making)
     for number, task in enumerate(recordings):
         part(report, 0.8, 1.0)(number / len(recordings), "replaying every sequence for the page")
         task.result()
     (making / "model.json").write_text(
-        json.dumps(_model(dataset, found, findings, names), indent=1)
+        json.dumps(_model(dataset, found, findings, list(problem.names)), indent=1)
     )
     (making / "report.json").write_text(json.dumps(result, indent=1))
+    return result
+
+
+def _validated(
+    evaluator: Evaluator,
+    findings: Findings,
+    held_out: list[Observations],
+    report: Report,
+    seed: int,
+    assurance: bool,
+) -> tuple[SurfaceGain | ForceGain | None, AllClearChecks]:
+    """Return the gain on test sequences and the checks of an all-clear; reject a wrong cause."""
+    fine, pool = evaluator.problem.fine_grid, evaluator.workers
+    report(0.75, "measuring the gain on test sequences")
+    gain = (
+        held_out_gain(evaluator, findings, held_out, pool, fine, seed, assurance)
+        if held_out
+        else None
+    )
+    if why := rejection_reason(findings, gain):
+        findings.withdraw(why)
+        gain = held_out_gain(evaluator, findings, held_out, pool, fine, seed) if held_out else None
+    if verdict_of(findings) != "none":
+        return gain, AllClearChecks()
+    report(0.77, "looking whether every sequence, also of the test, is as clear")
+    stiffness_error = largest_stiffness_error(evaluator, findings.baseline)
+    return gain, AllClearChecks(stiffness_error, check_held_out(evaluator, held_out, seed))
+
+
+def _with_pictures(
+    result: dict[str, Any],
+    evaluator: Evaluator,
+    fitted: Sequence[Observations],
+    findings: Findings,
+    making: Path,
+) -> dict[str, Any]:
+    """Draw the pictures of a run; return the report, with the palpation where there is one."""
+    problem = evaluator.problem
+    if problem.clouds:
+        model = findings.best.model if findings.best else findings.baseline
+        patterns = error_patterns(evaluator, fitted, findings.baseline, model)
+        patterns.save(making / "patterns.npz")
+        draw_patterns(patterns, problem.surface, making / "pictures" / "patterns.png")
+        return result
+    result, pushes, shown = with_palpation(result, evaluator, fitted, findings)
+    lump = next((cause for cause in result["causes"] if "cover" in cause), None)
+    body = problem.setup.geometry
+    draw_palpation(making / "pictures" / "palpation.png", body, pushes, shown, lump)
     return result
 
 

@@ -86,11 +86,13 @@ class Push:
         words = f"press {1e3 * self.depth:.2g} mm deep {_NAMED[self.side]} at ({shown}) mm"
         if self.kind == "drag":
             axis = int(np.abs(self.along).argmax())
-            words += f" and drag {1e3 * abs(self.along[axis]):.0f} mm along {'+' if self.along[axis] > 0 else '-'}{'xyz'[axis]}"
+            sign, length = "+" if self.along[axis] > 0 else "-", 1e3 * abs(self.along[axis])
+            words += f" and drag {length:.0f} mm along {sign}{'xyz'[axis]}"
         if self.speed and not self.hold:
             words += f", going in at {1e3 * self.speed:.0f} mm/s"
         return (
-            f"{words}, hold for {self.hold:.0f} s and look again {self.hold:.0f} s after the release"
+            f"{words}, hold for {self.hold:.0f} s and look again {self.hold:.0f} s after the "
+            "release"
             if self.hold
             else words
         )

@@ -58,7 +58,9 @@ class Columns:
     def __init__(self, block: Replay, wanted: JacobianRequest, forces: bool) -> None:
         self.block, self.wanted, self.forces = block, wanted, forces
         here = block.setup
-        self._seen = {at_rest: camera_model_for(here, reference=at_rest) for at_rest in (False, True)}
+        self._seen = {
+            at_rest: camera_model_for(here, reference=at_rest) for at_rest in (False, True)
+        }
         self._others = [
             {at_rest: camera_model_for(other, reference=at_rest) for at_rest in (False, True)}
             for other in wanted.setups

@@ -54,9 +54,11 @@ class Ripple:
         if not self.significant:
             return ""
         return (
-            f"rest.ply: depth waves with the distance from the camera, by about {self.size * 1e3:.2g} mm (RMS), alike over "
-            f"{self.reach * 1e3:.2g} mm of distance, on top, sides and table together ({self.gain:.0f} nats, {CRITERIA.camera_error.least_ripple_gain:.0f} "
-            "are asked): no effect of the catalogue does that; calibrate the camera's depth, or look for another camera's light"
+            "rest.ply: depth waves with the distance from the camera, by about "
+            f"{self.size * 1e3:.2g} mm (RMS), alike over {self.reach * 1e3:.2g} mm of distance, on "
+            f"top, sides and table together ({self.gain:.0f} nats, "
+            f"{CRITERIA.camera_error.least_ripple_gain:.0f} are asked): no effect of the catalogue "
+            "does that; calibrate the camera's depth, or look for another camera's light"
         )
 
 

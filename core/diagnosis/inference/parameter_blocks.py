@@ -64,9 +64,7 @@ class ParameterBlocks:
         """
         sizes = (sum(len(effect.numbers()) for effect in effects), tangents, inclusions)
         ends = list(accumulate(sizes, initial=self.replayed))
-        own, near, places = (
-            tuple(range(first, last)) for first, last in pairwise(ends)
-        )
+        own, near, places = (tuple(range(first, last)) for first, last in pairwise(ends))
         return ModelColumns((*range(self.replayed), count), own, near, places)
 
 

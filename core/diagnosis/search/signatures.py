@@ -97,9 +97,8 @@ def replayed_signatures(
         evaluator.report(f"what {effect.name} would do", 0.15 + 0.25 * number / len(pending))
         changed = [future.result() for future in futures]
         rows = zip(origin.predictions, changed, without, strict=True)
-        found.append(
-            (effect, [other.transferred(here, zero).without_details() for here, other, zero in rows])
-        )
+        moved = [other.transferred(here, zero) for here, other, zero in rows]
+        found.append((effect, [item.without_details() for item in moved]))
     return found
 
 
