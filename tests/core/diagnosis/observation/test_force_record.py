@@ -307,4 +307,4 @@ def test_without_forces_the_modulus_is_not_reported(baseline):
     with Workers([], 1) as workers:
         other = evaluator_of(SETUP, registration(), workers, ["poke-01"], None, QUICK, QUICK)
     assert modulus_interval(other, baseline) is None
-    assert len(other.nuisances.precision) == 15
+    assert len(other.problem.nuisances.precision) == 15
