@@ -176,11 +176,11 @@ def record(
         cloud[cleaner.clean(cloud, pose).indices] for cloud, pose in zip(raw, poses, strict=True)
     ]
     models = _replayed_models(sequence, stated, extended, grid, times, clouds)
-    cameras = {
+    cameras: dict[str, Any] = {
         f"camera_{model}": recorded_camera(sequence, camera_model_for(setup).pose).matrix
         for model, setup in (("raw", stated), ("extended", extended))
     }
-    radii = {
+    radii: dict[str, Any] = {
         f"tool_radius_{model}": np.array(setup.tool.radius)
         for model, setup in (("raw", stated), ("extended", extended))
     }

@@ -78,7 +78,7 @@ class Box:
         z, y, x = (axis.ravel() for axis in np.meshgrid(*axes[::-1], indexing="ij"))
         points = np.stack([x, y, z], axis=1)
         on_side = (np.abs(points[:, :2]) == self.high[:2]).any(axis=1)
-        return points[on_side | (points[:, 2] == self.high[2])]
+        return np.asarray(points[on_side | (points[:, 2] == self.high[2])])
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
