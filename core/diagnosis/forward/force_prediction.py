@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.history_replay import without_history
-from palpate.diagnosis.forward.jacobian import Columns, JacobianRequest
+from palpate.diagnosis.forward.jacobian import JacobianColumns, JacobianRequest
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.forward.tool_path import tool_path_of
 from palpate.diagnosis.observation.force_record import ForceComparison
@@ -49,7 +49,7 @@ def predict_forces(
     block, path = Replay(setup, grid, tolerance), tool_path_of(data, setup, grid, request)
     if path.measured is None:
         raise DiagnosisError(f"{data.name}: has neither clouds nor forces")
-    columns = None if request is None else Columns(block, request, forces=True)
+    columns = None if request is None else JacobianColumns(block, request, forces=True)
     frames: list[Equilibrium] = []
     changes: list[FloatArray] = []
     for number, (group, centre) in enumerate(zip(data.groups, path.centres, strict=True)):

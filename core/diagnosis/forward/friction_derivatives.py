@@ -1,10 +1,10 @@
-"""What friction under the tool would do, to first order, by the plain replay alone.
+"""First-order change by friction under the tool, from the plain replay alone.
 
-The contact is one spot that sticks to the tool until the tool pulls it by more than friction holds.
-How far it gives to a pull is told by the frame's own factor: tractions spread over the contact like
-its pressure, one linear solve for each direction. Along the tool's way between the groups pull and
-hold are integrated, as `palpate.diagnosis.forward.loading_history` has it: the hold goes with the
-depth to the power of Hertz.
+The contact is one spot that sticks to the tool until the pull exceeds what friction holds. The
+compliance of the spot follows from the frame's own factor: tractions are spread over the contact
+like its pressure, with one linear solve for each direction. Pull and hold are integrated along the
+tool's path between the groups (see `palpate.diagnosis.forward.loading_history`). The hold is
+proportional to the power of the depth that Hertz gives.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from palpate.gradients.frame_tangent import local_tool
 from palpate.replay.friction_step import contact_depth, points_from_tool
 from palpate.replay.replay import Equilibrium
 
-__all__ = ["Spot", "pulls", "spot_of"]
+__all__ = ["ContactSpot", "pulls", "spot_of"]
 
 
 @dataclass(frozen=True, eq=False)
-class Spot:
+class ContactSpot:
     """The contact of one group.
 
     Attributes:
-        answer: (u, 3) displacement of the unknowns under a pull of one over E along each axis
+        answer: displacement of the unknowns (u, 3) under a pull of one over E along each axis
             [1/m].
-        gives: (3, 3) how far the spot goes under it [1/m].
-        normal: (3,) from the tool's centre.
+        gives: motion of the spot under it (3, 3) [1/m].
+        normal: unit vector (3,) from the tool's centre.
         held: normal force over E [m^2].
     """
 
@@ -42,8 +42,8 @@ class Spot:
     held: float
 
 
-def spot_of(model: BlockModel, frame: Equilibrium) -> Spot | None:
-    """Of a frame whose tangent is factorised; None where nothing is felt."""
+def spot_of(model: BlockModel, frame: Equilibrium) -> ContactSpot | None:
+    """Return the contact of a frame whose tangent is factorised; None without a force."""
     positions, probe = frame.mesh.nodes + frame.displacement, local_tool(frame)
     seen = points_from_tool(model, positions, probe)
     pushes = CONTACT_STIFFNESS * model.areas * contact_depth(model, positions, probe)
@@ -60,11 +60,11 @@ def spot_of(model: BlockModel, frame: Equilibrium) -> Spot | None:
     pull = spread[model.topology.free]
     answer = model.topology.factor.solve(pull)
     normal = np.einsum("fq,fqi->i", shares, normals)
-    return Spot(answer, pull.T @ answer, normal / np.linalg.norm(normal), held)
+    return ContactSpot(answer, pull.T @ answer, normal / np.linalg.norm(normal), held)
 
 
 def pulls(
-    friction_coefficient: float, time: LoadingHistory, spots: Sequence[Spot | None]
+    friction_coefficient: float, time: LoadingHistory, spots: Sequence[ContactSpot | None]
 ) -> FloatArray:
     """Return the drag on the block over E (k, 3) [m^2] at each of the groups in contact.
 
@@ -97,14 +97,12 @@ def pulls(
                 sum(shares[number] * _required(spots[number]).held ** (2 / 3) for number in usable)
                 ** 1.5
             )
-            drag *= min(
-                1.0, friction_coefficient * hold / max(float(np.linalg.norm(drag)), 1e-300)
-            )
+            drag *= min(1.0, friction_coefficient * hold / max(float(np.linalg.norm(drag)), 1e-300))
         for number in np.flatnonzero(upcoming == row):
             found[number] = drag
     return found
 
 
-def _required(spot: Spot | None) -> Spot:
+def _required(spot: ContactSpot | None) -> ContactSpot:
     assert spot is not None
     return spot

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.forward.friction_derivatives import Spot, pulls, spot_of
+from palpate.diagnosis.forward.friction_derivatives import ContactSpot, pulls, spot_of
 from palpate.diagnosis.forward.loading_history import LoadingHistory, loading_history_of
-from palpate.diagnosis.forward.memory_derivatives import Recollection
+from palpate.diagnosis.forward.memory_derivatives import StressHistory
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.forward.ray_comparison import PointSample, averaging_matrix, compare
 from palpate.diagnosis.observation.frame_groups import Observations
@@ -106,14 +106,14 @@ def traces_of(
     """
     block, surface = Replay(setup, grid), Surface.of(setup)
     time = loading_history_of(data, setup, touch_correction(setup, grid), tuple(frames))
-    past = Recollection(block, frames, time)
+    past = StressHistory(block, frames, time)
     losses = [past.stress_losses(effect.apply(setup)) for effect in effects]
     frictions = {
         row: effect.apply(setup).tool.friction_coefficient
         for row, effect in enumerate(effects)
         if changes_tool_friction(effect, setup)
     }
-    spots: dict[int, Spot | None] = {}
+    spots: dict[int, ContactSpot | None] = {}
     shape, modulus = (len(frames), surface.patches), setup.material.young_modulus
     traces = [Trace(np.zeros(shape), np.zeros((len(frames), 3))) for _ in effects]
     stored: dict[int, tuple[_Look, Any]] = {}

@@ -55,8 +55,11 @@ class HistoryReplay:
         )
 
     def reach(self, centre: FloatArray, time: float | None) -> Equilibrium:
-        """What is found with the tool's stated centre here (3,) [m] at a group's time [s]; None for
-        a block long at rest.
+        """Return the equilibrium with the tool at a place, after everything that came before.
+
+        Args:
+            centre: stated centre of the tool (3,) [m].
+            time: of the group [s]; None for a block that has been at rest for long.
         """
         if time is None:
             return self._block.step(FAR, None, float(self._times[0]) - 1.0)
@@ -73,22 +76,22 @@ class HistoryReplay:
         return frame
 
     def _places(self, until: float) -> list[int]:
-        """Numbers of the places to be led through before this time [s]."""
+        """Return the numbers of the places to pass before a time [s]."""
         found: list[int] = []
         last = int(np.searchsorted(self._times, self._last)) if np.isfinite(self._last) else 0
         for number in range(last, int(np.searchsorted(self._times, until))):
             far = float(np.linalg.norm(self._way[number] - self._way[last]))
             long = self._times[number] - self._times[last]
             if self._near[number]:
-                wanted = far > self._travel or long > CRITERIA.history.hold or not self._near[last]
+                needed = far > self._travel or long > CRITERIA.history.hold or not self._near[last]
                 self._left = float(self._times[number])
             else:
                 away = self._times[last] - self._left
-                wanted = np.isfinite(self._left) and (
+                needed = np.isfinite(self._left) and (
                     self._near[last]
                     or long > max(CRITERIA.history.hold, CRITERIA.history.rest_growth * away)
                 )
-            if wanted:
+            if needed:
                 found.append(number)
                 last = number
         return found

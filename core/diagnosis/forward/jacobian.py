@@ -1,6 +1,4 @@
-"""How what is seen of a group, and the force that is felt, would change with anything that might be
-wrong.
-"""
+"""Changes of the visible surface and of the force of a group with each parameter of a model."""
 
 from __future__ import annotations
 
@@ -11,7 +9,7 @@ import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.ray_comparison import PointComparison, averaging_matrix
-from palpate.diagnosis.forward.slip_derivatives import Sliding
+from palpate.diagnosis.forward.slip_derivatives import SlipTangent
 from palpate.effects.parameter import LOG_PER_CONTRAST
 from palpate.fem.constitutive.stiffness_field import lump_share
 from palpate.fem.mesh_quadrature import element_quadrature
@@ -25,23 +23,23 @@ from palpate.measurement.camera_model import camera_model_for
 from palpate.replay.replay import Equilibrium, Replay
 from palpate.setup.setup import Inclusion, Setup
 
-__all__ = ["TOOL_COLUMNS", "Columns", "JacobianRequest"]
+__all__ = ["TOOL_COLUMNS", "JacobianColumns", "JacobianRequest"]
 
 TOOL_COLUMNS = 6
-"""Columns that always come first: the tool moved along x, y, z and turned about the robot
+"""Number of columns that always come first: the tool moved along x, y, z and turned about the robot
 registration's pivot."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class JacobianRequest:
-    """Which changes a prediction shall state.
+    """The columns that a prediction states.
 
     Attributes:
         setups: setups that differ a little.
-        steps: by how much, each; the column is the change over the step.
-        lumps: inclusions, whose columns are the change per unit of their stiffness ratio's
-            contrast, where it is one.
-        pivot: (3,) [m] about which the robot registration turns.
+        steps: size of each difference; the column is the change over the step.
+        lumps: inclusions, whose columns are the change by their stiffness contrast, where it is
+            zero.
+        pivot: (3,) about which the robot registration turns [m].
     """
 
     setups: tuple[Setup, ...] = ()
@@ -50,42 +48,51 @@ class JacobianRequest:
     pivot: FloatArray
 
 
-class Columns:
-    """Changes of a group's displacement, projected on what is seen of it, and of the force on the
-    tool, if that is `felt`.
+class JacobianColumns:
+    """Changes of a group's displacement, projected on the visible points, and of the tool's force.
+
+    Args:
+        block: replay of the setup.
+        request: columns.
+        forces: whether changes of the force are needed.
     """
 
-    def __init__(self, block: Replay, wanted: JacobianRequest, forces: bool) -> None:
-        self.block, self.wanted, self.forces = block, wanted, forces
+    def __init__(self, block: Replay, request: JacobianRequest, forces: bool) -> None:
+        self.block, self.request, self.forces = block, request, forces
         here = block.setup
         self._seen = {
             at_rest: camera_model_for(here, reference=at_rest) for at_rest in (False, True)
         }
         self._others = [
             {at_rest: camera_model_for(other, reference=at_rest) for at_rest in (False, True)}
-            for other in wanted.setups
+            for other in request.setups
         ]
-        self._grown = [other.scale / here.scale - 1.0 for other in wanted.setups]
+        self._grown = [other.scale / here.scale - 1.0 for other in request.setups]
         self._alike = not any(growth.any() for growth in self._grown)
         slides = here.support.friction_coefficient is not None
         self._sliding = (
-            Sliding(here, wanted.setups, wanted.steps, TOOL_COLUMNS, self.count) if slides else None
+            SlipTangent(here, request.setups, request.steps, TOOL_COLUMNS, self.count)
+            if slides
+            else None
         )
 
     @property
     def count(self) -> int:
-        """Of all columns."""
-        return TOOL_COLUMNS + len(self.wanted.setups) + len(self.wanted.lumps)
+        """Number of columns."""
+        return TOOL_COLUMNS + len(self.request.setups) + len(self.request.lumps)
 
     def changes(self, frame: Equilibrium, moves: FloatArray) -> FloatArray:
-        """(k, n + 1, 3) for the tool's motion, the setups and the lumps: of the nodes [m], and last
-        of the force [N].
+        """Return the changes of the nodes [m], and last of the force [N] (k, n + 1, 3).
 
-        `moves` (s, 3) are the setups' own tool motions [m].
+        They are those by the tool's motion, by the setups, and by the inclusions.
+
+        Args:
+            frame: equilibrium of the group.
+            moves: motion of the tool under each setup (s, 3) [m].
         """
-        setup, wanted = self.block.setup, self.wanted
+        setup, request = self.block.setup, self.request
         steps = [(setup, TOOL_STEP * axis) for axis in np.eye(3)]
-        steps += [(other, move) for other, move in zip(wanted.setups, moves, strict=True)]
+        steps += [(other, move) for other, move in zip(request.setups, moves, strict=True)]
         changed = self._with_forces(
             frame, steps, displacement_changes(self.block, frame, steps, exact=False)
         )
@@ -94,13 +101,13 @@ class Columns:
             np.abs(tool[:, :-1]).max(axis=(1, 2)) > CRITERIA.derivatives.most_response
         ):
             self._span(frame, int(axis), tool, changed[3:], moves)
-        arm = frame.tool.centre - wanted.pivot
+        arm = frame.tool.centre - request.pivot
         turned = [np.tensordot(np.cross(axis, arm), tool, axes=1) for axis in np.eye(3)]
         scaled = (
-            changed[3:] / np.array(wanted.steps)[:, None, None] if wanted.steps else changed[3:]
+            changed[3:] / np.array(request.steps)[:, None, None] if request.steps else changed[3:]
         )
         factors = LOG_PER_CONTRAST * np.array(
-            [lump_share(lump, element_quadrature(frame.mesh)) for lump in wanted.lumps]
+            [lump_share(lump, element_quadrature(frame.mesh)) for lump in request.lumps]
         )
         still = [(setup, np.zeros(3))] * len(factors)
         lumps = (
@@ -113,27 +120,32 @@ class Columns:
     def _with_forces(
         self, frame: Equilibrium, steps: Sequence[Change], moved: FloatArray
     ) -> FloatArray:
-        """Displacements (k, n, 3) [m], and last the forces that come with them [N]; zero where
-        nobody asks for them.
+        """Return displacements (k, n, 3) [m] with the force [N] as one more row.
+
+        It is zero where no force is needed.
         """
-        wanted = self.forces or self._sliding is not None
+        needed = self.forces or self._sliding is not None
         pressed = (
-            force_changes(self.block, frame, steps, moved) if wanted else np.zeros((len(moved), 3))
+            force_changes(self.block, frame, steps, moved) if needed else np.zeros((len(moved), 3))
         )
         return np.concatenate([moved, pressed[:, None]], axis=1)
 
     def of_force(self, changes: FloatArray, measured: FloatArray, turned: FloatArray) -> FloatArray:
-        """(3, k) changes of measured minus simulated force [N], from `changes` (k, n + 1, 3) and
-        the measured force (3,) [N].
+        """Return the changes of measured minus simulated force (3, k) [N].
 
-        A measured force turns with the robot's registration; `turned` (s, 3, 3) is how far each of
-        the setups turns it. Another clock finds another instant, but force and place of the same.
+        A measured force turns with the robot's registration. Another clock finds another instant,
+        but force and position of the same one.
+
+        Args:
+            changes: of the group, as `changes` returns them.
+            measured: force (3,) [N].
+            turned: rotation of a measured force by each setup (s, 3, 3).
         """
         found = -changes[:, -1].T
         found[:, 3:6] += np.cross(np.eye(3), np.nan_to_num(measured)).T
-        for number, other in enumerate(self.wanted.setups):
+        for number, other in enumerate(self.request.setups):
             found[:, TOOL_COLUMNS + number] += (
-                (turned[number] - np.eye(3)) @ np.nan_to_num(measured) / self.wanted.steps[number]
+                (turned[number] - np.eye(3)) @ np.nan_to_num(measured) / self.request.steps[number]
             )
             if other.sensor.time_offset != self.block.setup.sensor.time_offset:
                 found[:, TOOL_COLUMNS + number] = 0.0
@@ -147,12 +159,18 @@ class Columns:
         changed: FloatArray,
         moves: FloatArray,
     ) -> None:
-        """Put what a finite motion of the tool along an axis does in place of its derivative, in
-        all columns it has a share in.
+        """Replace the derivative by the tool's motion along an axis with a finite difference.
 
-        Under a deep push a coarse grid may be about to give way sideways. Its derivative then is
-        many times what any motion that matters brings about, and would hide an offset of the tool
-        from the screening.
+        Under a deep push a coarse grid may be close to an instability sideways. The derivative is
+        then many times the change by any motion that matters, and would hide an offset of the tool
+        from the screening. All columns that contain the motion are corrected.
+
+        Args:
+            frame: equilibrium of the group.
+            axis: of the motion.
+            tool: changes by the tool's motion along each axis, to be corrected.
+            changed: changes by the setups, to be corrected.
+            moves: motion of the tool under each setup (s, 3) [m].
         """
         step = CRITERIA.derivatives.tool_span * np.eye(3)[axis]
         sides = [
@@ -174,18 +192,20 @@ class Columns:
             (ahead - behind) / (2 * CRITERIA.derivatives.tool_span),
         )
         stated = np.array(self.block.setup.tool.offset)
-        for column, (other, move) in enumerate(zip(self.wanted.setups, moves, strict=True)):
+        for column, (other, move) in enumerate(zip(self.request.setups, moves, strict=True)):
             share = (np.array(other.tool.offset) - stated + move)[axis]
             changed[column] += share * (tool[axis] - wrong)
 
     def of_ball(self, frame: Equilibrium, moves: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """How the ball's centre (k, 3) and radius (k,) change, in the order of `displacement`."""
-        stated, steps = self.block.setup.tool, np.array(self.wanted.steps)[:, None]
-        arm = frame.tool.centre - self.wanted.pivot
-        shifts = [np.subtract(other.tool.offset, stated.offset) for other in self.wanted.setups]
-        growth = [other.tool.radius - stated.radius for other in self.wanted.setups]
+        """Return the changes of the ball's centre (k, 3) and radius (k,), in the order of
+        `changes`.
+        """
+        stated, steps = self.block.setup.tool, np.array(self.request.steps)[:, None]
+        arm = frame.tool.centre - self.request.pivot
+        shifts = [np.subtract(other.tool.offset, stated.offset) for other in self.request.setups]
+        growth = [other.tool.radius - stated.radius for other in self.request.setups]
         own = (moves + np.array(shifts)) / steps if shifts else np.zeros((0, 3))
-        lumps = np.zeros((len(self.wanted.lumps), 3))
+        lumps = np.zeros((len(self.request.lumps), 3))
         centre = np.concatenate([np.eye(3), np.cross(np.eye(3), arm), own, lumps])
         radius = np.concatenate(
             [np.zeros(6), np.array(growth) / steps[:, 0] if growth else [], np.zeros(len(lumps))]
@@ -193,8 +213,9 @@ class Columns:
         return centre, radius
 
     def of_group(self, frame: Equilibrium, moves: FloatArray) -> FloatArray:
-        """As `changes`, with how the block itself grows; zero where nothing holds the block against
-        anything.
+        """Return the changes of a group, as `changes` does, with the growth of the block in them.
+
+        They are zero where the block is in contact with nothing.
         """
         if (
             frame.in_contact
@@ -204,13 +225,16 @@ class Columns:
             found = self.changes(frame, moves)
         else:
             found = np.zeros((self.count, len(frame.displacement) + 1, 3))
-        for number, (growth, step) in enumerate(zip(self._grown, self.wanted.steps, strict=True)):
+        for number, (growth, step) in enumerate(zip(self._grown, self.request.steps, strict=True)):
             found[TOOL_COLUMNS + number, :-1] += frame.mesh.nodes * growth / step
         return found if self._sliding is None else self._sliding.after(frame, found)
 
     def passed(self, frame: Equilibrium, moves: FloatArray) -> None:
-        """Take note of an equilibrium between two groups, in which a base may slide; `moves` as for
-        `changes`.
+        """Include an equilibrium between two groups, in which a base may slide.
+
+        Args:
+            frame: the equilibrium.
+            moves: as for `changes`.
         """
         if self._sliding is not None and self._sliding.slid(frame):
             self._sliding.after(frame, self.changes(frame, moves))
@@ -223,8 +247,14 @@ class Columns:
         compared: PointComparison,
         reference: bool,
     ) -> FloatArray:
-        """(p, k) changes of the patch averages; the reference was seen before the camera could
-        move.
+        """Return the changes of the patch averages (p, k).
+
+        Args:
+            frame: equilibrium of the group.
+            changes: of the group.
+            moves: motion of the tool under each setup (s, 3) [m].
+            compared: the visible points.
+            reference: whether the group was seen before the camera could move.
         """
         values = np.zeros((len(compared.means.mean), self.count))
         if changes[:, :-1].any():
@@ -237,7 +267,7 @@ class Columns:
                 compared.away @ centre.T + radius, compared.patch
             )
         here = self._seen[reference]
-        for number, (others, step) in enumerate(zip(self._others, self.wanted.steps, strict=True)):
+        for number, (others, step) in enumerate(zip(self._others, self.request.steps, strict=True)):
             if not others[reference].same(here):
                 moved = others[reference].place(here.read(compared.places))
                 values[:, TOOL_COLUMNS + number] += (

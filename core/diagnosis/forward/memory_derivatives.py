@@ -1,12 +1,11 @@
-"""What a material that remembers would do, to first order, by the plain replay alone: no step of
-its past is replayed.
+"""First-order stress changes by a material with history, from the plain replay alone.
 
 To first order in the share g that relaxes (see `palpate.replay.material_history`), the block at a
-group lacks g Z of its stress, Z' = (S - Z) / tau, S the elastic shear stress: what it has lived
-through, seen through a window of tau. Of permanent set it lacks the stress T of the strain that
-stays. Either is a load on the frame as it is, and one linear solve. S and strain between the groups
-are those of `palpate.diagnosis.forward.loading_history`. Once the tool has left, nothing holds the
-block, and Z fades with the retardation time tau / (1 - g).
+group lacks g Z of its stress, with Z' = (S - Z) / tau and S the elastic shear stress: the loading
+history as seen through a window of tau. With permanent set it lacks the stress T of the strain that
+remains. Either is a load on the frame, and one linear solve. S and the strain between the groups
+are those of `palpate.diagnosis.forward.loading_history`. After the tool has left, nothing holds the
+block, and Z decays with the retardation time tau / (1 - g).
 """
 
 from __future__ import annotations
@@ -26,16 +25,16 @@ from palpate.foundation.arrays import FloatArray
 from palpate.replay.replay import Equilibrium, Replay
 from palpate.setup.setup import Relaxation, Setup
 
-__all__ = ["Recollection"]
+__all__ = ["StressHistory"]
 
 
-class Recollection:
-    """What one sequence's groups lack of their stress when the material remembers.
+class StressHistory:
+    """Stress that the groups of one sequence lose by a material with history.
 
     Args:
-        block: the plain replay's.
+        block: of the plain replay.
         frames: its equilibria, one for each group.
-        time: what lies between them.
+        time: loading history between the groups.
 
     Attributes:
         order: numbers of the groups by time.
@@ -68,8 +67,12 @@ class Recollection:
             yield _sum([next(part) for part in parts])
 
     def load(self, model: BlockModel, stress: FloatArray, displacement: FloatArray) -> FloatArray:
-        """On the unknowns of a model over E (u,) [m^2], as it stands displaced (n, 3) [m], where
-        its stress lacks this (m, 6).
+        """Return the load on the unknowns over E (u,) [m^2] that stands for a loss of stress.
+
+        Args:
+            model: factorised at the frame.
+            stress: that is lost (m, 6), over the shear modulus.
+            displacement: of the nodes (n, 3) [m].
         """
         at_points = self._points.read(model.mesh, stress) * model.unrelaxed[..., None]
         return ConstantStress.of(model, at_points).force(displacement[model.topology.free])
@@ -79,14 +82,15 @@ class Recollection:
         return [shear_stress(self._law, strained) for strained in self._strained]
 
     def _relaxed(self, term: Relaxation) -> Iterator[FloatArray | None]:
-        rates = (
-            np.where(self._time.depths > 0, 1.0, 1.0 - term.fraction) / term.time_constant
-        )
+        rates = np.where(self._time.depths > 0, 1.0, 1.0 - term.fraction) / term.time_constant
         left = term.fraction * self._time.faded(rates)
         return (self._mixed(left[number], self._stresses) for number in self.order)
 
     def _mixed(self, shares: FloatArray, fields: Sequence[FloatArray]) -> FloatArray | None:
-        """Added up in place: a list of the parts would take many times as much memory."""
+        """Return the weighted sum of fields; None for no weight.
+
+        It is added up in place, as a list of the parts would need many times the memory.
+        """
         total = None
         for share, field in zip(shares.tolist(), fields, strict=True):
             if abs(share) > 1e-6:
@@ -98,8 +102,10 @@ class Recollection:
         return [log_strain(strained) for strained in self._strained]
 
     def _set(self, retained_fraction: float) -> Iterator[FloatArray | None]:
-        """Strain is kept along the way as `palpate.replay.material_history` keeps it, from one peak
-        to the next.
+        """Yield the stress of the remaining strain.
+
+        Strain is stored along the path as in `palpate.replay.material_history`, from one peak to
+        the next.
         """
         kept: FloatArray = np.zeros((0, 6))
         largest, peaks, at = np.zeros(0), self._time.peaks(), 0

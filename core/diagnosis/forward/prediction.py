@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.history_replay import HistoryReplay, longest_step, without_history
-from palpate.diagnosis.forward.jacobian import Columns, JacobianRequest
+from palpate.diagnosis.forward.jacobian import JacobianColumns, JacobianRequest
 from palpate.diagnosis.forward.ray_comparison import (
     PointComparison,
     PointSample,
@@ -183,7 +183,9 @@ def predict(
     surface, block = Surface.of(setup), Replay(setup, grid, tolerance, longest_step(setup))
     path = tool_path_of(data, setup, grid, request)
     with_forces = path.measured is not None
-    columns = Columns(block, request, with_forces) if request and not setup.has_history else None
+    columns = (
+        JacobianColumns(block, request, with_forces) if request and not setup.has_history else None
+    )
     history = HistoryReplay(data, block, path.correction) if setup.has_history else None
     results: list[_GroupResult] = []
     previous: Equilibrium | None = None
@@ -232,7 +234,7 @@ def predict(
 
 
 def _group_columns(
-    columns: Columns,
+    columns: JacobianColumns,
     frame: Equilibrium,
     compared: PointComparison,
     path: ToolPath,

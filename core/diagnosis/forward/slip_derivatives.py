@@ -1,10 +1,9 @@
-"""How far a base that slides goes, to first order: what presses harder slides it further, and where
-it has gone it stays.
+"""First-order changes of the slip of a base.
 
-While it slides the force F on the tool stays at what friction holds, g(F) = |F_xy| - mu (W + F_z) =
-0 (Coulomb). So a change by dp moves it by dl along the push such that dg = 0: a tool that reaches a
-tenth of a millimetre further into a side moves the whole block by as much, of which nothing shows
-in a base that is taken to stay where it is.
+While the base slides, the force F on the tool stays at what friction holds: g(F) = |F_xy| - mu (W +
+F_z) = 0 (Coulomb). A change by dp therefore moves the base by dl along the push such that dg = 0. A
+tool that reaches a tenth of a millimetre further into a side moves the whole block by as much; a
+base that is taken to be fixed shows nothing of that. The slip stays after the push.
 """
 
 from __future__ import annotations
@@ -20,17 +19,19 @@ from palpate.replay.compliance_and_slip import weight_of
 from palpate.replay.replay import Equilibrium
 from palpate.setup.setup import Setup
 
-__all__ = ["Sliding"]
+__all__ = ["SlipTangent"]
 
 
-class Sliding:
-    """Follows one replay in the order of time and keeps how much further the base goes with each of
-    `count` changes.
+class SlipTangent:
+    """Follows one replay in order of time and adds up the changes of the slip.
 
     Args:
         setup: of the replay, with a base that slides.
-        others, steps: setups that differ a little, and by how much; the changes from number `first`
-            on. Before them are those of the tool, first of all its motion along x, y and z.
+        others: setups that differ a little.
+        steps: size of each difference.
+        first: number of the first of these changes. Those before it are changes of the tool, the
+            motion along x, y and z first.
+        count: number of changes.
     """
 
     def __init__(
@@ -47,7 +48,7 @@ class Sliding:
             self._heavier[number] = (weight_of(other) - self._weight) / step
 
     def slid(self, frame: Equilibrium) -> bool:
-        """Whether the base moves on in this frame."""
+        """Return whether the base slides in this frame."""
         moved = float(np.linalg.norm(frame.slip - self._at))
         return (
             frame.outcome is Outcome.CONVERGED
@@ -56,8 +57,12 @@ class Sliding:
         )
 
     def after(self, frame: Equilibrium, changes: FloatArray) -> FloatArray:
-        """Changes (k, n + 1, 3) of the nodes [m] and of the force [N], from those with a base that
-        stays where it is.
+        """Return the changes of the nodes [m] and of the force [N] (k, n + 1, 3) with the slip in
+        them.
+
+        Args:
+            frame: next in order of time.
+            changes: the same with a base that is fixed.
         """
         tool = changes[:3]
         if self.slid(frame):
@@ -70,8 +75,12 @@ class Sliding:
         return found
 
     def _slide(self, force: FloatArray, changes: FloatArray, tool: FloatArray) -> None:
-        """Go on, by the force (3,) on the tool [N], its changes (k, 3), and those per motion of the
-        tool along each axis (3, 3).
+        """Update the changes of the slip.
+
+        Args:
+            force: on the tool (3,) [N].
+            changes: of the force (k, 3) [N].
+            tool: change of the force by a motion of the tool along each axis (3, 3) [N/m].
         """
         pull = float(np.linalg.norm(force[:2]))
         if pull == 0.0:
