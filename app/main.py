@@ -19,7 +19,6 @@ from palpate.app.api import (
     disk_space,
     effects,
     evaluations,
-    imports,
     jobs,
     registering,
     registrations,
@@ -53,7 +52,6 @@ GET /api/jobs/events, have its progress.
 
 MODULES = (
     datasets,
-    imports,
     disk_space,
     replays_and_exports,
     registrations,

@@ -1,33 +1,69 @@
-"""Datasets by folder name: their list, and checks of one."""
+"""Datasets by folder name: list, check, and import.
+
+An import is an archive as the body of a request, or a folder on the server's disk.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+import asyncio
+import hashlib
+import os
+from pathlib import Path
+from typing import Annotated, Any
+from uuid import uuid4
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Query, Request
+from pydantic import BaseModel, ConfigDict, Field
 
+from palpate.app.http_errors import Conflict
+from palpate.app.jobs.job_records import Job
+from palpate.app.jobs.job_results import job_out
 from palpate.app.reporting.json_values import dataset_summary
-from palpate.app.services import CurrentServices
+from palpate.app.schemas import JobOut
+from palpate.app.services import CurrentServices, IdempotencyKey, Services
+from palpate.app.storage.archive import is_archive
+from palpate.app.storage.dataset_import import UPLOADS, check_name
 from palpate.dataset.check import check_dataset
+from palpate.foundation.errors import DatasetError
 
 __all__ = ["router"]
 
-router = APIRouter(prefix="/datasets", tags=["datasets"])
+router = APIRouter(tags=["datasets"])
+_BODY = {
+    "requestBody": {
+        "required": True,
+        "description": "The dataset's folder as .zip or .tar, compressed or not.",
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
 
 
-@router.get("")
+class FolderRequest(BaseModel):
+    """A folder on the server's disk, and the name of the new dataset."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        json_schema_extra={"examples": [{"folder": "/data/bench/block-07", "name": "block-07"}]},
+    )
+
+    folder: str = Field(min_length=1, max_length=1000)
+    name: str = Field(min_length=1, max_length=64)
+
+
+@router.get("/datasets")
 def listed(services: CurrentServices) -> dict[str, Any]:
     """The datasets folder and the names of the datasets in it."""
     return {"folder": str(services.settings.datasets), "datasets": services.library.names()}
 
 
-@router.get("/{name}")
+@router.get("/datasets/{name}")
 def one(name: str, services: CurrentServices) -> dict[str, Any]:
     """Phantom, tool, splits and sequences of one dataset, after the checks of opening it."""
     return dataset_summary(services.library.open(name))
 
 
-@router.get("/{name}/check")
+@router.get("/datasets/{name}/check")
 def check(name: str, services: CurrentServices) -> dict[str, Any]:
     """The same after reading every file, with warnings and missing data; 422 names the place of an
     error and the expected value.
@@ -39,3 +75,82 @@ def check(name: str, services: CurrentServices) -> dict[str, Any]:
         "warnings": list(summary.warnings),
         "lacks": [lack.sentence for lack in summary.lacks],
     }
+
+
+@router.post("/imports", status_code=202, openapi_extra=_BODY)
+async def upload(
+    request: Request,
+    services: CurrentServices,
+    name: Annotated[str, Query(min_length=1, max_length=64)],
+    key: IdempotencyKey = None,
+) -> JobOut:
+    """Take the body as an archive and queue its import. The archive is checked completely; the
+    dataset appears whole or not at all.
+    """
+    _free(name, services)
+    archive = await _received(request, services)
+    return job_out(_queue(services, name, {"archive": str(archive)}, key))
+
+
+@router.post("/imports/folder", status_code=202)
+def folder(request: FolderRequest, services: CurrentServices, key: IdempotencyKey = None) -> JobOut:
+    """Queue the import of a folder on the server's disk, from an allowed place. The folder is
+    copied and not changed.
+    """
+    _free(request.name, services)
+    path = Path(request.folder).resolve()
+    allowed = services.settings.import_roots
+    if allowed is not None and not any(path.is_relative_to(root.resolve()) for root in allowed):
+        raise DatasetError(
+            f"{request.folder} may not be imported from: start the server with "
+            "--import-from FOLDER for one that may",
+            key="folder",
+        )
+    if not path.is_dir():
+        raise DatasetError(f"{request.folder} is no folder that the server can read", key="folder")
+    return job_out(_queue(services, request.name, {"folder": str(path)}, key))
+
+
+def _free(name: str, services: Services) -> None:
+    try:
+        check_name(name, services.settings.datasets)
+    except DatasetError as error:
+        if "already" in error.message:
+            raise Conflict(error.message, **error.where) from error
+        raise
+
+
+def _queue(services: Services, name: str, source: dict[str, str], key: str | None) -> Job:
+    settings = services.settings
+    job_request = {
+        **source,
+        "name": name,
+        "datasets": str(settings.datasets),
+        "most": settings.largest_dataset,
+    }
+    return services.jobs.submit("import", job_request, f"import-{name}", key)
+
+
+async def _received(request: Request, services: Services) -> Path:
+    """Store the body below the uploads, named by its digest: the same archive sent twice is one
+    file.
+    """
+    folder = services.settings.runs / UPLOADS
+    folder.mkdir(parents=True, exist_ok=True)
+    coming, digest = folder / f".{uuid4().hex}.part", hashlib.sha256()
+    try:
+        with coming.open("wb") as sink:
+            async for chunk in request.stream():
+                digest.update(chunk)
+                await asyncio.to_thread(sink.write, chunk)
+        if not await asyncio.to_thread(is_archive, coming):
+            raise DatasetError(
+                "the body is neither a zip nor a tar; "
+                "send the dataset's folder packed as one of them",
+                key="body",
+            )
+        whole = folder / f"{digest.hexdigest()[:32]}.archive"
+        os.replace(coming, whole)
+        return whole
+    finally:
+        coming.unlink(missing_ok=True)

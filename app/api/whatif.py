@@ -1,4 +1,4 @@
-"""What-if: frames solved again with chosen effects, and interactive replays."""
+"""Frames solved again with chosen effects, and interactive replays."""
 
 from __future__ import annotations
 

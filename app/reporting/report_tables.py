@@ -139,7 +139,7 @@ def _has_extended(gain: dict[str, Any], named: bool) -> bool:
 
 def sequence_table(rows: Sequence[SequenceErrors]) -> Table:
     """Errors of both models on each sequence; test sequences are bold."""
-    cells = []
+    cells: list[tuple[str | Cell, ...]] = []
     for row in rows:
         name = Cell(row.sequence, style="b" if row.split == "test" else "")
         errors = [_millimetres(error) for error in (row.raw, row.extended, row.noise_floor)]
