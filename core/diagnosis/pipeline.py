@@ -37,15 +37,12 @@ from palpate.diagnosis.validation.checks import AllClearChecks
 from palpate.diagnosis.validation.held_out_test import check_held_out
 from palpate.diagnosis.validation.rejection import rejection_reason
 from palpate.diagnosis.validation.stiffness_error_test import largest_stiffness_error
+from palpate.experiment import Experiment
 from palpate.foundation.errors import RunError
 from palpate.foundation.progress import Report, part, rising, silent
-from palpate.measurement.phantom_drift import align_sequences
-from palpate.measurement.segmentation import cleaner_for
-from palpate.measurement.tool_pose import find_shaft_axis
 from palpate.mesh.graded_mesh import PAGE_GRID, REPLAY_GRID
 from palpate.mesh.push_meshes import REPLAY_PUSHES
 from palpate.recording.record_sequence import record
-from palpate.registration.registration import Registration, register, setup_from
 from palpate.setup.setup import Sensor, Setup, Shape
 
 __all__ = ["diagnose"]
@@ -86,17 +83,13 @@ def diagnose(
     with Workers([], workers) as pool:
         pool.start()
         dataset.validate(part(report, 0.0, 0.02))
-        dataset, registration = align_sequences(dataset, register(dataset))
-        setup = setup_from(dataset, registration)
-        data = _observed(
-            dataset, registration.repaired, setup.sensor, pool, part(report, 0.02, 0.05)
-        )
+        experiment = Experiment.of(dataset)
+        sensor = experiment.stated.sensor
+        data = _observed(experiment, sensor, pool, part(report, 0.02, 0.05))
         out.parent.mkdir(parents=True, exist_ok=True)
         making = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
         try:
-            result = _run(
-                dataset, registration, setup, data, pool, making, report, seed, (replays, assurance)
-            )
+            result = _run(experiment, data, pool, making, report, seed, (replays, assurance))
             os.rename(making, out)
         finally:
             shutil.rmtree(making, ignore_errors=True)
@@ -105,22 +98,16 @@ def diagnose(
 
 
 def _observed(
-    dataset: Dataset, registration: Registration, sensor: Sensor, pool: Workers, report: Report
+    experiment: Experiment, sensor: Sensor, pool: Workers, report: Report
 ) -> SplitObservations:
     """Observe the sequences by the clock of a sensor, and hand them to the workers."""
-    data = observe_splits(dataset, registration, sensor, pool.run, report)
+    data = observe_splits(experiment, sensor, pool.run, report)
     pool.hold([*data[0], *data[1]])
     return data
 
 
 def _searched(
-    dataset: Dataset,
-    registration: Registration,
-    setup: Setup,
-    data: SplitObservations,
-    pool: Workers,
-    report: Report,
-    seed: int,
+    experiment: Experiment, data: SplitObservations, pool: Workers, report: Report, seed: int
 ) -> tuple[SplitObservations, Evaluator, Findings]:
     """Search for causes; a second time, with frames grouped anew, where another clock was found.
 
@@ -128,8 +115,8 @@ def _searched(
     quarter of a second puts together are up to 4 mm apart by the right clock; replayed so, a clock
     error of 238 ms was found as 229 ms.
     """
-    evaluator = Evaluator(problem_of_dataset(dataset, registration, setup, *data), pool, report)
-    findings = search(evaluator, seed)
+    evaluator = Evaluator(problem_of_dataset(experiment, *data), pool, report)
+    findings, setup = search(evaluator, seed), experiment.stated
     late = (
         findings.best.model.setup.sensor.time_offset if findings.best else setup.sensor.time_offset
     )
@@ -137,16 +124,14 @@ def _searched(
     if late == setup.sensor.time_offset or all(item.grouping_holds(clock) for item in data[0]):
         return data, evaluator, findings
     del evaluator, findings
-    data = _observed(dataset, registration.repaired, clock.sensor, pool, silent)
-    evaluator = Evaluator(problem_of_dataset(dataset, registration, setup, *data), pool, report)
+    data = _observed(experiment, clock.sensor, pool, silent)
+    evaluator = Evaluator(problem_of_dataset(experiment, *data), pool, report)
     evaluator.report("searching again, with the frames grouped by the clock that was found")
     return data, evaluator, search(evaluator, seed)
 
 
 def _run(
-    dataset: Dataset,
-    registration: Registration,
-    setup: Setup,
+    experiment: Experiment,
     data: SplitObservations,
     pool: Workers,
     making: Path,
@@ -157,9 +142,9 @@ def _run(
     """Search, validate and write the files of a run; `parts` are replays and assurance."""
     replays, assurance = parts
     (fitted, held_out), evaluator, findings = _searched(
-        dataset, registration, setup, data, pool, part(report, 0.05, 0.75), seed
+        experiment, data, pool, part(report, 0.05, 0.75), seed
     )
-    problem = evaluator.problem
+    problem, dataset, setup = evaluator.problem, experiment.dataset, experiment.stated
     gain, checks = _validated(evaluator, findings, held_out, report, seed, assurance)
     model = findings.best.model if findings.best else findings.baseline
     found = tuned_setup(evaluator, model) if findings.best else setup
@@ -167,7 +152,7 @@ def _run(
     (making / "pictures").mkdir()
     # The recordings begin before the supplements, which leave a process idle now and then.
     recordings = (
-        _recordings(dataset, registration, (setup, found), pool, making / "replays")
+        _recordings(experiment, found, pool, making / "replays")
         if replays and problem.clouds
         else []
     )
@@ -236,18 +221,10 @@ def _with_pictures(
 
 
 def _recordings(
-    dataset: Dataset,
-    registration: Registration,
-    setups: tuple[Setup, Setup],
-    pool: Workers,
-    folder: Path,
+    experiment: Experiment, found: Setup, pool: Workers, folder: Path
 ) -> list[Future[str]]:
     """Begin to record every sequence with clouds under the stated and the extended setup."""
-    stated, found = setups
-    cleaner, shaft = (
-        cleaner_for(dataset, registration),
-        find_shaft_axis(dataset, registration.repaired),
-    )
+    dataset, stated = experiment.dataset, experiment.stated
     page = PAGE_GRID.for_tool(stated.tool.radius)
     return [
         pool.run(
@@ -255,13 +232,12 @@ def _recordings(
             dataset.sequence(name),
             stated,
             found,
-            cleaner,
-            shaft,
+            experiment.cleaner,
+            experiment.shaft,
             page,
             folder / f"{name}.npz",
         )
-        for name in dataset.sequences
-        if len(dataset.sequence(name))
+        for name in experiment.sequences
     ]
 
 

@@ -15,18 +15,18 @@ import numpy as np
 from palpate.dataset import Dataset, Sequence
 from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.evaluation.loaded_network import LoadedNetwork
+from palpate.experiment import Experiment
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.camera_model import camera_model_for
-from palpate.measurement.phantom_drift import align_sequences, recorded_camera
-from palpate.measurement.segmentation import Cleaner, cleaner_for
-from palpate.measurement.tool_pose import find_shaft_axis, tool_poses
+from palpate.measurement.phantom_drift import recorded_camera
+from palpate.measurement.segmentation import Cleaner
+from palpate.measurement.tool_pose import tool_poses
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.mesh.protocol import Meshing
 from palpate.recording.record_sequence import compare_with_clouds
 from palpate.recording.saved_model import setup_of_model
-from palpate.registration.registration import register, setup_from
 from palpate.replay.equilibrium import Equilibrium
 from palpate.replay.replay import replay
 from palpate.setup.setup import Setup
@@ -58,22 +58,22 @@ def record_corrections(
         out: folder of the result.
         report: receives the progress.
     """
-    dataset, registration = align_sequences(dataset, register(dataset))
-    stated = setup_from(dataset, registration)
+    experiment = Experiment.of(dataset)
+    stated = experiment.stated
     corrected = _CorrectedModel(
         setup=setup_of_model(stated, model),
         grid=PAGE_GRID.for_tool(stated.tool.radius),
         network=network,
         stated=stated,
-        cleaner=cleaner_for(dataset, registration),
-        shaft=find_shaft_axis(dataset, registration.repaired),
+        cleaner=experiment.cleaner,
+        shaft=experiment.shaft,
     )
     out.parent.mkdir(parents=True, exist_ok=True)
     aside = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
     try:
         for number, (name, index) in enumerate(frames.items()):
             report(number / len(frames), f"correcting {name} for the page")
-            arrays = corrected.arrays(dataset.sequence(name), index)
+            arrays = corrected.arrays(experiment.dataset.sequence(name), index)
             np.savez_compressed(aside / f"{name}.npz", **arrays)
         aside.chmod(0o755)
         _replace(aside, out)

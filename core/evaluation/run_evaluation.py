@@ -7,7 +7,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -24,13 +24,12 @@ from palpate.evaluation.error_ladder import Rung, build_ladder
 from palpate.evaluation.loaded_network import LoadedNetwork
 from palpate.evaluation.motion_kinds import kinds_in, kinds_of_pushes
 from palpate.evaluation.summary_sentence import summary_sentence
+from palpate.experiment import Experiment
 from palpate.foundation.errors import DiagnosisError, RunError
 from palpate.foundation.progress import Report, part, silent
-from palpate.measurement.phantom_drift import align_sequences
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.mesh.protocol import Meshing
 from palpate.recording.saved_model import effects_from, setup_of_model
-from palpate.registration.registration import register, setup_from
 from palpate.setup.setup import Setup
 
 __all__ = ["FILE", "MODELS", "EvaluationData", "EvaluationSpec", "LadderStep", "evaluate"]
@@ -100,12 +99,12 @@ class EvaluationData:
                 key="splits",
             )
         report(0.0, "registering robot, camera and phantom")
-        dataset, registration = align_sequences(dataset, register(dataset))
-        stated, repaired = setup_from(dataset, registration), registration.repaired
+        experiment = Experiment.of(dataset)
+        dataset, stated = experiment.dataset, experiment.stated
         *_, believed = _setups(stated, spec or EvaluationSpec()).values()
-        seen_from = replace(setup_from(dataset, repaired), sensor=believed.sensor)
+        setup = experiment.observation_setup(believed.sensor)
         data = observe_each(
-            dataset, tested, seen_from, repaired, (TEST_GROUPS, TEST_FELT), part(report, 0.1, 1.0)
+            experiment, tested, setup, (TEST_GROUPS, TEST_FELT), part(report, 0.1, 1.0)
         )
         trained = kinds_in(dataset, (*dataset.config.train, *dataset.config.validation), stated)
         kinds = kinds_of_pushes(dataset, data, stated)

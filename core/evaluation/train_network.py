@@ -23,11 +23,11 @@ from typing import TYPE_CHECKING, Any, Self
 
 from palpate.dataset import Dataset
 from palpate.effects.base import with_effects
+from palpate.experiment import Experiment
 from palpate.foundation.errors import CorrectionError, RunError
 from palpate.foundation.progress import Report, part, silent
 from palpate.mesh.stored_label import stored_label
 from palpate.recording.saved_model import effects_from, setup_of_model
-from palpate.registration.registration import Registration, register, setup_from
 from palpate.setup.setup import Setup
 
 if TYPE_CHECKING:
@@ -138,12 +138,10 @@ def train_network(
     _claim(folder, {**plan.to_json(), **source})
     if (folder / SUMMARY).is_file():
         return dict(json.loads((folder / SUMMARY).read_text()))
-    registration = register(dataset)
+    experiment = Experiment.of(dataset)
     if setup is None:
-        setup = _setup(setup_from(dataset, registration), model, truth)
-    samples = _samples(
-        dataset, plan, store, registration, setup, workers, part(report, 0.0, _SAMPLING)
-    )
+        setup = _setup(experiment.stated, model, truth)
+    samples = _samples(experiment, plan, store, setup, workers, part(report, 0.0, _SAMPLING))
     trained = train(samples, Split.of(samples), spec, folder, part(report, _SAMPLING, 1.0))
     about = trained.about
     summary = {
@@ -172,10 +170,9 @@ def _setup(
 
 
 def _samples(
-    dataset: Dataset,
+    experiment: Experiment,
     plan: TrainingPlan,
     store: Path,
-    registration: Registration,
     setup: Setup,
     workers: int,
     report: Report,
@@ -183,8 +180,9 @@ def _samples(
     """Return the samples of a model; made where the store does not have them."""
     from palpate.correction import make_samples, recorder_for
 
+    dataset = experiment.dataset
     recorder = recorder_for(
-        dataset, setup=setup, nodes=plan.nodes, points=plan.points, registration=registration
+        dataset, setup=setup, nodes=plan.nodes, points=plan.points, experiment=experiment
     )
     names = [
         name

@@ -4,8 +4,8 @@ experiment = register("my-block")
 replay = experiment.replay("poke-top-01")
 """
 
-from palpate.experiment.experiment import Experiment, register
+from palpate.experiment.experiment import Experiment, register, sequences_with_clouds
 from palpate.experiment.observed_clouds import ObservedClouds
 from palpate.experiment.replayed_sequence import ReplayedSequence
 
-__all__ = ["Experiment", "ObservedClouds", "ReplayedSequence", "register"]
+__all__ = ["Experiment", "ObservedClouds", "ReplayedSequence", "register", "sequences_with_clouds"]

@@ -8,6 +8,7 @@ of the clouds.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -35,9 +36,9 @@ from palpate.mesh.push_meshes import REPLAY_PUSHES
 from palpate.registration.registration import Registration, setup_from
 from palpate.registration.registration import register as relate_frames
 from palpate.replay.replay import replay
-from palpate.setup.setup import Setup, Shape
+from palpate.setup.setup import Sensor, Setup, Shape
 
-__all__ = ["Experiment", "register"]
+__all__ = ["Experiment", "register", "sequences_with_clouds"]
 
 _RATE = 30.0
 """Frames a second of a replay without clouds [1/s]."""
@@ -96,7 +97,7 @@ class Experiment:
     @property
     def sequences(self) -> tuple[str, ...]:
         """Names of the sequences that have clouds."""
-        return tuple(name for name in self.dataset.sequences if len(self.dataset.sequence(name)))
+        return sequences_with_clouds(self.dataset)
 
     @cached_property
     def stated(self) -> Setup:
@@ -113,6 +114,14 @@ class Experiment:
         """Direction (3,) of the tool's shaft in the tool's frame; None where no cloud shows one."""
         return find_shaft_axis(self.dataset, self.registration.repaired)
 
+    def observation_setup(self, sensor: Sensor) -> Setup:
+        """The stated setup as observations need it.
+
+        The robot is where the repaired touches put it, since the tool has to be found in the
+        clouds; `sensor` gives the clock.
+        """
+        return replace(setup_from(self.dataset, self.registration.repaired), sensor=sensor)
+
     def with_effects(self, *effects: Effect) -> Self:
         """The same experiment with these effects added to its model.
 
@@ -122,25 +131,6 @@ class Experiment:
             self, setup=with_effects(self.setup, effects), effects=(*self.effects, *effects)
         )
 
-    def choose(self, names: tuple[str, ...] | list[str] = ()) -> tuple[str, ...]:
-        """These sequences without repeats, or all that have clouds where none is named.
-
-        Raises DatasetError where a sequence has no clouds, or none of the dataset has.
-        """
-        chosen = tuple(dict.fromkeys(names)) or self.sequences
-        if not chosen:
-            raise DatasetError(
-                "no sequence has clouds to compare a simulation with; record some", key="sequences"
-            )
-        for name in chosen:
-            if not len(self.dataset.sequence(name)):
-                raise DatasetError(
-                    f"{name} has no clouds to compare with; choose other sequences",
-                    file=f"sequences/{name}",
-                    key="sequences",
-                )
-        return chosen
-
     def grid(self, centres: FloatArray) -> Meshing:
         """The mesh of a replay of tool centres (f, 3) [m], phantom frame."""
         radius = self.setup.tool.radius
@@ -149,7 +139,11 @@ class Experiment:
         return REPLAY_GRID.for_tool(radius)
 
     def observe(
-        self, sequence: str, frames: IntArray | None = None, report: Report = silent
+        self,
+        sequence: str,
+        frames: IntArray | None = None,
+        report: Report = silent,
+        keep: Callable[[FloatArray], FloatArray] = np.asarray,
     ) -> ObservedClouds:
         """The phantom's points in the clouds of a sequence.
 
@@ -157,11 +151,12 @@ class Experiment:
             sequence: name.
             frames: indices of the clouds; all of them where none is given.
             report: progress.
+            keep: applied to the points (n, 3) [m] of each cloud, camera frame, e.g. to thin them.
         """
         recorded = self.dataset.sequence(sequence)
         chosen = np.arange(len(recorded)) if frames is None else np.asarray(frames, dtype=int)
         return segment_clouds(
-            recorded, chosen, self.cleaner, self.stated.phantom_from_robot, self.shaft, report
+            recorded, chosen, self.cleaner, self.stated.phantom_from_robot, self.shaft, report, keep
         )
 
     def centres(self, sequence: Sequence, times: FloatArray, grid: Meshing) -> FloatArray:
@@ -207,6 +202,28 @@ class Experiment:
         )
 
 
+def sequences_with_clouds(dataset: Dataset, names: Iterable[str] = ()) -> tuple[str, ...]:
+    """The named sequences without repeats, or all that have clouds where none is named.
+
+    Raises DatasetError where a named sequence has no clouds, or no sequence of the dataset has.
+    """
+    chosen = tuple(dict.fromkeys(names)) or tuple(
+        name for name in dataset.sequences if len(dataset.sequence(name))
+    )
+    if not chosen:
+        raise DatasetError(
+            "no sequence has clouds to compare a simulation with; record some", key="sequences"
+        )
+    for name in chosen:
+        if not len(dataset.sequence(name)):
+            raise DatasetError(
+                f"{name} has no clouds to compare with; choose other sequences",
+                file=f"sequences/{name}",
+                key="sequences",
+            )
+    return chosen
+
+
 def _thinned(times: FloatArray) -> FloatArray:
     """Stamps (n,) [s] of a robot stream at no more than `_RATE` a second."""
     slots = np.floor((times - times[0]) * _RATE)
@@ -214,7 +231,10 @@ def _thinned(times: FloatArray) -> FloatArray:
 
 
 def register(
-    dataset: Dataset | Path | str, *, accepted: AcceptedRegistration | None = None, report: Report = silent
+    dataset: Dataset | Path | str,
+    *,
+    accepted: AcceptedRegistration | None = None,
+    report: Report = silent,
 ) -> Experiment:
     """Relate robot, camera and phantom of a dataset; see `Experiment.of`."""
     return Experiment.of(dataset, accepted=accepted, report=report)

@@ -12,16 +12,11 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.effects import Effect
-from palpate.effects.base import with_effects
-from palpate.foundation.errors import DatasetError
+from palpate.experiment import Experiment, sequences_with_clouds
 from palpate.foundation.processes import ProcessPool
 from palpate.foundation.progress import Report, silent
-from palpate.measurement.phantom_drift import align_sequences
-from palpate.measurement.segmentation import cleaner_for
-from palpate.measurement.tool_pose import find_shaft_axis
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.recording.record_sequence import record
-from palpate.registration.registration import register, setup_from
 from palpate.setup.setup import Setup
 
 __all__ = ["replay_into"]
@@ -49,15 +44,11 @@ def replay_into(
         workers: processes.
         report: progress.
     """
-    names = _with_clouds(dataset, sequences)
+    names = sequences_with_clouds(dataset, sequences)
     report(0.0, "relating robot, camera and phantom")
-    dataset, registration = align_sequences(dataset, register(dataset))
-    stated = setup_from(dataset, registration)
-    extended = with_effects(stated, effects) if effects else stated
-    cleaner, shaft = (
-        cleaner_for(dataset, registration),
-        find_shaft_axis(dataset, registration.repaired),
-    )
+    experiment = Experiment.of(dataset)
+    stated = experiment.stated
+    extended = experiment.with_effects(*effects).setup if effects else stated
     grid = PAGE_GRID.for_tool(stated.tool.radius)
     (out / "replays").mkdir(parents=True)
     (out / "pictures").mkdir()
@@ -65,11 +56,11 @@ def replay_into(
         tasks = [
             pool.submit(
                 record,
-                dataset.sequence(name),
+                experiment.dataset.sequence(name),
                 stated,
                 extended,
-                cleaner,
-                shaft,
+                experiment.cleaner,
+                experiment.shaft,
                 grid,
                 out / "replays" / f"{name}.npz",
             )
@@ -84,30 +75,11 @@ def replay_into(
         int((np.load(out / "replays" / f"{name}.npz")["outcome"] != 0).sum()) for name in names
     )
     warnings = [
-        *registration.warnings,
+        *experiment.warnings,
         *([f"{failed} frames found no equilibrium."] if failed else []),
     ]
     _write_run(out, dataset, extended, effects, warnings)
     return failed
-
-
-def _with_clouds(dataset: Dataset, sequences: Sequence[str]) -> tuple[str, ...]:
-    """The named sequences, or all with clouds; DatasetError if one or all have none."""
-    names = tuple(dict.fromkeys(sequences)) or tuple(
-        name for name in dataset.sequences if len(dataset.sequence(name))
-    )
-    for name in names:
-        if not len(dataset.sequence(name)):
-            raise DatasetError(
-                f"{name} has no clouds to compare with; choose other sequences",
-                file=f"sequences/{name}",
-            )
-    if not names:
-        raise DatasetError(
-            "no sequence has clouds, and a replay is compared with clouds; record some",
-            key="sequences",
-        )
-    return names
 
 
 def _write_run(

@@ -16,19 +16,16 @@ from palpate.dataset.accepted_registration import AcceptedRegistration
 from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.effects import DIAGNOSED, Effect
 from palpate.effects.base import with_effects
+from palpate.experiment import Experiment
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RunError
 from palpate.measurement.camera_model import camera_model_for
-from palpate.measurement.phantom_drift import align_sequences
-from palpate.measurement.segmentation import cleaner_for
-from palpate.measurement.tool_pose import find_shaft_axis, tool_poses
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.recording.interactive import InteractiveReplay
 from palpate.recording.interior_fields import InteriorFields
 from palpate.recording.record_sequence import ModelRecording, compare_with_clouds
 from palpate.recording.saved_model import with_fitted_values
-from palpate.registration.registration import register, setup_from
 from palpate.replay.equilibrium import Equilibrium
 from palpate.replay.replay import replay
 from palpate.setup.setup import Setup, Shape
@@ -88,16 +85,12 @@ class FrameResolver:
                 f"{sequence} has no clouds of a block, so that there is nothing to compare with",
                 sequence=sequence,
             )
-        dataset, registration = align_sequences(dataset, register(dataset))
-        self.stated = setup_from(dataset, registration)
+        self._experiment = Experiment.of(dataset)
+        self.stated = self._experiment.stated
         self.tuned = with_fitted_values(self.stated, extended)
-        self._sequence = dataset.sequence(sequence)
+        self._sequence = self._experiment.dataset.sequence(sequence)
         self._clouds = np.asarray(clouds, dtype=int)
         self._times = np.asarray(self._sequence.cloud_times)[self._clouds]
-        self._cleaner, self._shaft = (
-            cleaner_for(dataset, registration),
-            find_shaft_axis(dataset, registration.repaired),
-        )
         self._grid = PAGE_GRID.for_tool(self.stated.tool.radius)
         self._cleaned: dict[int, FloatArray] = {}
         self._last: tuple[int, Equilibrium] | None = None
@@ -172,14 +165,9 @@ class FrameResolver:
 
     def _cloud(self, frame: int) -> FloatArray:
         if frame not in self._cleaned:
-            pose = tool_poses(
-                self._sequence.kinematics,
-                self._times[[frame]],
-                self.stated.phantom_from_robot,
-                self._shaft,
-            )[0]
-            cloud = self._sequence.cloud(int(self._clouds[frame]))
-            self._cleaned[frame] = cloud[self._cleaner.clean(cloud, pose).indices]
+            index = self._clouds[[frame]]
+            observed = self._experiment.observe(self._sequence.name, index)
+            self._cleaned[frame] = observed.clouds[0]
         return self._cleaned[frame]
 
 

@@ -10,13 +10,10 @@ import numpy as np
 
 from palpate.dataset import Dataset, Kinematics
 from palpate.dataset.tool_smoothing import smooth_centres
+from palpate.experiment import Experiment, sequences_with_clouds
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
-from palpate.measurement.phantom_drift import align_sequences
-from palpate.measurement.segmentation import cleaner_for
-from palpate.measurement.tool_pose import find_shaft_axis, tool_poses
-from palpate.registration.registration import register, setup_from
 from palpate.setup.box import CLEARANCE, distance_to_block
 from palpate.setup.setup import Setup
 
@@ -72,28 +69,14 @@ def read_sweep_data(
 
     Raises DatasetError where a sequence has no clouds, or none in which the tool touches.
     """
-    names = tuple(dict.fromkeys(names)) or tuple(
-        name for name in dataset.sequences if len(dataset.sequence(name))
-    )
-    if not names:
-        raise DatasetError(
-            "no sequence has clouds, and a sweep compares with clouds; record some", key="sequences"
-        )
-    for name in names:
-        if not len(dataset.sequence(name)):
-            raise DatasetError(
-                f"{name} has no clouds to compare with; choose other sequences",
-                file=f"sequences/{name}",
-                key="sequences",
-            )
+    names = sequences_with_clouds(dataset, names)
     report(0.0, "registering robot, camera and phantom")
-    dataset, registration = align_sequences(dataset, register(dataset))
-    setup = setup_from(dataset, registration)
-    cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration)
+    experiment = Experiment.of(dataset)
+    setup = experiment.stated
     sequences = []
     for number, name in enumerate(names):
         report((number + 1) / (len(names) + 1), f"reading {name}")
-        sequence = dataset.sequence(name)
+        sequence = experiment.dataset.sequence(name)
         times = np.asarray(sequence.cloud_times)
         centres = setup.phantom_from_robot.apply(smooth_centres(sequence.kinematics, times))
         touched = distance_to_block(setup.box.size, centres) <= setup.tool.radius + CLEARANCE
@@ -107,17 +90,13 @@ def read_sweep_data(
         chosen = near[
             np.unique(np.linspace(0, len(near) - 1, min(len(near), frames)).round().astype(int))
         ]
-        poses = tool_poses(sequence.kinematics, times[chosen], setup.phantom_from_robot, shaft)
-        clouds = []
-        for frame, pose in zip(chosen, poses, strict=True):
-            raw = sequence.cloud(int(frame))
-            clouds.append(_subsampled(raw[cleaner.clean(raw, pose).indices]))
+        observed = experiment.observe(name, chosen, keep=_subsampled)
         sequences.append(
             SweepSequence(
                 name,
                 sequence.kinematics,
-                times[chosen],
-                tuple(clouds),
+                observed.times,
+                observed.clouds,
                 probes[chosen].astype(float),
             )
         )

@@ -9,16 +9,14 @@ from scipy.spatial import cKDTree
 
 from palpate.correction.samples.corrected_points import Body
 from palpate.dataset import Dataset
+from palpate.experiment import Experiment
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.camera_model import CameraModel
-from palpate.measurement.phantom_drift import align_sequences
-from palpate.measurement.segmentation import Cleaner, cleaner_for
-from palpate.measurement.tool_pose import find_shaft_axis
+from palpate.measurement.segmentation import Cleaner
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.mesh.protocol import Meshing
-from palpate.registration.registration import Registration, register, setup_from
 from palpate.replay.equilibrium import Equilibrium
 from palpate.setup.setup import Setup
 
@@ -70,7 +68,7 @@ def recorder_for(
     body: Body | None = None,
     points: int = 1024,
     seed: int = 0,
-    registration: Registration | None = None,
+    experiment: Experiment | None = None,
 ) -> Recorder:
     """Return a recorder for a dataset.
 
@@ -82,18 +80,18 @@ def recorder_for(
         body: material points to sample instead of a grid.
         points: most points of a cloud.
         seed: seed of the random draw of points.
-        registration: the registration, if it is known already.
+        experiment: the registered dataset, if there is one already.
     """
-    dataset, registration = align_sequences(dataset, registration or register(dataset))
-    setup = setup or setup_from(dataset, registration)
+    experiment = experiment or Experiment.of(dataset)
+    dataset, setup = experiment.dataset, setup or experiment.stated
     with_forces = [dataset.sequence(name).forces is not None for name in dataset.sequences]
     return Recorder(
         dataset,
         setup,
         grid or PAGE_GRID.for_tool(setup.tool.radius),
         body or Body.block(setup.box.size, nodes),
-        cleaner_for(dataset, registration),
-        find_shaft_axis(dataset, registration),
+        experiment.cleaner,
+        experiment.shaft,
         points,
         all(with_forces),
         seed,

@@ -4,46 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from palpate.dataset import Dataset
 from palpate.diagnosis.inference.inference_problem import InferenceProblem
 from palpate.diagnosis.inference.rest_cloud import RestCloud
 from palpate.diagnosis.inference.rest_evidence import RestEvidence
 from palpate.diagnosis.observation.force_only import pushed_places
 from palpate.diagnosis.observation.frame_groups import Observations
-from palpate.measurement.segmentation import cleaner_for
+from palpate.experiment import Experiment
 from palpate.mesh.graded_mesh import FINE_GRID, REPLAY_GRID, SCREEN_GRID
 from palpate.mesh.protocol import Meshing
 from palpate.mesh.push_meshes import FINE_PUSHES, REPLAY_PUSHES, SCREEN_PUSHES
-from palpate.registration.registration import Registration
 from palpate.setup.setup import Setup, Shape
 
 __all__ = ["problem_of_dataset"]
 
 
 def problem_of_dataset(
-    dataset: Dataset,
-    registration: Registration,
-    setup: Setup,
-    fitted: Sequence[Observations],
-    held_out: Sequence[Observations],
+    experiment: Experiment, fitted: Sequence[Observations], held_out: Sequence[Observations]
 ) -> InferenceProblem:
     """Return the inference problem of a dataset.
 
     Args:
-        dataset: with its rest cloud.
-        registration: of robot and camera.
-        setup: as stated.
+        experiment: the registered dataset with its rest cloud.
         fitted: sequences that causes are fitted on.
         held_out: sequences of the test, whose pushes the meshes must resolve too.
     """
+    setup = experiment.stated
     grid, fine, coarse = _meshes(setup, [*fitted, *held_out])
     clouds, at_rest = any(not item.force_only for item in fitted), None
     if clouds:
-        cleaner = cleaner_for(dataset, registration)
-        at_rest = RestEvidence(RestCloud.of(dataset.rest_cloud(), cleaner, setup, grid))
+        cloud = experiment.dataset.rest_cloud()
+        at_rest = RestEvidence(RestCloud.of(cloud, experiment.cleaner, setup, grid))
     return InferenceProblem(
         setup=setup,
-        registration=registration,
+        registration=experiment.registration,
         names=tuple(item.name for item in fitted),
         at_rest=at_rest,
         grid=grid,

@@ -13,17 +13,17 @@ from concurrent.futures import Future
 
 import numpy as np
 
-from palpate.dataset import Dataset, Sequence
+from palpate.dataset import Sequence
 from palpate.dataset.tool_smoothing import SMOOTHING, smooth_centres
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.force_record import ForceRecord
 from palpate.diagnosis.observation.frame_groups import Group, Observations
 from palpate.diagnosis.observation.observe_clouds import observe_all
+from palpate.experiment import Experiment
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DiagnosisError
 from palpate.foundation.processes import at_once
 from palpate.foundation.progress import Report, silent
-from palpate.registration.registration import Registration
 from palpate.setup.box import CLEARANCE
 from palpate.setup.setup import Setup
 
@@ -162,10 +162,9 @@ def deepest_rows(item: Observations) -> list[int]:
 
 
 def observe_each(
-    dataset: Dataset,
+    experiment: Experiment,
     names: Ordered[str],
     setup: Setup,
-    registration: Registration,
     most: tuple[int, int],
     report: Report = silent,
     begin: Callable[..., Future[Observations]] = at_once,
@@ -173,16 +172,16 @@ def observe_each(
     """Observe sequences with and without clouds.
 
     Args:
-        dataset: that holds them.
+        experiment: the registered dataset that holds them.
         names: of the sequences.
-        setup: as stated.
-        registration: of camera and robot.
+        setup: as stated, with the robot where it is seen (`Experiment.observation_setup`).
         most: largest number of groups of a sequence with clouds, and of one without.
         report: progress.
         begin: starts a task, as in `observe_all`.
     """
+    dataset = experiment.dataset
     seen = [name for name in names if len(dataset.sequence(name))]
-    known = observe_all(dataset, seen, setup, registration, most[0], report, begin) if seen else []
+    known = observe_all(experiment, seen, setup, most[0], report, begin) if seen else []
     found = {item.name: item for item in known}
     return [
         found[name] if name in found else observe_forces(dataset.sequence(name), setup, most[1])

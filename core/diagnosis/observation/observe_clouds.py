@@ -8,17 +8,17 @@ from concurrent.futures import Future
 
 import numpy as np
 
-from palpate.dataset import Dataset, Sequence
+from palpate.dataset import Sequence
 from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.force_record import ForceRecord
 from palpate.diagnosis.observation.frame_groups import Group, Observations
+from palpate.experiment import Experiment
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.processes import at_once
 from palpate.foundation.progress import Report, silent
-from palpate.measurement.segmentation import Cleaner, cleaner_for
-from palpate.measurement.tool_pose import find_shaft_axis, tool_poses
-from palpate.registration.registration import Registration
+from palpate.measurement.segmentation import Cleaner
+from palpate.measurement.tool_pose import tool_poses
 from palpate.setup.box import CLEARANCE, distance_to_block
 from palpate.setup.setup import Setup
 
@@ -153,10 +153,9 @@ def _forces(sequence: Sequence, setup: Setup) -> ForceRecord | None:
 
 
 def observe_all(
-    dataset: Dataset,
+    experiment: Experiment,
     names: Ordered[str],
     setup: Setup,
-    registration: Registration,
     most: int,
     report: Report = silent,
     begin: Callable[..., Future[Observations]] = at_once,
@@ -164,15 +163,14 @@ def observe_all(
     """Observe sequences with clouds.
 
     Args:
-        dataset: that holds them.
+        experiment: the registered dataset that holds them.
         names: of the sequences.
-        setup: as stated.
-        registration: of camera and robot.
+        setup: as stated, with the robot where it is seen (`Experiment.observation_setup`).
         most: largest number of groups with the tool near the phantom, in each sequence.
         report: progress.
         begin: starts `observe`, for instance in a pool of processes.
     """
-    cleaner, shaft = cleaner_for(dataset, registration), find_shaft_axis(dataset, registration)
+    dataset, cleaner, shaft = experiment.dataset, experiment.cleaner, experiment.shaft
     rest = dataset.rest_cloud() if dataset.has_rest else None
     pending, observed = [], []
     for number, name in enumerate(names):

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import replace
 
 from palpate.dataset import Dataset
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.force_only import observe_each
 from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.experiment import Experiment
 from palpate.foundation.errors import DiagnosisError
 from palpate.foundation.progress import Report, part
-from palpate.registration.registration import Registration, setup_from
 from palpate.setup.setup import Sensor
 
 __all__ = ["SplitObservations", "check_splits", "observe_splits"]
@@ -47,8 +46,7 @@ def check_splits(dataset: Dataset) -> None:
 
 
 def observe_splits(
-    dataset: Dataset,
-    registration: Registration,
+    experiment: Experiment,
     sensor: Sensor,
     begin: Callable[..., Future[Observations]],
     report: Report,
@@ -56,29 +54,26 @@ def observe_splits(
     """Observe the fitted and the test sequences, their frames by the clock of this sensor.
 
     Args:
-        dataset: with its splits.
-        registration: of robot and camera.
+        experiment: the registered dataset with its splits.
         sensor: whose clock groups the frames.
         begin: runs a task in another process.
         report: progress.
     """
-    config, setup = dataset.config, replace(setup_from(dataset, registration), sensor=sensor)
+    config, setup = experiment.dataset.config, experiment.observation_setup(sensor)
     limits = CRITERIA.grouping
     return (
         observe_each(
-            dataset,
+            experiment,
             (*config.train, *config.validation),
             setup,
-            registration,
             (limits.fitted_groups, limits.fitted_force_groups),
             part(report, 0.0, 0.7),
             begin,
         ),
         observe_each(
-            dataset,
+            experiment,
             tuple(config.test),
             setup,
-            registration,
             (limits.test_groups, limits.test_force_groups),
             part(report, 0.7, 1.0),
             begin,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -20,7 +20,10 @@ from palpate.foundation.errors import DiagnosisError
 from palpate.foundation.figure import new_figure, save_figure
 from palpate.measurement.surface_gaps import SIDES, Surface
 
-__all__ = ["ErrorPatterns", "draw_patterns", "error_patterns"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["ErrorPatterns", "draw_patterns", "error_patterns", "patterns_figure"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +41,12 @@ class ErrorPatterns:
     normals: FloatArray
     measured: FloatArray
     predicted: FloatArray
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Read what `save` wrote."""
+        with np.load(path) as arrays:
+            return cls(**{name: arrays[name] for name in arrays.files})
 
     def save(self, path: Path) -> None:
         """Write as npz."""
@@ -162,7 +171,12 @@ def _kernel(surface: Surface) -> FloatArray:
 
 
 def draw_patterns(patterns: ErrorPatterns, surface: Surface, path: Path) -> None:
-    """Draw both patterns, or the error alone if no cause is named, on the unfolded block, as PNG.
+    """Write the figure of both patterns as PNG."""
+    save_figure(patterns_figure(patterns, surface), path)
+
+
+def patterns_figure(patterns: ErrorPatterns, surface: Surface) -> Figure:
+    """Draw both patterns, or the error alone if no cause is named, on the unfolded block.
 
     Both have one colour scale [mm].
     """
@@ -184,7 +198,7 @@ def draw_patterns(patterns: ErrorPatterns, surface: Surface, path: Path) -> None
         shrink=0.7,
         label="surface higher (+) or lower (-) than the simulation [mm]",
     )
-    save_figure(figure, path)
+    return figure
 
 
 def _unfold(
