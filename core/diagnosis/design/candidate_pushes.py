@@ -1,6 +1,4 @@
-"""Pushes that could be made next: places on the top and the sides, straight in or along, as deep as
-those that were made.
-"""
+"""Candidate pushes: places on the top and the sides, straight in or along, of usual depth."""
 
 from __future__ import annotations
 
@@ -56,10 +54,14 @@ class Push:
         return np.asarray(-sign * np.eye(3)[axis])
 
     def centres(self, radius: float, late: float = 0.0) -> FloatArray:
-        """The tool's centre (4, 3) [m] when clouds are taken: passing half the depth, in all its
-        depth, dragged, and released.
+        """Return the tool's centre when clouds are taken (4, 3) [m].
 
-        `late` [s] is how much earlier than stated a cloud was taken.
+        They are taken when it passes half the depth, at full depth, after a drag, and after the
+        release.
+
+        Args:
+            radius: of the tool [m].
+            late: time by which a cloud is taken earlier than stated [s].
         """
         touch, inward = np.array(self.place) - radius * self.direction, self.direction
         passing = touch + (0.5 * self.depth - late * self.speed) * inward
@@ -67,19 +69,19 @@ class Push:
         return np.array([passing, deep, deep + np.array(self.along), touch - 2 * radius * inward])
 
     def half(self) -> Push:
-        """Half as deep."""
+        """Return the push at half the depth."""
         return replace(self, depth=self.depth / 2)
 
     @property
     def times(self) -> FloatArray:
-        """When these clouds are taken (4,) [s]; only a material with memory asks."""
+        """Return when these clouds are taken (4,) [s]; they matter for a material with history."""
         down = self.depth / max(self.speed, 1e-3)
         return (
             np.array([0.5 * down, down, down + self.hold + 0.5, down + 2 * self.hold + 1.5]) + 1.0
         )
 
     def text(self) -> str:
-        """What to do, in words."""
+        """Return the instruction in words."""
         shown = ", ".join(
             f"{1e3 * value:.0f}" for value in self.place[: 2 if self.side == "top" else 3]
         )
@@ -99,9 +101,7 @@ class Push:
 
 
 def depth_reached(data: Sequence[Observations], setup: Setup) -> float:
-    """The median of how deep the sequences' pushes went [m]: what the bench was made for, but never
-    a third of the block.
-    """
+    """Return the median depth of earlier pushes [m], at most a third of the block."""
     deepest = [
         -box_gap(item.centres(setup), setup.box.size, setup.tool.radius).min() for item in data
     ]
@@ -109,7 +109,7 @@ def depth_reached(data: Sequence[Observations], setup: Setup) -> float:
 
 
 def speed_reached(data: Sequence[Observations], setup: Setup) -> float:
-    """How fast the tool goes while it is near the block [m/s]: a high quantile of all sequences."""
+    """Return a high quantile of the tool's speed near the block [m/s]."""
     found = []
     for item in data:
         path = setup.phantom_from_robot.apply(item.kinematics.position_at(item.times))
@@ -125,12 +125,13 @@ def speed_reached(data: Sequence[Observations], setup: Setup) -> float:
 def pushes(
     setup: Setup, depth: float, *, drags: bool, speed: float = 0.0, holds: Sequence[float] = (0.0,)
 ) -> list[Push]:
-    """Candidates all over the reachable sides of the stated block.
+    """Return candidates all over the reachable sides of the stated block.
 
     Args:
+        setup: as stated.
         depth: of each [m].
-        drags: whether something drags or slides.
-        speed: of all [m/s], where clocks or memory matter.
+        drags: whether drags are candidates.
+        speed: of all [m/s], where clocks or history matter.
         holds: rests that are tried [s].
     """
     straight = [
@@ -164,7 +165,7 @@ def pushes(
 
 
 def _places(setup: Setup, side: str) -> list[tuple[float, float, float]]:
-    """Where a side is tried: the top on a grid, the others along one line."""
+    """Return the places of a side: a grid on the top, one line on the others."""
     size, margin = np.array(setup.box.size), CRITERIA.design.margin * setup.tool.radius
 
     def spread(axis: int) -> FloatArray:

@@ -1,11 +1,11 @@
-"""The next probe: the push that best tells the surviving causes apart (step 12 of the method).
+"""The next probe: the push that best tells the surviving causes apart.
 
-T-optimal in the sense of Atkinson and Fedorov (1975): each candidate is replayed under both models
-as they were fitted to the data so far, and what tells them apart is weighed against all that could
-blur it: the camera's noise with as many points per patch as it has had, the engine's own error, and
-what is still open in the nuisances and in both models' parameters. With squared distance 2 d the
-log density ratio after the push is Gaussian with mean d (the Kullback-Leibler divergence) and
-variance 2 d, so the chance that it exceeds a bound is known before anything is pushed.
+It is T-optimal in the sense of Atkinson and Fedorov (1975). Each candidate push is replayed under
+both models as they were fitted to the data so far. Their difference is weighed against everything
+that could blur it: the camera's noise with as many points per patch as so far, the engine's own
+error, and the uncertainty of nuisances and of both models' parameters. With squared distance 2 d
+the log density ratio after the push is Gaussian with mean d (the Kullback-Leibler divergence) and
+variance 2 d, so that the chance of exceeding a bound is known before the push.
 """
 
 from __future__ import annotations
@@ -37,9 +37,10 @@ class Pair:
     """Two models to tell apart.
 
     Attributes:
+        models: both.
         names: of both.
-        needed: [nats] by which the first must win if it is true, and the second.
-        part: of what the second does that is asked for [1]; its nats go with the square.
+        needed: nats by which the first must win if it is true, and the second.
+        part: share of the second effect that is in question [1]; its nats go with the square.
     """
 
     models: tuple[Survivor, Survivor]
@@ -48,14 +49,21 @@ class Pair:
     part: float = 1.0
 
     def chance(self, nats: float) -> float:
-        """That the new data decide, either model being true as often as the other."""
+        """Return the chance that the new data decide, both models being equally probable."""
         deviation = np.sqrt(2 * max(nats, 1e-9))
         return float(np.mean(norm.cdf((nats - np.array(self.needed)) / deviation)))
 
 
 @dataclass(frozen=True, eq=False)
 class Advice:
-    """A push and what it would tell."""
+    """A push and its expected result.
+
+    Attributes:
+        push: to be made.
+        pair: that it tells apart best.
+        nats: expected of this pair.
+        chances: of all pairs together.
+    """
 
     push: Push
     pair: Pair
@@ -63,7 +71,7 @@ class Advice:
     chances: float
 
     def to_json(self) -> dict[str, Any]:
-        """As the report has it."""
+        """Return the row of the report."""
         return {
             "kind": self.push.kind,
             "place": [round(value, 5) for value in self.push.place],
@@ -79,8 +87,8 @@ class Advice:
 def next_probe(
     evaluator: Evaluator, data: Sequence[Observations], findings: Findings
 ) -> list[dict[str, Any]]:
-    """Rows of the report, best first: up to three pushes, and before them what no push but another
-    measurement would tell.
+    """Return rows of the report, best first: measurements that are no push, then up to three
+    pushes.
     """
     pairs = pairs_of(evaluator, findings)
     if not pairs:
@@ -120,7 +128,7 @@ def next_probe(
 
 
 def _scene(evaluator: Evaluator, findings: Findings) -> Scene:
-    """What the camera sees, as it has seen it so far."""
+    """Return what all candidate pushes share, with the visibility so far."""
     predictions, surface = (
         [item for item in findings.baseline.predictions if not item.force_only],
         evaluator.problem.surface,
@@ -141,7 +149,7 @@ def _scene(evaluator: Evaluator, findings: Findings) -> Scene:
 
 
 def _advice(push: Push, pairs: Sequence[Pair], nats: list[tuple[float, float]]) -> Advice:
-    """The push at the least depth that will do, for the pair that it tells apart best."""
+    """Return the push at the least sufficient depth, with the pair that it tells apart best."""
     full = [pair.part**2 * both[1] for pair, both in zip(pairs, nats, strict=True)]
     half = [pair.part**2 * both[0] for pair, both in zip(pairs, nats, strict=True)]
     chances = [pair.chance(value) for pair, value in zip(pairs, full, strict=True)]
@@ -158,8 +166,9 @@ def _advice(push: Push, pairs: Sequence[Pair], nats: list[tuple[float, float]]) 
 
 
 def _choices(found: Sequence[Advice]) -> list[Advice]:
-    """The first few, each of its own kind and side: not every place can be reached in every
-    laboratory.
+    """Return the first few pushes, each of another kind and side.
+
+    Not every place can be reached in every laboratory.
     """
     chosen: list[Advice] = []
     for one in found:
@@ -199,8 +208,10 @@ def _other_measurements(
 
 
 def pairs_of(evaluator: Evaluator, findings: Findings) -> list[Pair]:
-    """What is still to be told apart: rivals; else the cause found and those that came next; else
-    nothing and what hides best.
+    """Return the pairs to be told apart.
+
+    These are the best model and its rivals, else the best model and the next one, else no cause and
+    the effects that stay hidden at the largest size.
     """
     best = findings.best
     if best is None:
@@ -232,9 +243,7 @@ def pairs_of(evaluator: Evaluator, findings: Findings) -> list[Pair]:
 
 
 def _next_best(findings: Findings, best: Trial) -> list[Trial]:
-    """The refitted set that came closest to the best, of other causes; none where all were told
-    from it long ago.
-    """
+    """Return the next best set of other causes; none where the best one is far ahead."""
     others = [
         trial
         for trial in findings.trials
@@ -244,8 +253,9 @@ def _next_best(findings: Findings, best: Trial) -> list[Trial]:
 
 
 def _imagined(evaluator: Evaluator, findings: Findings) -> list[Pair]:
-    """Nothing against the effects that would stay unseen longest, each as large as it may be
-    without being named.
+    """Return pairs of no cause and the effects with the highest detection limits.
+
+    Each effect is as large as it may be without being named.
     """
     nothing, needed = survivor(evaluator, findings.baseline), (findings.bound, findings.bound)
     others = [

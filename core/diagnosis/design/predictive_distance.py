@@ -1,6 +1,4 @@
-"""How far apart two models are under a push that was not made yet, over all that blurs what the
-camera would see of it.
-"""
+"""Distance between two models under a push that was not made yet, over everything that blurs it."""
 
 from __future__ import annotations
 
@@ -91,16 +89,18 @@ def survivor(evaluator: Evaluator, model: Model) -> Survivor:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What every candidate shares.
+    """Data that all candidate pushes share.
 
     Attributes:
         stated: the baseline.
-        lumps: spots whose stiffness the engine has only so well.
-        centres, normals: (p, 3) of the patches.
-        count: (p,) points a patch has had in a cloud.
-        variance: (p,) of one [m^2].
-        eye: the camera's place (3,) [m].
-        pivot: (3,) [m] about which the robot's registration turns.
+        lumps: places at which the engine's stiffness is uncertain.
+        centres: of the patches (p, 3) [m].
+        normals: of the patches (p, 3).
+        count: points of each patch in a cloud (p,).
+        variance: of one point (p,) [m^2].
+        eye: place of the camera (3,) [m].
+        pivot: (3,) about which the robot's registration turns [m].
+        grid: mesh.
         temperature: by which nats are divided.
     """
 
@@ -117,13 +117,18 @@ class Scene:
 
     @cached_property
     def basis(self) -> FloatArray:
-        """Smooth errors of displacement (p, b)."""
+        """Columns of smooth errors of displacement (p, b)."""
         return smooth_basis(self.centres, CRITERIA.noise.field_length)
 
 
 class _Replayed:
-    """One model under one push; its equilibria begin from those of another model `like` it, where
-    there is one.
+    """One model under one push.
+
+    Args:
+        scene: of all pushes.
+        model: to be replayed.
+        push: to be made.
+        like: another model whose equilibria are starts.
     """
 
     def __init__(
@@ -157,8 +162,8 @@ class _Replayed:
         self._engine: dict[int, FloatArray] = {}
 
     def moved(self, row: int) -> FloatArray:
-        """How far patches (p, 3) [m] are from where they rest; zero where nothing is left of the
-        push.
+        """Return the displacement of the patches from rest (p, 3) [m]; zero where nothing of the
+        push is left.
         """
         if row not in self.frames:
             return np.zeros_like(self.scene.centres) if row == 3 else self.moved(1)
@@ -173,7 +178,7 @@ class _Replayed:
 
     @property
     def has_columns(self) -> bool:
-        """Whether a frame hangs on nothing but itself, so that it has derivatives of its own."""
+        """Whether frames are independent of each other, so that they have derivatives."""
         return not self.model.setup.has_history
 
     def _along_normals(self, frame: Equilibrium, fields: FloatArray) -> FloatArray:
@@ -185,7 +190,7 @@ class _Replayed:
         )
 
     def open(self, row: int) -> FloatArray:
-        """What is open in the model (p, k) [m], as independent columns of unit variance."""
+        """Return the model's uncertainty (p, k) [m], as independent columns of unit variance."""
         frame, covariance, ways = self.frames.get(row), self.model.covariance, self.model.ways
         if frame is None or covariance is None or not frame.in_contact or not self.has_columns:
             return np.zeros((len(self.scene.centres), 0 if covariance is None else len(covariance)))
@@ -208,7 +213,7 @@ class _Replayed:
         return np.asarray(self._along_normals(frame, fields) @ _root(covariance))
 
     def engine(self, row: int) -> FloatArray:
-        """The engine's own error (p, k) [m], likewise."""
+        """Return the engine's own error (p, k) [m], as independent columns of unit variance."""
         if row not in self._engine:
             self._engine[row] = self._errors(row)
         return self._engine[row]
@@ -235,7 +240,7 @@ def _root(covariance: FloatArray) -> FloatArray:
 
 
 def _weights(scene: Scene, push: Push, moved: FloatArray, centre: FloatArray) -> FloatArray:
-    """Inverse variances (p,) [1/m^2]; zero where a patch is not seen, or behind the tool."""
+    """Return inverse variances (p,) [1/m^2]; zero where a patch is hidden."""
     seen = scene.count >= CRITERIA.design.least_points
     places = scene.centres + moved
     ray = places - scene.eye
@@ -253,8 +258,14 @@ def _weights(scene: Scene, push: Push, moved: FloatArray, centre: FloatArray) ->
 def nats_of(
     scene: Scene, pairs: Sequence[tuple[Survivor, Survivor]], push: Push
 ) -> list[tuple[float, float]]:
-    """For each pair the divergence [nats] of half the push and of all of it; zero where a model
-    finds no equilibrium.
+    """Return for each pair the divergence of half the push and of all of it [nats].
+
+    It is zero where a model has no equilibrium.
+
+    Args:
+        scene: of all pushes.
+        pairs: of models.
+        push: to be made.
     """
     known: dict[int, _Replayed] = {}
 
@@ -284,7 +295,7 @@ _Part = tuple[FloatArray, FloatArray, FloatArray]
 def _part(
     scene: Scene, push: Push, both: tuple[_Replayed, _Replayed], engine: _Replayed, row: int
 ) -> _Part:
-    """Difference (p,), what blurs it (p, k), and weights (p,) of one cloud."""
+    """Return difference (p,), blur (p, k) and weights (p,) of one cloud."""
     moved = [side.moved(row) for side in both]
     difference = np.einsum("pi,pi->p", moved[1] - moved[0], scene.normals)
     # The mean of both models' predictive covariances stands for each.
@@ -296,7 +307,9 @@ def _part(
 
 
 def _divergence(parts: Sequence[_Part]) -> float:
-    """Half the squared distance of two Gaussians with one covariance, noise and blur (Woodbury)."""
+    """Return half the squared distance of two Gaussians with one covariance, of noise and blur
+    (Woodbury).
+    """
     difference, blur, weights = (np.concatenate(values) for values in zip(*parts, strict=True))
     inner = np.eye(blur.shape[1]) + (blur.T * weights) @ blur
     right = (blur.T * weights) @ difference

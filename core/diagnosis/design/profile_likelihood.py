@@ -1,10 +1,9 @@
-"""Which parameters of a named cause the data determine, and which they only bound or tie to others
-(step 11 of the method).
+"""Parameters of a named cause that the data determine, bound, or tie to others.
 
 The Fisher information with the nuisances integrated out is the screen: a parameter that it knows to
 within a step that matters has its interval. The others get a profile likelihood (Raue et al. 2009):
 the evidence a few deviations to either side, replayed there, with the other parameters moved to
-where the linearised fit has them. Where it does not fall, that side is open.
+where the linearised fit has them. A side on which the evidence does not fall is open.
 """
 
 from __future__ import annotations
@@ -29,8 +28,11 @@ __all__ = ["Profile", "combination", "profile", "profiles", "vague"]
 
 @dataclass(frozen=True)
 class Profile:
-    """What the data say of one parameter: "interval", "at least", "at most" or "not identifiable",
-    after so many evaluations.
+    """Result for one parameter.
+
+    Attributes:
+        told: "interval", "at least", "at most" or "not identifiable".
+        evaluations: number of replays of all sequences.
     """
 
     told: str
@@ -48,8 +50,8 @@ def profile(
 
     Args:
         evidence: of search coordinates (n,) [nats].
-        at: (n,) the best.
-        covariance: (n, n) of the linearised fit there.
+        at: the best coordinates (n,).
+        covariance: of the linearised fit there (n, n).
         index: of the coordinate.
         item: the parameter, with its bounds.
     """
@@ -74,7 +76,9 @@ def profile(
 
 
 def vague(covariance: FloatArray, items: Sequence[Parameter]) -> list[int]:
-    """Which coordinates the linearised fit knows to no step that matters, the worst first."""
+    """Return the coordinates that the linearised fit does not know to a step that matters, worst
+    first.
+    """
     widths = (
         CRITERIA.intervals.normal_quantile
         * np.sqrt(np.diag(covariance))
@@ -84,8 +88,9 @@ def vague(covariance: FloatArray, items: Sequence[Parameter]) -> list[int]:
 
 
 def combination(covariance: FloatArray, items: Sequence[Parameter], index: int) -> str:
-    """The direction, through one coordinate, in which the data know least, in words; empty where it
-    is that coordinate alone.
+    """Return in words the direction through one coordinate in which the data know least.
+
+    It is empty where the direction is that coordinate alone.
     """
     scales = np.array([item.scale for item in items])
     values, vectors = np.linalg.eigh(covariance / np.outer(scales, scales))
@@ -104,8 +109,9 @@ def combination(covariance: FloatArray, items: Sequence[Parameter], index: int) 
 
 
 def _settled(evaluator: Evaluator, model: Model) -> tuple[FloatArray, FloatArray]:
-    """Prior precision of the nuisances, and the covariance (n, n) of the model's own
-    coordinates."""
+    """Return the prior precision of the nuisances, and the covariance (n, n) of the model's
+    coordinates.
+    """
     nuisances = evaluator.problem.nuisances.with_effects(model.effects)
     solution = fit(
         evaluator.tempered(model),
@@ -118,7 +124,7 @@ def _settled(evaluator: Evaluator, model: Model) -> tuple[FloatArray, FloatArray
 def _evidence(
     evaluator: Evaluator, model: Model, nuisances: FloatArray
 ) -> Callable[[FloatArray], float]:
-    """Of the model's coordinates; the nuisances' columns are those at the model."""
+    """Return the evidence as a function of the coordinates, with the nuisances' columns fixed."""
 
     def value(coordinates: FloatArray) -> float:
         effects = model.effects_at(coordinates)
@@ -138,8 +144,9 @@ def _evidence(
 def profiles(
     evaluator: Evaluator, model: Model
 ) -> tuple[list[dict[str, str]], list[dict[str, Any]]]:
-    """For each effect: parameter to verdict; and rows of the report for those that no data of this
-    kind determine.
+    """Return for each effect a mapping from parameter to verdict, and rows of the report.
+
+    The rows are those of parameters that no data of this kind determine.
     """
     nuisances, covariance = _settled(evaluator, model)
     items = [item for effect in model.effects for item in effect.numbers()]

@@ -1,11 +1,10 @@
-"""What a camera itself gets wrong in a cloud of the untouched block, from that cloud alone.
+"""The camera's own errors in a cloud of the untouched block, from that cloud alone.
 
-A smooth error over the image is expected of any camera, and no finding. Depth that waves with the
-distance, as interference and the sampling of a modulated light leave it (the wiggling error of
-Lindner, Schiller, Kolb and Koch 2010), is one: it is no deformation, no effect of the catalogue
-removes it, and it moves over a surface that moves. What is told apart is what the same distances
-have in common all over the cloud, on the top, the sides and the table, from what neighbours have in
-common.
+Any camera has an error that is smooth over the image, which is no finding. Depth that waves with
+the distance is a finding: interference and the sampling of a modulated light cause it (the wiggling
+error of Lindner, Schiller, Kolb and Koch 2010). It is no deformation, no effect of the catalogue
+removes it, and it moves over a surface that moves. The model separates what equal distances have in
+common all over the cloud (top, sides and table) from what neighbours have in common.
 """
 
 from __future__ import annotations
@@ -33,9 +32,10 @@ class Ripple:
     """Depth that waves with the distance.
 
     Attributes:
-        size, reach: its standard deviation, and the distance over which it is alike [m].
-        gain: what speaks for it [nats].
-        share: of the camera's error beyond scatter, in squares [1].
+        size: standard deviation [m].
+        reach: correlation length along the distance [m].
+        gain: of a model with waves over one without [nats].
+        share: of the camera's variance beyond scatter [1].
     """
 
     size: float
@@ -45,12 +45,12 @@ class Ripple:
 
     @property
     def significant(self) -> bool:
-        """Whether it is told."""
+        """Whether the gain is large enough for a finding."""
         return self.gain > CRITERIA.camera_error.least_ripple_gain
 
     @property
     def warning(self) -> str:
-        """What is told of it; empty of none."""
+        """Sentence about the waves; empty without a finding."""
         if not self.significant:
             return ""
         return (
@@ -67,8 +67,13 @@ CALM = Ripple(0.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class CameraErrors:
-    """Covariance (n, n) [m^2], with size and reach of the smooth bias in it [m], and the ripple
-    that was found or not.
+    """Errors of the camera in a cloud.
+
+    Attributes:
+        covariance: (n, n) [m^2].
+        bias: standard deviation of the smooth bias [m].
+        reach: its correlation length [m].
+        ripple: waves of depth, significant or not.
     """
 
     covariance: FloatArray
@@ -80,17 +85,17 @@ class CameraErrors:
 def camera_errors(
     places: FloatArray, depth: FloatArray, white: FloatArray, residual: FloatArray, free: FloatArray
 ) -> CameraErrors:
-    """By restricted maximum likelihood (Patterson and Thompson 1971): of what the `free` columns
-    (n, c) cannot explain.
+    """Estimate the camera's errors by restricted maximum likelihood (Patterson and Thompson 1971).
+
+    Waves are part of the covariance only where they are significant. Raises LinAlgError where no
+    model is positive definite.
 
     Args:
-        places: (n, 3) [m].
-        depth: (n,) of these from the camera [m].
-        white: (n,) variance of the scatter there [m^2].
+        places: points (n, 3) [m].
+        depth: distance of the points from the camera (n,) [m].
+        white: variance of the scatter there (n,) [m^2].
         residual: (n,) [m].
-
-    Raises LinAlgError where no model is positive definite. Waves are part of the covariance only
-    where they are told.
+        free: columns (n, c) whose share of the residual is left out.
     """
     scale = np.linalg.norm(free, axis=0)
     basis, sizes, _ = np.linalg.svd(free[:, scale > 0] / scale[scale > 0], full_matrices=False)
@@ -111,9 +116,7 @@ def camera_errors(
 
 
 def _climb(cloud: _Cloud) -> tuple[float, tuple[int, ...]]:
-    """Likelihood [nats] and place on the grid of the best model with waves, one coordinate after
-    the other.
-    """
+    """Return likelihood [nats] and indices of the best model with waves, by coordinate ascent."""
     grid = (BIAS_REACHES, BIAS_SIZES, WHITE_FACTORS, RIPPLE_SIZES, RIPPLE_REACHES)
     best: tuple[int, ...] = (3, 2, 0, 1, 1)
     value, before = cloud.likelihood(best), -np.inf
@@ -130,7 +133,7 @@ def _climb(cloud: _Cloud) -> tuple[float, tuple[int, ...]]:
 
 
 class _Cloud:
-    """The likelihood of places on the grid of models."""
+    """The likelihood of the models of a grid for one cloud."""
 
     def __init__(
         self,
@@ -149,8 +152,11 @@ class _Cloud:
         self._known: dict[tuple[int, ...], float] = {}
 
     def covariance(self, model: tuple[int, ...]) -> FloatArray:
-        """Of a model: places in BIAS_REACHES, BIAS_SIZES and WHITE_FACTORS, and for waves in
-        RIPPLE_SIZES and RIPPLE_REACHES.
+        """Return the covariance (n, n) [m^2] of a model.
+
+        Args:
+            model: indices of the bias's length, size and scatter factor, and of the waves' size and
+                length.
         """
         reach, size, factor, *waves = model
         covariance = BIAS_SIZES[size] ** 2 * self._near[reach] + np.diag(
@@ -161,7 +167,7 @@ class _Cloud:
         return np.asarray(covariance)
 
     def likelihood(self, model: tuple[int, ...]) -> float:
-        """Restricted, up to a constant [nats]."""
+        """Return the restricted log likelihood of a model, up to a constant [nats]."""
         if model not in self._known:
             factor = cho_factor(self.covariance(model))
             solved = cho_solve(factor, np.column_stack([self._basis, self._residual]))

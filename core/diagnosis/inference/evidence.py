@@ -1,10 +1,9 @@
-"""Gaussian evidence from quadratic forms: once a sequence is linearised, a few small matrices hold
-all it can say.
+"""Gaussian evidence from quadratic forms, which hold all that a linearised sequence can say.
 
 Residuals and columns of one block of data (a sequence, or the rest cloud) are whitened, and each
 patch's own constant is projected out (the camera's fixed pattern). What remains is the Gram matrix
-of [residual, columns]; fits, predictive densities of left-out blocks and draws under the null
-hypothesis all come from sums of such matrices.
+of [residual, columns]. Fits, predictive densities of left-out blocks and draws under the null
+hypothesis follow from sums of such matrices.
 """
 
 from __future__ import annotations
@@ -34,8 +33,12 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """One block of data: `gram` (1 + k, 1 + k) of the whitened residual and its k columns; `values`
-    counts independent values.
+    """One block of data.
+
+    Attributes:
+        name: of the sequence, or "rest".
+        gram: Gram matrix (1 + k, 1 + k) of the whitened residual and its k columns.
+        values: number of independent values.
     """
 
     name: str
@@ -46,16 +49,15 @@ class Block:
 def gram(
     residual: FloatArray, columns: FloatArray, weights: FloatArray, centred: bool = True
 ) -> tuple[FloatArray, float]:
-    """Gram matrix of residual and columns; where `centred`, with each patch's weighted mean over
-    the groups taken out.
+    """Return the Gram matrix (1 + k, 1 + k) of residual and columns, and the number of values.
+
+    The constants that are taken out are not counted.
 
     Args:
         residual: (g, p) [m].
         columns: (g, p, k).
-        weights: (g, p) inverse variances [1/m^2], zero where unseen.
-
-    Returns:
-        (1 + k, 1 + k) matrix, and the number of values less the constants taken out.
+        weights: inverse variances (g, p) [1/m^2], zero where unseen.
+        centred: whether each patch's weighted mean over the groups is taken out.
     """
     stacked = np.concatenate([np.where(weights > 0, residual, 0.0)[..., None], columns], axis=2)
     taken = float((weights.sum(axis=0) > 0).sum()) if centred else 0.0
@@ -67,15 +69,19 @@ def gram(
 
 
 def less_constants(columns: FloatArray, weights: FloatArray) -> FloatArray:
-    """Columns (g, p, k) less each patch's mean over the groups, by weights (g, p)."""
+    """Return columns (g, p, k) less each patch's mean over the groups, by weights (g, p)."""
     total = np.maximum(weights.sum(axis=0), 1e-300)
     return np.asarray(columns - np.einsum("gp,gpk->pk", weights, columns) / total[:, None])
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Most probable change (k,) of the columns' factors, their covariance (k, k), and the misfit
-    that is left.
+    """Result of a linear fit.
+
+    Attributes:
+        change: most probable factors of the columns (k,).
+        covariance: of the factors (k, k).
+        misfit: that is left.
     """
 
     change: FloatArray
@@ -95,12 +101,13 @@ def fit(
     precision: FloatArray,
     offset: FloatArray | None = None,
 ) -> Fit:
-    """Least squares with Gaussian priors.
+    """Fit columns by least squares with Gaussian priors.
 
     Args:
-        columns: which to use.
-        precision: (k, k) of their priors.
-        offset: (k,) prior mean of the change; zero without it.
+        blocks: of data.
+        columns: indices of those to use.
+        precision: of their priors (k, k).
+        offset: prior mean of the change (k,); zero without it.
     """
     square, right, matrix = _parts(blocks, columns)
     mean = np.zeros(len(right)) if offset is None else offset
@@ -118,16 +125,19 @@ def within_reach(
     scales: FloatArray,
     reach: float,
 ) -> FloatArray:
-    """Least squares (k,) in which some columns change by no more than `reach` of their scales
-    (Levenberg 1944, Marquardt 1963).
+    """Return the least squares change (k,), some of whose entries are limited (Levenberg 1944,
+    Marquardt 1963).
 
-    What the data hardly tell is held back first, what they tell surely goes nearly all the way; a
-    whole step made shorter would keep its direction, which the doubtful ones rule.
+    Damping holds back first what the data hardly determine. A whole step made shorter would keep
+    its direction, which the undetermined entries rule.
 
     Args:
-        columns, precision: as for `fit`.
+        blocks: of data.
+        columns: as for `fit`.
+        precision: as for `fit`.
         own: places among the columns of those with a limit.
-        scales: (len(own),) their scales.
+        scales: of these (len(own),).
+        reach: largest change of these, in their scales.
     """
     change = fit(blocks, columns, precision).change
     if not len(own) or np.abs(change[own] / scales).max() <= reach:
@@ -142,8 +152,9 @@ def within_reach(
 
 
 def log_evidence(blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray) -> float:
-    """Log density of the blocks' residuals with the columns' factors integrated out, up to a
-    constant of the data [nats].
+    """Return the log density of the residuals with the columns' factors integrated out [nats].
+
+    A constant of the data is left out. Arguments as for `fit`.
     """
     square, right, matrix = _parts(blocks, columns)
     full = matrix + precision
@@ -153,8 +164,10 @@ def log_evidence(blocks: Sequence[Block], columns: Sequence[int], precision: Flo
 
 
 def explained(blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray) -> float:
-    """How much of the misfit columns with these priors explain, halved: what a log density gains by
-    them [nats].
+    """Return half the misfit that columns with these priors explain: their gain in log density
+    [nats].
+
+    Arguments as for `fit`.
     """
     _, right, matrix = _parts(blocks, columns)
     return 0.5 * float(right @ np.linalg.solve(matrix + precision, right))
@@ -167,8 +180,16 @@ def draw_rights(
     draws: int,
     random: np.random.Generator,
 ) -> FloatArray:
-    """Right sides (d, b, k) as the noise model gives them: white noise and discrepancy in each
-    block, and the shared factors of `columns` drawn from their prior of this precision.
+    """Draw right sides (d, b, k) from the noise model.
+
+    Each block has white noise and discrepancy of its own. The factors of `columns` are shared.
+
+    Args:
+        blocks: of data.
+        columns: nuisances.
+        precision: of their prior.
+        draws: number of draws.
+        random: generator.
     """
     shift = random.multivariate_normal(np.zeros(len(columns)), np.linalg.inv(precision), size=draws)
     rights = np.empty((draws, len(blocks), blocks[0].gram.shape[0] - 1))
@@ -186,12 +207,17 @@ def draw_rights(
 def predictive_score(
     blocks: Sequence[Block], columns: Sequence[int], precision: FloatArray, stated: int
 ) -> FloatArray:
-    """Log predictive density (b + 1,) of each block given all the others, and of the stated
-    accuracies given the blocks [nats].
+    """Return the log predictive density (b + 1,) of each block given all others [nats].
 
-    The first `stated` columns are nuisances. What was stated of them (touches, calliper, data
-    sheet) is a measurement like any other, and is left out in its turn: a model that explains the
-    data only by breaking it must not come off well.
+    The last entry is that of the stated accuracies given the blocks. Touches, calliper and data
+    sheet are measurements like any other and are left out in their turn, so that a model that
+    explains the data only by breaking them has a low score.
+
+    Args:
+        blocks: of data.
+        columns: as for `fit`.
+        precision: as for `fit`.
+        stated: number of nuisances, which come first.
     """
     whole = log_evidence(blocks, columns, precision)
     scores = [
@@ -204,6 +230,6 @@ def predictive_score(
 
 
 def predictive_gain(score: FloatArray, baseline: FloatArray) -> tuple[float, float]:
-    """Total gain [nats] and its standard error from the blocks' paired differences."""
+    """Return the total gain [nats], and its standard error from paired differences."""
     difference = score - baseline
     return float(difference.sum()), float(difference.std(ddof=1) * np.sqrt(len(difference)))

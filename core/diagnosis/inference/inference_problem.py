@@ -28,11 +28,11 @@ def _no_pushes() -> tuple[FloatArray, FloatArray]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class InferenceProblem:
-    """What is to be inferred from one dataset, and from what. It never changes.
+    """The inference problem of one dataset. It is immutable.
 
     Attributes:
         setup: as stated.
-        registration: of robot and camera, with the covariances that the priors start from.
+        registration: of robot and camera, with the covariances from which the priors start.
         names: of the sequences that are fitted.
         at_rest: data without a push; None without clouds.
         grid: mesh of the diagnosis.

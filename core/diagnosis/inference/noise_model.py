@@ -1,10 +1,9 @@
-"""What residuals look like when nothing is wrong: the sensor's noise, the mesh's error, and the
-engine's own accuracy.
+"""The noise model: residuals without any cause, by sensor noise, mesh error, and engine accuracy.
 
-A cause may only be named for what none of these explains. The engine's accuracy is stated as two
-random fields, drawn anew for each sequence: displacements are right to a few percent, and so is the
-stiffness of any part of the block (a coarse contact zone acts like a stiffer one, another law at
-large strain like a softer one). Without them, an unsuspicious block is given lumps.
+A cause may be named only for residuals that none of these explains. The engine's accuracy is two
+random fields, independent for each sequence: displacements are right to a few percent, and so is
+the stiffness of any part of the block (a coarse contact zone acts like a stiffer part, another law
+at large strain like a softer one). Without them an inconspicuous block is given inclusions.
 """
 
 from __future__ import annotations
@@ -29,8 +28,9 @@ __all__ = ["Noise", "noises", "patch_variance", "rows_of", "smooth_basis"]
 
 
 def patch_variance(predictions: Sequence[Prediction]) -> FloatArray:
-    """Variance (p,) [m^2] of single points about their patch's mean, pooled over all groups;
-    scattered patches get the median.
+    """Return the variance of single points about their patch's mean (p,), over all groups [m^2].
+
+    Patches with few points get the median.
     """
     freedom = np.sum([np.maximum(item.count - 1, 0).sum(axis=0) for item in predictions], axis=0)
     squares = np.sum(
@@ -48,8 +48,11 @@ def patch_variance(predictions: Sequence[Prediction]) -> FloatArray:
 
 
 def smooth_basis(centres: FloatArray, length: float) -> FloatArray:
-    """Gaussian bumps (p, b) at patch centres (p, 3) about every `length` [m] along the surface;
-    their squares add up to one.
+    """Return Gaussian bumps along the surface (p, b) whose squares add up to one.
+
+    Args:
+        centres: of the patches (p, 3) [m].
+        length: distance between bumps [m].
     """
     chosen = [0]
     nearest = np.linalg.norm(centres - centres[0], axis=1)
@@ -63,8 +66,9 @@ def smooth_basis(centres: FloatArray, length: float) -> FloatArray:
 
 
 def rows_of(item: Prediction) -> tuple[FloatArray, FloatArray]:
-    """Gaps (g, r) of the surface's patches [m] and, where there is one, of the force's three
-    components [N]; columns (g, r, k).
+    """Return gaps (g, r) and columns (g, r, k) of a prediction.
+
+    Rows are the surface's patches [m] and, with forces, their three components [N].
     """
     if item.forces is None:
         return item.gap, item.columns
@@ -107,8 +111,14 @@ class Noise:
         variance: FloatArray,
         lumps: slice,
     ) -> Noise:
-        """From the baseline on two meshes; `lumps` are the baseline's columns for a softer or
-        stiffer spot.
+        """Make the noise of a sequence with clouds.
+
+        Args:
+            baseline: on the default mesh.
+            fine: on the fine mesh.
+            surface: of the block.
+            variance: of single points by patch (p,) [m^2].
+            lumps: the baseline's columns of local stiffness.
         """
         (gap, columns), finer = rows_of(baseline), rows_of(fine)[0]
         seen = np.isfinite(gap) & np.isfinite(finer)
@@ -143,8 +153,9 @@ class Noise:
 
     @classmethod
     def of_forces(cls, baseline: Prediction, fine: Prediction, lumps: slice) -> Noise:
-        """The same of a sequence without clouds: the force's rows alone, with how deep each push
-        went as one more thing that is known only so well.
+        """Make the noise of a sequence without clouds, whose rows are those of the force.
+
+        The depth of each push has an uncertainty of its own. Arguments as for `of`.
         """
         (gap, columns), finer = rows_of(baseline), rows_of(fine)[0]
         assert baseline.forces is not None
@@ -163,11 +174,15 @@ class Noise:
         )
 
     def remeshed(self, model: Prediction, fine: Prediction) -> Noise:
-        """With the mesh's error as it is in another model, which is settled by now.
+        """Return the noise with the mesh error of another model, which is settled by now.
 
-        A patch of which it shows another side loses its weight: of a block that slid from under its
-        edge the points that were the top's are a side's, with that side's share of the camera's
-        pattern. All else stays, so that no patch gains or loses.
+        A patch that shows another side of it loses its weight: of a block that slid from under its
+        edge, the points of the top are then points of a side, with that side's share of the
+        camera's pattern. All else is unchanged, so that no patch gains or loses.
+
+        Args:
+            model: on the default mesh.
+            fine: on the fine mesh.
         """
         gap, finer = rows_of(model)[0], rows_of(fine)[0]
         seen = np.isfinite(gap) & np.isfinite(finer) & (self.weights > 0)
@@ -180,8 +195,9 @@ class Noise:
         return replace(self, weights=weights, mesh=np.where(seen, finer - gap, self.mesh))
 
     def block(self, prediction: Prediction) -> Block:
-        """Quadratic form of a model's residual and columns (mesh error last), with the discrepancy
-        integrated out.
+        """Return the quadratic form of residual and columns, with the discrepancy integrated out.
+
+        The mesh error is the last column.
         """
         matrix, values = self.whole(prediction)
         kept = matrix.shape[0] - self.discrepancy.shape[2]
@@ -192,10 +208,10 @@ class Noise:
         return Block(prediction.name, reduced, values)
 
     def whole(self, prediction: Prediction) -> tuple[FloatArray, float]:
-        """Gram matrix of residual, columns, mesh error and the columns of the discrepancy, and the
-        number of values.
+        """Return the Gram matrix of residual, columns, mesh error and discrepancy, and the number
+        of values.
 
-        Where a model lost sight of a patch or found no equilibrium, the baseline's residual stands:
+        Where a model sees no patch or has no equilibrium, the baseline's residual counts, so that
         nothing is gained there.
         """
         gap, columns = rows_of(prediction)
@@ -208,8 +224,11 @@ class Noise:
 
 
 def _aside(surface: FloatArray, force: FloatArray) -> FloatArray:
-    """(g, p + 3, d + e) of columns (g, p, d) of the surface and others (g, 3, e) of the force,
-    which say nothing of each other.
+    """Return independent columns of surface and force in one array (g, p + 3, d + e).
+
+    Args:
+        surface: (g, p, d).
+        force: (g, 3, e).
     """
     nothing = [
         np.zeros((*rows.shape[:2], other.shape[2]))
@@ -230,7 +249,14 @@ def noises(
     surface: Surface | None,
     lumps: slice,
 ) -> list[Noise]:
-    """The noise of every sequence; only those without clouds need no surface."""
+    """Return the noise of every sequence.
+
+    Args:
+        baseline: on the default mesh.
+        fine: on the fine mesh.
+        surface: of the block; None for sequences without clouds.
+        lumps: the baseline's columns of local stiffness.
+    """
     seen = [item for item in baseline if not item.force_only]
     variance = patch_variance(seen) if seen else np.empty(0)
     return [

@@ -19,7 +19,7 @@ __all__ = ["InferenceState", "Posterior"]
 
 @dataclass(eq=False)
 class InferenceState:
-    """What changes in the course of a search.
+    """The mutable state of a search.
 
     Attributes:
         noises: noise of each sequence; empty until the baseline is known.

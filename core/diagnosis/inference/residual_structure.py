@@ -1,9 +1,8 @@
-"""Is anything wrong? The part of a model's error that is smooth over the surface and grows with the
-push, against pure noise.
+"""Test for structure in the residuals: a part that is smooth and grows with the push.
 
 The whitened residual of each sequence is projected on smooth surface modes times the depth of the
-push (step 3 of the method); the same projection of draws from the noise model, with the nuisances
-fitted anew in each, says how much of it chance gives.
+push. The same projection of draws from the noise model, with the nuisances fitted anew in each,
+gives the amount by chance.
 """
 
 from __future__ import annotations
@@ -31,8 +30,8 @@ class Structure:
 
     Attributes:
         value: of the data.
-        expected: mean of it when nothing is wrong.
-        bound: what it exceeds once in a thousand times then.
+        expected: mean by chance.
+        bound: value that chance exceeds once in a thousand times.
     """
 
     value: float
@@ -41,12 +40,12 @@ class Structure:
 
     @property
     def ratio(self) -> float:
-        """Over what chance gives; about one when nothing is wrong."""
+        """Value over the mean by chance, about one when nothing is wrong."""
         return self.value / self.expected
 
     @property
     def significant(self) -> bool:
-        """Whether chance alone would rarely give it."""
+        """Whether the value is above the bound."""
         return self.value > self.bound
 
 
@@ -54,7 +53,7 @@ NOTHING = Structure(0.0, 1.0, 1.0)
 
 
 def _depth(item: Prediction) -> FloatArray:
-    """(g,) largest displacement of each group over the largest of the sequence [1]."""
+    """Return the largest displacement of each group (g,) over that of the sequence [1]."""
     size = np.array(
         [
             np.linalg.norm(frame.displacement, axis=1).max() if frame.in_contact else 0.0
@@ -65,7 +64,7 @@ def _depth(item: Prediction) -> FloatArray:
 
 
 def _with_modes(model: Model, evaluator: Evaluator) -> list[Block]:
-    """The model's blocks whose last columns are the modes."""
+    """Return the model's blocks with the modes as last columns."""
     seen = (
         smooth_basis(evaluator.problem.surface.patch_centres, CRITERIA.structure.mode_length)
         if evaluator.problem.clouds
@@ -94,7 +93,7 @@ def _with_modes(model: Model, evaluator: Evaluator) -> list[Block]:
 
 
 def _wide(columns: FloatArray, count: int) -> FloatArray:
-    """With so many columns (..., count), the further ones zero: all blocks have the same."""
+    """Return columns (..., count), filled up with zeros, so that all blocks have as many."""
     missing = count - columns.shape[-1]
     return (
         np.concatenate([columns, np.zeros((*columns.shape[:-1], missing))], axis=-1)
@@ -110,11 +109,13 @@ def explained_by_modes(
     precision: FloatArray,
     modes: Sequence[int],
 ) -> FloatArray:
-    """What modes explain (d,) of right sides (d, b, k), after the `fitted` columns were fitted to
-    all blocks together.
+    """Return what modes explain (d,) after the fitted columns.
 
     Args:
-        precision: (f, f) prior of the fitted columns.
+        blocks: of data.
+        rights: right sides (d, b, k).
+        fitted: columns that are fitted to all blocks together.
+        precision: of their prior (f, f).
         modes: columns of which each block has its own factors.
     """
     index, own = np.asarray(fitted), np.asarray(modes)
@@ -131,7 +132,7 @@ def explained_by_modes(
 
 
 def structure_of(evaluator: Evaluator, model: Model, seed: int) -> Structure:
-    """Structured error that a model leaves."""
+    """Return the structure that a model leaves; `seed` is that of the draws."""
     blocks = _with_modes(model, evaluator)
     size = blocks[0].gram.shape[0] - 1
     first = model.predictions[0].columns.shape[2]

@@ -1,9 +1,8 @@
-"""The static channel: the rest cloud against the stated shape, with the table as its floor.
+"""The rest cloud against the stated shape, with the table as its floor.
 
-Here alone the sag of gravity shows. The camera's pose is free, since it was fitted to this very
-cloud, and the camera's smooth bias is a random field. Its size and reach come from the cloud
-itself, with every side of the block free to bulge, so that a block that sags does not pass for a
-bad camera.
+Only the rest cloud shows the sag by gravity. The camera's pose is free, since it was fitted to this
+cloud, and the camera's smooth bias is a random field. Its size and length come from the cloud, with
+every side of the block free to bulge, so that a sagging block does not pass for a bad camera.
 """
 
 from __future__ import annotations
@@ -31,13 +30,14 @@ __all__ = ["RestCloud"]
 
 @dataclass(frozen=True, eq=False)
 class RestCloud:
-    """The rest cloud, reduced; every model is compared at the same places.
+    """The rest cloud, reduced to the places at which every model is compared.
 
     Attributes:
-        centres, normals: (p, 3) of the patches of the surface that were seen [m], phantom frame.
-        table: (t, 3) of the table's cells [m].
-        residual: (p + t,) of the stated model, at the patches and at the table's cells [m].
-        factor: Cholesky factor of its covariance (p + t, p + t) [m^2], the camera's pose and bias
+        centres: of the visible patches of the surface (p, 3) [m], phantom frame.
+        normals: of these patches (p, 3).
+        table: cells of the table (t, 3) [m].
+        residual: of the stated model at patches and cells (p + t,) [m].
+        factor: Cholesky factor of its covariance (p + t, p + t) [m^2], camera pose and bias
             included.
         errors: of the camera.
     """
@@ -51,7 +51,14 @@ class RestCloud:
 
     @classmethod
     def of(cls, cloud: FloatArray, cleaner: Cleaner, setup: Setup, grid: Meshing) -> RestCloud:
-        """From the raw rest cloud (n, 3) [m], camera frame, under the stated setup."""
+        """Reduce a raw rest cloud.
+
+        Args:
+            cloud: points (n, 3) [m], camera frame.
+            cleaner: segments the block and the table.
+            setup: as stated.
+            grid: mesh for the sag.
+        """
         clean = cleaner.clean(cloud)
         table, height, scatter = _table_cells(clean.table_points)
         surface, sight = Surface.of(setup), camera_model_for(setup, reference=True)
@@ -90,14 +97,14 @@ class RestCloud:
         columns: int,
         varied: dict[int, tuple[Setup, float]],
     ) -> Block:
-        """Quadratic form with the pose and the bias integrated out.
+        """Return the quadratic form with the pose and the bias integrated out.
 
         Args:
-            stated: setup under which the channel was made.
+            stated: setup for which the cloud was reduced.
             setup: of the model.
+            grid: mesh for the sag.
             columns: total number of columns.
-            varied: column to (setup a little changed, step) for the effects that the block or the
-                camera shows at rest (`Effect.at_rest`).
+            varied: column to (setup a little changed, step) for effects that show at rest.
         """
         before, here = self._gap(stated, stated, grid), self._gap(stated, setup, grid)
         stacked = np.zeros((len(self.residual), 1 + columns))
@@ -109,10 +116,10 @@ class RestCloud:
         )
 
     def _gap(self, stated: Setup, setup: Setup, grid: Meshing) -> FloatArray:
-        """Measured minus simulated (p + t,) [m] under a setup, had the stated one left nothing but
-        its sag.
+        """Return measured minus simulated position (p + t,) [m] under a setup.
 
-        What was measured lies, under the stated setup, about where its block and the table are.
+        The measured points are taken to be where the stated setup has its block, without sag, and
+        its table.
         """
         rays = camera_model_for(stated, reference=True).read(
             np.concatenate([self.centres, self.table])
@@ -128,8 +135,11 @@ class RestCloud:
 
 
 def _table_cells(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Places (t, 3) on the table [m], mean height (t,) there [m], and its variance (t,) [m^2], from
-    points (m, 3).
+    """Return cells of the table (t, 3) [m], their mean height (t,) [m], and its variance (t,)
+    [m^2].
+
+    Args:
+        table: points (m, 3) [m].
     """
     _, index = np.unique(
         np.floor(table[:, :2] / CRITERIA.rest.table_cell).astype(int), axis=0, return_inverse=True
@@ -143,8 +153,9 @@ def _table_cells(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
 
 
 def _bulges(centres: FloatArray, normals: FloatArray, rows: int) -> FloatArray:
-    """Columns (rows, c) with which each side lies off as a whole and bulges; a smooth bias must not
-    be needed for that.
+    """Return columns (rows, c) by which each side is shifted and bulges.
+
+    The smooth bias is not to explain that.
     """
     found = []
     for side in np.unique(normals, axis=0):

@@ -1,10 +1,8 @@
-"""What was measured while nothing was pushed: the rest cloud, and the touches that the robot's
-registration rests on.
+"""Data without a push: the rest cloud, and the touches from which the robot was registered.
 
-A registration lays the touches on their landmarks as well as a rigid motion can. What they still
-miss by is no business of its pose: it says whether the touched polygon has the size and the order
-that were stated. Touches that miss are all that tells another place of a touch from a robot that is
-registered wrongly, or from a tool that is off.
+A registration fits the touches to their landmarks by a rigid motion. The residuals that remain
+carry no information on the pose; they test the size and the order of the touched polygon. Only they
+tell touches of other places from a robot that is registered wrongly, or from a tool offset.
 """
 
 from __future__ import annotations
@@ -31,16 +29,18 @@ Varied = dict[int, tuple[Setup, float]]
 
 @dataclass(frozen=True, eq=False)
 class RestEvidence:
-    """All evidence without a push, as one block of data."""
+    """All data without a push, as one block.
+
+    Attributes:
+        cloud: the rest cloud.
+    """
 
     cloud: RestCloud
 
     def block(
         self, stated: Setup, setup: Setup, grid: Meshing, columns: int, varied: Varied
     ) -> Block:
-        """Quadratic form of a model; as `RestCloud.block`, whose arguments these are, with the
-        touches beside the cloud.
-        """
+        """Return the quadratic form of cloud and touches; arguments as for `RestCloud.block`."""
         cloud, touches = (
             self.cloud.block(stated, setup, grid, columns, varied),
             touch_block(setup, grid, columns, varied),
@@ -49,16 +49,16 @@ class RestEvidence:
 
 
 def touch_block(setup: Setup, grid: Meshing, columns: int, varied: Varied) -> Block:
-    """Quadratic form of what the touches miss their places by, with the robot's pose integrated out
-    under a flat prior.
+    """Return the quadratic form of the touches' residuals, with the robot's pose integrated out.
+
+    The prior of the pose is flat. Fewer than three touches register nothing, and have no block of
+    data.
 
     Args:
         setup: of the model.
-        grid: for the sag of the landmarks.
+        grid: mesh for the sag of the landmarks.
         columns: total number of columns.
-        varied: as for `RestCloud`.
-
-    Of three touches or more; fewer registered nothing, and say nothing.
+        varied: as for `RestCloud.block`.
     """
     count = len(setup.landmarks)
     if count < CRITERIA.rest.least_touches:
@@ -73,7 +73,9 @@ def touch_block(setup: Setup, grid: Meshing, columns: int, varied: Varied) -> Bl
 
 
 def _beside_pose(places: FloatArray, rows: FloatArray) -> FloatArray:
-    """Rows (3n, k) without what any small rigid motion of the places (n, 3) [m] does."""
+    """Return rows (3n, k) without the part that a small rigid motion of the places (n, 3) [m]
+    explains.
+    """
     middle = places.mean(axis=0)
     reach = float(np.sqrt(((places - middle) ** 2).sum(axis=1).mean()))
     motions = motion_jacobian(places, middle).reshape(-1, 6) * np.repeat([1.0, 1.0 / reach], 3)

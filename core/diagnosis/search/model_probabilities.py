@@ -1,4 +1,4 @@
-"""From gains to probabilities of sets of causes (step 9 of the method)."""
+"""Probabilities of sets of causes from their gains."""
 
 from __future__ import annotations
 
@@ -17,11 +17,15 @@ Names = tuple[str, ...]
 def probabilities(
     surplus: Mapping[Names, float], temperature: float = CRITERIA.naming.probability_temperature
 ) -> dict[Names, float]:
-    """Softmax over sets of causes, and the set without any, of what each gains beyond what is asked
-    of it [nats].
+    """Return the softmax over sets of causes, the set without any included.
 
-    What is asked is part of the odds: what the search refused for too little is less probable than
-    what it named. Minus infinity is the surplus of a set that was refused whatever it gains.
+    The required gain is part of the odds, so that a set that the search rejected for too small a
+    gain is less probable than a named one.
+
+    Args:
+        surplus: gain of each set beyond its required gain [nats]; minus infinity for a set that was
+            rejected whatever its gain.
+        temperature: by which the surplus is divided.
     """
     every = {(): 0.0, **surplus}
     logits = np.array(list(every.values())) / temperature
