@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.effect_derivative import SetupChange
@@ -45,7 +46,7 @@ class Nuisances:
         robot[:3, :3] += priors.tool_tip**2 * np.eye(3)
         accuracy = np.array([priors.camera_translation] * 3 + [priors.camera_rotation] * 3)
         camera = registration.camera_covariance + np.diag(accuracy**2)
-        parts: dict[tuple[NuisanceBlock, ...], FloatArray | float] = {
+        parts: dict[tuple[NuisanceBlock, ...], ArrayLike] = {
             (NuisanceBlock.TOOL_POSITION, NuisanceBlock.TOOL_ROTATION): np.linalg.inv(robot),
             (NuisanceBlock.TOOL_RADIUS,): priors.tool_radius**-2,
             (NuisanceBlock.POISSON_RATIO,): priors.poisson_ratio**-2,
@@ -56,7 +57,7 @@ class Nuisances:
         precision = np.zeros((blocks.size, blocks.size))
         for names, part in parts.items():
             own = list(blocks.places(*names))
-            precision[np.ix_(own, own)] = part
+            precision[np.ix_(own, own)] = np.asarray(part)
         return cls(blocks, precision)
 
     def with_effects(self, effects: Sequence[Effect]) -> FloatArray:

@@ -10,9 +10,18 @@ import pytest
 from pushed_block import looking_at
 
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.effects import CATALOGUE, Effect, Slot, effect_named, from_json
-from palpate.effects.elastic_material import StiffInclusion, YoungModulus
+from palpate.effects import (
+    CATALOGUE,
+    Effect,
+    Linearisation,
+    Measurement,
+    Slot,
+    effect_named,
+    from_json,
+)
+from palpate.effects.elastic_material import StiffInclusion, YoungModulus, inclusion_grid
 from palpate.effects.heterogeneity import Anisotropy
+from palpate.effects.plugins import checked
 from palpate.effects.sensor import CameraRegistration, TimeOffset
 from palpate.effects.tool import ToolOffset
 from palpate.foundation.errors import EffectError
@@ -308,3 +317,53 @@ def test_unknown_effect_is_an_error_that_lists_the_known():
         EffectError, match=r"no effect is called 'magic'.*poisson_ratio.*camera_registration"
     ):
         effect_named("magic")
+
+
+@EACH
+def test_linearisation_of_an_effect_does_not_contradict_itself(effect):
+    others = {kind.name for kind in CATALOGUE} - {effect.name}
+    assert checked(effect, others) is effect if effect.enters is not Slot.GEOMETRY else True
+    assert effect.shown_by <= set(Measurement) and effect.shown_by
+    assert set(effect.told_apart_by) <= others and all(effect.told_apart_by.values())
+
+
+@EACH
+def test_tangents_change_nothing_but_one_number_or_are_a_whole_change(effect):
+    if effect.linearisation is not Linearisation.TANGENT:
+        return
+    names = [item.name for item in effect.numbers()]
+    for tangent in effect.tangents(SETUP):
+        assert isinstance(tangent.effect, effect) and tangent.of in ("", *names)
+        unchanged = _setup_as_text(tangent.effect.apply(SETUP)) == _setup_as_text(SETUP)
+        assert unchanged == bool(tangent.of)
+    if effect.joint:
+        assert [tangent.of for tangent in effect.tangents(SETUP)] == names
+
+
+@EACH
+def test_first_guess_follows_the_linear_fit_and_stays_within_the_bounds(effect):
+    start = effect.starts(SETUP)[0]
+    for change in (-1e3, -0.1, 0.1, 1e3):
+        guess = start.initial_guess({item.name: change * item.scale for item in effect.numbers()})
+        assert type(guess) is effect
+    if effect.linearisation in (Linearisation.NUISANCE, Linearisation.LOCAL_STIFFNESS):
+        item = effect.numbers()[-1]
+        neutral = effect.neutral(SETUP)
+        guess = neutral.initial_guess({item.name: item.scale})
+        assert guess.coordinates[-1] == pytest.approx(neutral.coordinates[-1] + item.scale)
+    assert type(start.scaled(0.5)) is effect
+
+
+def test_softer_along_one_direction_is_stiffer_across_it():
+    fibres = Anisotropy(direction=0.2, stiffness_ratio=1.0)
+    softer = fibres.initial_guess({"stiffness_ratio": -0.5})
+    assert softer.direction == pytest.approx(0.2 + np.pi / 2)
+    assert softer.stiffness_ratio == pytest.approx(np.exp(0.5))
+
+
+def test_an_inclusion_is_placed_where_the_grid_has_it():
+    for place in inclusion_grid(SETUP):
+        effect = StiffInclusion.placed(place)
+        assert effect.inclusion == replace(place, stiffness_ratio=1.0)
+    with pytest.raises(EffectError, match="has no place"):
+        ToolOffset.placed(place)
