@@ -17,7 +17,7 @@ __all__ = [
     "Notes",
     "Point",
     "Problem",
-    "Shown",
+    "RegistrationView",
     "WeakDirection",
     "WhatIfRequest",
 ]
@@ -78,7 +78,7 @@ class WeakDirection(BaseModel):
     text: str = Field(max_length=80)
 
 
-class Shown(BaseModel):
+class RegistrationView(BaseModel):
     """Manual registration as a page shows it.
 
     `mode` is the side that clicks select. The cloud is drawn by `pose` (phantom_from_camera) if it

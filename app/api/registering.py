@@ -11,7 +11,7 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from palpate.app.scene.registration_scene import Ray
-from palpate.app.schemas import Point, Shown
+from palpate.app.schemas import Point, RegistrationView
 from palpate.app.server.viser_proxy import PageId
 from palpate.app.services import CurrentServices
 
@@ -61,7 +61,7 @@ class Aim(BaseModel):
 
 
 @router.post("")
-def show(page: PageId, shown: Shown, services: CurrentServices) -> dict[str, Any]:
+def show(page: PageId, shown: RegistrationView, services: CurrentServices) -> dict[str, Any]:
     """Show rest cloud and phantom with these pairs; the answer has the numbers of points and marks,
     and the pose of the cloud [m].
     """

@@ -6,7 +6,17 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-__all__ = ["MODELS", "Camera", "Colouring", "Layer", "Look", "Model", "Quantity", "Section", "View"]
+__all__ = [
+    "MODELS",
+    "Camera",
+    "Colouring",
+    "Layer",
+    "LayerStyle",
+    "Model",
+    "Quantity",
+    "Section",
+    "View",
+]
 
 Model = Literal["raw", "extended", "corrected"]
 Layer = Literal[
@@ -18,7 +28,7 @@ Far = Annotated[float, Field(ge=-100.0, le=100.0)]
 MODELS: tuple[Model, ...] = ("raw", "extended", "corrected")
 
 
-class Look(BaseModel):
+class LayerStyle(BaseModel):
     """Style of one layer; None leaves it to `View.colour`.
 
     For the measured cloud `opacity` is the share of its points that are drawn.
@@ -92,7 +102,7 @@ class View(BaseModel):
     crop: bool = True
     side_by_side: bool = False
     section: Section | None = None
-    looks: dict[Layer, Look] = Field(default_factory=dict)
+    looks: dict[Layer, LayerStyle] = Field(default_factory=dict)
 
     def opacity(self, layer: Layer) -> float:
         """Opacity of a layer, 0 to 1."""

@@ -78,7 +78,7 @@ def gain_plot(removed: Sequence[float]) -> str:
         color=INK["text-3"],
     )
     axes.set(xlim=(0, 100), xlabel="reducible error removed [%]", ylabel="cases")
-    axes.yaxis.get_major_locator().set_params(integer=True)
+    axes.locator_params(axis="y", integer=True)
     return to_svg(drawn)
 
 

@@ -138,7 +138,7 @@ class ConfusionMatrix:
 
 def target_table(targets: Sequence[dict[str, Any]]) -> Table:
     """Each target with what is reached; a verdict that could be chance is in brackets."""
-    rows = []
+    rows: list[tuple[str | Cell, ...]] = []
     for one in targets:
         figure, interval = figure_text(one["reached"], one["unit"])
         mark = "no cases" if one["met"] is None else "✓ met" if one["met"] else "✗ missed"
@@ -150,7 +150,7 @@ def target_table(targets: Sequence[dict[str, Any]]) -> Table:
 
 def kind_table(kinds: dict[str, dict[str, Any]]) -> Table:
     """Cases of each kind: right, first, among, false names, and the verdicts."""
-    rows = []
+    rows: list[tuple[str | Cell, ...]] = []
     for kind, counted in kinds.items():
         cells = [
             _hits(counted.get(name))
@@ -185,7 +185,7 @@ def _hits(measured: dict[str, Any] | None, counted: bool = False) -> Cell:
 
 def calibration_table(calibration: dict[str, Any]) -> Table:
     """Brier score and calibration error, of the most probable effect and of all."""
-    rows = []
+    rows: list[tuple[str | Cell, ...]] = []
     for key, text in (
         ("first_effect", "most probable effect"),
         ("every_effect", "every effect in every case"),
@@ -204,7 +204,7 @@ def _score(measured: dict[str, Any]) -> Cell:
 
 def gain_table(gain: dict[str, Any]) -> Table:
     """Medians by kind of the share removed, and of the rest over the noise floor."""
-    rows = []
+    rows: list[tuple[str | Cell, ...]] = []
     for kind, own in gain.items():
         share, interval = figure_text(own["removed"])
         left = own["left_over_noise_floor"]["value"]
@@ -288,7 +288,7 @@ def _scored_level(summary: dict[str, Any]) -> str:
 
 def case_table(results: Sequence[CaseResult]) -> Table:
     """Hidden effects and diagnosis of each case; wrong ones are highlighted."""
-    rows = []
+    rows: list[tuple[str | Cell, ...]] = []
     for one in results:
         removed = "–" if one.removed is None else f"{100 * one.removed:.0f}{NARROW}%"
         size = "–" if one.size is None else f"{one.size:.1f}"

@@ -151,7 +151,7 @@ def sequence_table(rows: Sequence[SequenceErrors]) -> Table:
 def ranking_table(report: dict[str, Any]) -> Table:
     """Error that each cause alone removes, and its probability; named causes are coloured."""
     named = {cause["effect"] for cause in report.get("causes", [])}
-    rows = []
+    rows: list[tuple[str | Bar, ...]] = []
     for entry in (report.get("ranking") or [])[:8]:
         removed = entry.get("error_removed")
         length = 100 * min(1.0, max(0.0, removed or 0.0))

@@ -17,7 +17,7 @@ from palpate.app.http_errors import Missing
 from palpate.app.scene.phantom import Phantom
 from palpate.app.scene.registration_picture import Arrow, Mark, PairPicture, middle_of
 from palpate.app.scene.registration_scene import PairScene, Ray
-from palpate.app.schemas import Shown, WeakDirection
+from palpate.app.schemas import RegistrationView, WeakDirection
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import PalpateError
 from palpate.foundation.frames import Transform
@@ -44,7 +44,7 @@ class ManualRegistration:
         self._scenes: list[PairScene] = []
         self._lock = threading.RLock()
         self._listeners: list[Callable[[dict[str, Any]], None]] = []
-        self._shown: Shown | None = None
+        self._shown: RegistrationView | None = None
         self._phantom: tuple[str, Phantom] | None = None
         self._start: tuple[tuple[str, str], Transform] | None = None
         self._looked: tuple[str, str, bool] | None = None
@@ -54,7 +54,7 @@ class ManualRegistration:
         self._listeners.append(picked)
         return lambda: self._listeners.remove(picked)
 
-    def show(self, shown: Shown) -> dict[str, Any]:
+    def show(self, shown: RegistrationView) -> dict[str, Any]:
         """Draw this in all scenes of the page; returns a summary."""
         with self._lock:
             phantom = self._open(shown.dataset)
@@ -150,7 +150,7 @@ class ManualRegistration:
             moved = slide_on_cloud(pose.apply(phantom.cloud), start, eye, direction)
             return point if moved is None else [float(x) for x in pose.inverse().apply(moved)]
 
-    def _current(self) -> tuple[Phantom, Shown]:
+    def _current(self) -> tuple[Phantom, RegistrationView]:
         if self._shown is None:
             raise Missing("this page shows no registration yet")
         return self._open(self._shown.dataset), self._shown
@@ -160,7 +160,7 @@ class ManualRegistration:
             self._phantom = (dataset, self._phantom_of(dataset))
         return self._phantom[1]
 
-    def _pose(self, phantom: Phantom, shown: Shown) -> Transform:
+    def _pose(self, phantom: Phantom, shown: RegistrationView) -> Transform:
         """Pose of the drawn cloud: the fit, else the start, shifted aside unless `over` is set."""
         key = (shown.dataset, shown.start)
         if self._start is None or self._start[0] != key:
@@ -172,7 +172,7 @@ class ManualRegistration:
         aside = np.array([phantom.size[0] / 2 + APART - low[0], -(low[1] + high[1]) / 2, 0.0])
         return Transform(np.eye(3), aside) @ pose
 
-    def _picture(self, phantom: Phantom, shown: Shown) -> PairPicture:
+    def _picture(self, phantom: Phantom, shown: RegistrationView) -> PairPicture:
         pose = self._pose(phantom, shown)
         marks, lines = [], []
         for number, pair in enumerate(shown.pairs):
@@ -206,7 +206,9 @@ class ManualRegistration:
         for scene in self._scenes:
             scene.look(picture)
 
-    def _mark_under(self, phantom: Phantom, shown: Shown, ray: Ray, side: str) -> int | None:
+    def _mark_under(
+        self, phantom: Phantom, shown: RegistrationView, ray: Ray, side: str
+    ) -> int | None:
         """Number of the pair whose mark on this side is under the ray."""
         direction = ray.direction / np.linalg.norm(ray.direction)
         for mark in self._picture(phantom, shown).marks:
@@ -215,7 +217,9 @@ class ManualRegistration:
                 return mark.pair
         return None
 
-    def _on_cloud(self, phantom: Phantom, shown: Shown, ray: Ray) -> tuple[FloatArray, None] | None:
+    def _on_cloud(
+        self, phantom: Phantom, shown: RegistrationView, ray: Ray
+    ) -> tuple[FloatArray, None] | None:
         back = self._pose(phantom, shown).inverse()
         row = pick_cloud(
             phantom.cloud, back.apply(ray.origin), back.rotation @ ray.direction, ray.pixel
@@ -250,7 +254,9 @@ class ManualRegistration:
             return np.array(phantom.landmarks[name], dtype=float), name
         return None if hit is None else (hit, None)
 
-    def _summary(self, phantom: Phantom, shown: Shown, picture: PairPicture) -> dict[str, Any]:
+    def _summary(
+        self, phantom: Phantom, shown: RegistrationView, picture: PairPicture
+    ) -> dict[str, Any]:
         return {
             "points": len(phantom.cloud),
             "marks": len(picture.marks),

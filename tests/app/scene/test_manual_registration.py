@@ -13,7 +13,7 @@ from websockets.sync.client import connect
 from palpate.app.scene.manual_registration import ManualRegistration, Phantom
 from palpate.app.scene.registration_picture import PairPicture
 from palpate.app.scene.registration_scene import Ray
-from palpate.app.schemas import Shown
+from palpate.app.schemas import RegistrationView
 from palpate.foundation.frames import Transform
 from palpate.registration.pose import small_motion
 
@@ -62,7 +62,7 @@ def test_before_any_fit_the_cloud_lies_beside_the_phantom_whatever_its_pose(
     clicking: ManualRegistration,
 ) -> None:
     for start in ("levelled", "camera", "stated"):
-        said = clicking.show(Shown(dataset="a", start=start))
+        said = clicking.show(RegistrationView(dataset="a", start=start))
         cloud = clicking.scene.pictures[-1].cloud  # type: ignore[attr-defined]
         assert np.percentile(cloud[:, 0], 3) > X + 0.02 and said["points"] == 2800
     assert clicking.scene.looks == 3  # type: ignore[attr-defined]
@@ -72,7 +72,7 @@ def test_a_click_is_the_cloud_point_in_the_camera_frame_wherever_the_cloud_is_sh
     clicking: ManualRegistration,
 ) -> None:
     moved = small_motion(np.array([0.02, 0, 0, 0, 0, 0.4]), np.zeros(3)) @ POSE
-    clicking.show(Shown(dataset="a", pose=moved.matrix.tolist(), over=True))
+    clicking.show(RegistrationView(dataset="a", pose=moved.matrix.tolist(), over=True))
     aimed = phantom().cloud[1234]
     picked = clicking.pick(above(moved.apply(aimed)))["picked"]
     assert (
@@ -86,7 +86,7 @@ def test_a_click_is_the_cloud_point_in_the_camera_frame_wherever_the_cloud_is_sh
 def test_a_click_on_the_phantom_meets_its_surface_and_near_a_landmark_the_landmark(
     clicking: ManualRegistration,
 ) -> None:
-    clicking.show(Shown(dataset="a", mode="mesh"))
+    clicking.show(RegistrationView(dataset="a", mode="mesh"))
     assert np.allclose(
         clicking.pick(above([0.01, 0.005, 0.0]))["picked"]["point"], [0.01, 0.005, Z]
     )
@@ -101,12 +101,14 @@ def test_a_click_on_an_end_chooses_it_and_a_dragged_end_keeps_its_side(
 ) -> None:
     pairs = [{"cloud": None, "mesh": [0.01, 0.0, Z]}]
     clicking.show(
-        Shown.model_validate(
+        RegistrationView.model_validate(
             {"dataset": "a", "mode": "mesh", "pairs": pairs, "chosen": [0, "mesh"]}
         )
     )
     assert clicking.pick(above([0.0105, 0.0, Z])) == {"chosen": {"pair": 0, "side": "mesh"}}
-    clicking.show(Shown.model_validate({"dataset": "a", "mode": "cloud", "pairs": pairs}))
+    clicking.show(
+        RegistrationView.model_validate({"dataset": "a", "mode": "cloud", "pairs": pairs})
+    )
     dragged = clicking.pick(above([0.02, 0.0, Z], mark=(0, "mesh")))["picked"]
     assert (
         dragged["side"] == "mesh"
@@ -118,7 +120,7 @@ def test_a_click_on_an_end_chooses_it_and_a_dragged_end_keeps_its_side(
 def test_arrow_keys_move_a_point_on_its_surface_as_the_person_sees_it(
     clicking: ManualRegistration,
 ) -> None:
-    clicking.show(Shown(dataset="a", pose=POSE.matrix.tolist(), over=True))
+    clicking.show(RegistrationView(dataset="a", pose=POSE.matrix.tolist(), over=True))
     assert np.allclose(
         clicking.nudge("mesh", [0.01, 0.0, Z], 2e-4, -1e-4), [0.0102, -1e-4, Z], atol=1e-6
     )
@@ -141,7 +143,7 @@ def test_pairs_lines_and_weak_directions_are_drawn(clicking: ManualRegistration)
             {"translation": [0, 0, 0], "rotation": [0, 0, 1], "text": "r"},
         ],
     }
-    said = clicking.show(Shown.model_validate(asked))
+    said = clicking.show(RegistrationView.model_validate(asked))
     picture = clicking.scene.pictures[-1]  # type: ignore[attr-defined]
     assert (said["marks"], said["arrows"]) == (3, 2)
     assert [mark.chosen for mark in picture.marks] == [False, False, True]
