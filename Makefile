@@ -1,7 +1,8 @@
 # make demo    set everything up, make a phantom with a hidden fault, find it, open the page   (ARGS="--no-serve" ends after the table)
-# make test    set everything up, run the tests (fast ones and the browser's; the slow ones: make test ARGS="-m slow")
-# make bench   speed and accuracy of the engine, and of others     make check   lint, format, types
-# make clean   remove .venv and all caches                         PYTHON=...   another Python 3.11
+# make test    set everything up, run the default tier of the tests     make test-more   the rest (make test ARGS="-m slow": soaks)
+# make check   lint, format, types, layers, structure, page             make docs        the documentation, links checked
+# make bench   speed and accuracy of the engine, and of others          make clean       remove .venv and all caches
+# PYTHON=...   another Python 3.11
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
@@ -19,21 +20,27 @@ export OPENBLAS_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 export NUMBA_NUM_THREADS ?= 1
 
-.PHONY: demo test bench check check-page types-of-code types-of-tests clean install develop
+.PHONY: demo test test-more bench check check-page docs names types-of-code types-of-tests clean install develop
 .DELETE_ON_ERROR:
 
 demo: install
 	$(VENV)/bin/palpate demo $(ARGS)
 
 test: develop
-	$(VENV)/bin/python -m pytest -m "not slow" $(SPREAD) $(ARGS)
+	$(VENV)/bin/python -m pytest -m "not slow and not more" $(SPREAD) $(ARGS)
+
+test-more: develop
+	$(VENV)/bin/python -m pytest -m "more and not slow" $(SPREAD) $(ARGS)
 
 bench: $(VENV)/.peers
 	$(VENV)/bin/python -m benchmarks $(ARGS)
 
-check: develop check-page
+check: develop check-page names
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
+	.ci/packages --check
+	.ci/structure
+	PYTHONPATH=build/names $(VENV)/bin/lint-imports --no-cache
 	$(MAKE) --no-print-directory -j2 --output-sync=target types-of-code types-of-tests
 
 # The page is plain ES modules: the tools only check it.
@@ -42,6 +49,16 @@ check-page: $(PAGE)/node_modules/.installed
 	$(PAGE_TOOLS)/tsc --project $(PAGE)/tsconfig.json
 	$(PAGE_TOOLS)/prettier --config $(PAGE)/prettier.json --log-level warn --check \
 	    'static/**/*.{js,ts,css,html}' '!static/vendor/**'
+
+# The folders as they are installed, for tools that cannot follow an editable installation.
+names:
+	@.ci/link-tree
+
+# NO_MKDOCS_2_WARNING: an advertisement of the theme, no warning about these pages.
+docs: $(VENV)/.documented names
+	$(VENV)/bin/python docs/draw_architecture.py
+	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/mkdocs build --quiet --strict -f docs/mkdocs.yml
+	$(VENV)/bin/python -m pytest -q tests/docs tests/examples -m "not slow and not more"
 
 # Side by side, each with a cache of its own: they check by other rules.
 types-of-code:
@@ -89,4 +106,8 @@ $(VENV)/.developed: pyproject.toml constraints.txt $(VENV)/.installed
 
 $(PAGE)/node_modules/.installed: $(PAGE)/package.json $(PAGE)/package-lock.json | $(VENV)/.system-test
 	npm ci --prefix $(PAGE) --no-progress
+	@touch $@
+
+$(VENV)/.documented: pyproject.toml constraints.txt $(VENV)/.developed
+	$(PIP) install --quiet -e ".[docs]" -c constraints.txt
 	@touch $@
