@@ -52,7 +52,7 @@ def dragged(
             (number,),
             seen_points(frame, 3000, noise, 2 + number, truth),
             number in FREE,
-            probe=int(number > 0),
+            push=int(number > 0),
         )
         for number, frame in enumerate(seen)
     ]

@@ -89,7 +89,7 @@ def observed(
             (number,),
             seen_points(frame, count, noise, seed + number, truth),
             not frame.in_contact,
-            probe=1,
+            push=1,
         )
         for number, frame in enumerate(frames)
     ]

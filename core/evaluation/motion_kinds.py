@@ -37,11 +37,11 @@ def kinds_of_pushes(
         if not contacts:
             continue
         middles = np.array([(contact.start + contact.end) / 2 for contact in contacts])
-        for probe in sorted({group.probe for group in item.groups if not group.free}):
+        for probe in sorted({group.push for group in item.groups if not group.free}):
             frames = [
                 frame
                 for group in item.groups
-                if group.probe == probe and not group.free
+                if group.push == probe and not group.free
                 for frame in group.frames
             ]
             nearest = int(np.abs(middles - item.times[frames].mean()).argmin())

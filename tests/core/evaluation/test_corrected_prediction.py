@@ -51,7 +51,7 @@ def test_tool_input_is_the_mean_over_a_group_and_of_the_first_untouched_group_at
     groups = (
         Group((), none, True, True),
         Group((0,), none, True),
-        Group((1, 2), none, False, probe=1),
+        Group((1, 2), none, False, push=1),
     )
     columns = np.arange(39.0).reshape(3, 13)
     inputs = tool_inputs(Observations("push-01", times, stream, groups), columns)

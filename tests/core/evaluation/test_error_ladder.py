@@ -30,7 +30,7 @@ def _observations() -> Observations:
     """Four pushes of one sequence, after one untouched frame."""
     times, stream = dwelling(np.array([poke(2e-3)] * len(PROBES)))
     groups = [
-        Group((number,), CLOUD, probe == 0, probe=probe) for number, probe in enumerate(PROBES)
+        Group((number,), CLOUD, probe == 0, push=probe) for number, probe in enumerate(PROBES)
     ]
     return Observations("push-01", times, stream, tuple(groups))
 
@@ -148,7 +148,7 @@ def test_displaced_block_is_not_taken_for_the_cameras_pattern():
     after = (False, False, True, False, True)
     rows = zip(item.groups, after, (0, 1, 1, 2, 2), strict=True)
     groups = tuple(
-        replace(group, free=free or not probe, probe=probe) for group, free, probe in rows
+        replace(group, free=free or not probe, push=probe) for group, free, probe in rows
     )
     slid, corrected = _gaps(3e-3, 3e-3, 3e-3, 3e-3), _gaps(1e-3, 3e-3, 1e-3, 3e-3)
     rungs = [

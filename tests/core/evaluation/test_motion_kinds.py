@@ -45,7 +45,7 @@ def test_pushes_and_drags_are_distinguished(tmp_path: Path):
         sequence = dataset.sequence(name)
         groups = (
             Group((0,), np.zeros((0, 3)), True),
-            Group((2, 3), np.zeros((0, 3)), False, probe=1),
+            Group((2, 3), np.zeros((0, 3)), False, push=1),
         )
         data.append(
             Observations(name, np.asarray(sequence.cloud_times), sequence.kinematics, groups)
