@@ -95,9 +95,9 @@ def test_damaged_files_are_named_and_everything_else_is_there(
         paths += [f"{kind}/{names[kind]}" for kind in KINDS]
         paths += [f"sweeps/{names['sweeps']}/points"]
         paths += ["datasets/large-tool/registrations", "datasets/large-tool/registrations/by-hand"]
-        for path in paths:
-            answer = client.get(f"/api/{path}")
-            assert answer.status_code < 500, f"{path}: {answer.text}"
+        for asked in paths:
+            answer = client.get(f"/api/{asked}")
+            assert answer.status_code < 500, f"{asked}: {answer.text}"
             if answer.status_code >= 400:
                 assert set(answer.json()) == {"kind", "message", "where"}
         evaluation = client.post("/api/evaluations", json={"dataset": "large-tool"})
