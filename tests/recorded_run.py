@@ -8,15 +8,13 @@ import json
 from pathlib import Path
 
 import numpy as np
+from made_datasets import copy_dataset
 
-from palpate.dataset import open_dataset
 from palpate.effects import effect_named
-from palpate.measurement.segmentation import cleaner_for
-from palpate.measurement.tool_pose import find_shaft_axis
+from palpate.experiment import Experiment
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.recording.record_sequence import record
-from palpate.registration.registration import register, setup_from
-from palpate.synthetic import HiddenEffect, Scenario, make_dataset
+from palpate.synthetic import HiddenEffect, Scenario
 
 __all__ = ["RADIUS", "SEQUENCE", "write_recorded_run"]
 
@@ -38,24 +36,19 @@ def write_recorded_run(datasets: Path, runs: Path) -> Path:
     folder.
     """
     folder, run = datasets / "large-tool", runs / "large-tool-1"
-    make_dataset(folder, _SCENARIO, seed=3)
-    dataset = open_dataset(folder)
-    registration = register(dataset)
-    stated = setup_from(dataset, registration)
+    copy_dataset(folder, _SCENARIO, seed=3)
+    experiment = Experiment.of(folder)
+    dataset, stated = experiment.dataset, experiment.stated
     effect = effect_named("tool_radius")(radius=RADIUS)  # type: ignore[call-arg]
     found = effect.apply(stated)
     (run / "replays").mkdir(parents=True)
-    cleaner, shaft = (
-        cleaner_for(dataset, registration),
-        find_shaft_axis(dataset, registration.repaired),
-    )
     grid = PAGE_GRID.for_tool(stated.tool.radius)
     record(
         dataset.sequence(SEQUENCE),
         stated,
         found,
-        cleaner,
-        shaft,
+        experiment.cleaner,
+        experiment.shaft,
         grid,
         run / "replays" / f"{SEQUENCE}.npz",
     )

@@ -6,7 +6,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from palpate.synthetic import HiddenEffect, Scenario, make_dataset
+from made_datasets import copy_dataset
+
+from palpate.synthetic import HiddenEffect, Scenario
 
 __all__ = ["write_swept_phantom"]
 
@@ -24,5 +26,5 @@ def write_swept_phantom(folder: Path) -> Path:
         rate=5.0,
         robot_rate=200.0,
     )
-    make_dataset(folder, scenario, 3)
+    copy_dataset(folder, scenario, 3)
     return folder

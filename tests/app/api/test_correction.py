@@ -14,19 +14,17 @@ import httpx
 import numpy as np
 import pytest
 from browsing import NEEDS_CHROMIUM, Page
+from made_datasets import copy_dataset
 from typer.testing import CliRunner
 
 from palpate.app.cli import app
 from palpate.app.client import Client
 from palpate.app.settings import Settings
-from palpate.dataset import open_dataset
 from palpate.effects import effect_named
-from palpate.measurement.segmentation import cleaner_for
-from palpate.measurement.tool_pose import find_shaft_axis
+from palpate.experiment import Experiment
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.recording.record_sequence import record
-from palpate.registration.registration import register, setup_from
-from palpate.synthetic import HiddenEffect, Scenario, make_dataset
+from palpate.synthetic import HiddenEffect, Scenario
 
 RADIUS, RUN, LONG = 7.5e-3, "large-tool-1", 120_000
 SPLITS = {"train": ("poke-top-01",), "validation": ("poke-top-02",), "test": ("poke-top-03",)}
@@ -55,24 +53,19 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folders of a server with one dataset, and a run that names what is hidden in it."""
     folder = tmp_path_factory.mktemp("corrected")
     path, run = folder / "datasets" / "large-tool", folder / "runs" / RUN
-    make_dataset(path, SCENARIO, seed=3)
-    dataset = open_dataset(path)
-    registration = register(dataset)
-    stated = setup_from(dataset, registration)
+    copy_dataset(path, SCENARIO, seed=3)
+    experiment = Experiment.of(path)
+    dataset, stated = experiment.dataset, experiment.stated
     effect = effect_named("tool_radius")(radius=RADIUS)  # type: ignore[call-arg]
     found, tested = effect.apply(stated), SPLITS["test"][0]
     (run / "replays").mkdir(parents=True)
-    cleaner, shaft = (
-        cleaner_for(dataset, registration),
-        find_shaft_axis(dataset, registration.repaired),
-    )
     grid = PAGE_GRID.for_tool(stated.tool.radius)
     record(
         dataset.sequence(tested),
         stated,
         found,
-        cleaner,
-        shaft,
+        experiment.cleaner,
+        experiment.shaft,
         grid,
         run / "replays" / f"{tested}.npz",
     )

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from made_datasets import copy_dataset
 
 from palpate.correction import Recorder, Samples, make_samples, recorder_for
 from palpate.dataset import Dataset, open_dataset
 from palpate.mesh.box_mesh import GridSpec
-from palpate.synthetic import HiddenEffect, Scenario, make_dataset
+from palpate.synthetic import HiddenEffect, Scenario
 
 PUSHES = ("poke-top-01", "poke-top-02", "poke-top-03")
 
@@ -29,7 +30,7 @@ def _bench(folder: Path, weight: float, sequences: tuple[str, ...]) -> Bench:
     scenario = Scenario(
         effects=(hidden,), sequences=sequences, density=900, rate=2.0, robot_rate=200.0, fine=6e-3
     )
-    make_dataset(folder / "block", scenario, seed=7)
+    copy_dataset(folder / "block", scenario, seed=7)
     dataset = open_dataset(folder / "block")
     recorder = recorder_for(dataset, grid=GridSpec(nodes=(13, 5, 5)), points=400)
     return Bench(dataset, recorder, make_samples(folder / "samples", recorder))
