@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.inference_problem import InferenceProblem
-from palpate.diagnosis.inference.rest_evidence import RestEvidence
+from palpate.diagnosis.inference.noise.rest_evidence import RestEvidence
 from palpate.effects import CATALOGUE, Effect
 from palpate.mesh.protocol import Meshing
 from palpate.registration.registration import Registration

@@ -10,8 +10,8 @@ from palpate.app.storage.dataset_library import Library
 from palpate.app.storage.registration_store import refuse_unregistrable
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
+from palpate.registration.camera.levelling import as_seen, levelled
 from palpate.registration.faces import IndexArray
-from palpate.registration.levelling import as_seen, levelled
 
 __all__ = ["Phantom", "open_phantom"]
 

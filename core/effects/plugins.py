@@ -51,7 +51,7 @@ def outside_effects(
 
 
 def _reason(error: Exception) -> str:
-    """What went wrong, and what to write where a package imports Palpate by its old names."""
+    """Describe the error; for an import by the old names, say what to write."""
     if isinstance(error, EffectError):
         return error.message
     reason = f"{type(error).__name__}: {error}"

@@ -91,7 +91,7 @@ class Experiment:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is doubtful about the registration, one sentence each."""
+        """Doubts about the registration, one sentence each."""
         return self.registration.warnings
 
     @property

@@ -25,14 +25,14 @@ T = TypeVar("T")
 
 
 def at_once(task: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-    """Run a task in this process and return its finished future, as an executor's `submit` would."""
+    """Run a task in this process; return its finished future, as an executor's `submit` would."""
     done: Future[T] = Future()
     done.set_result(task(*args, **kwargs))
     return done
 
 
 class ProcessPool(ProcessPoolExecutor):
-    """The one kind of process pool in Palpate: an executor whose processes never outlive their owner.
+    """Palpate's only process pool: an executor whose processes never outlive their owner.
 
     Each process uses one thread (the processes are the parallelism), leaves Ctrl-C to its owner,
     keeps freed memory for the next solve, and ends as soon as the process that made the pool has

@@ -19,9 +19,9 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
 from palpate.measurement.tool_pose import SHAFT_LENGTH, ToolPose, locate_tool
+from palpate.registration.camera.table_plane import find_table
 from palpate.registration.faces import box_distance
 from palpate.registration.registration import Registration
-from palpate.registration.table_plane import find_table
 
 __all__ = ["REASONS", "CleanCloud", "Cleaner", "cleaner_for"]
 

@@ -17,7 +17,7 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.mesh.protocol import Meshing
-from palpate.registration.robot_fit import rigid_fits
+from palpate.registration.robot.robot_fit import rigid_fits
 from palpate.replay.replay import rest
 from palpate.setup.setup import Setup, Touching
 

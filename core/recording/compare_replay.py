@@ -17,7 +17,7 @@ __all__ = ["ReplayComparison", "compare"]
 
 @dataclass(frozen=True, eq=False)
 class ReplayComparison:
-    """How far the measured surface lies from the simulated one, frame by frame.
+    """Distances between the measured and the simulated surface, frame by frame.
 
     Attributes:
         replay: what was compared.

@@ -16,9 +16,9 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
-from palpate.registration.camera_fit import CameraFit, refine_camera
+from palpate.registration.camera.camera_fit import CameraFit, refine_camera
 from palpate.registration.faces import box_distance
-from palpate.registration.robot_fit import rigid_fits
+from palpate.registration.robot.robot_fit import rigid_fits
 from palpate.registration.uncertainty import NAMES
 
 __all__ = ["PairFit", "PairRegistration", "fit_pairs", "register_pairs"]

@@ -13,17 +13,17 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
 from palpate.foundation.progress import Report, silent
-from palpate.registration.accepted_camera import accepted_camera_fit
-from palpate.registration.camera_fit import CameraFit, fit_camera
-from palpate.registration.heading import tool_misfit, turned_fit
-from palpate.registration.landmark_pairing import TouchProposal, propose_pairing
-from palpate.registration.landmark_repair import (
+from palpate.registration.camera.accepted_camera import accepted_camera_fit
+from palpate.registration.camera.camera_fit import CameraFit, fit_camera
+from palpate.registration.camera.heading import tool_misfit, turned_fit
+from palpate.registration.robot.landmark_pairing import TouchProposal, propose_pairing
+from palpate.registration.robot.landmark_repair import (
     LandmarkRepair,
     choose_repair,
     find_repairs,
     resized_repair,
 )
-from palpate.registration.robot_fit import RobotFit, fit_robot
+from palpate.registration.robot.robot_fit import RobotFit, fit_robot
 from palpate.registration.uncertainty import PRIOR
 from palpate.setup.setup import Material, Sensor, Setup, Shape, Tool, Touching
 

@@ -21,7 +21,7 @@ from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.design.candidate_pushes import Push, depth_reached, pushes, speed_reached
 from palpate.diagnosis.design.predictive_distance import Scene, Survivor, nats_of, survivor
 from palpate.diagnosis.inference.evaluate import Evaluator
-from palpate.diagnosis.inference.noise_model import patch_variance
+from palpate.diagnosis.inference.noise.noise_model import patch_variance
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.identifiability import Identifiability

@@ -14,7 +14,7 @@ from palpate.diagnosis.inference.effect_derivative import stepped_setup
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import fit
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.noise_model import smooth_basis
+from palpate.diagnosis.inference.noise.noise_model import smooth_basis
 from palpate.diagnosis.inference.nuisances import poisson_change
 from palpate.effects import NuisanceBlock
 from palpate.fem.constitutive.stiffness_field import lump_share

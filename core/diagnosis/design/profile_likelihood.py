@@ -18,7 +18,7 @@ from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import fit
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.noise_model import rows_of
+from palpate.diagnosis.inference.noise.noise_model import rows_of
 from palpate.effects import Parameter
 from palpate.effects.base import with_effects
 from palpate.foundation.arrays import FloatArray

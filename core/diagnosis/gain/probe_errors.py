@@ -17,7 +17,7 @@ import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
-from palpate.diagnosis.inference.noise_model import patch_variance
+from palpate.diagnosis.inference.noise.noise_model import patch_variance
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import DiagnosisError

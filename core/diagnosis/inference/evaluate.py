@@ -19,8 +19,8 @@ from palpate.diagnosis.inference.evaluate_history import history_predictions
 from palpate.diagnosis.inference.evidence import Block
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import InferenceProblem
-from palpate.diagnosis.inference.mesh_discrepancy import under_stated, with_columns
-from palpate.diagnosis.inference.noise_model import noises
+from palpate.diagnosis.inference.noise.mesh_discrepancy import under_stated, with_columns
+from palpate.diagnosis.inference.noise.noise_model import noises
 from palpate.diagnosis.inference.nuisances import nuisance_setups
 from palpate.diagnosis.inference.posterior import Posterior
 from palpate.effects import Effect, Tangent

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from palpate.diagnosis.inference.applicable_effects import applicable_effects
+from palpate.diagnosis.inference.noise.rest_evidence import RestEvidence
 from palpate.diagnosis.inference.nuisances import Nuisances
 from palpate.diagnosis.inference.parameter_blocks import ParameterBlocks
-from palpate.diagnosis.inference.rest_evidence import RestEvidence
 from palpate.effects import CATALOGUE, Effect, NuisanceBlock
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.surface_gaps import Surface

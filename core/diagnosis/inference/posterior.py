@@ -11,7 +11,7 @@ from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.evidence import Block, fit, log_evidence, predictive_score
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import InferenceProblem
-from palpate.diagnosis.inference.noise_model import Noise
+from palpate.diagnosis.inference.noise.noise_model import Noise
 from palpate.foundation.arrays import FloatArray
 
 __all__ = ["InferenceState", "Posterior"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from palpate.diagnosis.inference.inference_problem import InferenceProblem
-from palpate.diagnosis.inference.rest_cloud import RestCloud
-from palpate.diagnosis.inference.rest_evidence import RestEvidence
+from palpate.diagnosis.inference.noise.rest_cloud import RestCloud
+from palpate.diagnosis.inference.noise.rest_evidence import RestEvidence
 from palpate.diagnosis.observation.force_only import pushed_places
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.experiment import Experiment

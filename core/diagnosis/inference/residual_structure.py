@@ -18,7 +18,7 @@ from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, draw_rights
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.noise_model import smooth_basis
+from palpate.diagnosis.inference.noise.noise_model import smooth_basis
 from palpate.foundation.arrays import FloatArray
 
 __all__ = ["NOTHING", "Structure", "explained_by_modes", "structure_of"]

@@ -14,7 +14,7 @@ from palpate.diagnosis.gain.force_gain import ForceGain
 from palpate.diagnosis.gain.gain_ladder import SurfaceGain
 from palpate.diagnosis.inference.credible_intervals import intervals, modulus_interval
 from palpate.diagnosis.inference.evaluate import Evaluator
-from palpate.diagnosis.inference.mesh_discrepancy import too_coarse
+from palpate.diagnosis.inference.noise.mesh_discrepancy import too_coarse
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.model_probabilities import probabilities
 from palpate.diagnosis.validation.checks import AllClearChecks

@@ -17,7 +17,7 @@ from palpate.effects import Effect
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.touch_correction import touch_misses
 from palpate.mesh.protocol import Meshing
-from palpate.registration.landmark_repair import LandmarkRepair
+from palpate.registration.robot.landmark_repair import LandmarkRepair
 from palpate.setup.setup import Setup
 
 __all__ = ["fitted_to_touches", "known_mismatch"]

@@ -16,7 +16,7 @@ from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.noise_model import rows_of
+from palpate.diagnosis.inference.noise.noise_model import rows_of
 from palpate.diagnosis.validation.negative_controls import Control, judge
 from palpate.foundation.arrays import FloatArray, IntArray
 

@@ -22,7 +22,7 @@ from palpate.diagnosis.forward.ray_comparison import PointSample
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, fit
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.noise_model import Noise, rows_of
+from palpate.diagnosis.inference.noise.noise_model import Noise, rows_of
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.search.identifiability import mimicry
 from palpate.diagnosis.search.screening import Candidate, linear_gains, right_sides

@@ -1,11 +1,11 @@
 """Tests whether any sequence needs more engine error than is usual.
 
 The noise model of every sequence allows for the engine's own error: smooth errors of displacement
-and of local stiffness (`palpate.diagnosis.inference.noise_model`). They are so wide that a cause
-outside the catalogue can hide in them: a shaft that leans on the rim in pushes from the side looks
-like spots that are a sixth too soft. The needed deviation of local stiffness maximises the evidence
-of the sequence's data (MacKay 1992, "Bayesian interpolation", eq. 4.2). Measured: in replays of
-data of two other solvers with nothing hidden it is at most half of the allowed one.
+and of local stiffness (`palpate.diagnosis.inference.noise.noise_model`). They are so wide that a
+cause outside the catalogue can hide in them: a shaft that leans on the rim in pushes from the side
+looks like spots that are a sixth too soft. The needed deviation of local stiffness maximises the
+evidence of the sequence's data (MacKay 1992, "Bayesian interpolation", eq. 4.2). Measured: in
+replays of data of two other solvers with nothing hidden it is at most half of the allowed one.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, fit, less_constants, log_evidence
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.noise_model import Noise
+from palpate.diagnosis.inference.noise.noise_model import Noise
 from palpate.diagnosis.validation.worst_location import ErrorLocation, location_of
 from palpate.foundation.arrays import FloatArray
 

@@ -18,9 +18,9 @@ from palpate.measurement.phantom_drift import (
     shift_sequences,
 )
 from palpate.measurement.segmentation import cleaner_for
-from palpate.registration.landmark_repair import LandmarkRepair
 from palpate.registration.registration import register, setup_from
-from palpate.registration.robot_fit import RobotFit
+from palpate.registration.robot.landmark_repair import LandmarkRepair
+from palpate.registration.robot.robot_fit import RobotFit
 from palpate.synthetic import HiddenEffect, Scenario, Truth, make_dataset
 
 SLIPPERY = HiddenEffect("base_slip", {"friction_coefficient": 0.16})

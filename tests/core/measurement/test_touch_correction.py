@@ -14,7 +14,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SetupError
 from palpate.foundation.frames import Transform
 from palpate.measurement.touch_correction import touch_correction, touch_misses, touched_places
-from palpate.registration.robot_fit import fit_robot
+from palpate.registration.robot.robot_fit import fit_robot
 from palpate.setup.setup import PAIRINGS, Setup, Touching
 
 TRUE = Transform.from_vector([0.1, -0.2, 0.3], [0.4, -1.1, 0.7])

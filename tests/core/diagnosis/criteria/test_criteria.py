@@ -1,4 +1,4 @@
-"""Every threshold says its unit, its meaning and its source, and a changed one changes the version."""
+"""Every threshold has unit, meaning and source, and a changed one changes the version."""
 
 from __future__ import annotations
 

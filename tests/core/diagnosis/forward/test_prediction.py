@@ -21,7 +21,7 @@ from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward import jacobian as columns_module
 from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS, JacobianRequest
 from palpate.diagnosis.forward.prediction import Prediction, predict
-from palpate.diagnosis.inference.noise_model import Noise
+from palpate.diagnosis.inference.noise.noise_model import Noise
 from palpate.diagnosis.observation.frame_groups import Group, Observations
 from palpate.effects.elastic_material import StiffInclusion
 from palpate.effects.geometry import GeometryScale

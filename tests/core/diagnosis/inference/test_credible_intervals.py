@@ -14,7 +14,7 @@ from palpate.diagnosis.inference.credible_intervals import intervals, is_support
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, gram
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.noise_model import Noise
+from palpate.diagnosis.inference.noise.noise_model import Noise
 from palpate.diagnosis.inference.parameter_blocks import ModelColumns
 from palpate.effects.elastic_material import PoissonRatio
 from palpate.effects.heterogeneity import Anisotropy

@@ -12,8 +12,8 @@ from small_dataset import write_valid_dataset
 from palpate.dataset import Dataset, open_dataset
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.gain.gain_ladder import SurfaceGain
-from palpate.diagnosis.inference.camera_error_model import Ripple
 from palpate.diagnosis.inference.evaluate import Evaluator
+from palpate.diagnosis.inference.noise.camera_error_model import Ripple
 from palpate.diagnosis.inference.residual_structure import Structure
 from palpate.diagnosis.report.report import report_of, verdict_of
 from palpate.diagnosis.search.findings import Findings, Trial

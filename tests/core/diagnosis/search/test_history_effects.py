@@ -16,7 +16,7 @@ from palpate.diagnosis.gain.gain_ladder import surface_gain
 from palpate.diagnosis.inference.credible_intervals import intervals
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.gauss_newton import refit
-from palpate.diagnosis.inference.noise_model import Noise
+from palpate.diagnosis.inference.noise.noise_model import Noise
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.validation.falsified_motions import FALSIFIED
 from palpate.diagnosis.validation.negative_controls import controls

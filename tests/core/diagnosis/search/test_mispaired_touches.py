@@ -13,8 +13,8 @@ from pushed_block import CORNERS, GRID, POSE, SETUP, SIZE, observed, poke
 from pushed_block import registration as stated_registration
 
 from palpate.diagnosis.forward.worker_pool import Workers
-from palpate.diagnosis.inference.rest_cloud import RestCloud
-from palpate.diagnosis.inference.rest_evidence import RestEvidence
+from palpate.diagnosis.inference.noise.rest_cloud import RestCloud
+from palpate.diagnosis.inference.noise.rest_evidence import RestEvidence
 from palpate.diagnosis.report.report import verdict_of
 from palpate.diagnosis.search.forward_selection import search as find_causes
 from palpate.effects import CATALOGUE, Linearisation
@@ -23,9 +23,9 @@ from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.segmentation import Cleaner
 from palpate.measurement.touch_correction import touched_places
 from palpate.mesh.box_mesh import GridSpec
-from palpate.registration.landmark_repair import find_repairs
 from palpate.registration.registration import Registration
-from palpate.registration.robot_fit import fit_robot
+from palpate.registration.robot.landmark_repair import find_repairs
+from palpate.registration.robot.robot_fit import fit_robot
 from palpate.setup.setup import Setup, Touching
 
 STATED = replace(SETUP, landmarks=CORNERS, touching=Touching(lift=5e-3))

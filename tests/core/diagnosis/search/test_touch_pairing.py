@@ -13,8 +13,8 @@ from palpate.effects.tool import LandmarkMismatch
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.touch_correction import touch_misses, touched_places
-from palpate.registration.landmark_repair import find_repairs, pairings_for
-from palpate.registration.robot_fit import fit_robot
+from palpate.registration.robot.landmark_repair import find_repairs, pairings_for
+from palpate.registration.robot.robot_fit import fit_robot
 from palpate.setup.setup import Setup, Touching
 
 STATED = replace(SETUP, landmarks=CORNERS, touching=Touching(lift=5e-3))
@@ -50,7 +50,7 @@ def _ranked(setup: Setup) -> list[tuple[Effect, float]]:
     """
     misses = touch_misses(setup, GRID) / CRITERIA.rest.touch_deviation
     rows = [_fitted(setup, pairing) for pairing in pairings_for(len(setup.landmarks))]
-    best = sorted(rows, key=lambda row: row[1])[: BEST]
+    best = sorted(rows, key=lambda row: row[1])[:BEST]
     return [(effect, 0.5 * float((misses**2).sum()) - cost) for effect, cost in best]
 
 

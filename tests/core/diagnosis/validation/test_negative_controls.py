@@ -13,7 +13,7 @@ from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, gram
-from palpate.diagnosis.inference.noise_model import Noise
+from palpate.diagnosis.inference.noise.noise_model import Noise
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.validation.falsified_motions import FALSIFIED
 from palpate.diagnosis.validation.negative_controls import Control, controls, judge, warnings_of

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.diagnosis.forward.prediction import Prediction
-from palpate.diagnosis.inference.noise_model import Noise, rows_of
+from palpate.diagnosis.inference.noise.noise_model import Noise, rows_of
 
 __all__ = ["too_coarse", "under_stated", "with_columns"]
 

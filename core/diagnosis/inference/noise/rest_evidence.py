@@ -13,7 +13,7 @@ import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.evidence import Block
-from palpate.diagnosis.inference.rest_cloud import RestCloud
+from palpate.diagnosis.inference.noise.rest_cloud import RestCloud
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.touch_correction import touch_misses, touched_places
 from palpate.mesh.protocol import Meshing

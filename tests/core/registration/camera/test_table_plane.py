@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from palpate.foundation.errors import RegistrationError
-from palpate.registration.table_plane import find_planes, find_table
+from palpate.registration.camera.table_plane import find_planes, find_table
 
 
 def test_the_table_is_found_even_where_the_block_fills_the_picture(scene):

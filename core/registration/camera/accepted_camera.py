@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.dataset.accepted_registration import AcceptedRegistration
 from palpate.foundation.arrays import FloatArray
-from palpate.registration.camera_fit import CameraFit, refine_camera
+from palpate.registration.camera.camera_fit import CameraFit, refine_camera
 
 __all__ = ["accepted_camera_fit"]
 

@@ -7,7 +7,7 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
-from palpate.registration.table_plane import TablePlane, find_table
+from palpate.registration.camera.table_plane import TablePlane, find_table
 
 __all__ = ["automatic_guess", "half_turn"]
 

@@ -12,7 +12,7 @@ from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.mesh_discrepancy import too_coarse
+from palpate.diagnosis.inference.noise.mesh_discrepancy import too_coarse
 from palpate.diagnosis.inference.parameter_blocks import ModelColumns
 from palpate.diagnosis.search.candidates import candidates_of, mesh_candidates, tangents_of
 from palpate.diagnosis.search.inclusion_grid import inclusion_places
@@ -32,7 +32,7 @@ PLACES = {"poke-01": (4e-3, -2e-3), "poke-02": (-1.2e-2, 5e-3), "poke-03": (1.5e
 
 
 def _screened(stated: Setup) -> tuple[Evaluator, Model, list[Candidate], dict[str, float]]:
-    """What a block that behaves like GRID gives to screen: the evaluator, its baseline, the candidates,
+    """What a block that behaves like GRID gives to screen: evaluator, baseline, candidates,
     and their gains by name.
     """
     data = []

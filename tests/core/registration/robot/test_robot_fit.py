@@ -5,7 +5,7 @@ import pytest
 
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
-from palpate.registration.robot_fit import fit_robot, rigid_fits, similarity
+from palpate.registration.robot.robot_fit import fit_robot, rigid_fits, similarity
 
 CORNERS = np.array(
     [[0.034, 0.02, 0.036], [0.034, -0.02, 0.036], [-0.034, -0.02, 0.036], [-0.034, 0.02, 0.036]]

@@ -4,7 +4,7 @@ import numpy as np
 from small_dataset import SIZE
 
 from palpate.foundation.frames import Transform
-from palpate.registration.levelling import as_seen, levelled
+from palpate.registration.camera.levelling import as_seen, levelled
 
 POSE = Transform.from_vector([0.01, -0.2, 0.3], [-2.3, 0.15, 0.1])
 """phantom_from_camera"""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from palpate.foundation.frames import Transform
-from palpate.registration.landmark_pairing import propose_pairing
+from palpate.registration.robot.landmark_pairing import propose_pairing
 
 SIZE = (0.0687, 0.0393, 0.0358)
 NAMES = ("corner_0", "corner_1", "corner_2", "corner_3")

@@ -8,7 +8,7 @@ from pushed_block import GRID, SETUP, poke, prediction
 from scipy.linalg import null_space
 
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.inference.noise_model import Noise, noises, patch_variance
+from palpate.diagnosis.inference.noise.noise_model import Noise, noises, patch_variance
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.surface_gaps import Surface
 from palpate.replay.replay import replay

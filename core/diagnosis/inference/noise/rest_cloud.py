@@ -13,8 +13,8 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.inference.camera_error_model import CameraErrors, camera_errors
 from palpate.diagnosis.inference.evidence import Block
+from palpate.diagnosis.inference.noise.camera_error_model import CameraErrors, camera_errors
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.patch_averages import patch_means

@@ -14,7 +14,7 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.registration.faces import box_distance
-from palpate.registration.robot_fit import rigid_fits, similarity
+from palpate.registration.robot.robot_fit import rigid_fits, similarity
 
 __all__ = [
     "CLEARLY_BETTER",

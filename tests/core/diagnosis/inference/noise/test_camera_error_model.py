@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.diagnosis.inference.camera_error_model import CameraErrors, camera_errors
+from palpate.diagnosis.inference.noise.camera_error_model import CameraErrors, camera_errors
 from palpate.foundation.arrays import FloatArray
 
 WHITE = 6e-5

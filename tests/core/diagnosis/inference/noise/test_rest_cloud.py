@@ -7,7 +7,7 @@ import pytest
 from pushed_block import GRID, POSE, SETUP, SIZE, TOP, seen_points
 
 from palpate.diagnosis.inference.evidence import Block, fit
-from palpate.diagnosis.inference.rest_cloud import RestCloud
+from palpate.diagnosis.inference.noise.rest_cloud import RestCloud
 from palpate.effects import Effect
 from palpate.effects.geometry import GeometryScale
 from palpate.effects.sensor import DepthBias

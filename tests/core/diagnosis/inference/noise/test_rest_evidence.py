@@ -8,14 +8,14 @@ from pushed_block import CORNERS, GRID, SETUP
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.evidence import Block, fit
-from palpate.diagnosis.inference.rest_evidence import touch_block
+from palpate.diagnosis.inference.noise.rest_evidence import touch_block
 from palpate.effects import Effect
 from palpate.effects.geometry import GeometryScale
 from palpate.effects.tool import LandmarkMismatch
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.touch_correction import touched_places
-from palpate.registration.robot_fit import fit_robot
+from palpate.registration.robot.robot_fit import fit_robot
 from palpate.setup.setup import Setup, Touching
 
 STATED = replace(SETUP, landmarks=CORNERS, touching=Touching(lift=5e-3))

@@ -9,7 +9,7 @@ import numpy as np
 from palpate.dataset import Dataset
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
-from palpate.registration.camera_fit import CameraFit
+from palpate.registration.camera.camera_fit import CameraFit
 from palpate.registration.faces import box_distance
 from palpate.registration.uncertainty import weak_directions
 

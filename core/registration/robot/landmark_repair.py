@@ -16,14 +16,14 @@ import numpy as np
 from palpate.dataset import Dataset
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
-from palpate.registration.heading import tool_misfit
-from palpate.registration.landmark_pairing import (
+from palpate.registration.camera.heading import tool_misfit
+from palpate.registration.robot.landmark_pairing import (
     CLEARLY_BETTER,
     IMPOSSIBLE,
     MUCH_BETTER,
     blocked_share,
 )
-from palpate.registration.robot_fit import RobotFit, fit_robot, similarity
+from palpate.registration.robot.robot_fit import RobotFit, fit_robot, similarity
 from palpate.setup.setup import PAIRINGS, Touching
 
 __all__ = ["LandmarkRepair", "choose_repair", "find_repairs", "pairings_for", "resized_repair"]

@@ -5,7 +5,7 @@ import pytest
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
-from palpate.registration.landmark_repair import find_repairs, pairings_for, resized_repair
+from palpate.registration.robot.landmark_repair import find_repairs, pairings_for, resized_repair
 from palpate.setup.setup import PAIRINGS, Touching
 
 SIZE = (0.0687, 0.0393, 0.0358)

@@ -11,9 +11,9 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
-from palpate.registration.coarse_icp import align_by_icp
+from palpate.registration.camera.coarse_icp import align_by_icp
+from palpate.registration.camera.guess import automatic_guess, half_turn
 from palpate.registration.faces import FACES, Assignment, assign, box_distance, camera_planes
-from palpate.registration.guess import automatic_guess, half_turn
 from palpate.registration.pose import motion_jacobian, small_motion
 from palpate.registration.uncertainty import PRIOR, estimate, make_patches, weak_directions
 

@@ -1,0 +1,1 @@
+"""Noise of the measurement, errors of camera and mesh, and the evidence of data at rest."""

@@ -1,0 +1,1 @@
+"""Robot to phantom: from touches of landmarks, with their pairing and repair."""
