@@ -58,7 +58,7 @@ def evaluator(data: list[Observations]) -> Iterator[Evaluator]:
             SETUP, registration(), workers, [item.name for item in data], None, GRID, GRID
         )
         shape = made.evaluate(()).predictions[0].gap.shape
-        made.noises = [_noise(item, shape) for item in made.evaluate(()).predictions]
+        made.state.noises = [_noise(item, shape) for item in made.evaluate(()).predictions]
         yield made
 
 
