@@ -115,4 +115,4 @@ def test_swapped_corners_are_named_with_the_size_of_the_touched_polygon_and_noth
         1e-3, abs=6e-4
     )
     assert evaluator.misfit(found.best.model) < 1.2 < found.misfit
-    assert found.known and not found.left.significant
+    assert found.known and not found.remaining.significant
