@@ -126,7 +126,7 @@ def test_last_row_that_was_torn_is_cut_off(tmp_path: Path) -> None:
     assert [one.name for one in read_results(file)] == ["a", "b"]
 
 
-@pytest.mark.parametrize("torn", ["{", "[]", json.dumps({"name": "poisson_ratio-7", "seed": 7})])
+@pytest.mark.parametrize("broken", ["{", "[]", json.dumps({"name": "poisson_ratio-7", "seed": 7})])
 def test_other_row_that_is_no_result_is_an_error_with_its_number(
     tmp_path: Path, broken: str
 ) -> None:
