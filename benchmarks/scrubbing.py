@@ -17,10 +17,12 @@ import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import websockets
 from rich.table import Table
+from websockets.typing import Subprotocol
 
 from benchmarks.made_up_run import CAMERA, RUN, SEQUENCE, cloud, write_run
 
@@ -155,12 +157,11 @@ async def _client(address: str, name: str) -> AsyncIterator[_Client]:
         "up_direction": [0, 0, 1],
     }
     lens = {"fov": 0.6, "near": 0.001, "far": 100.0, "image_height": 555, "image_width": 784}
-    options = {"max_size": None, "compression": None, "proxy": None}
+    options: dict[str, Any] = {"max_size": None, "compression": None, "proxy": None}
+    viser, socket = f"ws://{address}/viser/{name}", f"ws://{address}/api/sessions/{name}/socket"
     async with (
-        websockets.connect(
-            f"ws://{address}/viser/{name}", subprotocols=[VIEWER], **options
-        ) as viewer,  # type: ignore[arg-type, list-item]
-        websockets.connect(f"ws://{address}/api/sessions/{name}/socket", **options) as page,  # type: ignore[arg-type]
+        websockets.connect(viser, subprotocols=[Subprotocol(VIEWER)], **options) as viewer,
+        websockets.connect(socket, **options) as page,
     ):
         await viewer.send(msgspec.msgpack.encode({"type": "ViewerCameraMessage", **pose, **lens}))
         await asyncio.sleep(0.5)
