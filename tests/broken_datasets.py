@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from breakage import (
     Breakage,
     change,
@@ -29,7 +30,7 @@ from breakage import (
 )
 from small_dataset import ply_bytes, small_cloud, write_valid_dataset
 
-__all__ = ["BREAKAGES", "Breakage", "write_valid_dataset"]
+__all__ = ["BREAKAGES", "REPRESENTATIVE", "Breakage", "write_valid_dataset"]
 
 
 _TOML = "dataset.toml"
@@ -486,3 +487,18 @@ _PLY = {
 }
 
 BREAKAGES: dict[str, Breakage] = {**_FOLDER, **_SYNTAX, **_KEYS, **_TABLES, **_LISTS, **_PLY}
+
+_REPRESENTATIVE = (
+    "folder missing",
+    "toml syntax",
+    "mass in grams",
+    "touch of nan",
+    "time goes back",
+    "cloud truncated",
+)
+REPRESENTATIVE = [
+    pytest.param(kind, marks=() if kind in _REPRESENTATIVE else pytest.mark.more)
+    for kind in sorted(BREAKAGES)
+]
+"""All kinds for tests through command line and service: six in the default tier, the rest in
+`more`. The reader is tested with all of them."""
