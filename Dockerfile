@@ -17,7 +17,7 @@ RUN pip install --no-cache-dir --extra-index-url https://download.pytorch.org/wh
 COPY core core
 COPY app app
 COPY static static
-RUN pip install --no-cache-dir -e . -c constraints.txt
+RUN pip install --no-cache-dir . -c constraints.txt
 
 USER palpate
 WORKDIR /srv/palpate

@@ -1,6 +1,4 @@
-"""Order of the tests: the longest files first, so that no worker ends with one of them while the
-others have nothing left.
-"""
+"""Tiers and order of the tests, and one line on what was skipped for want of the shared datasets."""
 
 from __future__ import annotations
 
@@ -9,6 +7,14 @@ from pathlib import Path
 import pytest
 
 LONGEST = ("tests/loop", "tests/core/blind", "tests/core/diagnosis", "tests/app")
+"""These begin first, so that no worker ends with one of them while the others have nothing left."""
+
+SECOND_TIER: tuple[str, ...] = ()
+"""Beginnings of test ids that `make test-more` runs: each takes more than some ten seconds, and the
+default tier tests the same parts by lighter cases."""
+
+SHARED = "no datasets "
+"""Beginning of the reason for which tests of the shared datasets are skipped."""
 
 
 def _place(item: pytest.Item) -> int:
@@ -18,5 +24,24 @@ def _place(item: pytest.Item) -> int:
     )
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the second tier, and put the longest files first."""
+    for item in items:
+        if item.nodeid.startswith(SECOND_TIER):
+            item.add_marker("more")
     items.sort(key=_place)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say in one line how many tests want the shared datasets."""
+    missing = [
+        report
+        for report in terminalreporter.stats.get("skipped", [])
+        if isinstance(report.longrepr, tuple) and SHARED in str(report.longrepr[2])
+    ]
+    if missing:
+        terminalreporter.write_line(
+            f"{len(missing)} tests were skipped: the datasets with truth are not there; "
+            "PALPATE_DATASETS names their folder"
+        )
