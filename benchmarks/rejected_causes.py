@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from palpate.blind.case_results import CaseResult, read_results
-from palpate.diagnosis.inference.residual_structure import Structure
+from palpate.diagnosis.inference.noise.residual_structure import Structure
 from palpate.diagnosis.validation.rejection import leaves_structure
 
 __all__ = ["run", "structures"]

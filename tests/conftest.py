@@ -1,4 +1,4 @@
-"""Tiers and order of the tests, and one line on what was skipped for want of the shared datasets."""
+"""Tiers and order of the tests, and a line on what is skipped without the shared datasets."""
 
 from __future__ import annotations
 

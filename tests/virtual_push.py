@@ -8,7 +8,8 @@ from palpate.foundation.arrays import FloatArray
 from palpate.synthetic.bench.motion_plan import MotionPlan, PlannedPush
 from palpate.synthetic.bench.solved_track import SolvedTrack
 from palpate.synthetic.bench.virtual_experiment import solve_motion
-from palpate.synthetic.scenario.scenario import HiddenEffect, Scenario
+from palpate.synthetic.scenario.hidden_effects import HiddenEffect
+from palpate.synthetic.scenario.scenario import Scenario
 
 COARSE = 3.6e-3
 RADIUS = Scenario().tool_radius

@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import torch
 
-from palpate.correction.checkpoint import load, save
+from palpate.correction.checkpoint_file import load, save
 from palpate.correction.networks.architectures import CorrectionNetwork, NetworkSpec, build
 from palpate.correction.samples.corrected_points import Body
 from palpate.foundation.errors import RunError

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import torch
 from torch import Tensor
 
-from palpate.correction import checkpoint
+from palpate.correction import checkpoint_file as checkpoint
 from palpate.correction.networks.architectures import build
 from palpate.correction.networks.chamfer import SurfaceLoss
 from palpate.correction.sample_errors import sample_errors

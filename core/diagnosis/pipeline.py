@@ -16,8 +16,9 @@ from palpate.dataset import Dataset
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.gain.force_gain import ForceGain
-from palpate.diagnosis.gain.gain_ladder import SurfaceGain
-from palpate.diagnosis.gain.test_gain import held_out_gain, tuned_setup
+from palpate.diagnosis.gain.held_out_gain import held_out_gain
+from palpate.diagnosis.gain.surface_gain import SurfaceGain
+from palpate.diagnosis.gain.tuned_setup import tuned_setup
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.problem_of_dataset import problem_of_dataset
 from palpate.diagnosis.observation.frame_groups import Observations
@@ -34,7 +35,7 @@ from palpate.diagnosis.report.supplements import with_supplements
 from palpate.diagnosis.search.findings import Findings
 from palpate.diagnosis.search.forward_selection import search
 from palpate.diagnosis.validation.checks import AllClearChecks
-from palpate.diagnosis.validation.held_out_test import check_held_out
+from palpate.diagnosis.validation.held_out_check import check_held_out
 from palpate.diagnosis.validation.rejection import rejection_reason
 from palpate.diagnosis.validation.stiffness_error_test import largest_stiffness_error
 from palpate.experiment import Experiment

@@ -8,6 +8,7 @@ and `make_palpation` write whole datasets with their truth beside them.
 from palpate.synthetic.make_dataset import make_dataset
 from palpate.synthetic.make_palpation import Palpation, draw_palpation, make_palpation
 from palpate.synthetic.scenario.disturbance import DISTURBANCES, Disturbance, draw_disturbance
+from palpate.synthetic.scenario.hidden_effects import HIDDEN, QUICK, WEIGHED, HiddenEffect
 from palpate.synthetic.scenario.paper_protocol import (
     PAPER_EFFECTS,
     PAPER_SEED,
@@ -15,16 +16,9 @@ from palpate.synthetic.scenario.paper_protocol import (
     PaperSize,
     paper_scenario,
 )
-from palpate.synthetic.scenario.scenario import (
-    HIDDEN,
-    QUICK,
-    SHORT_PROTOCOL,
-    WEIGHED,
-    HiddenEffect,
-    Scenario,
-)
+from palpate.synthetic.scenario.scenario import SHORT_PROTOCOL, Scenario
 from palpate.synthetic.scenario.scenario_draws import draw_scenario
-from palpate.synthetic.scenario.truth import Truth, truth_path
+from palpate.synthetic.scenario.truth_file import Truth, truth_path
 
 __all__ = [
     "DISTURBANCES",

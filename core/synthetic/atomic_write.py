@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from palpate.foundation.errors import RunError
-from palpate.synthetic.scenario.truth import Truth, truth_path
+from palpate.synthetic.scenario.truth_file import Truth, truth_path
 
 __all__ = ["write_atomically"]
 

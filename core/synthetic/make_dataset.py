@@ -23,7 +23,7 @@ from palpate.synthetic.bench.sequence_recording import SequenceJob, SequenceReco
 from palpate.synthetic.bench.virtual_experiment import rest_surface
 from palpate.synthetic.dataset_writer import write_config, write_ply, write_touches
 from palpate.synthetic.scenario.scenario import STRAYED, Scenario
-from palpate.synthetic.scenario.truth import Truth
+from palpate.synthetic.scenario.truth_file import Truth
 
 __all__ = ["make_dataset", "motions"]
 

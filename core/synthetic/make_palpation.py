@@ -37,8 +37,9 @@ from palpate.synthetic.dataset_writer import (
     write_kinematics,
     write_touches,
 )
-from palpate.synthetic.scenario.scenario import HiddenEffect, Scenario
-from palpate.synthetic.scenario.truth import Truth
+from palpate.synthetic.scenario.hidden_effects import HiddenEffect
+from palpate.synthetic.scenario.scenario import Scenario
+from palpate.synthetic.scenario.truth_file import Truth
 from palpate.synthetic.solver.tet_block import TetBlock, TetGrading
 
 __all__ = ["Body", "Palpation", "draw_palpation", "make_palpation"]

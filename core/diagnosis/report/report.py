@@ -11,7 +11,7 @@ import numpy as np
 from palpate.dataset import Dataset
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.gain.force_gain import ForceGain
-from palpate.diagnosis.gain.gain_ladder import SurfaceGain
+from palpate.diagnosis.gain.surface_gain import SurfaceGain
 from palpate.diagnosis.inference.credible_intervals import intervals, modulus_interval
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.noise.mesh_discrepancy import too_coarse

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.noise.camera_error_model import CALM, Ripple
-from palpate.diagnosis.inference.residual_structure import NOTHING, Structure
+from palpate.diagnosis.inference.noise.residual_structure import NOTHING, Structure
 from palpate.diagnosis.search.identifiability import Identifiability
 from palpate.effects import Effect
 

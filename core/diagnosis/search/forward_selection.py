@@ -13,9 +13,9 @@ import numpy as np
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.credible_intervals import is_supported_by_all_sequences
 from palpate.diagnosis.inference.evaluate import Evaluator
-from palpate.diagnosis.inference.gauss_newton import refine
+from palpate.diagnosis.inference.final_fit import refine
 from palpate.diagnosis.inference.noise.camera_error_model import CALM
-from palpate.diagnosis.inference.residual_structure import structure_of
+from palpate.diagnosis.inference.noise.residual_structure import structure_of
 from palpate.diagnosis.search.candidates import tangents_of
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.identifiability import identifiability_of

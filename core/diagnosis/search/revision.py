@@ -11,7 +11,7 @@ from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.credible_intervals import is_supported_by_all_sequences
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.residual_structure import structure_of
+from palpate.diagnosis.inference.noise.residual_structure import structure_of
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.initial_guess import initial_guess
 from palpate.diagnosis.search.screening import pair_gains, right_sides

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from palpate.diagnosis.validation.held_out_test import HeldOutCheck
+from palpate.diagnosis.validation.held_out_check import HeldOutCheck
 from palpate.diagnosis.validation.stiffness_error_test import StiffnessErrorTest
 
 __all__ = ["AllClearChecks"]

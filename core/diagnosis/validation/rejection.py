@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.gain.force_gain import ForceGain
-from palpate.diagnosis.gain.gain_ladder import SurfaceGain
-from palpate.diagnosis.inference.residual_structure import Structure
+from palpate.diagnosis.gain.surface_gain import SurfaceGain
+from palpate.diagnosis.inference.noise.residual_structure import Structure
 from palpate.diagnosis.search.findings import Findings
 
 __all__ = ["leaves_structure", "rejection_reason"]

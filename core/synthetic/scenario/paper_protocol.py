@@ -19,7 +19,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from palpate.synthetic.scenario.scenario import HiddenEffect, Scenario
+from palpate.synthetic.scenario.hidden_effects import HiddenEffect
+from palpate.synthetic.scenario.scenario import Scenario
 
 __all__ = ["PAPER_EFFECTS", "PAPER_SEED", "PAPER_SIZES", "PaperSize", "paper_scenario"]
 

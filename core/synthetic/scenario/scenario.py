@@ -6,59 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from palpate.synthetic.scenario.disturbance import Disturbance
-from palpate.synthetic.scenario.parameter_names import check_named
+from palpate.synthetic.scenario.hidden_effects import HiddenEffect
 
-__all__ = ["HIDDEN", "QUICK", "SHORT_PROTOCOL", "STRAYED", "WEIGHED", "HiddenEffect", "Scenario"]
-
-HIDDEN: Mapping[str, Mapping[str, str]] = {
-    "poisson_ratio": {"nu": "1"},
-    "stiff_inclusion": {"x": "m", "y": "m", "z": "m", "radius": "m", "stiffness_ratio": "1"},
-    "tool_radius": {"radius": "m"},
-    "tool_offset": {"dx": "m", "dy": "m", "dz": "m"},
-    "base_slip": {"friction_coefficient": "1"},
-    "base_detachment": {"edge": "", "extent": "m"},
-    "gravity": {"specific_weight_over_stiffness": "1/m"},
-    "time_offset": {"offset": "s"},
-    "camera_registration": {"translation": "m", "rotation": "rad"},
-    "surface_layer": {"thickness": "m", "stiffness_ratio": "1"},
-    "stiffness_gradient": {"log_ratio": "1"},
-    "strain_stiffening": {"J_m": "1"},
-    "anisotropy": {"direction": "rad", "stiffness_ratio": "1"},
-    "base_compliance": {"stiffness_over_E": "1/m"},
-    "tool_compliance": {"compliance_times_stiffness": "1/m"},
-    "young_modulus": {"E": "Pa"},
-    "depth_bias": {"offset": "m", "scale": "1"},
-    "geometry_scale": {"scale_x": "1", "scale_y": "1", "scale_z": "1"},
-    "landmark_mismatch": {"pairing": "", "scale": "1", "inset": "m"},
-    "viscoelasticity": {"relaxed_fraction": "1", "time_constant": "s"},
-    "permanent_set": {"retained_fraction": "1"},
-    "tool_friction": {"friction_coefficient": "1"},
-}
-"""The effects that the virtual bench can hide, with the unit of each parameter; names are those of
-the catalogue."""
-
-WEIGHED = tuple(name for name in HIDDEN if name != "young_modulus")
-"""The effects that show in clouds alone; a block of any modulus takes the same shape."""
-
-QUICK = (
-    "poisson_ratio",
-    "stiff_inclusion",
-    "tool_radius",
-    "tool_offset",
-    "base_slip",
-    "base_detachment",
-    "gravity",
-    "time_offset",
-    "camera_registration",
-    "surface_layer",
-    "stiffness_gradient",
-    "strain_stiffening",
-    "anisotropy",
-    "base_compliance",
-    "tool_compliance",
-)
-"""The effects that are drawn by default; a material with a history, or friction at the tool, takes
-minutes to simulate."""
+__all__ = ["SHORT_PROTOCOL", "STRAYED", "Scenario"]
 
 STRAYED = 4e-3
 """Offset of a block from its place beyond which any operator puts it back [m]."""
@@ -66,26 +16,6 @@ STRAYED = 4e-3
 SHORT_PROTOCOL = ("poke-top-01", "poke-top-02", "poke-side-01", "poke-side-02", "drag-01")
 """Every kind of motion for the fit, and for the test a push from another side, which shows most
 causes."""
-
-
-@dataclass(frozen=True)
-class HiddenEffect:
-    """One hidden cause.
-
-    Attributes:
-        effect: name in the catalogue.
-        parameters: by name, SI units; an edge and a pairing are words.
-    """
-
-    effect: str
-    parameters: Mapping[str, float | str] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        check_named(self.effect, self.parameters, HIDDEN, "hide")
-
-    def value(self, name: str) -> float:
-        """The numeric parameter of this name."""
-        return float(self.parameters[name])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from palpate.foundation.errors import EffectError
-from palpate.synthetic.scenario.scenario import HIDDEN, QUICK, HiddenEffect, Scenario
+from palpate.synthetic.scenario.hidden_effects import HIDDEN, QUICK, HiddenEffect
+from palpate.synthetic.scenario.scenario import Scenario
 
 __all__ = ["draw_scenario"]
 

@@ -18,7 +18,8 @@ from palpate.diagnosis.forward.prediction import predict
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.inference.credible_intervals import modulus_interval
 from palpate.diagnosis.inference.evaluate import Evaluator
-from palpate.diagnosis.inference.gauss_newton import refine, refit
+from palpate.diagnosis.inference.final_fit import refine
+from palpate.diagnosis.inference.gauss_newton import refit
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.observation.force_record import (
     ForceComparison,

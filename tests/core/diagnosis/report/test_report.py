@@ -11,14 +11,14 @@ from small_dataset import write_valid_dataset
 
 from palpate.dataset import Dataset, open_dataset
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.gain.gain_ladder import SurfaceGain
+from palpate.diagnosis.gain.surface_gain import SurfaceGain
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.noise.camera_error_model import Ripple
-from palpate.diagnosis.inference.residual_structure import Structure
+from palpate.diagnosis.inference.noise.residual_structure import Structure
 from palpate.diagnosis.report.report import report_of, verdict_of
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.validation.checks import AllClearChecks
-from palpate.diagnosis.validation.held_out_test import HeldOutCheck
+from palpate.diagnosis.validation.held_out_check import HeldOutCheck
 from palpate.diagnosis.validation.rejection import rejection_reason
 from palpate.diagnosis.validation.stiffness_error_test import StiffnessErrorTest
 from palpate.diagnosis.validation.worst_location import ErrorLocation

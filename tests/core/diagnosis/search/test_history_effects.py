@@ -12,7 +12,7 @@ from pushed_block import GRID, SETUP, registration
 
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.forward.worker_pool import Workers
-from palpate.diagnosis.gain.gain_ladder import surface_gain
+from palpate.diagnosis.gain.surface_gain import surface_gain
 from palpate.diagnosis.inference.credible_intervals import intervals
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.gauss_newton import refit

@@ -6,8 +6,8 @@ from pushed_block import SETUP
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.hypothesis import Model
+from palpate.diagnosis.inference.noise.residual_structure import Structure
 from palpate.diagnosis.inference.parameter_blocks import ModelColumns
-from palpate.diagnosis.inference.residual_structure import Structure
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.forward_selection import _refits_nonlinear, required_gain
 from palpate.effects.support import BaseCompliance

@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 from pushed_block import SETUP
 
-from palpate.diagnosis.gain.gain_ladder import SurfaceGain
+from palpate.diagnosis.gain.surface_gain import SurfaceGain
 from palpate.diagnosis.inference.hypothesis import Model
+from palpate.diagnosis.inference.noise.residual_structure import Structure
 from palpate.diagnosis.inference.parameter_blocks import ModelColumns
-from palpate.diagnosis.inference.residual_structure import Structure
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.validation.rejection import rejection_reason
 from palpate.effects.tool import ToolCompliance

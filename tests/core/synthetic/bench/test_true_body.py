@@ -10,7 +10,8 @@ from virtual_push import RADIUS, X, Y, Z, hide, simulate_push, way
 from palpate.foundation.arrays import FloatArray
 from palpate.synthetic.bench.true_body import base_seams, material_levels, solid_model
 from palpate.synthetic.bench.virtual_experiment import rest_surface
-from palpate.synthetic.scenario.scenario import HiddenEffect, Scenario
+from palpate.synthetic.scenario.hidden_effects import HiddenEffect
+from palpate.synthetic.scenario.scenario import Scenario
 from palpate.synthetic.solver.tet_block import TetBlock, TetGrading, mesh_block
 from palpate.synthetic.solver.tet_equilibrium import TetSolver
 

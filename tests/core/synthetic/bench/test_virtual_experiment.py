@@ -11,7 +11,8 @@ from palpate.foundation.errors import SolveError
 from palpate.synthetic.bench.motion_plan import MotionPlan, PlannedPush, draw_motion
 from palpate.synthetic.bench.solved_track import SolvedTrack
 from palpate.synthetic.bench.virtual_experiment import rest_surface, solve_motion
-from palpate.synthetic.scenario.scenario import HiddenEffect, Scenario
+from palpate.synthetic.scenario.hidden_effects import HiddenEffect
+from palpate.synthetic.scenario.scenario import Scenario
 from palpate.synthetic.solver.tet_equilibrium import InstabilityError
 
 SEEN = np.array([1.0, 1.0])

@@ -6,7 +6,7 @@ import pytest
 
 from palpate.effects import effect_named, from_json
 from palpate.foundation.errors import EffectError
-from palpate.synthetic.scenario.scenario import HIDDEN, QUICK, WEIGHED, HiddenEffect
+from palpate.synthetic.scenario.hidden_effects import HIDDEN, QUICK, WEIGHED, HiddenEffect
 from palpate.synthetic.scenario.scenario_draws import draw_scenario
 
 

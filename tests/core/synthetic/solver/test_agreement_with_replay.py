@@ -13,7 +13,8 @@ from palpate.foundation.arrays import FloatArray
 from palpate.mesh.box_mesh import GridSpec
 from palpate.replay.replay import replay, require_converged
 from palpate.setup.setup import Box, Material, Setup, Tool
-from palpate.synthetic.scenario.scenario import HiddenEffect, Scenario
+from palpate.synthetic.scenario.hidden_effects import HiddenEffect
+from palpate.synthetic.scenario.scenario import Scenario
 
 GRID = GridSpec(nodes=(17, 13, 9), spacing=1.4e-3, order=2)
 DEPTH = 6e-3

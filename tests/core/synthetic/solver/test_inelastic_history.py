@@ -18,7 +18,8 @@ from palpate.setup.setup import Box, Material, Setup, Tool
 from palpate.synthetic.bench.motion_plan import MotionPlan, PlannedPush
 from palpate.synthetic.bench.solved_track import SolvedPush
 from palpate.synthetic.bench.virtual_experiment import solve_motion
-from palpate.synthetic.scenario.scenario import HiddenEffect, Scenario
+from palpate.synthetic.scenario.hidden_effects import HiddenEffect
+from palpate.synthetic.scenario.scenario import Scenario
 from palpate.synthetic.solver.inelastic_history import InelasticHistory
 from palpate.synthetic.solver.mooney_rivlin import constants, solid_energy
 from palpate.synthetic.solver.rest_metric import assemble_metric, isochoric, metric_energy

@@ -6,7 +6,7 @@ from linear_blocks import linear_blocks
 from scipy.stats import ks_2samp
 
 from palpate.diagnosis.inference.evidence import Block, draw_rights, gram
-from palpate.diagnosis.inference.residual_structure import Structure, explained_by_modes
+from palpate.diagnosis.inference.noise.residual_structure import Structure, explained_by_modes
 from palpate.foundation.arrays import FloatArray
 
 GROUPS, PATCHES, SEQUENCES = 6, 40, 3

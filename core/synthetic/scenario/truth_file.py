@@ -10,7 +10,7 @@ from typing import Any
 
 from palpate.foundation.frames import Transform
 from palpate.synthetic.scenario.disturbance import DISTURBANCES, Disturbance
-from palpate.synthetic.scenario.scenario import HIDDEN, HiddenEffect
+from palpate.synthetic.scenario.hidden_effects import HIDDEN, HiddenEffect
 
 __all__ = ["Truth", "truth_path"]
 

@@ -13,7 +13,7 @@ from pushed_block import CORNERS, SETUP, observed, poke, registration
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.observation.frame_groups import Observations
-from palpate.diagnosis.validation.held_out_test import check_held_out
+from palpate.diagnosis.validation.held_out_check import check_held_out
 from palpate.mesh.box_mesh import GridSpec
 from palpate.setup.setup import Material, Setup
 

@@ -7,8 +7,8 @@ import pytest
 from pushed_block import POSE, SETUP, dwelling, poke, prediction, seen_points
 
 from palpate.diagnosis.forward.prediction import Prediction
-from palpate.diagnosis.gain.gain_ladder import SurfaceGain, surface_gain
 from palpate.diagnosis.gain.probe_errors import fixed_pattern
+from palpate.diagnosis.gain.surface_gain import SurfaceGain, surface_gain
 from palpate.diagnosis.observation.frame_groups import Group, Observations
 from palpate.effects.support import BaseSlip
 from palpate.effects.time_dependence import PermanentSet

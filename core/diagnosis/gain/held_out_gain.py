@@ -12,55 +12,20 @@ from collections.abc import Sequence
 from concurrent.futures import as_completed
 from dataclasses import replace
 
-import numpy as np
-
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.forward.worker_pool import Pending, Workers
 from palpate.diagnosis.gain.force_gain import ForceGain, force_gain
-from palpate.diagnosis.gain.gain_ladder import SurfaceGain, surface_gain
+from palpate.diagnosis.gain.surface_gain import SurfaceGain, surface_gain
+from palpate.diagnosis.gain.tuned_setup import tuned_setup
 from palpate.diagnosis.inference.credible_intervals import modulus_interval
 from palpate.diagnosis.inference.evaluate import Evaluator
-from palpate.diagnosis.inference.evidence import fit
-from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.search.findings import Findings
 from palpate.effects import NuisanceBlock
-from palpate.effects.elastic_material import POISSON_BOUNDS
-from palpate.effects.tool import RADIUS_BOUNDS
 from palpate.mesh.protocol import Meshing
-from palpate.registration.pose import small_motion
 from palpate.setup.setup import Setup
 
-__all__ = ["held_out_gain", "tuned_setup"]
-
-
-def tuned_setup(evaluator: Evaluator, model: Model) -> Setup:
-    """The model's setup with the fitted pose of the robot, tool radius and Poisson's ratio.
-
-    The camera's pose stays as stated, because the fixed pattern of each sequence contains its
-    error. So does Young's modulus, because no surface shows it.
-    """
-    change = fit(
-        evaluator.tempered(model),
-        [*model.nuisance, *model.columns],
-        evaluator.bounded_precision(model),
-    ).change
-    problem, setup = evaluator.problem, model.setup
-    motion = problem.blocks.places(NuisanceBlock.TOOL_POSITION, NuisanceBlock.TOOL_ROTATION)
-    (wider,) = problem.blocks.places(NuisanceBlock.TOOL_RADIUS)
-    (softer,) = problem.blocks.places(NuisanceBlock.POISSON_RATIO)
-    pose = (
-        small_motion(change[list(motion)], problem.registration.robot_pivot)
-        @ setup.phantom_from_robot
-    )
-    radius = float(np.clip(setup.tool.radius + float(change[wider]), *RADIUS_BOUNDS))
-    nu = float(np.clip(setup.material.poisson_ratio + float(change[softer]), *POISSON_BOUNDS))
-    return replace(
-        setup,
-        phantom_from_robot=pose,
-        tool=replace(setup.tool, radius=radius),
-        material=replace(setup.material, poisson_ratio=nu),
-    )
+__all__ = ["held_out_gain"]
 
 
 def held_out_gain(

@@ -13,7 +13,7 @@ import numpy as np
 
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.inference.residual_structure import Structure, structure_of
+from palpate.diagnosis.inference.noise.residual_structure import Structure, structure_of
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.search.inclusion_grid import inclusion_places
 from palpate.diagnosis.validation.stiffness_error_test import (

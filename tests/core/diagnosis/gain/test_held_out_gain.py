@@ -12,7 +12,8 @@ from pushed_block import GRID, SETUP, observed, poke, registration
 
 from palpate.diagnosis.forward.jacobian import TOOL_COLUMNS
 from palpate.diagnosis.forward.worker_pool import Workers
-from palpate.diagnosis.gain.test_gain import _begun, tuned_setup
+from palpate.diagnosis.gain.held_out_gain import _begun
+from palpate.diagnosis.gain.tuned_setup import tuned_setup
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, gram
 from palpate.diagnosis.inference.hypothesis import Model
