@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from small_dataset import write_valid_dataset
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.more
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = """
