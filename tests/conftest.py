@@ -9,7 +9,32 @@ import pytest
 LONGEST = ("tests/loop", "tests/core/blind", "tests/core/diagnosis", "tests/app")
 """These begin first, so that no worker ends with one of them while the others have nothing left."""
 
-SECOND_TIER: tuple[str, ...] = ()
+SECOND_TIER = (
+    "tests/app/api/test_api_contract.py",
+    "tests/app/api/test_correction.py",
+    "tests/app/browser/test_jobs_browser.py",
+    "tests/app/browser/test_login_browser.py",
+    "tests/app/browser/test_register_browser.py",
+    "tests/app/browser/test_sweep_browser.py",
+    "tests/app/browser/test_tutorial_browser.py",
+    "tests/app/commands/test_sweep_command.py",
+    "tests/app/jobs/test_job_survival.py",
+    "tests/app/jobs/test_sweep_survival.py",
+    "tests/app/jobs/test_whatif_process.py",
+    "tests/app/legacy",
+    "tests/core/correction/samples/test_sample_store.py",
+    "tests/core/correction/test_online.py",
+    "tests/core/correction/test_train.py",
+    "tests/core/diagnosis/forward/test_history",
+    "tests/core/diagnosis/inference/noise/test_camera_error_model.py::test_told_waves",
+    "tests/core/diagnosis/inference/noise/test_camera_error_model.py::test_waves_are_told",
+    "tests/core/diagnosis/inference/noise/test_rest_cloud.py::test_block_that_does_not_sag",
+    "tests/core/diagnosis/inference/noise/test_rest_cloud.py::test_offset_of_depth",
+    "tests/core/diagnosis/inference/noise/test_rest_cloud.py::test_rigid_motion",
+    "tests/core/diagnosis/search/test_history_effects.py",
+    "tests/core/diagnosis/search/test_outside_effects.py",
+    "tests/loop",
+)
 """Beginnings of test ids that `make test-more` runs: each takes more than some ten seconds, and the
 default tier tests the same parts by lighter cases."""
 
