@@ -10,7 +10,8 @@ import pytest
 from small_dataset import SIZE
 from websockets.sync.client import connect
 
-from palpate.app.scene.manual_registration import ManualRegistration, Phantom
+from palpate.app.scene.manual_registration import ManualRegistration
+from palpate.app.scene.phantom import Phantom
 from palpate.app.scene.registration_picture import PairPicture
 from palpate.app.scene.registration_scene import Ray
 from palpate.app.schemas import RegistrationView

@@ -12,7 +12,7 @@ import sys
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import pytest
 
@@ -123,14 +123,14 @@ def _with(**changes: object) -> type[Effect]:
     return type("Odd", (Fine,), changes)
 
 
-def _sized(**field: object) -> type[Effect]:
-    bounds = {"low": 0.0, "high": 1.0, "scale": 0.1, **field}
+def _sized(**field: Any) -> type[Effect]:
+    bounds: dict[str, Any] = {"low": 0.0, "high": 1.0, "scale": 0.1, **field}
     unit = str(bounds.pop("unit", "m"))
     body = {
         "__annotations__": {"size": "float"},
         "size": parameter(unit, **bounds),
         "__module__": __name__,
-    }  # type: ignore[arg-type]
+    }
     return dataclass(frozen=True, kw_only=True)(type("Odd", (Fine,), body))
 
 

@@ -56,7 +56,7 @@ def _numbers(tree: ast.Module) -> list[str]:
         value = node.value if isinstance(node, ast.Assign | ast.AnnAssign) else None
         numbers = [
             one
-            for one in ast.walk(value or ast.Tuple())
+            for one in ast.walk(value or ast.Tuple(elts=[]))
             if isinstance(one, ast.Constant) and type(one.value) in (int, float)
         ]
         if numbers and isinstance(value, ast.Constant | ast.Tuple | ast.UnaryOp):

@@ -65,13 +65,12 @@ def test_pairing_scale_and_inset_are_found_as_in_the_public_recordings(pairing: 
     setup = _registered(_touches(truth))
     found = _ranked(setup)
     assert len(found) == BEST and found[0][1] > 100
-    alike = [effect for effect, gain in found if gain > found[0][1] - 1.0]
-    assert pairing in [
-        effect.pairing for effect in alike
-    ]  # a rectangle turned by half a turn fits as well
-    for effect in alike:
-        assert effect.scale == pytest.approx(0.87, abs=0.02)
-        assert effect.inset == pytest.approx(1.2e-3, abs=4e-4)
+    alike = [effect.values() for effect, gain in found if gain > found[0][1] - 1.0]
+    # A rectangle turned by half a turn fits as well.
+    assert pairing in [values["pairing"] for values in alike]
+    for values in alike:
+        assert values["scale"] == pytest.approx(0.87, abs=0.02)
+        assert values["inset"] == pytest.approx(1.2e-3, abs=4e-4)
 
 
 def test_a_wrong_pairing_costs_more_than_the_right_one():
@@ -91,7 +90,8 @@ def test_diagnosis_starts_from_the_pairing_that_the_touches_ask_for_and_else_fro
     (effect,) = known_mismatch(
         CATALOGUE, _registered(touches), GRID, replace(repair, pairing="swap-3-4")
     )
-    assert effect.pairing == "swap-3-4" and effect.scale == pytest.approx(0.85, abs=0.02)
+    values = effect.values()
+    assert values["pairing"] == "swap-3-4" and values["scale"] == pytest.approx(0.85, abs=0.02)
     assert (
         known_mismatch(CATALOGUE, STATED, GRID, None)
         == known_mismatch(CATALOGUE, STATED, GRID, replace(repair, pairing="as-paired"))
