@@ -3,7 +3,7 @@
     import palpate as pp
     experiment = pp.register(pp.open_dataset("my-block"))
     replay = experiment.replay("poke-top-01")
-    print(pp.compare(replay).rms, replay.force)                       # m, N
+    print(pp.compare(replay).rms, replay.force)  # m, N
     result = pp.diagnose(experiment.dataset, out="runs/one")
     print(result.verdict, result.causes)
 
