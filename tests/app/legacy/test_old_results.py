@@ -157,8 +157,7 @@ def test_an_old_registration_is_used_by_the_terminal(home: OldHome, tmp_path: Pa
     asked += ["--grid", "5x3x3", "--registration", "by-hand", "--runs", str(home.runs)]
     done = CliRunner().invoke(app, [*asked, "--out", str(out)])
     assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
-    expected = np.load(home.expected / "replay.npz")
-    with np.load(out) as found:
+    with np.load(home.expected / "replay.npz") as expected, np.load(out) as found:
         assert set(expected.files) <= set(found.files)
         for name in ("time", "tool", "rest", "faces", "vertices", "force"):
             assert np.allclose(found[name], expected[name], atol=1e-6, rtol=1e-4), name
@@ -190,8 +189,11 @@ def test_stored_networks_name_no_class_of_the_old_modules(home: OldHome) -> None
             named = [arg for code, arg, _ in pickletools.genops(stored.read(name)) if arg]
         classes = [arg for arg in named if isinstance(arg, str) and arg.split(".")[0] in OLD_NAMES]
         assert classes == []
-    for path in [*home.runs.rglob("*.npz"), *home.runs.rglob("*.npy")]:
-        np.load(path, allow_pickle=False)
+    for path in home.runs.rglob("*.npz"):
+        with np.load(path, allow_pickle=False) as arrays:
+            assert all(arrays[name].dtype != object for name in arrays.files)
+    for path in home.runs.rglob("*.npy"):
+        assert np.load(path, allow_pickle=False).dtype != object
 
 
 def test_a_training_that_was_killed_goes_on_where_it_was(home: OldHome, tmp_path: Path) -> None:
