@@ -60,12 +60,13 @@ def record_corrections(
     """
     experiment = Experiment.of(dataset)
     stated = experiment.stated
+    setup = setup_of_model(stated, model)
     corrected = _CorrectedModel(
-        setup=setup_of_model(stated, model),
+        setup=setup,
         grid=PAGE_GRID.for_tool(stated.tool.radius),
         network=network,
         stated=stated,
-        cleaner=experiment.cleaner,
+        cleaner=experiment.cleaner.allowing(setup.tool.radius),
         shaft=experiment.shaft,
     )
     out.parent.mkdir(parents=True, exist_ok=True)

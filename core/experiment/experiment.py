@@ -106,8 +106,8 @@ class Experiment:
 
     @cached_property
     def cleaner(self) -> Cleaner:
-        """Segmentation of the phantom in the raw clouds."""
-        return cleaner_for(self.dataset, self.registration)
+        """Segmentation of the phantom in the raw clouds, for the stated and the model's tool."""
+        return cleaner_for(self.dataset, self.registration).allowing(self.setup.tool.radius)
 
     @cached_property
     def shaft(self) -> FloatArray | None:
@@ -144,6 +144,7 @@ class Experiment:
         frames: IntArray | None = None,
         report: Report = silent,
         keep: Callable[[FloatArray], FloatArray] = np.asarray,
+        radii: Iterable[float] = (),
     ) -> ObservedClouds:
         """The phantom's points in the clouds of a sequence.
 
@@ -152,11 +153,13 @@ class Experiment:
             frames: indices of the clouds; all of them where none is given.
             report: progress.
             keep: applied to the points (n, 3) [m] of each cloud, camera frame, e.g. to thin them.
+            radii: of tools [m] of other models that will be compared with the same points.
         """
         recorded = self.dataset.sequence(sequence)
         chosen = np.arange(len(recorded)) if frames is None else np.asarray(frames, dtype=int)
+        cleaner = self.cleaner.allowing(*radii)
         return segment_clouds(
-            recorded, chosen, self.cleaner, self.stated.phantom_from_robot, self.shaft, report, keep
+            recorded, chosen, cleaner, self.stated.phantom_from_robot, self.shaft, report, keep
         )
 
     def centres(self, sequence: Sequence, times: FloatArray, grid: Meshing) -> FloatArray:

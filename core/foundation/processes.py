@@ -67,19 +67,24 @@ class ProcessPool(ProcessPoolExecutor):
         """Stop what runs and drop what waits.
 
         Args:
-            patience: wait at most this long [s] for each process to end, then kill it; None does
-                not wait.
+            patience: wait at most this long [s] for the processes to end, then kill them; None
+                does not wait.
         """
         processes = list((self._processes or {}).values())
+        # typeshed states another type.
+        joining: threading.Thread | None = self._executor_manager_thread  # type: ignore[assignment]
         self.shutdown(wait=False, cancel_futures=True)
         for process in processes:
             process.terminate()
-        if patience is None:
+        if patience is None or joining is None:
             return
-        for process in processes:
-            process.join(patience)
-            if process.is_alive():
+        # The executor's thread joins the processes. If this thread did so, too, only one of the two
+        # would learn that a process has ended.
+        joining.join(patience)
+        if joining.is_alive():
+            for process in processes:
                 process.kill()
+            joining.join()
 
 
 def _begin(begin: Callable[..., None] | None, args: tuple[Any, ...]) -> None:

@@ -9,7 +9,7 @@ along the line of sight, since a depth camera has hardly any across it.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from scipy.ndimage import uniform_filter
@@ -68,7 +68,8 @@ class Cleaner:
     Attributes:
         size: of the block [m].
         phantom_from_camera: pose of the camera.
-        tool_radius: of the sphere, and the largest of the shaft [m].
+        tool_radius: of the sphere, and the largest of the shaft, as stated [m].
+        tool_radii: smallest and largest radius [m] that the tool may have; as stated if None.
         noise: standard deviation of depth along the line of sight [m].
         table: normal (3,) and offset [m] of the table, phantom frame; z = 0 unless the rest cloud
             shows another plane. Each frame that shows enough of the table corrects it.
@@ -81,6 +82,16 @@ class Cleaner:
     noise: float
     table: tuple[FloatArray, float] = (np.array([0.0, 0.0, 1.0]), 0.0)
     bulge: float = 0.01
+    tool_radii: tuple[float, float] | None = None
+
+    def allowing(self, *radii: float) -> Self:
+        """A cleaner that removes the tool also if it has one of these radii [m].
+
+        Points on a tool that is larger than stated else count as the phantom's: they lie
+        millimetres off its surface under any model, the true one included.
+        """
+        known = (self.tool_radius, *(self.tool_radii or ()), *radii)
+        return replace(self, tool_radii=(min(known), max(known)))
 
     def clean(self, cloud: FloatArray, tool: ToolPose | None = None) -> CleanCloud:
         """Extract the phantom's points from a raw cloud (n, 3) [m], camera frame.
@@ -176,16 +187,19 @@ class Cleaner:
         to_centre = tool.centre - camera
         along = sight @ to_centre
         across = np.sqrt(np.maximum(to_centre @ to_centre - along**2, 0.0))
-        front = along - np.sqrt(np.maximum(self.tool_radius**2 - across**2, 0.0))
+        thinnest, thickest = self.tool_radii or (self.tool_radius, self.tool_radius)
+        nearest, farthest = (
+            along - np.sqrt(np.maximum(radius**2 - across**2, 0.0))
+            for radius in (thickest, thinnest)
+        )
         slack = SIGMAS * self.noise + POSE_ERROR
-        is_tool = (across < self.tool_radius + POSE_ERROR) & (np.abs(depth - front) < slack)
+        is_tool = across < thickest + POSE_ERROR
+        is_tool &= (depth - nearest > -slack) & (depth - farthest < slack)
         if tool.shaft is None:
             return is_tool, np.zeros(len(points), dtype=bool)
         height = (points - tool.centre) @ tool.shaft
         axis_distance = np.linalg.norm(points - tool.centre - height[:, None] * tool.shaft, axis=1)
-        is_shaft = (
-            (height > 0) & (height < SHAFT_LENGTH) & (axis_distance < self.tool_radius + slack)
-        )
+        is_shaft = (height > 0) & (height < SHAFT_LENGTH) & (axis_distance < thickest + slack)
         return is_tool, is_shaft
 
 

@@ -162,7 +162,7 @@ def record(
         sequence: of the dataset.
         stated: setup of the model "raw".
         extended: setup of the model "extended".
-        cleaner: segmentation of the phantom.
+        cleaner: segmentation of the phantom; the tools of both models are removed.
         shaft: axis of the tool's shaft, as of `palpate.measurement.tool_pose`.
         grid: mesh specification.
         target: file to write.
@@ -171,6 +171,7 @@ def record(
     index = np.unique(np.linspace(0, total - 1, min(total, MOST_FRAMES)).round().astype(int))
     times = np.asarray(sequence.cloud_times)[index]
     poses = tool_poses(sequence.kinematics, times, stated.phantom_from_robot, shaft)
+    cleaner = cleaner.allowing(extended.tool.radius)
     raw = [sequence.cloud(int(i)) for i in index]
     clouds = [
         cloud[cleaner.clean(cloud, pose).indices] for cloud, pose in zip(raw, poses, strict=True)

@@ -25,7 +25,7 @@ from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.recording.interactive import InteractiveReplay
 from palpate.recording.interior_fields import InteriorFields
 from palpate.recording.record_sequence import ModelRecording, compare_with_clouds
-from palpate.recording.saved_model import with_fitted_values
+from palpate.recording.saved_model import setup_of_model, with_fitted_values
 from palpate.replay.equilibrium import Equilibrium
 from palpate.replay.replay import replay
 from palpate.setup.setup import Setup, Shape
@@ -88,11 +88,12 @@ class FrameResolver:
         self._experiment = Experiment.of(dataset)
         self.stated = self._experiment.stated
         self.tuned = with_fitted_values(self.stated, extended)
+        self._recorded_radius = setup_of_model(self.stated, extended).tool.radius
         self._sequence = self._experiment.dataset.sequence(sequence)
         self._clouds = np.asarray(clouds, dtype=int)
         self._times = np.asarray(self._sequence.cloud_times)[self._clouds]
         self._grid = PAGE_GRID.for_tool(self.stated.tool.radius)
-        self._cleaned: dict[int, FloatArray] = {}
+        self._cleaned: dict[tuple[int, float], FloatArray] = {}
         self._last: tuple[int, Equilibrium] | None = None
 
     def __len__(self) -> int:
@@ -134,7 +135,7 @@ class FrameResolver:
             )
         setup = self.setup(effects, tuned)
         solved = self._solved(setup, frame)
-        side: ModelRecording = compare_with_clouds(setup, [solved], [self._cloud(frame)])
+        side: ModelRecording = compare_with_clouds(setup, [solved], [self._cloud(frame, setup)])
         return ResolvedFrame(
             side.surface[0],
             side.error[0],
@@ -163,12 +164,15 @@ class FrameResolver:
         self._last = (frame, result)
         return result
 
-    def _cloud(self, frame: int) -> FloatArray:
-        if frame not in self._cleaned:
-            index = self._clouds[[frame]]
-            observed = self._experiment.observe(self._sequence.name, index)
-            self._cleaned[frame] = observed.clouds[0]
-        return self._cleaned[frame]
+    def _cloud(self, frame: int, setup: Setup) -> FloatArray:
+        """The phantom's points (n, 3) [m], camera frame, as the recording has them."""
+        radius = setup.tool.radius
+        if (frame, radius) not in self._cleaned:
+            observed = self._experiment.observe(
+                self._sequence.name, self._clouds[[frame]], radii=(self._recorded_radius, radius)
+            )
+            self._cleaned[frame, radius] = observed.clouds[0]
+        return self._cleaned[frame, radius]
 
 
 @lru_cache(maxsize=4)

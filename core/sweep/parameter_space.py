@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from palpate.effects import Effect, Parameter, effect_named
-from palpate.foundation.errors import EffectError
+from palpate.foundation.errors import EffectError, PalpateError
 from palpate.setup.setup import Setup
 
 __all__ = ["Axis", "ParameterSpace", "Values"]
@@ -113,6 +114,16 @@ class ParameterSpace:
                 )
         for name in self.fixed:
             _parameter(name)
+
+    def tool_radii(self, stated: Setup) -> list[float]:
+        """Radii [m] of the tool at both ends of each axis; those of all points lie between."""
+        radii = []
+        for axis in self.axes:
+            for end in (axis.low, axis.high):
+                # An end that is impossible with the other parameters as stated has no setup.
+                with suppress(PalpateError):
+                    radii.append(self.setup(stated, {axis.name: end}).tool.radius)
+        return radii
 
     def setup(self, stated: Setup, values: Values) -> Setup:
         """Return the stated setup with these parameter values and the fixed ones.

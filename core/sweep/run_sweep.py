@@ -63,7 +63,7 @@ def run_sweep(
     registered = {"registration": dataset.accepted.name} if dataset.accepted else {}
     _claim(folder, {**request.to_json(), "dataset": str(dataset.path.name), **registered})
     stated, data = read_sweep_data(
-        dataset, request.sequences, request.frames, part(report, 0.0, 0.05)
+        dataset, request.sequences, request.frames, part(report, 0.0, 0.05), request.space
     )
     grid = grid or REPLAY_GRID.for_tool(stated.tool.radius)
     executor = make_executor(workers, scheduler, data, grid)

@@ -16,6 +16,7 @@ from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
 from palpate.setup.box import CLEARANCE, distance_to_block
 from palpate.setup.setup import Setup
+from palpate.sweep.parameter_space import ParameterSpace
 
 __all__ = ["SweepSequence", "read_sweep_data"]
 
@@ -57,7 +58,11 @@ class SweepSequence:
 
 
 def read_sweep_data(
-    dataset: Dataset, names: Sequence[str], frames: int, report: Report = silent
+    dataset: Dataset,
+    names: Sequence[str],
+    frames: int,
+    report: Report = silent,
+    space: ParameterSpace | None = None,
 ) -> tuple[Setup, tuple[SweepSequence, ...]]:
     """Return the stated setup with its registrations, and frames in which the tool touches.
 
@@ -66,6 +71,8 @@ def read_sweep_data(
         names: sequences to use; all with clouds if empty.
         frames: most frames of each sequence, evenly spread.
         report: receives the progress.
+        space: what will be swept; points on any of its tools are removed from the clouds, so that
+            all setups are compared with the same points.
 
     Raises DatasetError where a sequence has no clouds, or none in which the tool touches.
     """
@@ -73,6 +80,7 @@ def read_sweep_data(
     report(0.0, "registering robot, camera and phantom")
     experiment = Experiment.of(dataset)
     setup = experiment.stated
+    radii = space.tool_radii(setup) if space else []
     sequences = []
     for number, name in enumerate(names):
         report((number + 1) / (len(names) + 1), f"reading {name}")
@@ -90,7 +98,7 @@ def read_sweep_data(
         chosen = near[
             np.unique(np.linspace(0, len(near) - 1, min(len(near), frames)).round().astype(int))
         ]
-        observed = experiment.observe(name, chosen, keep=_subsampled)
+        observed = experiment.observe(name, chosen, keep=_subsampled, radii=radii)
         sequences.append(
             SweepSequence(
                 name,

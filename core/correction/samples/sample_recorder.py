@@ -90,7 +90,7 @@ def recorder_for(
         setup,
         grid or PAGE_GRID.for_tool(setup.tool.radius),
         body or Body.block(setup.box.size, nodes),
-        experiment.cleaner,
+        experiment.cleaner.allowing(setup.tool.radius),
         experiment.shaft,
         points,
         all(with_forces),

@@ -46,13 +46,24 @@ def test_pool_whose_owner_is_killed_leaves_no_process_behind(start: str, tmp_pat
             os.kill(process, signal.SIGKILL)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_terminated_pool_kills_a_process_that_ignores_it() -> None:
+    pool = ProcessPool(1)
+    pool.submit(signal.signal, signal.SIGTERM, signal.SIG_IGN).result(PATIENCE)
+    pool.submit(time.sleep, 600)
+    (process,) = pool._processes
+    pool.terminate(1.0)
+    assert not _runs(process)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_terminated_pool_waits_until_its_processes_have_ended() -> None:
     pool = ProcessPool(1)
     future = pool.submit(time.sleep, 600)
     assert _within(PATIENCE, future.running)
-    (process,) = pool._processes.values()
+    (process,) = pool._processes
     pool.terminate(PATIENCE)
-    assert not process.is_alive()
+    assert not _runs(process)
 
 
 def test_pool_begins_each_process_as_asked(tmp_path: Path) -> None:
@@ -73,6 +84,15 @@ def _resident() -> int:
     """Memory of this process [bytes]."""
     rows = Path("/proc/self/smaps_rollup").read_text().splitlines()
     return 1024 * next(int(row.split()[1]) for row in rows if row.startswith("Rss:"))
+
+
+def _runs(process: int) -> bool:
+    """Whether a process is there and is no zombie."""
+    try:
+        text = Path(f"/proc/{process}/stat").read_text()
+    except OSError:
+        return False
+    return text.rpartition(")")[2].split()[0] != "Z"
 
 
 def _within(seconds: float, holds: Callable[[], bool]) -> bool:
