@@ -19,9 +19,9 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rich.table import Table
 
 from palpate.app.jobs.signals import stop
-from palpate.app.reporting.quantities import parameter_texts
 from palpate.foundation.errors import Cancelled, PalpateError
 from palpate.foundation.progress import Report
+from palpate.foundation.quantities import parameter_texts
 
 __all__ = [
     "RegistrationOption",

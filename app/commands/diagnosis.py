@@ -26,7 +26,6 @@ from palpate.app.commands.console import (
     verdict_table,
     write_json,
 )
-from palpate.app.reporting.quantities import with_interval
 from palpate.app.reporting.sentences import (
     control_sentences,
     determined_sentences,
@@ -38,6 +37,7 @@ from palpate.app.reporting.sentences import (
     verdict_sentence,
 )
 from palpate.foundation.errors import DatasetError, RunError
+from palpate.foundation.quantities import with_interval
 
 if TYPE_CHECKING:
     from palpate.dataset.accepted_registration import AcceptedRegistration

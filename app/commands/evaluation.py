@@ -14,7 +14,7 @@ from rich.table import Table
 
 from palpate.app.commands.console import out, progress, write_json
 from palpate.app.commands.diagnosis import true_effects
-from palpate.app.reporting.quantities import quantity
+from palpate.foundation.quantities import quantity
 
 __all__ = ["evaluate"]
 

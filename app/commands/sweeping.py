@@ -9,8 +9,8 @@ import typer
 from rich.table import Table
 
 from palpate.app.commands.console import RegistrationOption, out, progress
-from palpate.app.reporting.quantities import quantity
 from palpate.foundation.errors import EffectError
+from palpate.foundation.quantities import quantity
 
 __all__ = ["sweep"]
 

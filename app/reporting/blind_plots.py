@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from palpate.app.reporting.quantities import SHOWN
 from palpate.app.reporting.svg_figure import INK, to_svg
 from palpate.blind.parameter_errors import ReportedParameter
 from palpate.foundation.figure import new_figure
+from palpate.foundation.quantities import SHOWN
 
 __all__ = ["gain_plot", "parameter_plot", "reliability_plot"]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from palpate.app.reporting.html_page import Cell, Table
-from palpate.app.reporting.quantities import NARROW, parameters_text, quantity, words
 from palpate.blind import CaseResult
+from palpate.foundation.quantities import NARROW, parameters_text, quantity, words
 
 __all__ = [
     "POSE",

@@ -11,9 +11,9 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from palpate.app.reporting.quantities import words
 from palpate.app.static_files import STATIC_FOLDER
 from palpate.foundation.errors import RunError
+from palpate.foundation.quantities import words
 
 __all__ = ["Bar", "Cell", "Table", "render_page"]
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from palpate.app.reporting.html_page import Bar, Cell, Table
 from palpate.app.reporting.model_comparison import SequenceErrors
-from palpate.app.reporting.quantities import NARROW, value_and_ends, words
 from palpate.app.reporting.sentences import limit_phrase
+from palpate.foundation.quantities import NARROW, value_and_ends, words
 
 __all__ = [
     "NamedCause",

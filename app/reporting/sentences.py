@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from palpate.app.reporting.cause_phrases import cause_phrase
-from palpate.app.reporting.quantities import NARROW, quantity, with_interval, words
+from palpate.foundation.quantities import NARROW, quantity, with_interval, words
 
 __all__ = [
     "control_sentences",

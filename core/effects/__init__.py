@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from palpate.effects.base import Effect, Slot
-from palpate.effects.catalogue import CATALOGUE, DIAGNOSED, OUTSIDE, effect_named, from_json
 from palpate.effects.elastic_material import PoissonRatio, StiffInclusion, YoungModulus
 from palpate.effects.geometry import GeometryScale, MeshResolution
 from palpate.effects.heterogeneity import (
@@ -25,6 +24,10 @@ from palpate.effects.tool import (
     ToolOffset,
     ToolRadius,
 )
+
+# isort: split
+# Effects of other packages import from here while the catalogue is made, so it comes last.
+from palpate.effects.catalogue import CATALOGUE, DIAGNOSED, OUTSIDE, effect_named, from_json
 
 __all__ = [
     "CATALOGUE",

@@ -215,6 +215,17 @@ class Effect(ABC):
         """
         return {item.name: (getattr(self, item.name), item.unit) for item in self.parameters()}
 
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        """The cause as a noun phrase, to follow "the simulation misses".
+
+        Args:
+            values: of the parameters and of what `reported` adds, SI. "depth" is a text with the
+                interval of a depth below the skin, where a report states one.
+            size: lengths (3,) of the block along x, y, z [m], where they are known.
+        """
+        return f"that {cls.summary}"
+
     def moved(self, values: Sequence[float]) -> Self:
         """Return the same effect with other numbers, clipped to their bounds."""
         pairs = zip(self.numbers(), values, strict=True)

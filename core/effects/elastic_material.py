@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 from palpate.effects.base import Effect, Slot
 from palpate.effects.linearisation import Linearisation, Measurement, NuisanceBlock
 from palpate.effects.parameter import parameter
+from palpate.foundation.quantities import quantity
 from palpate.setup.setup import Inclusion, Setup
 
 __all__ = [
@@ -67,6 +68,10 @@ class PoissonRatio(Effect):
     def apply(self, setup: Setup) -> Setup:
         return replace(setup, material=replace(setup.material, poisson_ratio=self.nu))
 
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        return f"another compressibility: Poisson's ratio is {values['nu']:.3g}"
+
 
 @dataclass(frozen=True, kw_only=True)
 class StiffInclusion(Effect):
@@ -116,6 +121,16 @@ class StiffInclusion(Effect):
         inclusions = (*setup.material.inclusions, self.inclusion)
         return replace(setup, material=replace(setup.material, inclusions=inclusions))
 
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        kind = "stiff" if values["stiffness_ratio"] >= 1.0 else "soft"
+        across, depth = quantity(2 * values["radius"], "m"), values.get("depth")
+        if depth is not None:
+            # Found from forces alone: the depth is that below the nearest skin.
+            return f"a {kind} lump, {across} across, its centre {depth} under the surface"
+        place = f", {quantity(size[2] - values['z'], 'm')} under the top" if size else ""
+        return f"a {kind} lump, {across} across{place}"
+
 
 @dataclass(frozen=True, kw_only=True)
 class YoungModulus(Effect):
@@ -141,3 +156,7 @@ class YoungModulus(Effect):
 
     def apply(self, setup: Setup) -> Setup:
         return replace(setup, material=replace(setup.material, young_modulus=self.E))
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        return f"another stiffness: Young's modulus is {quantity(values['E'], 'Pa')}"

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 from palpate.effects.base import Effect, Slot
 from palpate.effects.linearisation import Linearisation, NuisanceBlock
 from palpate.effects.parameter import parameter
+from palpate.foundation.quantities import quantity
 from palpate.setup.setup import Box, Setup
 
 __all__ = ["DIAGNOSIS_GRID", "GeometryScale", "MeshResolution"]
@@ -51,6 +52,11 @@ class GeometryScale(Effect):
         true = Box(size=(self.scale_x * x, self.scale_y * y, self.scale_z * z))
         return replace(setup, geometry=true, registered=stated)
 
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        scales = " × ".join(f"{values[f'scale_{axis}']:.3g}" for axis in "xyz")
+        return f"another size of the phantom: {scales} of the stated one"
+
 
 @dataclass(frozen=True, kw_only=True)
 class MeshResolution(Effect):
@@ -90,6 +96,11 @@ class MeshResolution(Effect):
         return replace(
             setup, element_size=None if self.element_size <= _FINEST else self.element_size
         )
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        edge = quantity(values["element_size"], "m")
+        return f"a finer grid: the stated one is too coarse, {edge} would do"
 
 
 DIAGNOSIS_GRID = MeshResolution(element_size=_FINEST)

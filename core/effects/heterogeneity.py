@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 from palpate.effects.base import Effect, Slot
 from palpate.effects.linearisation import Linearisation, Measurement, Tangent
 from palpate.effects.parameter import parameter
+from palpate.foundation.quantities import quantity
 from palpate.setup.setup import Fibres, Layer, Setup
 
 __all__ = ["Anisotropy", "StiffnessGradient", "StrainStiffening", "SurfaceLayer"]
@@ -59,6 +60,11 @@ class SurfaceLayer(Effect):
         layer = Layer(thickness=self.thickness, stiffness_ratio=self.stiffness_ratio)
         return replace(setup, material=replace(setup.material, layer=layer))
 
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        thickness, ratio = quantity(values["thickness"], "m"), values["stiffness_ratio"]
+        return f"a skin {thickness} thick, {ratio:.2g} times as stiff"
+
 
 @dataclass(frozen=True, kw_only=True)
 class StiffnessGradient(Effect):
@@ -84,6 +90,15 @@ class StiffnessGradient(Effect):
 
     def apply(self, setup: Setup) -> Setup:
         return replace(setup, material=replace(setup.material, log_ratio=self.log_ratio))
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        ratio = values["log_ratio"]
+        where, other = ("top", "base") if ratio >= 0 else ("base", "top")
+        return (
+            "that the stiffness changes with the height: "
+            f"the {where} is {math.exp(abs(ratio)):.2g} times as stiff as the {other}"
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,6 +132,10 @@ class StrainStiffening(Effect):
     def apply(self, setup: Setup) -> Setup:
         limit = None if self.J_m >= _UNLIMITED else self.J_m
         return replace(setup, material=replace(setup.material, stretch_limit=limit))
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        return f"that the material stiffens with strain, Gent's J_m = {values['J_m']:.2g}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,3 +178,9 @@ class Anisotropy(Effect):
             return setup
         fibres = Fibres(direction=self.direction, stiffness_ratio=self.stiffness_ratio)
         return replace(setup, material=replace(setup.material, fibres=fibres))
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        stiffer = f"{values['stiffness_ratio']:.2g} times as stiff along one direction as across"
+        angle = quantity(values["direction"], "rad")
+        return f"fibres: the phantom is {stiffer}, {angle} from its long side"

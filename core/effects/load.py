@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Self
+from typing import Any, Self
 
 from palpate.effects.base import MEASURE_SIZE, Effect, Slot
 from palpate.effects.parameter import parameter
@@ -49,3 +49,8 @@ class Gravity(Effect):
                 setup.load, specific_weight_over_stiffness=self.specific_weight_over_stiffness
             ),
         )
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        weight = values["specific_weight_over_stiffness"]
+        return f"the phantom's own weight, ρg/E = {weight:.2g} per metre"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from palpate.effects.base import MEASURE_SIZE, Effect, Slot
 from palpate.effects.linearisation import Linearisation, NuisanceBlock
 from palpate.effects.parameter import parameter
 from palpate.foundation.frames import Transform
+from palpate.foundation.quantities import quantity
 from palpate.setup.setup import Setup
 
 __all__ = ["CameraRegistration", "DepthBias", "TimeOffset", "with_moved_camera"]
@@ -58,6 +59,11 @@ class TimeOffset(Effect):
 
     def apply(self, setup: Setup) -> Setup:
         return replace(setup, sensor=replace(setup.sensor, time_offset=self.offset))
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        early = "late" if values["offset"] > 0 else "early"
+        return f"that the camera's clock runs {quantity(abs(values['offset']), 's')} {early}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,6 +112,12 @@ class CameraRegistration(Effect):
             **super().reported(setup),
         }
 
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        turn = f" and {quantity(values['rotation'], 'rad')}" if values.get("rotation") else ""
+        moved = quantity(values["translation"], "m")
+        return f"that the camera stands {moved}{turn} off its registration"
+
 
 @dataclass(frozen=True, kw_only=True)
 class DepthBias(Effect):
@@ -145,3 +157,8 @@ class DepthBias(Effect):
         return replace(
             setup, sensor=replace(setup.sensor, depth_offset=self.offset, depth_scale=self.scale)
         )
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        offset, scale = quantity(values["offset"], "m"), values["scale"]
+        return f"a camera that misreads depth, by {offset} and {scale:.3g} times"

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Self, cast
+from typing import Any, Self, cast
 
 from palpate.effects.base import Effect, Slot
 from palpate.effects.linearisation import Measurement
 from palpate.effects.parameter import parameter
+from palpate.foundation.quantities import quantity
 from palpate.setup.setup import Detachment, Edge, Setup
 
 __all__ = ["BaseCompliance", "BaseDetachment", "BaseSlip"]
@@ -46,6 +47,13 @@ class BaseSlip(Effect):
             setup, support=replace(setup.support, friction_coefficient=self.friction_coefficient)
         )
 
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        return (
+            "that the base slides on the table, "
+            f"with a friction coefficient of {values['friction_coefficient']:.2g}"
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class BaseDetachment(Effect):
@@ -73,6 +81,16 @@ class BaseDetachment(Effect):
         return replace(
             setup, support=replace(setup.support, detached=(*setup.support.detached, strip))
         )
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        side = {
+            "-x": "the left short side",
+            "+x": "the right short side",
+            "-y": "the front side",
+            "+y": "the back side",
+        }[values["edge"]]
+        return f"that the base is loose {quantity(values['extent'], 'm')} inwards from {side}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,3 +120,7 @@ class BaseCompliance(Effect):
     def apply(self, setup: Setup) -> Setup:
         stiffness = None if self.stiffness_over_E >= _RIGID else self.stiffness_over_E
         return replace(setup, support=replace(setup.support, stiffness_over_E=stiffness))
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        return f"a compliant support, with springs of {values['stiffness_over_E']:.2g} E per metre"

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Self
+from typing import Any, Self
 
 from palpate.effects.base import Effect, Slot
 from palpate.effects.linearisation import Linearisation
 from palpate.effects.parameter import parameter
+from palpate.foundation.quantities import quantity
 from palpate.setup.setup import Relaxation, Setup
 
 __all__ = ["PermanentSet", "Viscoelasticity"]
@@ -53,6 +54,14 @@ class Viscoelasticity(Effect):
             setup, material=replace(setup.material, relaxation=(*setup.material.relaxation, term))
         )
 
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        share, time = 100 * values["relaxed_fraction"], quantity(values["time_constant"], "s")
+        return (
+            f"that the material relaxes, by {share:.0f} % of its stiffness "
+            f"with a time constant of {time}"
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class PermanentSet(Effect):
@@ -79,4 +88,10 @@ class PermanentSet(Effect):
     def apply(self, setup: Setup) -> Setup:
         return replace(
             setup, material=replace(setup.material, retained_fraction=self.retained_fraction)
+        )
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        return (
+            f"that {100 * values['retained_fraction']:.0f} % of the deformation stays after release"
         )

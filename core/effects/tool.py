@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Self
+from typing import Any, Self
 
 from palpate.effects.base import MEASURE_SIZE, Effect, Slot
 from palpate.effects.linearisation import Linearisation, Measurement, NuisanceBlock
 from palpate.effects.parameter import parameter
+from palpate.foundation.quantities import quantity
 from palpate.setup.setup import PAIRINGS, Setup
 
 __all__ = [
@@ -51,6 +53,10 @@ class ToolRadius(Effect):
     def apply(self, setup: Setup) -> Setup:
         return replace(setup, tool=replace(setup.tool, radius=self.radius))
 
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        return f"the size of the tool: its radius is {quantity(values['radius'], 'm')}"
+
 
 @dataclass(frozen=True, kw_only=True)
 class ToolOffset(Effect):
@@ -87,6 +93,11 @@ class ToolOffset(Effect):
             ),
         )
 
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        away = quantity(math.hypot(values["dx"], values["dy"], values["dz"]), "m")
+        return f"that the tool's centre is {away} away from where the robot says"
+
 
 @dataclass(frozen=True, kw_only=True)
 class ToolCompliance(Effect):
@@ -112,6 +123,11 @@ class ToolCompliance(Effect):
             tool=replace(setup.tool, compliance_times_stiffness=self.compliance_times_stiffness),
         )
 
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        compliance = values["compliance_times_stiffness"]
+        return f"a tool that bends under load, C E = {compliance:.2g} per metre"
+
 
 @dataclass(frozen=True, kw_only=True)
 class ToolFriction(Effect):
@@ -135,6 +151,13 @@ class ToolFriction(Effect):
     def apply(self, setup: Setup) -> Setup:
         return replace(
             setup, tool=replace(setup.tool, friction_coefficient=self.friction_coefficient)
+        )
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        return (
+            "that the tool drags the surface along, "
+            f"with a friction coefficient of {values['friction_coefficient']:.2g}"
         )
 
 
@@ -183,3 +206,26 @@ class LandmarkMismatch(Effect):
     def apply(self, setup: Setup) -> Setup:
         touching = replace(setup.touching, pairing=self.pairing, scale=self.scale, inset=self.inset)
         return replace(setup, touching=touching)
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
+        side = "inside" if values["inset"] >= 0 else "outside"
+        apart, inset = (
+            f"{values['scale']:.3g} times as far apart",
+            quantity(abs(values["inset"]), "m"),
+        )
+        parts = [_paired(str(values["pairing"])), f"{apart}, {inset} {side}"]
+        return (
+            "that the touches were of other places than stated: "
+            f"{', '.join(part for part in parts if part)}"
+        )
+
+
+def _paired(pairing: str) -> str:
+    """The true pairing of touches in words, by the rows of touches.csv; empty if as stated."""
+    kind, *rows = pairing.split("-")
+    if kind == "swap":
+        return f"rows {rows[0]} and {rows[1]} were taken for each other"
+    if kind == "turn":
+        return f"each row is of the landmark {rows[0]} further on"
+    return "the rows are in the reverse order" if kind == "reversed" else ""

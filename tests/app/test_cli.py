@@ -22,8 +22,8 @@ from palpate.app.commands import console
 from palpate.app.commands.console import agrees, progress, verdict_cells, verdict_table, write_json
 from palpate.app.commands.diagnosis import print_report
 from palpate.app.jobs.signals import Stop
-from palpate.app.reporting.quantities import parameters_text
 from palpate.foundation.errors import Cancelled
+from palpate.foundation.quantities import parameters_text
 
 Palpate = Callable[..., tuple[int, str, str]]
 

@@ -33,8 +33,19 @@ def names_after_imports() -> dict[str, list[str]]:
     return names_by_file()
 
 
+def wrong_names(names: dict[str, list[str]]) -> dict[str, list[str]]:
+    """Files with more than one name, or with a name outside palpate."""
+    return {
+        file: known
+        for file, known in names.items()
+        if len(known) > 1 or not known[0].startswith("palpate")
+    }
+
+
 def test_each_file_has_one_name_in_this_process() -> None:
-    _check(names_after_imports())
+    names = names_after_imports()
+    assert len(names) > 30
+    assert wrong_names(names) == {}
 
 
 @pytest.mark.parametrize("start", ["spawn", "forkserver"])
@@ -42,14 +53,9 @@ def test_each_file_has_one_name_in_a_process_of_a_pool(
     start: Literal["spawn", "forkserver"],
 ) -> None:
     with ProcessPool(1, start=start) as pool:
-        _check(pool.submit(names_after_imports).result(120))
-
-
-def _check(names: dict[str, list[str]]) -> None:
+        names = pool.submit(names_after_imports).result(120)
     assert len(names) > 30
-    assert {file: known for file, known in names.items() if len(known) > 1} == {}
-    strangers = [one for known in names.values() for one in known if not one.startswith("palpate")]
-    assert strangers == []
+    assert wrong_names(names) == {}
 
 
 def _paths(name: str) -> list[str]:

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from palpate.app.reporting.quantities import NARROW, quantity, value_and_ends, with_interval
+from palpate.foundation.quantities import NARROW, quantity, value_and_ends, with_interval
 
 
 def _plain(text: str) -> str:
