@@ -7,6 +7,7 @@ import sys
 from rich.console import Console
 
 from benchmarks import (
+    cleaning,
     convergence,
     correction_benefit,
     correction_speed,
@@ -36,6 +37,7 @@ ALL = {
     "effect_sizes": effect_sizes.run,
     "measurement": measurement.run,
     "segmentation": segmentation.run,
+    "cleaning": cleaning.run,
     "picking": picking.run,
     "sweep_service": sweep_service.run,
     "dataset_reading": dataset_reading.run,

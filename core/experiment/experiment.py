@@ -28,7 +28,7 @@ from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.phantom_drift import align_sequences
 from palpate.measurement.segmentation import Cleaner, cleaner_for
-from palpate.measurement.tool_pose import find_shaft_axis
+from palpate.measurement.tool_pose import Shaft, find_shaft
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import REPLAY_GRID
 from palpate.mesh.protocol import Meshing
@@ -110,9 +110,9 @@ class Experiment:
         return cleaner_for(self.dataset, self.registration).allowing(self.setup.tool.radius)
 
     @cached_property
-    def shaft(self) -> FloatArray | None:
-        """Direction (3,) of the tool's shaft in the tool's frame; None where no cloud shows one."""
-        return find_shaft_axis(self.dataset, self.registration.repaired)
+    def shaft(self) -> Shaft | None:
+        """The tool's shaft in the tool's frame; None where no cloud shows one."""
+        return find_shaft(self.dataset, self.registration.repaired)
 
     def observation_setup(self, sensor: Sensor) -> Setup:
         """The stated setup as observations need it.

@@ -12,7 +12,7 @@ from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.frames import Transform
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.segmentation import Cleaner
-from palpate.measurement.tool_pose import tool_poses
+from palpate.measurement.tool_pose import Shaft, tool_poses
 
 __all__ = ["ObservedClouds", "segment_clouds"]
 
@@ -39,7 +39,7 @@ def segment_clouds(
     index: IntArray,
     cleaner: Cleaner,
     phantom_from_robot: Transform,
-    shaft: FloatArray | None,
+    shaft: Shaft | None,
     report: Report = silent,
     keep: Callable[[FloatArray], FloatArray] = np.asarray,
 ) -> ObservedClouds:
@@ -50,7 +50,7 @@ def segment_clouds(
         index: (f,) which clouds.
         cleaner: segmentation of the dataset.
         phantom_from_robot: where the kinematics put the tool.
-        shaft: (3,) direction of the shaft in the tool's frame, None where unknown.
+        shaft: of the tool, in its frame; None if unknown.
         report: progress.
         keep: applied to the points (n, 3) [m] of each cloud, camera frame, e.g. to thin them.
     """

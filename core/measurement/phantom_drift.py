@@ -19,7 +19,7 @@ from palpate.foundation.frames import Transform
 from palpate.measurement.patch_averages import PatchMeans, patch_means
 from palpate.measurement.segmentation import Cleaner, cleaner_for
 from palpate.measurement.surface_gaps import Surface, gaps
-from palpate.measurement.tool_pose import find_shaft_axis, tool_poses
+from palpate.measurement.tool_pose import Shaft, find_shaft, tool_poses
 from palpate.mesh.graded_mesh import SCREEN_GRID
 from palpate.registration.registration import Registration, setup_from
 from palpate.replay.equilibrium import Equilibrium
@@ -124,7 +124,7 @@ def measure_drift(dataset: Dataset, registration: Registration) -> dict[str, Flo
         return {}
     repaired = registration.repaired
     setup = setup_from(dataset, repaired)
-    cleaner, shaft = cleaner_for(dataset, repaired), find_shaft_axis(dataset, repaired)
+    cleaner, shaft = cleaner_for(dataset, repaired), find_shaft(dataset, repaired)
     bare, surface = (
         rest(setup, SCREEN_GRID.for_tool(setup.tool.radius)),
         replace(Surface.of(setup), patch=_PATCH),
@@ -155,7 +155,7 @@ def _significant(found: Mapping[str, PhantomDrift]) -> dict[str, FloatArray]:
 
 
 def _untouched_points(
-    sequence: Sequence, setup: Setup, cleaner: Cleaner, shaft: FloatArray | None
+    sequence: Sequence, setup: Setup, cleaner: Cleaner, shaft: Shaft | None
 ) -> FloatArray:
     """Segmented points (n, 3) [m], camera frame, of frames before the tool first comes near."""
     times = np.asarray(sequence.cloud_times)

@@ -18,7 +18,7 @@ from palpate.dataset import Dataset
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
-from palpate.measurement.tool_pose import SHAFT_LENGTH, ToolPose, locate_tool
+from palpate.measurement.tool_pose import SHAFT_LENGTH, ShaftSight, ToolPose, locate_tool
 from palpate.registration.camera.table_plane import find_table
 from palpate.registration.faces import box_distance
 from palpate.registration.registration import Registration
@@ -39,7 +39,7 @@ TABLE_REACH = 0.08
 FARTHEST_TABLE, FEWEST_ON_TABLE = 8.0e-3, 100
 """Largest height of points [m], and least number of them, for a correction of the table's plane."""
 VOXEL = 2.0e-3
-"""Edge length of the cells in which neighbours are counted [m]."""
+"""Width of the cells in which neighbours are counted [m]."""
 LONELY = 0.2
 """Neighbours over the median number of neighbours below which a point is stray [1]."""
 
@@ -68,7 +68,7 @@ class Cleaner:
     Attributes:
         size: of the block [m].
         phantom_from_camera: pose of the camera.
-        tool_radius: of the sphere, and the largest of the shaft, as stated [m].
+        tool_radius: of the sphere, as stated [m].
         tool_radii: smallest and largest radius [m] that the tool may have; as stated if None.
         noise: standard deviation of depth along the line of sight [m].
         table: normal (3,) and offset [m] of the table, phantom frame; z = 0 unless the rest cloud
@@ -108,14 +108,16 @@ class Cleaner:
         reason[height < thickness] = REASONS.index("background")
         reason[on_table] = REASONS.index("table")
         if tool is not None:
+            camera = self.phantom_from_camera.translation
             near = np.flatnonzero(reason != REASONS.index("table"))
             is_tool, is_shaft = self._tool_points(
-                points[near], locate_tool(points[near], apart[near], tool, self.tool_radius)
+                points[near], locate_tool(points[near], apart[near], tool, camera, self._slack)
             )
             reason[near[is_tool]] = REASONS.index("tool")
             reason[near[is_shaft & ~is_tool]] = REASONS.index("shaft")
         phantom = np.flatnonzero(reason == 0)
-        reason[phantom[_lonely(points[phantom])]] = REASONS.index("stray")
+        lonely = _lonely(points[phantom], self.phantom_from_camera.translation, self.noise)
+        reason[phantom[lonely]] = REASONS.index("stray")
         indices = np.flatnonzero(reason == 0)
         counts = np.bincount(reason, minlength=len(REASONS))
         return CleanCloud(
@@ -166,6 +168,11 @@ class Cleaner:
             )
         return np.asarray(height - points[:, :2] @ plane[:2] - plane[2])
 
+    @property
+    def _slack(self) -> float:
+        """Distance [m] along the line of sight up to which a point counts as the tool's."""
+        return SIGMAS * self.noise + POSE_ERROR
+
     def _table_slant(self) -> float:
         """Cosine between the table's normal and the line of sight to the block [1]: the part of
         depth noise that is height.
@@ -192,28 +199,39 @@ class Cleaner:
             along - np.sqrt(np.maximum(radius**2 - across**2, 0.0))
             for radius in (thickest, thinnest)
         )
-        slack = SIGMAS * self.noise + POSE_ERROR
+        slack = self._slack
         is_tool = across < thickest + POSE_ERROR
         is_tool &= (depth - nearest > -slack) & (depth - farthest < slack)
         if tool.shaft is None:
             return is_tool, np.zeros(len(points), dtype=bool)
-        height = (points - tool.centre) @ tool.shaft
-        axis_distance = np.linalg.norm(points - tool.centre - height[:, None] * tool.shaft, axis=1)
-        is_shaft = (height > 0) & (height < SHAFT_LENGTH) & (axis_distance < thickest + slack)
+        seen = ShaftSight.of(camera, sight, tool, tool.shaft)
+        is_shaft = (seen.height > 0) & (seen.height < SHAFT_LENGTH)
+        is_shaft &= np.abs(seen.across) < tool.shaft.radius + POSE_ERROR
+        is_shaft &= np.abs(depth - seen.front) < slack
         return is_tool, is_shaft
 
 
-def _lonely(points: FloatArray) -> Mask:
-    """Mask (n,) of points (n, 3) with far fewer neighbours in the 27 cells of 2 mm around them than
-    the median point of the cloud.
+def _lonely(points: FloatArray, camera: FloatArray, noise: float) -> Mask:
+    """Mask (n,) of points (n, 3) [m] with far fewer neighbours in the 27 cells around them than the
+    median point of the cloud.
+
+    Cells are VOXEL wide across the lines of sight from `camera` (3,) [m]. Along them they are at
+    least two standard deviations of `noise` [m] long: in shorter ones a point would be lonely by
+    its noise, and the points that are left would have less noise than the sensor, or a bias.
     """
     if len(points) < 20:
         return np.ones(len(points), dtype=bool)
-    cells = np.floor((points - points.min(axis=0)) / VOXEL).astype(np.int64) + 1
+    away = points - camera
+    depth = np.linalg.norm(away, axis=1)
+    middle = away.mean(axis=0) / max(float(np.linalg.norm(away.mean(axis=0))), 1e-9)
+    across = np.linalg.svd(middle[None])[2][1:]
+    flat = (away / np.maximum(depth, 1e-9)[:, None]) @ across.T * float(depth.mean())
+    scaled = np.column_stack([flat / VOXEL, depth / max(VOXEL, 2 * noise)])
+    cells = np.floor(scaled - scaled.min(axis=0)).astype(np.int64) + 1
     shape = tuple(cells.max(axis=0) + 2)
-    flat = np.ravel_multi_index((cells[:, 0], cells[:, 1], cells[:, 2]), shape)
-    filled = np.bincount(flat, minlength=int(np.prod(shape))).astype(np.float32).reshape(shape)
-    around = uniform_filter(filled, 3, mode="constant").ravel()[flat] * 27
+    rows = np.ravel_multi_index((cells[:, 0], cells[:, 1], cells[:, 2]), shape)
+    filled = np.bincount(rows, minlength=int(np.prod(shape))).astype(np.float32).reshape(shape)
+    around = uniform_filter(filled, 3, mode="constant").ravel()[rows] * 27
     return np.asarray(around < max(2.5, LONELY * float(np.median(around))))
 
 

@@ -1,4 +1,9 @@
-"""Pose of the tool in a cloud: its centre and the direction of its shaft."""
+"""The tool in a cloud: its centre, and the shaft that the camera sees beside it.
+
+Whether a point lies on the shaft is judged along its line of sight: a depth camera has noise along
+it and hardly any across it. A distance to the shaft's axis would take the phantom's points for the
+shaft's where noise lifts them, and keep those that noise sinks.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +18,31 @@ from palpate.foundation.frames import Transform
 from palpate.registration.faces import box_distance
 from palpate.registration.registration import Registration
 
-__all__ = ["SHAFT_LENGTH", "ToolPose", "find_shaft_axis", "locate_tool", "tool_poses"]
+__all__ = ["SHAFT_LENGTH", "Shaft", "ToolPose", "find_shaft", "locate_tool", "tool_poses"]
 
 FARTHEST_SHIFT = 6.0e-3
 """Largest correction of the tool's position from the clouds [m]."""
 SHAFT_LENGTH = 0.3
 """Length of the shaft along which points count as the shaft's [m]."""
+_CLEAR = 6.0e-3
+"""Distance from the block beyond which no point is the phantom's [m]."""
+_FEWEST = 40
+"""Least points on the shaft that place it."""
+_TAIL = 0.1
+"""Share of the points at either edge of the shaft's picture that may be strays [1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shaft:
+    """The rod behind the ball.
+
+    Attributes:
+        axis: (3,) unit vector from the ball along the rod.
+        radius: [m].
+    """
+
+    axis: FloatArray
+    radius: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,67 +50,105 @@ class ToolPose:
     """The tool in one frame, phantom frame.
 
     Attributes:
-        centre: (3,) [m].
-        shaft: (3,) unit vector from the tip along the shaft; None if unknown.
+        centre: (3,) of the ball [m].
+        shaft: None if unknown.
     """
 
     centre: FloatArray
-    shaft: FloatArray | None
+    shaft: Shaft | None
 
 
-def locate_tool(points: FloatArray, apart: FloatArray, tool: ToolPose, radius: float) -> ToolPose:
+@dataclass(frozen=True, eq=False)
+class ShaftSight:
+    """Lines of sight from a camera towards a shaft, without end at either side.
+
+    Attributes:
+        across: (n,) signed distance of each line from the axis [m].
+        front: (n,) distance from the camera to the shaft's front along the line [m]; to the place
+            nearest to the axis for a line that passes beside it.
+        height: (n,) of that place over the ball's centre, along the axis [m].
+        slant: (n,) sine of the angle between line and axis [1].
+        sideways: (3,) unit vector along which `across` counts, the mean of the lines'.
+        away: (3,) unit vector from the camera, at right angles to axis and `sideways`.
+    """
+
+    across: FloatArray
+    front: FloatArray
+    height: FloatArray
+    slant: FloatArray
+    sideways: FloatArray
+    away: FloatArray
+
+    @classmethod
+    def of(cls, camera: FloatArray, lines: FloatArray, tool: ToolPose, shaft: Shaft) -> ShaftSight:
+        """Lines (n, 3) of sight, unit vectors from the camera (3,) [m], phantom frame."""
+        start = camera - tool.centre
+        level = lines - (lines @ shaft.axis)[:, None] * shaft.axis
+        begin = start - (start @ shaft.axis) * shaft.axis
+        slant = np.maximum(np.linalg.norm(level, axis=1), 1e-6)
+        level = level / slant[:, None]
+        sideways = np.cross(shaft.axis, level)
+        across = sideways @ begin
+        nearest = -(level @ begin)
+        half = np.sqrt(np.maximum(shaft.radius**2 - across**2, 0.0))
+        front = (nearest - half) / slant
+        height = start @ shaft.axis + front * (lines @ shaft.axis)
+        away = level.mean(axis=0) if len(level) else -begin
+        away = away / max(float(np.linalg.norm(away)), 1e-9)
+        return cls(across, front, height, slant, np.cross(shaft.axis, away), away)
+
+
+def locate_tool(
+    points: FloatArray, apart: FloatArray, tool: ToolPose, camera: FloatArray, slack: float
+) -> ToolPose:
     """Move the tool across its shaft to where the camera sees the shaft; for segmentation only.
 
     Args:
         points: (n, 3) [m], phantom frame, without the table.
         apart: (n,) distance from the block [m].
         tool: pose by the kinematics; clocks and calibration may be off by some millimetres.
-        radius: of the tool [m]; that of the shaft is fitted.
+        camera: (3,) place of the camera [m], phantom frame.
+        slack: error that a depth may have [m].
     """
     if tool.shaft is None:
         return tool
-    offset = points - tool.centre
-    height = offset @ tool.shaft
-    across = offset - height[:, None] * tool.shaft
-    certain = (apart > 6.0e-3) & (height > radius) & (height < SHAFT_LENGTH)
-    certain &= np.linalg.norm(across, axis=1) < radius + FARTHEST_SHIFT
-    if np.count_nonzero(certain) < 40:
+    clear = points[apart > _CLEAR]
+    seen, depth = _on_shaft(clear, tool, tool.shaft, camera, slack)
+    if len(depth) < _FEWEST:
         return tool
-    first = np.linalg.svd(tool.shaft[None])[2][1]
-    plane = across[certain] @ np.stack([first, np.cross(tool.shaft, first)]).T
-    shift = _circle_centre(plane, 0.8 * radius)
-    if np.linalg.norm(shift) > FARTHEST_SHIFT:
+    sideways = _middle(seen.across)
+    moved = replace(tool, centre=tool.centre + sideways * seen.sideways)
+    seen, depth = _on_shaft(clear, moved, tool.shaft, camera, slack)
+    if len(depth) < _FEWEST:
         return tool
-    return replace(
-        tool, centre=tool.centre + shift @ np.stack([first, np.cross(tool.shaft, first)])
-    )
+    away = float(np.median((depth - seen.front) * seen.slant))
+    if np.hypot(sideways, away) > FARTHEST_SHIFT:
+        return tool
+    return replace(tool, centre=moved.centre + away * seen.away)
 
 
-def _circle_centre(points: FloatArray, radius: float) -> FloatArray:
-    """Fit the centre (2,) [m] of a circle of about `radius` [m] to points (n, 2) [m].
+def _on_shaft(
+    points: FloatArray, tool: ToolPose, shaft: Shaft, camera: FloatArray, slack: float
+) -> tuple[ShaftSight, FloatArray]:
+    """Lines of sight and depths (m,) [m] of the points (n, 3) [m] that can only be the shaft's."""
+    lines = points - camera
+    depth = np.linalg.norm(lines, axis=1)
+    lines = lines / np.maximum(depth, 1e-9)[:, None]
+    seen = ShaftSight.of(camera, lines, tool, shaft)
+    certain = (seen.height > shaft.radius) & (seen.height < SHAFT_LENGTH)
+    certain &= np.abs(seen.across) < shaft.radius + FARTHEST_SHIFT
+    certain &= np.abs(depth - seen.front) < FARTHEST_SHIFT + slack
+    return ShaftSight.of(camera, lines[certain], tool, shaft), depth[certain]
 
-    Robust Gauss-Newton with a prior, which short arcs need.
-    """
-    state = np.array([0.0, 0.0, radius])
-    prior = np.diag([1 / 0.003**2, 1 / 0.003**2, 1 / (0.1 * radius) ** 2])
-    for _ in range(6):
-        arm = points - state[:2]
-        length = np.maximum(np.linalg.norm(arm, axis=1), 1e-6)
-        residual = length - state[2]
-        sigma = max(1.4826 * float(np.median(np.abs(residual))), 2e-4)
-        weights = 1 / (1 + (residual / (2 * sigma)) ** 2) / sigma**2
-        jacobian = np.column_stack([-arm / length[:, None], -np.ones(len(arm))])
-        weighted = jacobian * weights[:, None]
-        pull = prior @ (state - np.array([0.0, 0.0, radius]))
-        state = state - np.linalg.solve(weighted.T @ jacobian + prior, weighted.T @ residual + pull)
-    return np.asarray(state[:2])
+
+def _middle(across: FloatArray) -> float:
+    """Middle [m] of what distances (n,) [m] from the axis span, strays left out."""
+    low, high = np.quantile(across, [_TAIL, 1 - _TAIL])
+    return float(low + high) / 2
 
 
 def tool_poses(
-    kinematics: Kinematics,
-    times: FloatArray,
-    phantom_from_robot: Transform,
-    shaft_axis: FloatArray | None,
+    kinematics: Kinematics, times: FloatArray, phantom_from_robot: Transform, shaft: Shaft | None
 ) -> list[ToolPose]:
     """The tool at `times` (m,) [s].
 
@@ -94,53 +156,83 @@ def tool_poses(
         kinematics: of the sequence.
         times: (m,) [s].
         phantom_from_robot: registration.
-        shaft_axis: (3,) direction of the shaft in the tool's own frame (see `find_shaft_axis`).
+        shaft: in the tool's own frame (see `find_shaft`).
     """
     centres = phantom_from_robot.apply(kinematics.position_at(times))
-    if shaft_axis is None:
+    if shaft is None:
         return [ToolPose(centre, None) for centre in centres]
     rows = np.clip(np.searchsorted(kinematics.time, times), 0, len(kinematics.time) - 1)
-    shafts = phantom_from_robot.rotate(
-        Rotation.from_quat(kinematics.quaternion[rows]).apply(shaft_axis)
+    axes = phantom_from_robot.rotate(
+        Rotation.from_quat(kinematics.quaternion[rows]).apply(shaft.axis)
     )
-    return [ToolPose(centre, shaft) for centre, shaft in zip(centres, shafts, strict=True)]
+    return [
+        ToolPose(centre, Shaft(axis, shaft.radius))
+        for centre, axis in zip(centres, axes, strict=True)
+    ]
 
 
-def find_shaft_axis(
-    dataset: Dataset, registration: Registration, frames: int = 3
-) -> FloatArray | None:
-    """Find the axis (3,) of the tool's frame that points from the tip along the shaft.
+def find_shaft(dataset: Dataset, registration: Registration, frames: int = 3) -> Shaft | None:
+    """Find the direction of the shaft in the tool's own frame, and its radius.
 
-    Of the six axes it is the one along which the clouds show points. On a dVRK it is -z. None where
-    no axis has at least half of the points clear of block and table.
+    Of the frame's six axes the direction is the one along which the clouds show points; on a dVRK
+    it is -z. None where no axis has at least half of the points clear of block and table. The
+    radius is half of what the shaft spans across the lines of sight, which depth noise does not
+    change; the tool's, where too few points show it.
     """
     axes = np.concatenate([-np.eye(3)[::-1], np.eye(3)])
+    radius, reach = dataset.config.tool_radius, dataset.config.tool_radius + 0.004
     hits, total = np.zeros(6), 0
+    spans: list[list[FloatArray]] = [[] for _ in axes]
     for name in dataset.sequences:
         sequence = dataset.sequence(name)
-        for index in (
-            np.unique(np.linspace(0, len(sequence) - 1, frames + 2).astype(int)[1:-1])
-            if len(sequence)
-            else ()
-        ):
+        for index in _some(len(sequence), frames):
             points = registration.phantom_from_camera.apply(sequence.cloud(int(index)))
-            clear = points[
-                (box_distance(points, np.asarray(dataset.config.size)) > 6.0e-3)
-                & (points[:, 2] > 6.0e-3)
-            ]
-            times = sequence.cloud_times[index : index + 1]
-            poses = [
-                tool_poses(sequence.kinematics, times, registration.phantom_from_robot, axis)[0]
-                for axis in axes
-            ]
-            hits += [_on_shaft(clear, pose, dataset.config.tool_radius + 0.004) for pose in poses]
+            apart = box_distance(points, np.asarray(dataset.config.size))
+            clear = points[(apart > _CLEAR) & (points[:, 2] > _CLEAR)]
+            times, camera = (
+                sequence.cloud_times[index : index + 1],
+                registration.phantom_from_camera.translation,
+            )
+            for number, axis in enumerate(axes):
+                (pose,) = tool_poses(
+                    sequence.kinematics, times, registration.phantom_from_robot, Shaft(axis, radius)
+                )
+                hits[number] += _count_near(clear, pose, reach)
+                spans[number].append(_span(clear, pose, camera))
             total += len(clear)
     best = int(hits.argmax())
-    return axes[best] if total >= 50 and hits[best] > 0.5 * total else None
+    if total < 50 or hits[best] <= 0.5 * total:
+        return None
+    across = np.concatenate(spans[best])
+    if len(across) < _FEWEST:
+        return Shaft(axes[best], radius)
+    low, high = np.quantile(across, [_TAIL, 1 - _TAIL])
+    return Shaft(axes[best], float(high - low) / 2 / (1 - 2 * _TAIL))
 
 
-def _on_shaft(points: FloatArray, tool: ToolPose, radius: float) -> int:
+def _some(count: int, frames: int) -> FloatArray:
+    """Indices of `frames` clouds, spread over the inside of a sequence of `count`."""
+    if not count:
+        return np.empty(0, dtype=int)
+    return np.unique(np.linspace(0, count - 1, frames + 2).astype(int)[1:-1])
+
+
+def _count_near(points: FloatArray, tool: ToolPose, reach: float) -> int:
+    """How many points (n, 3) [m] lie within `reach` [m] of the shaft's axis."""
     offset = points - tool.centre
-    height = offset @ (tool.shaft if tool.shaft is not None else np.zeros(3))
+    height = offset @ (tool.shaft.axis if tool.shaft is not None else np.zeros(3))
     across = np.sqrt(np.maximum((offset**2).sum(axis=1) - height**2, 0.0))
-    return int(((height > 0) & (across < radius)).sum())
+    return int(((height > 0) & (across < reach)).sum())
+
+
+def _span(points: FloatArray, tool: ToolPose, camera: FloatArray) -> FloatArray:
+    """Distances (m,) [m] of the shaft's points from the middle of the shaft's picture; empty where
+    too few show it.
+    """
+    if tool.shaft is None:
+        return np.empty(0)
+    # A shaft far thicker or thinner than the ball, and the ball's own neighbourhood, stay outside.
+    seen, _ = _on_shaft(points, tool, tool.shaft, camera, 2 * FARTHEST_SHIFT)
+    if len(seen.across) < _FEWEST:
+        return np.empty(0)
+    return np.asarray(seen.across - _middle(seen.across))

@@ -21,7 +21,7 @@ from palpate.measurement.metrics import paper_distance
 from palpate.measurement.phantom_drift import recorded_camera
 from palpate.measurement.segmentation import Cleaner
 from palpate.measurement.surface_gaps import Gaps, Surface, gaps
-from palpate.measurement.tool_pose import tool_poses
+from palpate.measurement.tool_pose import Shaft, tool_poses
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.interpolation import neighbourhood_means
 from palpate.mesh.protocol import Meshing
@@ -152,7 +152,7 @@ def record(
     stated: Setup,
     extended: Setup,
     cleaner: Cleaner,
-    shaft: FloatArray | None,
+    shaft: Shaft | None,
     grid: Meshing,
     target: Path,
 ) -> str:
@@ -163,7 +163,7 @@ def record(
         stated: setup of the model "raw".
         extended: setup of the model "extended".
         cleaner: segmentation of the phantom; the tools of both models are removed.
-        shaft: axis of the tool's shaft, as of `palpate.measurement.tool_pose`.
+        shaft: of the tool, in its frame; None if unknown.
         grid: mesh specification.
         target: file to write.
     """

@@ -14,6 +14,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.camera_model import CameraModel
 from palpate.measurement.segmentation import Cleaner
+from palpate.measurement.tool_pose import Shaft
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.mesh.protocol import Meshing
@@ -33,7 +34,7 @@ class Recorder:
         grid: its mesh protocol.
         body: the material points that are sampled.
         cleaner: segments the phantom out of the clouds.
-        shaft: direction of the tool's shaft, if it is known.
+        shaft: of the tool, in its frame; None if unknown.
         points: most points of a cloud.
         measured: whether forces are measured; otherwise they are simulated.
         seed: seed of the random draw of points.
@@ -44,7 +45,7 @@ class Recorder:
     grid: Meshing
     body: Body
     cleaner: Cleaner
-    shaft: FloatArray | None
+    shaft: Shaft | None
     points: int
     measured: bool
     seed: int = 0

@@ -18,7 +18,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.processes import at_once
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.segmentation import Cleaner
-from palpate.measurement.tool_pose import tool_poses
+from palpate.measurement.tool_pose import Shaft, tool_poses
 from palpate.setup.box import CLEARANCE, distance_to_block
 from palpate.setup.setup import Setup
 
@@ -75,7 +75,7 @@ def observe(
     sequence: Sequence,
     setup: Setup,
     cleaner: Cleaner,
-    shaft: FloatArray | None,
+    shaft: Shaft | None,
     most: int,
     rest: FloatArray | None = None,
 ) -> Observations:
@@ -85,7 +85,7 @@ def observe(
         sequence: with clouds.
         setup: as stated; its clock places the tool.
         cleaner: segments clouds.
-        shaft: axis of the tool's shaft (3,), tool frame; None if unknown.
+        shaft: of the tool, in its frame; None if unknown.
         most: largest number of groups with the tool near the phantom.
         rest: the raw rest cloud, which becomes the first group.
     """

@@ -6,13 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import RegistrationError
 
 __all__ = ["TablePlane", "find_planes", "find_table"]
 
 BEHIND = 5.0e-3
 """Distance behind a plane from which points count as behind it [m]."""
+_DRAWS, _BATCHES = 400, 20
+"""Planes that are tried, and in how many batches."""
 LEAST_SHARE = 0.05
 """Least share of the points that makes a large plane [1]."""
 
@@ -42,17 +44,10 @@ def find_planes(cloud: FloatArray, thickness: float, most: int = 4) -> list[Tabl
     """Find the largest planes of a cloud (n, 3) [m], camera frame, by repeated RANSAC; points
     within `thickness` [m] belong to a plane.
     """
-    import open3d as o3d
-
     planes: list[TablePlane] = []
-    left = cloud
-    # Open3D has a generator of its own; the seed makes the registration repeatable.
-    o3d.utility.random.seed(0)
+    left, rng = cloud, np.random.default_rng(0)
     while len(planes) < most and len(left) >= max(50, LEAST_SHARE * len(cloud)):
-        points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(left))
-        _, inliers = points.segment_plane(
-            distance_threshold=thickness, ransac_n=3, num_iterations=400
-        )
+        inliers = _largest_plane(left, thickness, rng)
         if len(inliers) < max(30, LEAST_SHARE * len(cloud)):
             break
         normal, offset = _least_squares_plane(left[inliers])
@@ -86,6 +81,30 @@ def find_table(cloud: FloatArray, thickness: float) -> TablePlane:
         planes,
         key=lambda plane: (plane.behind > 0.1, plane.behind - 0.05 * plane.count / len(cloud)),
     )
+
+
+def _largest_plane(points: FloatArray, thickness: float, rng: np.random.Generator) -> IntArray:
+    """Rows (m,) of the points (n, 3) [m] within `thickness` [m] of the plane through three of them
+    that has most.
+
+    Open3D's `segment_plane` draws in several threads, so that two calls with one seed differ.
+    """
+    corners = points[rng.integers(len(points), size=(_DRAWS, 3))]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normals, axis=1)
+    sound = length > 1e-12
+    normals = normals[sound] / length[sound, None]
+    offsets = np.einsum("ij,ij->i", normals, corners[sound, 0])
+    counts = [
+        (np.abs(points @ some.T - own) < thickness).sum(axis=0)
+        for some, own in zip(
+            np.array_split(normals, _BATCHES), np.array_split(offsets, _BATCHES), strict=True
+        )
+    ]
+    if not len(normals):
+        return np.empty(0, dtype=int)
+    best = int(np.concatenate(counts).argmax())
+    return np.flatnonzero(np.abs(points @ normals[best] - offsets[best]) < thickness)
 
 
 def _least_squares_plane(points: FloatArray) -> tuple[FloatArray, float]:

@@ -23,3 +23,11 @@ def test_a_cloud_without_planes_has_no_table():
     points = np.random.default_rng(0).uniform(-0.5, 0.5, (400, 3))
     with pytest.raises(RegistrationError, match="a table was expected"):
         find_table(points, 1e-3)
+
+
+def test_the_same_cloud_gives_the_same_planes_each_time(scene):
+    cloud = scene(noise=2e-3, bias=1e-3).look(seed=4).cloud
+    first = find_table(cloud, 4e-3)
+    for _ in range(20):
+        again = find_table(cloud, 4e-3)
+        assert np.array_equal(again.normal, first.normal) and again.offset == first.offset
