@@ -10,6 +10,7 @@ import palpate as pp
 from palpate.experiment import Experiment
 from palpate.foundation.errors import DatasetError, EffectError
 from palpate.recording.compare_replay import ReplayComparison
+from palpate.synthetic.solver.obstacles import shaft_radius
 
 SEQUENCE = "poke-top-01"
 
@@ -44,6 +45,11 @@ def test_points_on_the_tool_of_the_model_are_not_the_phantoms(experiment: Experi
     also = experiment.observe(SEQUENCE, radii=[RADIUS]).clouds
     assert sum(map(len, fewer)) < sum(map(len, clouds))
     assert all(np.array_equal(one, other) for one, other in zip(fewer, also, strict=True))
+
+
+def test_shaft_is_found_with_its_radius(experiment: Experiment) -> None:
+    assert experiment.shaft is not None
+    assert experiment.shaft.radius == pytest.approx(shaft_radius(RADIUS), abs=0.2e-3)
 
 
 def test_replay_has_a_force_and_an_outcome_for_each_chosen_frame(experiment: Experiment) -> None:

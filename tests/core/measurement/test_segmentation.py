@@ -114,6 +114,24 @@ def test_an_empty_cloud_gives_an_empty_one(scene):
     assert found.points.shape == (0, 3) and sum(found.counts.values()) == 0
 
 
+def test_kept_points_beside_the_shaft_have_no_bias(scene):
+    centre, noise = np.array([0.0, 0.0, SIZE[2] + 0.001]), 3e-3
+    look = scene(tool=tuple(centre), pixels=300, bias=0.0, strays=0)
+    errors = []
+    for seed in range(8):
+        exact, view = replace(look, noise=0.0).look(seed), replace(look, noise=noise).look(seed)
+        found = cleaned(view, ToolPose(centre, Shaft(UP, RADIUS)), noise).indices
+        places = exact.pose.apply(exact.cloud)
+        beside = np.linalg.norm(places[:, :2] - centre[:2], axis=1)
+        near = (beside > 6e-3) & (beside < 12e-3) & (view.label == BLOCK)
+        rows = found[near[found]]
+        errors.append(np.linalg.norm(view.cloud[rows], axis=1))
+        errors[-1] -= np.linalg.norm(exact.cloud[rows], axis=1)
+    error = np.concatenate(errors)
+    assert len(error) > 2000
+    assert abs(error.mean()) < 0.05e-3 + 2 * error.std() / np.sqrt(len(error))
+
+
 def test_tool_of_another_size_than_stated_goes_if_its_size_is_allowed(scene):
     centre = np.array([0.008, -0.004, SIZE[2] + 0.003])
     view = scene(tool=tuple(centre), pixels=150).look(seed=2)
