@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
+
+# As the Makefile sets them, for tests that are run without it: before NumPy is imported.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
 
 LONGEST = ("tests/loop", "tests/core/blind", "tests/core/diagnosis", "tests/app")
 """These begin first, so that no worker ends with one of them while the others have nothing left."""

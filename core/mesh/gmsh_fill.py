@@ -19,6 +19,7 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import MeshError, SetupError
+from palpate.foundation.signals import signals_kept
 from palpate.mesh.protocol import FINER
 from palpate.mesh.tet_mesh import TetMesh, sides_of
 from palpate.setup.closest_point import nearest
@@ -135,7 +136,7 @@ def fill(shape: Shape, spec: TetSpec) -> TetMesh:
 def _gmsh() -> Iterator[Any]:
     """Gmsh with an empty model, for one thread at a time.
 
-    It installs no signal handlers and reads none of the user's files.
+    It changes no signal handling and reads none of the user's files.
     """
     try:
         import gmsh
@@ -147,7 +148,7 @@ def _gmsh() -> Iterator[Any]:
             "libxinerama1",
             key="geometry",
         ) from error
-    with _alone:
+    with _alone, signals_kept():
         gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
         try:
             for key, value in {
