@@ -109,8 +109,8 @@ class RegistrationView(BaseModel):
 
 
 class DiagnosisRequest(BaseModel):
-    """A dataset to diagnose, by its folder's name, and an accepted registration that replaces the
-    automatic one.
+    """A dataset to diagnose, by its folder's name, an accepted registration that replaces the
+    automatic one, and the size [m] from which on structured error matters.
     """
 
     model_config = ConfigDict(
@@ -122,6 +122,7 @@ class DiagnosisRequest(BaseModel):
     dataset: str
     seed: int = Field(default=0, ge=0, lt=2**31)
     registration: str | None = None
+    tolerance: float | None = Field(default=None, ge=0, lt=1)
 
 
 class EffectIn(BaseModel):

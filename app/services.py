@@ -81,9 +81,10 @@ class Services:
         seed: int,
         key: str | None = None,
         registration: str | None = None,
+        tolerance: float | None = None,
     ) -> Job:
         """Queue the diagnosis of a dataset folder, with an accepted registration if named; the id
-        of the job will be the run's.
+        of the job will be the run's. `tolerance` [m] as of `palpate.diagnosis.pipeline.diagnose`.
         """
         places = {"dataset": str(dataset), "runs": str(self.settings.runs)}
         request = {
@@ -91,6 +92,7 @@ class Services:
             "name": name,
             "workers": self.settings.workers,
             "seed": seed,
+            **({} if tolerance is None else {"tolerance": tolerance}),
             **self.registered(name, registration),
         }
         return self.jobs.submit("diagnosis", request, name, key)

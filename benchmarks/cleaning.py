@@ -7,6 +7,7 @@ error of each kept point along its line of sight is known, too.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -20,7 +21,7 @@ from benchmarks.cpu_time import timed
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.segmentation import Cleaner
-from palpate.measurement.tool_pose import Shaft, ToolPose
+from palpate.measurement.tool_pose import ToolPose, ToolShaft
 
 __all__ = ["run"]
 
@@ -87,8 +88,8 @@ def _scene(centre: FloatArray, shaft: FloatArray, radius: float) -> Any:
     cast = o3d.t.geometry.RaycastingScene(nthreads=1)
     for mesh in (_block(centre), table, ball, rod):
         cast.add_triangles(
-            o3d.core.Tensor(np.asarray(mesh.vertices, dtype=np.float32)),
-            o3d.core.Tensor(np.asarray(mesh.faces, dtype=np.uint32)),
+            o3d.core.Tensor.from_numpy(np.asarray(mesh.vertices, dtype=np.float32)),
+            o3d.core.Tensor.from_numpy(np.asarray(mesh.faces, dtype=np.uint32)),
         )
     return cast
 
@@ -111,13 +112,13 @@ def _frame(
     sight = pose.rotate(rays)
     origin = np.broadcast_to(pose.translation, sight.shape)
     hit = _scene(centre, shaft, radius).cast_rays(
-        o3d.core.Tensor(np.hstack([origin, sight]).astype(np.float32)), nthreads=1
+        o3d.core.Tensor.from_numpy(np.hstack([origin, sight]).astype(np.float32)), nthreads=1
     )
     depth, what = hit["t_hit"].numpy().astype(float), hit["geometry_ids"].numpy()
     seen = np.isfinite(depth)
     depth, what, rays = depth[seen], what[seen].astype(int), rays[seen]
     noisy = depth + sigma * rng.standard_normal(len(depth))
-    return rays * noisy[:, None], depth, what, ToolPose(centre, Shaft(shaft, radius))
+    return rays * noisy[:, None], depth, what, ToolPose(centre, ToolShaft(shaft, radius))
 
 
 def _distances(places: FloatArray, tool: ToolPose) -> dict[str, FloatArray]:
@@ -154,7 +155,7 @@ def _case(name: str, sigma: float) -> tuple[dict[str, list[FloatArray]], float, 
     spent = 0.0
     for _ in range(FRAMES):
         cloud, depth, what, tool = _frame(pose, radius, tilt, sigma, rng)
-        clean, seconds = timed(lambda cloud=cloud, tool=tool: cleaner.clean(cloud, tool))
+        clean, seconds = timed(partial(cleaner.clean, cloud, tool))
         spent += seconds
         rows = clean.indices[what[clean.indices] == 0]
         phantom, kept_phantom = phantom + int((what == 0).sum()), kept_phantom + len(rows)

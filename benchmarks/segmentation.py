@@ -10,7 +10,7 @@ from benchmarks.reference_pokes import SETUP
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.segmentation import Cleaner
-from palpate.measurement.tool_pose import Shaft, ToolPose
+from palpate.measurement.tool_pose import ToolPose, ToolShaft
 
 __all__ = ["run"]
 
@@ -43,7 +43,7 @@ def run() -> list[Table]:
         tool_radius=SETUP.tool.radius,
         noise=SIGMA,
     )
-    tool = ToolPose(TOOL, Shaft(np.array([0.0, 0.0, 1.0]), 3e-3))
+    tool = ToolPose(TOOL, ToolShaft(np.array([0.0, 0.0, 1.0]), 3e-3))
     clean, seconds = timed(lambda: [cleaner.clean(cloud, tool) for _ in range(ROUNDS)][-1])
     selected = np.zeros(len(cloud), dtype=bool)
     selected[clean.indices] = True

@@ -28,7 +28,14 @@ def start(
     dataset = services.library.open(request.dataset)
     dataset.validate()
     return job_out(
-        services.diagnose(dataset.path, request.dataset, request.seed, key, request.registration)
+        services.diagnose(
+            dataset.path,
+            request.dataset,
+            request.seed,
+            key,
+            request.registration,
+            request.tolerance,
+        )
     )
 
 

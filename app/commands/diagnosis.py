@@ -64,6 +64,15 @@ def diagnose(
     runs: Annotated[Path, typer.Option(help="Folder of the accepted registrations.")] = Path(
         "runs"
     ),
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            help="Size in mm (RMS) from which on structured error matters; the larger of 0.1 mm "
+            "and 3 % of the surface's motion if omitted.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Find the causes of the simulation's error in each dataset, and what they gain on sequences
     that nothing was fitted on.
@@ -79,7 +88,14 @@ def diagnose(
     table = verdict_table(with_truth)
     for path in datasets:
         with _run_folder(run / path.name if run and several else run, path.name) as place:
-            report, seconds = run_diagnosis(path, place, workers, seed, registered[path])
+            report, seconds = run_diagnosis(
+                path,
+                place,
+                workers,
+                seed,
+                registered[path],
+                None if tolerance is None else 1e-3 * tolerance,
+            )
         table.add_row(*verdict_cells(path.name, report, seconds, truths[path], with_truth))
         if file is not None:
             write_json(file / f"{path.name}.json" if several else file, report)
@@ -92,7 +108,12 @@ def diagnose(
 
 
 def run_diagnosis(
-    dataset: Path, run: Path, workers: int, seed: int, accepted: AcceptedRegistration | None = None
+    dataset: Path,
+    run: Path,
+    workers: int,
+    seed: int,
+    accepted: AcceptedRegistration | None = None,
+    tolerance: float | None = None,
 ) -> tuple[dict[str, Any], float]:
     """Diagnose with a progress bar; returns report and time [s]. The run folder appears whole or
     not at all.
@@ -105,7 +126,14 @@ def run_diagnosis(
     try:
         with progress(f"diagnose {dataset.name}") as report:
             result = diagnose_into(
-                dataset, run, scratch, workers=workers, seed=seed, report=report, accepted=accepted
+                dataset,
+                run,
+                scratch,
+                workers=workers,
+                seed=seed,
+                report=report,
+                accepted=accepted,
+                tolerance=tolerance,
             )
     finally:
         shutil.rmtree(scratch, ignore_errors=True)

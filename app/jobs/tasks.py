@@ -52,6 +52,7 @@ def diagnose(request: dict[str, Any], report: Report) -> dict[str, Any]:
         seed=int(request["seed"]),
         report=report,
         accepted=AcceptedRegistration.from_json(registered) if registered else None,
+        tolerance=request.get("tolerance"),
     )
     return {"run": run.name, "verdict": result["verdict"]}
 
@@ -65,11 +66,13 @@ def diagnose_into(
     seed: int,
     report: Report,
     accepted: AcceptedRegistration | None = None,
+    tolerance: float | None = None,
 ) -> dict[str, Any]:
     """Diagnose into `scratch`, write the origin, and rename the result to `run`; returns the
     report.
 
-    `accepted` is a registration of the camera that replaces the automatic one.
+    `accepted` is a registration of the camera that replaces the automatic one; `tolerance` [m] as
+    of `palpate.diagnosis.pipeline.diagnose`.
     """
     from palpate.dataset import open_dataset
     from palpate.diagnosis.pipeline import diagnose as find_cause
@@ -79,7 +82,9 @@ def diagnose_into(
     began = time.time()
     made = scratch / run.name
     opened = open_dataset(dataset).registered(accepted)
-    result = find_cause(opened, made, workers=workers, report=report, seed=seed)
+    result = find_cause(
+        opened, made, workers=workers, report=report, seed=seed, tolerance=tolerance
+    )
     splits = {
         name: split
         for split in ("train", "validation", "test")

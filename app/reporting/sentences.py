@@ -135,18 +135,33 @@ def left_sentences(report: dict[str, Any]) -> list[str]:
 
     If there are causes, also its share.
     """
-    left = report.get("unexplained") or {}
+    left, small = report.get("unexplained") or {}, report.get("small_remainder")
     if not left.get("fraction"):
-        return []
+        return [] if small is None else [_small(small), *_place(small)]
     share = (
-        [f"{100 * left['fraction']:.0f}{NARROW}% of the structured error is left."]
+        [f"{100 * left['fraction']:.0f}{NARROW}% of the structured error is left{_size(left)}."]
         if report.get("causes")
-        else []
+        else [f"It is{_size(left, ' ')}."] * bool(_size(left))
     )
-    return [
-        *share,
-        *(f"{key.capitalize()}: {left[key]}." for key in ("where", "when") if left.get(key)),
-    ]
+    return [*share, *_place(left)]
+
+
+def _small(left: dict[str, Any]) -> str:
+    """Structured error within the tolerance."""
+    within = quantity(1e-3 * left["tolerance_mm"], "m")
+    return f"A structured error is left{_size(left)}, within the tolerance of {within}."
+
+
+def _size(left: dict[str, Any], before: str = ", ") -> str:
+    """Size of what is left; empty where it is unknown."""
+    if left.get("rms_mm") is None:
+        return ""
+    share = f"{100 * left['share_of_motion']:.2g}{NARROW}% of the surface's motion"
+    return f"{before}{quantity(1e-3 * left['rms_mm'], 'm')} RMS or {share}"
+
+
+def _place(left: dict[str, Any]) -> list[str]:
+    return [f"{key.capitalize()}: {left[key]}." for key in ("where", "when") if left.get(key)]
 
 
 def _gain(report: dict[str, Any]) -> str:

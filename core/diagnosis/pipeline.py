@@ -8,12 +8,13 @@ import shutil
 import tempfile
 from collections.abc import Sequence
 from concurrent.futures import Future
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from palpate.dataset import Dataset
 from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.criteria.tolerance import Tolerance
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.gain.force_gain import ForceGain
 from palpate.diagnosis.gain.held_out_gain import held_out_gain
@@ -58,6 +59,7 @@ def diagnose(
     seed: int = 0,
     replays: bool = True,
     assurance: bool = True,
+    tolerance: float | None = None,
 ) -> dict[str, Any]:
     """Find the causes of the stated simulation's error, write a run folder and return the report.
 
@@ -70,6 +72,8 @@ def diagnose(
         replays: whether every sequence is recorded for the page.
         assurance: whether controls, profiles and the next probe, which change no verdict, are
             computed.
+        tolerance: size (RMS) of structured error from which on it matters [m]; the larger of 0.1 mm
+            and 3 % of the surface's motion if None.
 
     Fits and choices use the train and validation sequences, the gain uses the test sequences.
     Raises DiagnosisError where the data cannot carry a diagnosis, DatasetError and
@@ -90,7 +94,8 @@ def diagnose(
         out.parent.mkdir(parents=True, exist_ok=True)
         making = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
         try:
-            result = _run(experiment, data, pool, making, report, seed, (replays, assurance))
+            options = _Options(seed, replays, assurance, Tolerance(tolerance))
+            result = _run(experiment, data, pool, making, report, options)
             os.rename(making, out)
         finally:
             shutil.rmtree(making, ignore_errors=True)
@@ -131,22 +136,31 @@ def _searched(
     return data, evaluator, search(evaluator, seed)
 
 
+@dataclass(frozen=True)
+class _Options:
+    """Options of a diagnosis; attributes as the arguments of `diagnose`."""
+
+    seed: int
+    replays: bool
+    assurance: bool
+    tolerance: Tolerance
+
+
 def _run(
     experiment: Experiment,
     data: SplitObservations,
     pool: Workers,
     making: Path,
     report: Report,
-    seed: int,
-    parts: tuple[bool, bool],
+    options: _Options,
 ) -> dict[str, Any]:
-    """Search, validate and write the files of a run; `parts` are replays and assurance."""
-    replays, assurance = parts
+    """Search, validate and write the files of a run."""
     (fitted, held_out), evaluator, findings = _searched(
-        experiment, data, pool, part(report, 0.05, 0.75), seed
+        experiment, data, pool, part(report, 0.05, 0.75), options.seed
     )
+    findings.tolerance = options.tolerance
     problem, dataset, setup = evaluator.problem, experiment.dataset, experiment.stated
-    gain, checks = _validated(evaluator, findings, held_out, report, seed, assurance)
+    gain, checks = _validated(evaluator, findings, held_out, report, options)
     model = findings.best.model if findings.best else findings.baseline
     found = tuned_setup(evaluator, model) if findings.best else setup
     (making / "replays").mkdir()
@@ -154,13 +168,13 @@ def _run(
     # The recordings begin before the supplements, which leave a process idle now and then.
     recordings = (
         _recordings(experiment, found, pool, making / "replays")
-        if replays and problem.clouds
+        if options.replays and problem.clouds
         else []
     )
     result = report_of(dataset, evaluator, findings, gain, "test", checks)
     if dataset.accepted is not None:
         result["registration"] = dataset.accepted.to_json()
-    if assurance:
+    if options.assurance:
         result = with_supplements(result, evaluator, fitted, findings)
     result = _with_pictures(result, evaluator, fitted, findings, making)
     for number, task in enumerate(recordings):
@@ -178,14 +192,13 @@ def _validated(
     findings: Findings,
     held_out: list[Observations],
     report: Report,
-    seed: int,
-    assurance: bool,
+    options: _Options,
 ) -> tuple[SurfaceGain | ForceGain | None, AllClearChecks]:
     """Return the gain on test sequences and the checks of an all-clear; reject a wrong cause."""
-    fine, pool = evaluator.problem.fine_grid, evaluator.workers
+    fine, pool, seed = evaluator.problem.fine_grid, evaluator.workers, options.seed
     report(0.75, "measuring the gain on test sequences")
     gain = (
-        held_out_gain(evaluator, findings, held_out, pool, fine, seed, assurance)
+        held_out_gain(evaluator, findings, held_out, pool, fine, seed, options.assurance)
         if held_out
         else None
     )
@@ -193,10 +206,12 @@ def _validated(
         findings.withdraw(why)
         gain = held_out_gain(evaluator, findings, held_out, pool, fine, seed) if held_out else None
     if verdict_of(findings) != "none":
-        return gain, AllClearChecks()
+        return gain, AllClearChecks(tolerance=options.tolerance)
     report(0.77, "looking whether every sequence, also of the test, is as clear")
     stiffness_error = largest_stiffness_error(evaluator, findings.baseline)
-    return gain, AllClearChecks(stiffness_error, check_held_out(evaluator, held_out, seed))
+    return gain, AllClearChecks(
+        stiffness_error, check_held_out(evaluator, held_out, seed), options.tolerance
+    )
 
 
 def _with_pictures(

@@ -21,7 +21,7 @@ from palpate.foundation.progress import Report, silent
 from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.phantom_drift import recorded_camera
 from palpate.measurement.segmentation import Cleaner
-from palpate.measurement.tool_pose import Shaft, tool_poses
+from palpate.measurement.tool_pose import ToolShaft, tool_poses
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.mesh.protocol import Meshing
@@ -100,7 +100,7 @@ class _CorrectedModel:
     network: LoadedNetwork
     stated: Setup
     cleaner: Cleaner
-    shaft: Shaft | None
+    shaft: ToolShaft | None
 
     def arrays(self, sequence: Sequence, index: FloatArray) -> dict[str, Any]:
         """Replay and correct these frames of a sequence; return the arrays for the page."""

@@ -28,7 +28,7 @@ from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.phantom_drift import align_sequences
 from palpate.measurement.segmentation import Cleaner, cleaner_for
-from palpate.measurement.tool_pose import Shaft, find_shaft
+from palpate.measurement.tool_pose import ToolShaft, find_shaft
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import REPLAY_GRID
 from palpate.mesh.protocol import Meshing
@@ -110,7 +110,7 @@ class Experiment:
         return cleaner_for(self.dataset, self.registration).allowing(self.setup.tool.radius)
 
     @cached_property
-    def shaft(self) -> Shaft | None:
+    def shaft(self) -> ToolShaft | None:
         """The tool's shaft in the tool's frame; None where no cloud shows one."""
         return find_shaft(self.dataset, self.registration.repaired)
 

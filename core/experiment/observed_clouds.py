@@ -12,7 +12,7 @@ from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.frames import Transform
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.segmentation import Cleaner
-from palpate.measurement.tool_pose import Shaft, tool_poses
+from palpate.measurement.tool_pose import ToolShaft, tool_poses
 
 __all__ = ["ObservedClouds", "segment_clouds"]
 
@@ -39,7 +39,7 @@ def segment_clouds(
     index: IntArray,
     cleaner: Cleaner,
     phantom_from_robot: Transform,
-    shaft: Shaft | None,
+    shaft: ToolShaft | None,
     report: Report = silent,
     keep: Callable[[FloatArray], FloatArray] = np.asarray,
 ) -> ObservedClouds:

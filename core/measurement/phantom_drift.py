@@ -19,7 +19,7 @@ from palpate.foundation.frames import Transform
 from palpate.measurement.patch_averages import PatchMeans, patch_means
 from palpate.measurement.segmentation import Cleaner, cleaner_for
 from palpate.measurement.surface_gaps import Surface, gaps
-from palpate.measurement.tool_pose import Shaft, find_shaft, tool_poses
+from palpate.measurement.tool_pose import ToolShaft, find_shaft, tool_poses
 from palpate.mesh.graded_mesh import SCREEN_GRID
 from palpate.registration.registration import Registration, setup_from
 from palpate.replay.equilibrium import Equilibrium
@@ -155,7 +155,7 @@ def _significant(found: Mapping[str, PhantomDrift]) -> dict[str, FloatArray]:
 
 
 def _untouched_points(
-    sequence: Sequence, setup: Setup, cleaner: Cleaner, shaft: Shaft | None
+    sequence: Sequence, setup: Setup, cleaner: Cleaner, shaft: ToolShaft | None
 ) -> FloatArray:
     """Segmented points (n, 3) [m], camera frame, of frames before the tool first comes near."""
     times = np.asarray(sequence.cloud_times)

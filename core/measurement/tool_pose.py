@@ -18,7 +18,7 @@ from palpate.foundation.frames import Transform
 from palpate.registration.faces import box_distance
 from palpate.registration.registration import Registration
 
-__all__ = ["SHAFT_LENGTH", "Shaft", "ToolPose", "find_shaft", "locate_tool", "tool_poses"]
+__all__ = ["SHAFT_LENGTH", "ToolPose", "ToolShaft", "find_shaft", "locate_tool", "tool_poses"]
 
 FARTHEST_SHIFT = 6.0e-3
 """Largest correction of the tool's position from the clouds [m]."""
@@ -33,7 +33,7 @@ _TAIL = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Shaft:
+class ToolShaft:
     """The rod behind the ball.
 
     Attributes:
@@ -55,7 +55,7 @@ class ToolPose:
     """
 
     centre: FloatArray
-    shaft: Shaft | None
+    shaft: ToolShaft | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,9 @@ class ShaftSight:
     away: FloatArray
 
     @classmethod
-    def of(cls, camera: FloatArray, lines: FloatArray, tool: ToolPose, shaft: Shaft) -> ShaftSight:
+    def of(
+        cls, camera: FloatArray, lines: FloatArray, tool: ToolPose, shaft: ToolShaft
+    ) -> ShaftSight:
         """Lines (n, 3) of sight, unit vectors from the camera (3,) [m], phantom frame."""
         start = camera - tool.centre
         level = lines - (lines @ shaft.axis)[:, None] * shaft.axis
@@ -128,7 +130,7 @@ def locate_tool(
 
 
 def _on_shaft(
-    points: FloatArray, tool: ToolPose, shaft: Shaft, camera: FloatArray, slack: float
+    points: FloatArray, tool: ToolPose, shaft: ToolShaft, camera: FloatArray, slack: float
 ) -> tuple[ShaftSight, FloatArray]:
     """Lines of sight and depths (m,) [m] of the points (n, 3) [m] that can only be the shaft's."""
     lines = points - camera
@@ -148,7 +150,10 @@ def _middle(across: FloatArray) -> float:
 
 
 def tool_poses(
-    kinematics: Kinematics, times: FloatArray, phantom_from_robot: Transform, shaft: Shaft | None
+    kinematics: Kinematics,
+    times: FloatArray,
+    phantom_from_robot: Transform,
+    shaft: ToolShaft | None,
 ) -> list[ToolPose]:
     """The tool at `times` (m,) [s].
 
@@ -166,12 +171,12 @@ def tool_poses(
         Rotation.from_quat(kinematics.quaternion[rows]).apply(shaft.axis)
     )
     return [
-        ToolPose(centre, Shaft(axis, shaft.radius))
+        ToolPose(centre, ToolShaft(axis, shaft.radius))
         for centre, axis in zip(centres, axes, strict=True)
     ]
 
 
-def find_shaft(dataset: Dataset, registration: Registration, frames: int = 3) -> Shaft | None:
+def find_shaft(dataset: Dataset, registration: Registration, frames: int = 3) -> ToolShaft | None:
     """Find the direction of the shaft in the tool's own frame, and its radius.
 
     Of the frame's six axes the direction is the one along which the clouds show points; on a dVRK
@@ -195,7 +200,10 @@ def find_shaft(dataset: Dataset, registration: Registration, frames: int = 3) ->
             )
             for number, axis in enumerate(axes):
                 (pose,) = tool_poses(
-                    sequence.kinematics, times, registration.phantom_from_robot, Shaft(axis, radius)
+                    sequence.kinematics,
+                    times,
+                    registration.phantom_from_robot,
+                    ToolShaft(axis, radius),
                 )
                 hits[number] += _count_near(clear, pose, reach)
                 spans[number].append(_span(clear, pose, camera))
@@ -205,9 +213,9 @@ def find_shaft(dataset: Dataset, registration: Registration, frames: int = 3) ->
         return None
     across = np.concatenate(spans[best])
     if len(across) < _FEWEST:
-        return Shaft(axes[best], radius)
+        return ToolShaft(axes[best], radius)
     low, high = np.quantile(across, [_TAIL, 1 - _TAIL])
-    return Shaft(axes[best], float(high - low) / 2 / (1 - 2 * _TAIL))
+    return ToolShaft(axes[best], float(high - low) / 2 / (1 - 2 * _TAIL))
 
 
 def _some(count: int, frames: int) -> FloatArray:

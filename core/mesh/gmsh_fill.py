@@ -19,7 +19,7 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import MeshError, SetupError
-from palpate.foundation.signals import signals_kept
+from palpate.foundation.signal_handling import signals_kept
 from palpate.mesh.protocol import FINER
 from palpate.mesh.tet_mesh import TetMesh, sides_of
 from palpate.setup.closest_point import nearest

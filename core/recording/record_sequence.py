@@ -21,7 +21,7 @@ from palpate.measurement.metrics import paper_distance
 from palpate.measurement.phantom_drift import recorded_camera
 from palpate.measurement.segmentation import Cleaner
 from palpate.measurement.surface_gaps import Gaps, Surface, gaps
-from palpate.measurement.tool_pose import Shaft, tool_poses
+from palpate.measurement.tool_pose import ToolShaft, tool_poses
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.interpolation import neighbourhood_means
 from palpate.mesh.protocol import Meshing
@@ -152,7 +152,7 @@ def record(
     stated: Setup,
     extended: Setup,
     cleaner: Cleaner,
-    shaft: Shaft | None,
+    shaft: ToolShaft | None,
     grid: Meshing,
     target: Path,
 ) -> str:

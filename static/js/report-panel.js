@@ -113,6 +113,9 @@ export function showReport(heading, report, patterns, palette) {
       ? section("Next probe", "would tell most", report.next_probe.map(probeEntry))
       : null,
     report.unexplained ? section("Unexplained", "", unexplainedNote(report.unexplained)) : null,
+    report.small_remainder
+      ? section("Small remainder", "", smallNote(report.small_remainder))
+      : null,
     report.identified?.length
       ? section("Told by the forces", "interval", report.identified.map(identifiedCard))
       : null,
@@ -571,7 +574,15 @@ function probeEntry({ text, separates, probability }) {
  * @param {Unexplained} unexplained
  * @returns {HTMLElement}
  */
-function unexplainedNote({ fraction, where, when: time, structure, structure_bound: bound }) {
+function unexplainedNote({
+  fraction,
+  where,
+  when: time,
+  structure,
+  structure_bound: bound,
+  rms_mm: rms,
+  share_of_motion: share,
+}) {
   const times =
     typeof structure === "number"
       ? `What is left is ${structure.toFixed(2)} times what chance gives, ` +
@@ -589,9 +600,33 @@ function unexplainedNote({ fraction, where, when: time, structure, structure_bou
     "p",
     { class: "gain-note" },
     element("b", {}, formatPercent(fraction)),
-    ` of the structured error is left${place ? `: ${place}` : ""}.`,
+    ` of the structured error is left${sizeText(rms, share)}${place ? `: ${place}` : ""}.`,
   );
 }
+
+/**
+ * Return the size of a structured error as text; empty where it is unknown.
+ * @param {number | null | undefined} rms in mm
+ * @param {number | null | undefined} share of the surface's motion
+ * @returns {string}
+ */
+const sizeText = (rms, share) =>
+  typeof rms === "number"
+    ? `, ${rms.toFixed(2)} mm RMS or ${formatPercent(share ?? 0)} of the motion`
+    : "";
+
+/**
+ * Tell of a structured error that is within the tolerance.
+ * @param {Unexplained} left
+ * @returns {HTMLElement}
+ */
+const smallNote = ({ rms_mm: rms, share_of_motion: share, tolerance_mm: most, where, when }) =>
+  element(
+    "p",
+    { class: "gain-note" },
+    `A structured error is left${sizeText(rms, share)}, within the tolerance of ` +
+      `${most?.toFixed(2)} mm: ${[where, when].filter(Boolean).join("; ")}.`,
+  );
 
 /**
  * @param {NonNullable<Report["identified"]>[number]} entry

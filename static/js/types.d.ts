@@ -209,6 +209,9 @@ export interface Unexplained {
   when?: string;
   structure?: number;
   structure_bound?: number;
+  rms_mm?: number | null;
+  share_of_motion?: number | null;
+  tolerance_mm?: number;
 }
 
 export interface RankingEntry {
@@ -234,6 +237,7 @@ export interface Report {
   controls?: ControlRow[];
   next_probe?: ProbeProposal[];
   unexplained?: Unexplained;
+  small_remainder?: Unexplained | null;
   identified?: { effect: string; why?: string; parameters: Record<string, Estimate> }[];
   not_identifiable?: { effect: string; why?: string; measure_instead?: string }[];
 }

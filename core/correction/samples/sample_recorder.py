@@ -14,7 +14,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.camera_model import CameraModel
 from palpate.measurement.segmentation import Cleaner
-from palpate.measurement.tool_pose import Shaft
+from palpate.measurement.tool_pose import ToolShaft
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.mesh.protocol import Meshing
@@ -45,7 +45,7 @@ class Recorder:
     grid: Meshing
     body: Body
     cleaner: Cleaner
-    shaft: Shaft | None
+    shaft: ToolShaft | None
     points: int
     measured: bool
     seed: int = 0

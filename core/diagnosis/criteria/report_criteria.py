@@ -21,6 +21,16 @@ class VerdictCriteria:
         "Misfit per value above which structured error is left. The engine's own accuracy is in "
         "the noise already.",
     )
+    tolerance: float = threshold(
+        1e-4,
+        "m",
+        "Size (RMS) of structured error from which on it matters, if the user states no other: a "
+        "real phantom and a model with the right cause differ by as much.",
+        "measured: a control of another solver whose mesh was off by 0.1 mm was called unexplained",
+    )
+    tolerance_share: float = threshold(
+        0.03, "1", "The same as a share of the motion of the visible surface; the larger counts."
+    )
     most_modulus_ratio: float = threshold(
         2.0,
         "1",

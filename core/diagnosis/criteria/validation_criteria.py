@@ -45,6 +45,14 @@ class RejectionCriteria:
         "A cause is rejected if it surely adds more than this share of the reducible error on "
         "test sequences. Less may be the mesh's error.",
     )
+    unconfirmed_gain: float = threshold(
+        2.0,
+        "1",
+        "A cause without structured error, and without a sure gain on test sequences, is a hint "
+        "if its gain is below this many times the required gain.",
+        "measured: without structure and without a sure gain a control of another solver named "
+        "strain stiffening at 26 to 31 nats for 25; chance gives no 50 nats",
+    )
     left_share: float = threshold(
         0.5,
         "1",

@@ -18,7 +18,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.processes import at_once
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.segmentation import Cleaner
-from palpate.measurement.tool_pose import Shaft, tool_poses
+from palpate.measurement.tool_pose import ToolShaft, tool_poses
 from palpate.setup.box import CLEARANCE, distance_to_block
 from palpate.setup.setup import Setup
 
@@ -75,7 +75,7 @@ def observe(
     sequence: Sequence,
     setup: Setup,
     cleaner: Cleaner,
-    shaft: Shaft | None,
+    shaft: ToolShaft | None,
     most: int,
     rest: FloatArray | None = None,
 ) -> Observations:

@@ -15,16 +15,15 @@ from palpate.diagnosis.gain.surface_gain import SurfaceGain
 from palpate.diagnosis.inference.credible_intervals import intervals, modulus_interval
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.noise.mesh_discrepancy import too_coarse
+from palpate.diagnosis.report.remaining_error import small_remainder, unexplained_error
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.model_probabilities import probabilities
 from palpate.diagnosis.validation.checks import AllClearChecks
-from palpate.diagnosis.validation.worst_location import worst_patch_location, worst_push_location
 from palpate.effects import NuisanceBlock
 
 __all__ = ["report_of", "verdict_of"]
 
 _NO_CHECKS = AllClearChecks()
-_NOT_FITTED = ", on which nothing was fitted"
 
 
 def verdict_of(findings: Findings, checks: AllClearChecks = _NO_CHECKS) -> str:
@@ -93,6 +92,8 @@ def _ranking(evaluator: Evaluator, findings: Findings, named: set[str]) -> list[
             ),
             "refitted": bool(alone),
         }
+        if kind.name in findings.hints:
+            row["hint"] = findings.hints[kind.name]
         rows.append(row)
     return sorted(rows, key=lambda row: -row["gain_nats"])
 
@@ -114,52 +115,6 @@ def _model(trial: Trial) -> dict[str, Any]:
         "asked_nats": required,
         "misfit": misfit,
         "parts": parts,
-    }
-
-
-def _unexplained(
-    evaluator: Evaluator, findings: Findings, checks: AllClearChecks
-) -> dict[str, Any]:
-    """Structured error that is left: its share over chance, the place and the sequence."""
-    model = findings.best.model if findings.best else findings.baseline
-    before, left, note = findings.structure, findings.remaining, ""
-    if checks.held_out_structure and checks.held_out is not None:
-        model, before = checks.held_out.model, checks.held_out.structure
-        left = before
-        note = _NOT_FITTED
-    worst = {
-        block.name: block.gram[0, 0] / max(block.values, 1)
-        for block in model.blocks
-        if block.name != "rest"
-    }
-    when = max(worst, key=lambda name: worst[name])
-    fraction = (
-        max(left.ratio - 1.0, 0.0) / max(before.ratio, left.ratio, 1.0) if left.significant else 0.0
-    )
-    if (one := checks.unusual) is not None and not left.significant:
-        note = note if one is checks.stiffness_error else _NOT_FITTED
-        when, fraction, place = one.sequence, one.share, one.place
-    else:
-        place = (
-            worst_patch_location(model.predictions, evaluator)
-            if evaluator.problem.clouds
-            else worst_push_location(model.predictions, evaluator)
-        )
-    where = str(place)
-    when = f"most in {when}{note}"
-    if findings.ripple.significant and not left.significant:
-        fraction = findings.ripple.share
-        where, when = (
-            "all over rest.ply, alike at equal distances from the camera",
-            "always, also while nothing is touched",
-        )
-    return {
-        "fraction": round(fraction, 4),
-        "where": where,
-        "when": when,
-        "misfit_per_value": round(evaluator.misfit(model), 4),
-        "structure": round(left.ratio, 4),
-        "structure_bound": round(left.bound / left.expected, 4),
     }
 
 
@@ -210,7 +165,8 @@ def report_of(
         "models": [_model(trial) for trial in findings.trials],
         "identified": known,
         "not_identifiable": unknown,
-        "unexplained": _unexplained(evaluator, findings, checks),
+        "unexplained": unexplained_error(evaluator, findings, checks),
+        "small_remainder": small_remainder(evaluator, findings, checks),
         "gain": None if gain is None else gain.to_json(split),
         "ambiguity_map": [one.to_json() for one in findings.identifiability],
         "evidence": _evidence(evaluator, findings, checks),

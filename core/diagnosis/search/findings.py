@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.criteria.tolerance import Tolerance
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.noise.camera_error_model import CALM, Ripple
 from palpate.diagnosis.inference.noise.residual_structure import NOTHING, Structure
@@ -56,6 +57,8 @@ class Findings:
         ripple: of the camera's depth in the rest cloud, which no effect expresses.
         withdrawn: reason why the causes found are not named; empty for no reason.
         known: effects without which nothing can be replayed: touches of other landmarks.
+        hints: reason why an effect with enough gain is not named, by name.
+        tolerance: size below which structured error does not matter.
     """
 
     baseline: Model
@@ -70,6 +73,8 @@ class Findings:
     ripple: Ripple = CALM
     withdrawn: str = ""
     known: tuple[Effect, ...] = ()
+    hints: dict[str, str] = field(default_factory=dict)
+    tolerance: Tolerance = field(default_factory=Tolerance)
 
     def withdraw(self, why: str) -> None:
         """Reject the best model and all that extend it, for this reason."""
@@ -77,12 +82,15 @@ class Findings:
         self.trials = [
             trial for trial in self.trials if not names or not names.issubset(trial.model.names)
         ]
+        self.hints |= dict.fromkeys(sorted(names), why)
         self.best, self.remaining, self.withdrawn = None, self.structure, why
 
     @property
     def structured(self) -> bool:
-        """Whether the stated setup leaves an error on the fitted sequences that is no noise."""
-        return self.structure.significant or self.ripple.significant
+        """Whether the stated setup leaves an error on the fitted sequences that is no noise, and
+        large enough to matter.
+        """
+        return self.structure.matters(self.tolerance) or self.ripple.significant
 
     def rivals(self) -> list[Trial]:
         """Return other sets of as many causes that explain the data about as well as the best."""

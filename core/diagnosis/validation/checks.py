@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from palpate.diagnosis.criteria.tolerance import Tolerance
 from palpate.diagnosis.validation.held_out_check import HeldOutCheck
 from palpate.diagnosis.validation.stiffness_error_test import StiffnessErrorTest
 
@@ -17,15 +18,17 @@ class AllClearChecks:
     Attributes:
         stiffness_error: largest error of local stiffness in a fitted sequence.
         held_out: the stated setup on sequences that nothing was fitted on.
+        tolerance: size below which an error does not matter.
     """
 
     stiffness_error: StiffnessErrorTest | None = None
     held_out: HeldOutCheck | None = None
+    tolerance: Tolerance = field(default_factory=Tolerance)
 
     @property
     def held_out_structure(self) -> bool:
-        """Whether the stated setup leaves structure where nothing was fitted."""
-        return self.held_out is not None and self.held_out.structure.significant
+        """Whether the stated setup leaves structure that matters where nothing was fitted."""
+        return self.held_out is not None and self.held_out.structure.matters(self.tolerance)
 
     @property
     def stiffness_errors(self) -> tuple[StiffnessErrorTest, ...]:
@@ -35,8 +38,10 @@ class AllClearChecks:
 
     @property
     def unusual(self) -> StiffnessErrorTest | None:
-        """The first test that the engine's own error does not explain."""
-        return next((one for one in self.stiffness_errors if one.significant), None)
+        """The first test that shows an error that the engine's own does not explain, and that
+        matters.
+        """
+        return next((one for one in self.stiffness_errors if one.matters(self.tolerance)), None)
 
     @property
     def failed(self) -> bool:

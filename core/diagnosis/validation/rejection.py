@@ -16,7 +16,11 @@ def rejection_reason(findings: Findings, gain: SurfaceGain | ForceGain | None) -
     if findings.best is None:
         return ""
     names = " and ".join(findings.best.model.names)
-    return _harm(names, gain) or _no_explanation(names, findings, gain)
+    return (
+        _harm(names, gain)
+        or _no_explanation(names, findings, gain)
+        or _unconfirmed(names, findings, gain)
+    )
 
 
 def _harm(names: str, gain: SurfaceGain | ForceGain | None) -> str:
@@ -47,6 +51,26 @@ def _no_explanation(names: str, findings: Findings, gain: SurfaceGain | ForceGai
         f"{names} would explain part of the sequences that were fitted on, but the error that is "
         f"smooth over the surface and grows with the push stays: {left.ratio:.1f} times what "
         f"chance gives, {before.ratio:.1f} times without it{tested}. It is not named"
+    )
+
+
+def _unconfirmed(names: str, findings: Findings, gain: SurfaceGain | ForceGain | None) -> str:
+    """Return the reason if neither structured error nor the held-out sequences confirm the causes,
+    and their gain is not far above the bound.
+
+    Causes that touches or the rest cloud show are exempt: pushes need not show them.
+    """
+    best = findings.best
+    if best is None or gain is None or findings.structure.significant or gain.removed[1] > 0.0:
+        return ""
+    if best.gain > CRITERIA.rejection.unconfirmed_gain * best.required_gain:
+        return ""
+    if any(effect.at_rest() for effect in best.model.effects):
+        return ""
+    return (
+        f"{names} would explain the data by {best.gain:.0f} nats, but no error that is smooth over "
+        f"the surface and grows with the push is there, and on test sequences {_share(gain)} of "
+        "the reducible error is removed. It is a hint, and is not named"
     )
 
 

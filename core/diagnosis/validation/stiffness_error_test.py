@@ -18,6 +18,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.criteria.tolerance import Tolerance
+from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, fit, less_constants, log_evidence
 from palpate.diagnosis.inference.hypothesis import Model
@@ -38,6 +40,9 @@ class StiffnessErrorTest:
         gain: of that deviation over the usual one [nats].
         bound: gain that one in a thousand datasets exceeds by chance [nats].
         place: around which most of the change by such errors lies.
+        amplitude: change of the visible surface by the part of them that is not usual, RMS over the
+            frames with contact [m].
+        motion: RMS displacement of that surface in those frames [m].
     """
 
     sequence: str
@@ -45,6 +50,12 @@ class StiffnessErrorTest:
     gain: float
     bound: float
     place: ErrorLocation
+    amplitude: float = np.nan
+    motion: float = np.nan
+
+    def matters(self, tolerance: Tolerance) -> bool:
+        """Whether it is significant and not known to be within the tolerance."""
+        return self.significant and not self.amplitude <= tolerance.of(self.motion)
 
     @property
     def significant(self) -> bool:
@@ -90,15 +101,38 @@ def largest_stiffness_error(evaluator: Evaluator, model: Model) -> StiffnessErro
             error = stiffness_error_of(
                 whole, [*model.nuisance, *model.columns], precision, own, noise.spots
             )
-            results.append((item.name, error, noise))
+            results.append((item, error, noise))
     if not results:
         return None
-    name, error, noise = max(results, key=lambda row: row[1].gain)
+    item, error, noise = max(results, key=lambda row: row[1].gain)
     place = location_of(
         evaluator.problem.surface.patch_centres,
         _seen(noise, error.errors)[: evaluator.problem.surface.patches],
     )
-    return StiffnessErrorTest(name, error.factor, error.gain, chance_bound(len(results)), place)
+    amplitude, motion = _size(evaluator, item, noise, error)
+    return StiffnessErrorTest(
+        item.name, error.factor, error.gain, chance_bound(len(results)), place, amplitude, motion
+    )
+
+
+def _size(
+    evaluator: Evaluator, item: Prediction, noise: Noise, error: StiffnessError
+) -> tuple[float, float]:
+    """Amplitude and motion [m] as of `StiffnessErrorTest`."""
+    centres = evaluator.problem.surface.patch_centres
+    touched = np.array([frame.in_contact for frame in item.equilibria])
+    seen = (noise.weights[:, : len(centres)] > 0) & touched[:, None]
+    if not seen.any():
+        return np.nan, np.nan
+    pattern = (noise.discrepancy[..., -noise.spots :] @ error.errors)[:, : len(centres)]
+    way = np.array(
+        [np.linalg.norm(frame.move(centres) - centres, axis=1) for frame in item.equilibria]
+    )
+    unusual = np.sqrt(max(1.0 - error.factor**-2, 0.0))
+    return (
+        float(unusual * np.sqrt(np.mean(pattern[seen] ** 2))),
+        float(np.sqrt(np.mean(way[seen] ** 2))),
+    )
 
 
 def _seen(noise: Noise, errors: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ import pytest
 
 from palpate.dataset import open_dataset
 from palpate.measurement.segmentation import CleanCloud, Cleaner, cleaner_for
-from palpate.measurement.tool_pose import Shaft, ToolPose, find_shaft, tool_poses
+from palpate.measurement.tool_pose import ToolPose, ToolShaft, find_shaft, tool_poses
 from palpate.registration.faces import box_distance
 from palpate.registration.pose import small_motion
 from palpate.registration.registration import register
@@ -47,7 +47,7 @@ def test_rest_cloud_keeps_the_block_and_loses_the_table(scene):
 def test_tool_points_go_and_the_dent_around_them_stays(scene, shaft, depth):
     centre = np.array([0.008, -0.004, SIZE[2] + 0.005 - depth])
     view = scene(tool=tuple(centre), shaft=tuple(shaft), pixels=150).look(seed=2)
-    found = cleaned(view, ToolPose(centre, Shaft(shaft, RADIUS)))
+    found = cleaned(view, ToolPose(centre, ToolShaft(shaft, RADIUS)))
     assert kept(found, view.label, SPHERE) < 0.1
     assert kept(found, view.label, SHAFT) < 0.01
     near = np.linalg.norm(view.pose.apply(view.cloud)[:, :2] - centre[:2], axis=1) < 0.012
@@ -86,7 +86,7 @@ def test_points_are_handed_over_in_the_phantom_frame_with_their_rows(scene):
 def test_a_tool_two_millimetres_beside_its_stated_place_is_still_taken_out(scene):
     centre = np.array([0.005, 0.003, SIZE[2] + 0.001])
     view = scene(tool=tuple(centre), shaft=tuple(TILTED), pixels=150).look(seed=4)
-    stated = ToolPose(centre + np.array([0.002, -0.001, 0.0]), Shaft(TILTED, RADIUS))
+    stated = ToolPose(centre + np.array([0.002, -0.001, 0.0]), ToolShaft(TILTED, RADIUS))
     found = cleaned(view, stated)
     assert kept(found, view.label, SPHERE) < 0.15
     assert kept(found, view.label, SHAFT) < 0.01
@@ -110,7 +110,7 @@ def test_an_empty_cloud_gives_an_empty_one(scene):
     cleaner = Cleaner(
         size=SIZE, phantom_from_camera=scene().look(seed=7).pose, tool_radius=0.005, noise=7e-4
     )
-    found = cleaner.clean(np.empty((0, 3)), ToolPose(np.zeros(3), Shaft(UP, RADIUS)))
+    found = cleaner.clean(np.empty((0, 3)), ToolPose(np.zeros(3), ToolShaft(UP, RADIUS)))
     assert found.points.shape == (0, 3) and sum(found.counts.values()) == 0
 
 
@@ -120,7 +120,7 @@ def test_kept_points_beside_the_shaft_have_no_bias(scene):
     errors = []
     for seed in range(8):
         exact, view = replace(look, noise=0.0).look(seed), replace(look, noise=noise).look(seed)
-        found = cleaned(view, ToolPose(centre, Shaft(UP, RADIUS)), noise).indices
+        found = cleaned(view, ToolPose(centre, ToolShaft(UP, RADIUS)), noise).indices
         places = exact.pose.apply(exact.cloud)
         beside = np.linalg.norm(places[:, :2] - centre[:2], axis=1)
         near = (beside > 6e-3) & (beside < 12e-3) & (view.label == BLOCK)
@@ -136,7 +136,7 @@ def test_tool_of_another_size_than_stated_goes_if_its_size_is_allowed(scene):
     centre = np.array([0.008, -0.004, SIZE[2] + 0.003])
     view = scene(tool=tuple(centre), pixels=150).look(seed=2)
     stated = Cleaner(size=SIZE, phantom_from_camera=view.pose, tool_radius=2e-3, noise=4e-4)
-    tool = ToolPose(centre, Shaft(UP, RADIUS))
+    tool = ToolPose(centre, ToolShaft(UP, RADIUS))
     assert kept(stated.clean(view.cloud, tool), view.label, SPHERE) > 0.5
     found = stated.allowing(5e-3).clean(view.cloud, tool)
     assert kept(found, view.label, SPHERE) < 0.1

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.stats import gamma
 
 from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.criteria.tolerance import Tolerance
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, draw_rights
@@ -21,7 +22,7 @@ from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.noise.noise_model import smooth_basis
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["NOTHING", "Structure", "explained_by_modes", "structure_of"]
+__all__ = ["NOTHING", "Structure", "explained_by_modes", "response_of_modes", "structure_of"]
 
 
 @dataclass(frozen=True)
@@ -32,11 +33,16 @@ class Structure:
         value: of the data.
         expected: mean by chance.
         bound: value that chance exceeds once in a thousand times.
+        amplitude: size of a smooth error that gives as much beyond chance, RMS over the visible
+            surface in frames with contact [m]; NaN where forces alone show it.
+        motion: RMS displacement of that surface in those frames [m].
     """
 
     value: float
     expected: float
     bound: float
+    amplitude: float = np.nan
+    motion: float = np.nan
 
     @property
     def ratio(self) -> float:
@@ -47,6 +53,10 @@ class Structure:
     def significant(self) -> bool:
         """Whether the value is above the bound."""
         return self.value > self.bound
+
+    def matters(self, tolerance: Tolerance) -> bool:
+        """Whether it is significant and not known to be within the tolerance."""
+        return self.significant and not self.amplitude <= tolerance.of(self.motion)
 
 
 NOTHING = Structure(0.0, 1.0, 1.0)
@@ -139,6 +149,7 @@ def structure_of(evaluator: Evaluator, model: Model, seed: int) -> Structure:
     fitted = [*model.nuisance[:-1], size - 1, *model.columns]  # the mesh's error is the last column
     precision = evaluator.bounded_precision(model)
     modes = range(first, size - 1)
+    depth, motion = _pushed(evaluator, model)
     data = np.array([[block.gram[1:, 0] for block in blocks]])
     rights = draw_rights(
         blocks, fitted, precision, CRITERIA.structure.draws, np.random.default_rng(seed)
@@ -146,8 +157,61 @@ def structure_of(evaluator: Evaluator, model: Model, seed: int) -> Structure:
     value = float(explained_by_modes(blocks, data, fitted, precision, modes)[0])
     chance = explained_by_modes(blocks, rights, fitted, precision, modes)
     mean, variance = float(chance.mean()), float(chance.var(ddof=1))
+    response = response_of_modes(blocks, fitted, precision, modes)
+    amplitude = depth * float(np.sqrt(max(value - mean, 0.0) / response))
     return Structure(
         value,
         mean,
         float(gamma.ppf(CRITERIA.structure.quantile, mean**2 / variance, scale=variance / mean)),
+        amplitude,
+        motion,
     )
+
+
+def _pushed(evaluator: Evaluator, model: Model) -> tuple[float, float]:
+    """RMS of `_depth` [1] and of the visible surface's displacement [m] over the groups with
+    contact; NaN where a sequence has no clouds.
+    """
+    centres = evaluator.problem.surface.patch_centres if evaluator.problem.clouds else None
+    depths, ways = [], []
+    for item in model.predictions:
+        if centres is None or item.force_only:
+            return np.nan, np.nan
+        for depth, frame, gap in zip(_depth(item), item.equilibria, item.gap, strict=True):
+            seen = np.isfinite(gap)
+            if frame.in_contact and seen.any():
+                depths.append(depth)
+                ways.append(np.linalg.norm(frame.move(centres[seen]) - centres[seen], axis=1))
+    if not depths:
+        return np.nan, np.nan
+    return (
+        float(np.sqrt(np.mean(np.square(depths)))),
+        float(np.sqrt(np.mean(np.concatenate(ways) ** 2))),
+    )
+
+
+def response_of_modes(
+    blocks: Sequence[Block], fitted: Sequence[int], precision: FloatArray, modes: Sequence[int]
+) -> float:
+    """Expected value of `explained_by_modes` for mode factors of unit variance without noise.
+
+    Of smooth error with such factors the fitted columns take their part: L is what is left of it in
+    the right sides of the modes, and the value is L^T A^-1 L with the modes' own matrices A.
+    """
+    index, own, count = np.asarray(fitted), np.asarray(modes), len(blocks)
+    grams = np.array([block.gram[1:, 1:] for block in blocks])
+    total = np.linalg.inv(grams[:, index[:, None], index].sum(axis=0) + precision)
+    cross = grams[:, index[:, None], own]
+    response = 0.0
+    inner = []
+    for matrix in grams:
+        part = matrix[np.ix_(own, own)]
+        least = CRITERIA.structure.least_precision * np.diag(part).max()
+        inner.append(np.linalg.inv(part + least * np.eye(len(own))))
+    for row in range(count):
+        for column in range(count):
+            left = -cross[row].T @ total @ cross[column]
+            if row == column:
+                left = left + grams[row][np.ix_(own, own)]
+            response += float(np.einsum("ij,ik,kj->", left, inner[row], left))
+    return max(response, 1e-300)

@@ -11,6 +11,7 @@ from small_dataset import write_valid_dataset
 
 from palpate.dataset import Dataset, open_dataset
 from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.criteria.tolerance import Tolerance
 from palpate.diagnosis.gain.surface_gain import SurfaceGain
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.noise.camera_error_model import Ripple
@@ -157,6 +158,38 @@ def test_error_in_held_out_sequences_alone_is_unexplained(evaluator, dataset):
         0.6,
     )
     assert report["unexplained"]["when"] == "most in poke-02, on which nothing was fitted"
+
+
+def test_structured_error_within_the_tolerance_is_a_small_remainder(evaluator, dataset):
+    findings = _findings(evaluator, accepted=False, misfit=1.02)
+    findings.structure = findings.remaining = Structure(50.0, 20.0, 30.0, 0.07e-3, 3e-3)
+    report = report_of(dataset, evaluator, findings, LADDER, "test")
+    assert (report["verdict"], report["unexplained"]["fraction"]) == ("none", 0.0)
+    small = report["small_remainder"]
+    assert (small["rms_mm"], small["share_of_motion"], small["tolerance_mm"]) == (0.07, 0.0233, 0.1)
+    assert small["when"] == "most in poke-02" and small["where"]
+    findings.tolerance = Tolerance(0.05e-3)
+    checks = AllClearChecks(tolerance=findings.tolerance)
+    report = report_of(dataset, evaluator, findings, LADDER, "test", checks)
+    assert (report["verdict"], report["small_remainder"]) == ("unexplained", None)
+    assert report["unexplained"]["rms_mm"] == 0.07
+
+
+def test_local_stiffness_within_the_tolerance_is_a_small_remainder(evaluator, dataset):
+    findings = _findings(evaluator, misfit=1.0)
+    name = findings.baseline.predictions[-1].name
+    one = StiffnessErrorTest(name, 4.0, 13.2, 6.0, RIM, 0.05e-3, 2e-3)
+    report = report_of(dataset, evaluator, findings, LADDER, "test", AllClearChecks(one))
+    assert report["verdict"] == "none"
+    assert report["small_remainder"]["when"] == f"most in {name}"
+    assert not any("local stiffness" in text for text in report["warnings"])
+
+
+def test_hint_stands_in_the_ranking(evaluator, dataset):
+    findings = _findings(evaluator, ((RADIUS,), 31.0, 1.0))
+    findings.withdraw("tool_radius is a hint")
+    rows = report_of(dataset, evaluator, findings, LADDER, "test")["ranking"]
+    assert [row["effect"] for row in rows if "hint" in row] == ["tool_radius"]
 
 
 def test_sequence_with_unusual_engine_error_is_unexplained(evaluator, dataset):

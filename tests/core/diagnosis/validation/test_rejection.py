@@ -11,6 +11,7 @@ from palpate.diagnosis.inference.noise.residual_structure import Structure
 from palpate.diagnosis.inference.parameter_blocks import ModelColumns
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.validation.rejection import rejection_reason
+from palpate.effects.geometry import GeometryScale
 from palpate.effects.tool import ToolCompliance
 
 LADDER = SurfaceGain(
@@ -75,3 +76,33 @@ def test_cause_that_leaves_most_of_structure_and_error_is_rejected():
 
 def test_no_cause_needs_no_rejection():
     assert rejection_reason(Findings(_found(1.0, 1.0).baseline), LADDER) == ""
+
+
+@pytest.mark.parametrize(
+    ("gain", "before", "removed", "named"),
+    [
+        (31.0, 1.0, (0.2, -0.69, 0.36), False),
+        (31.0, 1.0, (0.2, 0.01, 0.36), True),
+        (31.0, 3.0, (0.2, -0.69, 0.36), True),
+        (384.0, 1.0, (0.0, 0.0, 0.0), True),
+    ],
+)
+def test_small_gain_that_nothing_confirms_is_a_hint(gain, before, removed, named):
+    findings = _found(before, 1.0)
+    assert findings.best is not None
+    findings.best = replace(findings.best, gain=gain, required_gain=25.0)
+    why = rejection_reason(findings, replace(LADDER, removed=removed))
+    assert (why == "") is named
+    if not named:
+        assert "by 31 nats" in why and "20 % (-69 to 36 %)" in why
+        findings.withdraw(why)
+        assert findings.hints == {"tool_compliance": why}
+
+
+def test_cause_that_touches_or_the_rest_cloud_show_needs_no_push_to_confirm_it():
+    findings = _found(1.0, 1.0)
+    assert findings.best is not None
+    cause = GeometryScale(scale_x=1.0, scale_y=1.04, scale_z=1.0)
+    model = replace(findings.best.model, effects=(cause,))
+    findings.best = replace(findings.best, model=model, gain=31.0, required_gain=25.0)
+    assert rejection_reason(findings, IDLE) == ""

@@ -5,8 +5,13 @@ import pytest
 from linear_blocks import linear_blocks
 from scipy.stats import ks_2samp
 
+from palpate.diagnosis.criteria.tolerance import Tolerance
 from palpate.diagnosis.inference.evidence import Block, draw_rights, gram
-from palpate.diagnosis.inference.noise.residual_structure import Structure, explained_by_modes
+from palpate.diagnosis.inference.noise.residual_structure import (
+    Structure,
+    explained_by_modes,
+    response_of_modes,
+)
 from palpate.foundation.arrays import FloatArray
 
 GROUPS, PATCHES, SEQUENCES = 6, 40, 3
@@ -79,3 +84,35 @@ def test_structure_is_judged_by_its_bound(value, significant):
     found = Structure(value, expected=18.0, bound=33.0)
     assert found.significant is significant
     assert found.ratio == pytest.approx(value / 18.0)
+
+
+def test_size_of_mode_factors_follows_from_what_the_modes_explain():
+    random, values = np.random.default_rng(5), []
+    for _ in range(400):
+        factors = random.standard_normal((SEQUENCES, len(MODES)))
+        blocks = [
+            Block(
+                str(number),
+                *gram(-columns[..., list(MODES)] @ own, columns, np.ones((GROUPS, PATCHES))),
+            )
+            for number, (columns, own) in enumerate(zip(COLUMNS, factors, strict=True))
+        ]
+        values.append(_value(blocks))
+    response = response_of_modes(blocks, FITTED, PRECISION, MODES)
+    assert np.mean(values) == pytest.approx(response, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "motion", "stated", "matters"),
+    [
+        (0.09e-3, 1e-3, None, False),
+        (0.11e-3, 1e-3, None, True),
+        (0.11e-3, 5e-3, None, False),
+        (0.11e-3, 5e-3, 0.05e-3, True),
+        (np.nan, np.nan, 1e-3, True),
+    ],
+)
+def test_significant_error_matters_beyond_the_tolerance(amplitude, motion, stated, matters):
+    found = Structure(40.0, 18.0, 33.0, amplitude, motion)
+    assert found.matters(Tolerance(stated)) is matters
+    assert not Structure(20.0, 18.0, 33.0, amplitude, motion).matters(Tolerance(stated))

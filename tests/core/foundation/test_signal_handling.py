@@ -11,7 +11,7 @@ from threading import Thread
 
 import pytest
 
-from palpate.foundation.signals import signals_kept
+from palpate.foundation.signal_handling import signals_kept
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
@@ -42,7 +42,8 @@ def test_handling_is_restored_from_another_thread() -> None:
             ctypes.CDLL(None).signal(signal.SIGPIPE, 0)
             changed.append(_handling())
 
-    before, changed = _handling(), []
+    before = _handling()
+    changed: list[list[int]] = []
     thread = Thread(target=change)
     thread.start()
     thread.join()
