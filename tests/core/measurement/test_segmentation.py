@@ -118,7 +118,7 @@ def test_kept_points_beside_the_shaft_have_no_bias(scene):
     centre, noise = np.array([0.0, 0.0, SIZE[2] + 0.001]), 3e-3
     look = scene(tool=tuple(centre), pixels=300, bias=0.0, strays=0)
     errors = []
-    for seed in range(8):
+    for seed in range(4):
         exact, view = replace(look, noise=0.0).look(seed), replace(look, noise=noise).look(seed)
         found = cleaned(view, ToolPose(centre, ToolShaft(UP, RADIUS)), noise).indices
         places = exact.pose.apply(exact.cloud)
@@ -128,7 +128,7 @@ def test_kept_points_beside_the_shaft_have_no_bias(scene):
         errors.append(np.linalg.norm(view.cloud[rows], axis=1))
         errors[-1] -= np.linalg.norm(exact.cloud[rows], axis=1)
     error = np.concatenate(errors)
-    assert len(error) > 2000
+    assert len(error) > 1000
     assert abs(error.mean()) < 0.05e-3 + 2 * error.std() / np.sqrt(len(error))
 
 
