@@ -67,7 +67,7 @@ def _by_every_step(effect: Effect) -> list[FloatArray]:
     return [frames[int(np.argmin(np.abs(times - time)))].displacement for time in FEW]
 
 
-def test_a_look_hangs_on_what_was_done_between_looks(data, effect):
+def test_a_cloud_depends_on_what_was_done_between_clouds(data, effect):
     found = predict(data, effect.apply(SETUP), GRID)
     assert not found.failed and not found.equilibria[0].in_contact
     dense = _by_every_step(effect)

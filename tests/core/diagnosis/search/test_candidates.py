@@ -42,7 +42,7 @@ def origin(evaluator: Evaluator) -> Model:
 @pytest.mark.parametrize(
     ("there", "added"), [(SLIDING, WEIGHT), (WEIGHT, SLIDING), (THICK, WEIGHT)]
 )
-def test_weight_and_what_hangs_on_it_are_weighed_anew_on_top_of_each_other(
+def test_gravity_and_what_depends_on_it_are_weighed_anew_on_top_of_each_other(
     evaluator: Evaluator, origin: Model, there, added
 ):
     finite = replayed_signatures(evaluator, origin, [there, added], origin)
