@@ -58,7 +58,7 @@ names:
 docs: $(VENV)/.documented names
 	$(VENV)/bin/python docs/draw_architecture.py
 	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/mkdocs build --quiet --strict -f docs/mkdocs.yml
-	$(VENV)/bin/python -m pytest -q tests/docs tests/examples -m "not slow and not more"
+	$(VENV)/bin/python -m pytest -q tests/docs -m "not slow and not more"
 
 # Side by side, each with a cache of its own: they check by other rules.
 types-of-code:

@@ -37,17 +37,27 @@ FEWEST_TOUCHES = 4
 _BAGS = (".bag", ".db3", ".mcap")
 
 
+FARTHEST_REPEAT = 5e-3
+"""Largest distance between repeated touches of one landmark [m]."""
+LEAST_FREEDOM = 6
+"""Fewest degrees of freedom from which repeats tell the deviation of a touch."""
+
+
 @dataclass(frozen=True, eq=False)
 class Touches:
     """Touches of landmarks.
 
     Attributes:
-        names: (n) of the landmarks.
-        positions: (n, 3) tool centres at the touches [m], robot frame.
+        names: (n) of the landmarks, each once.
+        positions: (n, 3) tool centres at the touches [m], robot frame; the mean of a landmark that
+            was touched more than once.
+        deviation: standard deviation of one coordinate of a touch [m], as repeats show it; None
+            where too few landmarks were touched again.
     """
 
     names: tuple[str, ...]
     positions: FloatArray
+    deviation: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,13 +214,9 @@ def read_touches(root: Path, config: DatasetConfig) -> Touches:
                 key="landmark",
                 value=name,
             )
-        if (first := names.index(name) + FIRST_ROW) != row:
-            text = (
-                f"landmark '{name}' was touched in row {first} already; expected each once: "
-                "keep one of them"
-            )
-            raise problem(file, text, row=row, key="landmark", value=name)
     check_coordinates(file, positions)
+    _check_repeats(file, names, positions)
+    names, positions, deviation = _averaged_repeats(names, positions)
     if len(names) < FEWEST_TOUCHES:
         text = (
             f"{len(names)} touches; expected at least {FEWEST_TOUCHES}: three determine a pose "
@@ -219,7 +225,36 @@ def read_touches(root: Path, config: DatasetConfig) -> Touches:
         )
         raise problem(file, text, row=FIRST_ROW + len(names), value=len(names))
     _check_touch_scale(file, positions, np.array([config.landmarks[name] for name in names]))
-    return Touches(tuple(names), positions)
+    return Touches(tuple(names), positions, deviation)
+
+
+def _check_repeats(file: str, names: list[str], positions: FloatArray) -> None:
+    """Refuse repeated touches of one landmark that are too far apart to be of the same place."""
+    for row, name in enumerate(names):
+        apart = float(np.linalg.norm(positions[row] - positions[(first := names.index(name))]))
+        if apart > FARTHEST_REPEAT:
+            text = (
+                f"landmark '{name}' was touched in row {first + FIRST_ROW} already, "
+                f"{1e3 * apart:.1f} mm from here; expected repeats within "
+                f"{1e3 * FARTHEST_REPEAT:.0f} mm: name the right landmark, or remove one of them"
+            )
+            raise problem(file, text, row=row + FIRST_ROW, key="landmark", value=name)
+
+
+def _averaged_repeats(
+    names: list[str], positions: FloatArray
+) -> tuple[list[str], FloatArray, float | None]:
+    """Average repeated touches; return names, positions and the deviation as of `Touches`."""
+    unique = list(dict.fromkeys(names))
+    if len(unique) == len(names):
+        return unique, positions, None
+    which = np.array([unique.index(name) for name in names])
+    means = np.array([positions[which == number].mean(axis=0) for number in range(len(unique))])
+    means.flags.writeable = False
+    freedom = 3 * (len(names) - len(unique))
+    if freedom < LEAST_FREEDOM:
+        return unique, means, None
+    return unique, means, float(np.sqrt(((positions - means[which]) ** 2).sum() / freedom))
 
 
 def _check_touch_scale(file: str, positions: FloatArray, landmarks: FloatArray) -> None:

@@ -38,6 +38,7 @@ class DatasetConfig:
         tool_radius: believed radius of the spherical tip [m].
         landmarks: name to position [m], phantom frame.
         touch_offset: height of the tool centre over the landmark at a touch [m].
+        touch_sigma: standard deviation of one coordinate of a touch [m]; None if not stated.
         has_camera: whether there is a [camera] table; without one the next three are defaults.
         camera_name: for reports.
         depth_sigma: the maker's stated accuracy of depth [m].
@@ -57,6 +58,7 @@ class DatasetConfig:
     tool_radius: float
     landmarks: dict[str, Vector]
     touch_offset: float
+    touch_sigma: float | None
     has_camera: bool
     camera_name: str
     depth_sigma: float
@@ -267,10 +269,12 @@ def _tool(keys: _Keys) -> float:
 
 def _landmarks(keys: _Keys) -> dict[str, Any]:
     offset = keys.number("touch_offset", -0.2, 0.2, "m", default=0.0)
-    names = [name for name in keys.values if name != "touch_offset"]
+    sigma = keys.number("touch_sigma", 1e-6, 0.05, "m") if "touch_sigma" in keys.values else None
+    names = [name for name in keys.values if name not in ("touch_offset", "touch_sigma")]
     return {
         "landmarks": {name: keys.vector(name, -2.0, 2.0) for name in names},
         "touch_offset": offset,
+        "touch_sigma": sigma,
     }
 
 

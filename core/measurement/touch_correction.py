@@ -53,11 +53,10 @@ def touch_misses(setup: Setup, grid: Meshing) -> FloatArray:
 
 def _as_stated(setup: Setup) -> bool:
     """Whether the touches need no correction; fewer than three register nothing."""
-    plain = Touching(misses=setup.touching.misses, lift=setup.touching.lift)
+    stated = setup.touching
+    plain = Touching(misses=stated.misses, lift=stated.lift, deviation=stated.deviation)
     moved = (
-        setup.load.specific_weight_over_stiffness
-        or setup.registered is not None
-        or setup.touching != plain
+        setup.load.specific_weight_over_stiffness or setup.registered is not None or stated != plain
     )
     return len(setup.landmarks) < 3 or not moved
 

@@ -151,7 +151,11 @@ def setup_from(dataset: Dataset, registration: Registration) -> Setup:
         sensor=Sensor(depth_sigma=config.depth_sigma),
         mass=config.mass,
         landmarks=tuple(config.landmarks[name] for name in dataset.touches.names),
-        touching=Touching(misses=misses, lift=config.touch_offset),
+        touching=Touching(
+            misses=misses,
+            lift=config.touch_offset,
+            deviation=config.touch_sigma or dataset.touches.deviation,
+        ),
         phantom_from_robot=registration.phantom_from_robot,
         phantom_from_camera=registration.phantom_from_camera,
     )

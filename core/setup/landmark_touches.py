@@ -38,6 +38,7 @@ class Touching:
         scale: size of the touched polygon over that of the landmarks [1].
         inset: distance of each touch inwards from its landmark, along x and along y [m]: a ball
             does not stay on a corner.
+        deviation: standard deviation of one coordinate of a touch [m]; None if nothing tells it.
     """
 
     misses: tuple[tuple[float, float, float], ...] = ()
@@ -45,6 +46,7 @@ class Touching:
     pairing: str = "as-paired"
     scale: float = 1.0
     inset: float = 0.0
+    deviation: float | None = None
 
     def __post_init__(self) -> None:
         if self.pairing not in PAIRINGS:

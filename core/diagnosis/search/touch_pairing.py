@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.inference.noise.rest_evidence import touch_deviation
 from palpate.effects import Effect
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.touch_correction import touch_misses
@@ -44,7 +45,7 @@ def fitted_to_touches(start: Effect, setup: Setup, grid: Meshing) -> tuple[Effec
     def misses(one: Effect) -> FloatArray:
         own = (np.array(one.coordinates) - stated) / _SPREADS
         return np.concatenate(
-            [touch_misses(one.apply(setup), grid).ravel() / CRITERIA.rest.touch_deviation, own]
+            [touch_misses(one.apply(setup), grid).ravel() / touch_deviation(setup), own]
         )
 
     effect = start

@@ -163,3 +163,43 @@ def test_a_thousand_clouds_open_without_reading_their_points(folder: Path) -> No
     start = time.process_time()
     assert len(open_dataset(folder).sequence("poke-01")) == 1000
     assert time.process_time() - start < 1.0
+
+
+def test_repeated_touches_are_averaged_and_tell_their_deviation(tmp_path: Path) -> None:
+    folder = write_valid_dataset(tmp_path / "block")
+    file, random = folder / "touches.csv", np.random.default_rng(3)
+    head, *rows = file.read_text().split()
+    once = open_dataset(folder).touches
+    assert once.deviation is None
+    made = []
+    for row in rows:
+        name, *place = row.split(",")
+        for _ in range(6):
+            noisy = np.array(place, dtype=float) + 3e-4 * random.standard_normal(3)
+            made.append(",".join([name, *(f"{value:.7f}" for value in noisy)]))
+    file.write_text("\n".join([head, *made]) + "\n")
+    touches = open_dataset(folder).touches
+    assert touches.names == once.names
+    assert np.abs(touches.positions - once.positions).max() < 5e-4
+    assert touches.deviation == pytest.approx(3e-4, rel=0.3)
+
+
+def test_repeat_at_another_place_is_refused_with_its_row(tmp_path: Path) -> None:
+    folder = write_valid_dataset(tmp_path / "block")
+    file = folder / "touches.csv"
+    head, first, *rows = file.read_text().split()
+    name, x, y, z = first.split(",")
+    wrong = ",".join([name, f"{float(x) + 0.012:.7f}", y, z])
+    file.write_text("\n".join([head, first, *rows, wrong]) + "\n")
+    with pytest.raises(DatasetError, match=r"row 2 already, 12.0 mm from here") as caught:
+        open_dataset(folder)
+    assert caught.value.where["row"] == 6
+
+
+def test_stated_deviation_of_touches_reaches_the_setup(tmp_path: Path) -> None:
+    folder = write_valid_dataset(tmp_path / "block")
+    file = folder / "dataset.toml"
+    file.write_text(
+        file.read_text().replace("touch_offset = 0.0", "touch_offset = 0.0\ntouch_sigma = 2e-4")
+    )
+    assert open_dataset(folder).config.touch_sigma == 2e-4

@@ -20,7 +20,7 @@ from palpate.mesh.protocol import Meshing
 from palpate.registration.pose import motion_jacobian
 from palpate.setup.setup import Setup
 
-__all__ = ["RestEvidence", "touch_block"]
+__all__ = ["RestEvidence", "touch_block", "touch_deviation"]
 
 
 Varied = dict[int, tuple[Setup, float]]
@@ -68,8 +68,13 @@ def touch_block(setup: Setup, grid: Meshing, columns: int, varied: Varied) -> Bl
     stacked[:, 0] = here.ravel()
     for column, (other, step) in varied.items():
         stacked[:, 1 + column] = (touch_misses(other, grid) - here).ravel() / step
-    stacked = _beside_pose(touched_places(setup), stacked) / CRITERIA.rest.touch_deviation
+    stacked = _beside_pose(touched_places(setup), stacked) / touch_deviation(setup)
     return Block("touches", stacked.T @ stacked, 3.0 * count - 6.0)
+
+
+def touch_deviation(setup: Setup) -> float:
+    """Standard deviation of one coordinate of a touch [m]: of the dataset, or the usual one."""
+    return setup.touching.deviation or CRITERIA.rest.touch_deviation
 
 
 def _beside_pose(places: FloatArray, rows: FloatArray) -> FloatArray:

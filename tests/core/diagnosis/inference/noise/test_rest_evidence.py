@@ -104,3 +104,10 @@ def test_two_touches_say_nothing():
         not touch_block(lonely, GRID, 2, {}).gram.any()
         and touch_block(lonely, GRID, 2, {}).values == 0
     )
+
+
+def test_stated_deviation_replaces_the_usual_one():
+    setup = _registered(STATED, 2e-4, seed=3)
+    exact = replace(setup, touching=replace(setup.touching, deviation=2e-4))
+    ratio = _block(exact).gram[0, 0] / _block(setup).gram[0, 0]
+    assert ratio == pytest.approx((CRITERIA.rest.touch_deviation / 2e-4) ** 2)
