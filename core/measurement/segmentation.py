@@ -34,6 +34,9 @@ SIGMAS = 3.0
 """Standard deviations of noise that the tests allow for [1]."""
 POSE_ERROR = 5.0e-4
 """Error of the tool's position [m] after `locate_tool`; widens the tests on tool and shaft."""
+_HOLDER, _HEAVE = 4.0e-3, 0.5e-3
+"""How far beyond the tool's radius parts of the tool are looked for, and how far a pressed phantom
+may stand out around the tool [m]."""
 TABLE_REACH = 0.08
 """Distance from the block up to which points of the table are used [m]."""
 FARTHEST_TABLE, FEWEST_ON_TABLE = 8.0e-3, 100
@@ -110,9 +113,9 @@ class Cleaner:
         if tool is not None:
             camera = self.phantom_from_camera.translation
             near = np.flatnonzero(reason != REASONS.index("table"))
-            is_tool, is_shaft = self._tool_points(
-                points[near], locate_tool(points[near], apart[near], tool, camera, self._slack)
-            )
+            located = locate_tool(points[near], apart[near], tool, camera, self._slack)
+            is_tool, is_shaft = self._tool_points(points[near], located)
+            is_tool |= self._beside_tool(points[near], apart[near], located)
             reason[near[is_tool]] = REASONS.index("tool")
             reason[near[is_shaft & ~is_tool]] = REASONS.index("shaft")
         phantom = np.flatnonzero(reason == 0)
@@ -179,6 +182,22 @@ class Cleaner:
         """
         sight = self.phantom_from_camera.translation
         return float(abs(self.table[0] @ sight) / max(float(np.linalg.norm(sight)), 1e-9))
+
+    def _beside_tool(self, points: FloatArray, apart: FloatArray, tool: ToolPose) -> Mask:
+        """Mask (n,) of points (n, 3) [m] near the tool's axis that lie outside the undeformed
+        phantom by more than noise: a tool larger than stated, a neck, a holder.
+
+        Args:
+            points: phantom frame.
+            apart: (n,) distance from the undeformed phantom [m].
+            tool: as located.
+        """
+        offset = points - tool.centre
+        height = offset @ tool.shaft.axis if tool.shaft else np.zeros(len(points))
+        if tool.shaft is not None:
+            offset = offset - np.maximum(height, 0.0)[:, None] * tool.shaft.axis
+        reach = self.tool_radius + _HOLDER
+        return np.asarray((np.linalg.norm(offset, axis=1) < reach) & (apart > self._slack + _HEAVE))
 
     def _tool_points(self, points: FloatArray, tool: ToolPose) -> tuple[Mask, Mask]:
         """Masks (n,) of points (n, 3) [m], phantom frame, on the sphere and on the shaft.

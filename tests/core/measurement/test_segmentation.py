@@ -137,9 +137,9 @@ def test_tool_of_another_size_than_stated_goes_if_its_size_is_allowed(scene):
     view = scene(tool=tuple(centre), pixels=150).look(seed=2)
     stated = Cleaner(size=SIZE, phantom_from_camera=view.pose, tool_radius=2e-3, noise=4e-4)
     tool = ToolPose(centre, ToolShaft(UP, RADIUS))
-    assert kept(stated.clean(view.cloud, tool), view.label, SPHERE) > 0.5
+    assert kept(stated.clean(view.cloud, tool), view.label, SPHERE) > 0.1
     found = stated.allowing(5e-3).clean(view.cloud, tool)
-    assert kept(found, view.label, SPHERE) < 0.1
+    assert kept(found, view.label, SPHERE) < 0.05
     assert kept(found, view.label, BLOCK) > 0.93
 
 
@@ -162,3 +162,15 @@ def test_measured_datasets_keep_the_block_and_little_else(measured_datasets):
             total += len(found.points)
             assert found.counts["kept"] > 1800
         assert outside < 1e-3 * total
+
+
+def test_parts_of_the_tool_beyond_its_stated_size_go_where_they_stand_clear(scene):
+    centre = np.array([0.008, -0.004, SIZE[2] + 0.006])
+    view = scene(tool=tuple(centre), tool_radius=7e-3, pixels=150).look(seed=3)
+    cleaner = Cleaner(size=SIZE, phantom_from_camera=view.pose, tool_radius=5e-3, noise=4e-4)
+    found = cleaner.clean(view.cloud, ToolPose(centre, ToolShaft(UP, RADIUS)))
+    heights = view.pose.apply(view.cloud)[:, 2] - SIZE[2]
+    clear = np.flatnonzero((view.label == SPHERE) & (heights > 3e-3))
+    assert len(clear) > 20
+    assert np.isin(clear, found.indices).mean() < 0.02
+    assert kept(found, view.label, BLOCK) > 0.93
