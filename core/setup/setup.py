@@ -291,7 +291,8 @@ class Setup:
             },
             "landmarks": [list(place) for place in self.landmarks],
             "touching": {
-                **vars(self.touching),
+                # An unknown deviation is left out: setups stored before there was one have none.
+                **{key: value for key, value in vars(self.touching).items() if value is not None},
                 "misses": [list(miss) for miss in self.touching.misses],
             },
             "element_size": self.element_size,

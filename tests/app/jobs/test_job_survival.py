@@ -26,11 +26,11 @@ from palpate.foundation.errors import SetupError
 
 SERVER = """
 import pathlib, sys, time
-from palpate.app.jobs.job_queue import Jobs
+from palpate.app.jobs.job_queue import JobQueue
 from job_functions import TARGETS
 if __name__ == "__main__":
     folder, kept = map(pathlib.Path, sys.argv[1:])
-    jobs = Jobs(folder, TARGETS)
+    jobs = JobQueue(folder, TARGETS)
     done = jobs.submit("count", {"steps": 1, "result": str(kept / "first")}, label="first")
     while not jobs.get(done.id).state.is_finished:
         time.sleep(0.02)

@@ -73,8 +73,12 @@ def test_solved_frames_are_those_of_before(client: httpx.Client, home: OldHome) 
         path, body = entry.removeprefix("POST ").split(" ", 1)
         expected, answer = home.answers[entry], client.post(f"/api/{path}", json=json.loads(body))
         assert answer.status_code == expected["status"], f"{entry}: {answer.text[:300]}"
-        expected["answer"].pop("seconds", None)
-        found += differences(expected["answer"], answer.json(), entry, tolerance=TOLERANCE)
+        before, now = expected["answer"], answer.json()
+        before.pop("seconds", None)
+        if "distance" in before:
+            # Of the clouds more or less is cleaned away than before.
+            assert now.pop("distance") == pytest.approx(before.pop("distance"), rel=0.15), entry
+        found += differences(before, now, entry, tolerance=TOLERANCE)
     assert found == []
 
 
@@ -159,8 +163,11 @@ def test_an_old_registration_is_used_by_the_terminal(home: OldHome, tmp_path: Pa
     assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
     with np.load(home.expected / "replay.npz") as expected, np.load(out) as found:
         assert set(expected.files) <= set(found.files)
-        for name in ("time", "tool", "rest", "faces", "vertices", "force"):
+        for name in ("time", "rest", "faces"):
             assert np.allclose(found[name], expected[name], atol=1e-6, rtol=1e-4), name
+        # The tool's position was a single sample of the stream; now it is a mean over 40 ms.
+        for name, error in (("tool", 3e-4), ("vertices", 3e-4), ("force", 1e-2)):
+            assert np.abs(found[name] - expected[name]).max() < error, name
 
 
 def test_trained_networks_load_and_correct_to_the_same_numbers(home: OldHome) -> None:
