@@ -20,13 +20,13 @@ from palpate.app.commands.console import (
     print_warnings,
     progress,
 )
+from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError, PalpateError, RegistrationError
 from palpate.foundation.progress import part
 
 if TYPE_CHECKING:
     from palpate.dataset import Dataset
     from palpate.dataset.check import DatasetSummary
-    from palpate.experiment import ReplayedSequence
     from palpate.mesh.box_mesh import BoxMesh
     from palpate.registration.registration import Registration
     from palpate.replay.equilibrium import Equilibrium
@@ -110,28 +110,30 @@ def replay(
 
     Frames without equilibrium are listed, marked in the file, and make the exit code 1.
     """
+    import palpate.registration.registration as registering
+    import palpate.replay.replay as simulation
     from palpate.app.storage.registration_store import accepted_for
     from palpate.dataset import open_dataset
-    from palpate.experiment import register as registered
-    from palpate.fem.newton import RELATIVE_TOLERANCE
     from palpate.mesh.box_mesh import GridSpec, box_mesh
+    from palpate.mesh.graded_mesh import REPLAY_GRID
+    from palpate.mesh.protocol import Meshing
     from palpate.replay.mesh_convergence import mesh_errors
 
     even = None if grid == "graded" else GridSpec.parse(grid)
-    accepted = accepted_for(dataset, registration, runs)
+    opened = open_dataset(dataset).registered(accepted_for(dataset, registration, runs))
+    kinematics = opened.sequence(sequence).kinematics
+    times = opened.sequence(sequence).cloud_times
+    times = times if len(times) else kinematics.time
     with progress(f"replay {sequence}") as report:
-        opened = open_dataset(dataset)
-        opened.sequence(sequence)
-        experiment = registered(opened, accepted=accepted, report=part(report, 0.0, 0.1))
-        replayed = experiment.replay(
-            sequence, grid=even, tolerance=RELATIVE_TOLERANCE, report=part(report, 0.1, 0.8)
-        )
-        errors = mesh_errors(
-            experiment.setup, replayed.frames, replayed.grid, report=part(report, 0.8, 1.0)
-        )
-    mesh = box_mesh(experiment.setup.box.size, even or GridSpec(nodes=_NODES))
-    _save_frames(file, mesh, replayed, errors)
-    frames, failed = replayed.frames, replayed.failed
+        relation = registering.register(opened, part(report, 0.0, 0.1))
+        setup = registering.setup_from(opened, relation)
+        spec: Meshing = even or REPLAY_GRID.for_tool(setup.tool.radius)
+        centres = setup.phantom_from_robot.apply(kinematics.position_at(times))
+        frames = simulation.replay(setup, centres, spec, times=times, report=part(report, 0.1, 0.8))
+        errors = mesh_errors(setup, frames, spec, report=part(report, 0.8, 1.0))
+    mesh = box_mesh(setup.box.size, even or GridSpec(nodes=_NODES))
+    _save_frames(file, mesh, times, centres, frames, errors)
+    failed = _failed(frames)
     where = f"{grid} nodes" if even else "a mesh that follows the tool"
     out.print(
         f"{len(frames)} frames on {where}, {len(frames) - len(failed)} converged: {file}",
@@ -144,30 +146,42 @@ def replay(
             f"[yellow]frame {number}[/] {frame.outcome.value} (residual {frame.residual:.2g})",
             highlight=False,
         )
-    if len(failed):
+    if failed:
         raise typer.Exit(1)
 
 
 def _save_frames(
-    file: Path, mesh: BoxMesh, replayed: ReplayedSequence, errors: Sequence[MeshErrorEstimate]
+    file: Path,
+    mesh: BoxMesh,
+    times: FloatArray,
+    centres: FloatArray,
+    frames: Sequence[Equilibrium],
+    errors: Sequence[MeshErrorEstimate],
 ) -> None:
     """Write the frames with the surface of a mesh of the block at rest."""
     used, quads = np.unique(mesh.free_surface, return_inverse=True)
     rest = mesh.nodes[used]
     _save(
         file,
-        time=replayed.times,
-        tool=replayed.centres,
+        time=times,
+        tool=centres,
         rest=rest,
         faces=quads.reshape(-1, 4),
-        vertices=replayed.surface(rest),
-        force=replayed.force,
-        residual=np.array([frame.residual for frame in replayed.frames]),
-        outcome=np.array([frame.outcome.name for frame in replayed.frames]),
+        vertices=np.stack([frame.move(rest) for frame in frames]),
+        force=np.stack([frame.force for frame in frames]),
+        residual=np.array([frame.residual for frame in frames]),
+        outcome=np.array([frame.outcome.name for frame in frames]),
         mesh_error=np.array(
             [(error.frame, error.displacement, error.relative, error.force) for error in errors]
         ).reshape(-1, 4),
     )
+
+
+def _failed(frames: Sequence[Equilibrium]) -> list[int]:
+    """Indices of the frames without equilibrium."""
+    from palpate.fem.newton import Outcome
+
+    return [number for number, frame in enumerate(frames) if frame.outcome != Outcome.CONVERGED]
 
 
 def _print_mesh_errors(frames: Sequence[Equilibrium], errors: Sequence[MeshErrorEstimate]) -> None:

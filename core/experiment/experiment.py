@@ -201,7 +201,7 @@ class Experiment:
         clock = times - self.setup.sensor.time_offset
         frames = replay(self.setup, centres, mesh, times=clock, tolerance=tolerance, report=report)
         return ReplayedSequence(
-            self, sequence, times, index if observed else None, centres, mesh, tuple(frames)
+            self, sequence, times, index if observed else None, centres, tuple(frames)
         )
 
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray, IntArray
-from palpate.mesh.protocol import Meshing
 from palpate.replay.equilibrium import Equilibrium
 
 if TYPE_CHECKING:
@@ -28,7 +27,6 @@ class ReplayedSequence:
         times: (f,) stamps of the frames [s].
         cloud_index: (f,) cloud of each frame; None for a sequence without clouds.
         centres: (f, 3) tool centres under the model [m], phantom frame.
-        grid: the mesh.
         frames: the equilibria.
     """
 
@@ -37,7 +35,6 @@ class ReplayedSequence:
     times: FloatArray
     cloud_index: IntArray | None
     centres: FloatArray
-    grid: Meshing
     frames: tuple[Equilibrium, ...]
 
     def __len__(self) -> int:
