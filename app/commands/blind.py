@@ -31,6 +31,7 @@ from palpate.blind import (
     run_case,
     run_suite,
     summary_of,
+    with_nuisances,
 )
 from palpate.foundation.errors import RunError
 
@@ -73,6 +74,28 @@ def blind(
             "--short", help="Five sequences instead of seven: faster and less informative."
         ),
     ] = False,
+    nuisances: Annotated[
+        bool,
+        typer.Option(
+            "--nuisances",
+            help="Give the bench the faults of real cameras, robots, tools and phantoms.",
+        ),
+    ] = False,
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            help="Camera of the bench with nuisances: d405, d415, d435, azure-kinect, "
+            "structured-light; drawn if omitted."
+        ),
+    ] = None,
+    filters: Annotated[
+        str | None,
+        typer.Option(
+            "--filter",
+            help="Filters on its images, separated by commas: decimation, spatial, hole-filling, "
+            "temporal, or '' for none; drawn if omitted.",
+        ),
+    ] = None,
     any_version: Annotated[
         bool, typer.Option("--any-version", help="Also use results of other versions of the code.")
     ] = False,
@@ -104,6 +127,8 @@ def blind(
         cases = all_cases(seed, CONTROLS if controls is None else controls, hidden, short)
     else:
         cases = draw_cases(seed, scenarios, _split(kinds), hidden, controls, short)
+    if nuisances or camera is not None or filters is not None:
+        cases = with_nuisances(cases, camera, _split(filters))
     cases = [case for case in cases if only is None or only in case.name]
     if score:
         results = known_results(folder, cases, any_version)

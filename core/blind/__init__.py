@@ -6,7 +6,7 @@ errors, coverage and calibration, against the targets.
 """
 
 from palpate.blind.case_results import RESULTS_FILE, CaseResult, read_results
-from palpate.blind.cases import KINDS, MIX, Case, all_cases, draw_cases, scenario_of
+from palpate.blind.cases import KINDS, MIX, Case, all_cases, draw_cases, scenario_of, with_nuisances
 from palpate.blind.run_suite import known_results, run_case, run_suite
 from palpate.blind.summary import summary_of
 
@@ -24,4 +24,5 @@ __all__ = [
     "run_suite",
     "scenario_of",
     "summary_of",
+    "with_nuisances",
 ]

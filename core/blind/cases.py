@@ -14,7 +14,16 @@ from palpate.foundation.errors import RunError
 if TYPE_CHECKING:
     from palpate.synthetic import Scenario
 
-__all__ = ["ALIKE", "KINDS", "MIX", "Case", "all_cases", "draw_cases", "scenario_of"]
+__all__ = [
+    "ALIKE",
+    "KINDS",
+    "MIX",
+    "Case",
+    "all_cases",
+    "draw_cases",
+    "scenario_of",
+    "with_nuisances",
+]
 
 KINDS = ("control", "clear", "subtle", "pair", "outside", "twins", "modulus")
 """Kinds of cases: nothing hidden; one effect of clear or of subtle size; two effects; a disturbance
@@ -56,6 +65,10 @@ class Case:
         kind: one of KINDS.
         hidden: names of the effects, or of the disturbance.
         short: whether five sequences are recorded, not seven.
+        nuisances: whether the bench has the nuisances of real ones; every second case then has 1 to
+            3 mm of depth noise.
+        camera: name of a camera in place of a drawn one; None for a drawn one.
+        filters: names of the filters on its images; None for a drawn one.
     """
 
     name: str
@@ -63,15 +76,30 @@ class Case:
     kind: str
     hidden: tuple[str, ...] = ()
     short: bool = False
+    nuisances: bool = False
+    camera: str | None = None
+    filters: tuple[str, ...] | None = None
+
+    @property
+    def noisy(self) -> bool:
+        """Whether the depth noise is 1 to 3 mm."""
+        return self.nuisances and self.camera is None and self.seed % 2 == 1
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
-        return asdict(self) | {"hidden": list(self.hidden)}
+        """Plain values; of the bench only what differs from a bench without nuisances."""
+        values = asdict(self) | {"hidden": list(self.hidden)}
+        if self.filters is not None:
+            values["filters"] = list(self.filters)
+        plain = Case(self.name, self.seed, self.kind)
+        bench = ("nuisances", "camera", "filters")
+        same = {name for name in bench if getattr(self, name) == getattr(plain, name)}
+        return {name: value for name, value in values.items() if name not in same}
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Case:
         """Read the output of `to_json`."""
-        return cls(**{**data, "hidden": tuple(data["hidden"])})
+        lists = {name: tuple(data[name]) for name in ("hidden", "filters") if name in data}
+        return cls(**{**data, **lists})
 
 
 def all_cases(
@@ -147,9 +175,32 @@ def draw_cases(
     return cases
 
 
+def with_nuisances(
+    cases: Sequence[Case], camera: str | None = None, filters: Sequence[str] | None = None
+) -> list[Case]:
+    """The same cases on a bench with nuisances; RunError for an unknown camera or filter.
+
+    Args:
+        cases: on a bench without.
+        camera: its name; drawn if None.
+        filters: names of the filters on its images; drawn if None.
+    """
+    from palpate.synthetic import draw_nuisances
+
+    draw_nuisances(0, camera=camera, filters=filters)
+    chosen = None if filters is None else tuple(filters)
+    return [replace(case, nuisances=True, camera=camera, filters=chosen) for case in cases]
+
+
 def scenario_of(case: Case) -> Scenario:
     """The scenario of a case, from its kind, its hidden names and its seed alone."""
-    from palpate.synthetic import SHORT_PROTOCOL, Scenario, draw_disturbance, draw_scenario
+    from palpate.synthetic import (
+        SHORT_PROTOCOL,
+        Scenario,
+        draw_disturbance,
+        draw_nuisances,
+        draw_scenario,
+    )
 
     if case.kind == "control":
         scenario = Scenario()
@@ -165,6 +216,11 @@ def scenario_of(case: Case) -> Scenario:
         scenario = _pressing(scenario)
     # A slip of a millimetre is not noticed, and the block is not put back.
     scenario = replace(scenario, put_back=scenario.hidden("base_slip") is None)
+    if case.nuisances:
+        drawn = draw_nuisances(
+            case.seed, noisy=case.noisy, camera=case.camera, filters=case.filters
+        )
+        scenario = replace(scenario, nuisances=drawn)
     return replace(scenario, sequences=SHORT_PROTOCOL) if case.short else scenario
 
 

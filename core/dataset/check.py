@@ -14,6 +14,7 @@ from palpate.dataset.tool_motion import ToolMotion, describe_motion
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.foundation.progress import Report, part, silent
+from palpate.setup.depth_filters import DEPTH_FILTERS
 
 __all__ = ["ClockSummary", "DatasetSummary", "SequenceSummary", "check_dataset"]
 
@@ -182,6 +183,15 @@ def _doubts(dataset: Dataset) -> list[str]:
     if not dataset.config.test:
         doubts.append(
             "no sequence is kept for the test, so no gain can be shown: name one in splits.test"
+        )
+    doubts += [
+        f"dataset.toml: camera.filters names {name}: {DEPTH_FILTERS[name].caution}"
+        for name in dataset.config.camera_filters
+    ]
+    if dataset.config.edge:
+        doubts.append(
+            f"edge-filtered depth: points within {1e3 * dataset.config.edge:.1f} mm of the "
+            "phantom's edges are left out of every comparison"
         )
     listed = {file for name in dataset.sequences for file in dataset.sequence(name).cloud_files}
     present = {

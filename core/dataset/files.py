@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import stat
+import tomllib
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from palpate.foundation.errors import DatasetError
 
-__all__ = ["open_inside", "problem", "read_text"]
+__all__ = ["open_inside", "problem", "read_text", "read_toml"]
 
 
 def problem(
@@ -89,3 +90,17 @@ def read_text(root: Path, file: str, limit: int) -> str:
 
 def _reason(error: Exception) -> str:
     return getattr(error, "strerror", None) or str(error)
+
+
+def read_toml(root: Path, file: str, limit: int) -> dict[str, Any]:
+    """Read a TOML file of at most `limit` bytes, relative to `root`."""
+    text = read_text(root, file, limit)
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        # tomllib ends its message with "(at line 3, column 8)".
+        tail = str(error).rpartition("at line ")[2].partition(",")[0]
+        row = int(tail) if tail.isdecimal() else None
+        raise problem(
+            file, f"is not valid TOML: {error}; correct the syntax there", row=row
+        ) from None

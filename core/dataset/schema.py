@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import difflib
 import math
-import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from palpate.dataset.files import problem, read_text
+from palpate.dataset.files import problem, read_toml
 from palpate.foundation.errors import DatasetError, SetupError
 from palpate.foundation.frames import Transform
+from palpate.setup.depth_filters import DEPTH_FILTERS
 
 __all__ = ["FILE", "DatasetConfig", "nearest", "read_config"]
 
@@ -43,6 +43,9 @@ class DatasetConfig:
         camera_name: for reports.
         depth_sigma: the maker's stated accuracy of depth [m].
         to_phantom: first guess of phantom_from_camera; None without.
+        camera_filters: names of the filters on its images.
+        edge: width of the band along the phantom's edges in which depth is rounded [m]; the widest
+            of the filters' if not stated.
         train: names of sequences for the fit.
         validation: names of sequences for validation.
         test: names of sequences for the test.
@@ -63,6 +66,8 @@ class DatasetConfig:
     camera_name: str
     depth_sigma: float
     to_phantom: Transform | None
+    camera_filters: tuple[str, ...]
+    edge: float
     train: tuple[str, ...]
     validation: tuple[str, ...]
     test: tuple[str, ...]
@@ -72,7 +77,7 @@ def read_config(root: Path) -> DatasetConfig:
     """Read and check dataset.toml; every DatasetError names the key, the value and what is
     expected.
     """
-    top = _Keys("", _toml(root))
+    top = _Keys("", read_toml(root, FILE, _LIMIT))
     top.only(("format", "name", "phantom", "tool", "landmarks", "camera", "splits", "topics"))
     if (version := top.take("format")) != 1 or isinstance(version, bool):
         raise top.wrong("format", version, "1, the only version there is: convert the dataset")
@@ -99,19 +104,6 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return (
         (f"did you mean '{close[0]}'? " if close else "") + "Known: " + (", ".join(known) or "none")
     )
-
-
-def _toml(root: Path) -> dict[str, Any]:
-    text = read_text(root, FILE, _LIMIT)
-    try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        # tomllib ends its message with "(at line 3, column 8)".
-        tail = str(error).rpartition("at line ")[2].partition(",")[0]
-        row = int(tail) if tail.isdecimal() else None
-        raise problem(
-            FILE, f"is not valid TOML: {error}; correct the syntax there", row=row
-        ) from None
 
 
 class _Keys:
@@ -194,10 +186,10 @@ class _Keys:
             tuple(self.finite(f"{key}[{i}]", one, low, high, "m") for i, one in enumerate(value)),
         )
 
-    def names(self, key: str) -> tuple[str, ...]:
+    def names(self, key: str, kind: str = "sequences") -> tuple[str, ...]:
         value = self.values.get(key, [])
         if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
-            raise self.wrong(key, value, "a list of names of sequences in quotes")
+            raise self.wrong(key, value, f"a list of names of {kind} in quotes")
         return tuple(value)
 
     def finite(self, key: str, value: object, low: float, high: float, unit: str) -> float:
@@ -280,14 +272,34 @@ def _landmarks(keys: _Keys) -> dict[str, Any]:
 
 def _camera(keys: _Keys | None) -> dict[str, Any]:
     if keys is None:
-        return {"has_camera": False, "camera_name": "", "depth_sigma": 0.002, "to_phantom": None}
-    keys.only(("name", "depth_sigma", "to_phantom"))
+        return {
+            "has_camera": False,
+            "camera_name": "",
+            "depth_sigma": 0.002,
+            "to_phantom": None,
+            "camera_filters": (),
+            "edge": 0.0,
+        }
+    keys.only(("name", "depth_sigma", "to_phantom", "filters", "edge"))
+    filters = _filters(keys)
+    widest = max((DEPTH_FILTERS[name].edge for name in filters), default=0.0)
     return {
         "has_camera": True,
         "camera_name": keys.text("name"),
         "depth_sigma": keys.number("depth_sigma", 1e-6, 0.1, "m"),
         "to_phantom": _pose(keys, "to_phantom") if "to_phantom" in keys.values else None,
+        "camera_filters": filters,
+        "edge": keys.number("edge", 0.0, 0.02, "m", default=widest),
     }
+
+
+def _filters(keys: _Keys) -> tuple[str, ...]:
+    """Names of the filters on the camera's images."""
+    filters = keys.names("filters", "filters")
+    for name in filters:
+        if name not in DEPTH_FILTERS:
+            raise keys.wrong("filters", name, f"a known filter; {nearest(name, DEPTH_FILTERS)}")
+    return filters
 
 
 def _pose(keys: _Keys, key: str) -> Transform:

@@ -25,8 +25,8 @@ SIDES = ("+z", "-y", "+y", "-x", "+x")
 GRAZING = 0.3
 """Least cosine between ray and normal [1]; below it, depth noise moves points along the surface."""
 _EDGE = 1.5e-3
-"""Distance to an edge of the block below which points are left out [m]; depth cameras round
-edges."""
+"""Distance to an edge of the block below which points are left out [m], whatever is declared:
+depth cameras round edges."""
 _OUTLIER = 8e-3
 """Distance beyond which a point is an outlier [m]."""
 _BESIDE = 1e-3
@@ -42,17 +42,20 @@ class Surface:
         spacing: largest distance of vertices [m].
         patch: approximate edge length of a patch [m].
         stated: the block whose lengths set the numbers of vertices and patches; `geometry` if None.
+        edge: distance to an edge of the block below which points are left out [m].
     """
 
     geometry: Box
     spacing: float = 1.5e-3
     patch: float = 4e-3
     stated: Box | None = None
+    edge: float = _EDGE
 
     @classmethod
     def of(cls, setup: Setup, spacing: float = 1.5e-3) -> Surface:
         """The surface of a setup's block."""
-        return cls(setup.box, spacing=spacing, stated=setup.registered)
+        edge = max(_EDGE, setup.sensor.edge)
+        return cls(setup.box, spacing=spacing, stated=setup.registered, edge=edge)
 
     def axes(self, side: str) -> tuple[int, int, int]:
         """Normal axis and the two axes in the plane, right-handed about the outward normal."""
@@ -275,9 +278,8 @@ def gaps(
     gap = np.einsum("mi,mi->m", points[hit] - frame.move(foot), normal)
     side = surface.side[triangle]
     facing = -np.einsum("mi,mi->m", rays, normal)
-    good = (
-        (facing > grazing) & (surface.edge_distance(foot, side) > _EDGE) & (np.abs(gap) < _OUTLIER)
-    )
+    good = (facing > grazing) & (np.abs(gap) < _OUTLIER)
+    good &= surface.edge_distance(foot, side) > surface.edge
     good &= foot[:, 2] >= surface.bounds[0][2] + lowest
     good |= everything
     foot, side = foot[good], side[good]

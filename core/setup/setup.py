@@ -124,6 +124,8 @@ class Sensor:
             stated one.
         depth_offset: b in the reading a z + b of a depth z along the camera's axis [m].
         depth_scale: a in the same [1].
+        edge: width of the band along the phantom's edges in which filters round depth [m]; points
+            there are not compared.
     """
 
     depth_sigma: float = 0.002
@@ -131,6 +133,7 @@ class Sensor:
     camera_shift: Transform = field(default_factory=Transform)
     depth_offset: float = 0.0
     depth_scale: float = 1.0
+    edge: float = 0.0
 
     def __post_init__(self) -> None:
         require_within("sensor depth_offset", self.depth_offset, -0.2, 0.2, "m")
@@ -288,6 +291,8 @@ class Setup:
                 "camera_shift": self.sensor.camera_shift.matrix.tolist(),
                 "depth_offset": self.sensor.depth_offset,
                 "depth_scale": self.sensor.depth_scale,
+                # Left out without one: setups stored before there was one have none.
+                **({"edge": self.sensor.edge} if self.sensor.edge else {}),
             },
             "landmarks": [list(place) for place in self.landmarks],
             "touching": {

@@ -7,6 +7,7 @@ and `make_palpation` write whole datasets with their truth beside them.
 
 from palpate.synthetic.make_dataset import make_dataset
 from palpate.synthetic.make_palpation import Palpation, draw_palpation, make_palpation
+from palpate.synthetic.nuisances import CAMERAS, FILTERS, NUISANCES, Nuisance, draw_nuisances
 from palpate.synthetic.scenario.disturbance import DISTURBANCES, Disturbance, draw_disturbance
 from palpate.synthetic.scenario.hidden_effects import HIDDEN, QUICK, WEIGHED, HiddenEffect
 from palpate.synthetic.scenario.paper_protocol import (
@@ -21,8 +22,11 @@ from palpate.synthetic.scenario.scenario_draws import draw_scenario
 from palpate.synthetic.scenario.truth_file import Truth, truth_path
 
 __all__ = [
+    "CAMERAS",
     "DISTURBANCES",
+    "FILTERS",
     "HIDDEN",
+    "NUISANCES",
     "PAPER_EFFECTS",
     "PAPER_SEED",
     "PAPER_SIZES",
@@ -31,11 +35,13 @@ __all__ = [
     "WEIGHED",
     "Disturbance",
     "HiddenEffect",
+    "Nuisance",
     "Palpation",
     "PaperSize",
     "Scenario",
     "Truth",
     "draw_disturbance",
+    "draw_nuisances",
     "draw_palpation",
     "draw_scenario",
     "make_dataset",

@@ -18,10 +18,14 @@ from palpate.foundation.processes import ProcessPool
 from palpate.foundation.progress import Report, silent
 from palpate.synthetic.atomic_write import write_atomically
 from palpate.synthetic.bench.depth_camera import CameraScene, DepthCamera, place_camera
+from palpate.synthetic.bench.depth_image import nuisance_cloud, shown
+from palpate.synthetic.bench.formed_surface import FormedSurface
 from palpate.synthetic.bench.motion_plan import MotionPlan, draw_motion
 from palpate.synthetic.bench.sequence_recording import SequenceJob, SequenceRecord, record_motion
 from palpate.synthetic.bench.virtual_experiment import rest_surface
 from palpate.synthetic.dataset_writer import write_config, write_ply, write_touches
+from palpate.synthetic.nuisances.nuisance import StatedMotion
+from palpate.synthetic.nuisances.nuisance_chain import stated_centres
 from palpate.synthetic.scenario.scenario import STRAYED, Scenario
 from palpate.synthetic.scenario.truth_file import Truth
 
@@ -29,6 +33,8 @@ __all__ = ["make_dataset", "motions"]
 
 TOUCH_NOISE = 0.15e-3
 """Standard deviation of a touch [m]."""
+_BETWEEN = 60.0
+"""Time from `rest.ply` to the first sequence, and between the beginnings of sequences [s]."""
 
 
 def make_dataset(
@@ -56,7 +62,7 @@ def _fill(folder: Path, scenario: Scenario, seed: int, workers: int, report: Rep
     camera = _draw_camera(scenario, block, seen, rng)
     shift = _camera_shift(scenario, rng)
     scene = CameraScene(block, None, np.array([0.0, 0.0, -1.0]), 1.0)
-    write_ply(folder / "rest.ply", camera.cloud(scene, rng))
+    write_ply(folder / "rest.ply", _rest_cloud(scenario, camera, scene, rest, seed, rng))
     _write_touches(folder, scenario, robot_from_phantom, (rest, settled), rng)
     guess = (
         Transform.from_vector(rng.normal(size=3) * 2.5e-3, rng.normal(size=3) * 0.02)
@@ -74,10 +80,29 @@ def _fill(folder: Path, scenario: Scenario, seed: int, workers: int, report: Rep
             seen,
             folder / "sequences" / motion.name,
             seed,
+            session=_BETWEEN * (place + 1),
         )
-        for motion in motions(scenario, seen, seed)
+        for place, motion in enumerate(motions(scenario, seen, seed))
     ]
     return _record_all(jobs, workers, report)
+
+
+def _rest_cloud(
+    scenario: Scenario,
+    camera: DepthCamera,
+    scene: CameraScene,
+    rest: FloatArray,
+    seed: int,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """The cloud (k, 3) [m], camera frame, of a `scene` with the block in its place `rest`."""
+    if not scenario.nuisances:
+        return camera.cloud(scene, rng)
+    vertices, faces = scene.block
+    form = FormedSurface(rest, faces, scenario.true_size, scenario.nuisances)
+    scene = replace(scene, block=(form.displaced(vertices - rest), form.faces), rest=form.rest)
+    drawn = np.random.default_rng([seed, 6])
+    return nuisance_cloud(scenario.nuisances, camera, shown(camera, scene), 0.0, drawn)
 
 
 def _draw_camera(
@@ -117,6 +142,7 @@ def _record_all(jobs: list[SequenceJob], workers: int, report: Report) -> Truth:
         shortened,
         job.scenario.disturbances,
         begun,
+        job.scenario.nuisances,
     )
 
 
@@ -218,6 +244,9 @@ def _write_touches(
         [place + settled[np.argmin(np.linalg.norm(rest - place, axis=1))] for place in places]
     )
     touched = corners + (0.0, 0.0, scenario.touch_offset) + rng.normal(size=(4, 3)) * TOUCH_NOISE
+    still = np.zeros_like(touched)
+    motion = StatedMotion(np.arange(4.0), touched, still, still)
+    touched = stated_centres(scenario.nuisances, motion)
     write_touches(folder / "touches.csv", list(landmarks), robot_from_phantom.apply(touched))
 
 

@@ -76,7 +76,7 @@ class InferenceProblem:
     @cached_property
     def surface(self) -> Surface:
         """The block's surface as the camera sees it; SetupError for other bodies."""
-        return Surface(self.setup.box)
+        return Surface.of(self.setup)
 
     def effects_sharing(self, block: NuisanceBlock) -> tuple[type[Effect], ...]:
         """Return the effects of the catalogue that share these nuisance parameters."""

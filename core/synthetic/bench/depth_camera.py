@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
+from palpate.synthetic.nuisances.nuisance import Nuisance
+from palpate.synthetic.nuisances.nuisance_chain import shaped_tool
 from palpate.synthetic.scenario.disturbance import Disturbance, rippled
 from palpate.synthetic.solver.obstacles import shaft_radius
 
@@ -34,12 +37,16 @@ class CameraScene:
         centre: (3,) of the tool [m]; None without a tool.
         axis: (3,) unit vector from the shaft towards the tip.
         radius: of the tool [m].
+        rest: vertices (s, 3) of the block at rest [m]; None where it is at rest.
+        nuisances: of the tool.
     """
 
     block: tuple[FloatArray, Any]
     centre: FloatArray | None
     axis: FloatArray
     radius: float
+    rest: FloatArray | None = None
+    nuisances: tuple[Nuisance, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -77,6 +84,11 @@ class DepthCamera:
             true depth (n,) [m], infinite without a hit, and the object hit (n,): 0 block, 1 table,
             above 1 tool, -1 none.
         """
+        hit = self.cast(scene)
+        return hit["t_hit"].numpy().astype(float), hit["geometry_ids"].numpy().astype(np.int32)
+
+    def cast(self, scene: CameraScene) -> Any:
+        """Cast all rays; the fields of Open3D's `RaycastingScene.cast_rays`, camera frame."""
         import open3d as o3d
 
         cast = o3d.t.geometry.RaycastingScene(nthreads=1)
@@ -87,8 +99,7 @@ class DepthCamera:
                 _tensor(triangles.astype(np.uint32)),
             )
         rays = np.concatenate([np.zeros_like(self.rays), self.rays], axis=1).astype(np.float32)
-        hit = cast.cast_rays(_tensor(rays), nthreads=1)
-        return hit["t_hit"].numpy().astype(float), hit["geometry_ids"].numpy().astype(np.int32)
+        return cast.cast_rays(_tensor(rays), nthreads=1)
 
     def cloud(self, scene: CameraScene, rng: np.random.Generator) -> FloatArray:
         """Draw one raw cloud (k, 3) [m], camera frame, of block, table, tool and stray points."""
@@ -217,7 +228,9 @@ def _smooth(
     return np.asarray(field * amplitude / np.sqrt(np.mean(field**2)))
 
 
-def tool_solid(centre: FloatArray, axis: FloatArray, radius: float) -> list[tuple[FloatArray, Any]]:
+def tool_solid(
+    centre: FloatArray, axis: FloatArray, radius: float, nuisances: Sequence[Nuisance] = ()
+) -> list[tuple[FloatArray, Any]]:
     """Vertices and triangles of the tool's ball and of its shaft, which leaves it opposite to
     `axis`.
     """
@@ -228,10 +241,18 @@ def tool_solid(centre: FloatArray, axis: FloatArray, radius: float) -> list[tupl
         shaft_radius(radius), SHAFT_LENGTH, resolution=16, split=1
     )
     turn = Rotation.align_vectors(-axis[None], [[0.0, 0.0, 1.0]])[0].as_matrix()
-    rod = (np.asarray(shaft.vertices) + np.array([0.0, 0.0, SHAFT_LENGTH / 2])) @ turn.T + centre
+    rod = np.asarray(shaft.vertices) + np.array([0.0, 0.0, SHAFT_LENGTH / 2])
+    round_ball, *rods = shaped_tool(
+        nuisances,
+        [
+            (np.asarray(ball.vertices), np.asarray(ball.triangles)),
+            (rod, np.asarray(shaft.triangles)),
+        ],
+        radius,
+    )
     return [
-        (np.asarray(ball.vertices) + centre, np.asarray(ball.triangles)),
-        (rod, np.asarray(shaft.triangles)),
+        (round_ball[0] + centre, round_ball[1]),
+        *((vertices @ turn.T + centre, triangles) for vertices, triangles in rods),
     ]
 
 
@@ -245,6 +266,6 @@ def _meshes(scene: CameraScene) -> list[tuple[FloatArray, Any]]:
     """Meshes of block, table and tool, in this order."""
     table = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * (TABLE, TABLE, 1.0)
     meshes = [scene.block, (table, np.array([[0, 1, 2], [0, 2, 3]]))]
-    return meshes + (
-        tool_solid(scene.centre, scene.axis, scene.radius) if scene.centre is not None else []
-    )
+    if scene.centre is None:
+        return meshes
+    return meshes + tool_solid(scene.centre, scene.axis, scene.radius, scene.nuisances)

@@ -11,13 +11,17 @@ from scipy.spatial.transform import Rotation
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.synthetic.bench.depth_camera import CameraScene, DepthCamera
+from palpate.synthetic.bench.depth_image import nuisance_cloud, take_image
 from palpate.synthetic.bench.force_sensor import ForceSensor
+from palpate.synthetic.bench.formed_surface import FormedSurface
 from palpate.synthetic.bench.motion_plan import MotionPlan
 from palpate.synthetic.bench.solved_track import SolvedTrack
 from palpate.synthetic.bench.true_body import true_offset, true_radius
 from palpate.synthetic.bench.virtual_experiment import neutral_displacement, solve_motion
 from palpate.synthetic.bench.visibility import mean_square_change, visible_weights
 from palpate.synthetic.dataset_writer import write_clouds, write_forces, write_kinematics, write_ply
+from palpate.synthetic.nuisances.nuisance import DepthImage, StatedMotion
+from palpate.synthetic.nuisances.nuisance_chain import robot_rate, stamped_frames, stated_centres
 from palpate.synthetic.scenario.disturbance import drifted
 from palpate.synthetic.scenario.scenario import Scenario
 
@@ -45,6 +49,7 @@ class SequenceJob:
         folder: of the sequence.
         seed: of everything random.
         begun: offset of the base from its place (x, y) [m] at the beginning.
+        session: time from `rest.ply` to the beginning [s].
     """
 
     scenario: Scenario
@@ -56,6 +61,7 @@ class SequenceJob:
     folder: Path
     seed: int
     begun: tuple[float, float] = (0.0, 0.0)
+    session: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -89,25 +95,68 @@ def record_motion(job: SequenceJob) -> SequenceRecord:
     rng = np.random.default_rng([job.seed, 2, *job.motion.name.encode()])
     (job.folder / "clouds").mkdir(parents=True)
     start = rng.uniform(5.0, 45.0)
-    _write_kinematics(job, start, rng)
+    _write_kinematics(job, track, start, rng)
     _write_forces(job, track, start)
     hidden = job.scenario.hidden("time_offset")
     count = int((job.motion.duration - 2 * MARGIN) * job.scenario.rate)
     instants = MARGIN + np.arange(count) / job.scenario.rate + rng.uniform(-0.6e-3, 0.6e-3, count)
     instants = instants[rng.random(count) >= 0.02]
-    files = [f"clouds/{number:06d}.ply" for number in range(len(instants))]
+    disturbing = np.random.default_rng([job.seed, 6, *job.motion.name.encode()])
+    index, stamped = stamped_frames(job.scenario.nuisances, instants, disturbing)
+    files = [f"clouds/{number:06d}.ply" for number in range(len(index))]
     stamps = (
         start
-        + instants
+        + stamped
         + (hidden.value("offset") if hidden else 0.0)
-        + rng.uniform(-1e-3, 1e-3, len(instants))
+        + rng.uniform(-1e-3, 1e-3, len(index))
     )
     write_clouds(job.folder / "clouds.csv", stamps, files)
-    for file, instant in zip(files, instants.tolist(), strict=True):
-        write_ply(
-            job.folder / file, _camera(job, instant).cloud(scene_at(job, track, instant), rng)
+    taken = job.scenario.nuisances and _NuisanceCamera(job, track, disturbing)
+    for file, instant in zip(files, instants[index].tolist(), strict=True):
+        cloud = (
+            taken.cloud(instant)
+            if taken
+            else _camera(job, instant).cloud(scene_at(job, track, instant), rng)
         )
+        write_ply(job.folder / file, cloud)
     return SequenceRecord(planned.name, _visibility(job, track), shortened, job.begun, track.slid)
+
+
+class _NuisanceCamera:
+    """The camera in front of one motion, with the nuisances of the scenario."""
+
+    def __init__(self, job: SequenceJob, track: SolvedTrack, rng: np.random.Generator) -> None:
+        self.job, self.track, self.rng = job, track, rng
+        self._forms: dict[int, FormedSurface] = {}
+        self._last: tuple[float, FloatArray] | None = None
+
+    def cloud(self, instant: float) -> FloatArray:
+        """The cloud (k, 3) [m] of an instant [s]; a frame that is repeated is the same one."""
+        if self._last is None or self._last[0] != instant:
+            cloud = nuisance_cloud(
+                self.job.scenario.nuisances,
+                self.job.camera,
+                self._image,
+                instant + self.job.session,
+                self.rng,
+            )
+            self._last = instant, cloud
+        return self._last[1]
+
+    def _image(self, time: float) -> DepthImage:
+        instant = float(np.clip(time - self.job.session, 0.0, self.job.motion.duration))
+        solved, scenario = self.track.at(instant), self.job.scenario
+        form = self._forms.setdefault(
+            id(solved),
+            FormedSurface(solved.rest, solved.faces, scenario.true_size, scenario.nuisances),
+        )
+        scene = replace(
+            scene_at(self.job, self.track, instant),
+            block=(form.displaced(solved.displacement(instant)), form.faces),
+            rest=form.rest,
+            nuisances=scenario.nuisances,
+        )
+        return take_image(_camera(self.job, instant), scene)
 
 
 def _camera(job: SequenceJob, instant: float) -> DepthCamera:
@@ -129,16 +178,18 @@ def scene_at(job: SequenceJob, track: SolvedTrack, instant: float) -> CameraScen
     return CameraScene(track.surface(instant), centre, job.motion.axis, true_radius(job.scenario))
 
 
-def _write_kinematics(job: SequenceJob, start: float, rng: np.random.Generator) -> None:
+def _write_kinematics(
+    job: SequenceJob, track: SolvedTrack, start: float, rng: np.random.Generator
+) -> None:
     """Write the stated poses at about the robot's rate with jitter; the tool's z axis points from
     shaft to tip.
     """
-    count = int(job.motion.duration * job.scenario.robot_rate)
-    times = (
-        np.cumsum(np.clip(1 + 0.15 * rng.normal(size=count), 0.3, 1.7)) / job.scenario.robot_rate
-    )
+    rate = robot_rate(job.scenario.nuisances, job.scenario.robot_rate)
+    count = int(job.motion.duration * rate)
+    times = np.cumsum(np.clip(1 + 0.15 * rng.normal(size=count), 0.3, 1.7)) / rate
     times = np.unique(np.round(start + times[times < job.motion.duration], 5))
-    centres = job.motion.centre(times - start) + rng.normal(size=(len(times), 3)) * KINEMATICS_NOISE
+    centres = _stated_centres(job, track, times - start)
+    centres = centres + rng.normal(size=(len(times), 3)) * KINEMATICS_NOISE
     turn = Rotation.align_vectors(job.motion.axis[None], [[0.0, 0.0, 1.0]])[
         0
     ] * Rotation.from_euler("z", rng.uniform(0, 2 * np.pi))
@@ -146,6 +197,16 @@ def _write_kinematics(job: SequenceJob, start: float, rng: np.random.Generator) 
     write_kinematics(
         job.folder / "kinematics.csv", times, job.robot_from_phantom.apply(centres), quaternion
     )
+
+
+def _stated_centres(job: SequenceJob, track: SolvedTrack, times: FloatArray) -> FloatArray:
+    """Tool centres (n, 3) [m] that the robot states at times (n,) [s], phantom frame."""
+    centres, step = job.motion.centre(times), 1e-3
+    if not job.scenario.nuisances:
+        return centres
+    velocities = (job.motion.centre(times + step) - job.motion.centre(times - step)) / (2 * step)
+    motion = StatedMotion(times, centres, velocities, -track.tool_force(times))
+    return stated_centres(job.scenario.nuisances, motion)
 
 
 def _write_forces(job: SequenceJob, track: SolvedTrack, start: float) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from palpate.synthetic.nuisances import Nuisance
 from palpate.synthetic.scenario.disturbance import Disturbance
 from palpate.synthetic.scenario.hidden_effects import HiddenEffect
 
@@ -25,6 +26,7 @@ class Scenario:
     Attributes:
         effects: hidden, known to nobody.
         disturbances: hidden, outside the catalogue of effects.
+        nuisances: faults of the bench for which nothing is to be named.
         sequences: names; the part before the number is the kind of motion: poke-top, poke-side or
             drag.
         rounds: number of rounds (three pushes, or one drag) by sequence; one by default.
@@ -48,6 +50,7 @@ class Scenario:
 
     effects: tuple[HiddenEffect, ...] = ()
     disturbances: tuple[Disturbance, ...] = ()
+    nuisances: tuple[Nuisance, ...] = ()
     sequences: tuple[str, ...] = (
         "poke-top-01",
         "poke-top-02",

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from palpate.foundation.frames import Transform
+from palpate.synthetic.nuisances.nuisance import Nuisance
+from palpate.synthetic.nuisances.nuisance_chain import described
 from palpate.synthetic.scenario.disturbance import DISTURBANCES, Disturbance
 from palpate.synthetic.scenario.hidden_effects import HIDDEN, HiddenEffect
 
@@ -30,6 +32,7 @@ class Truth:
             unstable [m].
         disturbances: outside the catalogue of effects; the verdict is then unexplained.
         begun: by sequence, offset (x, y) of a block that was not put back, at the beginning [m].
+        nuisances: faults of the bench; they leave the verdict alone.
     """
 
     effects: tuple[HiddenEffect, ...]
@@ -40,6 +43,7 @@ class Truth:
     shortened: Mapping[str, list[float]] = field(default_factory=dict)
     disturbances: tuple[Disturbance, ...] = ()
     begun: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    nuisances: tuple[Nuisance, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -71,9 +75,12 @@ class Truth:
         }
 
     def _disturbed(self) -> dict[str, Any]:
-        """The entry of the disturbances; empty without any."""
+        """The entries of the disturbances and of the nuisances, where there are any."""
         entries = [_described(one.name, one.parameters, DISTURBANCES) for one in self.disturbances]
-        return {"disturbances": entries} if entries else {}
+        nuisances = described(self.nuisances)
+        return ({"disturbances": entries} if entries else {}) | (
+            {"nuisances": nuisances} if nuisances else {}
+        )
 
     def save(self, path: Path) -> None:
         """Write JSON."""
