@@ -149,6 +149,16 @@ _KEYS = {
     "unknown key of the camera": _key(
         "depth_sigma", "depth_sgima", "camera.depth_sgima", "did you mean 'depth_sigma'"
     ),
+    "unknown filter of the camera": _key(
+        "depth_sigma",
+        'filters = ["spatal"]\ndepth_sigma',
+        "camera.filters",
+        "'spatal'",
+        "did you mean 'spatial'",
+    ),
+    "edge in millimetres": _key(
+        "depth_sigma", "edge = 3\ndepth_sigma", "camera.edge", "did you write millimetres"
+    ),
     "unknown split": _key("test =", "tests =", "splits.tests", "did you mean 'test'"),
     "no radius": _key("radius = 0.005\n", "", "tool.radius", "missing", "add it"),
     "no camera": _key(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from itertools import groupby
 from pathlib import Path
@@ -11,6 +12,7 @@ from mkdocs.structure.files import File, Files
 
 from palpate.diagnosis.criteria import CRITERIA, criteria_rows
 from palpate.effects import CATALOGUE
+from palpate.synthetic import NUISANCES
 
 ROOT = Path(__file__).resolve().parents[2]
 REPOSITORY_LINK = re.compile(r"\[([^\]]+)\]\((?:\.\./)+[^)]*\)")
@@ -20,6 +22,7 @@ def on_files(files: Files, config: Any) -> Files:
     """Add the generated pages."""
     pages = {
         "criteria.md": criteria_page(),
+        "nuisances.md": nuisances_page(),
         "own-effects.md": (ROOT / "core/effects/README.md").read_text(encoding="utf-8"),
         "blind-suite.md": without_repository_links(ROOT / "benchmarks/blind/README.md"),
     }
@@ -56,6 +59,27 @@ def criteria_page() -> str:
             f"| {cell(row.source)} |"
             for row in rows
         ]
+    return "\n".join(lines)
+
+
+def nuisances_page() -> str:
+    """Every nuisance of the virtual bench, from its class."""
+    lines = [
+        "# Nuisances of the virtual bench",
+        "",
+        "`palpate blind --nuisances` gives the virtual bench the faults that data sheets and public "
+        "reports name. They are drawn from a random stream of their own; nothing is to be named for "
+        "one, unless the table says what. `--camera d405` and `--filter temporal` set camera and "
+        "filters. A filter can be declared in a dataset (`[camera] filters`).",
+        "",
+        "| nuisance | meaning and source | drawn | right names |",
+        "|---|---|---|---|",
+    ]
+    for kind in NUISANCES:
+        meaning = (inspect.getdoc(kind) or "").partition("Attributes:")[0]
+        drawn = inspect.getdoc(kind.draw) or ""
+        names = ", ".join(f"`{name}`" for name in kind.causes)
+        lines.append(f"| `{kind.__name__}` | {cell(meaning)} | {cell(drawn)} | {names} |")
     return "\n".join(lines)
 
 

@@ -119,6 +119,20 @@ def test_a_blocked_view_is_noticed(folder: Path) -> None:
     )
 
 
+def test_declared_filters_and_the_edge_they_cost_are_told(folder: Path) -> None:
+    path = folder / "dataset.toml"
+    stated = path.read_text()
+    path.write_text(
+        stated.replace("depth_sigma", 'filters = ["spatial", "temporal"]\ndepth_sigma', 1)
+    )
+    text = "\n".join(check(folder).warnings)
+    assert "camera.filters names temporal: what moves is seen late" in text
+    assert "points within 3.0 mm of the phantom's edges are left out" in text
+    assert open_dataset(folder).config.edge == 3e-3
+    path.write_text(stated.replace("depth_sigma", "edge = 0.004\ndepth_sigma", 1))
+    assert "points within 4.0 mm" in "\n".join(check(folder).warnings)
+
+
 def test_sequences_outside_the_splits_and_an_empty_test_give_warnings(folder: Path) -> None:
     path = folder / "dataset.toml"
     path.write_text(path.read_text().replace('test = ["drag-01"]', "test = []"))

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -147,6 +149,13 @@ def test_points_off_the_block_at_an_edge_or_far_away_are_left_out(flat):
     )
     found = gaps(points, CAMERA, flat, SURFACE)
     assert found.index.tolist() == [0]
+
+
+def test_points_near_an_edge_that_a_filter_rounds_are_left_out(flat):
+    points = np.array([[SIZE[0] / 2 - away, 0.0, TOP] for away in (2e-3, 3.9e-3, 4.1e-3)])
+    rounded = replace(SURFACE, edge=4e-3)
+    assert gaps(points, CAMERA, flat, SURFACE).index.tolist() == [0, 1, 2]
+    assert gaps(points, CAMERA, flat, rounded).index.tolist() == [2]
 
 
 def test_sides_that_the_camera_grazes_are_left_out(flat):
