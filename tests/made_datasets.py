@@ -1,7 +1,7 @@
 """Virtual datasets that tests share: made once for all workers and runs, then copied.
 
 The store is below pytest's cache folder. The name of an entry is a digest of the scenario, the
-seed and the sources, so that a change of one of them makes the dataset anew.
+seed and the sources of the virtual bench, so that a change of one of them makes the dataset anew.
 """
 
 from __future__ import annotations
@@ -17,12 +17,14 @@ from palpate.synthetic import Scenario, make_dataset, truth_path
 
 __all__ = ["copy_dataset"]
 
+BENCH = ("foundation", "mesh", "setup", "synthetic")
+"""Folders of `core` that the virtual bench imports."""
 STORE = Path(__file__).parents[1] / ".pytest_cache" / "made-datasets"
 
 
 def copy_dataset(folder: Path, scenario: Scenario, seed: int) -> None:
     """Put the dataset of a scenario and seed at `folder`, with its truth beside it."""
-    text = f"{scenario!r} {seed} {source_digest()}"
+    text = f"{scenario!r} {seed} {source_digest(*BENCH)}"
     made = STORE / hashlib.sha256(text.encode()).hexdigest()[:16] / folder.name
     made.parent.mkdir(parents=True, exist_ok=True)
     with FileLock(f"{made.parent}.lock"):

@@ -51,7 +51,8 @@ def blind(
     kinds: Annotated[
         str | None,
         typer.Option(
-            help="Kinds for --scenarios: control, clear, subtle, pair, outside, twins, modulus."
+            help="Kinds for --scenarios: control, clear, subtle, pair, outside, twins, modulus, "
+            "fault."
         ),
     ] = None,
     effects: Annotated[
@@ -148,7 +149,7 @@ def blind(
         right, false = counted["right"], counted["false_name"]
         named = (
             f", a cause falsely named in {false['hits']}"
-            if kind in ("control", "outside", "modulus")
+            if kind in ("control", "outside", "modulus", "fault")
             else ""
         )
         out.print(f"{TITLES[kind]}: {right['hits']} of {right['n']} right{named}", highlight=False)

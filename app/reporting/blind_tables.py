@@ -38,6 +38,7 @@ TITLES = {
     "outside": "outside the catalogue",
     "twins": "look-alikes",
     "modulus": "modulus alone",
+    "fault": "fault of the bench",
 }
 VERDICTS = ("several", "ambiguous", "none", "unexplained", "error")
 POSE = re.compile(r"camera_registration\.[tr][xyz]$")

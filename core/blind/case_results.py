@@ -70,7 +70,16 @@ class CaseResult:
     @property
     def truth(self) -> frozenset[str]:
         """Names of the hidden effects."""
-        return frozenset(self.case.hidden) if self.case.kind != "outside" else frozenset()
+        outside = self.case.kind in ("outside", "fault")
+        return frozenset() if outside else frozenset(self.case.hidden)
+
+    @property
+    def stating(self) -> frozenset[str]:
+        """Names of the effects that state the fault of the bench; empty for other kinds."""
+        from palpate.synthetic import FAULTS
+
+        fault = self.case.kind == "fault"
+        return frozenset(name for one in self.case.hidden if fault for name in FAULTS[one].causes)
 
     @property
     def right(self) -> bool:
@@ -78,8 +87,11 @@ class CaseResult:
 
         A hidden effect must be found exactly; outside of the catalogue no single cause may be
         named; of look-alikes the truth must be first or in an ambiguous set; a modulus alone must
-        be reported as not identifiable, or named where it is.
+        be reported as not identifiable, or named where it is; for a fault nothing but an effect
+        that states it may be named.
         """
+        if self.case.kind == "fault":
+            return self.verdict in ("found", "none") and set(self.named) <= self.stating
         if self.case.kind == "outside":
             return self.verdict in ("unexplained", "ambiguous")
         if self.case.kind == "twins":
@@ -113,7 +125,7 @@ class CaseResult:
         """
         if self.verdict == "ambiguous" and (self.inside or self.outside):
             return False
-        return bool(set(self.named) - self.truth)
+        return bool(set(self.named) - self.truth - self.stating)
 
     @property
     def modulus_not_identifiable(self) -> bool:

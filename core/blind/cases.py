@@ -25,10 +25,11 @@ __all__ = [
     "with_nuisances",
 ]
 
-KINDS = ("control", "clear", "subtle", "pair", "outside", "twins", "modulus")
+KINDS = ("control", "clear", "subtle", "pair", "outside", "twins", "modulus", "fault")
 """Kinds of cases: nothing hidden; one effect of clear or of subtle size; two effects; a disturbance
 outside the catalogue; one effect of the family that looks alike; another Young's modulus alone,
-which does not show without a measured force."""
+which does not show without a measured force; a fault of the bench that effects state
+(`palpate.synthetic.Nuisance.causes`). A drawn suite has no fault unless it is asked for."""
 
 MIX: Mapping[str, float] = {
     "control": 0.25,
@@ -38,9 +39,12 @@ MIX: Mapping[str, float] = {
     "outside": 0.075,
     "twins": 0.05,
     "modulus": 0.05,
+    "fault": 0.0,
 }
 """Shares of a drawn suite [1]: of 200 scenarios 50 hide nothing, so that a rate of one false alarm
 in 50 shows."""
+_ASKED = 0.05
+"""Share of a kind that is drawn only where it is asked for [1]."""
 
 ALIKE = (
     "tool_radius",
@@ -63,7 +67,7 @@ class Case:
         name: includes the names of what is hidden.
         seed: of everything random.
         kind: one of KINDS.
-        hidden: names of the effects, or of the disturbance.
+        hidden: names of the effects, of the disturbance, or of the fault.
         short: whether five sequences are recorded, not seven.
         nuisances: whether the bench has the nuisances of real ones; every second case then has 1 to
             3 mm of depth noise.
@@ -202,7 +206,7 @@ def scenario_of(case: Case) -> Scenario:
         draw_scenario,
     )
 
-    if case.kind == "control":
+    if case.kind in ("control", "fault"):
         scenario = Scenario()
     elif case.kind == "outside":
         scenario = Scenario(
@@ -216,9 +220,13 @@ def scenario_of(case: Case) -> Scenario:
         scenario = _pressing(scenario)
     # A slip of a millimetre is not noticed, and the block is not put back.
     scenario = replace(scenario, put_back=scenario.hidden("base_slip") is None)
-    if case.nuisances:
+    if case.nuisances or case.kind == "fault":
         drawn = draw_nuisances(
-            case.seed, noisy=case.noisy, camera=case.camera, filters=case.filters
+            case.seed,
+            noisy=case.noisy,
+            camera=case.camera,
+            filters=case.filters,
+            faults=case.hidden if case.kind == "fault" else (),
         )
         scenario = replace(scenario, nuisances=drawn)
     return replace(scenario, sequences=SHORT_PROTOCOL) if case.short else scenario
@@ -244,7 +252,7 @@ def _checked_kinds(kinds: Sequence[str] | None) -> list[str]:
             f"no kind of case is called {unknown[0]!r}; known are {', '.join(KINDS)}",
             kind=unknown[0],
         )
-    return [kind for kind in KINDS if kinds is None or kind in kinds]
+    return [kind for kind in KINDS if (kind != "fault" if kinds is None else kind in kinds)]
 
 
 def _checked_effects(effects: Sequence[str] | None) -> tuple[str, ...]:
@@ -263,11 +271,12 @@ def _interleaved(kinds: Sequence[str], count: int) -> list[str]:
     """Order `count` kinds by their shares; next is always the kind furthest behind its share."""
     if count and not kinds:
         raise RunError("no kind of case is left to be drawn: name others, or fewer controls")
-    total = sum(MIX[kind] for kind in kinds)
+    shares = {kind: MIX[kind] or _ASKED for kind in kinds}
+    total = sum(shares.values())
     met = dict.fromkeys(kinds, 0)
     order: list[str] = []
     for place in range(count):
-        kind = max(kinds, key=lambda one: (place + 1) * MIX[one] / total - met[one])
+        kind = max(kinds, key=lambda one: (place + 1) * shares[one] / total - met[one])
         met[kind] += 1
         order.append(kind)
     return order
@@ -283,7 +292,7 @@ def _hidden(kind: str, seed: int, number: int, effects: Sequence[str]) -> tuple[
 
 
 def _choices(kind: str, effects: Sequence[str]) -> list[tuple[str, ...]]:
-    from palpate.synthetic import DISTURBANCES
+    from palpate.synthetic import DISTURBANCES, FAULTS
 
     choices: dict[str, list[tuple[str, ...]]] = {
         "control": [()],
@@ -291,6 +300,7 @@ def _choices(kind: str, effects: Sequence[str]) -> list[tuple[str, ...]]:
         "outside": [(name,) for name in DISTURBANCES],
         "twins": [(effect,) for effect in effects if effect in ALIKE],
         "modulus": [("young_modulus",)],
+        "fault": [(name,) for name in FAULTS],
     }
     found = choices.get(kind, [(effect,) for effect in effects])
     if not found:

@@ -7,7 +7,14 @@ and `make_palpation` write whole datasets with their truth beside them.
 
 from palpate.synthetic.make_dataset import make_dataset
 from palpate.synthetic.make_palpation import Palpation, draw_palpation, make_palpation
-from palpate.synthetic.nuisances import CAMERAS, FILTERS, NUISANCES, Nuisance, draw_nuisances
+from palpate.synthetic.nuisances import (
+    CAMERAS,
+    FAULTS,
+    FILTERS,
+    NUISANCES,
+    Nuisance,
+    draw_nuisances,
+)
 from palpate.synthetic.scenario.disturbance import DISTURBANCES, Disturbance, draw_disturbance
 from palpate.synthetic.scenario.hidden_effects import HIDDEN, QUICK, WEIGHED, HiddenEffect
 from palpate.synthetic.scenario.paper_protocol import (
@@ -24,6 +31,7 @@ from palpate.synthetic.scenario.truth_file import Truth, truth_path
 __all__ = [
     "CAMERAS",
     "DISTURBANCES",
+    "FAULTS",
     "FILTERS",
     "HIDDEN",
     "NUISANCES",

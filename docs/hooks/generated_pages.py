@@ -67,10 +67,10 @@ def nuisances_page() -> str:
     lines = [
         "# Nuisances of the virtual bench",
         "",
-        "`palpate blind --nuisances` gives the virtual bench the faults that data sheets and public "
-        "reports name. They are drawn from a random stream of their own; nothing is to be named for "
-        "one, unless the table says what. `--camera d405` and `--filter temporal` set camera and "
-        "filters. A filter can be declared in a dataset (`[camera] filters`).",
+        "`palpate blind --nuisances` gives the virtual bench the faults that data sheets and "
+        "public reports name. They are drawn from a random stream of their own; nothing is to be "
+        "named for one, unless the table says what. `--camera d405` and `--filter temporal` set "
+        "camera and filters. A filter can be declared in a dataset (`[camera] filters`).",
         "",
         "| nuisance | meaning and source | drawn | right names |",
         "|---|---|---|---|",

@@ -5,11 +5,8 @@ from __future__ import annotations
 import ctypes
 import logging
 import math
-import os
-import sys
 import weakref
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +14,7 @@ import scipy.sparse as sp
 
 from palpate.fem.linalg.direct_solver import NotPositiveDefinite
 from palpate.foundation.arrays import FloatArray, IntArray
+from palpate.foundation.mkl_library import name_library
 
 __all__ = ["Pardiso"]
 
@@ -40,14 +38,8 @@ _ANY, _INTEGERS = ctypes.c_void_p, ctypes.POINTER(ctypes.c_int32)
 
 @lru_cache(maxsize=1)
 def _pardiso() -> Any:
-    """MKL's entry point.
-
-    pypardiso searches the whole environment for the library, for one to three seconds in each
-    process.
-    """
-    beside = sorted((Path(sys.prefix) / "lib").glob("libmkl_rt.so*"))
-    if beside:  # said before the import, which looks for the library already
-        os.environ.setdefault("PYPARDISO_MKL_RT", str(beside[0]))
+    """MKL's entry point."""
+    name_library()
     from pypardiso import PyPardisoSolver
 
     solver = PyPardisoSolver()

@@ -146,10 +146,11 @@ class _NuisanceCamera:
     def _image(self, time: float) -> DepthImage:
         instant = float(np.clip(time - self.job.session, 0.0, self.job.motion.duration))
         solved, scenario = self.track.at(instant), self.job.scenario
-        form = self._forms.setdefault(
-            id(solved),
-            FormedSurface(solved.rest, solved.faces, scenario.true_size, scenario.nuisances),
-        )
+        if id(solved) not in self._forms:
+            self._forms[id(solved)] = FormedSurface(
+                solved.rest, solved.faces, scenario.true_size, scenario.nuisances
+            )
+        form = self._forms[id(solved)]
         scene = replace(
             scene_at(self.job, self.track, instant),
             block=(form.displaced(solved.displacement(instant)), form.faces),

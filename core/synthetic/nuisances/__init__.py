@@ -5,10 +5,11 @@ A nuisance is one class in one file. `nuisance_draws` draws them, from a random 
 
 from palpate.synthetic.nuisances.cameras import CAMERAS
 from palpate.synthetic.nuisances.nuisance import DepthImage, Nuisance, StatedMotion
-from palpate.synthetic.nuisances.nuisance_draws import FILTERS, NUISANCES, draw_nuisances
+from palpate.synthetic.nuisances.nuisance_draws import FAULTS, FILTERS, NUISANCES, draw_nuisances
 
 __all__ = [
     "CAMERAS",
+    "FAULTS",
     "FILTERS",
     "NUISANCES",
     "DepthImage",

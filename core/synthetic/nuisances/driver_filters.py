@@ -92,8 +92,8 @@ class Decimation(Nuisance):
         """Halve the image."""
         image = source(instant)
         rows, columns = (2 * (length // 2) for length in image.depth.shape)
-        groups = image.depth[:rows, :columns].reshape(rows // 2, 2, columns // 2, 2)
-        groups = groups.transpose(0, 2, 1, 3).reshape(rows // 2, columns // 2, 4)
+        tiles = image.depth[:rows, :columns].reshape(rows // 2, 2, columns // 2, 2)
+        groups = tiles.transpose(0, 2, 1, 3).reshape(rows // 2, columns // 2, 4)
         known = np.isfinite(groups)
         ordered = np.sort(np.where(known, groups, np.inf), axis=2)
         middle = np.maximum(known.sum(axis=2) - 1, 0) // 2

@@ -38,7 +38,8 @@ class DepthImage:
     def slant(self) -> FloatArray:
         """Angle (rows, columns) [rad] between the line of sight and the surface's normal."""
         sight = self.rays / np.linalg.norm(self.rays, axis=2, keepdims=True)
-        return np.arccos(np.clip(np.abs(np.sum(sight * self.normals, axis=2)), 0.0, 1.0))
+        cosine = np.abs(np.sum(sight * self.normals, axis=2))
+        return np.asarray(np.arccos(np.clip(cosine, 0.0, 1.0)))
 
     @property
     def pitch(self) -> float:

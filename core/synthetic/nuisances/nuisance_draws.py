@@ -28,7 +28,7 @@ from palpate.synthetic.nuisances.robot_errors import (
 )
 from palpate.synthetic.nuisances.tool_form import Neck, OtherShaft, OutOfRound
 
-__all__ = ["FILTERS", "NUISANCES", "draw_nuisances"]
+__all__ = ["FAULTS", "FILTERS", "NUISANCES", "draw_nuisances"]
 
 NUISANCES: tuple[type[Nuisance], ...] = (
     RoundedEdges,
@@ -66,6 +66,8 @@ FILTERS: dict[str, type[Nuisance]] = {
     "hole-filling": HoleFilling,
     "temporal": TemporalFilter,
 }
+FAULTS: dict[str, type[Nuisance]] = {kind.__name__: kind for kind in NUISANCES if kind.causes}
+"""Nuisances that effects state, by name."""
 _ALWAYS = (SmoothBias, FlyingPixels, StereoNoise)
 _RARE = (MaskedTool, MultiPath)
 _OFTEN, _SELDOM, _FILTERED = 0.5, 0.2, 0.5
@@ -78,17 +80,19 @@ def draw_nuisances(
     noisy: bool = False,
     camera: str | None = None,
     filters: Sequence[str] | None = None,
+    faults: Sequence[str] = (),
 ) -> tuple[Nuisance, ...]:
-    """Draw nuisances from a random stream of their own; none of them states a cause.
+    """Draw nuisances from a random stream of their own; of FAULTS only those asked for.
 
     Args:
         seed: of the stream.
         noisy: whether the depth noise is 1 to 3 mm, not 0.3 to 1 mm.
         camera: one of CAMERAS, in place of drawn noise and flying pixels.
         filters: some of FILTERS, in place of a drawn one.
+        faults: some of FAULTS.
 
     Raises:
-        RunError: for an unknown camera or filter.
+        RunError: for an unknown camera, filter or fault.
     """
     rng = np.random.default_rng([seed, 5501])
     drawn: dict[type[Nuisance], Nuisance] = {}
@@ -111,6 +115,9 @@ def draw_nuisances(
     for name in filters:
         _require(name, FILTERS, "filter")
         drawn[FILTERS[name]] = FILTERS[name].draw(rng)
+    for name in faults:
+        _require(name, FAULTS, "fault")
+        drawn[FAULTS[name]] = FAULTS[name].draw(rng)
     return tuple(drawn[kind] for kind in NUISANCES if kind in drawn)
 
 

@@ -85,7 +85,7 @@ class SaggingTop(Nuisance):
         """Lift or lower the top; the rim keeps its height."""
         x, y = (np.clip(2 * surface[:, axis] / size[axis], -1, 1) for axis in range(2))
         lift = self.height * (1 - x**2) * (1 - y**2) * surface[:, 2] / size[2]
-        return surface + lift[:, None] * np.array([0.0, 0.0, 1.0])
+        return np.asarray(surface + lift[:, None] * np.array([0.0, 0.0, 1.0]))
 
 
 @dataclass(frozen=True)

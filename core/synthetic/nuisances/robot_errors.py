@@ -40,7 +40,9 @@ class Backlash(Nuisance):
         moving = speed > _STANDING
         last = np.maximum.accumulate(np.where(moving, np.arange(len(speed)), -1))
         ahead = motion.velocities[last] / np.maximum(speed[last], _STANDING)[:, None]
-        return motion.centres + 0.5 * self.width * np.where(last >= 0, 1.0, 0.0)[:, None] * ahead
+        return np.asarray(
+            motion.centres + 0.5 * self.width * np.where(last >= 0, 1.0, 0.0)[:, None] * ahead
+        )
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ class CableStretch(Nuisance):
     def stated(self, motion: StatedMotion) -> FloatArray:
         """State where the tool would be without load."""
         stretch = motion.forces * np.array([self.across, self.across, self.along])
-        return motion.centres - stretch
+        return np.asarray(motion.centres - stretch)
 
 
 @dataclass(frozen=True)

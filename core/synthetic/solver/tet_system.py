@@ -10,6 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from palpate.foundation.arrays import FloatArray
+from palpate.foundation.mkl_library import name_library
 from palpate.synthetic.solver.tet_block import IntArray
 
 __all__ = ["TetSystem"]
@@ -88,6 +89,7 @@ class TetSystem:
 
 @cache
 def _library() -> Any:
+    name_library()
     from pypardiso import PyPardisoSolver
 
     return PyPardisoSolver(mtype=-2)

@@ -72,6 +72,20 @@ def test_modulus_alone_is_not_identifiable_or_named(
 
 
 @pytest.mark.parametrize(
+    ("verdict", "named", "right"),
+    [
+        ("found", "depth_bias", True),
+        ("found", "camera_registration", True),
+        ("found", "gravity", False),
+        ("none", "", True),
+        ("unexplained", "", False),
+    ],
+)
+def test_a_fault_of_the_bench_has_its_own_names(verdict: str, named: str, right: bool) -> None:
+    assert scored("fault", "WarmUp", verdict, named).right is right
+
+
+@pytest.mark.parametrize(
     ("kind", "hidden", "verdict", "named", "first", "inside", "false_name"),
     [
         ("clear", "gravity", "found", "gravity", True, True, False),
@@ -84,6 +98,8 @@ def test_modulus_alone_is_not_identifiable_or_named(
         ("outside", "camera_drift", "ambiguous", "gravity tool_offset", False, False, False),
         ("outside", "camera_drift", "found", "gravity", False, False, True),
         ("modulus", "young_modulus", "found", "gravity", False, False, True),
+        ("fault", "WarmUp", "found", "depth_bias", False, False, False),
+        ("fault", "WarmUp", "found", "gravity", False, False, True),
     ],
 )
 def test_first_among_and_false_names(

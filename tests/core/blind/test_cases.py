@@ -1,14 +1,16 @@
 from __future__ import annotations
 
+import json
 from collections import Counter
+from dataclasses import replace
 
 import pytest
 
-from palpate.blind import KINDS, MIX, Case, all_cases, draw_cases, scenario_of
+from palpate.blind import KINDS, MIX, Case, all_cases, draw_cases, scenario_of, with_nuisances
 from palpate.blind.cases import ALIKE
 from palpate.effects import DIAGNOSED
 from palpate.foundation.errors import RunError
-from palpate.synthetic import DISTURBANCES, HIDDEN, QUICK, SHORT_PROTOCOL, WEIGHED
+from palpate.synthetic import DISTURBANCES, FAULTS, HIDDEN, QUICK, SHORT_PROTOCOL, WEIGHED
 
 
 def effects_of(cases: list[Case]) -> list[str]:
@@ -154,3 +156,34 @@ def test_short_case_records_fewer_sequences_of_the_same() -> None:
     assert scenario_of(short).sequences == SHORT_PROTOCOL != scenario_of(long).sequences
     assert scenario_of(short).effects == scenario_of(long).effects
     assert Case.from_json(short.to_json()) == short
+
+
+def test_nuisances_leave_what_is_hidden_alone() -> None:
+    plain = draw_cases(3, 12)
+    cases = with_nuisances(plain)
+    assert [replace(scenario_of(case), nuisances=()) for case in cases] == [
+        scenario_of(case) for case in plain
+    ]
+    assert all(scenario_of(case).nuisances for case in cases)
+    assert {case.noisy for case in cases} == {True, False}
+
+
+def test_a_case_with_nuisances_goes_to_a_row_and_back() -> None:
+    plain = draw_cases(3, 2)
+    assert not {"nuisances", "camera", "filters"} & set(plain[0].to_json())
+    for case in [*plain, *with_nuisances(plain, "d405", ["spatial"]), *with_nuisances(plain)]:
+        assert Case.from_json(json.loads(json.dumps(case.to_json()))) == case
+
+
+def test_unknown_cameras_are_refused_before_anything_runs() -> None:
+    with pytest.raises(RunError, match="no camera 'd999'"):
+        with_nuisances(draw_cases(3, 2), "d999")
+
+
+def test_faults_are_drawn_where_they_are_asked_for() -> None:
+    assert not any(case.kind == "fault" for case in draw_cases(3, 200))
+    cases = draw_cases(3, 6, ["fault"])
+    assert {case.hidden[0] for case in cases} == set(FAULTS)
+    for case in cases:
+        kinds = {type(one).__name__ for one in scenario_of(case).nuisances}
+        assert kinds & set(FAULTS) == set(case.hidden)

@@ -94,6 +94,7 @@ def test_keys_are_dense_enough_to_interpolate(monkeypatch: pytest.MonkeyPatch) -
         assert np.sqrt(np.mean(np.sum(error**2, axis=1))) < 0.03e-3
 
 
+@pytest.mark.more
 def test_push_onto_a_hard_lump_stops_before_the_block_is_unstable() -> None:
     lump = {"x": -0.0025, "y": 0.0009, "z": 0.0243, "radius": 0.0086, "stiffness_ratio": 9.1}
     top = np.array([-0.00303, 0.00161, 0.0473])

@@ -1,0 +1,16 @@
+"""What the virtual bench imports."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from made_datasets import BENCH
+
+import palpate.synthetic
+
+
+def test_bench_imports_only_the_folders_that_the_store_of_datasets_watches() -> None:
+    root = Path(palpate.synthetic.__path__[0])
+    text = "\n".join(path.read_text() for path in root.rglob("*.py"))
+    assert set(re.findall(r"(?:from|import) palpate\.(\w+)", text)) == set(BENCH)
