@@ -199,6 +199,7 @@ def with_nuisances(
 def scenario_of(case: Case) -> Scenario:
     """The scenario of a case, from its kind, its hidden names and its seed alone."""
     from palpate.synthetic import (
+        FILTERS,
         SHORT_PROTOCOL,
         Scenario,
         draw_disturbance,
@@ -228,7 +229,10 @@ def scenario_of(case: Case) -> Scenario:
             filters=case.filters,
             faults=case.hidden if case.kind == "fault" else (),
         )
-        scenario = replace(scenario, nuisances=drawn)
+        names = tuple(name for name, kind in FILTERS.items() if kind in map(type, drawn))
+        # Every other user knows the settings of the camera's driver.
+        declared = names if case.seed // 2 % 2 else ()
+        scenario = replace(scenario, nuisances=drawn, declared_filters=declared)
     return replace(scenario, sequences=SHORT_PROTOCOL) if case.short else scenario
 
 

@@ -85,6 +85,7 @@ def write_config(
         "[camera]",
         'name = "virtual depth camera"',
         "depth_sigma = 0.002",
+        *([f"filters = {list(filters)}"] if (filters := scenario.declared_filters) else []),
         f"to_phantom = [{matrix}]",
         "",
         *_listed(

@@ -27,6 +27,7 @@ class Scenario:
         effects: hidden, known to nobody.
         disturbances: hidden, outside the catalogue of effects.
         nuisances: faults of the bench for which nothing is to be named.
+        declared_filters: names of the filters that the dataset states.
         sequences: names; the part before the number is the kind of motion: poke-top, poke-side or
             drag.
         rounds: number of rounds (three pushes, or one drag) by sequence; one by default.
@@ -51,6 +52,7 @@ class Scenario:
     effects: tuple[HiddenEffect, ...] = ()
     disturbances: tuple[Disturbance, ...] = ()
     nuisances: tuple[Nuisance, ...] = ()
+    declared_filters: tuple[str, ...] = ()
     sequences: tuple[str, ...] = (
         "poke-top-01",
         "poke-top-02",

@@ -10,7 +10,9 @@ from palpate.blind import KINDS, MIX, Case, all_cases, draw_cases, scenario_of, 
 from palpate.blind.cases import ALIKE
 from palpate.effects import DIAGNOSED
 from palpate.foundation.errors import RunError
-from palpate.synthetic import DISTURBANCES, FAULTS, HIDDEN, QUICK, SHORT_PROTOCOL, WEIGHED
+from palpate.synthetic import DISTURBANCES, FAULTS, FILTERS, HIDDEN, QUICK, SHORT_PROTOCOL, WEIGHED
+
+FILTERS_USED = set(FILTERS.values())
 
 
 def effects_of(cases: list[Case]) -> list[str]:
@@ -161,9 +163,13 @@ def test_short_case_records_fewer_sequences_of_the_same() -> None:
 def test_nuisances_leave_what_is_hidden_alone() -> None:
     plain = draw_cases(3, 12)
     cases = with_nuisances(plain)
-    assert [replace(scenario_of(case), nuisances=()) for case in cases] == [
+    assert [replace(scenario_of(case), nuisances=(), declared_filters=()) for case in cases] == [
         scenario_of(case) for case in plain
     ]
+    filtered = [
+        one for one in map(scenario_of, cases) if FILTERS_USED & set(map(type, one.nuisances))
+    ]
+    assert {bool(one.declared_filters) for one in filtered} == {True, False}
     assert all(scenario_of(case).nuisances for case in cases)
     assert {case.noisy for case in cases} == {True, False}
 
