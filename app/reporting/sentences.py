@@ -143,7 +143,33 @@ def left_sentences(report: dict[str, Any]) -> list[str]:
         if report.get("causes")
         else [f"It is{_size(left, ' ')}."] * bool(_size(left))
     )
-    return [*share, *_place(left)]
+    return [*share, *_place(left), *_clues(left.get("clues") or {})]
+
+
+def _clues(clues: dict[str, Any]) -> list[str]:
+    """Say when an error is left, what it moves with, what removes part of it, and what is next."""
+    if not clues:
+        return []
+    shares = sorted(clues["moves_with"].items(), key=lambda one: -one[1])
+    moves = ", ".join(f"{name} {100 * share:.0f}{NARROW}%" for name, share in shares)
+    when = ", ".join(
+        f"{phase} {quantity(1e-3 * size, 'm')}" for phase, size in clues["rms_mm_when"].items()
+    )
+    frames = ", ".join(
+        f"{one['sequence']} at {one['time_s']:.2f}{NARROW}s" for one in clues["worst_frames"]
+    )
+    partial = ", ".join(
+        f"{' and '.join(one['effects'])} leaves {100 * one['left']:.0f}{NARROW}%"
+        for one in clues["partial_causes"]
+        if one["effects"]
+    )
+    return [
+        f"Size: {when}.",
+        f"Moves with: {moves}.",
+        *([f"Worst frames: {frames}."] if frames else []),
+        *([f"Partial causes: {partial}."] if partial else []),
+        f"Next: {clues['measure_next']}.",
+    ]
 
 
 def _small(left: dict[str, Any]) -> str:

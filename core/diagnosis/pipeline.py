@@ -28,6 +28,7 @@ from palpate.diagnosis.observation.observe_splits import (
     check_splits,
     observe_splits,
 )
+from palpate.diagnosis.report.error_clues import error_clues
 from palpate.diagnosis.report.error_patterns import draw_patterns, error_patterns
 from palpate.diagnosis.report.force_report import with_palpation
 from palpate.diagnosis.report.palpation_figure import draw_palpation
@@ -172,6 +173,8 @@ def _run(
         else []
     )
     result = report_of(dataset, evaluator, findings, gain, "test", checks)
+    if clues := error_clues(evaluator, fitted, findings, result["verdict"]):
+        result["unexplained"]["clues"] = clues
     if dataset.accepted is not None:
         result["registration"] = dataset.accepted.to_json()
     if options.assurance:

@@ -12,11 +12,12 @@ import {
 } from "./format.js";
 import { openPanel } from "./panels.js";
 import { patternSection } from "./error-maps.js";
+import { clueRows, smallNote, unexplainedNote } from "./remaining-error.js";
 
 /**
  * @import {
  *   AmbiguityRow, Cause, Child, ControlRow, Estimate, Gain, Palette, Palpation, Patterns,
- *   ProbeProposal, RankingEntry, Report, RunHeading, Unexplained
+ *   ProbeProposal, RankingEntry, Report, RunHeading
  * } from "./types.js"
  */
 
@@ -112,7 +113,12 @@ export function showReport(heading, report, patterns, palette) {
     report.next_probe?.length
       ? section("Next probe", "would tell most", report.next_probe.map(probeEntry))
       : null,
-    report.unexplained ? section("Unexplained", "", unexplainedNote(report.unexplained)) : null,
+    report.unexplained
+      ? section("Unexplained", "", [
+          unexplainedNote(report.unexplained),
+          ...clueRows(report.unexplained.clues),
+        ])
+      : null,
     report.small_remainder
       ? section("Small remainder", "", smallNote(report.small_remainder))
       : null,
@@ -569,64 +575,6 @@ function probeEntry({ text, separates, probability }) {
     element("small", {}, `${capitalise(names[0])} or ${names[1]}${chance}`),
   );
 }
-
-/**
- * @param {Unexplained} unexplained
- * @returns {HTMLElement}
- */
-function unexplainedNote({
-  fraction,
-  where,
-  when: time,
-  structure,
-  structure_bound: bound,
-  rms_mm: rms,
-  share_of_motion: share,
-}) {
-  const times =
-    typeof structure === "number"
-      ? `What is left is ${structure.toFixed(2)} times what chance gives, ` +
-        `where more than ${bound?.toFixed(2)} would be an error with a pattern.`
-      : "";
-  if (fraction === 0 && times)
-    return element(
-      "p",
-      { class: "gain-note" },
-      element("b", {}, "Nothing"),
-      ` beyond chance. ${times}`,
-    );
-  const place = [where, time].filter(Boolean).join("; ");
-  return element(
-    "p",
-    { class: "gain-note" },
-    element("b", {}, formatPercent(fraction)),
-    ` of the structured error is left${sizeText(rms, share)}${place ? `: ${place}` : ""}.`,
-  );
-}
-
-/**
- * Return the size of a structured error as text; empty where it is unknown.
- * @param {number | null | undefined} rms in mm
- * @param {number | null | undefined} share of the surface's motion
- * @returns {string}
- */
-const sizeText = (rms, share) =>
-  typeof rms === "number"
-    ? `, ${rms.toFixed(2)} mm RMS or ${formatPercent(share ?? 0)} of the motion`
-    : "";
-
-/**
- * Tell of a structured error that is within the tolerance.
- * @param {Unexplained} left
- * @returns {HTMLElement}
- */
-const smallNote = ({ rms_mm: rms, share_of_motion: share, tolerance_mm: most, where, when }) =>
-  element(
-    "p",
-    { class: "gain-note" },
-    `A structured error is left${sizeText(rms, share)}, within the tolerance of ` +
-      `${most?.toFixed(2)} mm: ${[where, when].filter(Boolean).join("; ")}.`,
-  );
 
 /**
  * @param {NonNullable<Report["identified"]>[number]} entry

@@ -212,6 +212,16 @@ export interface Unexplained {
   rms_mm?: number | null;
   share_of_motion?: number | null;
   tolerance_mm?: number;
+  clues?: ErrorClues;
+}
+
+export interface ErrorClues {
+  rms_mm_when: Record<string, number>;
+  grows_with_push: number | null;
+  moves_with: Record<string, number>;
+  worst_frames: { sequence: string; time_s: number; rms_mm: number }[];
+  partial_causes: { effects: string[]; gain_nats: number; left: number }[];
+  measure_next: string;
 }
 
 export interface RankingEntry {

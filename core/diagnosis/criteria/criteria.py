@@ -29,6 +29,7 @@ from palpate.diagnosis.criteria.observation_criteria import (
     OutlierCriteria,
 )
 from palpate.diagnosis.criteria.report_criteria import (
+    ClueCriteria,
     DesignCriteria,
     FigureCriteria,
     FootprintCriteria,
@@ -82,6 +83,7 @@ class Criteria:
     controls: ControlCriteria = field(default_factory=ControlCriteria)
     verdict: VerdictCriteria = field(default_factory=VerdictCriteria)
     figures: FigureCriteria = field(default_factory=FigureCriteria)
+    clues: ClueCriteria = field(default_factory=ClueCriteria)
     footprint: FootprintCriteria = field(default_factory=FootprintCriteria)
     design: DesignCriteria = field(default_factory=DesignCriteria)
 

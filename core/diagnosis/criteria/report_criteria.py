@@ -8,7 +8,13 @@ import numpy as np
 
 from palpate.diagnosis.criteria.threshold import threshold
 
-__all__ = ["DesignCriteria", "FigureCriteria", "FootprintCriteria", "VerdictCriteria"]
+__all__ = [
+    "ClueCriteria",
+    "DesignCriteria",
+    "FigureCriteria",
+    "FootprintCriteria",
+    "VerdictCriteria",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,6 +89,29 @@ class FigureCriteria:
     least_force_change: float = threshold(
         5.0, "%", "Smallest change of the force that fills the colour scale."
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClueCriteria:
+    """Clues to an error that no cause explains."""
+
+    tool_cell: float = threshold(
+        4e-3,
+        "m",
+        "Width of the cells around the tool in which a pattern that follows it is fitted.",
+    )
+    lasting_share: float = threshold(
+        0.3,
+        "1",
+        "An error after a release that is at least this share of that in contact is lasting.",
+    )
+    least_ratio: float = threshold(
+        0.1,
+        "1",
+        "Smallest error at shallow pushes over that at deep ones that is told apart from 0.",
+    )
+    worst_frames: int = threshold(3, "1", "Number of the worst frames that are listed.")
+    partial_causes: int = threshold(3, "1", "Number of sets of partial causes that are listed.")
 
 
 @dataclass(frozen=True, kw_only=True)

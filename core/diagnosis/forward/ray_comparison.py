@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -39,6 +39,7 @@ class PointSample:
         facing: (m,) cosine between the baseline's normal and the direction to the camera.
         foot: (m, 3) rest positions, on the stated phantom, of the material points they met [m].
         side: (m,) of the phantom on which these lie.
+        cloud: (m,) number of each point's cloud among the group's; empty if unknown.
     """
 
     index: IntArray
@@ -47,6 +48,7 @@ class PointSample:
     facing: FloatArray
     foot: FloatArray
     side: IntArray
+    cloud: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int16))
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,6 +148,7 @@ def choose_points(group: Group, setup: Setup, frame: Equilibrium, surface: Surfa
         seen.facing[chosen].astype(np.float32),
         surface.on_stated(seen.foot[chosen]).astype(np.float32),
         seen.side[chosen].astype(np.int8),
+        group.cloud[index] if len(group.cloud) else group.cloud,
     )
 
 

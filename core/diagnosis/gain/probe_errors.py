@@ -17,7 +17,8 @@ import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
-from palpate.diagnosis.inference.noise.noise_model import patch_variance
+from palpate.diagnosis.inference.noise.noise_model import patch_variance, scatter_share
+from palpate.diagnosis.inference.noise.shared_noise import shared_noise
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import DiagnosisError
@@ -110,12 +111,17 @@ def fixed_pattern(
         before: whether only frames before the first contact count, if there are any; for a phantom
             that keeps a dent or stays where it slid to.
     """
+    count = _clear_points(item, model, before)
+    total = count.sum(axis=0)
+    return (np.nan_to_num(model.gap) * count).sum(axis=0) / np.maximum(total, 1), total
+
+
+def _clear_points(item: Observations, model: Prediction, before: bool) -> FloatArray:
+    """Number of points (g, p) in the frames from which `fixed_pattern` is averaged."""
     free = np.array([group.free for group in item.groups])[:, None]
     early = np.array([group.free and not group.push for group in item.groups])[:, None]
     free = early if before and early.any() else free
-    count = np.where(free & np.isfinite(model.gap), model.count, 0.0)
-    total = count.sum(axis=0)
-    return (np.nan_to_num(model.gap) * count).sum(axis=0) / np.maximum(total, 1), total
+    return np.where(free & np.isfinite(model.gap), model.count, 0.0)
 
 
 def probe_sums(
@@ -137,10 +143,11 @@ def probe_sums(
     Raises DiagnosisError if a sequence has no untouched frame, or no sequence has a touched one.
     """
     seen = [row for row in zip(data, *models, strict=True) if not row[0].force_only]
-    variance = patch_variance([row[1:][end] for row in seen for end in ends])
+    compared = [row[1:][end] for row in seen for end in ends]
+    variance, shared = patch_variance(compared), shared_noise(compared)
     rows: list[tuple[str, FloatArray]] = []
     for item, *own in seen:
-        rows += _rows(item, own, variance, lasting, ends)
+        rows += _rows(item, own, (variance, shared), lasting, ends)
     if not rows:
         raise DiagnosisError(
             "the test sequences have no frame in which the tool touches the phantom; "
@@ -162,11 +169,20 @@ def probe_sums(
 def _rows(
     item: Observations,
     own: Sequence[Prediction],
-    variance: FloatArray,
+    noise: tuple[FloatArray, float],
     lasting: bool,
     ends: tuple[int, int],
 ) -> list[tuple[str, FloatArray]]:
-    """Name of the push of each group of one sequence, and the group's sums."""
+    """Name of the push of each group of one sequence, and the group's sums.
+
+    Args:
+        item: the sequence.
+        own: its predictions by every model.
+        noise: variance of single points by patch (p,) [m^2], and `shared_noise`.
+        lasting: as in `probe_sums`.
+        ends: as in `probe_sums`.
+    """
+    variance, shared = noise
     patterns = [fixed_pattern(item, model, lasting) for model in own]
     difference, known = patterns[ends[0]][0] - patterns[ends[1]][0], patterns[ends[1]][1]
     if not known.sum():
@@ -174,6 +190,8 @@ def _rows(
             f"{item.name} has no untouched frame, so its noise floor is unknown; "
             "name others in [splits] test"
         )
+    alone, clear = scatter_share(own[ends[1]], shared), _clear_points(item, own[ends[1]], lasting)
+    pattern_share = (clear**2 * alone).sum(axis=0) / np.maximum(known, 1) ** 2
     rows = []
     for number, group in enumerate(item.groups):
         left = lasting and group.push > 0
@@ -186,7 +204,7 @@ def _rows(
         errors = [
             model.gap[number] - pattern for model, (pattern, _) in zip(own, patterns, strict=True)
         ]
-        floor = (variance[seen] * (1 + count / known[seen])).sum()
+        floor = (variance * (alone[number] + pattern_share))[seen] @ count
         products = [
             *(error**2 for error in errors),
             *(pattern * difference for pattern, _ in patterns),

@@ -5,7 +5,7 @@ Frames with the tool at nearly one place share one equilibrium and one set of pa
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from palpate.dataset import Kinematics
 from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.force_record import ForceRecord
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.frames import Transform
 from palpate.setup.box import distance_to_block
 from palpate.setup.setup import Setup
@@ -46,6 +46,7 @@ class Group:
             was registered.
         push: number of the push that the group belongs to; 0 before the first.
         lowest: height of the lowest points of a side that are surely not of the table [m].
+        cloud: (n,) number of each point's cloud among the group's; empty if unknown.
     """
 
     frames: tuple[int, ...]
@@ -54,6 +55,7 @@ class Group:
     reference: bool = False
     push: int = 0
     lowest: float = 0.0
+    cloud: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int16))
 
 
 @dataclass(frozen=True, eq=False)

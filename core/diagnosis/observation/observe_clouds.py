@@ -113,21 +113,20 @@ def observe(
             ]
         )
         clouds = [sequence.cloud(frame) for frame in chosen]
-        points = np.concatenate(
-            [
-                raw[cleaner.clean(raw, poses[frame]).indices]
-                for frame, raw in zip(chosen, clouds, strict=True)
-            ]
-        )
+        cleaned = [
+            raw[cleaner.clean(raw, poses[frame]).indices]
+            for frame, raw in zip(chosen, clouds, strict=True)
+        ]
+        points = np.concatenate(cleaned)
+        cloud = np.repeat(np.arange(len(cleaned)), [len(one) for one in cleaned]).astype(np.int16)
         most_points = (
             CRITERIA.grouping.most_points_untouched
             if free[run[0]]
             else CRITERIA.grouping.most_points
         )
         if len(points) > most_points:
-            points = points[
-                np.random.default_rng(number).choice(len(points), most_points, replace=False)
-            ]
+            rows = np.random.default_rng(number).choice(len(points), most_points, replace=False)
+            points, cloud = points[rows], cloud[rows]
         groups.append(
             Group(
                 tuple(chosen),
@@ -135,6 +134,7 @@ def observe(
                 bool(free[run[0]]),
                 push=int(pushes[run[0]]),
                 lowest=cleaner.lowest,
+                cloud=cloud,
             )
         )
     return Observations(sequence.name, times, kinematics, tuple(groups), _forces(sequence, setup))

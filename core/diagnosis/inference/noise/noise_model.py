@@ -16,6 +16,7 @@ import numpy as np
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.evidence import Block, gram
+from palpate.diagnosis.inference.noise.shared_noise import clouds_in_patches, shared_noise
 from palpate.diagnosis.observation.force_record import (
     depth_discrepancy,
     force_discrepancy,
@@ -24,7 +25,7 @@ from palpate.diagnosis.observation.force_record import (
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.surface_gaps import Surface
 
-__all__ = ["Noise", "noises", "patch_variance", "rows_of", "smooth_basis"]
+__all__ = ["Noise", "noises", "patch_variance", "rows_of", "scatter_share", "smooth_basis"]
 
 
 def patch_variance(predictions: Sequence[Prediction]) -> FloatArray:
@@ -45,6 +46,17 @@ def patch_variance(predictions: Sequence[Prediction]) -> FloatArray:
         else float(squares.sum() / max(freedom.sum(), 1))
     )
     return np.where(enough, variance, typical)
+
+
+def scatter_share(prediction: Prediction, shared: float) -> FloatArray:
+    """Variance of each patch average (g, p) over that of single points [1].
+
+    Args:
+        prediction: with the points' numbers, and with their clouds if any noise is shared.
+        shared: variance that a patch's points share in a cloud, over that of single points [1].
+    """
+    alone = 1 / np.maximum(prediction.count, 1)
+    return alone + shared / clouds_in_patches(prediction) if shared else np.asarray(alone)
 
 
 def smooth_basis(centres: FloatArray, length: float) -> FloatArray:
@@ -110,6 +122,7 @@ class Noise:
         surface: Surface,
         variance: FloatArray,
         lumps: slice,
+        shared: float = 0.0,
     ) -> Noise:
         """Make the noise of a sequence with clouds.
 
@@ -119,12 +132,13 @@ class Noise:
             surface: of the block.
             variance: of single points by patch (p,) [m^2].
             lumps: the baseline's columns of local stiffness.
+            shared: variance that a patch's points share in a cloud, over that of single points [1].
         """
         (gap, columns), finer = rows_of(baseline), rows_of(fine)[0]
         seen = np.isfinite(gap) & np.isfinite(finer)
         seen[list(set(baseline.failed) | set(fine.failed))] = False
         mesh = np.where(seen, finer - gap, 0.0)
-        scatter = variance / np.maximum(baseline.count, 1) + CRITERIA.noise.white_floor**2
+        scatter = variance * scatter_share(baseline, shared) + CRITERIA.noise.white_floor**2
         if baseline.forces is not None:
             scatter = np.concatenate([scatter, force_scatter(baseline.forces)], axis=1)
         scatter = scatter + (CRITERIA.noise.mesh_share * mesh) ** 2
@@ -259,9 +273,10 @@ def noises(
     """
     seen = [item for item in baseline if not item.force_only]
     variance = patch_variance(seen) if seen else np.empty(0)
+    shared = shared_noise(seen)
     return [
         Noise.of_forces(b, f, lumps)
         if b.force_only or surface is None
-        else Noise.of(b, f, surface, variance, lumps)
+        else Noise.of(b, f, surface, variance, lumps, shared)
         for b, f in zip(baseline, fine, strict=True)
     ]

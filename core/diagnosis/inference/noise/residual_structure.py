@@ -22,7 +22,14 @@ from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.noise.noise_model import smooth_basis
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["NOTHING", "Structure", "explained_by_modes", "response_of_modes", "structure_of"]
+__all__ = [
+    "NOTHING",
+    "Structure",
+    "explained_by_modes",
+    "push_sizes",
+    "response_of_modes",
+    "structure_of",
+]
 
 
 @dataclass(frozen=True)
@@ -62,8 +69,8 @@ class Structure:
 NOTHING = Structure(0.0, 1.0, 1.0)
 
 
-def _depth(item: Prediction) -> FloatArray:
-    """Return the largest displacement of each group (g,) over that of the sequence [1]."""
+def push_sizes(item: Prediction) -> FloatArray:
+    """The largest displacement of each group (g,) over that of the sequence [1]."""
     size = np.array(
         [
             np.linalg.norm(frame.displacement, axis=1).max() if frame.in_contact else 0.0
@@ -97,7 +104,9 @@ def _with_modes(model: Model, evaluator: Evaluator) -> list[Block]:
             blocks.append(noise.block(item.append_columns(np.zeros((len(own), 0, modes)), force)))
         else:
             blocks.append(
-                noise.block(item.append_columns(_wide(_depth(item)[:, None, None] * seen, modes)))
+                noise.block(
+                    item.append_columns(_wide(push_sizes(item)[:, None, None] * seen, modes))
+                )
             )
     return blocks
 
@@ -169,7 +178,7 @@ def structure_of(evaluator: Evaluator, model: Model, seed: int) -> Structure:
 
 
 def _pushed(evaluator: Evaluator, model: Model) -> tuple[float, float]:
-    """RMS of `_depth` [1] and of the visible surface's displacement [m] over the groups with
+    """RMS of `push_sizes` [1] and of the visible surface's displacement [m] over the groups with
     contact; NaN where a sequence has no clouds.
     """
     centres = evaluator.problem.surface.patch_centres if evaluator.problem.clouds else None
@@ -177,7 +186,7 @@ def _pushed(evaluator: Evaluator, model: Model) -> tuple[float, float]:
     for item in model.predictions:
         if centres is None or item.force_only:
             return np.nan, np.nan
-        for depth, frame, gap in zip(_depth(item), item.equilibria, item.gap, strict=True):
+        for depth, frame, gap in zip(push_sizes(item), item.equilibria, item.gap, strict=True):
             seen = np.isfinite(gap)
             if frame.in_contact and seen.any():
                 depths.append(depth)
