@@ -112,7 +112,7 @@ def error_clues(
 
 def _residual(evaluator: Evaluator, data: Sequence[Observations], model: Model) -> _Residual:
     """Collect the residual of a model, without what clear frames show of each patch."""
-    parts: list[tuple[FloatArray, ...]] = []
+    parts: list[tuple[Any, ...]] = []
     phase: list[str] = []
     push: list[FloatArray] = []
     tool: list[FloatArray] = []
