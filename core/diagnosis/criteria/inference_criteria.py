@@ -112,9 +112,6 @@ class NoiseCriteria:
         "Noise that the points of a patch share is counted where it is this many standard errors "
         "above zero.",
     )
-    shared_least_points: int = threshold(
-        3, "1", "Fewest points of a patch in each of two clouds that are compared for it."
-    )
     least_freedom: int = threshold(
         50, "1", "A patch with no more degrees of freedom than this gets the median variance."
     )

@@ -100,6 +100,12 @@ class ClueCriteria:
         "m",
         "Width of the cells around the tool in which a pattern that follows it is fitted.",
     )
+    significance: float = threshold(
+        4.0,
+        "1",
+        "Nothing is said of what an error moves with unless its sum of squares is this many standard "
+        "deviations above what noise gives.",
+    )
     lasting_share: float = threshold(
         0.3,
         "1",

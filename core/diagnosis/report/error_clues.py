@@ -196,7 +196,7 @@ def _moves_with(evaluator: Evaluator, left: _Residual) -> dict[str, float]:
     group, patch = left.group[chosen], left.patch[chosen]
     sigma, whitened, push = left.sigma[chosen], left.whitened[chosen], left.push[group]
     total = float(np.sum(whitened**2 - 1.0))
-    if total <= 0:
+    if total < CRITERIA.clues.significance * np.sqrt(2 * len(whitened)):
         return {WHOLE: 0.0, TOOL: 0.0, PHANTOM: 0.0}
     centres, normals = surface.patch_centres, surface.patch_normals
     rigid = np.einsum("pi,pij->pj", normals, motion_jacobian(centres, centres.mean(axis=0)))

@@ -9,12 +9,13 @@ shared^2. Successive clouds are compared, so that a slow motion hardly counts.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import PointSample, Prediction
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import FloatArray, IntArray
 
 __all__ = ["clouds_in_patches", "shared_noise"]
 
@@ -25,44 +26,69 @@ def shared_noise(predictions: Sequence[Prediction]) -> float:
     Zero where it is within `CRITERIA.noise.shared_significance` standard errors of zero, and where
     no untouched group has two clouds.
     """
-    excess: list[FloatArray] = []
-    weight: list[FloatArray] = []
-    for item in predictions:
-        pairs = zip(item.samples, item.equilibria, strict=bool(item.samples))
-        for sample, frame in pairs:
-            if not frame.in_contact and len(sample.cloud):
-                own = _successive(sample, item.gap.shape[1])
-                excess.append(own[0])
-                weight.append(own[1])
-    weights = np.concatenate(weight) if weight else np.empty(0)
+    clear = [
+        (sample, item.gap.shape[1])
+        for item in predictions
+        for sample, frame in zip(item.samples, item.equilibria, strict=bool(item.samples))
+        if not frame.in_contact and len(sample.cloud)
+    ]
+    if not clear:
+        return 0.0
+    clouds = [_Clouds.of(sample, patches) for sample, patches in clear]
+    freedom = np.sum([one.freedom for one in clouds], axis=0)
+    spread = np.sum([one.within for one in clouds], axis=0) / np.maximum(freedom, 1)
+    known = (freedom > CRITERIA.noise.least_freedom) & (spread > 0)
+    # The mean of 1 / spread is freedom / (freedom - 2) times that of the true variance.
+    precision = np.where(known, (1 - 2 / np.maximum(freedom, 3)) / np.maximum(spread, 1e-30), 0.0)
+    pairs = [one.successive(precision) for one in clouds]
+    excess, weights = (np.concatenate(part) for part in zip(*pairs, strict=True))
     if not len(weights):
         return 0.0
-    value = float(np.sum(weights * np.concatenate(excess)) / (2 * weights.sum()))
+    value = float(weights @ excess) / (2 * float(weights.sum()))
     # Two successive squared differences of white noise have a correlation of 1/4.
     error = float(np.sqrt(1.5 / (2 * weights.sum())))
     return value if value > CRITERIA.noise.shared_significance * error else 0.0
 
 
-def _successive(sample: PointSample, patches: int) -> tuple[FloatArray, FloatArray]:
-    """Squared differences of successive clouds' patch averages, over the variance of single points,
-    minus what that variance gives (d,) [1], and their weights (d,).
+@dataclass(frozen=True, eq=False)
+class _Clouds:
+    """Averages of one untouched group by cloud and patch.
+
+    Attributes:
+        mean: (c, p) [m].
+        count: (c, p) number of points.
+        within: (p,) sum of squares about the averages [m^2].
+        freedom: (p,) its degrees of freedom.
     """
-    clouds = int(sample.cloud.max()) + 1
-    cell = sample.cloud.astype(np.int64) * patches + sample.patch
-    count = np.bincount(cell, minlength=clouds * patches).reshape(clouds, patches)
-    total = np.bincount(cell, sample.gap, minlength=clouds * patches).reshape(clouds, patches)
-    mean = total / np.maximum(count, 1)
-    within = (sample.gap - mean.ravel()[cell]) ** 2
-    freedom = np.maximum(count - 1, 0).sum(axis=0)
-    spread = np.bincount(sample.patch, within, minlength=patches) / np.maximum(freedom, 1)
-    least = CRITERIA.noise.shared_least_points
-    known = (count[1:] >= least) & (count[:-1] >= least)
-    known &= (freedom > CRITERIA.noise.least_freedom) & (spread > 0)
-    inverse = 1 / np.maximum(count[1:], 1) + 1 / np.maximum(count[:-1], 1)
-    # The mean of 1 / spread is freedom / (freedom - 2) times that of the true variance.
-    precision = (1 - 2 / np.maximum(freedom, 3)) / np.maximum(spread, 1e-30)
-    excess = (mean[1:] - mean[:-1]) ** 2 * precision - inverse
-    return excess[known], 1 / inverse[known] ** 2
+
+    mean: FloatArray
+    count: IntArray
+    within: FloatArray
+    freedom: IntArray
+
+    @classmethod
+    def of(cls, sample: PointSample, patches: int) -> _Clouds:
+        """Average the points of a sample."""
+        clouds, gap = int(sample.cloud.max()) + 1, sample.gap.astype(float)
+        cell = sample.cloud.astype(np.int64) * patches + sample.patch
+        count = np.bincount(cell, minlength=clouds * patches)
+        mean = np.bincount(cell, gap, minlength=clouds * patches) / np.maximum(count, 1)
+        within = np.bincount(sample.patch, (gap - mean[cell]) ** 2, minlength=patches)
+        shape = (clouds, patches)
+        freedom = np.maximum(count.reshape(shape) - 1, 0).sum(axis=0)
+        return cls(mean.reshape(shape), count.reshape(shape), within, freedom)
+
+    def successive(self, precision: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Squared differences of successive averages in units of the points' variance, minus what
+        that variance gives (d,) [1], and their weights (d,).
+
+        Args:
+            precision: (p,) one over the variance of single points [1/m^2]; zero where unknown.
+        """
+        known = (self.count[1:] > 0) & (self.count[:-1] > 0) & (precision > 0)
+        inverse = 1 / np.maximum(self.count[1:], 1) + 1 / np.maximum(self.count[:-1], 1)
+        excess = (self.mean[1:] - self.mean[:-1]) ** 2 * precision - inverse
+        return excess[known], 1 / inverse[known] ** 2
 
 
 def clouds_in_patches(prediction: Prediction) -> FloatArray:

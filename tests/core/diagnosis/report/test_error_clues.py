@@ -27,7 +27,7 @@ from palpate.diagnosis.report.error_clues import (
 from palpate.diagnosis.search.findings import Findings
 from palpate.foundation.arrays import FloatArray
 from palpate.registration.pose import motion_jacobian
-from palpate.replay.replay import replay
+from palpate.replay.replay import Equilibrium, replay
 
 SIGMA = 5e-5
 PLACES = [(4e-3, -2e-3), (-12e-3, 6e-3), (15e-3, 8e-3)]
@@ -45,11 +45,16 @@ def evaluator() -> Iterator[Evaluator]:
 
 
 @pytest.fixture(scope="module")
-def frames() -> tuple:
+def frames() -> tuple[Equilibrium, ...]:
     return tuple(replay(SETUP, CENTRES, GRID))
 
 
-def clues(evaluator: Evaluator, frames: tuple, error: FloatArray, verdict: str = "unexplained"):
+def clues(
+    evaluator: Evaluator,
+    frames: tuple[Equilibrium, ...],
+    error: FloatArray,
+    verdict: str = "unexplained",
+):
     """The clues to an error (g, p) [m] with noise of SIGMA and a fixed pattern of the camera."""
     rng = np.random.default_rng(3)
     patches = evaluator.problem.surface.patches
@@ -68,7 +73,7 @@ def clues(evaluator: Evaluator, frames: tuple, error: FloatArray, verdict: str =
     return error_clues(evaluator, data, Findings(model), verdict)
 
 
-def depth(frames: tuple) -> FloatArray:
+def depth(frames: tuple[Equilibrium, ...]) -> FloatArray:
     """Size (g, 1) of each group's deformation over the largest [1]."""
     size = np.array([np.linalg.norm(one.displacement, axis=1).max() for one in frames])
     size *= [one.in_contact for one in frames]
