@@ -103,8 +103,8 @@ class ClueCriteria:
     significance: float = threshold(
         4.0,
         "1",
-        "Nothing is said of what an error moves with unless its sum of squares is this many standard "
-        "deviations above what noise gives.",
+        "Nothing is said of what an error moves with unless its sum of squares is this many "
+        "standard deviations above what noise gives.",
     )
     lasting_share: float = threshold(
         0.3,
