@@ -78,9 +78,9 @@ export const smallNote = ({
 export function clueRows(clues) {
   if (!clues) return [];
   const rows = [
-    clueBars("Size", clues.rms_mm_when, (size) => `${size.toFixed(2)} mm`),
-    clueBars("Moves with", clues.moves_with, formatPercent),
-    clueBars("Left by", leftBy(clues), formatPercent),
+    clueBars("Size beyond noise", clues.rms_mm_when, (size) => `${size.toFixed(2)} mm`),
+    clueBars("Moves with", clues.moves_with, formatPercent, 1),
+    clueBars("What would stay with a cause", leftBy(clues), formatPercent, 1),
   ];
   const frames = clues.worst_frames.map(
     ({ sequence, time_s: time, rms_mm: rms }) =>
@@ -107,10 +107,10 @@ const leftBy = ({ partial_causes: causes }) =>
  * @param {string} title
  * @param {Record<string, number>} values
  * @param {(value: number) => string} text
+ * @param {number} most value of a full bar
  * @returns {HTMLElement}
  */
-function clueBars(title, values, text) {
-  const most = Math.max(...Object.values(values), 1e-12);
+function clueBars(title, values, text, most = Math.max(...Object.values(values), 1e-12)) {
   return element(
     "div",
     { class: "clue" },
@@ -120,7 +120,7 @@ function clueBars(title, values, text) {
         "div",
         { class: "clue-bar" },
         element("small", {}, name),
-        element("i", { style: `inline-size: ${Math.round((60 * value) / most)}px` }),
+        element("i", { style: { width: `${Math.round((60 * value) / most)}px` } }),
         element("b", {}, text(value)),
       ),
     ),

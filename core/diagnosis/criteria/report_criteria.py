@@ -109,7 +109,8 @@ class ClueCriteria:
     lasting_share: float = threshold(
         0.3,
         "1",
-        "An error after a release that is at least this share of that in contact is lasting.",
+        "An error before or after a push that is more than this share of that in contact does not "
+        "come from the push alone.",
     )
     least_ratio: float = threshold(
         0.1,

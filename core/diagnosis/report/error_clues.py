@@ -1,7 +1,8 @@
 """Clues to an error that no cause explains: when it is left, what it moves with, and what is next.
 
-All figures are of the residual on the fitted sequences with the camera's fixed pattern taken off,
-as the clear frames show it, in units of the noise.
+All figures are of the residual on the fitted sequences beyond noise, with the camera's fixed
+pattern taken off, which frames without contact show: all of them, or those before the first push
+where it is asked when the error is left.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ _NEXT = {
     "and let the table show in every cloud",
     TOOL: "measure the tool's ball and shaft, and touch every landmark twice",
     PHANTOM: "push again at this place, from another side and to another depth",
+    BEFORE: "look at the camera, since the error is there before anything is touched: switch its "
+    "filters off, or state them in [camera] filters",
     RELEASED: "record ten seconds without the tool after each push",
 }
 """What to measure next, by what the error moves with or when it is left."""
@@ -91,27 +94,33 @@ def error_clues(
     if verdict not in ("unexplained", "ambiguous") or not evaluator.problem.clouds:
         return None
     model = findings.best.model if findings.best else findings.baseline
-    left = _residual(evaluator, data, model)
-    phases = np.array(left.phase)[left.group]
-    when = {
-        phase: round(1e3 * left.beyond_noise(phases == phase), 4)
-        for phase in (CONTACT, RELEASED, BEFORE)
-    }
+    when = _when(_residual(evaluator, data, model, early=True))
+    left = _residual(evaluator, data, model, early=False)
     moves = _moves_with(evaluator, left)
     strongest = max(moves, key=lambda name: moves[name])
-    lasting = when[RELEASED] > CRITERIA.clues.lasting_share * when[CONTACT]
+    least = CRITERIA.clues.lasting_share * when[CONTACT]
+    before, lasting = when[BEFORE] > least, when[RELEASED] > least
     return {
         "rms_mm_when": when,
         "grows_with_push": _growth(left),
         "moves_with": {name: round(share, 3) for name, share in moves.items()},
         "worst_frames": _worst_frames(left),
         "partial_causes": _partial_causes(findings),
-        "measure_next": _NEXT[RELEASED] if lasting else _NEXT[strongest],
+        "measure_next": _NEXT[BEFORE if before else RELEASED if lasting else strongest],
     }
 
 
-def _residual(evaluator: Evaluator, data: Sequence[Observations], model: Model) -> _Residual:
-    """Collect the residual of a model, without what clear frames show of each patch."""
+def _residual(
+    evaluator: Evaluator, data: Sequence[Observations], model: Model, *, early: bool
+) -> _Residual:
+    """Collect the residual of a model, without what clear frames show of each patch.
+
+    Args:
+        evaluator: with the noise.
+        data: the fitted sequences.
+        model: whose predictions are compared.
+        early: whether only frames before the first push count as clear, where there are two.
+    """
     parts: list[tuple[Any, ...]] = []
     phase: list[str] = []
     push: list[FloatArray] = []
@@ -123,7 +132,9 @@ def _residual(evaluator: Evaluator, data: Sequence[Observations], model: Model) 
         if prediction.force_only:
             continue
         touched = np.array([one.in_contact for one in prediction.equilibria])
-        group, *values = _without_pattern(prediction, noise, touched)
+        first = np.array([not one.push for one in item.groups]) & ~touched
+        clear = first if early and first.sum() > 1 else ~touched
+        group, *values = _without_pattern(prediction, noise, clear)
         parts.append((group + len(phase), *values))
         phase += [_phase(*row) for row in zip(item.groups, touched.tolist(), strict=True)]
         push.append(np.where(touched, push_sizes(prediction), 0.0))
@@ -143,9 +154,9 @@ def _residual(evaluator: Evaluator, data: Sequence[Observations], model: Model) 
 
 
 def _without_pattern(
-    prediction: Prediction, noise: Noise, touched: Any
+    prediction: Prediction, noise: Noise, clear: Any
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
-    """Residuals of a sequence without what its clear groups show of each patch on average.
+    """Residuals of a sequence without what its groups `clear` (g,) show of each patch on average.
 
     Returns:
         group (n,), patch (n,), residual (n,) [m], and its standard deviation by noise (n,) [m].
@@ -153,13 +164,13 @@ def _without_pattern(
     gap = prediction.gap
     weights = noise.weights[:, : gap.shape[1]]
     seen = np.isfinite(gap) & (weights > 0)
-    clear = np.where(seen & ~touched[:, None], weights, 0.0)
-    total = clear.sum(axis=0)
-    zero = (clear * np.nan_to_num(gap)).sum(axis=0) / np.maximum(total, 1e-300)
+    averaged = np.where(seen & clear[:, None], weights, 0.0)
+    total = averaged.sum(axis=0)
+    zero = (averaged * np.nan_to_num(gap)).sum(axis=0) / np.maximum(total, 1e-300)
     # A patch that one clear group alone shows has no residual there.
-    seen &= (total > 0) & (total > clear * (1 + 1e-9))
+    seen &= (total > 0) & (total > averaged * (1 + 1e-9))
     group, patch = np.nonzero(seen)
-    sign = np.where(touched[group], 1.0, -1.0)
+    sign = np.where(clear[group], -1.0, 1.0)
     variance = 1 / weights[group, patch] + sign / total[patch]
     value = gap[group, patch] - zero[patch]
     return group, patch, value, np.sqrt(np.maximum(variance, 1e-16))
@@ -172,6 +183,15 @@ def _phase(group: Group, touched: bool) -> str:
 def _time(item: Observations, group: Group) -> float:
     """Mean time of a group's clouds [s]; NaN for the rest cloud."""
     return float(item.times[list(group.frames)].mean()) if group.frames else np.nan
+
+
+def _when(left: _Residual) -> dict[str, float]:
+    """RMS beyond noise [mm] in contact, after a release and before the first push."""
+    phases = np.array(left.phase)[left.group]
+    return {
+        phase: round(1e3 * left.beyond_noise(phases == phase), 4)
+        for phase in (CONTACT, RELEASED, BEFORE)
+    }
 
 
 def _growth(left: _Residual) -> float | None:

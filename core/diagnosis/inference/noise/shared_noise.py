@@ -73,7 +73,8 @@ class _Clouds:
         cell = sample.cloud.astype(np.int64) * patches + sample.patch
         count = np.bincount(cell, minlength=clouds * patches)
         mean = np.bincount(cell, gap, minlength=clouds * patches) / np.maximum(count, 1)
-        within = np.bincount(sample.patch, (gap - mean[cell]) ** 2, minlength=patches)
+        squares = np.bincount(sample.patch, (gap - mean[cell]) ** 2, minlength=patches)
+        within = np.asarray(squares, dtype=float)
         shape = (clouds, patches)
         freedom = np.maximum(count.reshape(shape) - 1, 0).sum(axis=0)
         return cls(mean.reshape(shape), count.reshape(shape), within, freedom)

@@ -125,8 +125,15 @@ def test_error_that_stays_after_a_release_is_told(evaluator, frames):
     spot = np.exp(-0.5 * (np.linalg.norm(centres - [0.0, 0.0, 0.036], axis=1) / 8e-3) ** 2)
     found = clues(evaluator, frames, 5e-4 * after * spot)
     assert found["rms_mm_when"][RELEASED] > 0.3 * found["rms_mm_when"][CONTACT]
-    assert found["rms_mm_when"][BEFORE] > 0
+    assert found["rms_mm_when"][BEFORE] < 0.1 * found["rms_mm_when"][CONTACT]
     assert "after each push" in found["measure_next"]
+
+
+def test_error_before_anything_is_touched_is_the_cameras(evaluator, frames):
+    flicker = np.asarray(5e-4 * (-1.0) ** np.arange(len(CENTRES))[:, None])
+    found = clues(evaluator, frames, flicker * np.ones(evaluator.problem.surface.patches))
+    assert "camera" in found["measure_next"]
+    assert "before anything is touched" in found["measure_next"]
 
 
 def test_worst_frames_are_those_with_the_error(evaluator, frames):
