@@ -136,7 +136,7 @@ def left_sentences(report: dict[str, Any]) -> list[str]:
     If there are causes, also its share.
     """
     left, small = report.get("unexplained") or {}, report.get("small_remainder")
-    if not left.get("fraction"):
+    if not left.get("fraction") and not left.get("clues"):
         return [] if small is None else [_small(small), *_place(small)]
     share = (
         [f"{100 * left['fraction']:.0f}{NARROW}% of the structured error is left{_size(left)}."]

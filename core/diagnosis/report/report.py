@@ -7,6 +7,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.stats import beta
 
 from palpate.dataset import Dataset
 from palpate.diagnosis.criteria import CRITERIA
@@ -185,7 +186,30 @@ def _evidence(evaluator: Evaluator, findings: Findings, checks: AllClearChecks) 
         "structure_bound": round(structure.bound / structure.expected, 4),
         "evaluations": evaluator.state.evaluations,
         "fitted_on": list(evaluator.problem.names),
+        **_false_alarms(findings),
         **_all_clear(checks),
+    }
+
+
+def _false_alarms(findings: Findings) -> dict[str, Any]:
+    """How often this data's noise, pushes and camera would name a cause where there is none.
+
+    A share of draws of the noise model, and the upper end of its interval (Clopper and Pearson
+    1934); structured error by chance has the probability that its test is made for.
+    """
+    draws = len(findings.chance)
+    if not draws:
+        return {}
+    named = int((findings.chance > findings.bound).sum())
+    level = CRITERIA.intervals.level
+    most = float(beta.ppf(level, named + 1, draws - named)) if named < draws else 1.0
+    return {
+        "false_alarms": {
+            "named": round(named / draws, 4),
+            "named_at_most": round(most, 4),
+            "structured": round(1 - CRITERIA.structure.quantile, 4),
+            "draws": draws,
+        }
     }
 
 

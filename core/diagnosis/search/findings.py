@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.criteria.tolerance import Tolerance
 from palpate.diagnosis.inference.hypothesis import Model
@@ -11,6 +13,7 @@ from palpate.diagnosis.inference.noise.camera_error_model import CALM, Ripple
 from palpate.diagnosis.inference.noise.residual_structure import NOTHING, Structure
 from palpate.diagnosis.search.identifiability import Identifiability
 from palpate.effects import Effect
+from palpate.foundation.arrays import FloatArray
 
 __all__ = ["Findings", "Trial"]
 
@@ -59,6 +62,7 @@ class Findings:
         known: effects without which nothing can be replayed: touches of other landmarks.
         hints: reason why an effect with enough gain is not named, by name.
         tolerance: size below which structured error does not matter.
+        chance: (d,) best gain of the catalogue in draws of this data's noise alone [nats].
     """
 
     baseline: Model
@@ -75,6 +79,7 @@ class Findings:
     known: tuple[Effect, ...] = ()
     hints: dict[str, str] = field(default_factory=dict)
     tolerance: Tolerance = field(default_factory=Tolerance)
+    chance: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def withdraw(self, why: str) -> None:
         """Reject the best model and all that extend it, for this reason."""

@@ -92,6 +92,7 @@ def _state_limits(
     blocks, nuisance = evaluator.tempered(extended), (*extended.nuisance, *extended.columns)
     known = evaluator.precision(extended)
     chance = null_gains(blocks, nuisance, known, candidates, CRITERIA.naming.null_draws, seed)
+    findings.chance = np.asarray(chance)
     findings.bound = max(
         float(np.quantile(chance, CRITERIA.naming.null_quantile)), CRITERIA.naming.least_gain
     )

@@ -61,6 +61,24 @@ def test_what_is_left_is_told_with_place_and_time(report: dict[str, Any]) -> Non
     assert left_sentences({**report, "unexplained": None}) == []
 
 
+def test_clues_to_an_unexplained_error_are_told(report: dict[str, Any]) -> None:
+    clues = {
+        "rms_mm_when": {"while the tool touches": 0.21, "after a release": 0.02},
+        "grows_with_push": 1.4,
+        "moves_with": {"the whole view": 0.04, "the tool": 0.62},
+        "worst_frames": [{"sequence": "drag-01", "time_s": 33.687, "rms_mm": 0.3}],
+        "partial_causes": [{"effects": ["tool_radius"], "gain_nats": 30.0, "left": 0.55}],
+        "measure_next": "measure the tool",
+    }
+    left = {"fraction": 0.4, "where": "here", "when": "then", "clues": clues}
+    told = " ".join(left_sentences({**report, "unexplained": left})).replace("\xa0", " ")
+    assert "while the tool touches 0.21 mm" in told
+    assert "Moves with: the tool 62 %, the whole view 4 %." in told
+    assert "Worst frames: drag-01 at 33.69 s." in told
+    assert "Partial causes: tool_radius leaves 55 %." in told
+    assert "Next: measure the tool." in told
+
+
 def test_every_effect_of_the_catalogue_has_its_own_words() -> None:
     own = [effect for effect in CATALOGUE if effect not in OUTSIDE]
     assert [effect.name for effect in own if "phrase" not in vars(effect)] == []

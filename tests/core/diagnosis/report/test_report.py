@@ -356,3 +356,14 @@ def test_remaining_error_has_place_and_sequence(evaluator, dataset):
     left = report_of(dataset, evaluator, findings, None, "test")["unexplained"]
     assert left["when"] == "most in poke-02"
     assert 0 <= left["fraction"] <= 1 and "mm" in left["where"]
+
+
+def test_report_says_how_often_chance_would_name_a_cause(evaluator, dataset):
+    findings = _findings(evaluator, misfit=1.0)
+    assert "false_alarms" not in report_of(dataset, evaluator, findings, LADDER, "test")["evidence"]
+    findings.chance = np.array([*np.linspace(0, 11, 398), 13.0, 14.0])
+    rates = report_of(dataset, evaluator, findings, LADDER, "test")["evidence"]["false_alarms"]
+    assert rates["draws"] == 400
+    assert rates["named"] == 0.005
+    assert 0.01 < rates["named_at_most"] < 0.03
+    assert rates["structured"] == pytest.approx(0.001)
