@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from made_datasets import copy_dataset
 
 from palpate.dataset import Dataset, open_dataset
 from palpate.synthetic import NUISANCES, Scenario, make_dataset, truth_path
@@ -28,7 +29,7 @@ def drawn(seed: int) -> Scenario:
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
     folder = tmp_path_factory.mktemp("bench") / "real"
-    make_dataset(folder, drawn(4), seed=11)
+    copy_dataset(folder, drawn(4), 11)
     return open_dataset(folder)
 
 
