@@ -20,6 +20,7 @@ from palpate.diagnosis.gain.force_gain import ForceGain
 from palpate.diagnosis.gain.held_out_gain import held_out_gain
 from palpate.diagnosis.gain.surface_gain import SurfaceGain
 from palpate.diagnosis.gain.tuned_setup import tuned_setup
+from palpate.diagnosis.inference.credible_intervals import as_stated
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.problem_of_dataset import problem_of_dataset
 from palpate.diagnosis.observation.frame_groups import Observations
@@ -205,7 +206,8 @@ def _validated(
         if held_out
         else None
     )
-    if why := rejection_reason(findings, gain):
+    stated = as_stated(evaluator, findings.best.model) if findings.best else ()
+    if why := rejection_reason(findings, gain, stated):
         findings.withdraw(why)
         gain = held_out_gain(evaluator, findings, held_out, pool, fine, seed) if held_out else None
     if verdict_of(findings) != "none":

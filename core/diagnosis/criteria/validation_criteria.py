@@ -48,8 +48,9 @@ class RejectionCriteria:
     unconfirmed_gain: float = threshold(
         2.0,
         "1",
-        "A cause without structured error, and without a sure gain on test sequences, is a hint "
-        "if its gain is below this many times the required gain.",
+        "A cause without structured error, and without a sure gain on test sequences or with "
+        "numbers that may all be as stated, is a hint if its gain is below this many times the "
+        "required gain. So is a further cause with such numbers.",
         "measured: without structure and without a sure gain a control of another solver named "
         "strain stiffening at 26 to 31 nats for 25; chance gives no 50 nats",
     )

@@ -18,7 +18,13 @@ from palpate.effects.elastic_material import MODULUS_ACCURACY
 from palpate.foundation.arrays import FloatArray
 from palpate.setup.setup import Setup
 
-__all__ = ["intervals", "is_supported_by_all_sequences", "modulus_interval", "spread_of"]
+__all__ = [
+    "as_stated",
+    "intervals",
+    "is_supported_by_all_sequences",
+    "modulus_interval",
+    "spread_of",
+]
 
 
 def _robust(
@@ -83,6 +89,21 @@ def is_supported_by_all_sequences(evaluator: Evaluator, model: Model, without: M
     )
     share, spread = _robust(evaluator.tempered(extended), columns, precision, slice(-1, None))
     return bool(share[0] > CRITERIA.intervals.normal_quantile * spread[0])
+
+
+def as_stated(posterior: Posterior, model: Model) -> tuple[str, ...]:
+    """Return the names of the effects of which every number may be as stated.
+
+    The intervals include the replay's own error. An effect that is absent at one value of a single
+    number, like an inclusion as stiff as the rest, is not among them while others of its numbers,
+    like its place, differ from those of the neutral effect.
+    """
+    found, setup = [], posterior.problem.setup
+    for effect, spread in model.split(spread_of(posterior, model)):
+        away = np.abs(np.subtract(effect.coordinates, effect.neutral(setup).coordinates))
+        if np.all(away <= CRITERIA.intervals.normal_quantile * spread):
+            found.append(effect.name)
+    return tuple(found)
 
 
 def intervals(posterior: Posterior, model: Model) -> list[dict[str, dict[str, Any]]]:

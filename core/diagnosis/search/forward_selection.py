@@ -21,7 +21,7 @@ from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.identifiability import identifiability_of
 from palpate.diagnosis.search.inclusion_grid import inclusion_places
 from palpate.diagnosis.search.initial_guess import initial_guess
-from palpate.diagnosis.search.revision import reconsidered, try_pairs
+from palpate.diagnosis.search.revision import distinct, reconsidered, try_pairs
 from palpate.diagnosis.search.screening import null_gains
 from palpate.diagnosis.search.shortlist import beyond_first_order, shortlist
 from palpate.diagnosis.search.signatures import signatures_of
@@ -76,6 +76,8 @@ def search(evaluator: Evaluator, seed: int) -> Findings:
         try_pairs(evaluator, findings, current, first, seed)
     if findings.best is not None and len(findings.best.model.effects) > 1 and not known:
         findings.best = reconsidered(evaluator, findings, grown, signatures, origin)
+        if len(findings.best.model.effects) > 1:
+            findings.best = distinct(evaluator, findings)
     _rescore(evaluator, findings)
     if findings.best is not None:
         refined = refine(evaluator, findings.best.model)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.inference.credible_intervals import is_supported_by_all_sequences
+from palpate.diagnosis.inference.credible_intervals import as_stated, is_supported_by_all_sequences
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.noise.residual_structure import structure_of
@@ -19,7 +19,7 @@ from palpate.diagnosis.search.shortlist import shortlist
 from palpate.diagnosis.search.signatures import Signature
 from palpate.diagnosis.search.trials import Screening, gain_over, screen_again, trial_of
 
-__all__ = ["reconsidered", "try_pairs"]
+__all__ = ["distinct", "reconsidered", "try_pairs"]
 
 
 def try_pairs(
@@ -140,4 +140,36 @@ def _exchanged(
             best = other
         else:
             findings.trials.append(other.scored())
+    return best
+
+
+def distinct(evaluator: Evaluator, findings: Findings) -> Trial:
+    """Return the best model without further causes of which every number may be as stated.
+
+    Such a cause becomes a hint, unless it gains far more than a further cause must.
+
+    Args:
+        evaluator: of the inference problem.
+        findings: with a best model of several causes.
+    """
+    best = findings.best
+    assert best is not None
+    needed = CRITERIA.naming.second_factor * findings.bound
+    for name in as_stated(evaluator, best.model):
+        rest = [effect for effect in best.model.effects if effect.name != name]
+        if not rest:
+            break
+        without = trial_of(evaluator, rest, best.model.predictions, findings.baseline)
+        without = replace(without, required_gain=best.required_gain - needed)
+        lost = gain_over(evaluator, best.model, without.model)
+        if lost <= CRITERIA.rejection.unconfirmed_gain * needed:
+            others = " and ".join(without.model.names)
+            findings.hints[name] = (
+                f"{name} beside {others} would gain {lost:.0f} nats, but the intervals of all its "
+                "numbers include what is stated. It is a hint, and is not named"
+            )
+            findings.trials.append(without)
+            best = without
+        else:
+            findings.trials.append(without.scored())
     return best

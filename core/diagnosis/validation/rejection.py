@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.gain.force_gain import ForceGain
 from palpate.diagnosis.gain.surface_gain import SurfaceGain
@@ -11,8 +13,16 @@ from palpate.diagnosis.search.findings import Findings
 __all__ = ["leaves_structure", "rejection_reason"]
 
 
-def rejection_reason(findings: Findings, gain: SurfaceGain | ForceGain | None) -> str:
-    """Return the reason why found causes are not named; empty if nothing contradicts them."""
+def rejection_reason(
+    findings: Findings, gain: SurfaceGain | ForceGain | None, as_stated: Collection[str] = ()
+) -> str:
+    """Return the reason why found causes are not named; empty if nothing contradicts them.
+
+    Args:
+        findings: of the search.
+        gain: on test sequences; None without them.
+        as_stated: names of the causes of which every number may be as stated.
+    """
     if findings.best is None:
         return ""
     names = " and ".join(findings.best.model.names)
@@ -20,6 +30,7 @@ def rejection_reason(findings: Findings, gain: SurfaceGain | ForceGain | None) -
         _harm(names, gain)
         or _no_explanation(names, findings, gain)
         or _unconfirmed(names, findings, gain)
+        or _indistinct(names, findings, as_stated)
     )
 
 
@@ -71,6 +82,22 @@ def _unconfirmed(names: str, findings: Findings, gain: SurfaceGain | ForceGain |
         f"{names} would explain the data by {best.gain:.0f} nats, but no error that is smooth over "
         f"the surface and grows with the push is there, and on test sequences {_share(gain)} of "
         "the reducible error is removed. It is a hint, and is not named"
+    )
+
+
+def _indistinct(names: str, findings: Findings, as_stated: Collection[str]) -> str:
+    """Return the reason if every number of every cause may be as stated, by intervals that include
+    the replay's own error, no structured error is there, and the gain is not far above the bound.
+    """
+    best = findings.best
+    if best is None or findings.structure.significant or not set(best.model.names) <= {*as_stated}:
+        return ""
+    if best.gain > CRITERIA.rejection.unconfirmed_gain * best.required_gain:
+        return ""
+    return (
+        f"{names} would explain the data by {best.gain:.0f} nats, but the intervals of all its "
+        "numbers include what is stated, and no error that is smooth over the surface and grows "
+        "with the push is there. It is a hint, and is not named"
     )
 
 

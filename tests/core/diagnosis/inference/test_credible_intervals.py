@@ -10,7 +10,12 @@ import pytest
 from noisy_model import GROUPS, LUMP, NUISANCES, RADIUS, noisy_model, stated_evaluator
 from pushed_block import SETUP, prediction
 
-from palpate.diagnosis.inference.credible_intervals import intervals, is_supported_by_all_sequences
+from palpate.diagnosis.inference.credible_intervals import (
+    as_stated,
+    intervals,
+    is_supported_by_all_sequences,
+    spread_of,
+)
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evidence import Block, gram
 from palpate.diagnosis.inference.hypothesis import Model
@@ -169,3 +174,18 @@ def test_intervals_of_several_causes_keep_to_their_columns(evaluator):
     lump, radius = intervals(evaluator, noisy_model(evaluator, LUMP, RADIUS))
     assert lump["stiffness_ratio"]["value"] == pytest.approx(4.0)
     assert radius["radius"]["value"] == pytest.approx(4.4e-3)
+
+
+def test_effect_whose_numbers_may_be_as_stated_is_told(evaluator):
+    """The radius is 5 mm as stated; half an interval's width away from it, and twice."""
+    for half_widths, expected in ((0.5, ("tool_radius",)), (2.0, ())):
+        near = noisy_model(evaluator, RADIUS)
+        reach = 1.96 * float(spread_of(evaluator, near)[0])
+        radius = SETUP.tool.radius + half_widths * reach
+        model = replace(near, effects=(replace(RADIUS, radius=radius),))
+        assert as_stated(evaluator, model) == expected
+
+
+def test_every_number_must_be_as_stated(evaluator):
+    model = noisy_model(evaluator, Gravity(specific_weight_over_stiffness=0.0), LUMP)
+    assert as_stated(evaluator, model) == ("gravity",)

@@ -106,3 +106,25 @@ def test_cause_that_touches_or_the_rest_cloud_show_needs_no_push_to_confirm_it()
     model = replace(findings.best.model, effects=(cause,))
     findings.best = replace(findings.best, model=model, gain=31.0, required_gain=25.0)
     assert rejection_reason(findings, IDLE) == ""
+
+
+def _faint(gain: float, ratio: float) -> Findings:
+    findings = _found(ratio, ratio)
+    assert findings.best is not None
+    findings.best = replace(findings.best, gain=gain, required_gain=25.0)
+    return findings
+
+
+def test_cause_whose_numbers_may_be_as_stated_is_a_hint():
+    why = rejection_reason(_faint(26.0, 0.9), LADDER, ("tool_compliance",))
+    assert "26 nats" in why
+    assert "include what is stated" in why
+
+
+@pytest.mark.parametrize(
+    ("gain", "ratio", "as_stated"),
+    [(60.0, 0.9, ("tool_compliance",)), (26.0, 1.6, ("tool_compliance",)), (26.0, 0.9, ())],
+    ids=["far above the bound", "structure is there", "numbers differ"],
+)
+def test_faint_cause_with_other_support_is_named(gain, ratio, as_stated):
+    assert rejection_reason(_faint(gain, ratio), LADDER, as_stated) == ""
