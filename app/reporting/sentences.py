@@ -38,9 +38,20 @@ def verdict_sentence(report: dict[str, Any], size: Sequence[float] | None = None
         )
     if verdict == "unexplained":
         return "Structured error remains that no known effect removes."
+    if verdict == "ambiguous" and (family := report.get("family")):
+        left = ", ".join(
+            f"{words(one['effect'])} leaves {100 * one['left']:.0f}{NARROW}% of the error"
+            for one in family["members"]
+        )
+        sure = family["sure"][0].upper() + family["sure"][1:]
+        return f"{sure}; by which law is open: {left}. {_part(family)}"
     if verdict == "ambiguous":
         return f"Several causes explain the data equally well: {_listed(phrases, 'or')}."
     return f"The simulation misses {_listed(phrases, 'and')}{_gain(report)}."
+
+
+def _part(family: dict[str, Any]) -> str:
+    return f"What would tell: {family['parted_by']}."
 
 
 def limit_phrase(row: dict[str, Any]) -> str:

@@ -15,6 +15,7 @@ from enum import Enum
 from types import MappingProxyType
 from typing import Any, ClassVar, Self
 
+from palpate.effects.family import Family
 from palpate.effects.linearisation import Linearisation, Measurement, NuisanceBlock, Tangent
 from palpate.effects.parameter import Parameter
 from palpate.foundation.errors import EffectError
@@ -80,6 +81,8 @@ class Effect(ABC):
     needs_fine_mesh: ClassVar[bool] = False
     """Whether finite differences need the mesh of the diagnosis; the coarse mesh of the screening
     does for others."""
+    family: ClassVar[Family | None] = None
+    """Effects that act in the same way by other laws; None for an effect without relatives."""
     told_apart_by: ClassVar[Mapping[str, str]] = MappingProxyType({})
     """Name of another effect to a measurement, which is no push, that tells the two apart."""
 

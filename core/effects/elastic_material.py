@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 from palpate.effects.base import Effect, Slot
+from palpate.effects.family import STIFFNESS
 from palpate.effects.linearisation import Linearisation, Measurement, NuisanceBlock
 from palpate.effects.parameter import parameter
 from palpate.foundation.quantities import quantity
@@ -78,6 +79,7 @@ class StiffInclusion(Effect):
     """A ball of other stiffness inside, such as a tumour or a bubble."""
 
     name, enters = "stiff_inclusion", Slot.MATERIAL
+    family = STIFFNESS
     summary = "a lump of other stiffness lies inside"
     linearisation, amplitude = Linearisation.LOCAL_STIFFNESS, "stiffness_ratio"
     amplitude_deviation = 0.8

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 from palpate.effects.base import Effect, Slot
+from palpate.effects.family import STIFFNESS
 from palpate.effects.linearisation import Linearisation, Measurement, Tangent
 from palpate.effects.parameter import parameter
 from palpate.foundation.quantities import quantity
@@ -27,6 +28,7 @@ class SurfaceLayer(Effect):
     """A skin of other stiffness on the top, such as a coating or a capsule."""
 
     name, enters = "surface_layer", Slot.MATERIAL
+    family = STIFFNESS
     summary = "a skin of other stiffness lies on the top"
     linearisation, amplitude = Linearisation.TANGENT, "stiffness_ratio"
     shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
@@ -75,6 +77,7 @@ class StiffnessGradient(Effect):
     """
 
     name, enters = "stiffness_gradient", Slot.MATERIAL
+    family = STIFFNESS
     summary = "the stiffness changes from the base to the top"
     linearisation = Linearisation.TANGENT
     shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
@@ -106,6 +109,7 @@ class StrainStiffening(Effect):
     """A material that stiffens with strain: Gent's law."""
 
     name, enters = "strain_stiffening", Slot.MATERIAL
+    family = STIFFNESS
     summary = "the material stiffens with strain"
     linearisation = Linearisation.TANGENT
     shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})

@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from palpate.effects.base import MEASURE_SIZE, Effect, Slot
+from palpate.effects.family import CAMERA
 from palpate.effects.linearisation import Linearisation, NuisanceBlock
 from palpate.effects.parameter import parameter
 from palpate.foundation.frames import Transform
@@ -75,6 +76,7 @@ class CameraRegistration(Effect):
     """
 
     name, enters = "camera_registration", Slot.SENSOR
+    family = CAMERA
     summary = "the camera is not where it was registered"
     linearisation, nuisance = Linearisation.NUISANCE, NuisanceBlock.CAMERA_POSE
     tx: float = parameter("m", low=-3e-2, high=3e-2, scale=1e-3)
@@ -129,6 +131,7 @@ class DepthBias(Effect):
     """
 
     name, enters = "depth_bias", Slot.SENSOR
+    family = CAMERA
     summary = "the camera reads too near or far, or stretches depth"
     linearisation, joint = Linearisation.TANGENT, True
     told_apart_by = MappingProxyType(

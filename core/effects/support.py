@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Self, cast
 
 from palpate.effects.base import Effect, Slot
+from palpate.effects.family import BASE
 from palpate.effects.linearisation import Measurement
 from palpate.effects.parameter import parameter
 from palpate.foundation.quantities import quantity
@@ -26,6 +27,7 @@ class BaseSlip(Effect):
     """
 
     name, enters = "base_slip", Slot.SUPPORT
+    family = BASE
     summary = "the base slides on the table"
     kinked = True  # a push that slides at one friction holds at the next
     # The accuracy is that of the sideways force, which the grid of a diagnosis has to some percent.
@@ -60,6 +62,7 @@ class BaseDetachment(Effect):
     """A strip of the base along one edge is not held: it may lift, but not go into the table."""
 
     name, enters = "base_detachment", Slot.SUPPORT
+    family = BASE
     summary = "a strip of the base is not held"
     edge: str = parameter("", choices=_EDGES)
     extent: float = parameter("m", low=0.0, high=0.04, scale=2e-3, accuracy=7e-4)
@@ -98,6 +101,7 @@ class BaseCompliance(Effect):
     """An elastic support: springs per area in all directions, over Young's modulus."""
 
     name, enters = "base_compliance", Slot.SUPPORT
+    family = BASE
     summary = "the support under the base gives way"
     shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
     stiffness_over_E: float = parameter("1/m", low=5.0, high=_RIGID, scale=0.3, log=True)

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any, Self
 
 from palpate.effects.base import Effect, Slot
+from palpate.effects.family import MEMORY
 from palpate.effects.linearisation import Linearisation
 from palpate.effects.parameter import parameter
 from palpate.foundation.quantities import quantity
@@ -21,6 +22,7 @@ class Viscoelasticity(Effect):
     """Relaxation and delayed recovery: one more term of a Prony series."""
 
     name, enters = "viscoelasticity", Slot.MATERIAL
+    family = MEMORY
     summary = "the material relaxes and recovers with delay"
     linearisation = Linearisation.HISTORY
     told_apart_by = MappingProxyType(
@@ -68,6 +70,7 @@ class PermanentSet(Effect):
     """Deformation that remains after release."""
 
     name, enters = "permanent_set", Slot.MATERIAL
+    family = MEMORY
     summary = "part of the deformation stays after release"
     linearisation = Linearisation.HISTORY
     # Measured: after the same push the remaining dents differ by 2 to 3 %.

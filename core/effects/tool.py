@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any, Self
 
 from palpate.effects.base import MEASURE_SIZE, Effect, Slot
+from palpate.effects.family import TOOL
 from palpate.effects.linearisation import Linearisation, Measurement, NuisanceBlock
 from palpate.effects.parameter import parameter
 from palpate.foundation.quantities import quantity
@@ -32,6 +33,7 @@ class ToolRadius(Effect):
     """A tool of another size than stated."""
 
     name, enters = "tool_radius", Slot.TOOL
+    family = TOOL
     summary = "the tool has another size than stated"
     linearisation, nuisance = Linearisation.NUISANCE, NuisanceBlock.TOOL_RADIUS
     shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
@@ -66,6 +68,7 @@ class ToolOffset(Effect):
     """
 
     name, enters = "tool_offset", Slot.TOOL
+    family = TOOL
     summary = "the tool's centre is not where the kinematics say"
     linearisation, nuisance = Linearisation.NUISANCE, NuisanceBlock.TOOL_POSITION
     shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
@@ -104,6 +107,7 @@ class ToolCompliance(Effect):
     """The shaft or the cables yield under load: the true centre is the stated one plus C F."""
 
     name, enters = "tool_compliance", Slot.TOOL
+    family = TOOL
     summary = "the tool gives way under load"
     linearisation = Linearisation.TANGENT
     shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})

@@ -36,6 +36,12 @@ class NamingCriteria:
         "derived: the difference of two log densities that differ by d has a spread of about "
         "sqrt(2 d), so 8 nats are two of its standard deviations",
     )
+    most_left: float = threshold(
+        0.9,
+        "1",
+        "Largest share of the misfit above noise that counts as left where laws of one family are "
+        "compared.",
+    )
     most_causes: int = threshold(3, "1", "Largest number of causes of one model.")
     promising: float = threshold(
         0.5,

@@ -17,7 +17,7 @@ from palpate.diagnosis.inference.credible_intervals import intervals, modulus_in
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.noise.mesh_discrepancy import too_coarse
 from palpate.diagnosis.report.remaining_error import small_remainder, unexplained_error
-from palpate.diagnosis.search.findings import Findings, Trial
+from palpate.diagnosis.search.findings import Findings, Trial, shared_family
 from palpate.diagnosis.search.model_probabilities import probabilities
 from palpate.diagnosis.validation.checks import AllClearChecks
 from palpate.effects import NuisanceBlock
@@ -49,7 +49,9 @@ def _probabilities(findings: Findings) -> dict[tuple[str, ...], float]:
         surplus[trial.model.names] = max(
             trial.gain - trial.required_gain, surplus.get(trial.model.names, -np.inf)
         )
-    return probabilities(surplus)
+    # Where the best law is wrong, a difference of gains says less about the cause.
+    doubt = findings.doubtful / CRITERIA.naming.rival
+    return probabilities(surplus, doubt * CRITERIA.naming.probability_temperature)
 
 
 def _removed(findings: Findings, misfit: float) -> float:
@@ -72,6 +74,31 @@ def _causes(evaluator: Evaluator, findings: Findings, trials: list[Trial]) -> li
                 {"effect": effect.name, "probability": round(chance, 4), "parameters": entry}
             )
     return rows
+
+
+def _family(findings: Findings, trials: list[Trial]) -> dict[str, Any] | None:
+    """What is sure where all sets that are named differ in one effect of one family; None
+    elsewhere.
+    """
+    first, *others = trials or [None]
+    if first is None or not others:
+        return None
+    families = {shared_family(first.model.effects, one.model.effects) for one in others}
+    family = families.pop() if len(families) == 1 else None
+    if family is None:
+        return None
+    shared = set(first.model.names).intersection(*(one.model.names for one in others))
+    return {
+        "name": family.name,
+        "sure": family.sure,
+        "parted_by": family.parted_by,
+        "members": [
+            {"effect": name, "left": round(1.0 - _removed(findings, trial.misfit), 4)}
+            for trial in trials
+            for name in trial.model.names
+            if name not in shared
+        ],
+    }
 
 
 def _ranking(evaluator: Evaluator, findings: Findings, named: set[str]) -> list[dict[str, Any]]:
@@ -160,6 +187,7 @@ def report_of(
         "dataset": dataset.name,
         "verdict": verdict,
         "causes": causes,
+        **({"family": family} if (family := _family(findings, trials)) else {}),
         "interval_level": CRITERIA.intervals.level,
         "criteria": CRITERIA.to_json(),
         "ranking": _ranking(evaluator, findings, named),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,9 +14,20 @@ from palpate.diagnosis.inference.noise.camera_error_model import CALM, Ripple
 from palpate.diagnosis.inference.noise.residual_structure import NOTHING, Structure
 from palpate.diagnosis.search.identifiability import Identifiability
 from palpate.effects import Effect
+from palpate.effects.family import Family
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["Findings", "Trial"]
+__all__ = ["Findings", "Trial", "shared_family"]
+
+
+def shared_family(one: Sequence[Effect], other: Sequence[Effect]) -> Family | None:
+    """Return the family of the two effects in which two sets differ; None where they differ in
+    more, or in effects of no common family.
+    """
+    names, others = {effect.name for effect in one}, {effect.name for effect in other}
+    first = [effect.family for effect in one if effect.name not in others]
+    second = [effect.family for effect in other if effect.name not in names]
+    return first[0] if len(first) == len(second) == 1 and first == second else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,20 +109,34 @@ class Findings:
         """
         return self.structure.matters(self.tolerance) or self.ripple.significant
 
+    @property
+    def doubtful(self) -> float:
+        """Difference of gains [nats] up to which laws of one family are not told apart.
+
+        Where the best model leaves significant structure its law is not the true one. It is then
+        the gain that a model would have beyond the best one that removes what the best one leaves.
+        """
+        if self.best is None or not self.remaining.significant:
+            return CRITERIA.naming.rival
+        left = (self.best.misfit - 1.0) / max(self.misfit - 1.0, 1e-9)
+        left = min(max(left, 0.0), CRITERIA.naming.most_left)
+        return max(CRITERIA.naming.rival, self.best.gain * left / (1.0 - left))
+
     def rivals(self) -> list[Trial]:
-        """Return other sets of as many causes that explain the data about as well as the best."""
+        """Return other sets of as many causes that explain the data about as well as the best, or
+        less well by another law of the same family where the best law is wrong.
+        """
         if self.best is None:
             return []
         best = self.best
         named = {best.model.names}
         close = []
         for trial in self.trials:
-            names = trial.model.names
-            if (
-                len(names) == len(best.model.names)
-                and names not in named
-                and best.gain - trial.gain < CRITERIA.naming.rival
-            ):
+            names, behind = trial.model.names, best.gain - trial.gain
+            if len(names) != len(best.model.names) or names in named:
+                continue
+            shared = shared_family(best.model.effects, trial.model.effects)
+            if behind < (self.doubtful if shared else CRITERIA.naming.rival):
                 named.add(names)
                 close.append(trial)
         return close

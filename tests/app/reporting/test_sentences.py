@@ -61,6 +61,23 @@ def test_what_is_left_is_told_with_place_and_time(report: dict[str, Any]) -> Non
     assert left_sentences({**report, "unexplained": None}) == []
 
 
+def test_family_is_said_where_its_laws_are_not_told_apart(report: dict[str, Any]) -> None:
+    family = {
+        "name": "memory",
+        "sure": "the material remembers",
+        "parted_by": "frames after a release",
+        "members": [
+            {"effect": "viscoelasticity", "left": 0.32},
+            {"effect": "permanent_set", "left": 0.46},
+        ],
+    }
+    told = verdict_sentence({**report, "verdict": "ambiguous", "family": family})
+    assert told.replace("\xa0", " ") == (
+        "The material remembers; by which law is open: viscoelasticity leaves 32 % of the error, "
+        "permanent set leaves 46 % of the error. What would tell: frames after a release."
+    )
+
+
 def test_clues_to_an_unexplained_error_are_told(report: dict[str, Any]) -> None:
     clues = {
         "rms_mm_when": {"while the tool touches": 0.21, "after a release": 0.02},

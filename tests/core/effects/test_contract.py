@@ -367,3 +367,12 @@ def test_an_inclusion_is_placed_where_the_grid_has_it():
         assert effect.inclusion == replace(place, stiffness_ratio=1.0)
     with pytest.raises(EffectError, match="has no place"):
         ToolOffset.placed(place)
+
+
+def test_families_have_at_least_two_members():
+    found: dict[str, int] = {}
+    for effect in CATALOGUE:
+        if effect.family is not None:
+            found[effect.family.name] = found.get(effect.family.name, 0) + 1
+    assert set(found) == {"memory", "tool", "camera", "stiffness", "base"}
+    assert min(found.values()) >= 2

@@ -25,6 +25,7 @@ from palpate.diagnosis.validation.stiffness_error_test import StiffnessErrorTest
 from palpate.diagnosis.validation.worst_location import ErrorLocation
 from palpate.effects import DIAGNOSED, Effect
 from palpate.effects.elastic_material import PoissonRatio
+from palpate.effects.time_dependence import PermanentSet, Viscoelasticity
 
 NU = PoissonRatio(nu=0.40)
 RIM = ErrorLocation((0.03, 0.0, 0.039), 0.4)
@@ -367,3 +368,35 @@ def test_report_says_how_often_chance_would_name_a_cause(evaluator, dataset):
     assert rates["named"] == 0.005
     assert 0.01 < rates["named_at_most"] < 0.03
     assert rates["structured"] == pytest.approx(0.001)
+
+
+REMEMBERS = Viscoelasticity(relaxed_fraction=0.49, time_constant=8.1)
+KEEPS = PermanentSet(retained_fraction=0.2)
+
+
+def _wrong_law(evaluator: Evaluator, left: float) -> Findings:
+    """A law that removes 68 % of the misfit above noise, and another of its family 54 %."""
+    findings = _findings(
+        evaluator, ((REMEMBERS,), 3719.0, 1.32), ((KEEPS,), 2941.0, 1.46), ((RADIUS,), 2900.0, 1.5)
+    )
+    findings.remaining = Structure(left, 20.0, 30.0, 0.5e-3, 3e-3)
+    return findings
+
+
+def test_laws_of_one_family_stay_possible_where_the_best_one_is_wrong(evaluator, dataset):
+    report = report_of(dataset, evaluator, _wrong_law(evaluator, 90.0), LADDER, "test")
+    assert report["verdict"] == "ambiguous"
+    assert [cause["effect"] for cause in report["causes"]] == ["viscoelasticity", "permanent_set"]
+    assert report["family"]["name"] == "memory"
+    assert [one["left"] for one in report["family"]["members"]] == [0.32, 0.46]
+    assert "release" in report["family"]["parted_by"]
+    best, other = (cause["probability"] for cause in report["causes"])
+    assert 0.5 < best < 0.9
+    assert other > 0.05
+
+
+def test_one_law_is_named_where_it_leaves_noise(evaluator, dataset):
+    report = report_of(dataset, evaluator, _wrong_law(evaluator, 21.0), LADDER, "test")
+    assert report["verdict"] == "found"
+    assert report["causes"][0]["probability"] == 1.0
+    assert "family" not in report
