@@ -77,12 +77,12 @@ def _causes(evaluator: Evaluator, findings: Findings, trials: list[Trial]) -> li
 
 
 def _family(findings: Findings, trials: list[Trial]) -> dict[str, Any] | None:
-    """What is sure where all sets that are named differ in one effect of one family; None
-    elsewhere.
+    """The family of the effects in which all named sets differ, with what is sure; None where
+    they differ in more.
     """
-    first, *others = trials or [None]
-    if first is None or not others:
+    if len(trials) < 2:
         return None
+    first, *others = trials
     families = {shared_family(first.model.effects, one.model.effects) for one in others}
     family = families.pop() if len(families) == 1 else None
     if family is None:
