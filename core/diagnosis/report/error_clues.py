@@ -260,11 +260,10 @@ def _worst_frames(left: _Residual) -> list[dict[str, Any]]:
 def _partial_causes(findings: Findings) -> list[dict[str, Any]]:
     """The best sets of causes that were fitted, and the share of the error that each leaves."""
     rows = []
-    noise = max(findings.misfit - 1.0, 1e-9)
     for trial in sorted(findings.trials, key=lambda one: -one.gain)[
         : CRITERIA.clues.partial_causes
     ]:
-        left = float(np.clip((trial.misfit - 1.0) / noise, 0.0, 1.0))
+        left = findings.share_left(trial.misfit)
         rows.append(
             {
                 "effects": list(trial.model.names),

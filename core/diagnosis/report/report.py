@@ -55,8 +55,10 @@ def _probabilities(findings: Findings) -> dict[tuple[str, ...], float]:
 
 
 def _removed(findings: Findings, misfit: float) -> float:
-    """Share of the misfit above noise that a model removes on the fitted sequences [1]."""
-    return float(np.clip((findings.misfit - misfit) / max(findings.misfit - 1.0, 1e-9), 0.0, 1.0))
+    """Share of the misfit above noise that a model removes on the fitted sequences [1]; zero where
+    the stated model has none.
+    """
+    return 1.0 - findings.share_left(misfit) if findings.misfit > 1.0 else 0.0
 
 
 def _causes(evaluator: Evaluator, findings: Findings, trials: list[Trial]) -> list[dict[str, Any]]:

@@ -109,6 +109,10 @@ class Findings:
         """
         return self.structure.matters(self.tolerance) or self.ripple.significant
 
+    def share_left(self, misfit: float) -> float:
+        """Return the share of the stated model's misfit above noise that another one leaves [1]."""
+        return min(max((misfit - 1.0) / max(self.misfit - 1.0, 1e-9), 0.0), 1.0)
+
     @property
     def doubtful(self) -> float:
         """Difference of gains [nats] up to which laws of one family are not told apart.
@@ -118,8 +122,7 @@ class Findings:
         """
         if self.best is None or not self.remaining.significant:
             return CRITERIA.naming.rival
-        left = (self.best.misfit - 1.0) / max(self.misfit - 1.0, 1e-9)
-        left = min(max(left, 0.0), CRITERIA.naming.most_left)
+        left = min(self.share_left(self.best.misfit), CRITERIA.naming.most_left)
         return max(CRITERIA.naming.rival, self.best.gain * left / (1.0 - left))
 
     def rivals(self) -> list[Trial]:

@@ -400,3 +400,9 @@ def test_one_law_is_named_where_it_leaves_noise(evaluator, dataset):
     assert report["verdict"] == "found"
     assert report["causes"][0]["probability"] == 1.0
     assert "family" not in report
+
+
+def test_nothing_is_removed_where_the_stated_model_is_at_the_noise(evaluator, dataset):
+    findings = _findings(evaluator, ((RADIUS,), 3.0, 0.95), accepted=False, misfit=0.96)
+    rows = report_of(dataset, evaluator, findings, LADDER, "test")["ranking"]
+    assert {row["error_removed"] for row in rows} == {0.0}
