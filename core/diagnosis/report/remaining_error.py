@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.search.findings import Findings
@@ -93,6 +94,16 @@ def small_remainder(
         }
         for amplitude, motion, note, own in left
     ]
+    if findings.misfit > CRITERIA.verdict.unexplained_misfit and not findings.poor:
+        motion = findings.structure.motion
+        entries.append(
+            {
+                **_size(findings.excess, motion),
+                "tolerance_mm": round(1e3 * tolerance.of(motion), 4),
+                "where": str(worst_patch_location(findings.baseline.predictions, evaluator)),
+                "when": f"most in {_worst_sequence(findings.baseline)}",
+            }
+        )
     for one in checks.stiffness_errors:
         if one.significant and not one.matters(tolerance):
             entries.append(

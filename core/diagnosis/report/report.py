@@ -30,13 +30,7 @@ _NO_CHECKS = AllClearChecks()
 def verdict_of(findings: Findings, checks: AllClearChecks = _NO_CHECKS) -> str:
     """Return the verdict: found, none, ambiguous or unexplained."""
     if findings.best is None:
-        return (
-            "unexplained"
-            if findings.structured
-            or checks.failed
-            or findings.misfit > CRITERIA.verdict.unexplained_misfit
-            else "none"
-        )
+        return "unexplained" if findings.structured or checks.failed or findings.poor else "none"
     if findings.rivals():
         return "ambiguous"
     return "found"

@@ -74,6 +74,8 @@ class Findings:
         known: effects without which nothing can be replayed: touches of other landmarks.
         hints: reason why an effect with enough gain is not named, by name.
         tolerance: size below which structured error does not matter.
+        excess: RMS of the baseline's error beyond noise over the visible surface [m]; NaN without
+            clouds.
         chance: (d,) best gain of the catalogue in draws of this data's noise alone [nats].
     """
 
@@ -91,6 +93,7 @@ class Findings:
     known: tuple[Effect, ...] = ()
     hints: dict[str, str] = field(default_factory=dict)
     tolerance: Tolerance = field(default_factory=Tolerance)
+    excess: float = np.nan
     chance: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     def withdraw(self, why: str) -> None:
@@ -101,6 +104,12 @@ class Findings:
         ]
         self.hints |= dict.fromkeys(sorted(names), why)
         self.best, self.remaining, self.withdrawn = None, self.structure, why
+
+    @property
+    def poor(self) -> bool:
+        """Whether the stated setup leaves far more than noise, and enough to matter."""
+        known_small = self.excess <= self.tolerance.of(self.structure.motion)
+        return self.misfit > CRITERIA.verdict.unexplained_misfit and not known_small
 
     @property
     def structured(self) -> bool:

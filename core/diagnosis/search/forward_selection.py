@@ -15,7 +15,7 @@ from palpate.diagnosis.inference.credible_intervals import is_supported_by_all_s
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.final_fit import refine
 from palpate.diagnosis.inference.noise.camera_error_model import CALM
-from palpate.diagnosis.inference.noise.residual_structure import structure_of
+from palpate.diagnosis.inference.noise.residual_structure import rms_beyond_noise, structure_of
 from palpate.diagnosis.search.candidates import tangents_of
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.identifiability import identifiability_of
@@ -48,6 +48,7 @@ def search(evaluator: Evaluator, seed: int) -> Findings:
     origin = evaluator.baseline(tangents, inclusion_places(problem), known)
     baseline = evaluator.evaluate((), origin.predictions) if known else origin
     findings = Findings(baseline, misfit=evaluator.misfit(baseline), known=known)
+    findings.excess = rms_beyond_noise(evaluator, baseline)
     findings.ripple = problem.at_rest.cloud.errors.ripple if problem.at_rest else CALM
     findings.structure = findings.remaining = structure_of(evaluator, origin, seed)
     signatures = signatures_of(evaluator, origin)

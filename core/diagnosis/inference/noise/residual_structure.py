@@ -28,6 +28,7 @@ __all__ = [
     "explained_by_modes",
     "push_sizes",
     "response_of_modes",
+    "rms_beyond_noise",
     "structure_of",
 ]
 
@@ -175,6 +176,22 @@ def structure_of(evaluator: Evaluator, model: Model, seed: int) -> Structure:
         amplitude,
         motion,
     )
+
+
+def rms_beyond_noise(evaluator: Evaluator, model: Model) -> float:
+    """RMS of a model's error beyond noise over the visible surface [m]; NaN without clouds."""
+    if not evaluator.problem.clouds:
+        return np.nan
+    patches = evaluator.problem.surface.patches
+    weights = np.concatenate(
+        [
+            noise.weights[:, :patches].ravel()
+            for noise, item in zip(evaluator.state.noises, model.predictions, strict=True)
+            if not item.force_only
+        ]
+    )
+    excess = max(evaluator.misfit(model) - 1.0, 0.0)
+    return float(np.sqrt(excess * (weights > 0).sum() / max(weights.sum(), 1e-300)))
 
 
 def _pushed(evaluator: Evaluator, model: Model) -> tuple[float, float]:

@@ -406,3 +406,16 @@ def test_nothing_is_removed_where_the_stated_model_is_at_the_noise(evaluator, da
     findings = _findings(evaluator, ((RADIUS,), 3.0, 0.95), accepted=False, misfit=0.96)
     rows = report_of(dataset, evaluator, findings, LADDER, "test")["ranking"]
     assert {row["error_removed"] for row in rows} == {0.0}
+
+
+def test_more_than_noise_that_is_too_small_to_matter_is_a_small_remainder(evaluator, dataset):
+    findings = _findings(evaluator, accepted=False, misfit=1.4)
+    findings.structure = findings.remaining = Structure(18.0, 20.0, 30.0, 0.0, 2e-3)
+    assert report_of(dataset, evaluator, findings, LADDER, "test")["verdict"] == "unexplained"
+    findings.excess = 0.06e-3
+    report = report_of(dataset, evaluator, findings, LADDER, "test")
+    assert report["verdict"] == "none"
+    assert report["small_remainder"]["rms_mm"] == 0.06
+    assert report["small_remainder"]["tolerance_mm"] == 0.1
+    findings.excess = 0.2e-3
+    assert report_of(dataset, evaluator, findings, LADDER, "test")["verdict"] == "unexplained"
