@@ -44,14 +44,10 @@ def verdict_sentence(report: dict[str, Any], size: Sequence[float] | None = None
             for one in family["members"]
         )
         sure = family["sure"][0].upper() + family["sure"][1:]
-        return f"{sure}; by which law is open: {left}. {_part(family)}"
+        return f"{sure}; by which law is open: {left}. What would tell: {family['parted_by']}."
     if verdict == "ambiguous":
         return f"Several causes explain the data equally well: {_listed(phrases, 'or')}."
     return f"The simulation misses {_listed(phrases, 'and')}{_gain(report)}."
-
-
-def _part(family: dict[str, Any]) -> str:
-    return f"What would tell: {family['parted_by']}."
 
 
 def limit_phrase(row: dict[str, Any]) -> str:
@@ -170,7 +166,7 @@ def _clues(clues: dict[str, Any]) -> list[str]:
         f"{one['sequence']} at {one['time_s']:.2f}{NARROW}s" for one in clues["worst_frames"]
     )
     partial = ", ".join(
-        f"{' and '.join(one['effects'])} leaves {100 * one['left']:.0f}{NARROW}%"
+        f"{' and '.join(map(words, one['effects']))} leaves {100 * one['left']:.0f}{NARROW}%"
         for one in clues["partial_causes"]
         if one["effects"]
     )

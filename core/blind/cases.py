@@ -94,10 +94,12 @@ class Case:
         values = asdict(self) | {"hidden": list(self.hidden)}
         if self.filters is not None:
             values["filters"] = list(self.filters)
-        plain = Case(self.name, self.seed, self.kind)
         bench = ("nuisances", "camera", "filters")
-        same = {name for name in bench if getattr(self, name) == getattr(plain, name)}
-        return {name: value for name, value in values.items() if name not in same}
+        return {
+            name: value
+            for name, value in values.items()
+            if name not in bench or value not in (False, None)
+        }
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Case:

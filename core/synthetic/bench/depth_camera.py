@@ -13,6 +13,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.synthetic.nuisances.nuisance import Nuisance
 from palpate.synthetic.nuisances.nuisance_chain import shaped_tool
+from palpate.synthetic.nuisances.random_waves import WAVES, sum_of_waves
 from palpate.synthetic.scenario.disturbance import Disturbance, rippled
 from palpate.synthetic.solver.obstacles import shaft_radius
 
@@ -222,9 +223,8 @@ def _smooth(
     """Draw a smooth random field (n,) [m] of RMS `amplitude`, with wavelengths of a third of the
     image and longer.
     """
-    waves = rng.normal(size=(24, 2)) * 2 * np.pi * 1.3 / width
-    phases, heights = rng.uniform(0, 2 * np.pi, 24), rng.normal(size=24)
-    field = np.cos(places @ waves.T + phases) @ heights
+    waves = rng.normal(size=(WAVES, 2)) * 2 * np.pi * 1.3 / width
+    field = sum_of_waves(places, waves, rng)
     return np.asarray(field * amplitude / np.sqrt(np.mean(field**2)))
 
 

@@ -10,6 +10,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.synthetic.bench.depth_camera import CameraScene, DepthCamera
 from palpate.synthetic.nuisances.nuisance import DepthImage, ImageSource, Nuisance
 from palpate.synthetic.nuisances.nuisance_chain import seen_through
+from palpate.synthetic.scenario.disturbance import rippled
 
 __all__ = ["nuisance_cloud", "shown", "take_image"]
 
@@ -18,11 +19,13 @@ _STRAY, _STRAY_RANGE = 0.006, (0.75, 1.3)
 
 
 def take_image(camera: DepthCamera, scene: CameraScene) -> DepthImage:
-    """The true depth image of a scene."""
+    """The depth image of a scene as the camera misreads it, without any nuisance."""
     hit = camera.cast(scene)
     shape = camera.shape
     what = hit["geometry_ids"].numpy().astype(np.int32)
-    depth = camera.scale * hit["t_hit"].numpy().astype(float) + camera.offset
+    met = hit["t_hit"].numpy().astype(float)
+    true = np.where(np.isfinite(met), met, np.nan)
+    depth = rippled(camera.disturbances, camera.scale * true + camera.offset)
     _, faces = scene.block
     corners = np.asarray(faces)[np.where(what == 0, hit["primitive_ids"].numpy(), 0).astype(int)]
     u, v = hit["primitive_uvs"].numpy().astype(float).T
@@ -30,7 +33,7 @@ def take_image(camera: DepthCamera, scene: CameraScene) -> DepthImage:
     weights = np.stack([1 - u - v, u, v], axis=1)
     places = np.einsum("nk,nki->ni", weights, rest[corners])
     return DepthImage(
-        np.where(np.isfinite(depth), depth, np.nan).reshape(shape),
+        depth.reshape(shape),
         what.reshape(shape),
         camera.rays.reshape(*shape, 3),
         hit["primitive_normals"].numpy().astype(float).reshape(*shape, 3),

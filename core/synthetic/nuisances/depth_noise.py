@@ -9,6 +9,7 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.synthetic.nuisances.nuisance import DepthImage, ImageSource, Nuisance
+from palpate.synthetic.nuisances.random_waves import WAVES, sum_of_waves
 
 __all__ = ["FlyingPixels", "MultiPath", "SmoothBias", "StereoNoise"]
 
@@ -91,9 +92,8 @@ class SmoothBias(Nuisance):
         places = image.rays[..., :2]
         width = float(np.max(np.ptp(places.reshape(-1, 2), axis=0)))
         draw = np.random.default_rng(self.seed)
-        waves = draw.normal(size=(24, 2)) * 2 * np.pi * 1.3 / width
-        phases, heights = draw.uniform(0, 2 * np.pi, 24), draw.normal(size=24)
-        field = np.cos(places @ waves.T + phases) @ heights / np.sqrt(np.sum(heights**2) / 2)
+        waves = draw.normal(size=(WAVES, 2)) * 2 * np.pi * 1.3 / width
+        field = sum_of_waves(places, waves, draw) / np.sqrt(WAVES / 2)
         return replace(image, depth=image.depth + self.amplitude * field * image.depth / REFERENCE)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.synthetic.nuisances.nuisance import DepthImage, ImageSource, Nuisance
+from palpate.synthetic.nuisances.random_waves import WAVES, sum_of_waves
 
 __all__ = ["Draft", "RoundedEdges", "SaggingTop", "Texture"]
 
@@ -115,12 +116,10 @@ class Texture(Nuisance):
         """Add the heights along the line of sight."""
         image = source(instant)
         draw = np.random.default_rng(self.seed)
-        waves = draw.normal(size=(24, 3))
+        waves = draw.normal(size=(WAVES, 3))
         waves *= 2 * np.pi / self.length / np.linalg.norm(waves, axis=1, keepdims=True)
         places = np.where(np.isfinite(image.material), image.material, 0.0)
-        heights = np.cos(places @ waves.T + draw.uniform(0, 2 * np.pi, 24)).sum(axis=2) / np.sqrt(
-            12
-        )
+        heights = sum_of_waves(places, waves, draw) / np.sqrt(WAVES / 2)
         return replace(
             image, depth=image.depth - np.where(image.what == 0, self.size * heights, 0.0)
         )

@@ -9,6 +9,7 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.synthetic.nuisances.nuisance import Nuisance, StatedMotion
+from palpate.synthetic.nuisances.random_waves import WAVES, sum_of_waves
 
 __all__ = ["Backlash", "CableStretch", "CalibrationError", "EncoderSteps", "RobotRate"]
 
@@ -96,9 +97,8 @@ class CalibrationError(Nuisance):
     def stated(self, motion: StatedMotion) -> FloatArray:
         """Add the error at each place."""
         draw = np.random.default_rng(self.seed)
-        waves = draw.normal(size=(12, 3)) * np.pi / (2 * self.length)
-        phases, heights = draw.uniform(0, 2 * np.pi, 12), draw.normal(size=(12, 3))
-        field = np.cos(motion.centres @ waves.T + phases) @ heights / np.sqrt(6)
+        waves = draw.normal(size=(WAVES, 3)) * np.pi / (2 * self.length)
+        field = sum_of_waves(motion.centres, waves, draw, parts=3) / np.sqrt(WAVES / 2)
         return np.asarray(motion.centres + self.size * field)
 
 

@@ -92,7 +92,7 @@ def test_clues_to_an_unexplained_error_are_told(report: dict[str, Any]) -> None:
     assert "while the tool touches 0.21 mm" in told
     assert "Moves with: the tool 62 %, the whole view 4 %." in told
     assert "Worst frames: drag-01 at 33.69 s." in told
-    assert "Partial causes: tool_radius leaves 55 %." in told
+    assert "Partial causes: tool radius leaves 55 %." in told
     assert "Next: measure the tool." in told
 
 

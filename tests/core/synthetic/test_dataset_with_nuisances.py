@@ -13,9 +13,12 @@ from made_datasets import copy_dataset
 
 from palpate.dataset import Dataset, open_dataset
 from palpate.synthetic import NUISANCES, Scenario, make_dataset, truth_path
+from palpate.synthetic.bench.depth_camera import CameraScene, place_camera
+from palpate.synthetic.bench.depth_image import take_image
 from palpate.synthetic.bench.formed_surface import FormedSurface
 from palpate.synthetic.bench.virtual_experiment import rest_surface
 from palpate.synthetic.nuisances.phantom_form import RoundedEdges
+from palpate.synthetic.scenario.disturbance import Disturbance
 
 PLAIN = Scenario(sequences=("poke-top-01",), fine=4.5e-3, density=900, rate=1.0, robot_rate=200.0)
 
@@ -71,3 +74,18 @@ def test_drawn_surface_is_fine_where_edges_are_round() -> None:
     x, y, z = PLAIN.size
     edges = 2 * (x + y) + 4 * z  # each loses (2 - pi / 2) times the radius of its area
     assert sharp - round_ == pytest.approx((2 - np.pi / 2) * 3e-3 * edges, rel=0.1)
+
+
+def test_rippled_depth_is_seen_through_nuisances() -> None:
+    rest, settled, faces = rest_surface(PLAIN)
+    rng, seen = np.random.default_rng(2), np.array([1.0, 1.0])
+    block = (rest + settled, faces)
+    camera = place_camera(rng, PLAIN.size, block, seen, 900, 1e-4)
+    scene = CameraScene(block, None, np.array([0.0, 0.0, -1.0]), 1.0)
+    ripple = Disturbance("depth_ripple", {"amplitude": 0.002, "period": 0.02})
+    plain = take_image(camera, scene).depth
+    waved = take_image(replace(camera, disturbances=(ripple,)), scene).depth
+    known = np.isfinite(plain)
+    assert np.array_equal(known, np.isfinite(waved))
+    ratio = waved[known] / plain[known] - 1
+    assert ratio == pytest.approx(0.002 * np.sin(2 * np.pi * plain[known] / 0.02), abs=1e-9)

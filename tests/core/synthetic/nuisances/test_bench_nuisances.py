@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.foundation.errors import RunError
+from palpate.setup.depth_filters import DEPTH_FILTERS
 from palpate.synthetic.nuisances import FILTERS, NUISANCES, StatedMotion, draw_nuisances
 from palpate.synthetic.nuisances.depth_noise import StereoNoise
 from palpate.synthetic.nuisances.phantom_form import Draft, RoundedEdges, SaggingTop
@@ -128,3 +129,7 @@ def test_cameras_and_filters_by_name() -> None:
         draw_nuisances(5, camera="d999")
     with pytest.raises(RunError, match="no filter 'magic'; it has decimation"):
         draw_nuisances(5, filters=["magic"])
+
+
+def test_every_filter_of_the_bench_can_be_declared_in_a_dataset() -> None:
+    assert set(FILTERS) == set(DEPTH_FILTERS)
