@@ -84,8 +84,8 @@ class StiffInclusion(Effect):
     linearisation, amplitude = Linearisation.LOCAL_STIFFNESS, "stiffness_ratio"
     amplitude_deviation = 0.8
     shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
-    x: float = parameter("m", low=-0.5, high=0.5, scale=3e-3)
-    y: float = parameter("m", low=-0.5, high=0.5, scale=3e-3)
+    x: float = parameter("m", low=-0.5, high=0.5, scale=3e-3, accuracy=1.4e-4)
+    y: float = parameter("m", low=-0.5, high=0.5, scale=3e-3, accuracy=1.4e-4)
     z: float = parameter("m", low=0.0, high=0.5, scale=3e-3, accuracy=5e-4)
     radius: float = parameter("m", low=2e-3, high=2e-2, scale=0.25, log=True)
     stiffness_ratio: float = parameter(

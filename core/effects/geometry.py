@@ -30,9 +30,9 @@ class GeometryScale(Effect):
     name, enters = "geometry_scale", Slot.GEOMETRY
     summary = "the phantom is not the stated size"
     linearisation, joint = Linearisation.TANGENT, True
-    scale_x: float = parameter("1", low=0.7, high=1.4, scale=0.01)
-    scale_y: float = parameter("1", low=0.7, high=1.4, scale=0.01)
-    scale_z: float = parameter("1", low=0.7, high=1.4, scale=0.01, accuracy=2.5e-3)
+    scale_x: float = parameter("1", low=0.7, high=1.4, scale=0.01, accuracy=2e-3)
+    scale_y: float = parameter("1", low=0.7, high=1.4, scale=0.01, accuracy=2e-3)
+    scale_z: float = parameter("1", low=0.7, high=1.4, scale=0.01, accuracy=4.7e-3)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

@@ -81,7 +81,7 @@ class StiffnessGradient(Effect):
     summary = "the stiffness changes from the base to the top"
     linearisation = Linearisation.TANGENT
     shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
-    log_ratio: float = parameter("1", low=-3.0, high=3.0, scale=0.2, accuracy=0.04)
+    log_ratio: float = parameter("1", low=-3.0, high=3.0, scale=0.2, accuracy=0.095)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
@@ -113,7 +113,9 @@ class StrainStiffening(Effect):
     summary = "the material stiffens with strain"
     linearisation = Linearisation.TANGENT
     shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
-    J_m: float = parameter("1", low=0.5, high=_UNLIMITED, scale=0.3, log=True)
+    J_m: float = parameter(
+        "1", low=0.5, high=_UNLIMITED, scale=0.3, log=True, accuracy=0.08
+    )
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
@@ -155,7 +157,9 @@ class Anisotropy(Effect):
     amplitude_deviation = 2.0
     shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
     direction: float = parameter("rad", low=0.0, high=math.pi, scale=0.3, periodic=True)
-    stiffness_ratio: float = parameter("1", low=1.0, high=30.0, scale=0.3, log=True)
+    stiffness_ratio: float = parameter(
+        "1", low=1.0, high=30.0, scale=0.3, log=True, accuracy=0.09
+    )
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

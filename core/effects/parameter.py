@@ -34,6 +34,9 @@ class Parameter:
             displaces its surroundings in proportion to it (Eshelby 1957): k = 10 and k = 50 are
             close to each other, as they are in data.
         accuracy: standard deviation that the replay's own error leaves, however good the data.
+            Measured against an independent solver: most likely spread of the errors beyond the
+            data's own, over the cases of `benchmarks/blind/calibration-301.jsonl` and
+            `benchmarks/blind/suite-1400.jsonl` (`python -m benchmarks.parameter_accuracy`).
         periodic: whether the upper bound means the same as the lower one, as for an axis.
     """
 

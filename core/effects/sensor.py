@@ -44,7 +44,7 @@ class TimeOffset(Effect):
     name, enters = "time_offset", Slot.SENSOR
     summary = "the camera's clock and the robot's differ"
     linearisation = Linearisation.TANGENT
-    offset: float = parameter("s", low=-1.0, high=1.0, scale=0.05)
+    offset: float = parameter("s", low=-1.0, high=1.0, scale=0.05, accuracy=2.2e-3)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
@@ -79,9 +79,9 @@ class CameraRegistration(Effect):
     family = CAMERA
     summary = "the camera is not where it was registered"
     linearisation, nuisance = Linearisation.NUISANCE, NuisanceBlock.CAMERA_POSE
-    tx: float = parameter("m", low=-3e-2, high=3e-2, scale=1e-3)
-    ty: float = parameter("m", low=-3e-2, high=3e-2, scale=1e-3)
-    tz: float = parameter("m", low=-3e-2, high=3e-2, scale=1e-3)
+    tx: float = parameter("m", low=-3e-2, high=3e-2, scale=1e-3, accuracy=2e-4)
+    ty: float = parameter("m", low=-3e-2, high=3e-2, scale=1e-3, accuracy=2e-4)
+    tz: float = parameter("m", low=-3e-2, high=3e-2, scale=1e-3, accuracy=2e-4)
     rx: float = parameter("rad", low=-0.3, high=0.3, scale=1e-2)
     ry: float = parameter("rad", low=-0.3, high=0.3, scale=1e-2)
     rz: float = parameter("rad", low=-0.3, high=0.3, scale=1e-2)

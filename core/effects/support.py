@@ -104,7 +104,9 @@ class BaseCompliance(Effect):
     family = BASE
     summary = "the support under the base gives way"
     shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
-    stiffness_over_E: float = parameter("1/m", low=5.0, high=_RIGID, scale=0.3, log=True)
+    stiffness_over_E: float = parameter(
+        "1/m", low=5.0, high=_RIGID, scale=0.3, log=True, accuracy=0.05
+    )
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

@@ -111,7 +111,9 @@ class ToolCompliance(Effect):
     summary = "the tool gives way under load"
     linearisation = Linearisation.TANGENT
     shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
-    compliance_times_stiffness: float = parameter("1/m", low=0.0, high=500.0, scale=3.0)
+    compliance_times_stiffness: float = parameter(
+        "1/m", low=0.0, high=500.0, scale=3.0, accuracy=1.0
+    )
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
