@@ -33,9 +33,7 @@ from palpate.foundation.arrays import FloatArray
 __all__ = ["errors_and_deviations", "lacking_deviation", "run"]
 
 
-def errors_and_deviations(
-    reported: Sequence[ReportedParameter],
-) -> tuple[FloatArray, FloatArray]:
+def errors_and_deviations(reported: Sequence[ReportedParameter]) -> tuple[FloatArray, FloatArray]:
     """Return errors (n,) and stated standard deviations (n,) in search coordinates.
 
     Parameters without an interval, and those that are not searched, are left out.
@@ -45,7 +43,8 @@ def errors_and_deviations(
         if one.searched is None or one.low is None or one.high is None:
             continue
         low, value, high, true = (
-            one.searched.coordinate(number) for number in (one.low, one.value, one.high, one.nearest)
+            one.searched.coordinate(number)
+            for number in (one.low, one.value, one.high, one.nearest)
         )
         errors.append(value - true)
         deviations.append((high - low) / (2 * float(norm.ppf(0.5 + one.level / 2))))

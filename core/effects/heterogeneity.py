@@ -113,9 +113,7 @@ class StrainStiffening(Effect):
     summary = "the material stiffens with strain"
     linearisation = Linearisation.TANGENT
     shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
-    J_m: float = parameter(
-        "1", low=0.5, high=_UNLIMITED, scale=0.3, log=True, accuracy=0.08
-    )
+    J_m: float = parameter("1", low=0.5, high=_UNLIMITED, scale=0.3, log=True, accuracy=0.08)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
@@ -157,9 +155,7 @@ class Anisotropy(Effect):
     amplitude_deviation = 2.0
     shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
     direction: float = parameter("rad", low=0.0, high=math.pi, scale=0.3, periodic=True)
-    stiffness_ratio: float = parameter(
-        "1", low=1.0, high=30.0, scale=0.3, log=True, accuracy=0.09
-    )
+    stiffness_ratio: float = parameter("1", low=1.0, high=30.0, scale=0.3, log=True, accuracy=0.09)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

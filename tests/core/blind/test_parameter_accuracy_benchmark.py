@@ -1,5 +1,6 @@
 """The spread that parameter intervals lack, from errors and stated deviations."""
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ def test_nothing_is_missing_where_the_stated_spread_is_enough():
 
 
 def test_the_table_has_the_coverage_of_a_stored_suite():
-    console = Console(width=140, record=True, quiet=True)
+    console = Console(width=140, record=True, file=io.StringIO())
     run(console, [Path("benchmarks/blind/suite-1400.jsonl")])
     text = console.export_text()
     assert "base_compliance.stiffness_over_E" in text
