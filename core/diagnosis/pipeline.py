@@ -39,6 +39,7 @@ from palpate.diagnosis.search.findings import Findings
 from palpate.diagnosis.search.forward_selection import search
 from palpate.diagnosis.validation.checks import AllClearChecks
 from palpate.diagnosis.validation.held_out_check import check_held_out
+from palpate.diagnosis.validation.held_out_evidence import gain_on_held_out
 from palpate.diagnosis.validation.rejection import rejection_reason
 from palpate.diagnosis.validation.stiffness_error_test import largest_stiffness_error
 from palpate.experiment import Experiment
@@ -206,6 +207,10 @@ def _validated(
         if held_out
         else None
     )
+    if findings.best is not None and findings.faint and held_out:
+        findings.test_gain = gain_on_held_out(
+            evaluator, findings.baseline, findings.best.model, held_out
+        )
     stated = as_stated(evaluator, findings.best.model) if findings.best else ()
     if why := rejection_reason(findings, gain, stated):
         findings.withdraw(why)

@@ -21,6 +21,14 @@ class NamingCriteria:
         "block's width such as the grid's own error looks like, and no other more than 10; the "
         "smallest gain of a hidden cause of clear size was 28, a lump that few pushes came near",
     )
+    least_confirmed_gain: float = threshold(
+        12.0,
+        "nat",
+        "Smallest gain on the fitted sequences of a cause that test sequences confirm, whatever "
+        "its own null distribution allows. Both gains together must be `least_gain`.",
+        "measured: the best of the catalogue gained at most 8 on each of fifty controls of the "
+        "virtual bench (seed 1400)",
+    )
     null_draws: int = threshold(400, "1", "Draws of the best gain in the catalogue by chance.")
     null_quantile: float = threshold(
         0.99,
@@ -28,6 +36,9 @@ class NamingCriteria:
         "Quantile of the best gain by chance that a cause must exceed.",
         "measured: in a linear trial with nothing hidden this bound named a cause in 0 of 150 "
         "data sets, two standard errors of the gain in 2.5 %, BIC in 96 %",
+    )
+    null_tail: float = threshold(
+        0.1, "1", "Share of an effect's gains by chance from which their tail is estimated."
     )
     rival: float = threshold(
         8.0,

@@ -205,6 +205,8 @@ def _evidence(evaluator: Evaluator, findings: Findings, checks: AllClearChecks) 
     return {
         "gain_nats": round(findings.best.gain, 2) if findings.best else 0.0,
         "bound_nats": round(findings.bound, 2),
+        "bounds_nats": {name: round(bound, 2) for name, bound in findings.bounds.items()},
+        **({} if findings.test_gain is None else {"test_gain_nats": round(findings.test_gain, 2)}),
         "baseline_misfit": round(findings.misfit, 4),
         "structure": round(structure.ratio, 4),
         "structure_bound": round(structure.bound / structure.expected, 4),
@@ -221,10 +223,10 @@ def _false_alarms(findings: Findings) -> dict[str, Any]:
     A share of draws of the noise model, and the upper end of its interval (Clopper and Pearson
     1934); structured error by chance has the probability that its test is made for.
     """
-    draws = len(findings.chance)
+    draws = len(findings.chance.gains)
     if not draws:
         return {}
-    named = int((findings.chance > findings.bound).sum())
+    named = findings.chance.named(findings.bounds)
     level = CRITERIA.intervals.level
     most = float(beta.ppf(level, named + 1, draws - named)) if named < draws else 1.0
     return {

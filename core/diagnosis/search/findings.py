@@ -12,10 +12,10 @@ from palpate.diagnosis.criteria.tolerance import Tolerance
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.noise.camera_error_model import CALM, Ripple
 from palpate.diagnosis.inference.noise.residual_structure import NOTHING, Structure
+from palpate.diagnosis.search.chance_gains import ChanceGains
 from palpate.diagnosis.search.identifiability import Identifiability
 from palpate.effects import Effect
 from palpate.effects.family import Family
-from palpate.foundation.arrays import FloatArray
 
 __all__ = ["Findings", "Trial", "shared_family"]
 
@@ -63,7 +63,7 @@ class Findings:
         baseline: the stated setup.
         best: the model accepted, or None.
         trials: every refitted model, best first.
-        bound: least gain of a cause [nats].
+        bound: least gain of a cause on all data [nats].
         misfit: of the baseline, per value.
         screened: linear gain by effect name [nats].
         structure: error of the baseline that is smooth and grows with the push.
@@ -76,7 +76,11 @@ class Findings:
         tolerance: size below which structured error does not matter.
         excess: RMS of the baseline's error beyond noise over the visible surface [m]; NaN without
             clouds.
-        chance: (d,) best gain of the catalogue in draws of this data's noise alone [nats].
+        chance: gains of the catalogue in draws of this data's noise alone.
+        bounds: least gain of an only cause on the fitted sequences, by effect name [nats]; `bound`
+            for others.
+        test_gain: gain of the best model on test sequences, with all numbers as fitted [nats]; None
+            where it was not asked for.
     """
 
     baseline: Model
@@ -94,7 +98,13 @@ class Findings:
     hints: dict[str, str] = field(default_factory=dict)
     tolerance: Tolerance = field(default_factory=Tolerance)
     excess: float = np.nan
-    chance: FloatArray = field(default_factory=lambda: np.zeros(0))
+    chance: ChanceGains = field(default_factory=ChanceGains)
+    bounds: dict[str, float] = field(default_factory=dict)
+    test_gain: float | None = None
+
+    def bound_of(self, name: str) -> float:
+        """Return the least gain of an effect as the only cause, on the fitted sequences [nats]."""
+        return self.bounds.get(name, self.bound)
 
     def withdraw(self, why: str) -> None:
         """Reject the best model and all that extend it, for this reason."""
@@ -104,6 +114,11 @@ class Findings:
         ]
         self.hints |= dict.fromkeys(sorted(names), why)
         self.best, self.remaining, self.withdrawn = None, self.structure, why
+
+    @property
+    def faint(self) -> bool:
+        """Whether causes were found by less than `bound`: test sequences must confirm them."""
+        return self.best is not None and self.best.gain < self.bound
 
     @property
     def poor(self) -> bool:

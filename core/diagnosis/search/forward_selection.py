@@ -17,12 +17,12 @@ from palpate.diagnosis.inference.final_fit import refine
 from palpate.diagnosis.inference.noise.camera_error_model import CALM
 from palpate.diagnosis.inference.noise.residual_structure import rms_beyond_noise, structure_of
 from palpate.diagnosis.search.candidates import tangents_of
+from palpate.diagnosis.search.chance_gains import ChanceGains
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.identifiability import identifiability_of
 from palpate.diagnosis.search.inclusion_grid import inclusion_places
 from palpate.diagnosis.search.initial_guess import initial_guess
 from palpate.diagnosis.search.revision import distinct, reconsidered, try_pairs
-from palpate.diagnosis.search.screening import null_gains
 from palpate.diagnosis.search.shortlist import beyond_first_order, shortlist
 from palpate.diagnosis.search.signatures import signatures_of
 from palpate.diagnosis.search.touch_pairing import known_mismatch
@@ -90,15 +90,14 @@ def search(evaluator: Evaluator, seed: int) -> Findings:
 def _state_limits(
     evaluator: Evaluator, findings: Findings, screening: Screening, seed: int
 ) -> None:
-    """Put the bound, the identifiability and the linear gains of the first screening."""
+    """Put the bounds, the identifiability and the linear gains of the first screening."""
     extended, candidates, gains = screening
     blocks, nuisance = evaluator.tempered(extended), (*extended.nuisance, *extended.columns)
     known = evaluator.precision(extended)
-    chance = null_gains(blocks, nuisance, known, candidates, CRITERIA.naming.null_draws, seed)
-    findings.chance = np.asarray(chance)
-    findings.bound = max(
-        float(np.quantile(chance, CRITERIA.naming.null_quantile)), CRITERIA.naming.least_gain
+    findings.chance = chance = ChanceGains.drawn(
+        blocks, nuisance, known, candidates, CRITERIA.naming.null_draws, seed
     )
+    findings.bound, findings.bounds = chance.bound, chance.bounds()
     findings.identifiability = identifiability_of(
         blocks, nuisance, known, candidates, findings.bound
     )
@@ -112,10 +111,12 @@ def _next_cause(
 ) -> Trial | None:
     """Return the best further cause that gains more than the bound, by all sequences; or None."""
     screened, candidates, gains = screening
-    trials, needed = list[Trial](), required_gain(findings, current)
-    more = _refits_nonlinear(findings, current, gains)
+    trials = list[Trial]()
+    asked = [required_gain(findings, current, candidate.start.name) for candidate in candidates]
+    least = CRITERIA.naming.promising * np.array(asked)
+    more = _refits_nonlinear(findings, current, gains > least)
     settled = beyond_first_order(evaluator, screened, candidates) if more else []
-    chosen = shortlist(gains, candidates, CRITERIA.naming.promising * needed, settled)
+    chosen = shortlist(gains, candidates, least, settled)
     before = evaluator.objective(current.model)
     linear = {id(one): gain for one, gain in zip(candidates, gains, strict=True)}
     # Expensive candidates, and those that are refitted whatever their gain, come last, when a
@@ -133,9 +134,10 @@ def _next_cause(
         effects = [*current.model.effects, initial_guess(candidate, screened, evaluator)]
         starts = current.model.predictions
         trial = trial_of(evaluator, effects, starts, current.model, hopeless)
+        needed = required_gain(findings, current, candidate.start.name)
         trials.append(replace(trial, required_gain=current.required_gain + needed))
     trials.sort(key=lambda trial: -trial.gain)
-    enough = [trial for trial in trials if trial.gain > needed]
+    enough = [trial for trial in trials if trial.gain > trial.required_gain - current.required_gain]
     best = next(
         (
             trial
@@ -152,24 +154,28 @@ def _next_cause(
     return best
 
 
-def _refits_nonlinear(findings: Findings, current: Trial, gains: np.ndarray) -> bool:
+def _refits_nonlinear(findings: Findings, current: Trial, promising: np.ndarray) -> bool:
     """Return whether strongly nonlinear effects are refitted whatever their linear gain.
+
+    Args:
+        findings: so far.
+        current: model that they would extend.
+        promising: whether the linear gain of each candidate (c,) is promising.
 
     They are for a first cause, where structure is left, and where more might be named. Otherwise a
     tool 1.5 mm off its place, whose tangent promises too little beside strain stiffening, loses
     unseen to another size of the block, which moves the visible sides by about as much.
     """
-    promising = bool((gains > CRITERIA.naming.promising * required_gain(findings, current)).any())
     first = current.model.names == _known_names(findings)
-    return first or findings.remaining.significant or promising
+    return first or findings.remaining.significant or bool(promising.any())
 
 
 def _known_names(findings: Findings) -> tuple[str, ...]:
     return tuple(effect.name for effect in findings.known)
 
 
-def required_gain(findings: Findings, current: Trial) -> float:
-    """Return the least gain [nats] of the next cause.
+def required_gain(findings: Findings, current: Trial, name: str) -> float:
+    """Return the least gain [nats] of an effect as the next cause.
 
     The mesh error is known for the stated setup only. A found cause changes it, and that change
     could pass for another cause. A second cause must therefore gain a good deal more than chance,
@@ -180,7 +186,7 @@ def required_gain(findings: Findings, current: Trial) -> float:
     sense.
     """
     if current.model.names == _known_names(findings):
-        return findings.bound
+        return findings.bound_of(name)
     share = 0.0 if findings.remaining.significant else CRITERIA.naming.second_share
     return max(CRITERIA.naming.second_factor * findings.bound, share * current.gain)
 

@@ -1,9 +1,10 @@
-"""Linear gains of all candidates, and the gain that chance alone can give.
+"""Linear gains of all candidates.
 
 All effects of the catalogue are columns of one linear problem: those with a derivative by their
 sensitivities, the others by the difference between two replays. The gain of a candidate is the
 predictive score of left-out blocks against that of the model without it. The same gains on data
-drawn from the noise model alone give the bound that a cause must exceed.
+drawn from the noise model alone give the bounds that a cause must exceed
+(`palpate.diagnosis.search.chance_gains`).
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ from itertools import combinations
 import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.inference.evidence import Block, draw_rights
+from palpate.diagnosis.inference.evidence import Block
 from palpate.effects import Effect
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["Candidate", "linear_gains", "null_gains", "pair_gains", "right_sides"]
+__all__ = ["Candidate", "linear_gains", "pair_gains", "right_sides"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -121,22 +122,6 @@ def linear_gains(
         ],
         axis=1,
     )
-
-
-def null_gains(
-    blocks: Sequence[Block],
-    nuisance: Sequence[int],
-    known: FloatArray,
-    candidates: Sequence[Candidate],
-    draws: int,
-    seed: int,
-) -> FloatArray:
-    """Return the best gain of the catalogue (d,) [nats] on each draw from the noise model.
-
-    The draws hold white noise, discrepancy and nuisances, and no cause.
-    """
-    rights = draw_rights(blocks, nuisance, known, draws, np.random.default_rng(seed))
-    return np.asarray(linear_gains(blocks, rights, nuisance, known, candidates).max(axis=1))
 
 
 def pair_gains(

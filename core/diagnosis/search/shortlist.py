@@ -13,6 +13,7 @@ from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.posterior import Posterior
 from palpate.diagnosis.search.screening import Candidate
 from palpate.effects import Effect
+from palpate.foundation.arrays import FloatArray
 
 __all__ = ["beyond_first_order", "shortlist"]
 
@@ -46,7 +47,7 @@ def beyond_first_order(
 def shortlist(
     gains: np.ndarray,
     candidates: Sequence[Candidate],
-    least: float,
+    least: float | FloatArray,
     settled: Sequence[Candidate] = (),
 ) -> list[Candidate]:
     """Return the best start of each promising effect, best first; of an inclusion two places.
@@ -54,10 +55,11 @@ def shortlist(
     Args:
         gains: linear gain (c,) of each candidate [nats].
         candidates: of the screening.
-        least: gain of a promising effect [nats].
+        least: gain of a promising effect [nats]; one for all, or one for each candidate (c,).
         settled: candidates that come first and take nobody's place.
     """
     chosen, names = list(settled), CRITERIA.screening.shortlist + len(settled)
+    enough = gains > least
     for number in np.argsort(-gains):
         candidate = candidates[number]
         taken = [c for c in chosen if c.start.name == candidate.start.name]
@@ -68,11 +70,7 @@ def shortlist(
         room = (not taken and candidate.refitted) or (
             candidate.start.inclusion is not None and len(taken) < 2 and apart
         )
-        if (
-            gains[number] > least
-            and room
-            and (taken or len({c.start.name for c in chosen}) < names)
-        ):
+        if enough[number] and room and (taken or len({c.start.name for c in chosen}) < names):
             chosen.append(candidate)
     return chosen
 

@@ -21,7 +21,7 @@ from palpate.diagnosis.validation.stiffness_error_test import (
     largest_stiffness_error,
 )
 
-__all__ = ["HeldOutCheck", "check_held_out"]
+__all__ = ["HeldOutCheck", "check_held_out", "held_out_evaluator"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +39,10 @@ class HeldOutCheck:
     stiffness_error: StiffnessErrorTest | None = None
 
 
-def check_held_out(
-    evaluator: Evaluator, held_out: Sequence[Observations], seed: int
-) -> HeldOutCheck | None:
-    """Check the sequences with clouds, which the workers must have; None without such sequences."""
+def held_out_evaluator(evaluator: Evaluator, held_out: Sequence[Observations]) -> Evaluator | None:
+    """Return an evaluator of the sequences with clouds, which the workers must have; None without
+    such sequences.
+    """
     names = [item.name for item in held_out if not item.force_only]
     if not names:
         return None
@@ -52,8 +52,17 @@ def check_held_out(
         clouds=True,
         pushes=(np.empty((0, 3)), np.empty((0, 3))),
     )
-    other = Evaluator(problem, evaluator.workers)
-    model = other.baseline((), inclusion_places(problem))
+    return Evaluator(problem, evaluator.workers)
+
+
+def check_held_out(
+    evaluator: Evaluator, held_out: Sequence[Observations], seed: int
+) -> HeldOutCheck | None:
+    """Check the sequences with clouds, which the workers must have; None without such sequences."""
+    other = held_out_evaluator(evaluator, held_out)
+    if other is None:
+        return None
+    model = other.baseline((), inclusion_places(other.problem))
     return HeldOutCheck(
         model, structure_of(other, model, seed), largest_stiffness_error(other, model)
     )

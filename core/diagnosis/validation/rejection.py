@@ -8,7 +8,7 @@ from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.gain.force_gain import ForceGain
 from palpate.diagnosis.gain.surface_gain import SurfaceGain
 from palpate.diagnosis.inference.noise.residual_structure import Structure
-from palpate.diagnosis.search.findings import Findings
+from palpate.diagnosis.search.findings import Findings, Trial
 
 __all__ = ["leaves_structure", "rejection_reason"]
 
@@ -29,6 +29,7 @@ def rejection_reason(
     return (
         _harm(names, gain)
         or _no_explanation(names, findings, gain)
+        or _faint(names, findings)
         or _unconfirmed(names, findings, gain)
         or _indistinct(names, findings, as_stated)
     )
@@ -74,7 +75,7 @@ def _unconfirmed(names: str, findings: Findings, gain: SurfaceGain | ForceGain |
     best = findings.best
     if best is None or gain is None or findings.structure.significant or gain.removed[1] > 0.0:
         return ""
-    if best.gain > CRITERIA.rejection.unconfirmed_gain * best.required_gain:
+    if best.gain > _far_above(findings, best):
         return ""
     if any(effect.at_rest() for effect in best.model.effects):
         return ""
@@ -92,12 +93,33 @@ def _indistinct(names: str, findings: Findings, as_stated: Collection[str]) -> s
     best = findings.best
     if best is None or findings.structure.significant or not set(best.model.names) <= {*as_stated}:
         return ""
-    if best.gain > CRITERIA.rejection.unconfirmed_gain * best.required_gain:
+    if best.gain > _far_above(findings, best):
         return ""
     return (
         f"{names} would explain the data by {best.gain:.0f} nats, but the intervals of all its "
         "numbers include what is stated, and no error that is smooth over the surface and grows "
         "with the push is there. It is a hint, and is not named"
+    )
+
+
+def _far_above(findings: Findings, best: Trial) -> float:
+    """Return the gain [nats] from which on a cause needs no confirmation."""
+    return CRITERIA.rejection.unconfirmed_gain * max(best.required_gain, findings.bound)
+
+
+def _faint(names: str, findings: Findings) -> str:
+    """Return the reason if the gains on fitted and test sequences together are below the bound."""
+    best, more = findings.best, findings.test_gain
+    if best is None or best.gain + (more or 0.0) >= findings.bound:
+        return ""
+    tested = (
+        "there are no test sequences with clouds"
+        if more is None
+        else f"test sequences add {more:.0f}"
+    )
+    return (
+        f"{names} would explain the data by {best.gain:.0f} nats, more than chance gives, and "
+        f"{tested}; {findings.bound:.0f} in all are asked for. It is a hint, and is not named"
     )
 
 

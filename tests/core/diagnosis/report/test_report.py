@@ -17,6 +17,7 @@ from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.noise.camera_error_model import Ripple
 from palpate.diagnosis.inference.noise.residual_structure import Structure
 from palpate.diagnosis.report.report import report_of, verdict_of
+from palpate.diagnosis.search.chance_gains import ChanceGains
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.validation.checks import AllClearChecks
 from palpate.diagnosis.validation.held_out_check import HeldOutCheck
@@ -362,7 +363,9 @@ def test_remaining_error_has_place_and_sequence(evaluator, dataset):
 def test_report_says_how_often_chance_would_name_a_cause(evaluator, dataset):
     findings = _findings(evaluator, misfit=1.0)
     assert "false_alarms" not in report_of(dataset, evaluator, findings, LADDER, "test")["evidence"]
-    findings.chance = np.array([*np.linspace(0, 11, 398), 13.0, 14.0])
+    gains = np.array([*np.linspace(0, 11, 398), 13.0, 14.0])
+    findings.chance = ChanceGains(("gravity", "tool_radius"), np.stack([gains, gains / 2], axis=1))
+    findings.bounds = {"gravity": 12.0, "tool_radius": 12.0}
     rates = report_of(dataset, evaluator, findings, LADDER, "test")["evidence"]["false_alarms"]
     assert rates["draws"] == 400
     assert rates["named"] == 0.005

@@ -18,11 +18,11 @@ QUIET, LOUD = Structure(75.0, 100.0, 140.0), Structure(300.0, 100.0, 140.0)
 
 
 def test_first_cause_must_gain_what_chance_alone_does_not():
-    assert required_gain(Findings(STATED, bound=31.0), Trial(STATED, 0.0, 1.2)) == 31.0
+    assert required_gain(Findings(STATED, bound=31.0), Trial(STATED, 0.0, 1.2), "gravity") == 31.0
 
 
 def _second(first: float, left: Structure = QUIET) -> float:
-    return required_gain(Findings(STATED, remaining=left), Trial(SOFT, first, 1.06))
+    return required_gain(Findings(STATED, remaining=left), Trial(SOFT, first, 1.06), "gravity")
 
 
 def test_second_cause_may_show_a_fifth_of_what_the_first_does():
@@ -47,13 +47,11 @@ def test_where_structure_is_left_a_fainter_second_cause_is_let_in():
 
 def test_nonlinear_effects_are_refitted_beside_a_cause_only_where_another_might_be_named():
     needed = _second(994.0)
-    quiet, promising = (
-        np.array([3.0, 0.9 * CRITERIA.naming.promising * needed]),
-        np.array([3.0, 1.1 * CRITERIA.naming.promising * needed]),
-    )
+    least = CRITERIA.naming.promising * needed
+    quiet, promising = np.array([3.0, 0.9 * least]) > least, np.array([3.0, 1.1 * least]) > least
     assert _refits_nonlinear(Findings(STATED), Trial(STATED, 0.0, 1.2), quiet)
     soft = Trial(SOFT, 994.0, 1.06)
     assert not _refits_nonlinear(Findings(STATED, remaining=QUIET), soft, quiet)
     assert _refits_nonlinear(Findings(STATED, remaining=QUIET), soft, promising)
     assert _refits_nonlinear(Findings(STATED, remaining=LOUD), soft, quiet)
-    assert not _refits_nonlinear(Findings(STATED, remaining=QUIET), soft, np.empty(0))
+    assert not _refits_nonlinear(Findings(STATED, remaining=QUIET), soft, np.empty(0, dtype=bool))

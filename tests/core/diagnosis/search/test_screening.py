@@ -8,13 +8,8 @@ from scipy.stats import ks_2samp
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.evidence import Block, log_evidence, predictive_score
-from palpate.diagnosis.search.screening import (
-    Candidate,
-    linear_gains,
-    null_gains,
-    pair_gains,
-    right_sides,
-)
+from palpate.diagnosis.search.chance_gains import ChanceGains
+from palpate.diagnosis.search.screening import Candidate, linear_gains, pair_gains, right_sides
 from palpate.effects import Effect
 from palpate.effects.elastic_material import StiffInclusion
 from palpate.effects.load import Gravity
@@ -84,9 +79,15 @@ def test_wider_prior_is_judged_against_the_same_flat_one():
     assert log_evidence(blocks, NUISANCE, CRITERIA.priors.flat_factor * KNOWN) < evidence[0]
 
 
+def _best_by_chance(
+    blocks: list[Block], draws: int, seed: int, catalogue: list[Candidate] = CATALOGUE
+) -> FloatArray:
+    return ChanceGains.drawn(blocks, NUISANCE, KNOWN, catalogue, draws, seed).best
+
+
 def test_chance_stays_below_its_own_quantile_in_fresh_data():
     blocks = _blocks({}, seed=3)
-    bound = np.quantile(null_gains(blocks, NUISANCE, KNOWN, CATALOGUE, 1000, seed=4), 0.99)
+    bound = np.quantile(_best_by_chance(blocks, 1000, 4), 0.99)
     # Fresh data are made of residuals, not of the Gram matrices that the null draws come from.
     rights = np.concatenate([right_sides(_blocks({}, seed)) for seed in range(100, 900)])
     best = linear_gains(blocks, rights, NUISANCE, KNOWN, CATALOGUE).max(axis=1)
@@ -100,7 +101,7 @@ def test_null_draws_are_distributed_like_fresh_data():
         Candidate(start=ToolOffset.neutral(SETUP), widened={0: 2.0, 1: 2.0}),
         Candidate(start=ToolRadius.neutral(SETUP), widened={2: 2.0}),
     ]
-    drawn = null_gains(_blocks({}, seed=3), NUISANCE, KNOWN, wide, 1000, seed=4)
+    drawn = _best_by_chance(_blocks({}, seed=3), 1000, 4, wide)
     blocks = _blocks({}, seed=3)
     rights = np.concatenate([right_sides(_blocks({}, seed)) for seed in range(100, 600)])
     fresh = linear_gains(blocks, rights, NUISANCE, KNOWN, wide).max(axis=1)
@@ -110,7 +111,7 @@ def test_null_draws_are_distributed_like_fresh_data():
 def test_planted_column_is_found_far_above_chance():
     blocks = _blocks({9: 0.5}, seed=5)
     gains = _gains(blocks)
-    bound = np.quantile(null_gains(blocks, NUISANCE, KNOWN, CATALOGUE, 200, seed=6), 0.99)
+    bound = np.quantile(_best_by_chance(blocks, 200, 6), 0.99)
     assert np.argmax(gains) == 9 - LUMPS[0]
     assert gains.max() > 3 * bound
 
@@ -159,6 +160,6 @@ def test_each_pair_of_effects_comes_once_by_its_best_candidates_and_none_beside_
 
 def test_null_draws_repeat_with_their_seed():
     blocks = _blocks({}, seed=7)
-    first, second = (null_gains(blocks, NUISANCE, KNOWN, CATALOGUE, 20, seed=8) for _ in range(2))
+    first, second = (_best_by_chance(blocks, 20, 8) for _ in range(2))
     assert np.array_equal(first, second)
-    assert not np.array_equal(first, null_gains(blocks, NUISANCE, KNOWN, CATALOGUE, 20, seed=9))
+    assert not np.array_equal(first, _best_by_chance(blocks, 20, 9))
