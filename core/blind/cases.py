@@ -208,6 +208,7 @@ def scenario_of(case: Case) -> Scenario:
         draw_nuisances,
         draw_scenario,
     )
+    from palpate.synthetic.laws import with_second_laws
 
     if case.kind in ("control", "fault"):
         scenario = Scenario()
@@ -235,6 +236,8 @@ def scenario_of(case: Case) -> Scenario:
         # Every other user knows the settings of the camera's driver.
         declared = names if case.seed // 2 % 2 else ()
         scenario = replace(scenario, nuisances=drawn, declared_filters=declared)
+    if case.nuisances:
+        scenario = with_second_laws(scenario, case.seed)
     return replace(scenario, sequences=SHORT_PROTOCOL) if case.short else scenario
 
 

@@ -24,6 +24,7 @@ from palpate.synthetic.bench.motion_plan import MotionPlan, draw_motion
 from palpate.synthetic.bench.sequence_recording import SequenceJob, SequenceRecord, record_motion
 from palpate.synthetic.bench.virtual_experiment import rest_surface
 from palpate.synthetic.dataset_writer import write_config, write_ply, write_touches
+from palpate.synthetic.laws.sensor_laws import depth_curvature
 from palpate.synthetic.nuisances.nuisance import StatedMotion
 from palpate.synthetic.nuisances.nuisance_chain import stated_centres
 from palpate.synthetic.scenario.scenario import STRAYED, Scenario
@@ -111,7 +112,13 @@ def _draw_camera(
     noise = scenario.noise * rng.uniform(0.9, 1.1)
     camera = place_camera(rng, scenario.true_size, block, seen, scenario.density, noise)
     offset, scale = _depth_error(scenario)
-    return replace(camera, disturbances=scenario.disturbances, offset=offset, scale=scale)
+    return replace(
+        camera,
+        disturbances=scenario.disturbances,
+        offset=offset,
+        scale=scale,
+        curvature=depth_curvature(scenario.hidden("depth_bias")),
+    )
 
 
 def _record_all(jobs: list[SequenceJob], workers: int, report: Report) -> Truth:

@@ -25,6 +25,8 @@ SHAFT_LENGTH = 0.16
 """Length of the visible shaft [m]."""
 QUANTUM = 0.125e-3
 """Resolution of a depth reading [m]."""
+_MIDDLE = 0.35
+"""Depth in the middle of the camera's range [m]."""
 EDGE = 4e-3
 """Step in depth between neighbouring pixels that makes an edge [m]."""
 
@@ -65,6 +67,7 @@ class DepthCamera:
         disturbances: of the depth.
         offset: a depth z is read as scale z + offset [m], before disturbances.
         scale: see `offset` [1].
+        curvature: what a reading adds for each squared metre from a depth of 0.35 m [1/m].
     """
 
     phantom_from_camera: Transform
@@ -77,6 +80,12 @@ class DepthCamera:
     disturbances: tuple[Disturbance, ...] = ()
     offset: float = 0.0
     scale: float = 1.0
+    curvature: float = 0.0
+
+    def reading(self, depth: FloatArray) -> FloatArray:
+        """Return the readings [m] of true depths [m], before disturbances, bias and noise."""
+        read = self.scale * depth + self.offset
+        return read + self.curvature * (depth - _MIDDLE) ** 2 if self.curvature else read
 
     def depth(self, scene: CameraScene) -> tuple[FloatArray, Any]:
         """Cast all rays.
@@ -109,7 +118,7 @@ class DepthCamera:
         keep = rng.random(len(depth)) < self._chance(what)
         seen = np.nonzero(keep & np.isfinite(depth))[0]
         z = (
-            rippled(self.disturbances, self.scale * depth[seen] + self.offset)
+            rippled(self.disturbances, self.reading(depth[seen]))
             + self.bias[seen]
             + rng.normal(size=len(seen)) * self.sigma * (depth[seen] / 0.35) ** 2
         )

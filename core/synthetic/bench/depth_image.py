@@ -25,7 +25,7 @@ def take_image(camera: DepthCamera, scene: CameraScene) -> DepthImage:
     what = hit["geometry_ids"].numpy().astype(np.int32)
     met = hit["t_hit"].numpy().astype(float)
     true = np.where(np.isfinite(met), met, np.nan)
-    depth = rippled(camera.disturbances, camera.scale * true + camera.offset)
+    depth = rippled(camera.disturbances, camera.reading(true))
     _, faces = scene.block
     corners = np.asarray(faces)[np.where(what == 0, hit["primitive_ids"].numpy(), 0).astype(int)]
     u, v = hit["primitive_uvs"].numpy().astype(float).T

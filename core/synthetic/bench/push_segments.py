@@ -48,7 +48,7 @@ def solve_segments(specimen: Specimen, push: PlannedPush, until: float) -> tuple
             ordered = arcs if first < last else arcs[::-1]
             times = push.when(number, ordered)
             key_frames = [
-                specimen.solve_key_frame(place + specimen.offset, float(time))
+                specimen.solve_key_frame(place + specimen.offset(place), float(time))
                 for place, time in zip(push.place(ordered), times, strict=True)
             ]
             key_frames = key_frames if first < last else key_frames[::-1]
@@ -66,10 +66,8 @@ def solve_segments(specimen: Specimen, push: PlannedPush, until: float) -> tuple
 
 def _hold_segment(specimen: Specimen, push: PlannedPush, number: int, until: float) -> PathSegment:
     """Solve a hold at a knot of the push; the time between key frames grows with the hold."""
-    centre, times = (
-        push.place(push.arcs[number : number + 1])[0] + specimen.offset,
-        [float(push.times[number])],
-    )
+    stated = push.place(push.arcs[number : number + 1])[0]
+    centre, times = stated + specimen.offset(stated), [float(push.times[number])]
     step = (
         _FIRST_WAIT[1]
         if specimen.memory is None
@@ -86,8 +84,9 @@ def _hold_segment(specimen: Specimen, push: PlannedPush, number: int, until: flo
 def _key_arcs(specimen: Specimen, push: PlannedPush, low: float, high: float) -> FloatArray:
     """Choose arc lengths (n,) [m] of key frames: even ones in contact, one just after its begin."""
     fine = np.linspace(low, high, 2 + int((high - low) / 5e-5))
+    stated = push.place(fine)
     touching = np.nonzero(
-        specimen.clearance.gap(push.place(fine) + specimen.offset - specimen.slip) < 0
+        specimen.clearance.gap(stated + specimen.offset(stated) - specimen.slip) < 0
     )[0]
     if not len(touching):
         return np.linspace(low, high, 5) if specimen.changes_at_rest else np.array([low, high])

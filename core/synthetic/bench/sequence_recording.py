@@ -20,6 +20,7 @@ from palpate.synthetic.bench.true_body import true_offset, true_radius
 from palpate.synthetic.bench.virtual_experiment import neutral_displacement, solve_motion
 from palpate.synthetic.bench.visibility import mean_square_change, visible_weights
 from palpate.synthetic.dataset_writer import write_clouds, write_forces, write_kinematics, write_ply
+from palpate.synthetic.laws.sensor_laws import camera_motion, clock_offset
 from palpate.synthetic.nuisances.nuisance import DepthImage, StatedMotion
 from palpate.synthetic.nuisances.nuisance_chain import robot_rate, stamped_frames, stated_centres
 from palpate.synthetic.scenario.disturbance import drifted
@@ -107,7 +108,7 @@ def record_motion(job: SequenceJob) -> SequenceRecord:
     stamps = (
         start
         + stamped
-        + (hidden.value("offset") if hidden else 0.0)
+        + clock_offset(hidden, stamped, job.motion.duration)
         + rng.uniform(-1e-3, 1e-3, len(index))
     )
     write_clouds(job.folder / "clouds.csv", stamps, files)
@@ -164,18 +165,15 @@ def _camera(job: SequenceJob, instant: float) -> DepthCamera:
     """The camera with its pose at a time [s] of the sequence."""
     away = np.random.default_rng([job.seed, 3])  # in the same direction in all sequences
     drift = drifted(job.scenario.disturbances, instant / job.motion.duration, away)
-    return replace(
-        job.camera, phantom_from_camera=drift @ job.camera_shift @ job.camera.phantom_from_camera
-    )
+    moved = job.scenario.hidden("camera_registration")
+    shift = camera_motion(moved, job.camera_shift, job.session + instant)
+    return replace(job.camera, phantom_from_camera=drift @ shift @ job.camera.phantom_from_camera)
 
 
 def scene_at(job: SequenceJob, track: SolvedTrack, instant: float) -> CameraScene:
     """The scene in front of the camera at a time [s] of the sequence."""
-    centre = (
-        job.motion.centre(np.array([instant]))[0]
-        + true_offset(job.scenario)
-        + track.at(instant).deflection(instant)
-    )
+    stated = job.motion.centre(np.array([instant]))[0]
+    centre = stated + true_offset(job.scenario, stated) + track.at(instant).deflection(instant)
     return CameraScene(track.surface(instant), centre, job.motion.axis, true_radius(job.scenario))
 
 

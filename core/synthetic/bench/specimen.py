@@ -6,6 +6,7 @@ The base is held, slips with friction or stands on springs; the material may hav
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator
@@ -15,10 +16,12 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SolveError
 from palpate.synthetic.bench.solved_track import KeyFrame
 from palpate.synthetic.bench.true_body import creep_velocity, solid_model, true_offset, true_radius
+from palpate.synthetic.laws.support_laws import slip_limit
+from palpate.synthetic.laws.tool_laws import drag_limits, shaft_softness
 from palpate.synthetic.scenario.scenario import Scenario
 from palpate.synthetic.solver.coulomb_friction import CoulombFriction, FrictionContact
 from palpate.synthetic.solver.inelastic_history import InelasticHistory, InelasticState
-from palpate.synthetic.solver.shaft_compliance import solve_compliant_shaft
+from palpate.synthetic.solver.shaft_compliance import solve_compliant_shaft, times
 from palpate.synthetic.solver.tet_block import TetBlock
 from palpate.synthetic.solver.tet_equilibrium import InstabilityError, TetSolver, TetState
 from palpate.synthetic.solver.tool_clearance import ToolClearance
@@ -58,14 +61,14 @@ class Specimen:
     ) -> None:
         self.block = block
         self.solver = TetSolver(block, solid_model(scenario, block, axis))
-        self.offset = true_offset(scenario)
+        self._scenario = scenario
         self.radius = true_radius(scenario)
         hidden = scenario.hidden("base_slip")
         self.friction = hidden.value("friction_coefficient") if hidden else None
+        self._sliding = hidden
         self.weight = scenario.mass * GRAVITY
-        shaft = scenario.hidden("tool_compliance")
-        self.softness = (
-            shaft.value("compliance_times_stiffness") / scenario.true_modulus if shaft else 0.0
+        self.softness = shaft_softness(
+            scenario.hidden("tool_compliance"), scenario.true_modulus, axis
         )
         self.slip = slip
         self.creep = creep_velocity(scenario)
@@ -75,7 +78,10 @@ class Specimen:
         rough = scenario.hidden("tool_friction")
         self.drag = (
             CoulombFriction(
-                block, rough.value("friction_coefficient"), self.radius, self.solver.hardest
+                block,
+                partial(drag_limits, rough, modulus=scenario.true_modulus),
+                self.radius,
+                self.solver.hardest,
             )
             if rough
             else None
@@ -90,6 +96,10 @@ class Specimen:
         self._last = self._before = self.solver.rest
         self._mesh: Delaunay | None = None
         self._stated: FloatArray | None = None
+
+    def offset(self, centre: FloatArray) -> FloatArray:
+        """Return true minus stated centre (..., 3) of the tool [m]."""
+        return true_offset(self._scenario, centre)
 
     def close(self) -> None:
         """Free the solver's memory."""
@@ -207,10 +217,9 @@ class Specimen:
 
     def _excess_force(self, state: TetState) -> float:
         """Tangential force on the base beyond the Coulomb limit [N]; negative where it sticks."""
-        assert self.friction is not None
-        return float(np.linalg.norm(state.tool_force[:2])) - self.friction * max(
-            self.weight - float(state.tool_force[2]), 0.0
-        )
+        assert self._sliding is not None
+        held = slip_limit(self._sliding, self.weight - float(state.tool_force[2]), self.weight)
+        return float(np.linalg.norm(state.tool_force[:2])) - held
 
     def _slide(self, centre: FloatArray, state: TetState) -> TetState:
         """Move the base along the force until friction holds it.
@@ -244,11 +253,11 @@ class Specimen:
         """Solve with the tool, or the far end of its compliant shaft, at `centre` (3,) [m] in the
         frame of the slid block.
         """
-        if not self.softness:
+        if not np.any(self.softness):
             return self._elastic(centre)
         before = self._last
         state = solve_compliant_shaft(
-            centre, self.softness, centre - self.softness * before.tool_force, self._elastic
+            centre, self.softness, centre - times(self.softness, before.tool_force), self._elastic
         )
         # The next guess uses the last two converged states, not iterates between them.
         self._before, self._last = before, state

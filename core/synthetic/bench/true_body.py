@@ -7,6 +7,17 @@ from typing import Any
 import numpy as np
 
 from palpate.foundation.arrays import FloatArray
+from palpate.synthetic.laws.stiffness_fields import (
+    fibre_families,
+    gradient_factor,
+    in_inclusion,
+    layer_factor,
+    uneven_density,
+    uneven_poisson_ratio,
+)
+from palpate.synthetic.laws.support_laws import is_bonded, side_of, spring_factor
+from palpate.synthetic.laws.tool_laws import offset_at
+from palpate.synthetic.scenario.hidden_effects import HiddenEffect
 from palpate.synthetic.scenario.scenario import Scenario
 from palpate.synthetic.solver.holzapfel_fibres import fibre_modulus
 from palpate.synthetic.solver.inelastic_history import relaxed_share
@@ -32,10 +43,14 @@ def true_radius(scenario: Scenario) -> float:
     return hidden.value("radius") if hidden else scenario.tool_radius
 
 
-def true_offset(scenario: Scenario) -> FloatArray:
-    """True minus stated centre of the tool (3,) before anything is touched, phantom frame [m]."""
-    hidden = scenario.hidden("tool_offset")
-    return np.array([hidden.value(name) for name in ("dx", "dy", "dz")]) if hidden else np.zeros(3)
+def true_offset(scenario: Scenario, centre: FloatArray) -> FloatArray:
+    """True minus stated centre (..., 3) of the tool before anything is touched, phantom frame [m].
+
+    Args:
+        scenario: with the hidden offset.
+        centre: (..., 3) stated centre [m].
+    """
+    return offset_at(scenario.hidden("tool_offset"), centre, scenario.size[0])
 
 
 def creep_velocity(scenario: Scenario) -> FloatArray:
@@ -60,13 +75,8 @@ def base_seams(scenario: Scenario) -> tuple[tuple[int, float], ...]:
     strip = scenario.hidden("base_detachment")
     if strip is None:
         return ()
-    axis, sign = _side(str(strip.parameters["edge"]))
+    axis, sign = side_of(str(strip.parameters["edge"]))
     return ((axis, sign * (scenario.true_size[axis] / 2 - strip.value("extent"))),)
-
-
-def _side(name: str) -> tuple[int, float]:
-    """Axis and sign of a side named like "-x"."""
-    return "xy".index(name[1]), -1.0 if name[0] == "-" else 1.0
 
 
 def solid_model(scenario: Scenario, block: TetBlock, axis: FloatArray | None = None) -> SolidModel:
@@ -82,23 +92,26 @@ def solid_model(scenario: Scenario, block: TetBlock, axis: FloatArray | None = N
         scenario.hidden(name) for name in ("strain_stiffening", "anisotropy", "base_compliance")
     )
     poisson_ratio = nu.value("nu") if nu else scenario.poisson_ratio
-    angle = fibres.value("direction") if fibres else 0.0
+    height = block.places[..., 2] / scenario.true_size[2]
     held = _held(scenario, block.nodes)
     return SolidModel(
         young_modulus=_modulus(scenario, block),
-        poisson_ratio=poisson_ratio,
-        weight=weight.value("specific_weight_over_stiffness") * scenario.true_modulus
+        poisson_ratio=poisson_ratio + uneven_poisson_ratio(nu, height),
+        weight=weight.value("specific_weight_over_stiffness")
+        * scenario.true_modulus
+        * uneven_density(weight, height)
         if weight
         else 0.0,
         held=np.zeros_like(held) if springs else held,
         tool_radius=true_radius(scenario),
         lifts=scenario.hidden("base_detachment") is not None,
         stretch_limit=limit.value("J_m") if limit else None,
-        fibres=np.array([np.cos(angle), np.sin(angle), 0.0]) if fibres else None,
+        exponential=limit is not None and limit.second_law,
+        fibres=fibre_families(fibres),
         fibre_modulus=fibre_modulus(fibres.value("stiffness_ratio"), poisson_ratio)
         if fibres
         else 0.0,
-        springs=_springs(scenario, block, springs.value("stiffness_over_E")) if springs else None,
+        springs=_springs(scenario, block, springs) if springs else None,
         relaxed=relaxed_share(scenario),
         shaft=_shaft(scenario, axis),
         neighbour=_neighbour(scenario),
@@ -116,7 +129,7 @@ def _neighbour(scenario: Scenario) -> Neighbour | None:
     body = scenario.disturbance("second_body")
     if body is None:
         return None
-    axis, sign = _side(str(body.parameters["side"]))
+    axis, sign = side_of(str(body.parameters["side"]))
     return Neighbour(
         axis, sign, body.value("overlap"), body.value("stiffness_over_E") * scenario.true_modulus
     )
@@ -130,16 +143,11 @@ def _modulus(scenario: Scenario, block: TetBlock) -> FloatArray:
     )
     height = scenario.true_size[2]
     if lump is not None:
-        inside = np.linalg.norm(
-            block.places - [lump.value(axis) for axis in "xyz"], axis=2
-        ) < lump.value("radius")
-        modulus[inside] *= lump.value("stiffness_ratio")
+        modulus[in_inclusion(lump, block.places)] *= lump.value("stiffness_ratio")
     if skin is not None:
-        modulus[block.places[..., 2] > height - skin.value("thickness")] *= skin.value(
-            "stiffness_ratio"
-        )
+        modulus *= layer_factor(skin, height - block.places[..., 2])
     if slope is not None:
-        modulus *= np.exp(slope.value("log_ratio") * (block.places[..., 2] / height - 0.5))
+        modulus *= gradient_factor(slope, block.places[..., 2] / height)
     return modulus
 
 
@@ -150,18 +158,14 @@ def _held(scenario: Scenario, nodes: FloatArray) -> BoolArray:
 
 def _bonded(scenario: Scenario, places: FloatArray) -> BoolArray:
     """Mask (...) of places (..., 3) [m] of the base that are not detached."""
-    strip = scenario.hidden("base_detachment")
-    if strip is None:
-        return np.ones(places.shape[:-1], dtype=bool)
-    axis, sign = _side(str(strip.parameters["edge"]))
-    return np.asarray(
-        scenario.true_size[axis] / 2 - sign * places[..., axis] >= strip.value("extent") - 1e-9
-    )
+    return is_bonded(scenario.hidden("base_detachment"), places, scenario.true_size)
 
 
-def _springs(scenario: Scenario, block: TetBlock, stiffness_over_modulus: float) -> FloatArray:
+def _springs(scenario: Scenario, block: TetBlock, hidden: HiddenEffect) -> FloatArray:
     """Stiffness per area (f, q) [N/m^3] at the points of the base; zero where it is detached."""
     places = np.einsum(
         "fqa,fai->fqi", block.sole.values, block.nodes[block.elements[block.sole.owner]]
     )
-    return np.where(_bonded(scenario, places), stiffness_over_modulus * scenario.true_modulus, 0.0)
+    stiffness = hidden.value("stiffness_over_E") * scenario.true_modulus
+    even = np.where(_bonded(scenario, places), stiffness, 0.0)
+    return np.asarray(even * spring_factor(hidden, places, scenario.true_size))

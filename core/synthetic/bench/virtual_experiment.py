@@ -222,7 +222,8 @@ def _touched(
     """Contact points (n, 3), radius of refinement around them (n,) and edge length (n,) [m]."""
     low, high = _bounds(scenario)
     radius = true_radius(scenario)
-    way = push.place(np.arange(0.0, push.corners[-1] + 1e-3, 1.0e-3)) + true_offset(scenario)
+    way = push.place(np.arange(0.0, push.corners[-1] + 1e-3, 1.0e-3))
+    way = way + true_offset(scenario, way)
     touching = way[np.linalg.norm(way - np.clip(way, low, high), axis=1) < radius]
     touching = touching if len(touching) else way[-1:]
     shallow = (

@@ -67,10 +67,12 @@ class HiddenEffect:
     Attributes:
         effect: name in the catalogue.
         parameters: by name, SI units; an edge and a pairing are words.
+        second_law: whether it follows its second law (`palpate.synthetic.laws`).
     """
 
     effect: str
     parameters: Mapping[str, float | str] = field(default_factory=dict)
+    second_law: bool = False
 
     def __post_init__(self) -> None:
         check_named(self.effect, self.parameters, HIDDEN, "hide")

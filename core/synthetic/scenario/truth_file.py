@@ -55,7 +55,9 @@ class Truth:
         return {
             "verdict": self.verdict,
             "effects": [
-                _described(hidden.effect, hidden.parameters, HIDDEN) for hidden in self.effects
+                _described(hidden.effect, hidden.parameters, HIDDEN)
+                | ({"second_law": True} if hidden.second_law else {})
+                for hidden in self.effects
             ],
             **self._disturbed(),
             "visibility_mm": round(self.visibility * 1e3, 4),

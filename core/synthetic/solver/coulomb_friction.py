@@ -72,12 +72,18 @@ class CoulombFriction:
 
     Args:
         block: the mesh.
-        friction: coefficient [1].
+        friction: largest tangential stress [Pa] at pressures [Pa].
         radius: of the tool [m].
         penalty: of the contact [Pa/m].
     """
 
-    def __init__(self, block: TetBlock, friction: float, radius: float, penalty: float) -> None:
+    def __init__(
+        self,
+        block: TetBlock,
+        friction: Callable[[FloatArray], FloatArray],
+        radius: float,
+        penalty: float,
+    ) -> None:
         self._block, self._friction, self._radius, self._penalty = block, friction, radius, penalty
         self._last: _SkinView | None = None
 
@@ -165,7 +171,7 @@ class CoulombFriction:
         met = (apart / np.maximum(apart + depth, 1e-12))[..., None]
         before = last.places[facets] + met * (places - last.places[facets])
         normals = places / np.linalg.norm(places, axis=2, keepdims=True)
-        limits = self._friction * pressure * skin.weights[facets]
+        limits = self._friction(pressure) * skin.weights[facets]
         creep = CREEPS[min(turn, len(CREEPS) - 1)]
         return FrictionContact(
             facets,

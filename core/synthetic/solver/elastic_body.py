@@ -38,8 +38,11 @@ class ElasticBody:
 
     def _own_weight(self) -> FloatArray:
         load = np.zeros_like(self._block.nodes)
-        nodal = np.einsum("eq,qa->ea", self._block.weights, shape_values())
-        np.add.at(load[:, 2], self._block.elements, -self._solid.weight * nodal)
+        weights, per_volume = self._block.weights, self._solid.weight
+        if np.ndim(per_volume):
+            weights, per_volume = weights * per_volume, 1.0
+        nodal = np.einsum("eq,qa->ea", weights, shape_values())
+        np.add.at(load[:, 2], self._block.elements, -per_volume * nodal)
         return load
 
     def _base_springs(self) -> FloatArray:
@@ -60,10 +63,13 @@ class ElasticBody:
         solid = self._solid
         energy = float(solid_energy(u, *self._grid, *self._constants))
         if solid.stretch_limit is not None and np.isfinite(energy):
-            energy += stiffening_energy(u, *self._grid, self._shear, solid.stretch_limit)
+            energy += stiffening_energy(
+                u, *self._grid, self._shear, solid.stretch_limit, solid.exponential
+            )
         if solid.fibres is not None:
-            modulus = solid.fibre_modulus * solid.young_modulus
-            energy += fibre_energy(u, *self._grid, modulus, solid.fibres)
+            modulus = solid.fibre_modulus * solid.young_modulus / len(solid.fibres)
+            for fibres in solid.fibres:
+                energy += fibre_energy(u, *self._grid, modulus, fibres)
         if metric is not None and np.isfinite(energy):
             energy += metric_energy(u, *self._grid, self._unrelaxed_shear, metric)
         if len(self.springs):
@@ -79,10 +85,13 @@ class ElasticBody:
         assemble_solid(u, *self._grid, *self._constants, stiffness, force)
         if solid.stretch_limit is not None:
             limit = solid.stretch_limit
-            assemble_stiffening(u, *self._grid, self._shear, limit, stiffness, force)
+            assemble_stiffening(
+                u, *self._grid, self._shear, limit, solid.exponential, stiffness, force
+            )
         if solid.fibres is not None:
-            modulus = solid.fibre_modulus * solid.young_modulus
-            assemble_fibres(u, *self._grid, modulus, solid.fibres, stiffness, force)
+            modulus = solid.fibre_modulus * solid.young_modulus / len(solid.fibres)
+            for fibres in solid.fibres:
+                assemble_fibres(u, *self._grid, modulus, fibres, stiffness, force)
         if metric is not None:
             assemble_metric(u, *self._grid, self._unrelaxed_shear, metric, stiffness, force)
         if len(self.springs):

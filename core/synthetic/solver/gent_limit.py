@@ -1,9 +1,10 @@
-"""Strain stiffening of the virtual block: Gent's stretch limit, added to the base law.
+"""Strain stiffening of the virtual block, added to the base law.
 
-W(F) = mu/2 (-J_m ln(1 - x / J_m) - x),   x = J^(-2/3) I1 - 3
+Gent's stretch limit:     W(F) = mu/2 (-J_m ln(1 - x / J_m) - x),   x = J^(-2/3) I1 - 3
+Exponential (Fung 1967):  W(F) = mu/2 (J_m (exp(x / J_m) - 1) - x)
 
 The base law is not changed. The added energy begins with mu x^2 / (4 J_m), as Gent's law exceeds
-the neo-Hookean one, and is infinite at x = J_m.
+the neo-Hookean one, and is infinite at x = J_m. The exponential law begins alike and has no limit.
 """
 
 from __future__ import annotations
@@ -22,10 +23,10 @@ _FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 @njit(cache=True, fastmath=_FAST)
 def stiffening_energy(
-    u: Any, elements: Any, gradients: Any, weights: Any, shear: Any, limit: float
+    u: Any, elements: Any, gradients: Any, weights: Any, shear: Any, limit: float, exponential: bool
 ) -> float:
     """Energy [J] of displacements u (n, 3) [m], for shear moduli (e, q) [Pa] and J_m [1]; infinite
-    beyond the limit.
+    beyond the limit of Gent's law.
     """
     f = np.empty((3, 3))
     total = 0.0
@@ -33,6 +34,9 @@ def stiffening_energy(
         for q in range(weights.shape[1]):
             det = deformation_gradient(u, elements[e], gradients[e, q], f)
             x = (f * f).sum() / np.cbrt(det * det) - 3.0
+            if exponential:
+                total += 0.5 * weights[e, q] * shear[e, q] * (limit * np.expm1(x / limit) - x)
+                continue
             if x >= limit:
                 return np.inf
             total += 0.5 * weights[e, q] * shear[e, q] * (-limit * np.log1p(-x / limit) - x)
@@ -47,6 +51,7 @@ def assemble_stiffening(
     weights: Any,
     shear: Any,
     limit: float,
+    exponential: bool,
     stiffness: Any,
     force: Any,
 ) -> None:
@@ -67,8 +72,12 @@ def assemble_stiffening(
             scale = 1.0 / np.cbrt(det * det)
             i1 = (f * f).sum()
             share = (scale * i1 - 3.0) / limit
-            first = 0.5 * weights[e, q] * shear[e, q] * share / (1.0 - share)
-            second = 0.5 * weights[e, q] * shear[e, q] / (limit * (1.0 - share) ** 2)
+            if exponential:
+                first = 0.5 * weights[e, q] * shear[e, q] * np.expm1(share)
+                second = 0.5 * weights[e, q] * shear[e, q] / limit * np.exp(share)
+            else:
+                first = 0.5 * weights[e, q] * shear[e, q] * share / (1.0 - share)
+                second = 0.5 * weights[e, q] * shear[e, q] / (limit * (1.0 - share) ** 2)
             for a in range(10):
                 for i in range(3):
                     xa[a, i] = 2.0 * scale * (fa[a, i] - i1 / 3.0 * ha[a, i])

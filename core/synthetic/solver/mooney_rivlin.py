@@ -34,7 +34,7 @@ _FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 
 def constants(
-    young_modulus: FloatArray, poisson_ratio: float, relaxed: float = 0.0
+    young_modulus: FloatArray, poisson_ratio: FloatArray | float, relaxed: float = 0.0
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """c10, c01 and l [Pa] for E [Pa] and nu [1] at small strain, with a share `relaxed` [1] of the
     shear modulus removed.

@@ -11,7 +11,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SolveError
 from palpate.synthetic.solver.tet_equilibrium import TetState
 
-__all__ = ["solve_compliant_shaft"]
+__all__ = ["solve_compliant_shaft", "times"]
 
 PLACED = 1e-7
 """Residual of the tool's position at which Newton's method has converged [m]."""
@@ -21,8 +21,18 @@ LONGEST = 1.5e-3
 """Longest Newton step [m]."""
 
 
+def times(softness: FloatArray | float, load: FloatArray) -> FloatArray:
+    """Return softness [m/N], a number or a matrix (3, 3), times a force (3,) or a matrix (3, 3)."""
+    if isinstance(softness, np.ndarray):
+        return np.asarray(softness @ load)
+    return softness * load
+
+
 def solve_compliant_shaft(
-    stated: FloatArray, softness: float, place: FloatArray, solve: Callable[[FloatArray], TetState]
+    stated: FloatArray,
+    softness: FloatArray | float,
+    place: FloatArray,
+    solve: Callable[[FloatArray], TetState],
 ) -> TetState:
     """Solve for the state whose tool centre is `stated` plus softness times the force on the tool.
 
@@ -31,14 +41,14 @@ def solve_compliant_shaft(
 
     Args:
         stated: (3,) centre of the unloaded tool [m].
-        softness: C [m/N].
+        softness: C [m/N]: one for all directions, or a matrix (3, 3).
         place: (3,) start of the iteration [m].
         solve: the state with the tool held at a position (3,) [m].
     """
     for _ in range(MOST):
         state = solve(place)
-        miss = stated - softness * state.tool_force - place
-        slope = np.eye(3) + softness * state.contact_stiffness
+        miss = stated - times(softness, state.tool_force) - place
+        slope = np.eye(3) + times(softness, state.contact_stiffness)
         if np.linalg.norm(miss) < PLACED:
             return replace(state, contact_stiffness=state.contact_stiffness @ np.linalg.inv(slope))
         step = np.linalg.solve(slope, miss)

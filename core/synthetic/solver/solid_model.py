@@ -17,13 +17,14 @@ class SolidModel:
 
     Attributes:
         young_modulus: (e, 4) at the volume points [Pa].
-        poisson_ratio: [1].
-        weight: per volume [N/m^3].
+        poisson_ratio: [1], the same everywhere or (e, 4) at the volume points.
+        weight: per volume [N/m^3], the same everywhere or (e, 4).
         held: (n,) bool, nodes that do not move.
         tool_radius: [m].
         lifts: whether some of the base may lift off the table.
         stretch_limit: J_m of Gent's law [1]; None without.
-        fibres: (3,) unit vector along the fibres; None without.
+        exponential: whether stiffening follows the exponential law of the same beginning instead.
+        fibres: (k, 3) unit vectors along families of fibres that share the modulus; None without.
         fibre_modulus: of the fibres over Young's modulus [1].
         springs: (f, q) stiffness per area, in all directions, at the points of the sole [N/m^3];
             None without.
@@ -33,12 +34,13 @@ class SolidModel:
     """
 
     young_modulus: FloatArray
-    poisson_ratio: float
-    weight: float
+    poisson_ratio: FloatArray | float
+    weight: FloatArray | float
     held: Any
     tool_radius: float
     lifts: bool
     stretch_limit: float | None = None
+    exponential: bool = False
     fibres: FloatArray | None = None
     fibre_modulus: float = 0.0
     springs: FloatArray | None = None
