@@ -13,6 +13,7 @@ from mkdocs.structure.files import File, Files
 from palpate.diagnosis.criteria import CRITERIA, criteria_rows
 from palpate.effects import CATALOGUE
 from palpate.synthetic import NUISANCES
+from palpate.synthetic.laws import SECOND_LAWS
 
 ROOT = Path(__file__).resolve().parents[2]
 REPOSITORY_LINK = re.compile(r"\[([^\]]+)\]\((?:\.\./)+[^)]*\)")
@@ -80,6 +81,19 @@ def nuisances_page() -> str:
         drawn = inspect.getdoc(kind.draw) or ""
         names = ", ".join(f"`{name}`" for name in kind.causes)
         lines.append(f"| `{kind.__name__}` | {cell(meaning)} | {cell(drawn)} | {names} |")
+    lines += [
+        "",
+        "## Second laws",
+        "",
+        "With nuisances, every second hidden effect follows another law than the catalogue's.",
+        "",
+        "| effect | second law | parameters that keep their meaning |",
+        "|---|---|---|",
+        *(
+            f"| `{effect}` | {cell(law.summary)} | {', '.join(law.kept)} |"
+            for effect, law in SECOND_LAWS.items()
+        ),
+    ]
     return "\n".join(lines)
 
 

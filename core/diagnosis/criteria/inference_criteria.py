@@ -210,6 +210,14 @@ class FitCriteria:
         "its first step and after it.",
         "measured: to first order a tool's shift by millimetres promises a small part of its gain",
     )
+    most_work: tuple[float, float] = threshold(
+        (30.0, 50.0),
+        "1",
+        "A fit of one cause, and of several, ends after solving this many times the equilibria of "
+        "one replay of all sequences.",
+        "derived: 30 replays are a whole diagnosis of a usual cause; a material with a history "
+        "solves several times as many equilibria in one replay",
+    )
     least_step: float = threshold(
         0.05, "1", "A fit ends with a shorter step, in the parameters' scales."
     )

@@ -42,11 +42,14 @@ class HistoryReplay:
         data: the sequence.
         block: its replay, whose setup has history.
         moved: stated to true places of the tool.
+
+    Attributes:
+        solves: number of equilibria that were solved.
     """
 
     def __init__(self, data: Observations, block: Replay, moved: Transform) -> None:
         self._block, self._last, self._left = block, -np.inf, -np.inf
-        self._travel = longest_step(block.setup)
+        self._travel, self.solves = longest_step(block.setup), 0
         self._frame: Equilibrium | None = None
         self._times, way = data.path(block.setup)
         self._way = moved.apply(way)
@@ -70,6 +73,7 @@ class HistoryReplay:
         return self._step(centre, self._last)
 
     def _step(self, centre: FloatArray, time: float) -> Equilibrium:
+        self.solves += 1
         frame = self._block.solve_from_any(centre, (self._frame,), time)
         if frame.outcome is Outcome.CONVERGED:
             self._frame = frame

@@ -46,6 +46,7 @@ class Prediction:
         forces: comparison of forces; None where none were measured.
         other_side: (g, p) share of the points that meet another side of this model than of the
             model that chose them [1]; None without points.
+        solves: number of equilibria that were solved.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Prediction:
     samples: tuple[PointSample, ...]
     forces: ForceComparison | None = None
     other_side: FloatArray | None = None
+    solves: int = 0
 
     @property
     def force_only(self) -> bool:
@@ -221,7 +223,8 @@ def predict(
                 force,
             )
         )
-    prediction = _collected(data, results, path)
+    solves = len(results) if history is None else history.solves
+    prediction = replace(_collected(data, results, path), solves=solves)
     if request is None or history is None:
         return prediction
     # A small change of a parameter changes the whole history, which is no first-order change of
@@ -273,7 +276,8 @@ def _collected(data: Observations, results: Sequence[_GroupResult], path: ToolPa
 
 def _with_columns_of(prediction: Prediction, other: Prediction) -> Prediction:
     """A prediction with the columns of another one."""
+    solves = prediction.solves + other.solves
     if prediction.forces is None or other.forces is None:
-        return replace(prediction, columns=other.columns)
+        return replace(prediction, columns=other.columns, solves=solves)
     forces = replace(prediction.forces, columns=other.forces.columns)
-    return replace(prediction, columns=other.columns, forces=forces)
+    return replace(prediction, columns=other.columns, forces=forces, solves=solves)

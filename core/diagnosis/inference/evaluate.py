@@ -92,7 +92,15 @@ class Evaluator(Posterior):
         grid: Meshing | None = None,
     ) -> list[Prediction]:
         """Return predictions of all sequences without columns; arguments as for `predict`."""
-        return [pending.result() for pending in self.predict(effects, None, starts, grid)]
+        return self.finished(self.predict(effects, None, starts, grid))
+
+    def finished(self, begun: Sequence[Pending]) -> list[Prediction]:
+        """Wait for replays of all sequences and count their work."""
+        predictions = [pending.result() for pending in begun]
+        work = sum(prediction.solves for prediction in predictions)
+        self.state.work += work
+        self.state.unit = self.state.unit or work
+        return predictions
 
     def evaluate(
         self,
@@ -114,7 +122,7 @@ class Evaluator(Posterior):
             predictions = history_predictions(self, effects, starts, tangents, inclusions)
             return self.assemble(effects, setup, predictions, tangents, len(inclusions))
         request = self._request(effects, setup, tangents, inclusions)
-        predictions = [pending.result() for pending in self.predict(effects, request, starts)]
+        predictions = self.finished(self.predict(effects, request, starts))
         model = self.assemble(effects, setup, predictions, tangents, len(inclusions))
         self.state.recent = [*self.state.recent[:1], model]
         return model

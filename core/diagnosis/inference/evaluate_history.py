@@ -44,9 +44,9 @@ def history_predictions(
         problem.names, plain.setup, problem.grid, plain.predictions, perturbed_effects(effects)
     )
     first, extra = problem.blocks.replayed, len(tangents) + len(inclusions)
-    rows = zip(pending, plain.predictions, traces, strict=True)
+    rows = zip(evaluator.finished(pending), plain.predictions, traces, strict=True)
     predictions = [
-        with_history_columns(one.result(), base, own.result(), effects, first, extra)
+        with_history_columns(one, base, own.result(), effects, first, extra)
         for one, base, own in rows
     ]
     column = first

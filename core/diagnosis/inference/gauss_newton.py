@@ -61,17 +61,44 @@ def best_fit(
         hopeless: a model whose log evidence will hardly reach this [nats] is given up.
         worth: a step that promises less [nats] is not made.
     """
-    best = _descended(evaluator, model, nuisances, hopeless, worth)
+    budget = _Budget(evaluator, model)
+    best = _descended(evaluator, model, nuisances, hopeless, worth, budget)
     for _ in range(CRITERIA.fits.polls):
-        better = _polled(evaluator, best, nuisances, hopeless, worth)
+        better = _polled(evaluator, best, nuisances, hopeless, worth, budget)
         if better is None:
             break
-        best = _descended(evaluator, better, nuisances, hopeless, worth)
+        best = _descended(evaluator, better, nuisances, hopeless, worth, budget)
     return best
 
 
+class _Budget:
+    """The work that one fit may do.
+
+    Args:
+        evaluator: that does it.
+        model: whose effects are fitted.
+    """
+
+    def __init__(self, evaluator: Evaluator, model: Model) -> None:
+        self._state, self._names = evaluator.state, model.names
+        most = CRITERIA.fits.most_work[min(len(model.effects), 2) - 1]
+        self._end = evaluator.state.work + most * evaluator.state.unit
+
+    def is_spent(self) -> bool:
+        """Return whether the fit must end; it is then noted."""
+        spent = self._state.work > self._end
+        if spent:
+            self._state.cut_short.add(self._names)
+        return spent
+
+
 def _descended(
-    evaluator: Evaluator, model: Model, nuisances: FloatArray, hopeless: float, worth: float
+    evaluator: Evaluator,
+    model: Model,
+    nuisances: FloatArray,
+    hopeless: float,
+    worth: float,
+    budget: _Budget,
 ) -> Model:
     """Return the model after Gauss-Newton steps."""
     best, radius = evaluator.objective(model, nuisances), CRITERIA.fits.trust
@@ -80,7 +107,7 @@ def _descended(
         lost = best + CRITERIA.fits.optimism[min(iteration, 1)] * promised < hopeless or (
             iteration == 2 and best < hopeless
         )
-        if lost or promised < worth:
+        if lost or promised < worth or budget.is_spent():
             break
         step = _step(evaluator, model, nuisances, radius)
         if np.abs(step / model.scales).max() < CRITERIA.fits.least_step:
@@ -99,7 +126,12 @@ def _descended(
 
 
 def _polled(
-    evaluator: Evaluator, model: Model, nuisances: FloatArray, hopeless: float, worth: float
+    evaluator: Evaluator,
+    model: Model,
+    nuisances: FloatArray,
+    hopeless: float,
+    worth: float,
+    budget: _Budget,
 ) -> Model | None:
     """Return the first better model a little to a side; None if there is none.
 
@@ -109,6 +141,8 @@ def _polled(
     if best < hopeless:
         return None
     for step in _poll_steps(model):
+        if budget.is_spent():
+            break
         trial = _shifted(evaluator, model, step)
         if evaluator.objective(trial, nuisances) > best + worth:
             return trial

@@ -27,6 +27,9 @@ class InferenceState:
         on_diagnosis_grid: the stated setup on the grid of the diagnosis, where it states another.
         recent: the first model evaluated and the last one, which others may reuse.
         evaluations: number of replays of all sequences.
+        work: number of equilibria that were solved.
+        unit: the same of the first replay of all sequences.
+        cut_short: names of the effects of fits that ended at their budget of work.
         progress: share that is done [1].
     """
 
@@ -35,6 +38,9 @@ class InferenceState:
     on_diagnosis_grid: tuple[Prediction, ...] = ()
     recent: list[Model] = field(default_factory=list)
     evaluations: int = 0
+    work: int = 0
+    unit: int = 0
+    cut_short: set[tuple[str, ...]] = field(default_factory=set)
     progress: float = 0.0
 
 

@@ -4,6 +4,7 @@ cannot determine, and the error that is left.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -122,8 +123,13 @@ def _ranking(evaluator: Evaluator, findings: Findings, named: set[str]) -> list[
     return sorted(rows, key=lambda row: -row["gain_nats"])
 
 
-def _model(trial: Trial) -> dict[str, Any]:
-    """A set of causes that was fitted, with its gain split by block of data."""
+def _model(trial: Trial, cut_short: Collection[tuple[str, ...]]) -> dict[str, Any]:
+    """A set of causes that was fitted, with its gain split by block of data.
+
+    Args:
+        trial: the fit.
+        cut_short: names of the sets whose fit ended at its budget of work.
+    """
     blocks = [*(block.name for block in trial.model.blocks), "stated accuracies"]
     parts = [
         {"of": name, "gain_nats": round(part, 2)}
@@ -139,6 +145,7 @@ def _model(trial: Trial) -> dict[str, Any]:
         "asked_nats": required,
         "misfit": misfit,
         "parts": parts,
+        **({"cut_short": True} if trial.model.names in cut_short else {}),
     }
 
 
@@ -187,7 +194,7 @@ def report_of(
         "interval_level": CRITERIA.intervals.level,
         "criteria": CRITERIA.to_json(),
         "ranking": _ranking(evaluator, findings, named),
-        "models": [_model(trial) for trial in findings.trials],
+        "models": [_model(trial, evaluator.state.cut_short) for trial in findings.trials],
         "identified": known,
         "not_identifiable": unknown,
         "unexplained": unexplained_error(evaluator, findings, checks),
@@ -211,6 +218,7 @@ def _evidence(evaluator: Evaluator, findings: Findings, checks: AllClearChecks) 
         "structure": round(structure.ratio, 4),
         "structure_bound": round(structure.bound / structure.expected, 4),
         "evaluations": evaluator.state.evaluations,
+        "equilibria": evaluator.state.work,
         "fitted_on": list(evaluator.problem.names),
         **_false_alarms(findings),
         **_all_clear(checks),
@@ -248,11 +256,22 @@ def _warnings(evaluator: Evaluator, findings: Findings, checks: AllClearChecks) 
         coarse = too_coarse(screened, findings.bound)
     texts = (
         findings.withdrawn,
+        *_cut_short(evaluator, findings),
         coarse,
         findings.ripple.warning,
         checks.unusual.warning if checks.unusual else "",
     )
     return [*problem.registration.warnings, *(text for text in texts if text)]
+
+
+def _cut_short(evaluator: Evaluator, findings: Findings) -> list[str]:
+    """A sentence if the fit of a set that is named, or nearly, ended at its budget of work."""
+    close = [trial.model.names for trial in (findings.best, *findings.rivals()) if trial]
+    names = [" and ".join(one) for one in close if one in evaluator.state.cut_short]
+    return [
+        f"the fit of {name} ended at its budget of work, before its numbers had settled"
+        for name in names
+    ]
 
 
 def _modulus(

@@ -86,7 +86,7 @@ class ElasticBody:
         if solid.stretch_limit is not None:
             limit = solid.stretch_limit
             assemble_stiffening(
-                u, *self._grid, self._shear, limit, solid.exponential, stiffness, force
+                u, *self._grid, self._shear, limit, stiffness, force, solid.exponential
             )
         if solid.fibres is not None:
             modulus = solid.fibre_modulus * solid.young_modulus / len(solid.fibres)

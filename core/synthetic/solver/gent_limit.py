@@ -23,7 +23,13 @@ _FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 @njit(cache=True, fastmath=_FAST)
 def stiffening_energy(
-    u: Any, elements: Any, gradients: Any, weights: Any, shear: Any, limit: float, exponential: bool
+    u: Any,
+    elements: Any,
+    gradients: Any,
+    weights: Any,
+    shear: Any,
+    limit: float,
+    exponential: bool = False,
 ) -> float:
     """Energy [J] of displacements u (n, 3) [m], for shear moduli (e, q) [Pa] and J_m [1]; infinite
     beyond the limit of Gent's law.
@@ -51,9 +57,9 @@ def assemble_stiffening(
     weights: Any,
     shear: Any,
     limit: float,
-    exponential: bool,
     stiffness: Any,
     force: Any,
+    exponential: bool = False,
 ) -> None:
     """Add to element stiffness (e, 10, 10, 3, 3) [N/m], upper node pairs only, and to force (n, 3)
     [N].

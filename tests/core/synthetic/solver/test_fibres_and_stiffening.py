@@ -45,6 +45,12 @@ def _terms(block: TetBlock) -> dict[str, tuple[Energy, Assemble]]:
             lambda u: stiffening_energy(u, *grid, stiff, 1.3),
             lambda u, stiffness, force: assemble_stiffening(u, *grid, stiff, 1.3, stiffness, force),
         ),
+        "exponential": (
+            lambda u: stiffening_energy(u, *grid, stiff, 1.3, True),
+            lambda u, stiffness, force: assemble_stiffening(
+                u, *grid, stiff, 1.3, stiffness, force, True
+            ),
+        ),
         "fibres": (
             lambda u: fibre_energy(u, *grid, stiff, ALONG),
             lambda u, stiffness, force: assemble_fibres(u, *grid, stiff, ALONG, stiffness, force),
@@ -114,6 +120,15 @@ def test_stiffening_stores_what_gent_does_above_neo_hooke(block: TetBlock) -> No
     assert stiffening_energy(1.2 * block.nodes, *grid, shear, limit) == pytest.approx(
         0.0, abs=1e-12
     )
+
+
+def test_exponential_law_begins_like_gents_and_has_no_limit(block: TetBlock) -> None:
+    grid = (block.elements, block.gradients, block.weights)
+    shear = np.full(block.weights.shape, SHEAR)
+    little, far = block.nodes * (0.02, -0.01, -0.01), block.nodes * (1.0, -0.3, -0.3)
+    gent = stiffening_energy(little, *grid, shear, 1.5)
+    assert stiffening_energy(little, *grid, shear, 1.5, True) == pytest.approx(gent, rel=2e-3)
+    assert np.isfinite(stiffening_energy(far, *grid, shear, 1.5, True))
 
 
 def test_block_stretched_to_the_limit_stores_without_bound(block: TetBlock) -> None:

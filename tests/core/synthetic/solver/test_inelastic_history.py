@@ -4,6 +4,7 @@ block and agree.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -214,3 +215,40 @@ def test_set_is_the_retained_share_of_the_largest_strain(block) -> None:
     assert np.allclose(
         memory.inelastic_state.natural, np.diag(np.exp(-2 * 0.2 * strain)), atol=2e-3
     )
+
+
+def _held(memory: InelasticHistory, u: FloatArray, times: list[float]) -> None:
+    for time in times:
+        memory.inelastic_state = memory.after(u, time)
+
+
+def test_second_law_relaxes_sooner_and_later_by_the_same_share(block) -> None:
+    """Before the shorter time constant nothing has relaxed, long after the longer one all."""
+    u = _bent(block)
+    first, other = (
+        InelasticHistory(Scenario(effects=(replace(DELAYED, second_law=law),)), block)
+        for law in (False, True)
+    )
+    for memory in (first, other):
+        memory.inelastic_state = memory.after(u, 0.0)
+    assert np.allclose(first.metric(1e-9), other.metric(1e-9), atol=1e-6)
+    assert np.abs(first.metric(0.8) - other.metric(0.8)).max() > 1e-3
+    for memory in (first, other):
+        _held(memory, u, [0.5, 2.0, 8.0, 60.0])
+    assert np.allclose(first.metric(90.0), other.metric(90.0), atol=1e-6)
+    assert other.time_constants == pytest.approx((0.8 / 3, 2.4))
+
+
+def test_second_law_of_a_set_flows_above_a_strain_and_while_it_is_held(block) -> None:
+    memory = InelasticHistory(Scenario(effects=(replace(KEPT, second_law=True),)), block)
+    assert memory.relaxes
+    large = block.nodes * (0.2, -0.1, -0.1)
+    _held(memory, 0.05 * large, [0.0, 1.0, 2.0])
+    assert not memory.inelastic_state.peak_strain.any()
+    _held(memory, large, [2.1, 3.1])
+    strain = np.log([1.2, 0.9, 0.9])
+    strain -= strain.mean()
+    kept = np.diag(strain) * (1 - np.exp(-1.1))
+    assert np.allclose(memory.inelastic_state.peak_strain, kept, atol=2e-3)
+    _held(memory, 0.9 * large, [8.0])
+    assert np.allclose(memory.inelastic_state.peak_strain, kept, atol=2e-3)
