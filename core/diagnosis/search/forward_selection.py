@@ -29,7 +29,7 @@ from palpate.diagnosis.search.touch_pairing import known_mismatch
 from palpate.diagnosis.search.trials import Screening, screen, screen_again, trial_of
 from palpate.effects.base import with_effects
 
-__all__ = ["search"]
+__all__ = ["removes_rest", "required_gain", "search"]
 
 
 def search(evaluator: Evaluator, seed: int) -> Findings:
@@ -112,7 +112,7 @@ def _next_cause(
     """Return the best further cause that gains more than the bound, by all sequences; or None."""
     screened, candidates, gains = screening
     trials = list[Trial]()
-    asked = [required_gain(findings, current, candidate.start.name) for candidate in candidates]
+    asked = [required_gain(findings, current, one.start.name, True) for one in candidates]
     least = CRITERIA.naming.promising * np.array(asked)
     more = _refits_nonlinear(findings, current, gains > least)
     settled = beyond_first_order(evaluator, screened, candidates) if more else []
@@ -134,7 +134,9 @@ def _next_cause(
         effects = [*current.model.effects, initial_guess(candidate, screened, evaluator)]
         starts = current.model.predictions
         trial = trial_of(evaluator, effects, starts, current.model, hopeless)
-        needed = required_gain(findings, current, candidate.start.name)
+        needed = required_gain(
+            findings, current, candidate.start.name, removes_rest(current, trial)
+        )
         trials.append(replace(trial, required_gain=current.required_gain + needed))
     trials.sort(key=lambda trial: -trial.gain)
     enough = [trial for trial in trials if trial.gain > trial.required_gain - current.required_gain]
@@ -174,20 +176,32 @@ def _known_names(findings: Findings) -> tuple[str, ...]:
     return tuple(effect.name for effect in findings.known)
 
 
-def required_gain(findings: Findings, current: Trial, name: str) -> float:
+def removes_rest(current: Trial, trial: Trial) -> bool:
+    """Return whether a further cause removes most of the misfit above noise that a model leaves."""
+    left = CRITERIA.naming.second_left * max(current.misfit - 1.0, 0.0)
+    return trial.misfit - 1.0 <= left
+
+
+def required_gain(findings: Findings, current: Trial, name: str, rest: bool = False) -> float:
     """Return the least gain [nats] of an effect as the next cause.
 
     The mesh error is known for the stated setup only. A found cause changes it, and that change
     could pass for another cause. A second cause must therefore gain a good deal more than chance,
-    and a share of the first gain unless significant structure is left. (Measured: on top of the
-    only cause, of 84 to 14 780 nats, the best of the catalogue has at most 40. Of two causes one
-    can show a fifth of what the other shows, and leave no structure.) An effect without which
-    nothing can be replayed was there when the noise was measured, and is no first cause in this
-    sense.
+    and a share of the first gain unless significant structure is left, or unless it removes most of
+    what the first leaves. (Measured: on top of the only cause, of 84 to 14 780 nats, the best of
+    the catalogue has at most 40. Of two causes one can show a twentieth of what the other shows,
+    and leave no structure.) An effect without which nothing can be replayed was there when the
+    noise was measured, and is no first cause in this sense.
+
+    Args:
+        findings: so far.
+        current: model that the effect would extend.
+        name: of the effect.
+        rest: whether the effect removes most of the misfit above noise that the model leaves.
     """
     if current.model.names == _known_names(findings):
         return findings.bound_of(name)
-    share = 0.0 if findings.remaining.significant else CRITERIA.naming.second_share
+    share = 0.0 if findings.remaining.significant or rest else CRITERIA.naming.second_share
     return max(CRITERIA.naming.second_factor * findings.bound, share * current.gain)
 
 

@@ -9,7 +9,11 @@ from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.noise.residual_structure import Structure
 from palpate.diagnosis.inference.parameter_blocks import ModelColumns
 from palpate.diagnosis.search.findings import Findings, Trial
-from palpate.diagnosis.search.forward_selection import _refits_nonlinear, required_gain
+from palpate.diagnosis.search.forward_selection import (
+    _refits_nonlinear,
+    removes_rest,
+    required_gain,
+)
 from palpate.effects.support import BaseCompliance
 
 STATED = Model((), SETUP, (), (), ModelColumns(()))
@@ -43,6 +47,19 @@ def test_nothing_is_named_beside_an_only_cause(only: float, best: float):
 
 def test_where_structure_is_left_a_fainter_second_cause_is_let_in():
     assert _second(2508.0, LOUD) == 2 * CRITERIA.naming.least_gain < _second(2508.0)
+
+
+def test_faint_second_cause_that_removes_the_rest_is_let_in():
+    """A relaxing gel of 11 000 nats removes 93 %, a tool that is off its place the rest."""
+    first = Trial(SOFT, 11_000.0, 1.08)
+    whole, half = Trial(SOFT, 11_400.0, 1.01), Trial(SOFT, 11_400.0, 1.05)
+    assert removes_rest(first, whole) and not removes_rest(first, half)
+    findings = Findings(STATED, remaining=QUIET)
+    asked = [
+        required_gain(findings, first, "tool_offset", removes_rest(first, trial))
+        for trial in (whole, half)
+    ]
+    assert asked[0] == 2 * CRITERIA.naming.least_gain < 400.0 < asked[1]
 
 
 def test_nonlinear_effects_are_refitted_beside_a_cause_only_where_another_might_be_named():
