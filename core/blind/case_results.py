@@ -74,6 +74,11 @@ class CaseResult:
         return frozenset() if outside else frozenset(self.case.hidden)
 
     @property
+    def second_law(self) -> bool:
+        """Whether any effect was hidden by its second law."""
+        return any(hidden.get("second_law", False) for hidden in self.hidden)
+
+    @property
     def stating(self) -> frozenset[str]:
         """Names of the effects that state the fault of the bench; empty for other kinds."""
         from palpate.synthetic import FAULTS

@@ -107,12 +107,20 @@ class ReportedParameter:
 
 
 def reported_parameters(results: Iterable[CaseResult]) -> list[ReportedParameter]:
-    """List every number of every cause that is named and hidden."""
+    """List every number of every cause that is named and hidden.
+
+    Of an effect that was hidden by its second law only those that mean the same under both laws.
+    """
+    from palpate.synthetic.laws import SECOND_LAWS
+
     found = []
     for result in results:
         causes = {cause["effect"]: cause["parameters"] for cause in result.causes}
         for hidden in result.hidden:
             entries = causes.get(hidden["effect"], {})
+            if hidden.get("second_law"):
+                kept = SECOND_LAWS[hidden["effect"]].kept
+                entries = {name: entry for name, entry in entries.items() if name in kept}
             for name, true in hidden["parameters"].items():
                 if name in entries and isinstance(true["value"], (int, float)):
                     found.append(

@@ -51,6 +51,11 @@ def summary_of(results: Sequence[CaseResult], seed: int, missing: int = 0) -> di
             for kind in KINDS
             if (own := [one for one in results if one.case.kind == kind])
         },
+        "laws": {
+            name: _kind(own)
+            for name, second in (("catalogue", False), ("second", True))
+            if (own := [one for one in results if one.truth and one.second_law is second])
+        },
         "sizes": dict(
             Counter(grade(result) or "not given" for result in results if len(result.truth) == 1)
         ),

@@ -122,6 +122,12 @@ class ScreeningCriteria:
         "pull its parameters as improbably as one by this many standard deviations.",
         "derived: to first order the nuisance explains most of it already, and hides the rest",
     )
+    search_over_baseline: float = threshold(
+        6.0,
+        "1",
+        "Expected duration of a search over that of the first replay on two meshes.",
+        "measured: 3 with nothing hidden, 5 to 9 with one cause, up to 20 with two that remember",
+    )
     inclusions_apart: float = threshold(
         0.015, "m", "Two starts of an inclusion are refitted if they are farther apart than this."
     )

@@ -51,12 +51,17 @@ class Evaluator(Posterior):
         self, problem: InferenceProblem, workers: Workers, report: Report = silent
     ) -> None:
         super().__init__(problem)
-        self.workers, self._report = workers, report
+        self.workers, self._report, self._expected = workers, report, ""
 
     def report(self, text: str, done: float = 0.0) -> None:
         """Report what is being done; the share that is done [1] never falls."""
         self.state.progress = max(self.state.progress, done)
-        self._report(self.state.progress, text)
+        self._report(self.state.progress, text + self._expected)
+
+    def expect(self, seconds: float) -> None:
+        """State the expected duration of the search [s] from here on, behind every report."""
+        minutes = max(round(seconds / 60), 1)
+        self._expected = f" (the search takes about {minutes} min)"
 
     def predict(
         self,

@@ -6,6 +6,7 @@ cannot give, one after another.
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -45,7 +46,9 @@ def search(evaluator: Evaluator, seed: int) -> Findings:
     known = known_mismatch(problem.catalogue, problem.setup, problem.grid, repair)
     names = [effect.name for effect in known]
     tangents = tangents_of(problem.applicable, with_effects(problem.setup, known), names)
+    began = time.monotonic()
     origin = evaluator.baseline(tangents, inclusion_places(problem), known)
+    evaluator.expect(CRITERIA.screening.search_over_baseline * (time.monotonic() - began))
     baseline = evaluator.evaluate((), origin.predictions) if known else origin
     findings = Findings(baseline, misfit=evaluator.misfit(baseline), known=known)
     findings.excess = rms_beyond_noise(evaluator, baseline)
