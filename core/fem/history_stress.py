@@ -24,7 +24,7 @@ from palpate.fem.model import BlockModel
 from palpate.fem.strain_tensors import invert
 from palpate.foundation.arrays import FloatArray
 
-__all__ = ["ConstantStress", "shear_stress"]
+__all__ = ["ConstantStress", "constant_stress_force", "shear_stress"]
 
 _MOST_HARDENING = 50.0
 """Largest hardening [1]. Between quadrature points an element may be beyond Gent's limit although
@@ -95,6 +95,60 @@ def _add(
                     for i in range(3):
                         matrix[3 * a + i, 3 * b + i] += share
         scatter(matrix, slots[e], data)
+
+
+@njit(cache=True)
+def _add_force(
+    gradients: Any, weights: Any, nodes: Any, stress: Any, displacement: Any, force: Any
+) -> None:
+    """Add the forces of the stress at a displacement to `force` (n, 3) [m^2].
+
+    Args:
+        gradients: (e, q, a, 3) [1/m].
+        weights: (e, q) [m^3].
+        nodes: (e, a).
+        stress: (e, q, 6) over E [1].
+        displacement: (n, 3) [m].
+        force: to be added to.
+    """
+    corners = nodes.shape[1]
+    f, pulled = np.empty((3, 3)), np.empty((3, 3))
+    for e in range(nodes.shape[0]):
+        for q in range(weights.shape[1]):
+            g, h, w = gradients[e, q], stress[e, q], weights[e, q]
+            for i in range(3):
+                for k in range(3):
+                    f[i, k] = 1.0 if i == k else 0.0
+            for a in range(corners):
+                for i in range(3):
+                    moved = displacement[nodes[e, a], i]
+                    for k in range(3):
+                        f[i, k] += moved * g[a, k]
+            for i in range(3):
+                pulled[i, 0] = w * (f[i, 0] * h[0] + f[i, 1] * h[5] + f[i, 2] * h[4])
+                pulled[i, 1] = w * (f[i, 0] * h[5] + f[i, 1] * h[1] + f[i, 2] * h[3])
+                pulled[i, 2] = w * (f[i, 0] * h[4] + f[i, 1] * h[3] + f[i, 2] * h[2])
+            for a in range(corners):
+                for i in range(3):
+                    force[nodes[e, a], i] += (
+                        pulled[i, 0] * g[a, 0] + pulled[i, 1] * g[a, 1] + pulled[i, 2] * g[a, 2]
+                    )
+
+
+def constant_stress_force(
+    model: BlockModel, stress: FloatArray, displacement: FloatArray
+) -> FloatArray:
+    """Return the gradient (u,) [m^2] of the energy of `ConstantStress` without its quadratic form.
+
+    Args:
+        model: with the mesh.
+        stress: over E (e, q, 6) [1] at its quadrature points.
+        displacement: of the nodes (n, 3) [m].
+    """
+    force = np.zeros_like(model.mesh.nodes)
+    rule, elements = model.rule, model.topology.elements
+    _add_force(rule.gradients, rule.weights, elements, stress, displacement, force)
+    return np.asarray(force[model.topology.free])
 
 
 @dataclass(frozen=True, eq=False)

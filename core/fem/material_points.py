@@ -97,19 +97,19 @@ class CellPoints:
         nx, ny, nz = mesh.shape
         (mx, dx), (my, dy), (mz, dz) = (_means(self, mesh, axis) for axis in range(3))
         field = positions.reshape(nz, ny, nx, 3)
-        low, rising = _along(mz, field, 0), _along(dz, field, 0)
-        rows = [
-            _along(dx, _along(my, low, 1), 2),
-            _along(mx, _along(dy, low, 1), 2),
-            _along(mx, _along(my, rising, 1), 2),
-        ]
-        return np.stack([row.reshape(-1, 3) for row in rows], axis=1)
+        # The axis with the shortest rows behind it comes first, while the field is small.
+        mean, rising = _along(mx, field, 2), _along(dx, field, 2)
+        result = np.empty((np.prod(self._counts), 3, 3))
+        result[:, 0] = _along(mz, _along(my, rising, 1), 0).reshape(-1, 3)
+        result[:, 1] = _along(mz, _along(dy, mean, 1), 0).reshape(-1, 3)
+        result[:, 2] = _along(dz, _along(my, mean, 1), 0).reshape(-1, 3)
+        return result
 
     def read(self, mesh: Mesh, field: FloatArray) -> FloatArray:
         """See `MaterialPoints`."""
         assert isinstance(mesh, BoxMesh)
         result = field.reshape(*self._counts[::-1], -1)
-        for axis in range(3):
+        for axis in (2, 1, 0):
             result = _along(_reading(self, mesh, axis), result, 2 - axis)
         (ex, ey, ez), points = _elements(mesh), _points_along(mesh)
         result = result.reshape(ez, points, ey, points, ex, points, -1).transpose(
@@ -125,7 +125,9 @@ class CellPoints:
 
 def _along(matrix: FloatArray, field: FloatArray, axis: int) -> FloatArray:
     """Apply a matrix (p, n) to one axis of n of a field."""
-    return np.asarray(np.moveaxis(np.tensordot(matrix, field, axes=(1, axis)), 0, axis))
+    before, after = field.shape[:axis], field.shape[axis + 1 :]
+    rows = field.reshape(int(np.prod(before)), field.shape[axis], int(np.prod(after)))
+    return np.asarray(np.matmul(matrix, rows).reshape(*before, len(matrix), *after))
 
 
 def _elements(mesh: BoxMesh) -> tuple[int, int, int]:

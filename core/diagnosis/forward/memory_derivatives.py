@@ -17,7 +17,7 @@ import numpy as np
 
 from palpate.diagnosis.forward.loading_history import LoadingHistory
 from palpate.fem.constitutive.elastic import Law
-from palpate.fem.history_stress import ConstantStress, shear_stress
+from palpate.fem.history_stress import constant_stress_force, shear_stress
 from palpate.fem.material_points import material_points
 from palpate.fem.model import BlockModel
 from palpate.fem.strain_tensors import cauchy_green, from_log_strain, log_strain
@@ -75,7 +75,7 @@ class StressHistory:
             displacement: of the nodes (n, 3) [m].
         """
         at_points = self._points.read(model.mesh, stress) * model.unrelaxed[..., None]
-        return ConstantStress.of(model, at_points).force(displacement[model.topology.free])
+        return constant_stress_force(model, at_points, displacement)
 
     @cached_property
     def _stresses(self) -> list[FloatArray]:

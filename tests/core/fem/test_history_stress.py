@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from palpate.fem.constitutive.elastic import Law
-from palpate.fem.history_stress import ConstantStress, shear_stress
+from palpate.fem.history_stress import ConstantStress, constant_stress_force, shear_stress
 from palpate.fem.material_points import CellPoints, QuadraturePoints
 from palpate.fem.model import BlockModel, ToolSphere
 from palpate.fem.newton import Outcome, solve
@@ -184,6 +184,18 @@ def test_constant_stress_does_the_work_of_its_strain(order):
     moved = (_sheared(held, 1.0) - held.mesh.nodes)[held.model.topology.free]
     wanted = 0.5 * float(h @ ((c - [1, 1, 1, 0, 0, 0]) * [1, 1, 1, 2, 2, 2])) * np.prod(SIZE)
     assert carried.energy(moved) == pytest.approx(wanted, rel=1e-12)
+
+
+@ORDERS
+def test_force_of_a_stress_is_that_of_its_quadratic_form(order):
+    held = PrescribedBlock(MADE_OF["neo_hooke"], order)
+    random = np.random.default_rng(4)
+    stress = random.normal(size=(*held.model.mu.shape, 6))
+    moved = _bent(held, 5) - held.mesh.nodes
+    moved[held.mesh.base_nodes] = 0.0
+    found = constant_stress_force(held.model, stress, moved)
+    wanted = ConstantStress.of(held.model, stress).force(moved[held.model.topology.free])
+    assert found == pytest.approx(wanted, rel=1e-9, abs=1e-12 * np.abs(wanted).max())
 
 
 @ORDERS
