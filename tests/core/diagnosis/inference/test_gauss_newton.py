@@ -13,6 +13,7 @@ from palpate.diagnosis.inference.evidence import Block, log_evidence
 from palpate.diagnosis.inference.gauss_newton import best_fit
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.parameter_blocks import ModelColumns
+from palpate.diagnosis.inference.posterior import InferenceState
 from palpate.effects import Effect
 from palpate.effects.support import BaseCompliance, BaseSlip
 from palpate.foundation.arrays import FloatArray
@@ -28,16 +29,19 @@ class Slope:
     """Residuals (2,) that are linear in one coordinate and vanish at `best`; below a `kink` others
     do not quite vanish at `REST`.
 
-    It keeps the coordinates at which it was evaluated.
+    It keeps the coordinates at which it was evaluated, and solves `work` equilibria for each.
     """
 
     best: float = BEST
     kink: float = KINK
     evaluated: list[float] = field(default_factory=list)
+    state: InferenceState = field(default_factory=lambda: InferenceState(unit=1))
+    work: int = 1
 
     def evaluate(self, effects: Sequence[Effect], starts: Any) -> Model:
         (at,) = effects[0].coordinates
         self.evaluated.append(at)
+        self.state.work += self.work
         rows = np.array([[0.0, 300.0 * (at - self.best)], [0.0, 300.0]])
         if at < self.kink:
             rows = np.array([[10.0, 200.0 * (at - REST)], [0.0, 200.0]])
@@ -76,3 +80,13 @@ def test_a_fit_that_is_given_up_is_not_asked_again() -> None:
     slope = Slope()
     _fit(slope, BaseSlip(friction_coefficient=0.139), hopeless=1e6)
     assert len(slope.evaluated) == 1
+
+
+def test_a_fit_ends_at_its_budget_and_is_noted() -> None:
+    dear = Slope(work=40)
+    found = _fit(dear, BaseSlip(friction_coefficient=0.3))
+    assert len(dear.evaluated) == 2
+    assert dear.state.cut_short == {found.names}
+    cheap = Slope()
+    _fit(cheap, BaseSlip(friction_coefficient=0.3))
+    assert len(cheap.evaluated) > 2 and not cheap.state.cut_short
