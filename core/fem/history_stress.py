@@ -12,6 +12,7 @@ modulus, so that an inclusion's edge is in the modulus alone.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -181,11 +182,13 @@ class ConstantStress:
         )
         return cls(upper, data, load[top.free])
 
+    @cached_property
+    def _diagonal(self) -> FloatArray:
+        return np.asarray(self.upper.diagonal())
+
     def _turned(self, displacement: FloatArray) -> FloatArray:
         whole = (
-            self.upper @ displacement
-            + self.upper.T @ displacement
-            - self.upper.diagonal() * displacement
+            self.upper @ displacement + self.upper.T @ displacement - self._diagonal * displacement
         )
         return np.asarray(whole)
 

@@ -120,7 +120,7 @@ class FixedBaseReplay:
             solution.residual,
             solution.penetration,
             touched,
-            hardness=self.model(mesh).hardness,
+            hardness=1.0 if self._model is None else self._model.hardness,
             dense=self.dense,
         )
 

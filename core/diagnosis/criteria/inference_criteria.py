@@ -196,6 +196,13 @@ class FitCriteria:
         "A step that promises less is not made while models are compared.",
         "derived: the parameters are then within one standard deviation of the best",
     )
+    worth_share: float = threshold(
+        1e-3,
+        "1",
+        "Nor is one while models are compared that promises less than this share of the gain over "
+        "the stated setup.",
+        "derived: models whose gains differ by less are rivals; the accepted one is fitted again",
+    )
     settled: float = threshold(
         0.02,
         "nat",

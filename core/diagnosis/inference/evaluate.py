@@ -225,6 +225,7 @@ class Evaluator(Posterior):
         )
         model = self.assemble(effects, model.setup, model.predictions, tangents, len(inclusions))
         state.temperature = self.misfit(model)
+        state.stated = self.objective(model)
         return model
 
     def with_signatures(

@@ -42,7 +42,9 @@ def refit(
     """
     evaluator.report(f"fitting {' and '.join(effect.name for effect in effects)}")
     model = evaluator.evaluate(effects, starts)
-    return best_fit(evaluator, model, evaluator.problem.nuisances.precision, hopeless)
+    gained = evaluator.objective(model) - evaluator.state.stated
+    worth = max(CRITERIA.fits.worth, CRITERIA.fits.worth_share * gained)
+    return best_fit(evaluator, model, evaluator.problem.nuisances.precision, hopeless, worth)
 
 
 def best_fit(

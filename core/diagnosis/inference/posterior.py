@@ -29,6 +29,7 @@ class InferenceState:
         evaluations: number of replays of all sequences.
         work: number of equilibria that were solved.
         unit: the same of the first replay of all sequences.
+        stated: log evidence of the stated setup at its own temperature [nats].
         cut_short: names of the effects of fits that ended at their budget of work.
         progress: share that is done [1].
     """
@@ -40,6 +41,7 @@ class InferenceState:
     evaluations: int = 0
     work: int = 0
     unit: int = 0
+    stated: float = np.inf
     cut_short: set[tuple[str, ...]] = field(default_factory=set)
     progress: float = 0.0
 

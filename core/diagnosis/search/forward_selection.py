@@ -24,6 +24,7 @@ from palpate.diagnosis.search.identifiability import identifiability_of
 from palpate.diagnosis.search.inclusion_grid import inclusion_places
 from palpate.diagnosis.search.initial_guess import initial_guess
 from palpate.diagnosis.search.revision import distinct, reconsidered, try_pairs
+from palpate.diagnosis.search.screening import Candidate
 from palpate.diagnosis.search.shortlist import beyond_first_order, shortlist
 from palpate.diagnosis.search.signatures import signatures_of
 from palpate.diagnosis.search.touch_pairing import known_mismatch
@@ -131,8 +132,7 @@ def _next_cause(
                 *(evaluator.objective(trial.model) - CRITERIA.naming.hopeless for trial in trials),
             ]
         )
-        promised = before + CRITERIA.naming.history_optimism * linear[id(candidate)]
-        if candidate.start.has_history() and promised < hopeless:
+        if before + _most_promised(candidate, current, linear[id(candidate)]) < hopeless:
             continue
         effects = [*current.model.effects, initial_guess(candidate, screened, evaluator)]
         starts = current.model.predictions
@@ -157,6 +157,21 @@ def _next_cause(
         ]
     findings.trials.extend(trial if trial is best else trial.scored() for trial in trials)
     return best
+
+
+def _most_promised(candidate: Candidate, current: Trial, linear: float) -> float:
+    """Return what a fit may gain [nats]; infinite where it is cheap to try.
+
+    Args:
+        candidate: to be fitted.
+        current: model that it would extend.
+        linear: its linear gain [nats].
+    """
+    if candidate.start.has_history():
+        return CRITERIA.naming.history_optimism * linear
+    if any(effect.has_history() for effect in current.model.effects):
+        return CRITERIA.fits.optimism[0] * max(linear, 0.0)
+    return np.inf
 
 
 def _refits_nonlinear(findings: Findings, current: Trial, promising: np.ndarray) -> bool:
