@@ -43,10 +43,21 @@ def agrees_with_neighbours(gap: FloatArray, patch: IntArray, surface: Surface) -
         & well
     )
     np.fill_diagonal(near, False)
-    expected = np.array([np.median(middle[around]) if around.any() else 0.0 for around in near])
+    expected = _medians(middle, near)
     far = np.where(
         well,
         np.where(near.any(axis=1), CRITERIA.outliers.seen_offset, np.inf),
         CRITERIA.outliers.hidden_offset,
     )
     return ~np.isin(patch, seen[np.abs(middle - expected) > far])
+
+
+def _medians(values: FloatArray, near: MaskArray) -> FloatArray:
+    """Median (s,) of the values (s,) that each row of a mask (s, s) chooses; zero without any.
+
+    All rows at once: a median of its own for each row takes ten times as long.
+    """
+    ordered = np.sort(np.where(near, values, np.inf), axis=1)
+    count, rows = near.sum(axis=1), np.arange(len(near))
+    low, high = ordered[rows, np.maximum(count - 1, 0) // 2], ordered[rows, count // 2 % len(near)]
+    return np.where(count > 0, 0.5 * (low + high), 0.0)

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.diagnosis.observation.outlier_patches import agrees_with_neighbours
+from palpate.diagnosis.observation.outlier_patches import _medians, agrees_with_neighbours
 from palpate.measurement.surface_gaps import Surface
 from palpate.setup.setup import Box
 
@@ -53,3 +53,12 @@ def test_patch_near_its_neighbours_is_no_outlier_however_wrong_the_model():
 
 def test_cloud_without_points_has_no_outliers():
     assert len(agrees_with_neighbours(np.zeros(0), np.zeros(0, dtype=int), SURFACE)) == 0
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.6, 1.0])
+@pytest.mark.parametrize("count", [1, 2, 5, 60])
+def test_medians_of_all_rows_are_those_of_each(count: int, share: float) -> None:
+    random = np.random.default_rng(count)
+    values, near = random.normal(size=count), random.random((count, count)) < share
+    each = [np.median(values[row]) if row.any() else 0.0 for row in near]
+    assert np.array_equal(_medians(values, near), each)
