@@ -104,7 +104,12 @@ class HistoryCriteria:
     """Resolution of the tool's path in replays with history."""
 
     travel: float = threshold(
-        1e-3, "m", "Longest motion between two places near the phantom, for a material's history."
+        2e-3,
+        "m",
+        "Longest motion between two places near the phantom, for a material's history.",
+        "measured: on pushes from above, relaxation and permanent set of 110 um RMS are then 3.8 "
+        "and 3.4 um RMS off those by places of 0.5 mm, and 3.1 and 2.6 um by those of 1 mm, with "
+        "a quarter more equilibria",
     )
     friction_travel: float = threshold(
         2e-3,
