@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from palpate.diagnosis.inference.evaluate import Evaluator
     from palpate.diagnosis.inference.hypothesis import Model
 
-__all__ = ["history_predictions"]
+__all__ = ["history_predictions", "plain_model"]
 
 
 def history_predictions(
@@ -39,7 +39,7 @@ def history_predictions(
     """Return predictions along the tool's path with their columns; arguments as for `evaluate`."""
     problem = evaluator.problem
     pending = evaluator.predict(effects, None, starts)
-    plain = _without_history(evaluator, effects, starts, tangents, inclusions)
+    plain = plain_model(evaluator, effects, starts, tangents, inclusions)
     traces = evaluator.workers.trace(
         problem.names, plain.setup, problem.grid, plain.predictions, perturbed_effects(effects)
     )
@@ -66,14 +66,17 @@ def history_predictions(
     return predictions
 
 
-def _without_history(
+def plain_model(
     evaluator: Evaluator,
     effects: Sequence[Effect],
     starts: Sequence[Prediction] | None,
-    tangents: Sequence[Tangent],
-    inclusions: Sequence[Inclusion],
+    tangents: Sequence[Tangent] = (),
+    inclusions: Sequence[Inclusion] = (),
 ) -> Model:
-    """Return the model of the effects without history, which is reused from one fit to the next."""
+    """Return the model of the effects without history, which is reused from one fit to the next.
+
+    Arguments as for `evaluate`.
+    """
     others = tuple(effect for effect in effects if not effect.has_history())
     if not (tangents or inclusions):
         for model in evaluator.state.recent:

@@ -76,6 +76,11 @@ class Model:
         """Names of the effects."""
         return tuple(effect.name for effect in self.effects)
 
+    @property
+    def has_history(self) -> bool:
+        """Whether a frame depends on the frames before it."""
+        return any(effect.has_history() for effect in self.effects)
+
     def split(self, values: FloatArray) -> Iterator[tuple[Effect, FloatArray]]:
         """Yield each effect with its part of values (n,), one for each search coordinate."""
         at = 0

@@ -136,7 +136,7 @@ def _next_cause(
             continue
         effects = [*current.model.effects, initial_guess(candidate, screened, evaluator)]
         starts = current.model.predictions
-        trial = trial_of(evaluator, effects, starts, current.model, hopeless)
+        trial = trial_of(evaluator, effects, starts, current.model, hopeless, current.model)
         needed = required_gain(
             findings, current, candidate.start.name, removes_rest(current, trial)
         )
@@ -169,7 +169,7 @@ def _most_promised(candidate: Candidate, current: Trial, linear: float) -> float
     """
     if candidate.start.has_history():
         return CRITERIA.naming.history_optimism * linear
-    if any(effect.has_history() for effect in current.model.effects):
+    if current.model.has_history:
         return CRITERIA.fits.optimism[0] * max(linear, 0.0)
     return np.inf
 

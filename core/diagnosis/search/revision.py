@@ -132,7 +132,7 @@ def _exchanged(
         evaluator.report(f"trying {candidate.start.name} instead")
         hopeless = evaluator.objective(best.model) - CRITERIA.naming.hopeless
         starts = without.model.predictions
-        other = trial_of(evaluator, effects, starts, findings.baseline, hopeless)
+        other = trial_of(evaluator, effects, starts, findings.baseline, hopeless, without.model)
         other = replace(other, required_gain=best.required_gain)
         better = gain_over(evaluator, other.model, best.model) > 0
         if better and is_supported_by_all_sequences(evaluator, other.model, without.model):

@@ -1,13 +1,20 @@
-"""Screenings and trials: the linear gains of the catalogue, and fits of single sets of causes."""
+"""Screenings and trials: the linear gains of the catalogue, and fits of single sets of causes.
+
+A cause beside one with history is fitted twice: first with the change by the history held as it is,
+which costs plain replays alone, and then, if that is promising, with everything.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.evaluate import Evaluator
+from palpate.diagnosis.inference.evaluate_history import plain_model
 from palpate.diagnosis.inference.evidence import predictive_gain
 from palpate.diagnosis.inference.gauss_newton import refit
 from palpate.diagnosis.inference.hypothesis import Model
@@ -16,9 +23,12 @@ from palpate.diagnosis.search.findings import Trial
 from palpate.diagnosis.search.inclusion_grid import inclusion_places
 from palpate.diagnosis.search.screening import Candidate, linear_gains, right_sides
 from palpate.diagnosis.search.signatures import Signature, updated_signatures
-from palpate.effects import Effect
+from palpate.effects import Effect, Tangent
+from palpate.effects.base import with_effects
+from palpate.foundation.arrays import FloatArray
+from palpate.setup.setup import Inclusion
 
-__all__ = ["Screening", "gain_over", "screen", "screen_again", "trial_of"]
+__all__ = ["HeldHistory", "Screening", "gain_over", "screen", "screen_again", "trial_of"]
 
 Screening = tuple[Model, list[Candidate], np.ndarray]
 """A model with the catalogue as columns, the candidates, and the linear gain of each [nats]."""
@@ -62,6 +72,7 @@ def trial_of(
     starts: Sequence[Prediction],
     against: Model,
     hopeless: float = -np.inf,
+    beside: Model | None = None,
 ) -> Trial:
     """Fit these effects and return the model with its gain.
 
@@ -71,9 +82,108 @@ def trial_of(
         starts: predictions to begin from, one for each sequence.
         against: the model that the gain is over.
         hopeless: a model whose log evidence will hardly reach this [nats] is given up.
+        beside: fitted model with history that the last effect, which has none, extends.
     """
+    if beside is not None and beside.has_history and not effects[-1].has_history():
+        held = HeldHistory(evaluator, beside)
+        model = refit(held, effects, held.plain.predictions, hopeless)
+        if evaluator.objective(model) < hopeless:
+            return Trial(model, gain_over(evaluator, model, against), evaluator.misfit(model))
+        effects = model.effects
     model = refit(evaluator, effects, starts, hopeless)
     return Trial(model, gain_over(evaluator, model, against), evaluator.misfit(model))
+
+
+class HeldHistory(Evaluator):
+    """Evaluates further causes beside a model with history, whose change by the history is held.
+
+    To first order its numbers may still change. It shares the state of the evaluator that it is
+    made from.
+
+    Args:
+        evaluator: of the inference problem.
+        beside: fitted model with history.
+
+    Attributes:
+        plain: the same model without its effects with history.
+    """
+
+    def __init__(self, evaluator: Evaluator, beside: Model) -> None:
+        super().__init__(evaluator.problem, evaluator.workers)
+        self.state, self._told, self._beside = evaluator.state, evaluator, beside
+        self.plain = plain_model(evaluator, beside.effects, beside.predictions)
+
+    def report(self, text: str, done: float = 0.0) -> None:
+        """Report as the evaluator that it is made from does."""
+        self._told.report(text, done)
+
+    def evaluate(
+        self,
+        effects: Sequence[Effect],
+        starts: Sequence[Prediction] | None = None,
+        tangents: Sequence[Tangent] = (),
+        inclusions: Sequence[Inclusion] = (),
+    ) -> Model:
+        """Replay the effects without history, and add the change by those with history.
+
+        Args:
+            effects: of the model, in its order, and further ones without history.
+            starts: predictions to begin from, one for each sequence.
+            tangents: must be none.
+            inclusions: must be none.
+        """
+        others = [effect for effect in effects if not effect.has_history()]
+        plain = super().evaluate(others, starts)
+        rows = zip(plain.predictions, self.plain.predictions, self._beside.predictions, strict=True)
+        predictions = [self._with_history(new, old, held, effects) for new, old, held in rows]
+        return self.assemble(effects, with_effects(self.problem.setup, effects), predictions)
+
+    def _with_history(
+        self, new: Prediction, old: Prediction, held: Prediction, effects: Sequence[Effect]
+    ) -> Prediction:
+        """Return a plain prediction with the change by the history.
+
+        Args:
+            new: plain prediction with all effects without history.
+            old: plain prediction of the model beside.
+            held: prediction of that model with its history.
+            effects: in the order of the columns that are returned.
+        """
+        first = self.problem.blocks.replayed
+        was = dict(zip(self._beside.names, self._beside.effects, strict=True))
+        places = dict(zip(was, _places(self._beside.effects, first), strict=True))
+        others = [effect for effect in effects if not effect.has_history()]
+        own = dict(zip((e.name for e in others), _places(others, first), strict=True))
+        shifted = new.transferred(held, old)
+        ahead, there = _every_column(new), _every_column(held)
+        parts, change = [ahead[..., :first]], np.zeros(ahead.shape[:2])
+        for effect in effects:
+            if effect.name in own:
+                parts.append(ahead[..., own[effect.name]])
+                continue
+            columns = there[..., places[effect.name]]
+            moved = np.subtract(effect.coordinates, was[effect.name].coordinates)
+            parts.append(columns)
+            change = change + columns @ moved
+        patches = shifted.gap.shape[1]
+        forces = shifted.forces
+        if forces is not None:
+            forces = replace(forces, gap=forces.gap + change[:, patches:])
+        shifted = replace(shifted, gap=shifted.gap + change[:, :patches], forces=forces)
+        return shifted.replace_columns(np.concatenate(parts, axis=2))
+
+
+def _places(effects: Sequence[Effect], first: int) -> list[slice]:
+    """Return the columns of each effect, from a first column on."""
+    ends = np.cumsum([first, *(len(effect.numbers()) for effect in effects)]).tolist()
+    return [slice(low, high) for low, high in pairwise(ends)]
+
+
+def _every_column(item: Prediction) -> FloatArray:
+    """Return the columns (g, p, k), with the force's rows last where forces were measured."""
+    if item.forces is None:
+        return item.columns
+    return np.concatenate([item.columns, item.forces.columns], axis=1)
 
 
 def gain_over(evaluator: Evaluator, model: Model, other: Model) -> float:

@@ -18,11 +18,12 @@ from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.gauss_newton import refit
 from palpate.diagnosis.inference.noise.noise_model import Noise
 from palpate.diagnosis.observation.frame_groups import Observations
+from palpate.diagnosis.search.trials import HeldHistory
 from palpate.diagnosis.validation.falsified_motions import FALSIFIED
 from palpate.diagnosis.validation.negative_controls import controls
 from palpate.effects import Effect
 from palpate.effects.time_dependence import PermanentSet, Viscoelasticity
-from palpate.effects.tool import ToolFriction, ToolRadius
+from palpate.effects.tool import ToolFriction, ToolOffset, ToolRadius
 from palpate.foundation.arrays import FloatArray
 
 TRUE: dict[str, Effect] = {
@@ -97,6 +98,32 @@ def test_columns_of_what_is_not_remembered_stay_in_their_places(evaluator, name)
     own, place = (model.predictions[0].columns[..., model.columns[-1]] for model in (both, alone))
     assert len(both.columns) == 1 + len(BEGIN[name].numbers())
     assert np.array_equal(own, place) and np.abs(own).max() > 0.1
+
+
+def test_change_by_a_history_that_is_held_is_nearly_that_of_a_full_replay(evaluator, name):
+    """A cause beside it that shifts the tool by 0.3 mm; and a size that differs, to first order."""
+    baseline = evaluator.evaluate(())
+    beside = evaluator.evaluate((BEGIN[name],), baseline.predictions)
+    held, offset = HeldHistory(evaluator, beside), ToolOffset(dx=0.0, dy=0.0, dz=-3e-4)
+    same = held.evaluate((BEGIN[name],), held.plain.predictions)
+    assert np.abs(_change(list(same.predictions), list(beside.predictions))).max() < 1e-5
+    effects = (BEGIN[name], offset)
+    quick = held.evaluate(effects, held.plain.predictions)
+    full = evaluator.evaluate(effects, beside.predictions)
+    assert quick.layout == full.layout
+    true, found = (
+        _change(list(model.predictions), list(beside.predictions)) for model in (full, quick)
+    )
+    assert np.linalg.norm(found - true) < 0.35 * np.linalg.norm(true)
+    coordinates = BEGIN[name].coordinates
+    coordinates[0] += 0.2 * BEGIN[name].numbers()[0].scale
+    moved = held.evaluate((BEGIN[name].at(coordinates),), held.plain.predictions)
+    step = _change(list(moved.predictions), list(beside.predictions))
+    column = np.concatenate(
+        [one.columns[..., beside.columns[0]].ravel() for one in beside.predictions]
+    )
+    wanted = 0.2 * BEGIN[name].numbers()[0].scale * column
+    assert np.abs(step - wanted).max() < 1e-5
 
 
 def test_fit_finds_what_is_remembered_and_its_gain_and_controls_know_it(evaluator, data, name):
