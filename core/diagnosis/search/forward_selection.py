@@ -132,7 +132,8 @@ def _next_cause(
                 *(evaluator.objective(trial.model) - CRITERIA.naming.hopeless for trial in trials),
             ]
         )
-        if before + _most_promised(candidate, current, linear[id(candidate)]) < hopeless:
+        most = _most_promised(candidate, current, linear[id(candidate)])
+        if candidate not in settled and before + most < hopeless:
             continue
         effects = [*current.model.effects, initial_guess(candidate, screened, evaluator)]
         starts = current.model.predictions
