@@ -12,6 +12,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
@@ -137,7 +138,9 @@ def draw(file: Path) -> None:
             )
         )
     file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, metadata={"Date": None} if file.suffix == ".svg" else None)
+    # The same drawing is the same file: without a salt its marks have other names each time.
+    with rc_context({"svg.hashsalt": "palpate"}):
+        figure.savefig(file, metadata={"Date": None} if file.suffix == ".svg" else None)
 
 
 if __name__ == "__main__":

@@ -25,6 +25,7 @@ from palpate.setup.setup import Box, Setup, Tool
 SIZE = (0.0687, 0.0393, 0.0358)
 TOP = SIZE[2]
 GRID = GridSpec(nodes=(9, 7, 6), spacing=2e-3)
+FINER_GRID = GridSpec(nodes=(11, 9, 7), spacing=1.7e-3)
 EYE = np.array([-0.19, -0.16, 0.28])
 DWELL = 0.1
 
@@ -99,6 +100,12 @@ def observed(
 def poke(depth: float, x: float = 4e-3, y: float = -2e-3) -> FloatArray:
     """Centre (3,) [m] of the ball pressed into the top by `depth` [m]."""
     return np.array([x, y, TOP + 5e-3 - depth])
+
+
+def poked(name: str, truth: Setup, seed: int) -> Observations:
+    """A sequence of this name, with the ball out of contact and at three depths."""
+    centres = np.array([poke(-6e-3), poke(2e-3), poke(4e-3), poke(6e-3)])
+    return replace(observed(truth, centres, count=20000, noise=2e-4, seed=seed), name=name)
 
 
 def prediction(

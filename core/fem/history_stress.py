@@ -139,7 +139,9 @@ def _add_force(
 def constant_stress_force(
     model: BlockModel, stress: FloatArray, displacement: FloatArray
 ) -> FloatArray:
-    """Return the gradient (u,) [m^2] of the energy of `ConstantStress` without its quadratic form.
+    """Return the force of a constant stress on the unknowns over E (u,) [m^2].
+
+    It is `ConstantStress.force`, without the stiffness that a solver needs.
 
     Args:
         model: with the mesh.

@@ -85,7 +85,8 @@ def nuisances_page() -> str:
         "",
         "## Second laws",
         "",
-        "With nuisances, every second hidden effect follows another law than the catalogue's.",
+        "With nuisances, a hidden effect follows another law than the catalogue's in half of the "
+        "cases.",
         "",
         "| effect | second law | parameters that keep their meaning |",
         "|---|---|---|",

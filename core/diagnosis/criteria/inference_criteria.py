@@ -200,8 +200,9 @@ class FitCriteria:
         1e-3,
         "1",
         "Nor is one while models are compared that promises less than this share of the gain over "
-        "the stated setup.",
-        "derived: models whose gains differ by less are rivals; the accepted one is fitted again",
+        "the stated setup, or than half the distance of rivals if that is less.",
+        "derived: models that are nearer to each other are rivals anyway; the accepted one is "
+        "fitted again",
     )
     settled: float = threshold(
         0.02,

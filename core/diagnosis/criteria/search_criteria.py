@@ -79,7 +79,8 @@ class NamingCriteria:
         "1",
         "Largest share of the first cause's misfit above noise that a second one leaves if it "
         "counts as removing most of it.",
-        "measured: of 24 pairs of the virtual bench (seed 1400) the second cause left more in one",
+        "measured: of the virtual bench's 20 pairs (seed 1400) whose first cause leaves misfit above "
+        "noise, the second one leaves more in one",
     )
     hopeless: float = threshold(
         60.0,

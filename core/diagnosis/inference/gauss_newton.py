@@ -43,7 +43,9 @@ def refit(
     evaluator.report(f"fitting {' and '.join(effect.name for effect in effects)}")
     model = evaluator.evaluate(effects, starts)
     gained = evaluator.objective(model) - evaluator.state.stated
-    worth = max(CRITERIA.fits.worth, CRITERIA.fits.worth_share * gained)
+    # Half the distance of rivals at most, so that what is left open does not change their order.
+    least = min(CRITERIA.fits.worth_share * gained, CRITERIA.naming.rival / 2)
+    worth = max(CRITERIA.fits.worth, least)
     return best_fit(evaluator, model, evaluator.problem.nuisances.precision, hopeless, worth)
 
 
@@ -63,92 +65,94 @@ def best_fit(
         hopeless: a model whose log evidence will hardly reach this [nats] is given up.
         worth: a step that promises less [nats] is not made.
     """
-    budget = _Budget(evaluator, model)
-    best = _descended(evaluator, model, nuisances, hopeless, worth, budget)
-    for _ in range(CRITERIA.fits.polls):
-        better = _polled(evaluator, best, nuisances, hopeless, worth, budget)
-        if better is None:
-            break
-        best = _descended(evaluator, better, nuisances, hopeless, worth, budget)
-    return best
+    return _Fit(evaluator, model, nuisances, hopeless, worth).best_from(model)
 
 
-class _Budget:
-    """The work that one fit may do.
+class _Fit:
+    """One fit: its bounds, and the work that it may do.
 
     Args:
-        evaluator: that does it.
+        evaluator: of the inference problem.
         model: whose effects are fitted.
+        nuisances: prior precision of the nuisances.
+        hopeless: a model whose log evidence will hardly reach this [nats] is given up.
+        worth: a step that promises less [nats] is not made.
     """
 
-    def __init__(self, evaluator: Evaluator, model: Model) -> None:
-        self._state, self._names = evaluator.state, model.names
+    def __init__(
+        self,
+        evaluator: Evaluator,
+        model: Model,
+        nuisances: FloatArray,
+        hopeless: float,
+        worth: float,
+    ) -> None:
+        self._evaluator, self._nuisances = evaluator, nuisances
+        self._hopeless, self._worth, self._names = hopeless, worth, model.names
         most = CRITERIA.fits.most_work[min(len(model.effects), 2) - 1]
-        self._end = evaluator.state.work + most * evaluator.state.unit
+        self._most_work = evaluator.state.work + most * evaluator.state.unit
 
-    def is_spent(self) -> bool:
-        """Return whether the fit must end; it is then noted."""
-        spent = self._state.work > self._end
-        if spent:
-            self._state.cut_short.add(self._names)
-        return spent
-
-
-def _descended(
-    evaluator: Evaluator,
-    model: Model,
-    nuisances: FloatArray,
-    hopeless: float,
-    worth: float,
-    budget: _Budget,
-) -> Model:
-    """Return the model after Gauss-Newton steps."""
-    best, radius = evaluator.objective(model, nuisances), CRITERIA.fits.trust
-    for iteration in range(CRITERIA.fits.iterations):
-        promised = _promised(evaluator, model, nuisances)
-        lost = best + CRITERIA.fits.optimism[min(iteration, 1)] * promised < hopeless or (
-            iteration == 2 and best < hopeless
-        )
-        if lost or promised < worth or budget.is_spent():
-            break
-        step = _step(evaluator, model, nuisances, radius)
-        if np.abs(step / model.scales).max() < CRITERIA.fits.least_step:
-            break
-        trial = _shifted(evaluator, model, step)
-        value = evaluator.objective(trial, nuisances)
-        if value > best:
-            gained, model, best = value - best, trial, value
-            if gained < 2 * worth:
+    def best_from(self, model: Model) -> Model:
+        """Return the best model met from this one on."""
+        best = self._descended(model)
+        for _ in range(CRITERIA.fits.polls):
+            better = self._polled(best)
+            if better is None:
                 break
-        else:
-            radius = CRITERIA.fits.shrinking * np.abs(step / model.scales).max()
-            if radius < CRITERIA.fits.least_trust:
+            best = self._descended(better)
+        return best
+
+    def _is_spent(self) -> bool:
+        """Return whether the fit must end for its work; it is then noted."""
+        state = self._evaluator.state
+        if state.work > self._most_work:
+            state.cut_short.add(self._names)
+        return state.work > self._most_work
+
+    def _objective(self, model: Model) -> float:
+        return self._evaluator.objective(model, self._nuisances)
+
+    def _descended(self, model: Model) -> Model:
+        """Return the model after Gauss-Newton steps."""
+        best, radius = self._objective(model), CRITERIA.fits.trust
+        for iteration in range(CRITERIA.fits.iterations):
+            promised = _promised(self._evaluator, model, self._nuisances)
+            optimism = CRITERIA.fits.optimism[min(iteration, 1)]
+            lost = best + optimism * promised < self._hopeless or (
+                iteration == 2 and best < self._hopeless
+            )
+            if lost or promised < self._worth or self._is_spent():
                 break
-    return model
+            step = _step(self._evaluator, model, self._nuisances, radius)
+            if np.abs(step / model.scales).max() < CRITERIA.fits.least_step:
+                break
+            trial = _shifted(self._evaluator, model, step)
+            value = self._objective(trial)
+            if value > best:
+                gained, model, best = value - best, trial, value
+                if gained < 2 * self._worth:
+                    break
+            else:
+                radius = CRITERIA.fits.shrinking * np.abs(step / model.scales).max()
+                if radius < CRITERIA.fits.least_trust:
+                    break
+        return model
 
+    def _polled(self, model: Model) -> Model | None:
+        """Return the first better model a little to a side; None if there is none.
 
-def _polled(
-    evaluator: Evaluator,
-    model: Model,
-    nuisances: FloatArray,
-    hopeless: float,
-    worth: float,
-    budget: _Budget,
-) -> Model | None:
-    """Return the first better model a little to a side; None if there is none.
-
-    None also for a fit that was given up.
-    """
-    best = evaluator.objective(model, nuisances)
-    if best < hopeless:
+        None also for a fit that was given up.
+        """
+        best = self._objective(model)
+        if best < self._hopeless:
+            return None
+        for step in _poll_steps(model):
+            if self._is_spent():
+                break
+            trial = _shifted(self._evaluator, model, step)
+            if self._objective(trial) > best + self._worth:
+                return trial
         return None
-    for step in _poll_steps(model):
-        if budget.is_spent():
-            break
-        trial = _shifted(evaluator, model, step)
-        if evaluator.objective(trial, nuisances) > best + worth:
-            return trial
-    return None
 
 
 def _poll_steps(model: Model) -> Iterator[FloatArray]:

@@ -196,9 +196,12 @@ def _known_names(findings: Findings) -> tuple[str, ...]:
 
 
 def removes_rest(current: Trial, trial: Trial) -> bool:
-    """Return whether a further cause removes most of the misfit above noise that a model leaves."""
-    left = CRITERIA.naming.second_left * max(current.misfit - 1.0, 0.0)
-    return trial.misfit - 1.0 <= left
+    """Return whether a further cause removes most of the misfit above noise that a model leaves.
+
+    Where a model leaves none there is nothing to remove.
+    """
+    left = current.misfit - 1.0
+    return left > 0.0 and trial.misfit - 1.0 <= CRITERIA.naming.second_left * left
 
 
 def required_gain(findings: Findings, current: Trial, name: str, rest: bool = False) -> float:

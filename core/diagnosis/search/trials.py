@@ -130,15 +130,16 @@ class HeldHistory(Evaluator):
 
         Args:
             effects: of the model, in its order, and further ones without history.
-            starts: predictions to begin from, one for each sequence.
-            tangents: must be none.
-            inclusions: must be none.
+            starts: plain predictions to begin from, one for each sequence.
+            tangents: as for `Evaluator.evaluate`.
+            inclusions: as for `Evaluator.evaluate`.
         """
         others = [effect for effect in effects if not effect.has_history()]
-        plain = super().evaluate(others, starts)
+        plain = super().evaluate(others, starts, tangents, inclusions)
         rows = zip(plain.predictions, self.plain.predictions, self._beside.predictions, strict=True)
         predictions = [self._with_history(new, old, held, effects) for new, old, held in rows]
-        return self.assemble(effects, with_effects(self.problem.setup, effects), predictions)
+        setup = with_effects(self.problem.setup, effects)
+        return self.assemble(effects, setup, predictions, tangents, len(inclusions))
 
     def _with_history(
         self, new: Prediction, old: Prediction, held: Prediction, effects: Sequence[Effect]
@@ -167,6 +168,7 @@ class HeldHistory(Evaluator):
             moved = np.subtract(effect.coordinates, was[effect.name].coordinates)
             parts.append(columns)
             change = change + columns @ moved
+        parts.append(ahead[..., first + sum(len(effect.numbers()) for effect in others) :])
         patches = shifted.gap.shape[1]
         forces = shifted.forces
         if forces is not None:

@@ -64,8 +64,7 @@ class Specimen:
         self._scenario = scenario
         self.radius = true_radius(scenario)
         hidden = scenario.hidden("base_slip")
-        self.friction = hidden.value("friction_coefficient") if hidden else None
-        self._sliding = hidden
+        self.sliding = hidden
         self.weight = scenario.mass * GRAVITY
         self.softness = shaft_softness(
             scenario.hidden("tool_compliance"), scenario.true_modulus, axis
@@ -133,7 +132,7 @@ class Specimen:
         """Whether unloading differs from loading."""
         return (
             self.changes_at_rest
-            or self.friction is not None
+            or self.sliding is not None
             or self.memory is not None
             or self.drag is not None
         )
@@ -211,14 +210,14 @@ class Specimen:
         state = self._solve_with_compliant_shaft(centre - self.slip)
         return (
             self._slide(centre, state)
-            if self.friction is not None and self._excess_force(state) > 0
+            if self.sliding is not None and self._excess_force(state) > 0
             else state
         )
 
     def _excess_force(self, state: TetState) -> float:
         """Tangential force on the base beyond the Coulomb limit [N]; negative where it sticks."""
-        assert self._sliding is not None
-        held = slip_limit(self._sliding, self.weight - float(state.tool_force[2]), self.weight)
+        assert self.sliding is not None
+        held = slip_limit(self.sliding, self.weight - float(state.tool_force[2]), self.weight)
         return float(np.linalg.norm(state.tool_force[:2])) - held
 
     def _slide(self, centre: FloatArray, state: TetState) -> TetState:
@@ -226,18 +225,17 @@ class Specimen:
 
         Newton's method on the length of the slide, within a bracket; SolveError after 40 steps.
         """
-        assert self.friction is not None
+        assert self.sliding is not None
+        friction = self.sliding.value("friction_coefficient")
         direction = np.array([*state.tool_force[:2], 0.0]) / np.linalg.norm(state.tool_force[:2])
         start, length, short, long = self.slip, 0.0, 0.0, np.inf
         for _ in range(40):
             excess = self._excess_force(state)
-            if abs(excess) < 1e-3 * self.friction * self.weight or (
-                excess < 0 and long - short < 1e-6
-            ):
+            if abs(excess) < 1e-3 * friction * self.weight or (excess < 0 and long - short < 1e-6):
                 return state
             short, long = (max(short, length), long) if excess > 0 else (short, min(long, length))
             change = state.contact_stiffness @ direction
-            rate = float(change @ direction) + self.friction * float(change[2])
+            rate = float(change @ direction) + friction * float(change[2])
             step = excess / max(rate, 1e-2 * self.solver.modulus * self.radius)
             length += float(np.clip(step, -0.7e-3, 0.7e-3))
             if not short < length < long:

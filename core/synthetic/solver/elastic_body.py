@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from palpate.foundation.arrays import FloatArray
-from palpate.synthetic.solver.gent_limit import assemble_stiffening, stiffening_energy
 from palpate.synthetic.solver.holzapfel_fibres import assemble_fibres, fibre_energy
 from palpate.synthetic.solver.mooney_rivlin import assemble_solid, constants, solid_energy
 from palpate.synthetic.solver.rest_metric import assemble_metric, metric_energy
 from palpate.synthetic.solver.solid_model import SolidModel
+from palpate.synthetic.solver.stiffening_laws import assemble_stiffening, stiffening_energy
 from palpate.synthetic.solver.tet_block import TetBlock, shape_values
 
 __all__ = ["ElasticBody"]

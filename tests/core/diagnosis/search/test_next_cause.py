@@ -54,6 +54,8 @@ def test_faint_second_cause_that_removes_the_rest_is_let_in():
     first = Trial(SOFT, 11_000.0, 1.08)
     whole, half = Trial(SOFT, 11_400.0, 1.01), Trial(SOFT, 11_400.0, 1.05)
     assert removes_rest(first, whole) and not removes_rest(first, half)
+    clean = Trial(SOFT, 11_000.0, 0.98)
+    assert not removes_rest(clean, Trial(SOFT, 11_060.0, 0.97))  # there is no rest
     findings = Findings(STATED, remaining=QUIET)
     asked = [
         required_gain(findings, first, "tool_offset", removes_rest(first, trial))

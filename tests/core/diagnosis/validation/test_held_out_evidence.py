@@ -5,40 +5,30 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from evaluating import evaluator_of
-from pushed_block import CORNERS, SETUP, observed, poke, registration
+from pushed_block import CORNERS, FINER_GRID, GRID, SETUP, poked, registration
 
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.gauss_newton import refit
-from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.inclusion_grid import inclusion_places
 from palpate.diagnosis.validation.held_out_evidence import gain_on_held_out
 from palpate.diagnosis.validation.rejection import rejection_reason
 from palpate.effects.elastic_material import PoissonRatio
-from palpate.mesh.box_mesh import GridSpec
-from palpate.setup.setup import Setup
 
-GRID, FINE = GridSpec(nodes=(9, 7, 6), spacing=2e-3), GridSpec(nodes=(11, 9, 7), spacing=1.7e-3)
 STATED = replace(SETUP, landmarks=CORNERS)
 TRUE = PoissonRatio(nu=0.25)
-
-
-def _pushed(name: str, truth: Setup, seed: int) -> Observations:
-    centres = np.array([poke(-6e-3), poke(2e-3), poke(4e-3), poke(6e-3)])
-    return replace(observed(truth, centres, count=20000, noise=2e-4, seed=seed), name=name)
 
 
 DATA = {
     one.name: one
     for one in (
-        _pushed("fitted-1", TRUE.apply(STATED), 0),
-        _pushed("fitted-2", TRUE.apply(STATED), 1),
-        _pushed("alike", TRUE.apply(STATED), 10),
-        _pushed("without", STATED, 20),
+        poked("fitted-1", TRUE.apply(STATED), 0),
+        poked("fitted-2", TRUE.apply(STATED), 1),
+        poked("alike", TRUE.apply(STATED), 10),
+        poked("without", STATED, 20),
     )
 }
 
@@ -47,7 +37,7 @@ DATA = {
 def evaluator() -> Iterator[Evaluator]:
     with Workers(list(DATA.values()), 1) as workers:
         names = ["fitted-1", "fitted-2"]
-        yield evaluator_of(STATED, registration(), workers, names, None, GRID, FINE)
+        yield evaluator_of(STATED, registration(), workers, names, None, GRID, FINER_GRID)
 
 
 def test_only_sequences_with_the_cause_confirm_it(evaluator: Evaluator) -> None:

@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from evaluating import evaluator_of
-from pushed_block import CORNERS, SETUP, TOP, observed, poke, registration
+from pushed_block import CORNERS, FINER_GRID, GRID, SETUP, TOP, poked, registration
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.inference.evidence import Block, gram
-from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.search.inclusion_grid import inclusion_places
 from palpate.diagnosis.validation.stiffness_error_test import (
     StiffnessError,
@@ -25,25 +24,17 @@ from palpate.diagnosis.validation.stiffness_error_test import (
 from palpate.diagnosis.validation.worst_location import ErrorLocation
 from palpate.effects.base import with_effects
 from palpate.effects.elastic_material import StiffInclusion
-from palpate.mesh.box_mesh import GridSpec
-from palpate.setup.setup import Setup
 
-GRID, FINE = GridSpec(nodes=(9, 7, 6), spacing=2e-3), GridSpec(nodes=(11, 9, 7), spacing=1.7e-3)
 STATED = replace(SETUP, landmarks=CORNERS)
 LUMP = StiffInclusion(x=0.002, y=0.0, z=0.026, radius=7e-3, stiffness_ratio=6.0)
-
-
-def _pushed(name: str, truth: Setup, seed: int) -> Observations:
-    centres = np.array([poke(-6e-3), poke(2e-3), poke(4e-3), poke(6e-3)])
-    return replace(observed(truth, centres, count=20000, noise=2e-4, seed=seed), name=name)
 
 
 DATA = {
     one.name: one
     for one in (
-        _pushed("clear", STATED, 0),
-        _pushed("alike", STATED, 10),
-        _pushed("lumpy", with_effects(STATED, [LUMP]), 20),
+        poked("clear", STATED, 0),
+        poked("alike", STATED, 10),
+        poked("lumpy", with_effects(STATED, [LUMP]), 20),
     )
 }
 
@@ -55,7 +46,7 @@ def workers() -> Iterator[Workers]:
 
 
 def _looked_at(workers: Workers, *names: str) -> StiffnessErrorTest:
-    evaluator = evaluator_of(STATED, registration(), workers, names, None, GRID, FINE)
+    evaluator = evaluator_of(STATED, registration(), workers, names, None, GRID, FINER_GRID)
     found = largest_stiffness_error(
         evaluator, evaluator.baseline((), inclusion_places(evaluator.problem))
     )

@@ -11,7 +11,6 @@ import pytest
 from scipy.optimize import brentq, fmin
 
 from palpate.foundation.arrays import FloatArray
-from palpate.synthetic.solver.gent_limit import assemble_stiffening, stiffening_energy
 from palpate.synthetic.solver.holzapfel_fibres import (
     CURVING,
     assemble_fibres,
@@ -19,6 +18,7 @@ from palpate.synthetic.solver.holzapfel_fibres import (
     fibre_modulus,
 )
 from palpate.synthetic.solver.mooney_rivlin import assemble_solid, constants, solid_energy
+from palpate.synthetic.solver.stiffening_laws import assemble_stiffening, stiffening_energy
 from palpate.synthetic.solver.tet_block import TetBlock, TetGrading, mesh_block
 
 SIZE = (0.03, 0.02, 0.02)
