@@ -58,10 +58,10 @@ class Evaluator(Posterior):
         self.state.progress = max(self.state.progress, done)
         self._report(self.state.progress, text + self._expected)
 
-    def expect(self, seconds: float) -> None:
-        """State the expected duration of the search [s] from here on, behind every report."""
-        minutes = max(round(seconds / 60), 1)
-        self._expected = f" (the search takes about {minutes} min)"
+    def expect(self, seconds: float | None) -> None:
+        """State the expected duration of the search [s] behind every report; None to stop."""
+        minutes = 0 if seconds is None else max(round(seconds / 60), 1)
+        self._expected = f" (the search takes about {minutes} min)" if minutes else ""
 
     def predict(
         self,

@@ -88,6 +88,7 @@ def search(evaluator: Evaluator, seed: int) -> Findings:
         refined = refine(evaluator, findings.best.model)
         findings.best = replace(findings.best, model=refined, misfit=evaluator.misfit(refined))
         findings.remaining = structure_of(evaluator, findings.best.model, seed)
+    evaluator.expect(None)
     return findings
 
 
