@@ -12,13 +12,12 @@ from pathlib import Path
 
 from filelock import FileLock
 
+from palpate.blind.dataset_store import BENCH
 from palpate.foundation.source_digest import source_digest
 from palpate.synthetic import Scenario, make_dataset, truth_path
 
 __all__ = ["copy_dataset"]
 
-BENCH = ("foundation", "mesh", "setup", "synthetic")
-"""Folders of `core` that the virtual bench imports."""
 STORE = Path(__file__).parents[1] / ".pytest_cache" / "made-datasets"
 
 

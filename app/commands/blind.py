@@ -115,6 +115,13 @@ def blind(
             "--keep", help="Store dataset and run of each case in FOLDER/kept, for the page."
         ),
     ] = False,
+    datasets: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder in which the datasets of cases stay; one that the same bench has made "
+            "there is used again. Each case needs about 30 MB."
+        ),
+    ] = None,
 ) -> None:
     """Hide effects, disturbances outside the catalogue, and nothing; score the diagnosis of each
     case.
@@ -122,6 +129,8 @@ def blind(
     Writes results.jsonl, summary.json and report.html into the folder. Can be stopped and resumed.
     """
     hidden, kept = _split(effects), folder / "kept"
+    if keep and datasets is not None:
+        raise typer.BadParameter("--keep stores the datasets itself; leave --datasets out")
     if scenarios is None:
         if kinds is not None:
             raise typer.BadParameter("--kinds needs --scenarios, the number of cases to draw")
@@ -137,7 +146,7 @@ def blind(
             raise RunError(_nothing_of(folder, len(cases)), file=str(folder))
     else:
         with progress("blind suite") as report:
-            run = partial(run_case, kept=kept) if keep else None
+            run = partial(run_case, kept=kept if keep else None, store=datasets)
             results = run_suite(
                 folder, cases, workers, report, any_version=any_version, again=again, run=run
             )

@@ -111,7 +111,9 @@ def known_results(
     return [known[case.name] for case in cases if case.name in known]
 
 
-def run_case(case: Case, folder: Path, kept: Path | None = None) -> CaseResult:
+def run_case(
+    case: Case, folder: Path, kept: Path | None = None, store: Path | None = None
+) -> CaseResult:
     """Make the dataset of a case, diagnose it without the truth, and score it.
 
     An error on the way is a result, too, and counts as wrong.
@@ -121,7 +123,9 @@ def run_case(case: Case, folder: Path, kept: Path | None = None) -> CaseResult:
         folder: for temporary files.
         kept: folder in which datasets/CASE and runs/CASE stay, the run with replays and controls;
             None keeps only the result.
+        store: folder of made datasets, which stay there and are used again; None makes each anew.
     """
+    from palpate.blind.dataset_store import stored_dataset
     from palpate.dataset import open_dataset
     from palpate.diagnosis.pipeline import diagnose
     from palpate.synthetic import make_dataset
@@ -143,7 +147,10 @@ def run_case(case: Case, folder: Path, kept: Path | None = None) -> CaseResult:
         scenario = scenario_of(case)
         for older in (dataset, run):
             shutil.rmtree(older, ignore_errors=True)
-        made = make_dataset(dataset, scenario, case.seed)
+        if store is None:
+            made = make_dataset(dataset, scenario, case.seed)
+        else:
+            dataset, made = stored_dataset(store, case)
         hidden, outside = _truth(made, scenario.size)
         doing, began = "diagnosing it", time.monotonic()
         result = diagnose(open_dataset(dataset), run, workers=1, replays=whole, assurance=whole)

@@ -26,7 +26,7 @@ from palpate.synthetic.scenario.paper_protocol import (
 )
 from palpate.synthetic.scenario.scenario import SHORT_PROTOCOL, Scenario
 from palpate.synthetic.scenario.scenario_draws import draw_scenario
-from palpate.synthetic.scenario.truth_file import Truth, truth_path
+from palpate.synthetic.scenario.truth_file import Truth, read_truth, truth_path
 
 __all__ = [
     "CAMERAS",
@@ -55,5 +55,6 @@ __all__ = [
     "make_dataset",
     "make_palpation",
     "paper_scenario",
+    "read_truth",
     "truth_path",
 ]

@@ -6,7 +6,9 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from palpate.foundation.frames import Transform
 from palpate.synthetic.nuisances.nuisance import Nuisance
@@ -14,7 +16,10 @@ from palpate.synthetic.nuisances.nuisance_chain import described
 from palpate.synthetic.scenario.disturbance import DISTURBANCES, Disturbance
 from palpate.synthetic.scenario.hidden_effects import HIDDEN, HiddenEffect
 
-__all__ = ["Truth", "truth_path"]
+if TYPE_CHECKING:
+    from palpate.synthetic.scenario.scenario import Scenario
+
+__all__ = ["Truth", "read_truth", "truth_path"]
 
 
 @dataclass(frozen=True)
@@ -92,6 +97,28 @@ class Truth:
 def truth_path(folder: Path) -> Path:
     """Path of the truth of the dataset in `folder`: beside it, never in it."""
     return folder.with_name(folder.name + ".truth.json")
+
+
+def read_truth(folder: Path, scenario: Scenario) -> Truth:
+    """Read the truth of the dataset in `folder`; lengths are those of the file, which are rounded.
+
+    Args:
+        folder: of the dataset.
+        scenario: that it was made from.
+    """
+    data = json.loads(truth_path(folder).read_text())
+    poses = data["registration"]
+    return Truth(
+        scenario.effects,
+        1e-3 * data["visibility_mm"],
+        Transform.from_matrix(poses["phantom_from_camera"]),
+        Transform(np.array(poses["robot_from_phantom_R"]), np.array(poses["robot_from_phantom_t"])),
+        Transform.from_matrix(poses["camera_shift"]),
+        {name: [1e-3 * part for part in row] for name, row in data["stopped_short_mm"].items()},
+        scenario.disturbances,
+        {name: (1e-3 * x, 1e-3 * y) for name, (x, y) in data["began_off_mm"].items()},
+        scenario.nuisances,
+    )
 
 
 def _described(
