@@ -16,6 +16,7 @@ import numpy as np
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.evidence import Block, gram
+from palpate.diagnosis.inference.noise.isolated_errors import isolated_errors
 from palpate.diagnosis.inference.noise.shared_noise import clouds_in_patches, shared_noise
 from palpate.diagnosis.observation.force_record import (
     depth_discrepancy,
@@ -162,6 +163,9 @@ class Noise:
             )
         stiffness = CRITERIA.noise.stiffness_error * columns[..., lumps].astype(float)
         weights = np.where(seen, 1 / scatter, 0.0)
+        patches = surface.patches
+        alone = isolated_errors(gap[:, :patches], weights[:, :patches], surface)
+        weights[:, :patches][alone] = 0.0
         discrepancy = np.concatenate([displacement, stiffness], axis=2)
         return cls(weights, np.where(seen, gap, 0.0), mesh, discrepancy, spots=stiffness.shape[2])
 

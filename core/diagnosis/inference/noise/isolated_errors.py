@@ -1,0 +1,78 @@
+"""Errors of single patches in single groups, such as what a camera's filter makes up in a hole.
+
+A driver that fills holes copies readings from the rim of the hole. The patch there is off by
+millimetres in this group and right in the next, and its neighbours are right. No deformation does
+that: it moves neighbours alike, and a dent at another place makes steps at many patches at once.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import norm
+
+from palpate.diagnosis.criteria import CRITERIA
+from palpate.foundation.arrays import FloatArray
+from palpate.measurement.patch_averages import MaskArray
+from palpate.measurement.surface_gaps import Surface
+
+__all__ = ["isolated_errors"]
+
+
+def isolated_errors(gap: FloatArray, weights: FloatArray, surface: Surface) -> MaskArray:
+    """Return the averages (g, p) that differ from their neighbours' as noise cannot.
+
+    What a patch has in all groups, as its own place in the camera's pattern, does not count. An
+    average is compared with the median of the neighbours in its group. It differs where the
+    difference is more than `CRITERIA.noise.isolated` standard deviations, or as many times those
+    of the neighbours from theirs where these are larger. Of the neighbours
+    `CRITERIA.noise.calm_share` count: a dent shows in more of them than the rest. What is found is
+    no neighbour any more, and the rest is looked through again, until nothing is found.
+
+    Args:
+        gap: averages of the baseline (g, p) [m]; NaN where unseen.
+        weights: their inverse variances (g, p) [1/m^2]; zero where they do not count.
+        surface: with the patches.
+    """
+    near, found = _neighbours(surface), np.zeros(gap.shape, dtype=bool)
+    while True:
+        known = np.where((weights > 0) & ~found, gap, np.nan)
+        moved = known - _quantiles(known.T, 0.5)
+        apart = np.abs(moved - _quantiles(_gathered(moved, near), 0.5)) * np.sqrt(weights)
+        share = CRITERIA.noise.calm_share
+        usual = _quantiles(_gathered(apart, near), share) / norm.ppf(0.5 + 0.5 * share)
+        further = apart > CRITERIA.noise.isolated * np.fmax(usual, 1.0)
+        if not further.any():
+            return found
+        found |= further
+
+
+def _neighbours(surface: Surface) -> np.ndarray:
+    """Return the numbers of each patch's neighbours (p, n), filled up with p."""
+    centres, normals = surface.patch_centres, surface.patch_normals
+    near = np.linalg.norm(centres[:, None] - centres, axis=2) < CRITERIA.outliers.neighbour_distance
+    near &= normals @ normals.T > CRITERIA.outliers.same_side_cosine
+    np.fill_diagonal(near, False)
+    order = np.argsort(~near, axis=1, kind="stable")[:, : int(near.sum(axis=1).max())]
+    return np.where(np.take_along_axis(near, order, axis=1), order, len(centres))
+
+
+def _gathered(values: FloatArray, near: np.ndarray) -> FloatArray:
+    """Return the neighbours' values (g, p, n) of values (g, p)."""
+    padded = np.concatenate([values, np.full((len(values), 1), np.nan)], axis=1)
+    return np.asarray(padded[:, near])
+
+
+def _quantiles(values: FloatArray, share: float) -> FloatArray:
+    """Return the quantiles along the last axis, without NaN; NaN where there is nothing else.
+
+    NumPy's own takes a hundred times as long on many short rows.
+    """
+    ordered = np.sort(values, axis=-1)
+    last = np.isfinite(ordered).sum(axis=-1) - 1
+    place = share * np.maximum(last, 0)
+    low = place.astype(int)
+    high = np.minimum(low + 1, np.maximum(last, 0))
+    below, above = (
+        np.take_along_axis(ordered, index[..., None], axis=-1)[..., 0] for index in (low, high)
+    )
+    return np.asarray(below + (place - low) * (above - below))
