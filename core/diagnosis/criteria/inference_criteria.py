@@ -117,8 +117,8 @@ class NoiseCriteria:
         "1",
         "An average is an error of a single patch where it differs from its neighbours by this "
         "many standard deviations.",
-        "measured: 1 % of the averages of a camera with filled holes, 0.01 % without; at 6 and 4 "
-        "their misfit is 1.10 and 0.97, from 2.7 before",
+        "measured: 1 % of the averages of a camera with filled holes, below 0.05 % of those of "
+        "other data, also where a cause is hidden",
     )
     calm_share: float = threshold(
         0.8,
