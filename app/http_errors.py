@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
+import sqlite3
 from typing import Any
 
 from palpate.foundation.errors import PalpateError, RunError
 
-__all__ = ["Conflict", "Missing", "as_dict", "status_code"]
+__all__ = ["Conflict", "Missing", "NoSpace", "as_dict", "disk_is_full", "status_code"]
 
 
 class Missing(PalpateError):
@@ -15,6 +17,23 @@ class Missing(PalpateError):
 
 class Conflict(PalpateError):
     """The request does not fit the state of the thing that it names."""
+
+
+class NoSpace(PalpateError):
+    """The disk is full."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "the disk of the runs folder is full: empty the caches (Jobs on the page, or POST "
+            "/api/disk/empty), delete runs, or make room; waiting jobs then go on by themselves"
+        )
+
+
+def disk_is_full(error: BaseException) -> bool:
+    """Whether an error of the file system or of SQLite says that there is no room."""
+    if isinstance(error, sqlite3.Error):
+        return error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
+    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
 def as_dict(error: PalpateError) -> dict[str, Any]:
@@ -27,9 +46,11 @@ def as_dict(error: PalpateError) -> dict[str, Any]:
 
 
 def status_code(error: PalpateError) -> int:
-    """404 for a missing name, 409 for a conflict or a damaged result, 422 for invalid data or
-    values.
+    """404 for a missing name, 409 for a conflict or a damaged result, 507 for a full disk, 422 for
+    invalid data or values.
     """
     if isinstance(error, Missing):
         return 404
+    if isinstance(error, NoSpace):
+        return 507
     return 409 if isinstance(error, (Conflict, RunError)) else 422

@@ -5,9 +5,10 @@ from __future__ import annotations
 import threading
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
+from functools import partial
 from importlib.metadata import version
 
-from fastapi import FastAPI, Request
+from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
@@ -29,9 +30,9 @@ from palpate.app.api import (
     trainings,
     whatif,
 )
-from palpate.app.http_errors import as_dict, status_code
+from palpate.app.http_errors import NoSpace, as_dict, disk_is_full, status_code
 from palpate.app.jobs.tasks import TARGETS
-from palpate.app.schemas import PROBLEMS
+from palpate.app.schemas import PROBLEMS, Health
 from palpate.app.server import viser_proxy
 from palpate.app.server.login import Login
 from palpate.app.server.login import router as login_router
@@ -79,7 +80,7 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        app.state.services = Services.open(settings, dict(targets))
+        app.state.services = Services.open(settings, dict(targets), partial(_fail, app))
         yield
         app.state.services.close()
 
@@ -92,6 +93,7 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
         redoc_url=None,
     )
     app.state.ending = threading.Event()
+    app.state.failure, app.state.stop = "", app.state.ending.set
     app.state.settings, app.state.login = settings, login
     app.add_middleware(RequestGuard, settings=settings, login=login)
     for module in MODULES:
@@ -100,12 +102,25 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
     app.include_router(login_router)
     _answer_problems(app)
 
+    @app.get("/health", tags=["health"], responses={503: {"model": Health}})
+    def health(response: Response) -> Health:
+        """200 where all works, 503 where the job queue does not; the page shows the reason."""
+        troubled = bool(app.state.services.jobs.trouble)
+        response.status_code = 503 if troubled else 200
+        return Health(status="troubled" if troubled else "ok")
+
     @app.get("/", include_in_schema=False)
     def page() -> FileResponse:
         return FileResponse(settings.static / "index.html", headers={"cache-control": "no-cache"})
 
     app.mount("/static", StaticFiles(directory=settings.static), name="static")
     return app
+
+
+def _fail(app: FastAPI, reason: str) -> None:
+    """End the server, which then exits with the reason."""
+    app.state.failure = reason
+    app.state.stop()
 
 
 def _answer_problems(app: FastAPI) -> None:
@@ -126,6 +141,8 @@ def _answer_problems(app: FastAPI) -> None:
 
     @app.exception_handler(Exception)
     def fault(request: Request, error: Exception) -> JSONResponse:
+        if disk_is_full(error):
+            return JSONResponse(as_dict(full := NoSpace()), status_code=status_code(full))
         message = (
             f"{request.method} {request.url.path} stopped: {type(error).__name__}: {error}; "
             "the server's log has more"

@@ -11,6 +11,7 @@ __all__ = [
     "DiagnosisRequest",
     "EffectIn",
     "HalfPair",
+    "Health",
     "JobOut",
     "LiveRequest",
     "NoteOut",
@@ -43,6 +44,7 @@ PROBLEMS: dict[int | str, dict[str, Any]] = {
         409: "does not fit the state of what it names",
         413: "the body is too large",
         422: "data or values that are off",
+        507: "the disk is full",
     }.items()
 }
 """Error answers of every operation."""
@@ -53,6 +55,12 @@ Point = Annotated[
 ]
 """A place [m]."""
 Row = Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)]
+
+
+class Health(BaseModel):
+    """State of the server: `troubled` where the job queue does not work, or lately did not."""
+
+    status: Literal["ok", "troubled"]
 
 
 class HalfPair(BaseModel):

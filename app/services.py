@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -43,8 +44,10 @@ class Services:
     interactive_solver: InteractiveSolver
 
     @classmethod
-    def open(cls, settings: Settings, targets: dict[str, str]) -> Services:
-        """Start the job queue and the inner viewer."""
+    def open(
+        cls, settings: Settings, targets: dict[str, str], failed: Callable[[str], object]
+    ) -> Services:
+        """Start the job queue and the inner viewer; `failed` is called where the queue gives up."""
         runs = RunStore(settings.runs)
         sessions, library = Sessions(runs), Library(settings.datasets)
         manual_registrations, disk = (
@@ -61,6 +64,7 @@ class Services:
                 settings.preload,
                 [settings.datasets / STAGING],
                 lambda: _tidy(disk),
+                failed,
             ),
             disk=disk,
             sessions=sessions,

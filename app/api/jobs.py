@@ -32,7 +32,10 @@ def listed(services: CurrentServices, response: Response, page: RequestedPage) -
 
 @router.get("/events")
 def events(request: Request, services: CurrentServices) -> StreamingResponse:
-    """The newest jobs, at most 50, as server-sent events: at once, and after each change."""
+    """The newest jobs, at most 50, as server-sent events: at once, and after each change.
+
+    An event `trouble` has the reason why the queue does not work, empty when it works again.
+    """
     return StreamingResponse(
         _changes(request, services),
         media_type="text/event-stream",
@@ -73,9 +76,12 @@ def notes(
 
 
 async def _changes(request: Request, services: Services) -> AsyncIterator[str]:
-    seen, quiet = -1, 0.0
+    seen, quiet, told = -1, 0.0, ""
     while not request.app.state.ending.is_set() and not await request.is_disconnected():
-        version = services.jobs.version
+        version, trouble = services.jobs.version, services.jobs.trouble
+        if trouble != told:
+            yield f"event: trouble\ndata: {json.dumps(trouble)}\n\n"
+            told = trouble
         if version != seen:
             jobs = await asyncio.to_thread(services.jobs.all, SHOWN)
             yield f"data: {json.dumps([job_out(job).model_dump() for job in jobs])}\n\n"

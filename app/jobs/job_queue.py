@@ -6,34 +6,32 @@ the server or the worker was killed are known to be interrupted.
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import logging
 import queue
-import re
 import secrets
 import shutil
-import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
-from multiprocessing.connection import Connection
-from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 from typing import Any
 
-from palpate.app.http_errors import Conflict, Missing
-from palpate.app.jobs.job_process import context, stop_group, work
+from palpate.app.http_errors import Conflict, Missing, NoSpace
 from palpate.app.jobs.job_records import Job, JobRecords, JobState, Note
-from palpate.foundation.errors import SetupError
+from palpate.app.jobs.job_runner import JobRunner
+from palpate.foundation.errors import RunError, SetupError
 
 __all__ = ["JobQueue"]
 
 log = logging.getLogger(__name__)
-PAUSE = 0.1
-"""Least time between two entries of a job's progress [s]; limits writes to the disk."""
+_FAILURES = 3
+"""Errors of the queue in a row after which it gives up."""
+_PAUSE = 1.0
+"""Time from an error of the queue to the next attempt [s]."""
 _ENDING = 10.0
-"""Longest time that a cancelled job's processes may take to end [s]."""
-_NUMBERS = re.compile(r"\d+(\.\d+)?")
+"""Longest time that the processes of an ended job may take to end [s]."""
 
 
 class JobQueue:
@@ -48,6 +46,7 @@ class JobQueue:
         preload: modules that the worker processes import in advance.
         beside: folders in which a job may have another scratch folder of its id.
         tidy: is called before each job; its text goes into the job's log.
+        failed: is called with the reason when the queue cannot go on.
     """
 
     def __init__(
@@ -57,21 +56,20 @@ class JobQueue:
         preload: Iterable[str] = (),
         beside: Iterable[Path] = (),
         tidy: Callable[[], str] = str,
+        failed: Callable[[str], object] = log.critical,
     ) -> None:
-        self._targets, self._beside, self._tidy = dict(targets), tuple(beside), tidy
+        beside = tuple(beside)
         self._scratch = folder / ".making"
         self._alone = _take(folder)
-        for place in (self._scratch, *self._beside):
+        for place in (self._scratch, *beside):
             shutil.rmtree(place, ignore_errors=True)
         self._records = JobRecords(folder / "jobs.sqlite")
         self._records.interrupt_running("the server ended while this job ran; retry it")
         self._waiting: queue.Queue[str | None] = queue.Queue()
         for job in self._records.waiting():
             self._waiting.put(job.id)
-        self._running: dict[str, ForkServerProcess] = {}
-        self._lock = threading.Lock()
-        self._closing = False
-        self._context = context(preload)
+        self._runner = JobRunner(self._records, targets, preload, beside, tidy)
+        self._failed, self._stopped, self._put_back = failed, "", set[str]()
         self._thread = threading.Thread(target=self._serve, name="jobs", daemon=True)
         self._thread.start()
 
@@ -79,6 +77,11 @@ class JobQueue:
     def version(self) -> int:
         """A number that grows with every change of any record."""
         return self._records.version
+
+    @property
+    def trouble(self) -> str:
+        """The reason why the queue does not work, or lately did not; empty without any."""
+        return self._runner.patience.trouble or self._stopped
 
     def submit(
         self, kind: str, request: dict[str, Any], label: str = "job", key: str | None = None
@@ -123,21 +126,23 @@ class JobQueue:
             raise Conflict(
                 f"job {identity} is {job.state.value} already", job=identity, state=job.state.value
             )
-        self._finish(identity, JobState.CANCELLED, text="cancelled")
-        self._stop(identity)
+        try:
+            self._runner.finish(identity, JobState.CANCELLED, text="cancelled")
+        finally:
+            self._runner.stop(identity)
         return self.get(identity)
 
     def retry(self, identity: str) -> Job:
         """Repeat a job that ended without a result, under its name; sweeps and trainings resume."""
         job = self.get(identity)
-        if job.kind not in self._targets:
+        if not self._runner.can_do(job.kind):
             raise Missing(
                 f"job {identity} is a {job.kind}, which this version cannot do", job=identity
             )
         end = time.monotonic() + _ENDING
-        while identity in self._running and job.state.is_finished and time.monotonic() < end:
+        while identity in self._runner.running and job.state.is_finished and time.monotonic() < end:
             time.sleep(0.02)
-        if identity in self._running or not self._records.reopen(identity):
+        if identity in self._runner.running or not self._records.reopen(identity):
             state = job.state.value
             raise Conflict(
                 f"job {identity} is {state}: there is nothing to retry", job=identity, state=state
@@ -149,16 +154,17 @@ class JobQueue:
         """Interrupt the running job and stop the server's thread; waiting jobs wait for the next
         start.
         """
-        self._closing = True
+        self._runner.patience.closing.set()
         self._waiting.put(None)
-        for identity in list(self._running):
+        for identity in list(self._runner.running):
             error = {
                 "kind": "Interrupted",
                 "message": "the server was stopped while this job ran; retry it",
                 "where": {},
             }
-            self._finish(identity, JobState.INTERRUPTED, error=error, text="interrupted")
-            self._stop(identity)
+            with contextlib.suppress(NoSpace):  # the next start then finds it running
+                self._runner.finish(identity, JobState.INTERRUPTED, error=error, text="interrupted")
+            self._runner.stop(identity)
         self._thread.join(timeout=10.0)
         self._records.close()
         self._alone.close()
@@ -176,113 +182,44 @@ class JobQueue:
         return known
 
     def _serve(self) -> None:
-        while (identity := self._waiting.get()) is not None and not self._closing:
-            if self.get(identity).state is JobState.QUEUED:
-                self._run(identity)
-
-    def _run(self, identity: str) -> None:
-        job = self.get(identity)
-        if job.kind not in self._targets:
-            message = f"this version cannot do a {job.kind}"
-            self._finish(
-                identity,
-                JobState.FAILED,
-                error={"kind": "Missing", "message": message, "where": {}},
-            )
-            return
-        if text := self._tidy():
-            self._records.note(identity, "info", text)
-        scratch = Path(job.request["scratch"])
-        scratch.mkdir(parents=True, exist_ok=True)
-        ending: tuple[Any, ...] | None = None
-        here, there = self._context.Pipe()
-        process = self._context.Process(
-            target=work, args=(self._targets[job.kind], job.request, there)
-        )
-        try:
-            with self._lock:
-                process.start()
-                self._running[identity] = process
-            there.close()
-            self._records.update(
-                identity, state=JobState.RUNNING, started=time.time(), text="starting"
-            )
-            self._records.note(identity, "info", f"started, attempt {job.attempt}")
-            if self.get(identity).state.is_finished:
-                self._stop(identity)
-            ending = self._follow(identity, here)
-            process.join(None if ending is None else _ENDING)
-        finally:
-            self._stop(identity)
-            here.close()
-            for place in (scratch, *(folder / identity for folder in self._beside)):
-                shutil.rmtree(place, ignore_errors=True)
-            self._ended(identity, ending, process.exitcode)
-            self._running.pop(identity, None)
-
-    def _ended(self, identity: str, ending: tuple[Any, ...] | None, code: int | None) -> None:
-        """Close the record with the worker's last message, after its folders are deleted.
-
-        A worker that was killed without a last message interrupted its job.
+        """Run waiting jobs. After an error of the queue itself it goes on; after several, it gives
+        up.
         """
-        if ending is not None and ending[0] == "failed":
-            self._finish(identity, JobState.FAILED, error=ending[1])
-        elif ending is not None and ending[0] == "cancelled":
-            self._finish(identity, JobState.CANCELLED, text="cancelled")
-        elif ending is not None:
-            self._finish(identity, JobState.DONE, result=ending[1], fraction=1.0, text="done")
-        elif code is not None and code < 0:
-            name = signal.Signals(-code).name
-            message = f"the worker process was ended from outside ({name}); retry it"
-            self._finish(
-                identity,
-                JobState.INTERRUPTED,
-                error={"kind": "WorkerDied", "message": message, "where": {}},
-            )
-        else:
-            message = f"the worker process ended with code {code}"
-            self._finish(
-                identity,
-                JobState.FAILED,
-                error={"kind": "WorkerDied", "message": message, "where": {}},
-            )
-
-    def _follow(self, identity: str, pipe: Connection) -> tuple[Any, ...] | None:
-        """Record the worker's messages; returns the last one, or None if the worker died."""
-        written, stage = 0.0, ""
-        while True:
+        closing, failures = self._runner.patience.closing, 0
+        while (identity := self._waiting.get()) is not None and not closing.is_set():
             try:
-                message: tuple[Any, ...] = pipe.recv()
-            except (EOFError, OSError):
-                return None
-            if message[0] == "progress":
-                _, fraction, text = message
-                if _NUMBERS.sub("#", text) != stage:
-                    stage = _NUMBERS.sub("#", text)
-                    self._records.note(identity, "info", text)
-                elif time.monotonic() - written < PAUSE:
-                    continue
-                written = time.monotonic()
-                self._records.update(identity, fraction=fraction, text=text)
-            elif message[0] == "note":
-                self._records.note(identity, message[1], message[2])
-            else:
-                return message
+                job = self.get(identity)
+                if job.state is JobState.QUEUED:
+                    self._runner.run(job)
+                failures, self._stopped = 0, ""
+            except Exception as error:  # any one: jobs that wait must not wait for ever
+                if closing.is_set():
+                    return
+                log.exception("the job queue stopped at %s", identity)
+                failures += 1
+                if isinstance(error, RunError) or failures == _FAILURES:
+                    self._stopped = str(error)
+                    self._failed(f"the job queue gives up: {error}")
+                    return
+                self._recover(identity, f"{type(error).__name__}: {error}")
 
-    def _finish(self, identity: str, state: JobState, **values: Any) -> None:
-        if self._records.update(identity, state=state, finished=time.time(), **values):
-            error = values.get("error") or {}
-            self._records.note(
-                identity, "error" if error else "info", error.get("message", state.value)
-            )
-
-    def _stop(self, identity: str) -> None:
-        with self._lock:
-            process = self._running.get(identity)
-            if process is not None and process.pid is not None:
-                if process.is_alive():
-                    process.terminate()
-                stop_group(process.pid)
+    def _recover(self, identity: str, text: str) -> None:
+        """Put a job back whose run met an error of the queue; fail it the second time."""
+        self._stopped = f"the job queue stopped at {identity} ({text}) and was started again"
+        write = self._runner.patience.write
+        try:
+            if identity in self._put_back:
+                error = {"kind": "InternalError", "message": text, "where": {}}
+                write(self._runner.finish, identity, JobState.FAILED, error=error)
+                return
+            write(self._records.put_back, identity)
+            note = f"put back, since the queue met {text}"
+            write(self._records.note, identity, "warning", note)
+            self._put_back.add(identity)
+        except Exception:  # any one, as above
+            log.exception("%s could not be put back", identity)
+        self._runner.patience.closing.wait(_PAUSE)
+        self._waiting.put(identity)
 
 
 def _request_of(job: Job) -> dict[str, Any]:

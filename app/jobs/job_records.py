@@ -11,7 +11,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from palpate.app.http_errors import Missing
+from palpate.app.http_errors import Missing, NoSpace, disk_is_full
 
 __all__ = ["Job", "JobRecords", "JobState", "Note"]
 
@@ -101,7 +101,10 @@ JSON_COLUMNS = ("request", "error", "result")
 
 
 class JobRecords:
-    """The table of jobs; every method may be called from any thread."""
+    """The table of jobs; every method may be called from any thread.
+
+    A change raises NoSpace where the disk is full.
+    """
 
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -138,6 +141,14 @@ class JobRecords:
             "update jobs set state = 'queued', fraction = 0, text = 'waiting for its turn', "
             "started = null, finished = null, error = null, result = null, attempt = attempt + 1 "
             "where id = ? and state in ('failed', 'cancelled', 'interrupted')",
+            [identity],
+        )
+
+    def put_back(self, identity: str) -> bool:
+        """Queue a running job again; returns False where it does not run."""
+        return self._change(
+            "update jobs set state = 'queued', fraction = 0, text = 'waiting for its turn', "
+            "started = null where id = ? and state = 'running'",
             [identity],
         )
 
@@ -208,7 +219,10 @@ class JobRecords:
 
     def _change(self, statement: str, values: list[Any]) -> bool:
         with self._lock:
-            changed = self._database.execute(statement, values).rowcount
+            try:
+                changed = self._database.execute(statement, values).rowcount
+            except sqlite3.OperationalError as error:
+                raise NoSpace if disk_is_full(error) else error from error
             self.version += 1
         return changed > 0
 

@@ -27,8 +27,8 @@ VIEWER_POLICY = (
     "frame-ancestors 'self'; object-src 'none'"
 )
 
-# Accessible without login: the page's own files and the login.
-OPEN = ("/login", "/logout")
+# Accessible without login: the page's own files, the login, and whether the server works.
+OPEN = ("/login", "/logout", "/health")
 OPEN_BELOW = "/static/"
 UPLOAD = "/api/imports"
 WILD = frozenset({"0.0.0.0", "::"})

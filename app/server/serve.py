@@ -31,6 +31,12 @@ class Server(uvicorn.Server):
             )
         )
         self._app = app
+        app.state.stop = self.stop
+
+    def stop(self) -> None:
+        """End the event streams, then the server."""
+        self._app.state.ending.set()
+        self.should_exit = True
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """End the event streams on a signal, then the server."""
@@ -49,6 +55,7 @@ def serve(app: FastAPI, host: str, port: int, started: Callable[[str], None]) ->
 
     Raises:
         SetupError: the port cannot be used.
+        SystemExit: the job queue has given up; the status is 1, the message on standard error.
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as listener:
@@ -69,3 +76,5 @@ def serve(app: FastAPI, host: str, port: int, started: Callable[[str], None]) ->
         started(f"http://{name}:{listener.getsockname()[1]}")
         with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C ends the server
             Server(app).run(sockets=[listener])
+    if app.state.failure:
+        raise SystemExit(app.state.failure)

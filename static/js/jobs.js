@@ -59,6 +59,11 @@ export function startJobs() {
     if (done.length && panel.firstChild) byId("disk").replaceWith(diskUsageLine());
     if (done.length) for (const listener of listeners) listener(done);
   };
+  events.addEventListener("trouble", ({ data }) => {
+    const text = JSON.parse(data);
+    byId("trouble").textContent = text && `⚠ ${capitalise(text)}`;
+    byId("trouble").hidden = !text;
+  });
   setInterval(draw, 1000);
 }
 

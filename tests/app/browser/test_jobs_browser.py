@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sqlite3
 from typing import Any
 
 from browsing import NEEDS_CHROMIUM, Page
@@ -39,3 +40,28 @@ def test_a_job_is_watched_cancelled_and_retried_with_the_mouse(
         )
         assert client.get("/api/jobs").headers["x-total-count"] == "1"
         assert page.trouble == []
+
+
+def test_trouble_of_the_job_queue_is_told_until_it_is_over(
+    browser: Any, serve: Any, place: Any
+) -> None:
+    with serve(place.settings, {"diagnosis": "job_functions:linger"}) as client:
+        with sqlite3.connect(place.runs / "jobs.sqlite") as database:
+            database.execute(
+                "create trigger broken before insert on log when new.text like 'started%' and "
+                "not exists (select 1 from log where text like 'put back%') "
+                "begin select raise(fail, 'broken'); end"
+            )
+        page = Page(browser.new_context(viewport={"width": 1440, "height": 900}).new_page(), client)
+        at = page.page
+        at.set_default_timeout(120_000)
+        at.goto(str(client.base_url))
+        assert not at.locator("#trouble").is_visible()
+        at.click("#datasets >> text=small")
+        at.click("#panel >> text=Diagnose")
+        at.wait_for_selector("#trouble >> text=The job queue stopped at small")
+        assert client.get("/health").status_code == 503
+        (place.runs / "go").touch()
+        at.wait_for_selector("#trouble", state="hidden")
+        assert client.get("/health").json() == {"status": "ok"}
+        assert client.get("/api/jobs").json()[0]["state"] == "done"

@@ -1,0 +1,196 @@
+"""Runs one job in a process of its own and keeps its record."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import re
+import shutil
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping
+from multiprocessing.connection import Connection
+from multiprocessing.context import ForkServerProcess
+from pathlib import Path
+from typing import Any
+
+from palpate.app.http_errors import NoSpace
+from palpate.app.jobs.full_disk import PatientWriter
+from palpate.app.jobs.job_process import context, stop_group, work
+from palpate.app.jobs.job_records import Job, JobRecords, JobState
+from palpate.foundation.errors import RunError
+
+__all__ = ["JobRunner"]
+
+log = logging.getLogger(__name__)
+PAUSE = 0.1
+"""Least time between two entries of a job's progress [s]; limits writes to the disk."""
+_ENDING = 10.0
+"""Longest time that a cancelled job's processes may take to end [s]."""
+_STARTS = 3
+"""How often a job's process is started where the fork server ends meanwhile."""
+_NUMBERS = re.compile(r"\d+(\.\d+)?")
+
+
+class JobRunner:
+    """Runs jobs, one at a time.
+
+    Args:
+        records: of the jobs.
+        targets: function of each kind of job, as "module:function".
+        preload: modules that the worker processes import in advance.
+        beside: folders in which a job may have another scratch folder of its id.
+        tidy: is called before each job; its text goes into the job's log.
+
+    Attributes:
+        patience: waits for room where the disk is full.
+        running: process of each job that runs.
+    """
+
+    def __init__(
+        self,
+        records: JobRecords,
+        targets: Mapping[str, str],
+        preload: Iterable[str],
+        beside: Iterable[Path],
+        tidy: Callable[[], str],
+    ) -> None:
+        self._records, self._targets = records, dict(targets)
+        self._beside, self._tidy = tuple(beside), tidy
+        self._context = context(preload)
+        self._lock = threading.Lock()
+        self.patience = PatientWriter()
+        self.running: dict[str, ForkServerProcess] = {}
+
+    def can_do(self, kind: str) -> bool:
+        """Whether this version has a function for a kind of job."""
+        return kind in self._targets
+
+    def run(self, job: Job) -> None:
+        """Run a job to its end.
+
+        Raises:
+            RunError: no process can be started; the job is as before.
+            NoSpace: the disk is full, and nothing waits for room any longer.
+        """
+        identity, write = job.id, self.patience.write
+        if not self.can_do(job.kind):
+            message = f"this version cannot do a {job.kind}"
+            error = {"kind": "Missing", "message": message, "where": {}}
+            write(self.finish, identity, JobState.FAILED, error=error)
+            return
+        if text := self._tidy():
+            write(self._records.note, identity, "info", text)
+        scratch = Path(job.request["scratch"])
+        write(scratch.mkdir, parents=True, exist_ok=True)
+        process, here = self._started(job)
+        try:
+            started = {"state": JobState.RUNNING, "started": time.time(), "text": "starting"}
+            write(self._records.update, identity, **started)
+            write(self._records.note, identity, "info", f"started, attempt {job.attempt}")
+            if self._records.get(identity).state.is_finished:
+                self.stop(identity)
+            ending = self._follow(identity, here)
+            process.join(None if ending is None else _ENDING)
+        finally:
+            self.stop(identity)
+            here.close()
+            for place in (scratch, *(folder / identity for folder in self._beside)):
+                shutil.rmtree(place, ignore_errors=True)
+            self.running.pop(identity, None)
+        write(self._ended, identity, ending, process.exitcode)
+
+    def finish(self, identity: str, state: JobState, **values: Any) -> None:
+        """Close a job's record, unless it is closed."""
+        if self._records.update(identity, state=state, finished=time.time(), **values):
+            error = values.get("error") or {}
+            text = error.get("message", state.value)
+            with contextlib.suppress(NoSpace):  # the record has it, too
+                self._records.note(identity, "error" if error else "info", text)
+
+    def stop(self, identity: str) -> None:
+        """End a job's processes."""
+        with self._lock:
+            process = self.running.get(identity)
+            if process is not None and process.pid is not None:
+                if process.is_alive():
+                    process.terminate()
+                stop_group(process.pid)
+
+    def _started(self, job: Job) -> tuple[ForkServerProcess, Connection]:
+        """Start a job's process; return it and the pipe of its messages.
+
+        A fork server that has ended is started again. Raises RunError where that does not help.
+        """
+        reason: Exception | None = None
+        for _ in range(_STARTS):
+            try:
+                return self._process(job)
+            except (EOFError, OSError) as error:
+                reason = error
+                text = f"its process did not start ({type(error).__name__}); started again"
+                log.warning("%s: %s", job.id, text)
+                self.patience.write(self._records.note, job.id, "warning", text)
+        raise RunError(
+            f"no process could be started for {job.id} in {_STARTS} attempts "
+            f"({type(reason).__name__}: {reason}); it waits for the next start of the server",
+            job=job.id,
+        ) from reason
+
+    def _process(self, job: Job) -> tuple[ForkServerProcess, Connection]:
+        here, there = self._context.Pipe()
+        with there:
+            target = self._targets[job.kind]
+            process = self._context.Process(target=work, args=(target, job.request, there))
+            try:
+                with self._lock:
+                    process.start()
+                    self.running[job.id] = process
+            except BaseException:
+                here.close()
+                raise
+        return process, here
+
+    def _follow(self, identity: str, pipe: Connection) -> tuple[Any, ...] | None:
+        """Record the worker's messages; returns the last one, or None if the worker died."""
+        written, stage, write = 0.0, "", self.patience.write
+        while True:
+            try:
+                message: tuple[Any, ...] = pipe.recv()
+            except (EOFError, OSError):
+                return None
+            if message[0] == "progress":
+                _, fraction, text = message
+                if _NUMBERS.sub("#", text) != stage:
+                    stage = _NUMBERS.sub("#", text)
+                    write(self._records.note, identity, "info", text)
+                elif time.monotonic() - written < PAUSE:
+                    continue
+                written = time.monotonic()
+                write(self._records.update, identity, fraction=fraction, text=text)
+            elif message[0] == "note":
+                write(self._records.note, identity, message[1], message[2])
+            else:
+                return message
+
+    def _ended(self, identity: str, ending: tuple[Any, ...] | None, code: int | None) -> None:
+        """Close the record with the worker's last message, after its folders are deleted.
+
+        A worker that was killed without a last message interrupted its job.
+        """
+        if ending is not None and ending[0] == "failed":
+            self.finish(identity, JobState.FAILED, error=ending[1])
+        elif ending is not None and ending[0] == "cancelled":
+            self.finish(identity, JobState.CANCELLED, text="cancelled")
+        elif ending is not None:
+            self.finish(identity, JobState.DONE, result=ending[1], fraction=1.0, text="done")
+        elif code is not None and code < 0:
+            name = signal.Signals(-code).name
+            message = f"the worker process was ended from outside ({name}); retry it"
+            error = {"kind": "WorkerDied", "message": message, "where": {}}
+            self.finish(identity, JobState.INTERRUPTED, error=error)
+        else:
+            message = f"the worker process ended with code {code}"
+            error = {"kind": "WorkerDied", "message": message, "where": {}}
+            self.finish(identity, JobState.FAILED, error=error)

@@ -1,0 +1,101 @@
+"""Faults that must not end the queue: a killed fork server, a full disk, an error of its own."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import sqlite3
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from multiprocessing import forkserver
+from pathlib import Path
+
+import pytest
+from job_functions import TARGETS, ended, reached
+
+from palpate.app.http_errors import NoSpace
+from palpate.app.jobs.job_queue import JobQueue
+from palpate.app.jobs.job_records import JobState
+
+
+@pytest.fixture
+def jobs(tmp_path: Path) -> Iterator[JobQueue]:
+    with closing(JobQueue(tmp_path / "runs", TARGETS)) as jobs:
+        yield jobs
+
+
+def fork_server() -> int:
+    forkserver.ensure_running()
+    return int(forkserver._forkserver._forkserver_pid)
+
+
+def count(jobs: JobQueue, tmp_path: Path, name: str) -> str:
+    return jobs.submit("count", {"steps": 2, "result": str(tmp_path / name)}).id
+
+
+def test_fork_server_that_is_killed_while_a_job_starts(jobs: JobQueue, tmp_path: Path) -> None:
+    server = fork_server()
+    os.kill(server, signal.SIGSTOP)
+    first = count(jobs, tmp_path, "first")
+    time.sleep(0.5)
+    os.kill(server, signal.SIGKILL)
+    second = count(jobs, tmp_path, "second")
+    for name in (first, second):
+        assert ended(jobs, jobs.get(name)).state is JobState.DONE
+    assert any("started again" in note.text for note in jobs.notes(first))
+
+
+def test_full_disk_refuses_new_work_and_loses_none(jobs: JobQueue, tmp_path: Path) -> None:
+    running = jobs.submit("count", {"steps": 20, "pause": 0.1, "result": str(tmp_path / "one")})
+    waiting = count(jobs, tmp_path, "two")
+    reached(jobs, running, lambda now: now.state is JobState.RUNNING)
+    database: sqlite3.Connection = jobs._records._database
+    pages = database.execute("pragma page_count").fetchone()[0]
+    database.execute(f"pragma max_page_count = {pages}")
+    accepted = []
+    with pytest.raises(NoSpace, match="empty the caches"):
+        for _ in range(200):
+            accepted.append(count(jobs, tmp_path, f"more-{len(accepted)}"))
+    reached(jobs, running, lambda _: bool(jobs.trouble))
+    database.execute("pragma max_page_count = 100000")
+    for name in (running.id, waiting, *accepted):
+        assert ended(jobs, jobs.get(name)).state is JobState.DONE
+    assert not jobs.trouble
+
+
+def test_error_of_the_queue_puts_the_job_back_once(jobs: JobQueue, tmp_path: Path) -> None:
+    database: sqlite3.Connection = jobs._records._database
+    database.execute(
+        "create trigger broken before insert on log begin select raise(fail, 'x'); end"
+    )
+    first = count(jobs, tmp_path, "first")
+    end = time.monotonic() + 20
+    while not jobs.trouble and time.monotonic() < end:
+        time.sleep(0.001)
+    database.execute("drop trigger broken")
+    assert "was started again" in jobs.trouble
+    assert ended(jobs, jobs.get(first)).state is JobState.DONE
+    second = count(jobs, tmp_path, "second")
+    assert ended(jobs, jobs.get(second)).state is JobState.DONE
+    assert not jobs.trouble
+
+
+def test_queue_that_cannot_start_processes_gives_up_aloud(tmp_path: Path) -> None:
+    told: list[str] = []
+    with closing(JobQueue(tmp_path / "runs", TARGETS, failed=told.append)) as jobs:
+        usual = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (3, usual[1]))
+        try:
+            job = count(jobs, tmp_path, "never")
+            end = time.monotonic() + 20
+            while not told and time.monotonic() < end:
+                time.sleep(0.02)
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, usual)
+        assert len(told) == 1 and "in 3 attempts (OSError" in told[0]
+        assert told[0].endswith(jobs.trouble)
+        assert jobs.get(job).state is JobState.QUEUED
+    with closing(JobQueue(tmp_path / "runs", TARGETS)) as jobs:
+        assert ended(jobs, jobs.get(job)).state is JobState.DONE
