@@ -28,7 +28,7 @@ def jobs(tmp_path: Path) -> Iterator[JobQueue]:
 
 def fork_server() -> int:
     forkserver.ensure_running()
-    return int(forkserver._forkserver._forkserver_pid)
+    return int(vars(forkserver)["_forkserver"]._forkserver_pid)
 
 
 def count(jobs: JobQueue, tmp_path: Path, name: str) -> str:
@@ -54,7 +54,7 @@ def test_full_disk_refuses_new_work_and_loses_none(jobs: JobQueue, tmp_path: Pat
     database: sqlite3.Connection = jobs._records._database
     pages = database.execute("pragma page_count").fetchone()[0]
     database.execute(f"pragma max_page_count = {pages}")
-    accepted = []
+    accepted: list[str] = []
     with pytest.raises(NoSpace, match="empty the caches"):
         for _ in range(200):
             accepted.append(count(jobs, tmp_path, f"more-{len(accepted)}"))

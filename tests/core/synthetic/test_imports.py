@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from made_datasets import BENCH
-
 import palpate.synthetic
+from palpate.blind.dataset_store import BENCH
 
 
 def test_bench_imports_only_the_folders_that_the_store_of_datasets_watches() -> None:
