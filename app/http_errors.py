@@ -25,14 +25,15 @@ class NoSpace(PalpateError):
     def __init__(self) -> None:
         super().__init__(
             "the disk of the runs folder is full: empty the caches (Jobs on the page, or POST "
-            "/api/disk/empty), delete runs, or make room; waiting jobs then go on by themselves"
+            "/api/disk/empty), delete runs, or make room; waiting jobs then go on, "
+            "and failed ones can be retried"
         )
 
 
 def disk_is_full(error: BaseException) -> bool:
     """Whether an error of the file system or of SQLite says that there is no room."""
     if isinstance(error, sqlite3.Error):
-        return error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
+        return error.sqlite_errorcode == sqlite3.SQLITE_FULL
     return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 

@@ -119,7 +119,7 @@ def blind(
         Path | None,
         typer.Option(
             help="Folder in which the datasets of cases stay; one that the same bench has made "
-            "there is used again. Each case needs about 30 MB."
+            "there is used again. A short case needs about 18 MB."
         ),
     ] = None,
 ) -> None:

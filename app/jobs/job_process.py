@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext
 from typing import Any
 
-from palpate.app.http_errors import as_dict
+from palpate.app.http_errors import NoSpace, as_dict, disk_is_full
 from palpate.foundation.errors import Cancelled, PalpateError
 from palpate.foundation.progress import Report
 
@@ -90,6 +90,8 @@ def _outcome(target: str, request: dict[str, Any], report: Report) -> tuple[str,
     except Cancelled:
         return "cancelled", {}
     except Exception as error:
+        if disk_is_full(error):
+            return "failed", as_dict(NoSpace())
         log.exception("job %s stopped", target)
         return "failed", {
             "kind": "InternalError",

@@ -20,7 +20,7 @@ from typing import Any
 
 from palpate.app.http_errors import Conflict, Missing, NoSpace
 from palpate.app.jobs.job_records import Job, JobRecords, JobState, Note
-from palpate.app.jobs.job_runner import JobRunner
+from palpate.app.jobs.job_runner import ENDING, JobRunner
 from palpate.foundation.errors import RunError, SetupError
 
 __all__ = ["JobQueue"]
@@ -30,8 +30,6 @@ _FAILURES = 3
 """Errors of the queue in a row after which it gives up."""
 _PAUSE = 1.0
 """Time from an error of the queue to the next attempt [s]."""
-_ENDING = 10.0
-"""Longest time that the processes of an ended job may take to end [s]."""
 
 
 class JobQueue:
@@ -139,7 +137,7 @@ class JobQueue:
             raise Missing(
                 f"job {identity} is a {job.kind}, which this version cannot do", job=identity
             )
-        end = time.monotonic() + _ENDING
+        end = time.monotonic() + ENDING
         while identity in self._runner.running and job.state.is_finished and time.monotonic() < end:
             time.sleep(0.02)
         if identity in self._runner.running or not self._records.reopen(identity):

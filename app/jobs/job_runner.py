@@ -21,13 +21,13 @@ from palpate.app.jobs.job_process import context, stop_group, work
 from palpate.app.jobs.job_records import Job, JobRecords, JobState
 from palpate.foundation.errors import RunError
 
-__all__ = ["JobRunner"]
+__all__ = ["ENDING", "JobRunner"]
 
 log = logging.getLogger(__name__)
 PAUSE = 0.1
 """Least time between two entries of a job's progress [s]; limits writes to the disk."""
-_ENDING = 10.0
-"""Longest time that a cancelled job's processes may take to end [s]."""
+ENDING = 10.0
+"""Longest time that the processes of an ended job may take to end [s]."""
 _STARTS = 3
 """How often a job's process is started where the fork server ends meanwhile."""
 _NUMBERS = re.compile(r"\d+(\.\d+)?")
@@ -38,10 +38,7 @@ class JobRunner:
 
     Args:
         records: of the jobs.
-        targets: function of each kind of job, as "module:function".
-        preload: modules that the worker processes import in advance.
-        beside: folders in which a job may have another scratch folder of its id.
-        tidy: is called before each job; its text goes into the job's log.
+        targets: and all further arguments: as of `JobQueue`.
 
     Attributes:
         patience: waits for room where the disk is full.
@@ -92,7 +89,7 @@ class JobRunner:
             if self._records.get(identity).state.is_finished:
                 self.stop(identity)
             ending = self._follow(identity, here)
-            process.join(None if ending is None else _ENDING)
+            process.join(None if ending is None else ENDING)
         finally:
             self.stop(identity)
             here.close()

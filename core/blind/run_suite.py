@@ -150,7 +150,7 @@ def run_case(
         if store is None:
             made = make_dataset(dataset, scenario, case.seed)
         else:
-            dataset, made = stored_dataset(store, case)
+            dataset, made = stored_dataset(store, case.name, scenario, case.seed)
         hidden, outside = _truth(made, scenario.size)
         doing, began = "diagnosing it", time.monotonic()
         result = diagnose(open_dataset(dataset), run, workers=1, replays=whole, assurance=whole)

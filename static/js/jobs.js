@@ -59,12 +59,15 @@ export function startJobs() {
     if (done.length && panel.firstChild) byId("disk").replaceWith(diskUsageLine());
     if (done.length) for (const listener of listeners) listener(done);
   };
-  events.addEventListener("trouble", ({ data }) => {
-    const text = JSON.parse(data);
-    byId("trouble").textContent = text && `⚠ ${capitalise(text)}`;
-    byId("trouble").hidden = !text;
-  });
+  events.addEventListener("trouble", ({ data }) => showTrouble(JSON.parse(data)));
+  events.onopen = () => showTrouble(""); // a server that was started again tells its own
   setInterval(draw, 1000);
+}
+
+/** @param {string} text what keeps the job queue from working; empty when it works */
+function showTrouble(text) {
+  byId("trouble").textContent = text && `⚠ ${capitalise(text)}`;
+  byId("trouble").hidden = !text;
 }
 
 /**

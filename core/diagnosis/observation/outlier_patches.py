@@ -14,7 +14,7 @@ from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.measurement.patch_averages import MaskArray, patch_medians
 from palpate.measurement.surface_gaps import Surface
 
-__all__ = ["agrees_with_neighbours"]
+__all__ = ["agrees_with_neighbours", "neighbours"]
 
 
 def agrees_with_neighbours(gap: FloatArray, patch: IntArray, surface: Surface) -> MaskArray:
@@ -37,19 +37,26 @@ def agrees_with_neighbours(gap: FloatArray, patch: IntArray, surface: Surface) -
     )
     middle = patch_medians(gap, patch, surface.patches)[seen]
     centres, normals = surface.patch_centres[seen], surface.patch_normals[seen]
-    near = (
-        (np.linalg.norm(centres[:, None] - centres, axis=2) < CRITERIA.outliers.neighbour_distance)
-        & (normals @ normals.T > CRITERIA.outliers.same_side_cosine)
-        & well
-    )
-    np.fill_diagonal(near, False)
-    expected = _medians(middle, near)
+    expected = _medians(middle, near := neighbours(centres, normals) & well)
     far = np.where(
         well,
         np.where(near.any(axis=1), CRITERIA.outliers.seen_offset, np.inf),
         CRITERIA.outliers.hidden_offset,
     )
     return ~np.isin(patch, seen[np.abs(middle - expected) > far])
+
+
+def neighbours(centres: FloatArray, normals: FloatArray) -> MaskArray:
+    """Mask (p, p) of the patches that are near each other on one side of the surface.
+
+    Args:
+        centres: of the patches (p, 3) [m].
+        normals: of the patches (p, 3).
+    """
+    near = np.linalg.norm(centres[:, None] - centres, axis=2) < CRITERIA.outliers.neighbour_distance
+    near &= normals @ normals.T > CRITERIA.outliers.same_side_cosine
+    np.fill_diagonal(near, False)
+    return near
 
 
 def _medians(values: FloatArray, near: MaskArray) -> FloatArray:

@@ -65,6 +65,17 @@ def test_full_disk_refuses_new_work_and_loses_none(jobs: JobQueue, tmp_path: Pat
     assert not jobs.trouble
 
 
+def test_work_that_finds_no_room_says_what_to_free(jobs: JobQueue, tmp_path: Path) -> None:
+    """/dev/full answers every write as a full disk does."""
+    (tmp_path / "full.pid").symlink_to("/dev/full")
+    job = jobs.submit("count", {"steps": 1, "result": str(tmp_path / "full")})
+    failed = ended(jobs, job)
+    assert (failed.state, (failed.error or {})["kind"]) == (JobState.FAILED, "NoSpace")
+    (tmp_path / "full.pid").unlink()
+    jobs.retry(job.id)
+    assert ended(jobs, job).state is JobState.DONE
+
+
 def test_error_of_the_queue_puts_the_job_back_once(jobs: JobQueue, tmp_path: Path) -> None:
     database: sqlite3.Connection = jobs._records._database
     database.execute(

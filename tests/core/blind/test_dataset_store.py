@@ -37,9 +37,10 @@ def test_dataset_that_is_there_is_not_made_again(tmp_path: Path, case: Case) -> 
         {"poke-top-01": [2e-3, 0.0]},
         begun={"drag-01": (1e-3, -2e-3)},
     )
-    put(place_of(tmp_path, case), truth)
-    folder, read = stored_dataset(tmp_path, case)
-    assert folder == place_of(tmp_path, case) and list(folder.iterdir()) == []
+    place = place_of(tmp_path, case.name, scenario, case.seed)
+    put(place, truth)
+    folder, read = stored_dataset(tmp_path, case.name, scenario, case.seed)
+    assert folder == place and list(folder.iterdir()) == []
     assert read.effects == scenario.effects and read.verdict == "found"
     assert read.visibility == pytest.approx(1.25e-3)
     assert read.shortened == {"poke-top-01": [2e-3, 0.0]}
@@ -53,5 +54,5 @@ def test_dataset_that_is_there_is_not_made_again(tmp_path: Path, case: Case) -> 
 
 def test_another_seed_or_scenario_has_another_place(tmp_path: Path, case: Case) -> None:
     others = (replace(case, seed=case.seed + 1), replace(case, short=False), replace(case))
-    places = [place_of(tmp_path, one) for one in (case, *others)]
+    places = [place_of(tmp_path, "made", scenario_of(one), one.seed) for one in (case, *others)]
     assert places[0] == places[3] and len(set(places)) == 3

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.stats import norm
 
 from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.observation.outlier_patches import neighbours
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.patch_averages import MaskArray
 from palpate.measurement.surface_gaps import Surface
@@ -33,7 +34,7 @@ def isolated_errors(gap: FloatArray, weights: FloatArray, surface: Surface) -> M
         weights: their inverse variances (g, p) [1/m^2]; zero where they do not count.
         surface: with the patches.
     """
-    near, found = _neighbours(surface), np.zeros(gap.shape, dtype=bool)
+    near, found = _numbered(surface), np.zeros(gap.shape, dtype=bool)
     while True:
         known = np.where((weights > 0) & ~found, gap, np.nan)
         moved = known - _quantiles(known.T, 0.5)
@@ -46,14 +47,11 @@ def isolated_errors(gap: FloatArray, weights: FloatArray, surface: Surface) -> M
         found |= further
 
 
-def _neighbours(surface: Surface) -> np.ndarray:
+def _numbered(surface: Surface) -> np.ndarray:
     """Return the numbers of each patch's neighbours (p, n), filled up with p."""
-    centres, normals = surface.patch_centres, surface.patch_normals
-    near = np.linalg.norm(centres[:, None] - centres, axis=2) < CRITERIA.outliers.neighbour_distance
-    near &= normals @ normals.T > CRITERIA.outliers.same_side_cosine
-    np.fill_diagonal(near, False)
+    near = neighbours(surface.patch_centres, surface.patch_normals)
     order = np.argsort(~near, axis=1, kind="stable")[:, : int(near.sum(axis=1).max())]
-    return np.where(np.take_along_axis(near, order, axis=1), order, len(centres))
+    return np.where(np.take_along_axis(near, order, axis=1), order, len(near))
 
 
 def _gathered(values: FloatArray, near: np.ndarray) -> FloatArray:
