@@ -56,7 +56,7 @@ def neighbours(centres: FloatArray, normals: FloatArray) -> MaskArray:
     near = np.linalg.norm(centres[:, None] - centres, axis=2) < CRITERIA.outliers.neighbour_distance
     near &= normals @ normals.T > CRITERIA.outliers.same_side_cosine
     np.fill_diagonal(near, False)
-    return near
+    return np.asarray(near)
 
 
 def _medians(values: FloatArray, near: MaskArray) -> FloatArray:
