@@ -186,5 +186,6 @@ class Anisotropy(Effect):
     @classmethod
     def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
         stiffer = f"{values['stiffness_ratio']:.2g} times as stiff along one direction as across"
-        angle = quantity(values["direction"], "rad")
-        return f"fibres: the phantom is {stiffer}, {angle} from its long side"
+        # A direction has no zero: two digits of 106.9 degrees are outside an interval of two.
+        angle = math.degrees(values["direction"])
+        return f"fibres: the phantom is {stiffer}, {angle:.0f}° from its long side"

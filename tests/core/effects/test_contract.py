@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -376,3 +377,10 @@ def test_families_have_at_least_two_members():
             found[effect.family.name] = found.get(effect.family.name, 0) + 1
     assert set(found) == {"memory", "tool", "camera", "stiffness", "base"}
     assert min(found.values()) >= 2
+
+
+def test_direction_is_said_to_the_degree() -> None:
+    said = Anisotropy.phrase({"stiffness_ratio": 2.8, "direction": math.radians(106.9)})
+    assert said.endswith(
+        "2.8 times as stiff along one direction as across, 107° from its long side"
+    )
