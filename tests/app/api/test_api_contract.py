@@ -78,6 +78,9 @@ def test_operation_keeps_to_its_description(
 
 def test_every_operation_says_what_it_does_and_what_may_go_wrong() -> None:
     for path, methods in DESCRIBED.items():
+        if path == "/health":  # open to probes, and answered 503 by its own body
+            assert set(methods["get"]["responses"]) == {"200", "503"}
+            continue
         for method, said in methods.items():
             assert len(said["description"]) > 10, (path, method)
             assert {"401", "404", "409", "413", "422"} <= set(said["responses"]), (path, method)

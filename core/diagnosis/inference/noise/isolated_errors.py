@@ -22,12 +22,13 @@ __all__ = ["isolated_errors"]
 def isolated_errors(gap: FloatArray, weights: FloatArray, surface: Surface) -> MaskArray:
     """Return the averages (g, p) that differ from their neighbours' as noise cannot.
 
-    What a patch has in all groups, as its own place in the camera's pattern, does not count. An
-    average is compared with the median of the neighbours in its group. It differs where the
-    difference is more than `CRITERIA.noise.isolated` standard deviations, or as many times those
-    of the neighbours from theirs where these are larger. Of the neighbours
-    `CRITERIA.noise.calm_share` count: a dent shows in more of them than the rest. What is found is
-    no neighbour any more, and the rest is looked through again, until nothing is found.
+    An average is compared with the median of the neighbours in its group, once as it is and once
+    less what its patch has in most groups, and must differ both times. So neither the camera's
+    pattern is found, nor the untouched group of a patch that most groups touch. It differs where
+    the smaller difference is more than `CRITERIA.noise.isolated` standard deviations, or as many
+    times what the neighbours usually differ, where that is larger. `CRITERIA.noise.calm_share` is
+    the quantile that counts as usual: a dent shows in more neighbours than the rest. What is found
+    is no neighbour any more, and the rest is looked through again, until nothing is found.
 
     Args:
         gap: averages of the baseline (g, p) [m]; NaN where unseen.
@@ -35,16 +36,22 @@ def isolated_errors(gap: FloatArray, weights: FloatArray, surface: Surface) -> M
         surface: with the patches.
     """
     near, found = _numbered(surface), np.zeros(gap.shape, dtype=bool)
+    share = CRITERIA.noise.calm_share
     while True:
         known = np.where((weights > 0) & ~found, gap, np.nan)
         moved = known - _quantiles(known.T, 0.5)
-        apart = np.abs(moved - _quantiles(_gathered(moved, near), 0.5)) * np.sqrt(weights)
-        share = CRITERIA.noise.calm_share
+        apart = _apart(moved, near) * np.sqrt(weights)
         usual = _quantiles(_gathered(apart, near), share) / norm.ppf(0.5 + 0.5 * share)
-        further = apart > CRITERIA.noise.isolated * np.fmax(usual, 1.0)
+        least = np.minimum(apart, _apart(known, near) * np.sqrt(weights))
+        further = least > CRITERIA.noise.isolated * np.fmax(usual, 1.0)
         if not further.any():
             return found
         found |= further
+
+
+def _apart(values: FloatArray, near: np.ndarray) -> FloatArray:
+    """Return how far values (g, p) lie from the median of their neighbours (g, p)."""
+    return np.abs(values - _quantiles(_gathered(values, near), 0.5))
 
 
 def _numbered(surface: Surface) -> np.ndarray:

@@ -47,6 +47,12 @@ def test_dent_at_another_place_is_no_error_of_single_patches(gap: np.ndarray) ->
     assert found(gap) == set()
 
 
+def test_untouched_groups_of_a_patch_that_most_groups_touch_are_no_errors(gap: np.ndarray) -> None:
+    """Under a small tool, a wrong radius shows in one patch: in all groups that touch."""
+    gap[3:, TOP[40]] += 6 * SIGMA
+    assert found(gap) == set()
+
+
 def test_patch_that_is_always_off_is_the_cameras_pattern(gap: np.ndarray) -> None:
     gap[:, TOP[40]] += 2e-3
     assert found(gap) == set()
