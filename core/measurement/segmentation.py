@@ -18,6 +18,7 @@ from palpate.dataset import Dataset
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
+from palpate.measurement.hole_rims import beside_holes
 from palpate.measurement.tool_pose import SHAFT_LENGTH, ShaftSight, ToolPose, locate_tool
 from palpate.registration.camera.table_plane import find_table
 from palpate.registration.faces import box_distance
@@ -28,7 +29,7 @@ __all__ = ["REASONS", "CleanCloud", "Cleaner", "cleaner_for"]
 IndexArray = np.ndarray[Any, np.dtype[np.int64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
-REASONS = ("kept", "table", "tool", "shaft", "background", "stray")
+REASONS = ("kept", "table", "tool", "shaft", "background", "stray", "hole")
 """Labels of points: the phantom's ("kept"), and why others are removed."""
 SIGMAS = 3.0
 """Standard deviations of noise that the tests allow for [1]."""
@@ -121,6 +122,7 @@ class Cleaner:
         phantom = np.flatnonzero(reason == 0)
         lonely = _lonely(points[phantom], self.phantom_from_camera.translation, self.noise)
         reason[phantom[lonely]] = REASONS.index("stray")
+        reason[self._beside_holes(points, reason == 0)] = REASONS.index("hole")
         indices = np.flatnonzero(reason == 0)
         counts = np.bincount(reason, minlength=len(REASONS))
         return CleanCloud(
@@ -129,6 +131,12 @@ class Cleaner:
             points[on_table & (apart > thickness) & (apart < TABLE_REACH)],
             {name: int(count) for name, count in zip(REASONS, counts, strict=True)},
         )
+
+    def _beside_holes(self, points: FloatArray, asked: Mask) -> Mask:
+        """Mask (n,) of the asked points (n, 3) [m], phantom frame, at the rim of holes."""
+        sights = points - self.phantom_from_camera.translation
+        lengths = np.linalg.norm(sights, axis=1, keepdims=True)
+        return beside_holes(sights / np.maximum(lengths, 1e-9), asked)
 
     @property
     def lowest(self) -> float:

@@ -126,6 +126,12 @@ class NoiseCriteria:
         "Share of an average's neighbours that differ as little as noise where it alone is off.",
         "derived: a dent of a tool shows in more than a fifth of the patches within 9 mm",
     )
+    seen_share: float = threshold(
+        0.25,
+        "1",
+        "An average has no weight where its patch has less than this share of the part of its "
+        "group's points that it has where it is seen best.",
+    )
     least_freedom: int = threshold(
         50, "1", "A patch with no more degrees of freedom than this gets the median variance."
     )

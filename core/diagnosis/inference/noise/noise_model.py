@@ -17,6 +17,7 @@ from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.evidence import Block, gram
 from palpate.diagnosis.inference.noise.isolated_errors import isolated_errors
+from palpate.diagnosis.inference.noise.partly_seen import partly_seen
 from palpate.diagnosis.inference.noise.shared_noise import clouds_in_patches, shared_noise
 from palpate.diagnosis.observation.force_record import (
     depth_discrepancy,
@@ -164,6 +165,7 @@ class Noise:
         stiffness = CRITERIA.noise.stiffness_error * columns[..., lumps].astype(float)
         weights = np.where(seen, 1 / scatter, 0.0)
         patches = surface.patches
+        weights[:, :patches][partly_seen(baseline.count)] = 0.0
         alone = isolated_errors(gap[:, :patches], weights[:, :patches], surface)
         weights[:, :patches][alone] = 0.0
         discrepancy = np.concatenate([displacement, stiffness], axis=2)
