@@ -186,7 +186,8 @@ class LiveRequest(BaseModel):
 class JobOut(BaseModel):
     """A job without folders of this machine.
 
-    Times are seconds since 1970. `remaining` is estimated [s]. `can_retry` says whether POST
+    Times are seconds since 1970. `seconds` is how long it has run, at its last progress or at its
+    end [s]; a clock that is set does not change it. `remaining` is estimated [s]. `can_retry` says whether POST
     /api/jobs/{id}/retry would repeat it.
     """
 
@@ -199,6 +200,7 @@ class JobOut(BaseModel):
     created: float
     started: float | None
     finished: float | None
+    seconds: float
     error: dict[str, Any] | None
     result: dict[str, Any] | None
     attempt: int

@@ -104,7 +104,7 @@ def _ladder(
     from palpate.app.jobs.tasks import evaluate as climb
     from palpate.app.storage.evaluation_store import EvaluationStore
 
-    name = f"{dataset.resolve().name}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(2)}"
+    name = f"{dataset.resolve().name}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(4)}"
     hidden = true_effects(dataset) if truth else None
     request = {
         **choices,

@@ -84,20 +84,23 @@ class JobQueue:
     def submit(
         self, kind: str, request: dict[str, Any], label: str = "job", key: str | None = None
     ) -> Job:
-        """Queue a job; its id is the label, the time and four random characters.
+        """Queue a job; its id is the label, the time and eight random characters.
 
         A second request with the same `key` gives the same job; raises Conflict if its content
         differs.
         """
-        identity = f"{label}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(2)}"
-        job = Job(
-            id=identity,
-            kind=kind,
-            request={**request, "scratch": str(self._scratch / identity)},
-            key=key,
-        )
-        if not self._records.add(job):
-            return self._same(job)
+        while True:
+            identity = f"{label}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(4)}"
+            job = Job(
+                id=identity,
+                kind=kind,
+                request={**request, "scratch": str(self._scratch / identity)},
+                key=key,
+            )
+            if self._records.add(job):
+                break
+            if key is not None and self._records.by_key(key) is not None:
+                return self._same(job)
         self._waiting.put(identity)
         return self.get(identity)
 

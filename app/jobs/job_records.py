@@ -26,7 +26,11 @@ create table if not exists log (
 );
 create index if not exists log_of_job on log (job);
 """
-LATER = {"attempt": "integer not null default 1", "key": "text"}
+LATER = {
+    "attempt": "integer not null default 1",
+    "key": "text",
+    "seconds": "real not null default 0",
+}
 """Columns that files of earlier versions lack."""
 FORESEEN = 0.03
 """Share of a job that must be done before its remaining time is estimated [1]."""
@@ -59,7 +63,8 @@ class JobState(StrEnum):
 class Job:
     """A copy of one record; times are seconds since 1970, `fraction` runs from 0 to 1.
 
-    `attempt` counts from 1. `key` names the request, so that a repeated request does not make
+    `seconds` is how long its process has run [s], at the last progress and at the end, by a clock
+    that nobody sets. `attempt` counts from 1. `key` names the request, so that a repeated request does not make
     another job.
     """
 
@@ -76,6 +81,7 @@ class Job:
     result: dict[str, Any] | None = None
     attempt: int = 1
     key: str | None = None
+    seconds: float = 0.0
 
     @property
     def remaining(self) -> float | None:
@@ -84,7 +90,7 @@ class Job:
         """
         if self.state is not JobState.RUNNING or self.started is None or self.fraction < FORESEEN:
             return None
-        return (time.time() - self.started) / self.fraction * (1.0 - self.fraction)
+        return self.seconds / self.fraction * (1.0 - self.fraction)
 
 
 @dataclass(frozen=True)
@@ -121,10 +127,10 @@ class JobRecords:
         self.version = 0
 
     def add(self, job: Job) -> bool:
-        """Add a record; returns False, and adds nothing, where its key is taken."""
+        """Add a record; returns False, and adds nothing, where its id or its key is taken."""
         values = [_stored(name, getattr(job, name)) for name in COLUMNS]
         columns = f"({', '.join(COLUMNS)}) values ({', '.join('?' * len(COLUMNS))})"
-        return self._change(f"insert into jobs {columns} on conflict (key) do nothing", values)
+        return self._change(f"insert into jobs {columns} on conflict do nothing", values)
 
     def update(self, identity: str, **values: Any) -> bool:
         """Set some columns; returns False, and changes nothing, where the job has finished."""
@@ -139,7 +145,8 @@ class JobRecords:
         """Queue a job again that ended without a result; returns False where it is open or done."""
         return self._change(
             "update jobs set state = 'queued', fraction = 0, text = 'waiting for its turn', "
-            "started = null, finished = null, error = null, result = null, attempt = attempt + 1 "
+            "started = null, finished = null, seconds = 0, error = null, result = null, "
+            "attempt = attempt + 1 "
             "where id = ? and state in ('failed', 'cancelled', 'interrupted')",
             [identity],
         )
@@ -148,7 +155,7 @@ class JobRecords:
         """Queue a running job again; returns False where it does not run."""
         return self._change(
             "update jobs set state = 'queued', fraction = 0, text = 'waiting for its turn', "
-            "started = null where id = ? and state = 'running'",
+            "started = null, seconds = 0 where id = ? and state = 'running'",
             [identity],
         )
 
@@ -167,7 +174,7 @@ class JobRecords:
 
     def waiting(self) -> list[Job]:
         """Queued jobs, the oldest first."""
-        return self._select("where state = 'queued' order by created", [])
+        return self._select("where state = 'queued' order by rowid", [])
 
     def by_key(self, key: str) -> Job | None:
         """The job of the request with this key."""
@@ -198,7 +205,7 @@ class JobRecords:
 
     def all(self, most: int = -1, after: int = 0) -> list[Job]:
         """Jobs, the newest first: at most `most` from the `after`-th on, or all."""
-        return self._select("order by created desc, id limit ? offset ?", [most, after])
+        return self._select("order by rowid desc limit ? offset ?", [most, after])
 
     def count(self) -> int:
         """Number of jobs."""

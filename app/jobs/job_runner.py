@@ -59,6 +59,7 @@ class JobRunner:
         self._lock = threading.Lock()
         self.patience = PatientWriter()
         self.running: dict[str, ForkServerProcess] = {}
+        self._began: dict[str, float] = {}
 
     def can_do(self, kind: str) -> bool:
         """Whether this version has a function for a kind of job."""
@@ -82,6 +83,7 @@ class JobRunner:
         scratch = Path(job.request["scratch"])
         write(scratch.mkdir, parents=True, exist_ok=True)
         process, here = self._started(job)
+        self._began[identity] = time.monotonic()
         try:
             started = {"state": JobState.RUNNING, "started": time.time(), "text": "starting"}
             write(self._records.update, identity, **started)
@@ -97,14 +99,21 @@ class JobRunner:
                 shutil.rmtree(place, ignore_errors=True)
             self.running.pop(identity, None)
         write(self._ended, identity, ending, process.exitcode)
+        self._began.pop(identity, None)
 
     def finish(self, identity: str, state: JobState, **values: Any) -> None:
         """Close a job's record, unless it is closed."""
-        if self._records.update(identity, state=state, finished=time.time(), **values):
+        ended = {"state": state, "finished": time.time(), "seconds": self._seconds(identity)}
+        if self._records.update(identity, **ended, **values):
             error = values.get("error") or {}
             text = error.get("message", state.value)
             with contextlib.suppress(NoSpace):  # the record has it, too
                 self._records.note(identity, "error" if error else "info", text)
+
+    def _seconds(self, identity: str) -> float:
+        """How long a job's process has run [s]; 0 where it has not begun."""
+        now = time.monotonic()
+        return now - self._began.get(identity, now)
 
     def stop(self, identity: str) -> None:
         """End a job's processes."""
@@ -165,7 +174,8 @@ class JobRunner:
                 elif time.monotonic() - written < PAUSE:
                     continue
                 written = time.monotonic()
-                write(self._records.update, identity, fraction=fraction, text=text)
+                values = {"fraction": fraction, "text": text, "seconds": self._seconds(identity)}
+                write(self._records.update, identity, **values)
             elif message[0] == "note":
                 write(self._records.note, identity, message[1], message[2])
             else:

@@ -90,7 +90,7 @@ def replay(request: dict[str, Any], report: Report) -> dict[str, Any]:
     dataset = open_dataset(Path(request["dataset"])).registered(
         AcceptedRegistration.from_json(registered) if registered else None
     )
-    began, run = time.time(), Path(request["runs"]) / scratch.name
+    run, began, since = Path(request["runs"]) / scratch.name, time.time(), time.monotonic()
     made = scratch / run.name
     failed = replay_into(
         dataset,
@@ -101,7 +101,9 @@ def replay(request: dict[str, Any], report: Report) -> dict[str, Any]:
         report=report,
     )
     (made / "origin.json").write_text(
-        json.dumps({**_origin(dataset), "created": began, "seconds": time.time() - began}, indent=1)
+        json.dumps(
+            {**_origin(dataset), "created": began, "seconds": time.monotonic() - since}, indent=1
+        )
     )
     os.rename(made, run)
     return {"run": run.name, "frames_without_equilibrium": failed}

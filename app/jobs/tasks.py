@@ -79,7 +79,7 @@ def diagnose_into(
 
     if run.exists():
         raise RunError(f"{run} exists already; name another folder or move it away", file=str(run))
-    began = time.time()
+    began, since = time.time(), time.monotonic()
     made = scratch / run.name
     opened = open_dataset(dataset).registered(accepted)
     result = find_cause(
@@ -93,7 +93,7 @@ def diagnose_into(
     origin = {
         "dataset": str(dataset.resolve()),
         "created": began,
-        "seconds": time.time() - began,
+        "seconds": time.monotonic() - since,
         "seed": seed,
         "splits": splits,
     }

@@ -149,3 +149,31 @@ def test_what_a_killed_job_made_beside_the_others_is_gone_and_it_is_done_once_mo
         assert ended(jobs, job).state is JobState.DONE
         assert not list(beside.iterdir())
         assert [note.text for note in jobs.notes(job.id)].count("made room") == 2
+
+
+def test_ids_that_would_collide_do_not(
+    jobs: JobQueue, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two requests of one second that draw the same characters are two jobs."""
+    drawn = iter(["00aa00aa", "00aa00aa", "11bb11bb"])
+    monkeypatch.setattr("palpate.app.jobs.job_queue.secrets.token_hex", lambda _: next(drawn))
+    monkeypatch.setattr("palpate.app.jobs.job_queue.time.strftime", lambda _: "20260101-000000")
+    made = [jobs.submit("count", {"steps": 1, "result": str(tmp_path / name)}) for name in "ab"]
+    assert [job.id[-8:] for job in made] == ["00aa00aa", "11bb11bb"]
+    assert {ended(jobs, job).state for job in made} == {JobState.DONE}
+    assert len(list(tmp_path.glob("[ab]"))) == 2
+
+
+def test_clock_that_is_set_back_changes_no_duration(
+    jobs: JobQueue, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, back = time.time, iter(range(0, 100_000, 100))
+    monkeypatch.setattr("time.time", lambda: real() - next(back))
+    job = jobs.submit("count", {"steps": 40, "pause": 0.05, "result": str(tmp_path / "result")})
+    running = reached(jobs, job, lambda now: now.fraction > 0.3)
+    assert running.remaining is not None and 0.1 < running.remaining < 60
+    done = ended(jobs, job)
+    assert 1.5 < done.seconds < 60
+    later = jobs.submit("count", {"steps": 1, "result": str(tmp_path / "later")})
+    assert [one.id for one in jobs.all()] == [later.id, job.id]
+    ended(jobs, later)
