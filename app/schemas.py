@@ -187,8 +187,8 @@ class JobOut(BaseModel):
     """A job without folders of this machine.
 
     Times are seconds since 1970. `seconds` is how long it has run, at its last progress or at its
-    end [s]; a clock that is set does not change it. `remaining` is estimated [s]. `can_retry` says whether POST
-    /api/jobs/{id}/retry would repeat it.
+    end [s]; a clock that is set does not change it. `remaining` is estimated [s]. `can_retry` says
+    whether POST /api/jobs/{id}/retry would repeat it.
     """
 
     id: str

@@ -21,6 +21,7 @@ from typing import Any
 from palpate.app.http_errors import Conflict, Missing, NoSpace
 from palpate.app.jobs.job_records import Job, JobRecords, JobState, Note
 from palpate.app.jobs.job_runner import ENDING, JobRunner
+from palpate.app.storage.held_folder import drop_left_behind
 from palpate.foundation.errors import RunError, SetupError
 
 __all__ = ["JobQueue"]
@@ -42,7 +43,8 @@ class JobQueue:
         folder: of the records.
         targets: function of each kind of job, as "module:function".
         preload: modules that the worker processes import in advance.
-        beside: folders in which a job may have another scratch folder of its id.
+        beside: folders in which a job may hold another scratch folder of its id; other servers
+            may use them, too.
         tidy: is called before each job; its text goes into the job's log.
         failed: is called with the reason when the queue cannot go on.
     """
@@ -59,8 +61,9 @@ class JobQueue:
         beside = tuple(beside)
         self._scratch = folder / ".making"
         self._alone = _take(folder)
-        for place in (self._scratch, *beside):
-            shutil.rmtree(place, ignore_errors=True)
+        shutil.rmtree(self._scratch, ignore_errors=True)
+        for place in beside:
+            drop_left_behind(place)
         self._records = JobRecords(folder / "jobs.sqlite")
         self._records.interrupt_running("the server ended while this job ran; retry it")
         self._waiting: queue.Queue[str | None] = queue.Queue()

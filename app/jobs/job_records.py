@@ -64,8 +64,8 @@ class Job:
     """A copy of one record; times are seconds since 1970, `fraction` runs from 0 to 1.
 
     `seconds` is how long its process has run [s], at the last progress and at the end, by a clock
-    that nobody sets. `attempt` counts from 1. `key` names the request, so that a repeated request does not make
-    another job.
+    that nobody sets. `attempt` counts from 1. `key` names the request, so that a repeated request
+    does not make another job.
     """
 
     id: str

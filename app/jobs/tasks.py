@@ -9,25 +9,23 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from palpate.app.storage.archive import copy_folder, dataset_root, unpack
-from palpate.app.storage.dataset_import import STAGING, check_name
 from palpate.app.storage.evaluation_store import EvaluationStore, networks_for
 from palpate.app.storage.run_store import CORRECTIONS, Run, RunStore
 from palpate.app.storage.sweep_store import SweepStore
 from palpate.app.storage.training_store import TrainingStore
-from palpate.foundation.errors import DatasetError, RunError
+from palpate.foundation.errors import RunError
 from palpate.foundation.progress import Report, part
 
 if TYPE_CHECKING:
     from palpate.dataset.accepted_registration import AcceptedRegistration
 
-__all__ = ["TARGETS", "diagnose", "diagnose_into", "evaluate", "import_dataset", "sweep", "train"]
+__all__ = ["TARGETS", "diagnose", "diagnose_into", "evaluate", "sweep", "train"]
 
 TARGETS = {
     "diagnosis": "palpate.app.jobs.tasks:diagnose",
     "sweep": "palpate.app.jobs.tasks:sweep",
     "training": "palpate.app.jobs.tasks:train",
-    "import": "palpate.app.jobs.tasks:import_dataset",
+    "import": "palpate.app.jobs.import_dataset:import_dataset",
     "registration": "palpate.app.jobs.short_tasks:register",
     "replay": "palpate.app.jobs.short_tasks:replay",
     "export": "palpate.app.jobs.short_tasks:export",
@@ -210,47 +208,3 @@ def evaluate(request: Mapping[str, Any], report: Report) -> dict[str, Any]:
         report=report,
     )
     return {"evaluation": name, "sentence": summary["sentence"]}
-
-
-def import_dataset(request: dict[str, Any], report: Report) -> dict[str, Any]:
-    """Unpack `request["archive"]`, or copy `request["folder"]`, check every file, and make it the
-    dataset `name`.
-
-    The archive stays until it is accepted or refused, so that an interrupted import can be
-    repeated.
-    """
-    from palpate.dataset import open_dataset
-    from palpate.dataset.dataset_problems import refuse_problems
-
-    datasets, name = Path(request["datasets"]), str(request["name"])
-    check_name(name, datasets)
-    aside = datasets / STAGING / Path(request["scratch"]).name
-    aside.mkdir(parents=True, exist_ok=True)
-    archive = Path(request["archive"]) if request.get("archive") else None
-    try:
-        if archive is not None:
-            if not archive.is_file():
-                raise DatasetError(
-                    "the archive is no longer there: upload it again", file=archive.name
-                )
-            unpack(archive, aside, int(request["most"]), part(report, 0.0, 0.4))
-        else:
-            copy_folder(
-                Path(request["folder"]), aside, int(request["most"]), part(report, 0.0, 0.4)
-            )
-        root = dataset_root(aside)
-        refuse_problems(root, part(report, 0.4, 1.0))
-    except DatasetError:
-        if archive is not None:
-            archive.unlink(missing_ok=True)
-        raise
-    opened = open_dataset(root)
-    check_name(name, datasets)
-    os.rename(root, datasets / name)
-    if archive is not None:
-        archive.unlink(missing_ok=True)
-    return {
-        "dataset": name,
-        "sequences": len(opened.sequences),
-        "clouds": sum(map(len, opened.loaded)),
-    }

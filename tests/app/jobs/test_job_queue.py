@@ -139,7 +139,7 @@ def test_what_a_killed_job_made_beside_the_others_is_gone_and_it_is_done_once_mo
     with closing(
         JobQueue(tmp_path / "runs", TARGETS, beside=[beside], tidy=lambda: "made room")
     ) as jobs:
-        assert not beside.exists()
+        assert not list(beside.iterdir())
         job = ended(
             jobs, jobs.submit("litter", {"beside": str(beside), "again": str(tmp_path / "again")})
         )

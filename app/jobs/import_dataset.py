@@ -1,0 +1,79 @@
+"""Import of a dataset: an archive is unpacked or a folder copied, checked, and put in its place."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from palpate.app.storage.archive import copy_folder, dataset_root, unpack
+from palpate.app.storage.dataset_import import STAGING, check_name
+from palpate.app.storage.held_folder import held_folder
+from palpate.foundation.errors import DatasetError
+from palpate.foundation.progress import Report, part
+
+if TYPE_CHECKING:
+    from palpate.dataset import Dataset
+
+__all__ = ["import_dataset"]
+
+
+def import_dataset(request: dict[str, Any], report: Report) -> dict[str, Any]:
+    """Unpack `request["archive"]`, or copy `request["folder"]`, check every file, and make it the
+    dataset `name`.
+
+    The archive stays until it is accepted or refused, so that an interrupted import can be
+    repeated.
+    """
+    datasets, name = Path(request["datasets"]), str(request["name"])
+    check_name(name, datasets)
+    with contextlib.ExitStack() as held:
+        try:
+            aside = held.enter_context(
+                held_folder(datasets / STAGING / Path(request["scratch"]).name)
+            )
+        except OSError as error:
+            raise DatasetError(
+                f"no dataset can be imported into {datasets} ({error.strerror}): let the server "
+                "write there, or start it with another folder of datasets",
+                key="datasets",
+            ) from error
+        opened = _imported(request, aside, datasets / name, report)
+    return {
+        "dataset": name,
+        "sequences": len(opened.sequences),
+        "clouds": sum(map(len, opened.loaded)),
+    }
+
+
+def _imported(request: dict[str, Any], aside: Path, whole: Path, report: Report) -> Dataset:
+    """Fill `aside`, check it, and rename it to `whole`; returns the dataset."""
+    from palpate.dataset import open_dataset
+    from palpate.dataset.dataset_problems import refuse_problems
+
+    archive = Path(request["archive"]) if request.get("archive") else None
+    most, filling = int(request["most"]), part(report, 0.0, 0.4)
+    try:
+        if archive is None:
+            copy_folder(Path(request["folder"]), aside, most, filling)
+        elif archive.is_file():
+            unpack(archive, aside, most, filling)
+        else:
+            raise DatasetError("the archive is no longer there: upload it again", file=archive.name)
+        root = dataset_root(aside)
+        refuse_problems(root, part(report, 0.4, 1.0))
+    except DatasetError:
+        if archive is not None:
+            archive.unlink(missing_ok=True)
+        raise
+    opened = open_dataset(root)
+    check_name(whole.name, whole.parent)
+    try:
+        os.rename(root, whole)
+    except OSError:
+        check_name(whole.name, whole.parent)  # another server was faster
+        raise
+    if archive is not None:
+        archive.unlink(missing_ok=True)
+    return opened
