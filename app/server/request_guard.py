@@ -92,6 +92,10 @@ class RequestGuard:
                 "RequestError",
                 "the path has an empty, encoded or dotted part; write it plainly",
             )
+        if "content-length" in headers and "transfer-encoding" in headers:
+            return _answer(
+                400, "RequestError", "the body has a length and is in chunks: send one of both"
+            )
         # A length that is no number is checked while the body arrives.
         length = headers.get("content-length", "0")
         if (
@@ -144,7 +148,12 @@ class RequestGuard:
 def same_origin(host: str, origin: str | None, names: Collection[str] = LOOPBACK) -> bool:
     """Whether the Host is one of `names` and the Origin, if sent, is a page of that host."""
     name = host.rsplit(":", 1)[0] if not host.endswith("]") else host
-    return name.lower() in names and (origin is None or urlsplit(origin).netloc == host)
+    if name.lower() not in names:
+        return False
+    try:
+        return origin is None or urlsplit(origin).netloc == host
+    except ValueError:  # an address that is none
+        return False
 
 
 def ambiguous(scope: Scope) -> bool:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import socket
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
 from types import FrameType
 
 import uvicorn
 from fastapi import FastAPI
 
+from palpate.app.server.patience import ImpatientProtocol
 from palpate.foundation.errors import SetupError
 
 __all__ = ["Server", "serve"]
@@ -24,6 +27,7 @@ class Server(uvicorn.Server):
         super().__init__(
             uvicorn.Config(
                 app,
+                http=ImpatientProtocol,
                 log_level="warning",
                 ws_per_message_deflate=False,
                 ws_max_size=64 * 2**20,
@@ -54,9 +58,10 @@ def serve(app: FastAPI, host: str, port: int, started: Callable[[str], None]) ->
         started: is called with the server's address as soon as the port is bound.
 
     Raises:
-        SetupError: the port cannot be used.
+        SetupError: the port cannot be used, or the folder of runs not be written.
         SystemExit: the job queue has given up; the status is 1, the message on standard error.
     """
+    _refuse_unwritable(app.state.settings.runs)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -78,3 +83,17 @@ def serve(app: FastAPI, host: str, port: int, started: Callable[[str], None]) ->
             Server(app).run(sockets=[listener])
     if app.state.failure:
         raise SystemExit(app.state.failure)
+
+
+def _refuse_unwritable(runs: Path) -> None:
+    """Raise SetupError for a folder of runs in which no file can be made."""
+    try:
+        runs.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=runs):
+            pass
+    except OSError as error:
+        raise SetupError(
+            f"no file can be made in {runs} ({error.strerror}): choose another folder with --runs",
+            key="runs",
+            value=str(runs),
+        ) from error

@@ -23,7 +23,7 @@ MOST_FILES = 300_000
 DEEPEST, LONGEST = 8, 200
 _CHUNK = 2**20
 _IGNORED = ("__MACOSX", ".DS_Store", "Thumbs.db")
-_ODD = re.compile(r'[\x00-\x1f\x7f\\:*?"<>|]')
+_ODD = re.compile(r'[\x00-\x1f\x7f\\:*?"<>|\ud800-\udfff]')
 _MOST_TOLD = 20
 
 
@@ -166,9 +166,9 @@ def _take(
     parts = [part for part in path.parts if part != "."]
     if path.is_absolute() or ".." in parts or _ODD.search(name) or not parts:
         bad.append(f"{name[:80]!r}: leads out of the folder, or is no name for a file")
-    elif len(parts) > DEEPEST or len(name) > LONGEST:
+    elif len(parts) > DEEPEST or len(name.encode()) > LONGEST:
         bad.append(
-            f"{name[:80]!r}: is longer than {LONGEST} characters or deeper than {DEEPEST} folders"
+            f"{name[:80]!r}: is longer than {LONGEST} bytes or deeper than {DEEPEST} folders"
         )
     else:
         entries.append(_Entry(PurePosixPath(*parts), size, opening))
@@ -183,6 +183,8 @@ def _write(
         if entry.path in seen:
             bad.append(f"{entry.path}: is there twice")
         seen.add(entry.path)
+    for folder in {above for path in seen for above in path.parents} & seen:
+        bad.append(f"{folder}: is a file and a folder")
     if bad:
         more = f"\nand {len(bad) - _MOST_TOLD} more" if len(bad) > _MOST_TOLD else ""
         text = "\n".join(bad[:_MOST_TOLD])

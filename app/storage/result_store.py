@@ -13,8 +13,8 @@ from palpate.foundation.errors import RunError
 
 __all__ = ["NAME", "ResultStore", "read_object", "request_name"]
 
-NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
-"""Names of results and datasets: safe as the name of a file."""
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,199}")
+"""Names of results and datasets: safe as the name of a file, also with an ending."""
 
 
 class ResultStore:

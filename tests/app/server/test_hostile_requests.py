@@ -1,0 +1,149 @@
+"""Requests that no honest client forms: none is a fault of the server's, and none holds it up."""
+
+from __future__ import annotations
+
+import io
+import re
+import socket
+import time
+import zipfile
+from pathlib import Path
+
+import httpx
+import pytest
+
+from palpate.app.main import create_app
+from palpate.app.server.serve import serve
+from palpate.app.settings import Settings
+from palpate.foundation.errors import SetupError
+
+NAMES = [
+    "%00",
+    "a%00b",
+    "x" * 300,
+    "%ED%A0%80",
+    "%FF",
+    "%2e%2e",
+    "a%2Fb",
+    "a%0Ab",
+    "%F0%9F%92%A9" * 80,
+]
+"""NUL, too long for a file, half a surrogate, no UTF-8, dots, a slash, a line end, emojis."""
+ENDLESS = "/api/jobs/events"
+
+
+def answered(client: httpx.Client, request: bytes, seconds: float = 10.0) -> bytes:
+    """The head of the answer to raw bytes; empty where the server closes without one."""
+    url = client.base_url
+    with socket.create_connection((url.host, url.port or 80), timeout=seconds) as line:
+        line.sendall(request)
+        head = b""
+        while b"\r\n\r\n" not in head:
+            more = line.recv(4096)
+            if not more:
+                break
+            head += more
+    return head
+
+
+def raw(client: httpx.Client, line: str, *headers: str, body: bytes = b"") -> bytes:
+    """A request as bytes, in which nothing is made proper."""
+    host = f"host: {client.base_url.host}:{client.base_url.port}"
+    head = "\r\n".join([f"{line} HTTP/1.1", host, *headers])
+    return head.encode("latin-1") + b"\r\n\r\n" + body
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_path_and_no_query_is_a_fault_of_the_server(client: httpx.Client, name: str) -> None:
+    asked = 0
+    for path, methods in create_app(Settings(), {}).openapi()["paths"].items():
+        if path == ENDLESS:
+            continue
+        hostile = re.sub(r"{\w+}", name, path)
+        if hostile == path:
+            hostile += f"?name={name}&sequence={name}&beside={name}&key={name}"
+        for method in methods:
+            headers = ("content-type: application/json", "content-length: 2", "connection: close")
+            line = f"{method.upper()} {hostile}"
+            answer = answered(client, raw(client, line, *headers, body=b"{}"))
+            assert re.match(rb"HTTP/1.1 [234]", answer), (line, answer[:80])
+            asked += 1
+    assert asked > 50
+
+
+@pytest.mark.parametrize(
+    "origin", ["http://[bad", "http://[::1", "null", "http://a:99999999", "http://" + "x" * 9000]
+)
+def test_origin_that_is_no_address_is_refused(client: httpx.Client, origin: str) -> None:
+    request = raw(client, "GET /api/datasets", f"origin: {origin}")
+    assert answered(client, request).startswith(b"HTTP/1.1 403 ")
+
+
+def test_body_of_two_lengths_is_refused(client: httpx.Client) -> None:
+    chunked = raw(
+        client,
+        "POST /api/diagnoses",
+        "content-length: 2",
+        "transfer-encoding: chunked",
+        body=b"2\r\n{}\r\n0\r\n\r\n",
+    )
+    twice = raw(client, "POST /api/diagnoses", "content-length: 2", "content-length: 3", body=b"{}")
+    for request in (chunked, twice):
+        assert answered(client, request).startswith(b"HTTP/1.1 400 ")
+
+
+@pytest.mark.parametrize(
+    "half",
+    [
+        b"",
+        b"GET /api/datasets HTTP/1.1\r\nhost: x",
+        b"POST /api/diagnoses HTTP/1.1\r\nhost: {host}\r\ncontent-length: 50\r\n\r\n{",
+    ],
+    ids=["nothing", "head", "body"],
+)
+def test_half_sent_requests_are_dropped_and_slow_nobody(client: httpx.Client, half: bytes) -> None:
+    url, begun = client.base_url, time.monotonic()
+    half = half.replace(b"{host}", f"{url.host}:{url.port}".encode())
+    lines = [socket.create_connection((url.host, url.port or 80), timeout=20) for _ in range(10)]
+    for line in lines:
+        line.sendall(half)
+    client.get("/api/datasets").raise_for_status()
+    assert time.monotonic() - begun < 4.0
+    for line in lines:
+        while line.recv(4096):
+            pass
+        line.close()
+    assert 4.0 < time.monotonic() - begun < 15.0
+
+
+def test_head_whose_bytes_drip_has_one_limit(client: httpx.Client) -> None:
+    url, begun = client.base_url, time.monotonic()
+    with socket.create_connection((url.host, url.port or 80), timeout=20) as line:
+        with pytest.raises(OSError):  # reset or broken pipe, as it happens
+            for byte in b"GET /api/datasets HTTP/1.1\r\nhost: " + b"x" * 100:
+                line.sendall(bytes([byte]))
+                time.sleep(0.25)
+        assert time.monotonic() - begun < 12.0
+
+
+def test_archive_with_a_file_and_a_folder_of_one_name_is_refused(client: httpx.Client) -> None:
+    sent = io.BytesIO()
+    with zipfile.ZipFile(sent, "w") as archive:
+        archive.writestr("set/a", b"file")
+        archive.writestr("set/a/b", b"file in a folder of the same name")
+    answer = client.post("/api/imports?name=doubled", content=sent.getvalue())
+    end = time.monotonic() + 60
+    while answer.status_code < 300 and answer.json()["state"] in ("queued", "running"):
+        assert time.monotonic() < end
+        time.sleep(0.1)
+        answer = client.get(f"/api/jobs/{answer.json()['id']}")
+    error = answer.json()["error"] if answer.status_code == 200 else answer.json()
+    assert answer.status_code < 500 and error["kind"] == "DatasetError", error
+
+
+def test_folder_that_cannot_be_written_is_told_before_an_address_is_printed() -> None:
+    told: list[str] = []
+    app = create_app(Settings(runs=Path("/proc/nothing")), {})
+    with pytest.raises(SetupError, match="no file can be made in /proc/nothing"):
+        serve(app, "127.0.0.1", 0, told.append)
+    assert not told
