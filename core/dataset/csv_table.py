@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
-from palpate.dataset.files import problem, read_text
+from palpate.dataset.files import problem, read_lines
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError
 
@@ -34,19 +35,15 @@ LATEST = 1e11
 """Latest plausible time stamp [s]; since 1970 it is 1.8e9 s, so a larger one has another unit."""
 _LIMIT = 2**29
 """Largest size of a table [bytes]."""
-_CHUNK = 20_000
-"""Number of rows that are parsed at once."""
+_MOST_EMPTY = 1_000_000
+"""Empty rows in a row after which a table is given up."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 def read_numbers(root: Path, file: str, header: str) -> FloatArray:
     """Read all rows (n, columns), n >= 1, below exactly this header; every number is finite."""
-    lines = _body(root, file, header)
     columns = header.count(",") + 1
-    blocks = [
-        _block(file, lines[start : start + _CHUNK], header, FIRST_ROW + start)
-        for start in range(0, len(lines), _CHUNK)
-    ]
+    blocks = [_block(file, lines, header, row) for row, lines in _body(root, file, header)]
     numbers = np.concatenate(blocks).reshape(-1, columns)
     numbers.setflags(write=False)
     return numbers
@@ -61,7 +58,7 @@ def read_labelled(root: Path, file: str, header: str, label: int) -> tuple[list[
     names = header.split(",")
     words: list[str] = []
     numbers: list[list[float]] = []
-    for row, line in enumerate(_body(root, file, header), FIRST_ROW):
+    for row, line in _single(_body(root, file, header)):
         cells = _cells(file, line, header, row)
         word = cells.pop(label)
         if not word:
@@ -95,19 +92,20 @@ def row_problems(
     """
     problems: list[DatasetError] = []
     names = header.split(",")
-    try:
-        lines = _body(root, file, header)
-    except DatasetError as error:
-        return [error]
-    for row, line in enumerate(lines, FIRST_ROW):
+    rows = _single(_body(root, file, header))
+    while len(problems) < most:
+        try:
+            row, line = next(rows)
+        except StopIteration:
+            break
+        except DatasetError as error:
+            return [*problems, error]
         try:
             for place, cell in enumerate(_cells(file, line, header, row)):
                 if place != label:
                     _number(file, cell, row, names[place])
         except DatasetError as error:
             problems.append(error)
-        if len(problems) == most:
-            break
     return problems
 
 
@@ -151,22 +149,47 @@ def check_coordinates(file: str, points: FloatArray, first_row: int = FIRST_ROW)
         raise problem(file, found + advice, row=at + first_row, key="xyz"[axis], value=f"{value:g}")
 
 
-def _body(root: Path, file: str, header: str) -> list[str]:
-    lines = read_text(root, file, _LIMIT).rstrip("\n ").split("\n")
-    found = ",".join(cell.strip() for cell in lines[0].split(","))
+def _body(root: Path, file: str, header: str) -> Iterator[tuple[int, list[str]]]:
+    """Blocks of rows below the header, each with the number of its first row; empty rows at the
+    end are left out.
+    """
+    row, empty, any_row = 1, 0, False
+    for lines in read_lines(root, file, _LIMIT):
+        if row == 1:
+            _check_header(file, lines.pop(0), header)
+            row = FIRST_ROW
+        filled = len(lines)
+        while filled and not lines[filled - 1].strip(" "):
+            filled -= 1
+        if filled:
+            yield row, [""] * empty + lines[:filled]
+            row, empty, any_row = row + empty + filled, 0, True
+        empty += len(lines) - filled
+        if empty > _MOST_EMPTY:
+            text = f"more than {_MOST_EMPTY} empty rows follow; expected numbers"
+            raise problem(file, f"{text}: check what was exported", row=row)
+    if not any_row:
+        raise problem(
+            file,
+            "has a header but no rows; expected at least one: export this file again",
+            row=FIRST_ROW,
+        )
+
+
+def _single(blocks: Iterable[tuple[int, list[str]]]) -> Iterator[tuple[int, str]]:
+    """Single rows with their numbers."""
+    for first, lines in blocks:
+        yield from enumerate(lines, first)
+
+
+def _check_header(file: str, line: str, header: str) -> None:
+    found = ",".join(cell.strip() for cell in line.split(","))
     if found != header:
         text = (
             f"the header is '{found[:80]}'; expected '{header}': name and order the columns "
             "like this"
         )
         raise problem(file, text, row=1, value=found[:80])
-    if len(lines) == 1:
-        raise problem(
-            file,
-            "has a header but no rows; expected at least one: export this file again",
-            row=FIRST_ROW,
-        )
-    return lines[1:]
 
 
 def _block(file: str, lines: list[str], header: str, first_row: int) -> FloatArray:

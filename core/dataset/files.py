@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import codecs
 import os
 import stat
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from palpate.foundation.errors import DatasetError
 
-__all__ = ["open_inside", "problem", "read_text", "read_toml"]
+__all__ = ["open_inside", "problem", "read_lines", "read_text", "read_toml"]
+
+_BLOCK, _LONGEST = 2**20, 2**16
+"""Bytes that are read at once, and of the longest line."""
 
 
 def problem(
@@ -67,25 +72,61 @@ def read_text(root: Path, file: str, limit: int) -> str:
     mark.
     """
     with open_inside(root, file) as stream:
-        try:
-            data = stream.read(limit + 1)
-        except OSError as error:
-            raise problem(
-                file, f"cannot be read ({_reason(error)}); check the disk and copy the file again"
-            ) from error
+        data = _read(stream, file, limit + 1)
     if len(data) > limit:
-        raise problem(
-            file,
-            f"is larger than {limit // 2**20} MiB; expected far less of such a file: check what "
-            "was exported",
-        )
+        raise _too_large(file, limit)
+    return _decoded(data.removeprefix(codecs.BOM_UTF8), file, 1)
+
+
+def read_lines(root: Path, file: str, limit: int) -> Iterator[list[str]]:
+    """Read the lines of a UTF-8 file as `read_text` does, in blocks of about a megabyte.
+
+    A line of more than 64 KiB is refused.
+    """
+    with open_inside(root, file) as stream:
+        row, size, begun, mark = 1, 0, b"", codecs.BOM_UTF8
+        while block := _read(stream, file, _BLOCK):
+            if (size := size + len(block)) > limit:
+                raise _too_large(file, limit)
+            whole, end, rest = (begun + block).removeprefix(mark).rpartition(b"\n")
+            mark = b""
+            if end:
+                lines = _decoded(whole, file, row).split("\n")
+                row += len(lines)
+                yield lines
+            if len(rest) > _LONGEST:
+                text = f"is longer than {_LONGEST // 2**10} KiB; expected a row of a table"
+                raise problem(file, f"{text}: check what was exported", row=row)
+            begun = rest
+        yield [_decoded(begun, file, row)]
+
+
+def _read(stream: BinaryIO, file: str, most: int) -> bytes:
     try:
-        text = data.decode("utf-8-sig")
+        return stream.read(most)
+    except OSError as error:
+        raise problem(
+            file, f"cannot be read ({_reason(error)}); check the disk and copy the file again"
+        ) from error
+
+
+def _too_large(file: str, limit: int) -> DatasetError:
+    return problem(
+        file,
+        f"is larger than {limit // 2**20} MiB; expected far less of such a file: check what was "
+        "exported",
+    )
+
+
+def _decoded(data: bytes, file: str, first_row: int) -> str:
+    """Decode UTF-8 that begins in row `first_row`, with \\n line ends."""
+    try:
+        text = data.decode()
     except UnicodeDecodeError as error:
-        row = data.count(b"\n", 0, error.start) + 1
+        row = data.count(b"\n", 0, error.start) + first_row
         found = f"byte 0x{data[error.start]:02x} is not UTF-8 text; save the file as UTF-8"
         raise problem(file, found, row=row) from None
-    return text.replace("\r\n", "\n")
+    return text.replace("\r\n", "\n").removesuffix("\r")
 
 
 def _reason(error: Exception) -> str:
