@@ -21,7 +21,7 @@ from palpate.app.jobs.job_results import job_out
 from palpate.app.reporting.json_values import dataset_summary
 from palpate.app.schemas import JobOut
 from palpate.app.services import CurrentServices, IdempotencyKey, Services
-from palpate.app.storage.archive import is_archive
+from palpate.app.storage.archive_reader import is_archive
 from palpate.app.storage.dataset_import import UPLOADS, check_name
 from palpate.dataset.check import check_dataset
 from palpate.foundation.errors import DatasetError

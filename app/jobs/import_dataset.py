@@ -11,12 +11,16 @@ from palpate.app.storage.archive import copy_folder, dataset_root, unpack
 from palpate.app.storage.dataset_import import STAGING, check_name
 from palpate.app.storage.held_folder import held_folder
 from palpate.foundation.errors import DatasetError
+from palpate.foundation.processes import limited_memory
 from palpate.foundation.progress import Report, part
 
 if TYPE_CHECKING:
     from palpate.dataset import Dataset
 
 __all__ = ["import_dataset"]
+
+_MEMORY = 2**30
+"""Address space that the import of a dataset may take [bytes]."""
 
 
 def import_dataset(request: dict[str, Any], report: Report) -> dict[str, Any]:
@@ -39,7 +43,14 @@ def import_dataset(request: dict[str, Any], report: Report) -> dict[str, Any]:
                 "write there, or start it with another folder of datasets",
                 key="datasets",
             ) from error
-        opened = _imported(request, aside, datasets / name, report)
+        try:
+            with limited_memory(_MEMORY):
+                opened = _imported(request, aside, datasets / name, report)
+        except MemoryError:
+            raise DatasetError(
+                f"its files take more than {_MEMORY // 2**20} MiB of memory to read: check what "
+                "was exported"
+            ) from None
     return {
         "dataset": name,
         "sequences": len(opened.sequences),

@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from palpate.app.storage.archive import copy_folder, dataset_root, is_archive, unpack
+from palpate.app.storage.archive import copy_folder, dataset_root, unpack
+from palpate.app.storage.archive_reader import is_archive
 from palpate.foundation.errors import DatasetError
 
 MOST = 10_000

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from palpate.foundation.processes import ProcessPool, giving_memory_back
+from palpate.foundation.processes import ProcessPool, giving_memory_back, limited_memory
 
 OWNER = """
 import sys, time
@@ -115,3 +115,11 @@ def _session(leader: int) -> list[int]:
         if int(session) == leader and state != "Z":
             found.append(int(place.parent.name))
     return found
+
+
+def test_memory_beyond_a_limit_is_refused_in_the_block_alone() -> None:
+    with limited_memory(2**28):
+        with pytest.raises(MemoryError):
+            np.ones(2**27)
+        assert np.ones(2**20).sum() == 2**20
+    assert np.ones(2**27)[-1] == 1.0
