@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from palpate.app.scene.registration_scene import PairScene, Ray, ViserPairScene
+from palpate.app.scene.secret_viser import page_of, secret_viser
 from palpate.app.scene.viewer_scene import PageScene, ViserScene
 from palpate.app.scene.viewpoint import FIELD_OF_VIEW
 
 if TYPE_CHECKING:
-    from viser import ClientHandle, ViserServer
+    from viser import ClientHandle
 
 __all__ = ["BY_HAND", "SceneListener", "ViewerServer"]
 
@@ -45,6 +44,9 @@ class ViewerServer:
         show: is called for scenes of a page's replays.
         pairs: is called for scenes of manual registration.
         clicked: is called with each click in the latter.
+
+    Attributes:
+        secret: first part of the path of the relay's connections.
     """
 
     def __init__(
@@ -53,11 +55,7 @@ class ViewerServer:
         pairs: SceneListener[PairScene],
         clicked: Callable[[str, Ray], None],
     ) -> None:
-        import viser
-
-        # Viser prints its inner address.
-        with contextlib.redirect_stdout(io.StringIO()):
-            self._server: ViserServer = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        self._server, self.secret = secret_viser()
         # A browser may close while its scene is drawn; this is harmless.
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
         self._server.request_share_url = lambda *_, **__: None  # type: ignore[method-assign]
@@ -66,7 +64,7 @@ class ViewerServer:
 
         @self._server.on_client_connect
         def _(client: ClientHandle) -> None:
-            page = self._page_of(client.client_id)
+            page = page_of(self._server, client.client_id)
             if page.endswith(BY_HAND):
                 page = page.removesuffix(BY_HAND)
                 self._left[client.client_id] = pairs.join(
@@ -89,13 +87,6 @@ class ViewerServer:
     def close(self) -> None:
         """Stop the server."""
         self._server.stop()
-
-    def _page_of(self, client_id: int) -> str:
-        """The last part of the path of the relay's connection (private attributes: pinned to viser
-        1.1.1).
-        """
-        connection = self._server._websock_server._live_connections[client_id]
-        return connection.request.path.strip("/") if connection.request is not None else ""
 
     def _set_up_scene(self) -> None:
         server = self._server

@@ -50,11 +50,11 @@ def viewer(page: PageId) -> HTMLResponse:
 @router.websocket("/viser/{page}")
 async def relay(websocket: WebSocket, page: PageId) -> None:
     """Relay both directions of the websocket until either side ends."""
-    port = websocket.app.state.services.viewer.port
+    inner = websocket.app.state.services.viewer
     offered = [Subprotocol(name) for name in websocket.scope.get("subprotocols", [])]
     try:
         upstream = await websockets.connect(
-            f"ws://127.0.0.1:{port}/{page}",
+            f"ws://127.0.0.1:{inner.port}/{inner.secret}/{page}",
             subprotocols=offered or None,
             max_size=None,
             compression=None,

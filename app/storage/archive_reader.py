@@ -1,4 +1,4 @@
-"""What an archive contains: its plain files, and the entries that may not be in a dataset.
+"""Reader of archives: lists their plain files, and the entries that may not be in a dataset.
 
 Headers are read with a bound, since a few megabytes can unpack to gigabytes of a name.
 """
