@@ -38,6 +38,9 @@ class ImpatientProtocol(H11Protocol):
         super().connection_lost(exc)
 
     def _wait(self) -> None:
+        if self.transport.get_protocol() is not self:  # a websocket has taken over
+            self._stop()
+            return
         was_in_head, self._in_head = self._in_head, self.conn.their_state is h11.IDLE
         if self._in_head and was_in_head and self._timer is not None:
             return  # the whole head has one limit, however its bytes drip

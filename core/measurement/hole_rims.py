@@ -43,7 +43,7 @@ def beside_holes(sights: FloatArray, asked: Mask) -> Mask:
         return rim
     tree = cKDTree(sights, balanced_tree=False, compact_nodes=False)
     some = sights[rows[:: len(rows) // 500 + 1]]
-    nearest = tree.query(some, k=2)[0][:, 1]
+    nearest = np.asarray(tree.query(some, k=2)[0])[:, 1]
     around = tree.query_ball_point(
         sights[rows], WIDTH * float(np.median(nearest)), return_length=True
     )

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import httpx
 import pytest
+from websockets.sync.client import connect
 
 from palpate.app.main import create_app
 from palpate.app.server.serve import serve
@@ -124,6 +125,20 @@ def test_head_whose_bytes_drip_has_one_limit(client: httpx.Client) -> None:
                 line.sendall(bytes([byte]))
                 time.sleep(0.25)
         assert time.monotonic() - begun < 12.0
+
+
+def test_websocket_that_says_nothing_and_a_slow_answer_stay(client: httpx.Client) -> None:
+    url = client.base_url
+    address = f"ws://{url.host}:{url.port}/api/sessions/page-00000000/socket"
+    with connect(address, proxy=None) as quiet, client.stream("GET", ENDLESS, timeout=20) as slow:
+        first = next(slow.iter_bytes())
+        time.sleep(6.5)
+        quiet.ping().wait(5)
+        quiet.send("{}")
+        assert first and not slow.is_closed and slow.status_code == 200
+        with pytest.raises(TimeoutError):
+            while True:
+                quiet.recv(timeout=1)
 
 
 def test_archive_with_a_file_and_a_folder_of_one_name_is_refused(client: httpx.Client) -> None:
