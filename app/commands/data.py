@@ -225,7 +225,7 @@ def _check_one(path: Path, picture: Path | None) -> None:
     _print_summary(dataset, summary, registration)
     print_warnings((*summary.warnings, *warnings))
     if picture is not None and registration is not None:
-        from palpate.dataset.coverage_figure import coverage_picture
+        from palpate.dataset.check.coverage_figure import coverage_picture
 
         coverage_picture(dataset, registration.phantom_from_robot, picture)
         out.print(f"coverage: {picture}", highlight=False)

@@ -13,7 +13,7 @@ from small_dataset import ply_bytes, small_cloud, write_valid_dataset
 
 from palpate.dataset import open_dataset
 from palpate.dataset.check import DatasetSummary, check_dataset
-from palpate.dataset.coverage_figure import coverage_picture
+from palpate.dataset.check.coverage_figure import coverage_picture
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.frames import Transform
 

@@ -11,7 +11,7 @@ from small_dataset import write_valid_dataset
 
 from palpate.dataset import open_dataset
 from palpate.dataset.check import check_dataset
-from palpate.dataset.plausibility import implausible_values
+from palpate.dataset.check.plausibility import implausible_values
 from palpate.dataset.schema import DatasetConfig
 
 

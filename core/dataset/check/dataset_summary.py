@@ -7,9 +7,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from palpate.dataset.check.motion_coverage import CoverageGap, coverage_gaps
+from palpate.dataset.check.plausibility import implausible_values
 from palpate.dataset.folder import Dataset
-from palpate.dataset.motion_coverage import CoverageGap, coverage_gaps
-from palpate.dataset.plausibility import implausible_values
 from palpate.dataset.sequence import Sequence
 from palpate.dataset.tool_motion import ToolMotion, describe_motion
 from palpate.foundation.arrays import FloatArray
