@@ -13,6 +13,7 @@ from palpate.app.commands import (
     data,
     demo,
     diagnosis,
+    doctor,
     evaluation,
     export,
     service,
@@ -46,6 +47,7 @@ app.command()(evaluation.evaluate)
 app.command()(export.export)
 app.command()(blind.blind)
 app.command()(service.serve)
+app.command()(doctor.doctor)
 
 
 def main() -> NoReturn:

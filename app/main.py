@@ -10,7 +10,7 @@ from importlib.metadata import version
 
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import FileResponse, JSONResponse
+from fastapi.responses import FileResponse, JSONResponse, PlainTextResponse
 from fastapi.staticfiles import StaticFiles
 from starlette.exceptions import HTTPException
 
@@ -34,6 +34,7 @@ from palpate.app.http_errors import NoSpace, as_dict, disk_is_full, status_code
 from palpate.app.jobs.tasks import TARGETS
 from palpate.app.schemas import PROBLEMS, Health
 from palpate.app.server import viser_proxy
+from palpate.app.server.diagnostics import diagnostics
 from palpate.app.server.login import Login
 from palpate.app.server.login import router as login_router
 from palpate.app.server.request_guard import RequestGuard
@@ -108,6 +109,15 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
         troubled = bool(app.state.services.jobs.trouble)
         response.status_code = 503 if troubled else 200
         return Health(status="troubled" if troubled else "ok")
+
+    @app.get("/api/diagnostics", tags=["health"], responses=PROBLEMS)
+    def fault_report() -> PlainTextResponse:
+        """Versions, machine, settings, the last jobs and the log as a text file, for the report of
+        a fault; without data and results.
+        """
+        text = diagnostics(settings.runs, settings.model_dump(mode="json"))
+        headers = {"content-disposition": 'attachment; filename="palpate-diagnostics.txt"'}
+        return PlainTextResponse(text, headers=headers)
 
     @app.get("/", include_in_schema=False)
     def page() -> FileResponse:

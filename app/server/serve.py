@@ -12,6 +12,7 @@ from types import FrameType
 import uvicorn
 from fastapi import FastAPI
 
+from palpate.app.server.diagnostics import write_log
 from palpate.app.server.patience import ImpatientProtocol
 from palpate.foundation.errors import SetupError
 
@@ -79,8 +80,10 @@ def serve(app: FastAPI, host: str, port: int, started: Callable[[str], None]) ->
         listener.listen()
         name = f"[{host}]" if ":" in host else host
         started(f"http://{name}:{listener.getsockname()[1]}")
+        server = Server(app)
+        write_log(app.state.settings.runs)
         with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C ends the server
-            Server(app).run(sockets=[listener])
+            server.run(sockets=[listener])
     if app.state.failure:
         raise SystemExit(app.state.failure)
 

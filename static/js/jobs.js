@@ -98,6 +98,16 @@ function drawPanel() {
       element("h1", { class: "verdict" }, "What was asked for, and what became of it"),
       element("div", { class: "jobs-list" }),
       diskUsageLine(),
+      element(
+        "p",
+        { class: "muted" },
+        element(
+          "a",
+          { href: "/api/diagnostics", download: "palpate-diagnostics.txt" },
+          "Download diagnostics",
+        ),
+        ": versions, settings, last jobs and the log, for the report of a fault; no data.",
+      ),
     );
   placeRows(
     /** @type {HTMLElement} */ (panel.querySelector(".jobs-list")),
