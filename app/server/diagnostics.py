@@ -1,4 +1,4 @@
-"""What a maintainer asks for when something fails: versions, machine, settings, log, last jobs.
+"""Diagnostics for the report of a fault: versions, machine, settings, log, last jobs.
 
 It contains no measurement, no token and no result; names of datasets and folders are in it.
 """
