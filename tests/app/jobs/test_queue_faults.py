@@ -58,6 +58,10 @@ def test_full_disk_refuses_new_work_and_loses_none(jobs: JobQueue, tmp_path: Pat
     with pytest.raises(NoSpace, match="empty the caches"):
         for _ in range(200):
             accepted.append(count(jobs, tmp_path, f"more-{len(accepted)}"))
+    for size in (1000, 100, 10, 1):  # no room is left for the note of the next job either
+        with pytest.raises(NoSpace):
+            for _ in range(1000):
+                jobs._records.note(waiting, "info", "x" * size)
     reached(jobs, running, lambda _: bool(jobs.trouble))
     database.execute("pragma max_page_count = 100000")
     for name in (running.id, waiting, *accepted):
