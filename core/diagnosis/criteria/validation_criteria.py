@@ -48,9 +48,9 @@ class RejectionCriteria:
     unconfirmed_gain: float = threshold(
         2.0,
         "1",
-        "A cause without structured error, and without a sure gain on test sequences or with "
-        "numbers that may all be as stated, is a hint if its gain is below this many times the "
-        "required gain. So is a further cause with such numbers.",
+        "A cause without structured error is a hint if its gain is below this many times the "
+        "required gain, and either its numbers may all be as stated or test sequences have no "
+        "reducible error. So is a further cause with such numbers.",
         "measured: without structure and without a sure gain a control of another solver named "
         "strain stiffening at 26 to 31 nats for 25; chance gives no 50 nats",
     )
