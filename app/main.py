@@ -10,7 +10,7 @@ from importlib.metadata import version
 
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import FileResponse, JSONResponse, PlainTextResponse
+from fastapi.responses import FileResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 from starlette.exceptions import HTTPException
 
@@ -110,14 +110,19 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
         response.status_code = 503 if troubled else 200
         return Health(status="troubled" if troubled else "ok")
 
-    @app.get("/api/diagnostics", tags=["health"], responses=PROBLEMS)
-    def fault_report() -> PlainTextResponse:
+    @app.get(
+        "/api/diagnostics",
+        tags=["health"],
+        response_class=Response,
+        responses={**PROBLEMS, 200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
+    )
+    def fault_report() -> Response:
         """Versions, machine, settings, the last jobs and the log as a text file, for the report of
         a fault; without data and results.
         """
         text = diagnostics(settings.runs, settings.model_dump(mode="json"))
         headers = {"content-disposition": 'attachment; filename="palpate-diagnostics.txt"'}
-        return PlainTextResponse(text, headers=headers)
+        return Response(text, media_type="text/plain", headers=headers)
 
     @app.get("/", include_in_schema=False)
     def page() -> FileResponse:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from small_dataset import write_valid_dataset
@@ -36,7 +37,7 @@ def test_a_usual_phantom_raises_no_doubt(config: DatasetConfig) -> None:
     ],
 )
 def test_an_implausible_value_is_told_with_its_bound(
-    config: DatasetConfig, values: dict[str, float], told: str
+    config: DatasetConfig, values: dict[str, Any], told: str
 ) -> None:
     (text,) = implausible_values(replace(config, **values))
     assert re.search(told, text), text
