@@ -43,14 +43,7 @@ def import_dataset(request: dict[str, Any], report: Report) -> dict[str, Any]:
                 "write there, or start it with another folder of datasets",
                 key="datasets",
             ) from error
-        try:
-            with limited_memory(_MEMORY):
-                opened = _imported(request, aside, datasets / name, report)
-        except MemoryError:
-            raise DatasetError(
-                f"its files take more than {_MEMORY // 2**20} MiB of memory to read: check what "
-                "was exported"
-            ) from None
+        opened = _imported(request, aside, datasets / name, report)
     return {
         "dataset": name,
         "sequences": len(opened.sequences),
@@ -64,20 +57,19 @@ def _imported(request: dict[str, Any], aside: Path, whole: Path, report: Report)
     from palpate.dataset.dataset_problems import refuse_problems
 
     archive = Path(request["archive"]) if request.get("archive") else None
-    most, filling = int(request["most"]), part(report, 0.0, 0.4)
     try:
-        if archive is None:
-            copy_folder(Path(request["folder"]), aside, most, filling)
-        elif archive.is_file():
-            unpack(archive, aside, most, filling)
-        else:
-            raise DatasetError("the archive is no longer there: upload it again", file=archive.name)
-        root = dataset_root(aside)
-        refuse_problems(root, part(report, 0.4, 1.0))
-    except DatasetError:
+        with limited_memory(_MEMORY):
+            root = _filled(request, archive, aside, part(report, 0.0, 0.4))
+            refuse_problems(root, part(report, 0.4, 1.0))
+    except (DatasetError, MemoryError) as error:
         if archive is not None:
             archive.unlink(missing_ok=True)
-        raise
+        if isinstance(error, DatasetError):
+            raise
+        raise DatasetError(
+            f"its files take more than {_MEMORY // 2**20} MiB of memory to read: check what was "
+            "exported"
+        ) from None
     opened = open_dataset(root)
     check_name(whole.name, whole.parent)
     try:
@@ -88,3 +80,15 @@ def _imported(request: dict[str, Any], aside: Path, whole: Path, report: Report)
     if archive is not None:
         archive.unlink(missing_ok=True)
     return opened
+
+
+def _filled(request: dict[str, Any], archive: Path | None, aside: Path, report: Report) -> Path:
+    """Fill `aside` from an archive or a folder; returns the dataset's folder in it."""
+    most = int(request["most"])
+    if archive is None:
+        copy_folder(Path(request["folder"]), aside, most, report)
+    elif archive.is_file():
+        unpack(archive, aside, most, report)
+    else:
+        raise DatasetError("the archive is no longer there: upload it again", file=archive.name)
+    return dataset_root(aside)

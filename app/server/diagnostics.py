@@ -77,7 +77,7 @@ def _machine(runs: Path) -> Iterator[str]:
 
 
 def _jobs(path: Path) -> Iterator[str]:
-    """The last jobs and the last lines of each; from a copy that nothing writes to."""
+    """The last jobs and the last lines of each; the file is opened for reading alone."""
     if not path.is_file():
         yield "none"
         return

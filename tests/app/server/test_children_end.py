@@ -40,4 +40,7 @@ def test_processes_of_a_registration_end_with_a_killed_server(tmp_path: Path, wa
         process.kill()
         process.wait()
         asking.join()
-        until(lambda: not any(job_functions.alive(one) for one in family), seconds=20.0)
+        end = time.monotonic() + 20
+        while any(job_functions.alive(one) for one in family) and time.monotonic() < end:
+            time.sleep(0.05)
+        assert family and not [one for one in family if job_functions.alive(one)]
