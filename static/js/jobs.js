@@ -100,13 +100,13 @@ function drawPanel() {
       diskUsageLine(),
       element(
         "p",
-        { class: "muted" },
+        { class: "disk muted" },
         element(
           "a",
           { href: "/api/diagnostics", download: "palpate-diagnostics.txt" },
           "Download diagnostics",
         ),
-        ": versions, settings, last jobs and the log, for the report of a fault; no data.",
+        ": versions, settings, last jobs and the log, to report a fault; no measurements.",
       ),
     );
   placeRows(
