@@ -88,6 +88,12 @@ class NamingCriteria:
         "A candidate this far behind the best one after two steps of its fit, or behind the model "
         "without it, is given up.",
     )
+    unsettled: float = threshold(
+        0.5,
+        "1",
+        "Share of the best gain from which a cause beside one with history is fitted to its end.",
+        "measured: such a fit gained 1100 nats besides the 2300 that it had before its end",
+    )
     history_optimism: float = threshold(
         2.0,
         "1",

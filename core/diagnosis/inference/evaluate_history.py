@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from palpate.diagnosis.inference.evaluate import Evaluator
     from palpate.diagnosis.inference.hypothesis import Model
 
-__all__ = ["history_predictions", "plain_model"]
+__all__ = ["history_predictions", "plain_model", "with_replayed_columns"]
 
 
 def history_predictions(
@@ -49,21 +49,40 @@ def history_predictions(
         with_history_columns(one, base, own.result(), effects, first, extra)
         for one, base, own in rows
     ]
-    column = first
+    rough = [
+        effect.has_history() and changes_tool_friction(effect, plain.setup) for effect in effects
+    ]
+    return with_replayed_columns(evaluator, effects, predictions, starts, rough)
+
+
+def with_replayed_columns(
+    evaluator: Evaluator,
+    effects: Sequence[Effect],
+    predictions: Sequence[Prediction],
+    starts: Sequence[Prediction] | None,
+    chosen: Sequence[bool],
+) -> list[Prediction]:
+    """Return predictions whose columns of some effects are differences of two replays along the
+    tool's path.
+
+    Args:
+        evaluator: of the inference problem.
+        effects: of the model.
+        predictions: of these effects, with columns.
+        starts: predictions to begin from, one for each sequence.
+        chosen: whether the columns of each effect are replaced.
+    """
+    found, column = list(predictions), evaluator.problem.blocks.replayed
     for index, effect in enumerate(effects):
-        rough = effect.has_history() and changes_tool_friction(effect, plain.setup)
         for number in range(len(effect.numbers())):
-            if rough:
+            if chosen[index]:
                 other, step = perturbed(effect, number)
                 changed = [*effects[:index], other, *effects[index + 1 :]]
-                predictions = [
-                    here.replace_column(one, column, step)
-                    for here, one in zip(
-                        predictions, evaluator.replayed(changed, starts), strict=True
-                    )
-                ]
+                replays = evaluator.replayed(changed, starts)
+                rows = zip(found, replays, strict=True)
+                found = [here.replace_column(there, column, step) for here, there in rows]
             column += 1
-    return predictions
+    return found
 
 
 def plain_model(

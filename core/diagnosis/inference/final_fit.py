@@ -1,17 +1,21 @@
-"""The last fit of an accepted model, with the mesh error of this model."""
+"""The last fits of a model: with replayed columns, and with the mesh error of the model itself."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import replace
 
 from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.forward.prediction import Prediction
+from palpate.diagnosis.inference.evaluate import Evaluator
+from palpate.diagnosis.inference.evaluate_history import with_replayed_columns
 from palpate.diagnosis.inference.gauss_newton import best_fit
 from palpate.diagnosis.inference.hypothesis import Model
+from palpate.effects import Effect, Tangent
+from palpate.foundation.arrays import FloatArray
+from palpate.setup.setup import Inclusion
 
-if TYPE_CHECKING:
-    from palpate.diagnosis.inference.evaluate import Evaluator
-
-__all__ = ["refine"]
+__all__ = ["refine", "settle"]
 
 
 def refine(evaluator: Evaluator, model: Model) -> Model:
@@ -37,4 +41,85 @@ def refine(evaluator: Evaluator, model: Model) -> Model:
         ]
     start = evaluator.assemble(model.effects, model.setup, model.predictions)
     held = problem.nuisances.with_effects(start.effects)
+    if model.has_history:
+        return settle(evaluator, start, held, CRITERIA.fits.settled)
     return best_fit(evaluator, start, held, worth=CRITERIA.fits.settled)
+
+
+def settle(
+    evaluator: Evaluator, model: Model, nuisances: FloatArray, worth: float = CRITERIA.fits.worth
+) -> Model:
+    """Fit a model with history to its end, by columns that are replayed along the tool's path.
+
+    The columns of `Evaluator.evaluate` are those of replays without history. Measured, for a tool
+    that is 2 mm off beside viscoelasticity: their correlation with the replayed ones is 0.63 to
+    0.9, and a fit by them ends 1100 nats short of the best.
+
+    Args:
+        evaluator: of the inference problem.
+        model: with history, fitted by the columns of `Evaluator.evaluate`.
+        nuisances: prior precision of the nuisances.
+        worth: a step that promises less [nats] is not made.
+    """
+    for _ in range(CRITERIA.fits.replayed_columns):
+        evaluator.report(f"replaying what changes {' and '.join(model.names)}")
+        start = _with_replayed_columns(evaluator, model)
+        held = _HeldColumns(evaluator, start)
+        model = best_fit(held, start, nuisances, worth=worth)
+        gained = evaluator.objective(model, nuisances) - evaluator.objective(start, nuisances)
+        if gained < 2 * worth:
+            break
+    return model
+
+
+def _with_replayed_columns(evaluator: Evaluator, model: Model) -> Model:
+    """Return the model with columns of its effects from replays along the tool's path."""
+    every = [True] * len(model.effects)
+    starts = model.predictions
+    found = with_replayed_columns(evaluator, model.effects, starts, starts, every)
+    return evaluator.assemble(model.effects, model.setup, found)
+
+
+class _HeldColumns(Evaluator):
+    """Evaluates models near one whose columns of effects are held.
+
+    It shares the state of the evaluator that it is made from.
+
+    Args:
+        evaluator: of the inference problem.
+        model: whose columns are held.
+    """
+
+    def __init__(self, evaluator: Evaluator, model: Model) -> None:
+        super().__init__(evaluator.problem, evaluator.workers)
+        self.state, self._told, self._model = evaluator.state, evaluator, model
+
+    def report(self, text: str, done: float = 0.0) -> None:
+        """Report as the evaluator that it is made from does."""
+        self._told.report(text, done)
+
+    def evaluate(
+        self,
+        effects: Sequence[Effect],
+        starts: Sequence[Prediction] | None = None,
+        tangents: Sequence[Tangent] = (),
+        inclusions: Sequence[Inclusion] = (),
+    ) -> Model:
+        """Replay the effects; arguments as for `Evaluator.evaluate`."""
+        model = self._told.evaluate(effects, starts, tangents, inclusions)
+        own = list(self._model.columns)
+        rows = zip(model.predictions, self._model.predictions, strict=True)
+        found = [_with_columns(here, there, own) for here, there in rows]
+        return self.assemble(effects, model.setup, found, tangents, len(inclusions))
+
+
+def _with_columns(here: Prediction, there: Prediction, places: list[int]) -> Prediction:
+    """Return a prediction with some columns of another one."""
+    columns = here.columns.copy()
+    columns[..., places] = there.columns[..., places]
+    forces = here.forces
+    if forces is not None and there.forces is not None:
+        own = forces.columns.copy()
+        own[..., places] = there.forces.columns[..., places]
+        forces = replace(forces, columns=own)
+    return replace(here, columns=columns, forces=forces)

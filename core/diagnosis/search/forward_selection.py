@@ -28,7 +28,13 @@ from palpate.diagnosis.search.screening import Candidate
 from palpate.diagnosis.search.shortlist import beyond_first_order, shortlist
 from palpate.diagnosis.search.signatures import signatures_of
 from palpate.diagnosis.search.touch_pairing import known_mismatch
-from palpate.diagnosis.search.trials import Screening, screen, screen_again, trial_of
+from palpate.diagnosis.search.trials import (
+    Screening,
+    screen,
+    screen_again,
+    settled_trials,
+    trial_of,
+)
 from palpate.effects.base import with_effects
 
 __all__ = ["removes_rest", "required_gain", "search"]
@@ -138,12 +144,8 @@ def _next_cause(
             continue
         effects = [*current.model.effects, initial_guess(candidate, screened, evaluator)]
         starts = current.model.predictions
-        trial = trial_of(evaluator, effects, starts, current.model, hopeless, current.model)
-        needed = required_gain(
-            findings, current, candidate.start.name, removes_rest(current, trial)
-        )
-        trials.append(replace(trial, required_gain=current.required_gain + needed))
-    trials.sort(key=lambda trial: -trial.gain)
+        trials.append(trial_of(evaluator, effects, starts, current.model, hopeless, current.model))
+    trials = _with_required_gains(evaluator, findings, current, trials)
     enough = [trial for trial in trials if trial.gain > trial.required_gain - current.required_gain]
     best = next(
         (
@@ -159,6 +161,30 @@ def _next_cause(
         ]
     findings.trials.extend(trial if trial is best else trial.scored() for trial in trials)
     return best
+
+
+def _with_required_gains(
+    evaluator: Evaluator, findings: Findings, current: Trial, trials: list[Trial]
+) -> list[Trial]:
+    """Return the trials of a further cause, best first, with the gain that each must reach.
+
+    Args:
+        evaluator: of the inference problem.
+        findings: so far.
+        current: model that they extend.
+        trials: as fitted.
+    """
+
+    def needed(trial: Trial) -> float:
+        rest = removes_rest(current, trial)
+        return required_gain(findings, current, trial.model.names[-1], rest)
+
+    least = [CRITERIA.naming.promising * needed(trial) for trial in trials]
+    trials = [
+        replace(trial, required_gain=current.required_gain + needed(trial))
+        for trial in settled_trials(evaluator, trials, current.model, least)
+    ]
+    return sorted(trials, key=lambda trial: -trial.gain)
 
 
 def _most_promised(candidate: Candidate, current: Trial, linear: float) -> float:

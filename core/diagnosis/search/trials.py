@@ -1,7 +1,8 @@
 """Screenings and trials: the linear gains of the catalogue, and fits of single sets of causes.
 
-A cause beside one with history is fitted twice: first with the change by the history held as it is,
-which costs plain replays alone, and then, if that is promising, with everything.
+A cause beside one with history is fitted up to three times: with the change by the history held as
+it is, which costs plain replays alone; then, if that is promising, with everything; and, if it may
+be the best, with columns that are replayed along the tool's path.
 """
 
 from __future__ import annotations
@@ -12,10 +13,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evaluate_history import plain_model
 from palpate.diagnosis.inference.evidence import predictive_gain
+from palpate.diagnosis.inference.final_fit import settle
 from palpate.diagnosis.inference.gauss_newton import refit
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.search.candidates import candidates_of, tangents_of
@@ -28,7 +31,15 @@ from palpate.effects.base import with_effects
 from palpate.foundation.arrays import FloatArray
 from palpate.setup.setup import Inclusion
 
-__all__ = ["HeldHistory", "Screening", "gain_over", "screen", "screen_again", "trial_of"]
+__all__ = [
+    "HeldHistory",
+    "Screening",
+    "gain_over",
+    "screen",
+    "screen_again",
+    "settled_trials",
+    "trial_of",
+]
 
 Screening = tuple[Model, list[Candidate], np.ndarray]
 """A model with the catalogue as columns, the candidates, and the linear gain of each [nats]."""
@@ -94,6 +105,29 @@ def trial_of(
         effects = model.effects
     model = refit(evaluator, effects, starts, hopeless)
     return Trial(model, gain_over(evaluator, model, against), evaluator.misfit(model))
+
+
+def settled_trials(
+    evaluator: Evaluator, trials: Sequence[Trial], against: Model, least: Sequence[float]
+) -> list[Trial]:
+    """Return the trials, with those fitted to their end that may be the best cause beside one with
+    history.
+
+    Args:
+        evaluator: of the inference problem.
+        trials: of a further cause each.
+        against: the model that their gains are over.
+        least: gain of each trial from which it is worth it [nats].
+    """
+    most = max((trial.gain for trial in trials), default=0.0)
+    found = list(trials)
+    for number, (trial, needed) in enumerate(zip(trials, least, strict=True)):
+        chosen = trial.gain >= max(needed, CRITERIA.naming.unsettled * most)
+        if chosen and trial.model.has_history and against.effects:
+            model = settle(evaluator, trial.model, evaluator.problem.nuisances.precision)
+            gain, misfit = gain_over(evaluator, model, against), evaluator.misfit(model)
+            found[number] = replace(trial, model=model, gain=gain, misfit=misfit)
+    return found
 
 
 class HeldHistory(Evaluator):
