@@ -15,6 +15,7 @@ from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.gain.surface_gain import surface_gain
 from palpate.diagnosis.inference.credible_intervals import intervals
 from palpate.diagnosis.inference.evaluate import Evaluator
+from palpate.diagnosis.inference.final_fit import settle
 from palpate.diagnosis.inference.gauss_newton import refit
 from palpate.diagnosis.inference.noise.noise_model import Noise
 from palpate.diagnosis.observation.frame_groups import Observations
@@ -22,6 +23,7 @@ from palpate.diagnosis.search.trials import HeldHistory
 from palpate.diagnosis.validation.falsified_motions import FALSIFIED
 from palpate.diagnosis.validation.negative_controls import controls
 from palpate.effects import Effect
+from palpate.effects.base import with_effects
 from palpate.effects.time_dependence import PermanentSet, Viscoelasticity
 from palpate.effects.tool import ToolFriction, ToolOffset, ToolRadius
 from palpate.foundation.arrays import FloatArray
@@ -143,3 +145,29 @@ def test_fit_finds_what_is_remembered_and_its_gain_and_controls_know_it(evaluato
     found = controls(evaluator, data, model, baseline)
     assert [control.control for control in found] == list(FALSIFIED)
     assert all(control.true > 30 and control.passed is not False for control in found)
+
+
+def test_a_fit_beside_a_history_ends_at_the_truth_by_replayed_columns() -> None:
+    """Viscoelasticity and a tool that is off by 1 mm, from a third short of either."""
+    true = (TRUE["viscoelasticity"], ToolOffset(dx=-8e-4, dy=0.0, dz=6e-4))
+    looks = [
+        dragged(with_effects(SETUP, true), 1e-4, f"drag-{number:02d}", turn)
+        for number, turn in enumerate((1.0, -1.0))
+    ]
+    begin = (
+        Viscoelasticity(relaxed_fraction=0.4, time_constant=0.8),
+        ToolOffset(dx=0.0, dy=0.0, dz=4e-4),
+    )
+    with Workers(looks, 1) as workers:
+        names = [item.name for item in looks]
+        evaluator = evaluator_of(SETUP, registration(), workers, names, None, GRID, GRID)
+        plain = evaluator.evaluate(()).predictions
+        evaluator.state.noises = [_noise(item, item.gap.shape) for item in plain]
+        start = evaluator.evaluate(begin, plain)
+        model = settle(evaluator, start, evaluator.problem.nuisances.precision)
+        other = evaluator.evaluate(true, plain)
+    assert evaluator.objective(model) > evaluator.objective(other) - 3
+    for item, value, wanted in zip(
+        model.parameters, model.coordinates, other.coordinates, strict=True
+    ):
+        assert value == pytest.approx(wanted, abs=0.3 * item.scale)
