@@ -76,14 +76,14 @@ def listed(
     """
     store = EvaluationStore(services.settings.runs)
     rows = paginate(names_and_jobs(store, services.jobs), page, response)
-    return [listed_result(store, name, job) for name, job in rows]
+    return [listed_result(store, name, job, services.library) for name, job in rows]
 
 
 @router.get("/{identity}")
 def one(identity: str, services: CurrentServices) -> dict[str, Any]:
     """One evaluation: its job, and the errors once it has ended."""
     store = EvaluationStore(services.settings.runs)
-    return result_and_job(store, identity, job_of(store, identity, services.jobs))
+    return result_and_job(store, identity, job_of(store, identity, services.jobs), services.library)
 
 
 @router.post("/{identity}/cancel")

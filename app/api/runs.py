@@ -18,6 +18,7 @@ from palpate.app.reporting.timeline_series import timeline_series
 from palpate.app.scene.model_layer import NO_INSIDE
 from palpate.app.server.pagination import RequestedPage, paginate
 from palpate.app.services import CurrentServices
+from palpate.app.storage.dataset_library import Library
 from palpate.app.storage.run_store import RecordedReplay, Run
 from palpate.foundation.errors import RunError
 
@@ -33,7 +34,7 @@ def listed(
     """Runs, the newest first, each with its verdict, or `unreadable`. The header X-Total-Count has
     their number.
     """
-    return [_listed(run) for run in paginate(services.runs.all(), page, response)]
+    return [_listed(run, services.library) for run in paginate(services.runs.all(), page, response)]
 
 
 @router.get("/{name}")
@@ -45,7 +46,7 @@ def one(name: str, services: CurrentServices) -> dict[str, Any]:
     replays = [run.replay(sequence) for sequence in run.sequences]
     size = [round(float(edge), 6) for edge in replays[0].size] if replays else None
     return {
-        **_heading(run),
+        **_heading(run, services.library),
         "sentence": verdict_sentence(run.report, size),
         "notes": registration_sentences(run.report),
         "size": size,
@@ -170,9 +171,9 @@ def _worst(replay: RecordedReplay) -> dict[str, Any]:
     return {key: finite(replay[key][frame]) for key in keys}
 
 
-def _listed(run: Run) -> dict[str, Any]:
+def _listed(run: Run, library: Library) -> dict[str, Any]:
     try:
-        return _heading(run)
+        return _heading(run, library)
     except (RunError, AttributeError, KeyError, TypeError):  # damaged, or of another program
         return {
             "id": run.name,
@@ -181,16 +182,18 @@ def _listed(run: Run) -> dict[str, Any]:
             "verdict": "unreadable",
             "causes": [],
             "created": run.path.stat().st_mtime,
+            "data_changed": None,
         }
 
 
-def _heading(run: Run) -> dict[str, Any]:
-    report = run.report
+def _heading(run: Run, library: Library) -> dict[str, Any]:
+    report, folder = run.report, Path(run.origin.get("dataset", "")).name
     return {
         "id": run.name,
         "dataset": report.get("dataset", "?"),
-        "folder": Path(run.origin["dataset"]).name if "dataset" in run.origin else None,
+        "folder": folder or None,
         "verdict": report.get("verdict", "?"),
         "causes": [cause["effect"] for cause in report.get("causes", [])],
         "created": run.origin.get("created", run.path.stat().st_mtime),
+        "data_changed": library.data_changed(folder, run.origin.get("made_from", {})),
     }

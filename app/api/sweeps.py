@@ -93,7 +93,7 @@ def listed(
 def one(identity: str, services: CurrentServices) -> dict[str, Any]:
     """One sweep: its job, the request, and the summary once it has ended."""
     store = SweepStore(services.settings.runs)
-    return result_and_job(store, identity, job_of(store, identity, services.jobs))
+    return result_and_job(store, identity, job_of(store, identity, services.jobs), services.library)
 
 
 @router.get("/{identity}/points")

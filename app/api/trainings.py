@@ -105,7 +105,7 @@ def listed(
     """
     store = TrainingStore(services.settings.runs)
     rows = paginate(names_and_jobs(store, services.jobs), page, response)
-    return [listed_result(store, name, job) for name, job in rows]
+    return [listed_result(store, name, job, services.library) for name, job in rows]
 
 
 @router.get("/{identity}")
@@ -115,7 +115,9 @@ def one(identity: str, services: CurrentServices) -> dict[str, Any]:
     The history has loss, validation error [mm] and learning rate of each finished epoch.
     """
     store = TrainingStore(services.settings.runs)
-    result = result_and_job(store, identity, job_of(store, identity, services.jobs))
+    result = result_and_job(
+        store, identity, job_of(store, identity, services.jobs), services.library
+    )
     return {**result, "history": store.history(identity)}
 
 

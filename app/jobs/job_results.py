@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from palpate.app.http_errors import Missing
 from palpate.app.jobs.job_queue import JobQueue
 from palpate.app.jobs.job_records import Job
 from palpate.app.schemas import JobOut
+from palpate.app.storage.dataset_library import Library
 from palpate.app.storage.result_store import ResultStore
 from palpate.foundation.errors import RunError
 
@@ -35,8 +37,11 @@ def names_and_jobs(store: ResultStore, jobs: JobQueue) -> list[tuple[str, dict[s
     return [(name, public[name].model_dump() if name in public else None) for name in names]
 
 
-def result_and_job(store: ResultStore, name: str, job: dict[str, Any] | None) -> dict[str, Any]:
-    """One result as REST answers it: its job, the request, and the summary once it is finished.
+def result_and_job(
+    store: ResultStore, name: str, job: dict[str, Any] | None, library: Library
+) -> dict[str, Any]:
+    """One result as REST answers it: its job, the request, the summary once it is finished, and
+    whether the data have changed since; null where that is not known.
 
     Raises Missing where there is neither a job nor a folder.
     """
@@ -44,20 +49,28 @@ def result_and_job(store: ResultStore, name: str, job: dict[str, Any] | None) ->
     if job is None and not begun:
         raise store.missing(name)
     has_request = begun and store.first != store.last
+    request = store.request(name) if has_request else None
+    summary = store.result(name) if begun else None
+    stated = {**(request or {}), **(summary or {})}
+    folder = Path(str(stated.get("folder") or stated.get("dataset"))).name
     return {
         "id": name,
         "job": job,
-        "request": store.request(name) if has_request else None,
-        "summary": store.result(name) if begun else None,
+        "request": request,
+        "summary": summary,
+        "data_changed": library.data_changed(folder, stated.get("made_from") or {}),
     }
 
 
-def listed_result(store: ResultStore, name: str, job: dict[str, Any] | None) -> dict[str, Any]:
+def listed_result(
+    store: ResultStore, name: str, job: dict[str, Any] | None, library: Library
+) -> dict[str, Any]:
     """One result in a list; the content of a damaged file is left out."""
     try:
-        return result_and_job(store, name, job)
+        return result_and_job(store, name, job, library)
     except RunError:
-        return {"id": name, "job": job, "request": None, "summary": None}
+        empty = dict.fromkeys(("request", "summary", "data_changed"))
+        return {"id": name, "job": job, **empty}
 
 
 def job_of(store: ResultStore, name: str, jobs: JobQueue) -> dict[str, Any] | None:

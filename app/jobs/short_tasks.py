@@ -83,6 +83,7 @@ def replay(request: dict[str, Any], report: Report) -> dict[str, Any]:
     """
     from palpate.dataset import open_dataset
     from palpate.dataset.accepted_registration import AcceptedRegistration
+    from palpate.dataset.provenance import made_from
     from palpate.recording.replay_run import replay_into
     from palpate.recording.saved_model import effects_from
 
@@ -90,6 +91,7 @@ def replay(request: dict[str, Any], report: Report) -> dict[str, Any]:
     dataset = open_dataset(Path(request["dataset"])).registered(
         AcceptedRegistration.from_json(registered) if registered else None
     )
+    sources = made_from(dataset.path)
     run, began, since = Path(request["runs"]) / scratch.name, time.time(), time.monotonic()
     made = scratch / run.name
     failed = replay_into(
@@ -102,7 +104,13 @@ def replay(request: dict[str, Any], report: Report) -> dict[str, Any]:
     )
     (made / "origin.json").write_text(
         json.dumps(
-            {**_origin(dataset), "created": began, "seconds": time.monotonic() - since}, indent=1
+            {
+                **_origin(dataset),
+                "created": began,
+                "seconds": time.monotonic() - since,
+                "made_from": sources,
+            },
+            indent=1,
         )
     )
     os.rename(made, run)

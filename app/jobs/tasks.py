@@ -94,6 +94,7 @@ def diagnose_into(
         "seconds": time.monotonic() - since,
         "seed": seed,
         "splits": splits,
+        "made_from": result["made_from"],
     }
     (made / "origin.json").write_text(json.dumps(origin, indent=1))
     run.parent.mkdir(parents=True, exist_ok=True)

@@ -103,4 +103,7 @@ def _provenance(run: Run) -> str:
         parts.append(f"seed {origin['seed']}")
     if "seconds" in origin:
         parts.append(f"{origin['seconds']:.0f} s")
+    if made := origin.get("made_from"):
+        parts.append(f"data {made['data']}")
+        parts.append(f"Palpate {made['version']}, commit {made['commit'] or 'unknown'}")
     return "; ".join(parts) + "."

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from palpate.app.http_errors import Missing
 from palpate.app.storage.result_store import NAME
@@ -58,3 +59,11 @@ class Library:
         from palpate.dataset import open_dataset
 
         return open_dataset(self.path(name))
+
+    def data_changed(self, name: str, made: Mapping[str, Any]) -> bool | None:
+        """Whether a dataset's files differ from those that a result was made from, by its
+        `made_from`; None where that is not known.
+        """
+        from palpate.dataset.provenance import data_changed
+
+        return data_changed(self.folder / name, made) if NAME.fullmatch(name) else None

@@ -25,5 +25,9 @@ class SweepStore(ResultStore):
         return self.folder / REPLAY_CACHE
 
     def points(self, name: str) -> list[dict[str, Any]]:
-        """Finished points in the order of their ends; failed ones with their reason."""
-        return ResultRows(self.folder / name / "points.jsonl").read()
+        """Finished points in the order of their first ends; failed ones with their reason.
+
+        A point that was evaluated again, by other code, has its last row.
+        """
+        rows = ResultRows(self.folder / name / "points.jsonl").read()
+        return list({row["number"]: row for row in rows}.values())

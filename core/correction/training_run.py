@@ -154,6 +154,7 @@ class TrainingRun:
         }
         about = {
             **known,
+            "made_from": self.samples.about.get("made_from", {}),
             "split": {key: list(names) for key, names in asdict(self.split).items()},
             "training": self.spec.to_json(),
             "error": self.progress.best,

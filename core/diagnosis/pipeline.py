@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from palpate.dataset import Dataset
+from palpate.dataset.provenance import check_unchanged, made_from
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.criteria.tolerance import Tolerance
 from palpate.diagnosis.forward.worker_pool import Workers
@@ -88,6 +89,7 @@ def diagnose(
     report = rising(report)
     check_splits(dataset)
     report(0.0, "reading every cloud")
+    made = made_from(dataset.path)
     with Workers([], workers) as pool:
         pool.start()
         dataset.validate(part(report, 0.0, 0.02))
@@ -98,7 +100,8 @@ def diagnose(
         making = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
         try:
             options = _Options(seed, replays, assurance, Tolerance(tolerance))
-            result = _run(experiment, data, pool, making, report, options)
+            result = _run(experiment, data, pool, making, report, options, made)
+            check_unchanged(dataset.path, made)
             os.rename(making, out)
         finally:
             shutil.rmtree(making, ignore_errors=True)
@@ -156,8 +159,9 @@ def _run(
     making: Path,
     report: Report,
     options: _Options,
+    made: dict[str, Any],
 ) -> dict[str, Any]:
-    """Search, validate and write the files of a run."""
+    """Search, validate and write the files of a run, whose report states `made_from`."""
     (fitted, held_out), evaluator, findings = _searched(
         experiment, data, pool, part(report, 0.05, 0.75), options.seed
     )
@@ -177,6 +181,7 @@ def _run(
     result = report_of(dataset, evaluator, findings, gain, "test", checks)
     if clues := error_clues(evaluator, fitted, findings, result["verdict"]):
         result["unexplained"]["clues"] = clues
+    result["made_from"] = {**made, "seed": options.seed, "tolerance": options.tolerance.stated}
     if dataset.accepted is not None:
         result["registration"] = dataset.accepted.to_json()
     if options.assurance:

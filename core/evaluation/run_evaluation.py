@@ -14,6 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from palpate.dataset import Dataset
+from palpate.dataset.provenance import check_unchanged, made_from
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.forward.worker_pool import Workers
 from palpate.diagnosis.observation.force_only import observe_each
@@ -201,6 +202,7 @@ def evaluate(
     networks = {
         name: LoadedNetwork.load(folder, spec.feedback) for name, folder in spec.networks.items()
     }
+    made = made_from(dataset.path)
     data = EvaluationData.read(dataset, spec, part(report, 0.0, 0.2))
     steps = [
         LadderStep(name, MODELS[name], setup, _own(name, networks))
@@ -213,7 +215,9 @@ def evaluate(
         "folder": dataset.path.resolve().name,
         "split": "test",
         **ladder,
+        "made_from": {**made, "seed": seed},
     }
+    check_unchanged(dataset.path, made)
     result["sentence"] = summary_sentence(result)
     _write(out, result)
     report(1.0, "done")

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from palpate.dataset import Dataset
+from palpate.dataset.provenance import check_data, check_unchanged, dataset_digest, made_from
 from palpate.effects.base import with_effects
 from palpate.experiment import Experiment
 from palpate.foundation.errors import CorrectionError, RunError
@@ -135,13 +136,15 @@ def train_network(
         "model": on,
         "effects": None if effects is None else list(effects),
     }
-    _claim(folder, {**plan.to_json(), **source})
+    made = made_from(dataset.path)
+    _claim(folder, {**plan.to_json(), **source}, made)
     if (folder / SUMMARY).is_file():
         return dict(json.loads((folder / SUMMARY).read_text()))
     experiment = Experiment.of(dataset)
     if setup is None:
         setup = _setup(experiment.stated, model, truth)
     samples = _samples(experiment, plan, store, setup, workers, part(report, 0.0, _SAMPLING))
+    check_unchanged(dataset.path, made)
     trained = train(samples, Split.of(samples), spec, folder, part(report, _SAMPLING, 1.0))
     about = trained.about
     summary = {
@@ -156,6 +159,7 @@ def train_network(
         "validation_error_mm": about["error"],
         "validation_error_without_mm": about["raw_error"],
         "history": about["history"],
+        "made_from": {**made, "seed": spec.seed},
     }
     _write(folder / SUMMARY, summary)
     return summary
@@ -191,6 +195,7 @@ def _samples(
     ]
     content = [
         str(dataset.path.resolve()),
+        dataset_digest(dataset.path),
         setup.as_dict(),
         stored_label(recorder.grid),
         plan.nodes,
@@ -235,12 +240,19 @@ def complete_samples(folder: Path) -> Samples | None:
     return samples
 
 
-def _claim(folder: Path, content: dict[str, Any]) -> None:
+def _claim(folder: Path, content: dict[str, Any], made: dict[str, Any]) -> None:
+    """Write the request, or compare it with the one that is there, and the data with its data."""
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / REQUEST
-    if file.is_file() and json.loads(file.read_text()) != content:
-        raise RunError(f"{folder} holds another training; name another folder", file=REQUEST)
-    _write(file, content)
+    if file.is_file():
+        known = json.loads(file.read_text())
+        before = known.pop("made_from", {})
+        if known != content:
+            raise RunError(f"{folder} holds another training; name another folder", file=REQUEST)
+        if not (folder / SUMMARY).is_file():
+            check_data(before, made, "training", folder.name)
+        made = before or made
+    _write(file, {**content, "made_from": made})
 
 
 def _write(file: Path, value: Any) -> None:

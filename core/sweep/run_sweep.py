@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from palpate.dataset import Dataset
+from palpate.dataset.provenance import check_data, check_unchanged, made_from
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import PalpateError, RunError
 from palpate.foundation.progress import Report, part, silent
@@ -61,7 +62,8 @@ def run_sweep(
     Raises RunError where the folder holds another sweep.
     """
     registered = {"registration": dataset.accepted.name} if dataset.accepted else {}
-    _claim(folder, {**request.to_json(), "dataset": str(dataset.path.name), **registered})
+    made = made_from(dataset.path)
+    _claim(folder, {**request.to_json(), "dataset": str(dataset.path.name), **registered}, made)
     stated, data = read_sweep_data(
         dataset, request.sequences, request.frames, part(report, 0.0, 0.05), request.space
     )
@@ -77,8 +79,10 @@ def run_sweep(
             ReplayCache(store),
             ResultRows(folder / "points.jsonl"),
             part(report, 0.05, 1.0),
+            {"data": made["data"], "code": made["code"]},
         )
-        summary = run.run()
+        summary = {**run.run(), "made_from": {**made, "seed": request.seed}}
+        check_unchanged(dataset.path, made)
     finally:
         executor.close()
     _write(folder / "summary.json", summary)
@@ -86,12 +90,19 @@ def run_sweep(
     return summary
 
 
-def _claim(folder: Path, content: dict[str, Any]) -> None:
+def _claim(folder: Path, content: dict[str, Any], made: dict[str, Any]) -> None:
+    """Write the request, or compare it with the one that is there, and the data with its data."""
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / "request.json"
-    if file.is_file() and json.loads(file.read_text()) != content:
-        raise RunError(f"{folder} holds another sweep; name another folder", file="request.json")
-    _write(file, content)
+    if file.is_file():
+        known = json.loads(file.read_text())
+        before = known.pop("made_from", {})
+        if known != content:
+            raise RunError(
+                f"{folder} holds another sweep; name another folder", file="request.json"
+            )
+        check_data(before, made, "sweep", folder.name)
+    _write(file, {**content, "made_from": made})
 
 
 def _write(file: Path, value: Any) -> None:
@@ -105,6 +116,7 @@ class _SweepRun:
 
     Attributes:
         points: the rows of all points so far.
+        made: digests of the data and of the code, which every row states.
         sums: sums (p, 4) over the pushes of all sequences, by the number of each solved point.
         old: rows of an earlier, interrupted run by number.
         computed: number of replays that were not in the cache.
@@ -121,9 +133,11 @@ class _SweepRun:
         store: ReplayCache,
         rows: ResultRows,
         report: Report,
+        made: dict[str, str],
     ) -> None:
         self.request, self.stated, self.data, self.grid = request, stated, data, grid
         self.executor, self.store, self.rows, self.report = executor, store, rows, report
+        self.made = made
         self.digests = [item.digest for item in data]
         self.points: list[dict[str, Any]] = []
         self.sums: dict[int, FloatArray] = {}
@@ -266,7 +280,7 @@ class _SweepRun:
                 "error": None,
                 "paper": None,
             }
-            row["failure"] = failure
+            row |= {"failure": failure, **self.made}
             if not failure:
                 sums = np.array([probe for key in keys for probe in known[key].sums])
                 self.sums[begin + place] = sums

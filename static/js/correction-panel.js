@@ -2,7 +2,7 @@
 // models with and without networks on the test sequences (the ladder).
 import { errorCard, get, post, toast } from "./api.js";
 import { validationCurve, ladderChart } from "./correction-plots.js";
-import { element, fill } from "./dom.js";
+import { changedDataNote, element, fill } from "./dom.js";
 import { capitalise } from "./format.js";
 import { onJobsDone, addResultOpener } from "./jobs.js";
 import { addPanel, openedPanel, openPanel } from "./panels.js";
@@ -155,6 +155,7 @@ async function drawAll(mine) {
       { class: "verdict" },
       newest?.summary?.sentence ?? "What can a network learn of the error that the model leaves?",
     ),
+    changedDataNote(newest),
     newest?.summary ? ladderChart(newest.summary) : null,
     form(datasets, models),
     list("Trainings", "trainings", trainings),
@@ -316,7 +317,7 @@ function list(heading, kind, entries) {
     element(
       "div",
       { class: "sweep-list" },
-      entries.slice(0, 8).map(({ id, job, summary }) =>
+      entries.slice(0, 8).map(({ id, job, summary, data_changed: changed }) =>
         element(
           "button",
           {
@@ -334,6 +335,7 @@ function list(heading, kind, entries) {
             summary && "validation_error_mm" in summary
               ? `${summary.validation_error_mm.toFixed(3)} mm`
               : (job?.state ?? "on disk"),
+            changed ? " · data changed since" : null,
           ),
         ),
       ),
@@ -399,6 +401,7 @@ async function drawOne(mine) {
         ? trainingSentence(training)
         : (evaluation?.summary?.sentence ?? "Measuring the test sequences …"),
     ),
+    changedDataNote(training ?? evaluation),
     isOpen(job)
       ? element(
           "div",

@@ -156,3 +156,18 @@ export function swatch(name, line = false) {
     style: { background: `var(--${name})` },
   });
 }
+
+/**
+ * A visible warning where the data have changed since a result was made from them; else null.
+ * @param {{ data_changed?: boolean | null } | null | undefined} result
+ * @returns {HTMLElement | null}
+ */
+export const changedDataNote = (result) =>
+  result?.data_changed
+    ? element(
+        "div",
+        { class: "note-card bad", "data-changed": true },
+        element("strong", {}, "The data have changed"),
+        "This result was made from other files than the dataset has now. Make it again.",
+      )
+    : null;

@@ -2,7 +2,7 @@
 // cannot tell.
 import { post, toast, toError } from "./api.js";
 import { comparisonSection } from "./comparison.js";
-import { byId, element, fill } from "./dom.js";
+import { byId, changedDataNote, element, fill } from "./dom.js";
 import {
   capitalise,
   formatParameter,
@@ -54,6 +54,7 @@ export function showReport(heading, report, patterns, palette) {
       ),
       exportButton(heading.id),
     ),
+    changedDataNote(heading),
     (heading.notes ?? []).map((text) => element("p", { class: "gain-note" }, text)),
     causes.length
       ? section(

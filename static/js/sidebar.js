@@ -102,7 +102,7 @@ function drawRuns() {
   fill(
     "runs",
     runs.length
-      ? runs.map(({ id, verdict, causes, created, dataset, folder }) =>
+      ? runs.map(({ id, verdict, causes, created, dataset, folder, data_changed: changed }) =>
           element(
             "button",
             {
@@ -130,7 +130,12 @@ function drawRuns() {
               element(
                 "span",
                 { class: "sub" },
-                [verdict === "replay" ? "replay" : "", folder ?? dataset, formatDateTime(created)]
+                [
+                  verdict === "replay" ? "replay" : "",
+                  folder ?? dataset,
+                  formatDateTime(created),
+                  changed ? "data changed since" : "",
+                ]
                   .filter(Boolean)
                   .join(" · "),
               ),

@@ -1,7 +1,7 @@
 // The panel of sweeps: the form, the points as they arrive, and what they say about each
 // parameter.
 import { errorCard, errorTitle, get, post, toast } from "./api.js";
-import { element, fill, icon } from "./dom.js";
+import { changedDataNote, element, fill, icon } from "./dom.js";
 import { capitalise, readableName, UNITS } from "./format.js";
 import { addResultOpener } from "./jobs.js";
 import { addPanel, openPanel } from "./panels.js";
@@ -435,7 +435,8 @@ function stopButton(id) {
  * @param {SweepPoint[]} points
  * @param {HTMLElement} stop button that stays the same from call to call, so that it can be pressed
  */
-function draw({ id, job, request, summary }, points, stop) {
+function draw(sweep, points, stop) {
+  const { id, job, request, summary } = sweep;
   const running = job && ["queued", "running"].includes(job.state) ? job : null;
   const swept = points.filter(({ kind }) => kind !== "stated");
   const stated = points.find(({ kind }) => kind === "stated")?.error ?? null;
@@ -467,6 +468,7 @@ function draw({ id, job, request, summary }, points, stop) {
         : null,
     ),
     element("h1", { class: "verdict" }, sentence(best, stated, drawn, running !== null)),
+    changedDataNote(sweep),
     running
       ? element(
           "div",

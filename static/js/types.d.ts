@@ -56,6 +56,7 @@ export interface RunEntry {
   verdict: string;
   causes: string[];
   created: number;
+  data_changed?: boolean | null;
 }
 
 export interface RunHeading extends RunEntry {
@@ -426,6 +427,7 @@ export interface Sweep {
   job: Job | null;
   request: { parameters: { parameter: string; low: number; high: number }[] } | null;
   summary: { directions: SweepDirection[] } | null;
+  data_changed: boolean | null;
 }
 
 /** Errors in mm. */
@@ -462,12 +464,14 @@ export interface Training {
   request: { run: string | null } | null;
   history: number[][];
   summary: TrainingSummary | null;
+  data_changed: boolean | null;
 }
 
 export interface Evaluation {
   id: string;
   job: Job | null;
   summary: LadderSummary | null;
+  data_changed: boolean | null;
 }
 
 export type Side = "cloud" | "mesh";

@@ -17,6 +17,7 @@ from palpate.correction.samples.sample_recorder import Recorder, measured_points
 from palpate.correction.samples.sample_store import FORMAT, Samples, open_samples
 from palpate.correction.samples.tool_columns import tool_columns
 from palpate.dataset import Dataset
+from palpate.dataset.provenance import made_from
 from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
@@ -206,6 +207,7 @@ def _write_about(
     about = {
         "format": FORMAT,
         "dataset": config.name,
+        "made_from": made_from(dataset.path),
         "sequences": {one.name: one.count for one in made},
         "left_out": {one.name: one.left_out for one in made},
         "splits": {
