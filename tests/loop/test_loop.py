@@ -74,6 +74,7 @@ def test_naming_it_removes_most_of_the_error_on_unseen_sequences(loop: Loop) -> 
 def test_run_folder_holds_everything_that_the_page_needs(loop: Loop) -> None:
     written = json.loads((loop.run / "report.json").read_text())
     assert {**loop.report, "ambiguity_map": written["ambiguity_map"]} == written
+    assert set(written["made_from"]) == {"data", "version", "commit", "code", "seed", "tolerance"}
     model = json.loads((loop.run / "model.json").read_text())
     assert [from_json(one).name for one in model["effects"]] == list(loop.found.named)
     assert (loop.run / "pictures" / "patterns.png").stat().st_size > 5000

@@ -20,6 +20,8 @@ from typer.testing import CliRunner
 from palpate.app.cli import app
 from palpate.app.client import Client
 from palpate.app.settings import Settings
+from palpate.correction import TrainedNetwork
+from palpate.dataset.provenance import dataset_digest
 from palpate.effects import effect_named
 from palpate.experiment import Experiment
 from palpate.mesh.graded_mesh import PAGE_GRID
@@ -138,6 +140,18 @@ def test_networks_on_both_models_come_nearer_in_validation_epoch_by_epoch(
         alone["summary"]["validation_error_mm"]
         < 0.98 * alone["summary"]["validation_error_without_mm"]
     )
+
+
+def test_network_and_ladder_state_the_data_and_the_code_that_they_were_made_from(
+    client: httpx.Client, home: Path, ladder: dict[str, Any]
+) -> None:
+    digest = dataset_digest(home / "datasets" / "large-tool")
+    made = ladder["summary"]["made_from"]
+    assert made["data"] == digest and made["code"] and made["version"] and made["seed"] == 0
+    assert ladder["data_changed"] is False
+    for one in client.get("/api/trainings").json():
+        network = TrainedNetwork.load(home / "runs" / "trainings" / one["id"] / "network.pt")
+        assert network.about["made_from"]["data"] == one["summary"]["made_from"]["data"] == digest
 
 
 def test_ladder_has_a_rung_for_each_model_and_network_on_pushes_that_nothing_was_fitted_on(

@@ -5,6 +5,7 @@ phantom.
 from __future__ import annotations
 
 import json
+import shutil
 import time
 from pathlib import Path
 from typing import Any
@@ -117,3 +118,28 @@ def test_a_sweep_that_is_stopped_keeps_its_points(home: Path, serve: Any) -> Non
             json.loads((home / "runs" / "sweeps" / identity / "request.json").read_text())["points"]
             == 300
         )
+
+
+def test_a_stopped_sweep_is_not_resumed_on_other_data(
+    home: Path, tmp_path: Path, serve: Any
+) -> None:
+    shutil.copytree(home / "datasets", tmp_path / "datasets")
+    with serve(settings(tmp_path)) as client:
+        asked = {**ASKED, "method": "random", "points": 300, "seed": 6}
+        identity = client.post("/api/sweeps", json=asked).json()["id"]
+        end = time.monotonic() + 120
+        while not client.get(f"/api/sweeps/{identity}/points").json()["points"]:
+            assert time.monotonic() < end
+            time.sleep(0.1)
+        client.post(f"/api/sweeps/{identity}/cancel")
+        before = client.get(f"/api/sweeps/{identity}").json()
+        made = before["request"]["made_from"]["data"]
+        rows = client.get(f"/api/sweeps/{identity}/points").json()["points"]
+        assert before["data_changed"] is False and {row["data"] for row in rows} == {made}
+        with (tmp_path / "datasets" / "phantom" / "touches.csv").open("a") as table:
+            table.write("\n")
+        assert client.get(f"/api/sweeps/{identity}").json()["data_changed"] is True
+        assert client.post(f"/api/jobs/{identity}/retry").status_code == 202
+        error = ended(client, identity)["job"]["error"]["message"]
+        assert f"digest {made}" in error and "start a new sweep" in error
+        assert client.get(f"/api/sweeps/{identity}/points").json()["points"] == rows

@@ -23,9 +23,7 @@ except DatasetError as error:
 """
 
 
-def test_import_that_takes_too_much_memory_is_refused_and_leaves_no_dataset(
-    tmp_path: Path,
-) -> None:
+def test_import_that_takes_too_much_memory_is_refused_and_leaves_no_dataset(tmp_path: Path) -> None:
     """The import runs in a process of its own: one that ran other tests holds freed memory, from
     which it would read the table without taking more.
     """
