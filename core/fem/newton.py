@@ -53,6 +53,10 @@ class Outcome(Enum):
     )
     BASE_IN_TOOL = "the tool reaches into the base, which is fixed: nothing can yield to it"
     INSIDE_TOOL = "the material came to rest inside the tool, or the tool inside the material"
+    GIVEN_UP = (
+        "the push was given up, for it takes more work than any push may; "
+        "look at its first frame without equilibrium"
+    )
 
 
 @dataclass(frozen=True, eq=False)

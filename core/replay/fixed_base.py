@@ -17,6 +17,7 @@ from palpate.mesh.protocol import Mesh, Meshing
 from palpate.replay.equilibrium import Equilibrium, extrapolated, predict_from_similar
 from palpate.replay.friction_step import FrictionState, solve_with_friction
 from palpate.replay.material_history import MaterialHistory, ReplayState
+from palpate.replay.work_budget import WorkBudget
 from palpate.setup.setup import Setup
 
 __all__ = ["FixedBaseReplay"]
@@ -33,13 +34,14 @@ class FixedBaseReplay:
     Attributes:
         slip: (2,) accumulated slip of the base along x and y [m].
         dense: whether contact is evaluated at many points (`palpate.fem.model.BlockModel`).
+        budget: of the work of each push.
         factorised: the frame whose tangent is factorised, its model and the factor's number
             (`palpate.gradients.frame_tangent.factorise_at`).
     """
 
     def __init__(self, setup: Setup, grid: Meshing, tolerance: float = RELATIVE_TOLERANCE) -> None:
         self.setup, self.grid, self.tolerance = setup, meshing_for(setup, grid), tolerance
-        self._quick_solver = ModifiedNewton()
+        self._quick_solver, self.budget = ModifiedNewton(), WorkBudget()
         self._model: BlockModel | None = None
         self._mesh: Mesh | None = None
         self._before: tuple[Equilibrium, Equilibrium] | None = None
@@ -72,6 +74,7 @@ class FixedBaseReplay:
         """The block's potential on this mesh in the current time step; the last one is cached."""
         if self._model is None or self._model.mesh is not mesh or self._model.dense != self.dense:
             self._model = BlockModel(self.setup, mesh, dense=self.dense)
+            self._model.spend = self.budget.spend
         if self.material_history is not None:
             self.material_history.apply_to(self._model)
         return self._model

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from time import monotonic
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,13 +25,14 @@ from palpate.replay.compliance_and_slip import GRAVITY, slip_step, solve_complia
 from palpate.replay.equilibrium import Equilibrium, require_converged
 from palpate.replay.fixed_base import FixedBaseReplay
 from palpate.replay.material_history import ReplayState
+from palpate.replay.work_budget import WorkSpentError
 from palpate.setup.setup import Setup
 
 __all__ = ["GRAVITY", "Equilibrium", "Replay", "replay", "require_converged", "rest"]
 
-_MOST_SLIDES, _DRAG_STEP = 40, 1e-3
-"""Largest number of base-slip iterations per frame, and default of `drag_step`: longest motion of a
-tool with friction in one substep [m]."""
+_MOST_SLIDES, _DRAG_STEP, _TELLING = 40, 1e-3, 2.0
+"""Largest number of base-slip iterations per frame; default of `drag_step`: longest motion of a
+tool with friction in one substep [m]; and time after which a replay tells what is left [s]."""
 
 
 class Replay(FixedBaseReplay):
@@ -100,6 +102,18 @@ class Replay(FixedBaseReplay):
             time: of the frame [s].
         """
         centre, start = stated_centre + self._offset, self.free if start is None else start
+        tool = ToolSphere(centre, self.setup.tool.radius)
+        slip = self.slip
+        self.budget.begin_frame(self.is_clear(replace(tool, centre=centre - np.append(slip, 0.0))))
+        try:
+            if not self.budget.given_up:
+                return self._step(centre, start, time)
+        except WorkSpentError:
+            self._model, self._mesh, self.slip = None, None, slip
+        return replace(start, tool=tool, path=(), outcome=Outcome.GIVEN_UP, residual=np.inf)
+
+    def _step(self, centre: FloatArray, start: Equilibrium, time: float | None) -> Equilibrium:
+        """Solve as `step` does, with the tool, or the fixed end of its spring, at `centre`."""
         self.dense = start.dense and start.in_contact
         if self.material_history is not None:
             self.material_history.begin(time)
@@ -185,7 +199,9 @@ def replay(
     """Solve for one equilibrium per frame.
 
     A frame without equilibrium is returned with its outcome, never raised: look at `outcome`, or
-    call `require_converged`.
+    call `require_converged`. A push that takes more work than its budget
+    (`palpate.replay.work_budget`) is given up: its remaining frames have the outcome GIVEN_UP, and
+    the replay goes on when the tool is clear of the block.
 
     Args:
         setup: the experiment as assumed.
@@ -204,7 +220,7 @@ def replay(
             "a setup whose frames depend on those before them is replayed in order of time, "
             "without starts"
         )
-    block, frames = Replay(setup, grid, tolerance), []
+    block, frames, began = Replay(setup, grid, tolerance), list[Equilibrium](), monotonic()
     previous = None if since is None else since.frame
     if since is not None:
         block.resume(since)
@@ -216,7 +232,7 @@ def replay(
     for number, (centre, time) in enumerate(
         zip(np.asarray(centres, dtype=float), instants, strict=True)
     ):
-        report(number / len(centres), f"frame {number + 1} of {len(centres)}")
+        report(number / len(centres), _progress(number, len(centres), monotonic() - began))
         start = starts[number] if starts is not None and starts[number].in_contact else previous
         frame = block.solve_from_any(centre, (start, previous), time)
         frames.append(frame)
@@ -224,3 +240,18 @@ def replay(
             frame if frame.outcome is Outcome.CONVERGED else previous if setup.has_history else None
         )
     return frames
+
+
+def _progress(number: int, count: int, seconds: float) -> str:
+    """Return what a replay is doing, with the time that is left once it can be told.
+
+    Args:
+        number: of frames that are done.
+        count: of all frames.
+        seconds: since the replay began.
+    """
+    text = f"frame {number + 1} of {count}"
+    if seconds < _TELLING or not number:
+        return text
+    left = seconds / number * (count - number)
+    return f"{text}, about " + (f"{left / 60:.0f} min" if left > 90 else f"{left:.0f} s") + " left"

@@ -1,0 +1,53 @@
+"""Pushes that take more work than their budget."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pushed_block import GRID, SETUP, TOP
+
+from palpate.fem.newton import Outcome
+from palpate.replay import work_budget
+from palpate.replay.replay import replay
+from palpate.replay.work_budget import WorkBudget, WorkSpentError
+
+RADIUS = SETUP.tool.radius
+DEPTHS = (-2e-3, 1e-3, 3e-3, 5e-3, 5.2e-3, -2e-3, 1e-3, 1.2e-3)
+CENTRES = np.array([[0.0, 0.0, TOP + RADIUS - depth] for depth in DEPTHS])
+
+
+def test_push_beyond_its_budget_is_given_up_and_the_next_one_is_replayed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    whole = replay(SETUP, CENTRES, GRID)
+    assert {frame.outcome for frame in whole} == {Outcome.CONVERGED}
+    # The small budget is between the work of the light second push and that of the first.
+    monkeypatch.setattr(work_budget, "PER_PUSH", 12.0)
+    monkeypatch.setattr(work_budget, "PER_FRAME", 0.0)
+    frames = replay(SETUP, CENTRES, GRID)
+    given_up = [frame.outcome is Outcome.GIVEN_UP for frame in frames]
+    first = given_up.index(True)
+    assert 1 < first < 5 and given_up == [False] * first + [True] * (5 - first) + [False] * 3
+    for one, other in zip(frames[:first] + frames[5:], whole[:first] + whole[5:], strict=True):
+        assert np.allclose(one.displacement, other.displacement, atol=1e-7)
+
+
+def test_work_of_a_push_is_bounded_and_each_push_has_its_own() -> None:
+    budget = WorkBudget()
+    for _ in range(2):
+        budget.begin_frame(clear=True)
+        budget.spend(work_budget.PER_PUSH)
+        budget.begin_frame(clear=False)
+        budget.spend(2 * work_budget.PER_FRAME)
+        assert not budget.given_up
+        with pytest.raises(WorkSpentError):
+            budget.spend(1.0)
+        assert budget.given_up
+
+
+def test_replay_tells_what_time_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    monkeypatch.setattr("palpate.replay.replay._TELLING", 0.0)
+    replay(SETUP, CENTRES, GRID, report=lambda _, text: told.append(text))
+    assert told[0] == "frame 1 of 8" and told[-1].startswith("frame 8 of 8, about ")
+    assert told[-1].endswith(" s left")
