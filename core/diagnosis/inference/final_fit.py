@@ -42,12 +42,16 @@ def refine(evaluator: Evaluator, model: Model) -> Model:
     start = evaluator.assemble(model.effects, model.setup, model.predictions)
     held = problem.nuisances.with_effects(start.effects)
     if model.has_history:
-        return settle(evaluator, start, held, CRITERIA.fits.settled)
+        return settle(evaluator, start, held, CRITERIA.fits.settled, most=1)
     return best_fit(evaluator, start, held, worth=CRITERIA.fits.settled)
 
 
 def settle(
-    evaluator: Evaluator, model: Model, nuisances: FloatArray, worth: float = CRITERIA.fits.worth
+    evaluator: Evaluator,
+    model: Model,
+    nuisances: FloatArray,
+    worth: float,
+    most: int = CRITERIA.fits.replayed_columns,
 ) -> Model:
     """Fit a model with history to its end, by columns that are replayed along the tool's path.
 
@@ -60,8 +64,9 @@ def settle(
         model: with history, fitted by the columns of `Evaluator.evaluate`.
         nuisances: prior precision of the nuisances.
         worth: a step that promises less [nats] is not made.
+        most: times that the columns are replayed, at most.
     """
-    for _ in range(CRITERIA.fits.replayed_columns):
+    for _ in range(most):
         evaluator.report(f"replaying what changes {' and '.join(model.names)}")
         start = _with_replayed_columns(evaluator, model)
         held = _HeldColumns(evaluator, start)

@@ -23,7 +23,7 @@ from palpate.foundation.arrays import FloatArray
 if TYPE_CHECKING:
     from palpate.diagnosis.inference.evaluate import Evaluator
 
-__all__ = ["best_fit", "refit"]
+__all__ = ["best_fit", "refit", "worth_while"]
 
 
 def refit(
@@ -42,11 +42,19 @@ def refit(
     """
     evaluator.report(f"fitting {' and '.join(effect.name for effect in effects)}")
     model = evaluator.evaluate(effects, starts)
+    nuisances = evaluator.problem.nuisances.precision
+    return best_fit(evaluator, model, nuisances, hopeless, worth_while(evaluator, model))
+
+
+def worth_while(evaluator: Evaluator, model: Model) -> float:
+    """Return what a step must promise to be made while models are compared [nats].
+
+    It is half the distance of rivals at most, so that what is left open does not change their
+    order.
+    """
     gained = evaluator.objective(model) - evaluator.state.stated
-    # Half the distance of rivals at most, so that what is left open does not change their order.
     least = min(CRITERIA.fits.worth_share * gained, CRITERIA.naming.rival / 2)
-    worth = max(CRITERIA.fits.worth, least)
-    return best_fit(evaluator, model, evaluator.problem.nuisances.precision, hopeless, worth)
+    return max(CRITERIA.fits.worth, least)
 
 
 def best_fit(

@@ -19,7 +19,7 @@ from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evaluate_history import plain_model
 from palpate.diagnosis.inference.evidence import predictive_gain
 from palpate.diagnosis.inference.final_fit import settle
-from palpate.diagnosis.inference.gauss_newton import refit
+from palpate.diagnosis.inference.gauss_newton import refit, worth_while
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.search.candidates import candidates_of, tangents_of
 from palpate.diagnosis.search.findings import Trial
@@ -124,7 +124,9 @@ def settled_trials(
     for number, (trial, needed) in enumerate(zip(trials, least, strict=True)):
         chosen = trial.gain >= max(needed, CRITERIA.naming.unsettled * most)
         if chosen and trial.model.has_history and against.effects:
-            model = settle(evaluator, trial.model, evaluator.problem.nuisances.precision)
+            nuisances = evaluator.problem.nuisances.precision
+            worth = worth_while(evaluator, trial.model)
+            model = settle(evaluator, trial.model, nuisances, worth)
             gain, misfit = gain_over(evaluator, model, against), evaluator.misfit(model)
             found[number] = replace(trial, model=model, gain=gain, misfit=misfit)
     return found

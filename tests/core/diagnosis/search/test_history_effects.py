@@ -164,7 +164,7 @@ def test_a_fit_beside_a_history_ends_at_the_truth_by_replayed_columns() -> None:
         plain = evaluator.evaluate(()).predictions
         evaluator.state.noises = [_noise(item, item.gap.shape) for item in plain]
         start = evaluator.evaluate(begin, plain)
-        model = settle(evaluator, start, evaluator.problem.nuisances.precision)
+        model = settle(evaluator, start, evaluator.problem.nuisances.precision, 0.5)
         other = evaluator.evaluate(true, plain)
     assert evaluator.objective(model) > evaluator.objective(other) - 3
     for item, value, wanted in zip(
